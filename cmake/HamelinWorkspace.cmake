@@ -1,0 +1,140 @@
+# What holds for every target of the workspace, set once: compiler settings, the shape of a library, installing.
+include(CMakePackageConfigHelpers)
+
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # libraries go into plugins
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+set(HAMELIN_PLUGIN_DIR "${CMAKE_INSTALL_LIBDIR}/hamelin/plugins")
+set(HAMELIN_BUILD_PLUGIN_DIR "${PROJECT_BINARY_DIR}/lib/hamelin/plugins")
+
+# Linked as $<BUILD_INTERFACE:...> only, so that no flag of ours reaches a user of the installed package.
+add_library(hamelin_options INTERFACE)
+target_compile_features(hamelin_options INTERFACE cxx_std_20)
+target_compile_options(hamelin_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast
+  # Debug keeps its checks but is run by people too: light optimisation makes Eigen bearable.
+  $<$<CONFIG:Debug>:-Og>
+  # Same bytes with and without FMA hardware: contraction is opt-in, per kernel.
+  -ffp-contract=off
+  $<$<BOOL:${HAMELIN_WERROR}>:-Werror>
+  $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
+target_link_options(hamelin_options INTERFACE $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
+if(HAMELIN_SANITIZE)
+  list(JOIN HAMELIN_SANITIZE "," _sanitizers)
+  target_compile_options(hamelin_options INTERFACE -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(hamelin_options INTERFACE -fsanitize=${_sanitizers})
+  target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
+endif()
+
+# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen] [PRIVATE_LINKS ...])
+#
+# Makes hamelin::NAME from the folder it is called in: headers in include/hamelin/NAME, tests/*_test.cpp as one
+# test program, bench/*_bench.cpp as one benchmark program. A DEP must stand above in libs/CMakeLists.txt, so the
+# order there is the dependency order and a cycle cannot be written.
+function(hamelin_library)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS")
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  set(target hamelin_${arg_NAME})
+  if(arg_SOURCES)
+    set(scope PUBLIC)
+    add_library(${target} STATIC ${arg_SOURCES})
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:hamelin_options> ${arg_PRIVATE_LINKS})
+  else()
+    set(scope INTERFACE)
+    add_library(${target} INTERFACE)
+  endif()
+  target_compile_features(${target} ${scope} cxx_std_20)
+  add_library(hamelin::${arg_NAME} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${arg_NAME})
+  foreach(dep IN LISTS arg_DEPS)
+    if(NOT TARGET hamelin::${dep})
+      message(FATAL_ERROR "libs/${arg_NAME} depends on '${dep}', which does not stand above it in libs/CMakeLists.txt")
+    endif()
+    target_link_libraries(${target} ${scope} hamelin::${dep})
+  endforeach()
+  target_link_libraries(${target} ${scope} ${arg_LINKS})
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS include/*.hpp include/*.h)
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS include FILES ${headers})
+  set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
+  set_property(GLOBAL APPEND PROPERTY HAMELIN_LIBS ${arg_NAME})
+  install(TARGETS ${target} EXPORT hamelinTargets FILE_SET HEADERS)
+  hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
+  hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
+endfunction()
+
+# hamelin_tests(NAME scene LINKS hamelin::scene [TIMEOUT s]): tests/*_test.cpp of the calling folder as one program.
+# Tests that need ../shared or data/ find the checkout by HAMELIN_SOURCE_DIR and skip what is absent, saying so.
+function(hamelin_tests)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS")
+  file(GLOB tests CONFIGURE_DEPENDS tests/*_test.cpp)
+  if(NOT HAMELIN_BUILD_TESTS OR NOT tests)
+    return()
+  endif()
+  set(target hamelin_${arg_NAME}_tests)
+  add_executable(${target} ${tests})
+  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin_options Catch2::Catch2WithMain)
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/include")
+  target_compile_definitions(${target} PRIVATE
+    HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+    HAMELIN_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
+    HAMELIN_TEST_PLUGIN_DIR="${HAMELIN_BUILD_PLUGIN_DIR}")
+  catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS ${arg_NAME})
+endfunction()
+
+# Debian's Catch2 main has no benchmarking compiled in, so benchmarks bring their own.
+function(hamelin_benchmarks)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS")
+  file(GLOB benches CONFIGURE_DEPENDS bench/*_bench.cpp)
+  if(NOT HAMELIN_BUILD_BENCH OR NOT benches)
+    return()
+  endif()
+  find_package(Catch2 REQUIRED)
+  set(target hamelin_${arg_NAME}_bench)
+  add_executable(${target} ${benches} "${PROJECT_SOURCE_DIR}/cmake/bench_main.cpp")
+  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin_options Catch2::Catch2)
+  target_compile_definitions(${target} PRIVATE CATCH_CONFIG_ENABLE_BENCHMARKING HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  set_property(GLOBAL APPEND PROPERTY HAMELIN_BENCHES ${target})
+endfunction()
+
+# hamelin_embed(TARGET hamelin_core FILES ${schemas}): each file's text as a string, looked up by its name.
+function(hamelin_embed)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "TARGET;FUNCTION;NAMESPACE" "FILES")
+  set(source "${CMAKE_CURRENT_BINARY_DIR}/${arg_FUNCTION}.cpp")
+  set(text "// Made at configure time from ${arg_FUNCTION}'s files; do not edit.\n#include <string_view>\n\n")
+  string(APPEND text "namespace ${arg_NAMESPACE} {\nstd::string_view ${arg_FUNCTION}(std::string_view name) noexcept;\n")
+  string(APPEND text "std::string_view ${arg_FUNCTION}(std::string_view name) noexcept {\n")
+  foreach(file IN LISTS arg_FILES)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
+    file(READ "${file}" content)
+    cmake_path(GET file FILENAME name)
+    string(APPEND text "  if (name == \"${name}\") return R\"hamelin(${content})hamelin\";\n")
+  endforeach()
+  string(APPEND text "  return {};\n}\n}  // namespace ${arg_NAMESPACE}\n")
+  file(CONFIGURE OUTPUT "${source}" CONTENT "${text}" @ONLY)
+  target_sources(${arg_TARGET} PRIVATE "${source}")
+endfunction()
+
+function(hamelin_install_package)
+  get_property(libs GLOBAL PROPERTY HAMELIN_LIBS)
+  add_library(hamelin_all INTERFACE)
+  add_library(hamelin::hamelin ALIAS hamelin_all)
+  set_target_properties(hamelin_all PROPERTIES EXPORT_NAME hamelin)
+  list(TRANSFORM libs PREPEND hamelin::)
+  target_link_libraries(hamelin_all INTERFACE ${libs})
+  install(TARGETS hamelin_all EXPORT hamelinTargets)
+  set(dest "${CMAKE_INSTALL_LIBDIR}/cmake/hamelin")
+  install(EXPORT hamelinTargets NAMESPACE hamelin:: DESTINATION ${dest})
+  configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/hamelinConfig.cmake.in" hamelinConfig.cmake
+    INSTALL_DESTINATION ${dest} PATH_VARS HAMELIN_PLUGIN_DIR)
+  write_basic_package_version_file(hamelinConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake" "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
+    "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" DESTINATION ${dest})
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/schema" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
+endfunction()
+
+include(HamelinPlugin)

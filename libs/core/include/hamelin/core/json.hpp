@@ -1,0 +1,37 @@
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hamelin {
+
+/// JSON that keeps the order in which keys were written.
+using Json = nlohmann::ordered_json;
+
+/// Parses text; `where` (a file name) opens the error message.
+/// @throws Error parse: "where: line L, column C: what is wrong"; doubled keys are errors too
+[[nodiscard]] Json parse_json(std::string_view text, const std::string& where);
+
+/// Reads and parses a file. @throws Error io or parse
+[[nodiscard]] Json read_json(const std::filesystem::path& file);
+
+/// The text of a shipped JSON Schema (draft-07), e.g. schema_text("robot"); empty if there is none of that name.
+[[nodiscard]] std::string_view schema_text(std::string_view name);
+
+/// Checks a document against a schema.
+/// @throws Error invalid with the first violation: "where: /json/pointer: what is wrong, what was expected"
+void check_schema(const Json& document, const Json& schema, const std::string& where);
+
+/// Checks against the shipped schema of that name. @throws Error invalid
+void check_shipped_schema(const Json& document, std::string_view schema_name, const std::string& where);
+
+/// A copy of `document` (an object) with the `default` of every property that the schema names and it lacks,
+/// nested objects included.
+[[nodiscard]] Json with_defaults(Json document, const Json& schema);
+
+/// The candidate nearest to `name` by edit distance, or empty if none is near: for "did you mean".
+[[nodiscard]] std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
+
+}  // namespace hamelin

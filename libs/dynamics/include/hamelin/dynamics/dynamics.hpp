@@ -1,0 +1,77 @@
+#pragma once
+#include <Eigen/Core>
+#include <span>
+
+#include "hamelin/dynamics/workspace.hpp"
+#include "hamelin/model/model.hpp"
+
+/// Recursive algorithms on an open chain, O(n) but for the mass matrix. `Model` is const and shared, `Workspace` holds
+/// all scratch of one thread; nothing here allocates. Joint vectors are plain Eigen vectors of size dof, sized by the
+/// caller; velocity, acceleration and torque pair as watts. Equations as in SPEC §2 and the README of this library.
+namespace hamelin::dynamics {
+
+using model::Model;
+using Eigen::VectorXd;
+using Matrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic>;
+using Matrix6Xd = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+/// τ = M(q) a + C(q, v) v + ∂U(q): recursive Newton–Euler.
+void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a, VectorXd& tau);
+/// a = M(q)⁻¹ (τ − C v − ∂U): articulated-body algorithm.
+void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau, VectorXd& a);
+/// C(q, v) v + ∂U(q).
+void bias_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& tau);
+/// ∂U(q): the torque that holds the arm against gravity.
+void gravity_torque(const Model& model, Workspace& ws, const VectorXd& q, VectorXd& tau);
+/// x = M(q)⁻¹ y, one sweep in and one out. y and x may be the same vector.
+void solve_mass(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& y, VectorXd& x);
+/// p = M(q) v, O(n).
+void momentum(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& p);
+/// M(q): composite rigid bodies; symmetric, both triangles written.
+void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::MatrixXd& M);
+
+/// ½ vᵀM(q)v [J].
+[[nodiscard]] double kinetic_energy(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v);
+/// U(q) = −Σ m_i g·p_i [J].
+[[nodiscard]] double potential_energy(const Model& model, Workspace& ws, const VectorXd& q);
+
+/// World poses of all links at q, kept in ws until the next call. The functions below read them.
+void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);
+/// World position of a point fixed in link i's COM frame, after forward_kinematics.
+[[nodiscard]] Eigen::Vector3d point_position(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_link);
+/// World pose of link i's COM frame, after forward_kinematics.
+[[nodiscard]] geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link);
+/// World pose of the tip, after forward_kinematics.
+[[nodiscard]] geometry::SE3 tip_pose(const Model& model, const Workspace& ws);
+/// World centres of all collision spheres, in the order of Model::spheres(), after forward_kinematics.
+void sphere_centers(const Model& model, const Workspace& ws, Matrix3Xd& centers);
+
+/// J with ẋ = J v for the world point x that moves with link i, after forward_kinematics; 3 × dof, columns past the link are zero.
+void point_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world, Matrix3Xd& J);
+/// [J_ω; J_x] of that point: 6 × dof, angular rows first, world axes.
+void frame_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world, Matrix6Xd& J);
+/// row = Jᵀ d for a world point x moving with link i and a world direction d: how the joints move x along d. O(depth).
+void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
+                              const Eigen::Vector3d& direction_world, VectorXd& row);
+/// World velocity of a world point that moves with link i, after forward_kinematics.
+[[nodiscard]] Eigen::Vector3d point_velocity(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
+                                             const VectorXd& v);
+
+/// At `point_link` (link's COM frame) of link `link` acts the force w × (velocity of that point), w in the world frame
+/// [N s/m]: it turns motion and does no work.
+struct GyroscopicTerm {
+  int link = 0;
+  Eigen::Vector3d point_link = Eigen::Vector3d::Zero();
+  Eigen::Vector3d w_world = Eigen::Vector3d::Zero();
+};
+
+/// Joint torques of gyroscopic terms, Σ J_pᵀ (w × J_p v). O(n + terms). Overwrites the poses in ws with those at q.
+void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v,
+                       std::span<const GyroscopicTerm> terms, VectorXd& tau);
+
+/// Operational-space inertia M_x of (21), the inverse of Λ⁻¹ = J M⁻¹ Jᵀ (3 × 3, world axes), damped: eigenvalue d of
+/// Λ⁻¹ becomes d/(d² + λ²), so a lost direction gets zero, not 1/λ.
+[[nodiscard]] Eigen::Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J,
+                                                  double damping = 1e-3);
+
+}  // namespace hamelin::dynamics

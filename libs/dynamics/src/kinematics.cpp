@@ -1,0 +1,165 @@
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "hamelin/dynamics/dynamics.hpp"
+
+namespace hamelin::dynamics {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Frame = Workspace::Frame;
+
+Frame child_frame(const model::SpatialLink& l, const kernel::Spatial<double>::Placement& x, const Matrix3d& R,
+                  const Vector3d& p) {
+  Frame out;
+  const Vector3d e1 = R.col(1) * l.cos_alpha + R.col(2) * l.sin_alpha;
+  out.R.col(0) = R.col(0) * x.c + e1 * x.s;
+  out.R.col(1) = e1 * x.c - R.col(0) * x.s;
+  out.R.col(2) = R.col(2) * l.cos_alpha - R.col(1) * l.sin_alpha;
+  out.p = p + R * Vector3d{x.p.x, x.p.y, x.p.z};
+  out.axis = out.R.col(2);
+  return out;
+}
+
+Frame child_frame(const model::PlanarLink& l, const kernel::Planar<double>::Placement& x, const Matrix3d& R,
+                  const Vector3d& p) {
+  Frame out;
+  out.R.col(0) = R.col(0) * x.c + R.col(1) * x.s;
+  out.R.col(1) = R.col(1) * x.c - R.col(0) * x.s;
+  out.R.col(2) = R.col(2);
+  out.p = p + R.col(0) * x.px + R.col(1) * x.py;
+  out.axis = l.prismatic ? Vector3d(out.R.col(0)) : Vector3d(out.R.col(2) * l.direction);
+  return out;
+}
+
+const Frame& frame(const Workspace& ws, int link) { return ws.frames[static_cast<std::size_t>(link)]; }
+
+bool slides(const Model& model, int link) {
+  return model.robot().links[static_cast<std::size_t>(link)].joint.type == model::JointType::prismatic;
+}
+
+int parent(const Model& model, int link) { return model.robot().links[static_cast<std::size_t>(link)].parent; }
+
+// How joint j moves a world point that it carries.
+Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const Vector3d& point) {
+  const Frame& f = frame(ws, j);
+  return slides(model, j) ? f.axis : Vector3d(f.axis.cross(point - f.p));
+}
+
+}  // namespace
+
+void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q) {
+  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      const auto& l = chain.links[i];
+      const auto x = Space::place(l, q[static_cast<Eigen::Index>(i)]);
+      ws.frames[i] = l.parent < 0 ? child_frame(l, x, chain.root.R(), chain.root.p())
+                                  : child_frame(l, x, frame(ws, l.parent).R, frame(ws, l.parent).p);
+    }
+  });
+}
+
+Vector3d point_position(const Model& model, const Workspace& ws, int link, const Vector3d& point_link) {
+  return frame(ws, link).p + frame(ws, link).R * (model.com_in_frame(link) * point_link);
+}
+
+geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link) {
+  return geometry::SE3{frame(ws, link).R, frame(ws, link).p} * model.com_in_frame(link);
+}
+
+geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
+  const Frame& f = frame(ws, model.robot().tip.link);
+  return geometry::SE3{f.R, f.p} * model.tip_in_frame();
+}
+
+void sphere_centers(const Model& model, const Workspace& ws, Matrix3Xd& centers) {
+  Eigen::Index column = 0;
+  for (const auto& s : model.spheres()) {
+    const Frame& f = frame(ws, s.link);
+    centers.col(column++) = f.p + f.R * s.center;
+  }
+}
+
+void point_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world, Matrix3Xd& J) {
+  J.setZero();
+  for (int j = link; j >= 0; j = parent(model, j)) J.col(j) = velocity_column(model, ws, j, point_world);
+}
+
+void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world, Matrix6Xd& J) {
+  J.setZero();
+  for (int j = link; j >= 0; j = parent(model, j)) {
+    if (!slides(model, j)) J.col(j).head<3>() = frame(ws, j).axis;
+    J.col(j).tail<3>() = velocity_column(model, ws, j, point_world);
+  }
+}
+
+void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
+                              const Vector3d& direction_world, VectorXd& row) {
+  row.setZero();
+  for (int j = link; j >= 0; j = parent(model, j))
+    row[j] = direction_world.dot(velocity_column(model, ws, j, point_world));
+}
+
+Vector3d point_velocity(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
+                        const VectorXd& v) {
+  Vector3d velocity = Vector3d::Zero();
+  for (int j = link; j >= 0; j = parent(model, j)) velocity += velocity_column(model, ws, j, point_world) * v[j];
+  return velocity;
+}
+
+void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v,
+                       std::span<const GyroscopicTerm> terms, VectorXd& tau) {
+  forward_kinematics(model, ws, q);
+  const int n = model.dof();
+  for (int i = 0; i < n; ++i) {
+    const Frame& f = frame(ws, i);
+    auto& motion = ws.motions[static_cast<std::size_t>(i)];
+    motion = {Vector3d::Zero(), Vector3d::Zero()};
+    if (const int up = parent(model, i); up >= 0) {
+      const auto& carrier = ws.motions[static_cast<std::size_t>(up)];
+      motion = {carrier.angular, carrier.linear + carrier.angular.cross(f.p - frame(ws, up).p)};
+    }
+    (slides(model, i) ? motion.linear : motion.angular) += f.axis * v[i];
+    ws.forces[static_cast<std::size_t>(i)] = {Vector3d::Zero(), Vector3d::Zero()};
+  }
+  for (const auto& term : terms) {
+    const Vector3d arm = point_position(model, ws, term.link, term.point_link) - frame(ws, term.link).p;
+    const auto& motion = ws.motions[static_cast<std::size_t>(term.link)];
+    const Vector3d force = term.w_world.cross(motion.linear + motion.angular.cross(arm));
+    auto& total = ws.forces[static_cast<std::size_t>(term.link)];
+    total.linear += force;
+    total.angular += arm.cross(force);
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    const Frame& f = frame(ws, i);
+    const auto& total = ws.forces[static_cast<std::size_t>(i)];
+    tau[i] = f.axis.dot(slides(model, i) ? total.linear : total.angular);
+    if (const int up = parent(model, i); up >= 0) {
+      auto& carrier = ws.forces[static_cast<std::size_t>(up)];
+      carrier.linear += total.linear;
+      carrier.angular += total.angular + (f.p - frame(ws, up).p).cross(total.linear);
+    }
+  }
+}
+
+Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J, double damping) {
+  return with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) -> Matrix3d {
+    kernel::place<Space>(chain, k, q.data());
+    kernel::factor<Space>(chain, k);
+    Matrix3d inverse;
+    for (int c = 0; c < 3; ++c) {
+      ws.column_in = J.row(c).transpose();
+      for (auto& link : k) link.force = Space::zero_force();
+      kernel::solve_factored<Space>(chain, k, ws.column_in.data(), ws.column_out.data());
+      inverse.col(c).noalias() = J * ws.column_out;
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(0.5 * (inverse + inverse.transpose()));
+    const Vector3d d = eigen.eigenvalues();
+    const Vector3d damped = d.array() / (d.array().square() + damping * damping);
+    return eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose();
+  });
+}
+
+}  // namespace hamelin::dynamics

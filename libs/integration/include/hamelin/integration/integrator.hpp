@@ -1,0 +1,135 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hamelin/core/json.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+
+namespace hamelin::integration {
+
+using dynamics::GyroscopicTerm;
+using Eigen::VectorXd;
+using model::Model;
+
+/// What acts on the arm during one step besides gravity (SPEC §4). Coefficients are kept over the step and evaluated at
+/// the scheme's own velocity: midpoint, stage or sub-step. Empty vectors mean none and cost nothing. The nodal
+/// potential (a) and the node impulse (e) act between steps: Integrator::kick and Integrator::set_velocity.
+struct Channels {
+  VectorXd damping;                        ///< (b) torque −damping_i v_i; empty or dof [Nm s/rad]
+  std::vector<GyroscopicTerm> gyroscopic;  ///< (c)
+  VectorXd held_torque;                    ///< (d) empty or dof [Nm]
+};
+
+/// What an integrator remembers between steps: a plain value, to be copied, kept and restored. Schemes with a momentum
+/// use p and leave v to be asked for; explicit schemes use v.
+struct State {
+  double time_s = 0.0;
+  long k = 0;
+  VectorXd q, v, p;
+  VectorXd memory;            ///< hamel: body twists of the last step, dof × (6 or 3)
+  VectorXd force_previous;    ///< hamel: generalised force of the last step
+  double step_previous = 0.0; ///< hamel: 0 right after a (consistent) start
+  std::vector<VectorXd> deltas;  ///< last displacements, newest first, for the guess
+  int delta_count = 0;        ///< how many of them are valid
+};
+
+/// What one step did.
+struct StepReport {
+  bool converged = true;
+  int updates = 0;         ///< corrections of Δ
+  int factorizations = 0;  ///< linear solves that made new factors
+  int evaluations = 0;     ///< sweeps over the chain: residuals, or forward dynamics for explicit schemes
+  int halvings = 0;        ///< how often the step was halved to find a root
+  double residual = 0.0;   ///< the figure the criterion looks at, of the accepted step
+  double gyroscopic_work_J = 0.0;
+  double dissipated_J = 0.0;   ///< by channel (b), positive
+  double held_work_J = 0.0;    ///< by channel (d)
+};
+
+struct Energy {
+  double kinetic_J = 0.0, potential_J = 0.0;
+  [[nodiscard]] double total() const noexcept { return kinetic_J + potential_J; }
+};
+
+enum class Start : std::int32_t { consistent, published };
+enum class Solver : std::int32_t { newton, feedback };
+
+/// Settings of all integrators; each takes what concerns it and refuses what it cannot do.
+struct Options {
+  double alpha = 0.5;             ///< hamel: where in the step velocities are taken, 0 .. 1
+  Start start = Start::consistent;
+  bool solver_given = false;      ///< whether `solver` was asked for, or the scheme's own default holds
+  Solver solver = Solver::newton;
+  double tolerance = 1e-12;       ///< newton: ‖δΔ‖∞ [rad or m]
+  double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
+  int max_updates = 100;          ///< feedback; newton gives up after 30
+  int max_halvings = 8;           ///< a step is cut into at most 2^max_halvings pieces
+};
+
+/// Options from a scene's or command line's parameters {"alpha":…, "start":…, "solver":…, "tolerance":…, "max_halvings":…}.
+/// @throws Error invalid naming `where` and the key
+[[nodiscard]] Options options_from_json(const Json& params, const std::string& where);
+
+/// A one-step scheme for a chain: θ^k → θ^{k+1}. One object a thread; State is the memory. No allocation in a step.
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  Integrator(const Integrator&) = delete;
+  Integrator& operator=(const Integrator&) = delete;
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] const Model& model() const noexcept { return model_; }
+  /// What "converged" means, for the result: e.g. "|delta|_inf <= 1e-12".
+  [[nodiscard]] virtual std::string criterion() const = 0;
+  [[nodiscard]] virtual int order() const = 0;
+
+  /// A state at rest or in motion. q0, v0: dof numbers.
+  [[nodiscard]] State start(const VectorXd& q0, const VectorXd& v0);
+  /// Velocity at the node.
+  virtual void velocity(const State& state, VectorXd& v) = 0;
+  /// Node impulse: p += dp [Nm s].
+  virtual void kick(State& state, const VectorXd& dp) = 0;
+  /// Node velocity: p = M(θ^k) v.
+  virtual void set_velocity(State& state, const VectorXd& v) = 0;
+  /// One step of h > 0. If it reports converged = false the state must not be used further.
+  [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
+  /// Energy at the node, as the scheme defines it (SPEC §3).
+  [[nodiscard]] virtual Energy energy(const State& state);
+
+ protected:
+  Integrator(std::string name, const Model& model, const Options& options);
+
+  /// Fills q, v and whatever the scheme keeps; sizes are set.
+  virtual void begin(State& state, const VectorXd& v0) = 0;
+  /// One undivided step; on failure the state may be left half-way.
+  virtual StepReport attempt(State& state, const Channels& channels, double h) = 0;
+
+  /// Generalised force of the channels at (q, v): total, with its parts kept for the work done.
+  void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
+  /// Adds the work of the forces last evaluated over the displacement to the report.
+  void book_work(StepReport& report, const VectorXd& displacement, double weight) const;
+
+  const Model& model_;
+  Options options_;
+  dynamics::Workspace ws_;
+  VectorXd force_;  ///< sum of the channels, as evaluate_forces left it
+
+ private:
+  StepReport divide(State& state, const Channels& channels, double h, int depth);
+
+  std::string name_;
+  std::vector<State> saved_;  ///< one a halving level
+  VectorXd held_, damped_, gyroscopic_;
+};
+
+/// Names that make_integrator knows.
+[[nodiscard]] const std::vector<std::string>& integrator_names();
+
+/// @throws Error usage for an unknown name (with the nearest), or a solver the scheme has not
+[[nodiscard]] std::unique_ptr<Integrator> make_integrator(const std::string& name, const Model& model,
+                                                          const Options& options = {});
+
+}  // namespace hamelin::integration

@@ -1,0 +1,55 @@
+#include "explicit.hpp"
+
+namespace hamelin::integration {
+
+Explicit::Explicit(std::string name, const Model& model, const Options& options)
+    : Integrator(std::move(name), model, options), acceleration_(VectorXd::Zero(model.dof())) {}
+
+void Explicit::kick(State& state, const VectorXd& dp) {
+  dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
+  state.v += acceleration_;
+}
+
+void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
+  evaluate_forces(channels, q, v);
+  dynamics::forward_dynamics(model_, ws_, q, v, force_, acceleration_);
+  ++report.evaluations;
+}
+
+StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, double h) {
+  StepReport report;
+  accelerate(channels, state.q, state.v, report);
+  state.v += h * acceleration_;
+  book_work(report, state.v, h);
+  state.q += h * state.v;
+  report.converged = state.q.allFinite() && state.v.allFinite();
+  return report;
+}
+
+Rk4::Rk4(const Model& model, const Options& options) : Explicit("rk4", model, options) {
+  q_ = v_ = q_sum_ = v_sum_ = VectorXd::Zero(model.dof());
+}
+
+StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
+  // stage i stands at (q, v) + c_i h (v_, acceleration_) of the stage before
+  static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  StepReport report;
+  q_sum_ = state.q;
+  v_sum_ = state.v;
+  v_ = state.v;
+  acceleration_.setZero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    q_ = state.q + c[i] * h * v_;
+    v_ = state.v + c[i] * h * acceleration_;
+    accelerate(channels, q_, v_, report);
+    book_work(report, v_, b[i] * h);
+    q_sum_ += b[i] * h * v_;
+    v_sum_ += b[i] * h * acceleration_;
+  }
+  state.q = q_sum_;
+  state.v = v_sum_;
+  report.converged = state.q.allFinite() && state.v.allFinite();
+  return report;
+}
+
+}  // namespace hamelin::integration

@@ -1,0 +1,47 @@
+#pragma once
+#include <array>
+
+#include "hamelin/integration/integrator.hpp"
+
+namespace hamelin::integration {
+
+/// What the explicit schemes share: a state (q, v), forward dynamics at a point, kicks as M⁻¹ dp.
+class Explicit : public Integrator {
+ public:
+  [[nodiscard]] std::string criterion() const override { return "explicit"; }
+  void velocity(const State& state, VectorXd& v) override { v = state.v; }
+  void kick(State& state, const VectorXd& dp) override;
+  void set_velocity(State& state, const VectorXd& v) override { state.v = v; }
+
+ protected:
+  Explicit(std::string name, const Model& model, const Options& options);
+  void begin(State& state, const VectorXd& v0) override { state.v = v0; }
+  /// acceleration_ at (q, v) under gravity and the channels.
+  void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
+
+  VectorXd acceleration_;
+};
+
+/// v⁺ = v + h a(q, v), q⁺ = q + h v⁺: the paper's baseline. Order 1.
+class SemiImplicitEuler final : public Explicit {
+ public:
+  SemiImplicitEuler(const Model& model, const Options& options) : Explicit("semi-implicit-euler", model, options) {}
+  [[nodiscard]] int order() const override { return 1; }
+
+ private:
+  StepReport attempt(State& state, const Channels& channels, double h) override;
+};
+
+/// The classical Runge–Kutta scheme of order 4.
+class Rk4 final : public Explicit {
+ public:
+  Rk4(const Model& model, const Options& options);
+  [[nodiscard]] int order() const override { return 4; }
+
+ private:
+  StepReport attempt(State& state, const Channels& channels, double h) override;
+
+  VectorXd q_, v_, q_sum_, v_sum_;
+};
+
+}  // namespace hamelin::integration

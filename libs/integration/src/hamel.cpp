@@ -1,0 +1,177 @@
+#include "hamel.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+namespace hamelin::integration {
+
+Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
+    : Integrator(midpoint ? "hamel-midpoint" : "hamel", model, options),
+      midpoint_(midpoint),
+      alpha_(midpoint ? 0.5 : options.alpha) {
+  const auto n = static_cast<std::size_t>(model.dof());
+  if (model.planar())
+    links_ = Links<dynamics::kernel::Planar<double>>(n);
+  else
+    links_ = Links<dynamics::kernel::Spatial<double>>(n);
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
+}
+
+std::string Hamel::criterion() const { return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance); }
+
+template <class F>
+decltype(auto) Hamel::with_links(F&& f) {
+  if (model_.planar())
+    return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
+  return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
+}
+
+void Hamel::begin(State& state, const VectorXd& v0) { set_velocity(state, v0); }
+
+void Hamel::set_velocity(State& state, const VectorXd& v) {
+  state.v = v;
+  state.p.setZero();  // pending node impulse
+  state.force_previous.setZero();
+  state.step_previous = 0.0;
+  state.delta_count = 0;
+  // ξ^{−1+α} from the velocity by (5)
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
+    state.memory.resize(static_cast<Eigen::Index>(width * k.size()));
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      const auto& l = chain.links[i];
+      const auto x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
+      k[i].twist = l.parent < 0 ? Space::zero_motion()
+                                : Space::to_child(l, x, k[static_cast<std::size_t>(l.parent)].twist);
+      Space::add_along_axis(l, k[i].twist, v[static_cast<Eigen::Index>(i)]);
+      std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
+    }
+  });
+}
+
+void Hamel::kick(State& state, const VectorXd& dp) { state.p += dp; }
+
+void Hamel::load(const State& state) {
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      const auto& l = chain.links[i];
+      typename Space::Motion twist;
+      std::memcpy(&twist, state.memory.data() + width * i, sizeof(twist));
+      k[i].x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
+      const auto mu = Space::momentum(l, twist);
+      k[i].before = Space::scaled(
+          Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * state.step_previous)), -1.0);
+    }
+  });
+}
+
+void Hamel::momentum_before(const State& state, VectorXd& p) {
+  load(state);
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i) k[i].force = Space::scaled(k[i].before, -1.0);
+    for (std::size_t i = k.size(); i-- > 0;) {
+      const auto& l = chain.links[i];
+      p[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force);
+      if (l.parent < 0) continue;
+      auto& outer = k[static_cast<std::size_t>(l.parent)].force;
+      outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
+    }
+  });
+  if (state.step_previous > 0.0) {
+    dynamics::gravity_torque(model_, ws_, state.q, gradient_);
+    p += 0.5 * state.step_previous * (state.force_previous - gradient_);
+  }
+  p += state.p;
+}
+
+void Hamel::velocity(const State& state, VectorXd& v) {
+  momentum_before(state, correction_);
+  dynamics::solve_mass(model_, ws_, state.q, correction_, v);
+}
+
+Energy Hamel::energy(const State& state) {
+  if (state.delta_count == 0)
+    return {dynamics::kinetic_energy(model_, ws_, state.q, state.v), dynamics::potential_energy(model_, ws_, state.q)};
+  const VectorXd& delta = state.deltas[0];
+  rate_ = delta / state.step_previous;
+  mid_ = state.q - 0.5 * delta;
+  Energy energy{dynamics::kinetic_energy(model_, ws_, mid_, rate_), 0.0};
+  mid_ = state.q - delta;
+  energy.potential_J = 0.5 * (dynamics::potential_energy(model_, ws_, mid_) +
+                              dynamics::potential_energy(model_, ws_, state.q));
+  return energy;
+}
+
+void Hamel::evaluate(const State& state, const Channels& channels, double h, double h_potential, double h_force) {
+  rate_ = delta_ / h;
+  mid_ = state.q + 0.5 * delta_;
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      const auto& l = chain.links[i];
+      const auto j = static_cast<Eigen::Index>(i);
+      const auto transport = midpoint_ ? Space::place(l, mid_[j]) : k[i].x;
+      k[i].twist = l.parent < 0 ? Space::zero_motion()
+                                : Space::to_child(l, transport, k[static_cast<std::size_t>(l.parent)].twist);
+      Space::add_along_axis(l, k[i].twist, rate_[j]);
+      const auto mu = Space::momentum(l, k[i].twist);
+      const auto turn = Space::scaled(Space::ad_T(k[i].twist, mu), -(1.0 - alpha_) * h);
+      k[i].force = Space::sum(k[i].before, Space::sum(mu, turn));
+    }
+    for (std::size_t i = k.size(); i-- > 0;) {
+      const auto& l = chain.links[i];
+      residual_[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force);
+      if (l.parent < 0) continue;
+      auto& outer = k[static_cast<std::size_t>(l.parent)].force;
+      outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
+    }
+  });
+  evaluate_forces(channels, mid_, rate_);
+  residual_ += h_potential * gradient_ - h_force * force_ - 0.5 * state.step_previous * state.force_previous - state.p;
+}
+
+StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
+  StepReport report;
+  report.converged = false;
+  load(state);
+  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
+  // The published start counts the whole node at k = 0, as if a step like this one had ended there.
+  const bool whole_node = state.k == 0 && state.step_previous == 0.0 && options_.start == Start::published;
+  if (whole_node) {
+    state.step_previous = h;
+    load(state);
+  }
+  const double h_potential = 0.5 * (h + state.step_previous);
+  const double h_force = whole_node ? h : 0.5 * h;
+  delta_.setZero();  // the paper's guess θ^k
+  for (;;) {
+    evaluate(state, channels, h, h_potential, h_force);
+    ++report.evaluations;
+    report.residual = residual_.norm() / h;  // ‖τ_e‖
+    if (!std::isfinite(report.residual)) return report;
+    if (report.residual < options_.feedback_tolerance) break;
+    if (report.updates == options_.max_updates) return report;
+    residual_ *= -h;
+    dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);  // (16)
+    delta_ += correction_;
+    ++report.updates;
+    ++report.factorizations;
+  }
+  report.converged = true;
+  book_work(report, delta_, 1.0);
+  with_links([&]<class Space>(Space, const auto&, auto& k) {
+    constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
+    for (std::size_t i = 0; i < k.size(); ++i)
+      std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
+  });
+  state.q += delta_;
+  state.deltas[0] = delta_;
+  state.delta_count = 1;
+  state.p.setZero();
+  state.force_previous = force_;
+  state.step_previous = h;
+  return report;
+}
+
+}  // namespace hamelin::integration

@@ -1,0 +1,59 @@
+#pragma once
+#include <Eigen/Core>
+#include <variant>
+#include <vector>
+
+#include "hamelin/model/chain.hpp"
+#include "hamelin/model/robot.hpp"
+
+namespace hamelin::model {
+
+/// A robot placed in a world, ready for the algorithms: joint-aligned frames with their constants absorbed, in SE(2)
+/// where the chain is planar, else in SE(3). Immutable and shared between threads; scratch lives in
+/// dynamics::Workspace.
+class Model {
+ public:
+  /// @param base pose of the robot's base frame in the world
+  /// @param gravity acceleration of free fall [m/s²], world frame
+  /// @throws Error invalid, as check(robot) does
+  explicit Model(Robot robot, const geometry::SE3& base = geometry::SE3{},
+                 const Eigen::Vector3d& gravity = Eigen::Vector3d{0.0, 0.0, -9.81});
+
+  [[nodiscard]] int dof() const noexcept { return robot_.dof(); }
+  [[nodiscard]] const Robot& robot() const noexcept { return robot_; }
+  [[nodiscard]] const geometry::SE3& base() const noexcept { return base_; }
+  [[nodiscard]] const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
+  /// Whether all joints keep one plane, so that the SE(2) path is taken.
+  [[nodiscard]] bool planar() const noexcept { return std::holds_alternative<PlanarChain>(chain_); }
+  [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept { return chain_; }
+
+  /// Pose of link i's COM frame in its joint-aligned frame (constant).
+  [[nodiscard]] const geometry::SE3& com_in_frame(int link) const { return com_in_frame_[static_cast<std::size_t>(link)]; }
+  /// Pose of the tip in its link's joint-aligned frame (constant).
+  [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept { return tip_in_frame_; }
+
+  struct PlacedSphere {
+    int link;
+    int index_in_link;
+    Eigen::Vector3d center;  ///< in the link's joint-aligned frame [m]
+    double radius;           ///< [m]
+  };
+  /// The collision spheres of all links, link by link.
+  [[nodiscard]] const std::vector<PlacedSphere>& spheres() const noexcept { return spheres_; }
+
+  /// An upper bound of the distance from the base to any point of any sphere or the tip, over all q; infinite never: prismatic
+  /// joints count their limits, unlimited ones 1 m. [m]
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+
+ private:
+  Robot robot_;
+  geometry::SE3 base_;
+  Eigen::Vector3d gravity_;
+  std::variant<SpatialChain, PlanarChain> chain_;
+  std::vector<geometry::SE3> com_in_frame_;
+  geometry::SE3 tip_in_frame_;
+  std::vector<PlacedSphere> spheres_;
+  double reach_ = 0.0;
+};
+
+}  // namespace hamelin::model

@@ -1,0 +1,75 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hamelin/geometry/se3.hpp"
+
+namespace hamelin::model {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+enum class JointType : std::int32_t { revolute, prismatic };
+
+struct Joint {
+  std::string name;
+  JointType type = JointType::revolute;
+  Vector6d screw = Vector6d::Zero();    ///< S = [ω; v], spatial, base frame, at q = 0; |ω| = 1, or ω = 0 and |v| = 1
+  std::optional<double> lower, upper;   ///< position limits [rad or m]; none = unlimited
+  std::optional<double> velocity_max;   ///< [rad/s or m/s]
+  std::optional<double> effort_max;     ///< [Nm or N]
+  double damping = 0.0;                 ///< viscous, as the robot file gives it; used only where a scene says so
+};
+
+/// Collision sphere. Coordinates in the link's COM frame.
+struct Sphere {
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+/// Collision capsule (a segment if the radius is zero). Coordinates in the link's COM frame.
+struct Segment {
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+/// One moving body with the joint that carries it.
+struct Link {
+  std::string name;
+  int parent = -1;       ///< index of the parent link, −1 for the base; always less than the link's own index
+  Joint joint;
+  geometry::SE3 com;     ///< pose of the COM frame in the base frame at q = 0
+  double mass_kg = 0.0;
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the COM, in the COM frame
+  std::vector<Sphere> spheres;
+  std::vector<Segment> segments;
+};
+
+/// The last link's point that goals speak of.
+struct Tip {
+  std::string name;
+  int link = 0;          ///< index of the link it moves with
+  geometry::SE3 pose;    ///< in the base frame at q = 0
+};
+
+/// An open chain as a file describes it, brought to one form: screws and poses in the base frame at q = 0, everything
+/// about a link in its COM frame (SPEC §1, data/robots). `notes` says what the reader lumped, locked or skipped.
+struct Robot {
+  std::string name;
+  std::vector<Link> links;
+  Tip tip;
+  std::vector<std::pair<std::string, std::string>> self_collision_disabled;
+  std::vector<std::string> notes;
+
+  [[nodiscard]] int dof() const noexcept { return static_cast<int>(links.size()); }
+};
+
+/// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws, positive mass
+/// wherever a joint moves it, inertia positive definite with the triangle inequality, finite numbers, lower < upper.
+/// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
+void check(const Robot& robot, const std::string& where);
+
+}  // namespace hamelin::model

@@ -1,0 +1,1 @@
+#include "hamelin/model/robot.hpp"

@@ -1,0 +1,221 @@
+#include "hamelin/model/model.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace hamelin::model {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using geometry::SE3;
+using geometry::Vec3;
+
+// Below this the sine of the angle between two directions counts as zero: they are one direction.
+constexpr double parallel_sine = 1e-14;
+// Below this a chain's axes count as parallel for the choice of SE(2): rounding in files is larger than in doubles.
+constexpr double planar_sine = 1e-9;
+
+Vec3<double> small(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Vector3d axis_of(const Joint& joint) {
+  return joint.type == JointType::revolute ? joint.screw.head<3>() : joint.screw.tail<3>();
+}
+
+// A point on the joint's axis (revolute; the screw is [ω; −ω × r]), nearest to `near`. Prismatic: `near` itself.
+Vector3d origin_near(const Joint& joint, const Vector3d& near) {
+  if (joint.type == JointType::prismatic) return near;
+  const Vector3d w = joint.screw.head<3>();
+  const Vector3d foot = w.cross(joint.screw.tail<3>());  // |ω| = 1
+  return foot + w * w.dot(near - foot);
+}
+
+Vector3d any_normal(const Vector3d& z) {
+  const Vector3d least = std::abs(z.x()) <= std::abs(z.y()) && std::abs(z.x()) <= std::abs(z.z()) ? Vector3d::UnitX()
+                         : std::abs(z.y()) <= std::abs(z.z())                                     ? Vector3d::UnitY()
+                                                                                                  : Vector3d::UnitZ();
+  return (least - z * z.dot(least)).normalized();
+}
+
+double angle_about(const Vector3d& axis, const Vector3d& from, const Vector3d& to) {
+  return std::atan2(axis.dot(from.cross(to)), from.dot(to));
+}
+
+// Inertia about the origin of `frame` in its axes, of a link whose COM pose is in the same base frame.
+Matrix3d inertia_in(const SE3& frame, const Link& link) {
+  const SE3 com = frame.inverse() * link.com;
+  const Vector3d c = com.p();
+  return com.R() * link.inertia_kg_m2 * com.R().transpose() +
+         link.mass_kg * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
+}
+
+SE3 frame_of(const Vector3d& x, const Vector3d& z, const Vector3d& origin) {
+  Matrix3d R;
+  R.col(0) = x;
+  R.col(1) = z.cross(x);
+  R.col(2) = z;
+  return {R, origin};
+}
+
+// The plane's normal if all joints keep one plane.
+std::optional<Vector3d> plane_normal(const Robot& robot) {
+  std::optional<Vector3d> normal;
+  for (const auto& link : robot.links)
+    if (link.joint.type == JointType::revolute && !normal) normal = link.joint.screw.head<3>();
+  if (!normal) return std::nullopt;
+  for (const auto& link : robot.links) {
+    const Vector3d axis = axis_of(link.joint);
+    const double off =
+        link.joint.type == JointType::revolute ? normal->cross(axis).norm() : std::abs(normal->dot(axis));
+    if (off > planar_sine) return std::nullopt;
+  }
+  return normal;
+}
+
+// Joint-aligned frames at q = 0 in the base frame, one a link, and the root in front.
+std::vector<SE3> spatial_frames(const Robot& robot) {
+  const auto& links = robot.links;
+  std::vector<SE3> frames;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    const Vector3d z = axis_of(links[i].joint);
+    const Vector3d origin = origin_near(links[i].joint, links[i].com.p());
+    const Vector3d before = i == 0 ? any_normal(z) : Vector3d(frames.back().R().col(0));
+    Vector3d x = before - z * z.dot(before);
+    x = x.norm() > 0.5 ? Vector3d(x.normalized()) : any_normal(z);
+    if (i + 1 < links.size()) {
+      const Vector3d normal = z.cross(axis_of(links[i + 1].joint));
+      if (normal.norm() > parallel_sine) {
+        x = normal.normalized();
+        x = (x - z * z.dot(x)).normalized();
+      }
+    }
+    frames.push_back(frame_of(x, z, origin));
+  }
+  frames.insert(frames.begin(), frames.front());
+  return frames;
+}
+
+SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base, const Vector3d& gravity) {
+  SpatialChain chain;
+  chain.root = base * frames[0];
+  chain.gravity = small(chain.root.R().transpose() * gravity);
+  chain.potential_constant = 0.0;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link& link = robot.links[i];
+    const SE3& parent = frames[static_cast<std::size_t>(link.parent + 1)];
+    const SE3& frame = frames[i + 1];
+    const Vector3d x_parent = parent.R().col(0), z_parent = parent.R().col(2);
+    const Vector3d x = frame.R().col(0), z = frame.R().col(2);
+    const double alpha = angle_about(x_parent, z_parent, z);
+    const Matrix3d I = inertia_in(frame, link);
+    SpatialLink out{};
+    out.parent = link.parent;
+    out.prismatic = link.joint.type == JointType::prismatic;
+    out.cos_alpha = std::cos(alpha);
+    out.sin_alpha = std::sin(alpha);
+    out.offset = angle_about(z, x_parent, x);
+    out.p0 = small(parent.R().transpose() * (frame.p() - parent.p()));
+    out.mass = link.mass_kg;
+    out.moment = small(link.mass_kg * (frame.inverse() * link.com.p()));
+    out.inertia = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
+    chain.potential_constant -= link.mass_kg * gravity.dot(chain.root.p());
+    chain.links.push_back(out);
+  }
+  return chain;
+}
+
+// Planar frames: z is the normal, all origins in the root's plane; out-of-plane offsets stay in com_in_frame.
+std::vector<SE3> planar_frames(const Robot& robot, const Vector3d& normal) {
+  std::vector<SE3> frames;
+  const Vector3d root = origin_near(robot.links[0].joint, robot.links[0].com.p());
+  const auto in_plane = [&](const Vector3d& p) -> Vector3d { return p - normal * normal.dot(p - root); };
+  for (const auto& link : robot.links) {
+    const bool slides = link.joint.type == JointType::prismatic;
+    Vector3d x = slides ? axis_of(link.joint) : any_normal(normal);
+    x = (x - normal * normal.dot(x)).normalized();
+    frames.push_back(frame_of(x, normal, in_plane(origin_near(link.joint, link.com.p()))));
+  }
+  frames.insert(frames.begin(), frame_of(any_normal(normal), normal, root));
+  return frames;
+}
+
+PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base, const Vector3d& gravity) {
+  PlanarChain chain;
+  chain.root = base * frames[0];
+  const Vector3d g = chain.root.R().transpose() * gravity;
+  chain.gravity_x = g.x();
+  chain.gravity_y = g.y();
+  chain.potential_constant = 0.0;
+  const Vector3d normal = frames[0].R().col(2);
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link& link = robot.links[i];
+    const SE3& parent = frames[static_cast<std::size_t>(link.parent + 1)];
+    const SE3& frame = frames[i + 1];
+    const Vector3d p0 = parent.R().transpose() * (frame.p() - parent.p());
+    const Vector3d c = frame.inverse() * link.com.p();
+    PlanarLink out{};
+    out.parent = link.parent;
+    out.prismatic = link.joint.type == JointType::prismatic;
+    out.direction = out.prismatic || normal.dot(axis_of(link.joint)) > 0.0 ? 1.0 : -1.0;
+    out.offset = angle_about(normal, parent.R().col(0), frame.R().col(0));
+    out.p0x = p0.x();
+    out.p0y = p0.y();
+    out.mass = link.mass_kg;
+    out.moment_x = link.mass_kg * c.x();
+    out.moment_y = link.mass_kg * c.y();
+    out.inertia = inertia_in(frame, link)(2, 2);
+    chain.potential_constant -= link.mass_kg * (gravity.dot(chain.root.p()) + g.z() * c.z());
+    chain.links.push_back(out);
+  }
+  return chain;
+}
+
+double reach_of(const Robot& robot, const std::vector<SE3>& frames) {
+  // Distances between successive frames bound how far anything gets from the base, whatever the joints do.
+  double to_frame = frames[1].p().norm(), reach = 0.0;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link& link = robot.links[i];
+    if (i > 0) to_frame += (frames[i + 1].p() - frames[i].p()).norm();
+    if (link.joint.type == JointType::prismatic)
+      to_frame += std::max(std::abs(link.joint.lower.value_or(-1.0)), std::abs(link.joint.upper.value_or(1.0)));
+    const auto farthest = [&](const Vector3d& point_base, double radius) {
+      reach = std::max(reach, to_frame + (point_base - frames[i + 1].p()).norm() + radius);
+    };
+    for (const auto& s : link.spheres) farthest(link.com * s.center_m, s.radius_m);
+    for (const auto& s : link.segments) {
+      farthest(link.com * s.from_m, s.radius_m);
+      farthest(link.com * s.to_m, s.radius_m);
+    }
+    if (robot.tip.link == static_cast<int>(i)) farthest(robot.tip.pose.p(), 0.0);
+  }
+  return reach;
+}
+
+}  // namespace
+
+Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
+    : robot_(std::move(robot)), base_(base), gravity_(gravity) {
+  check(robot_, robot_.name);
+  std::vector<SE3> frames;
+  if (const auto normal = plane_normal(robot_)) {
+    frames = planar_frames(robot_, *normal);
+    chain_ = planar_chain(robot_, frames, base_, gravity_);
+  } else {
+    frames = spatial_frames(robot_);
+    chain_ = spatial_chain(robot_, frames, base_, gravity_);
+  }
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) {
+    const Link& link = robot_.links[i];
+    com_in_frame_.push_back(frames[i + 1].inverse() * link.com);
+    for (std::size_t s = 0; s < link.spheres.size(); ++s)
+      spheres_.push_back({static_cast<int>(i), static_cast<int>(s), com_in_frame_.back() * link.spheres[s].center_m,
+                          link.spheres[s].radius_m});
+  }
+  tip_in_frame_ = frames[static_cast<std::size_t>(robot_.tip.link) + 1].inverse() * robot_.tip.pose;
+  reach_ = reach_of(robot_, frames);
+}
+
+}  // namespace hamelin::model

@@ -1,0 +1,236 @@
+#pragma once
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/json.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/planning/plugin_abi.h"
+
+/// What the author of a planner includes: thin C++ views over the C structs of plugin_abi.h, a base class, and the
+/// macro that makes a plugin of it. The views copy nothing and live as long as what they show: a Tick and a Command
+/// for one call, a Setup and a Host as long as the planner.
+namespace hamelin::planning {
+
+using ConstVectorMap = Eigen::Map<const Eigen::VectorXd>;
+using VectorMap = Eigen::Map<Eigen::VectorXd>;
+
+/// Three numbers of a C struct as a vector.
+[[nodiscard]] inline Eigen::Vector3d vec3(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
+
+/// What holds for a whole run.
+class Setup {
+ public:
+  explicit Setup(const hamelin_setup& raw) : raw_(&raw) {}
+
+  [[nodiscard]] int dof() const { return static_cast<int>(raw_->dof); }
+  /// The nominal robot as resolved JSON (hamelin.robot/1).
+  [[nodiscard]] std::string_view robot_json() const { return {raw_->robot_json, raw_->robot_json_size}; }
+  /// The nominal robot where it stands, with the scene's gravity. Builds it anew at each call.
+  /// @throws Error invalid if the robot's JSON is not what the border promises
+  [[nodiscard]] model::Model model() const;
+  /// Control spheres, centres in their link's COM frame [m].
+  [[nodiscard]] std::span<const hamelin_sphere> spheres() const { return {raw_->spheres, raw_->sphere_count}; }
+  /// Goals, to be reached in this order.
+  [[nodiscard]] std::span<const hamelin_goal> goals() const { return {raw_->goals, raw_->goal_count}; }
+  /// Position limits [rad or m]; none where the scene models none.
+  [[nodiscard]] std::optional<ConstVectorMap> q_lower() const { return limit(raw_->q_lower); }
+  [[nodiscard]] std::optional<ConstVectorMap> q_upper() const { return limit(raw_->q_upper); }
+  /// Speed limits [rad/s or m/s].
+  [[nodiscard]] std::optional<ConstVectorMap> velocity_max() const { return limit(raw_->velocity_max); }
+  /// Torque limits [Nm or N].
+  [[nodiscard]] std::optional<ConstVectorMap> effort_max() const { return limit(raw_->effort_max); }
+  /// Time between two ticks [s].
+  [[nodiscard]] double control_period_s() const { return raw_->control_period_s; }
+  /// Contacts are listed up to this distance [m].
+  [[nodiscard]] double influence_m() const { return raw_->influence_m; }
+  /// Edge of the map's smallest box [m]; zero without a map.
+  [[nodiscard]] double map_resolution_m() const { return raw_->map_resolution_m; }
+  [[nodiscard]] std::uint64_t seed() const { return raw_->seed; }
+  [[nodiscard]] const hamelin_setup& raw() const { return *raw_; }
+
+ private:
+  [[nodiscard]] std::optional<ConstVectorMap> limit(const double* numbers) const {
+    if (numbers == nullptr) return std::nullopt;
+    return ConstVectorMap(numbers, dof());
+  }
+  const hamelin_setup* raw_;
+};
+
+/// One tick's input.
+class Tick {
+ public:
+  Tick(const hamelin_tick& raw, std::size_t dof) : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
+
+  [[nodiscard]] std::uint64_t k() const { return raw_->k; }
+  [[nodiscard]] double time_s() const { return raw_->time_s; }
+  /// Joint positions [rad or m] and velocities.
+  [[nodiscard]] ConstVectorMap q() const { return {raw_->q, dof_}; }
+  [[nodiscard]] ConstVectorMap v() const { return {raw_->v, dof_}; }
+  /// Near obstacle points: spheres in order, nearest first within a sphere.
+  [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {raw_->contacts, raw_->contact_count}; }
+  /// Index into Setup::goals().
+  [[nodiscard]] std::size_t goal_index() const { return raw_->goal_index; }
+  /// 1, or less where the scene asks for slow motion.
+  [[nodiscard]] double speed_scale() const { return raw_->speed_scale; }
+  [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
+
+ private:
+  const hamelin_tick* raw_;
+  Eigen::Index dof_;
+};
+
+/// One tick's answer, in channels (SPEC §4; plugin_abi.h). All zero at first; what is left alone acts not.
+class Command {
+ public:
+  Command(hamelin_command& raw, std::size_t dof) : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
+
+  /// (a) Value [J] and gradient [Nm or N] of a control potential at q.
+  void set_potential(double value_J) { raw_->potential_J = value_J; }
+  [[nodiscard]] VectorMap potential_gradient() { return {raw_->potential_gradient, dof_}; }
+  /// (b) Non-negative coefficients [Nm s/rad or N s/m].
+  [[nodiscard]] VectorMap damping() { return {raw_->damping, dof_}; }
+  /// (c) Adds the force w × (velocity of the point), w in world axes [N s/m], the point in the link's COM frame [m].
+  /// @throws Error plugin if the host left no room, which it does for one term a contact
+  void add_gyroscopic(int link, const Eigen::Vector3d& point_link, const Eigen::Vector3d& w_world) {
+    if (raw_->gyroscopic_count == raw_->gyroscopic_capacity)
+      throw Error(ErrorCode::plugin, "more gyroscopic terms than the host has room for");
+    auto& term = raw_->gyroscopic[raw_->gyroscopic_count++];
+    term.link = link;
+    VectorMap(term.point_link_m, 3) = point_link;
+    VectorMap(term.w_world, 3) = w_world;
+  }
+  /// (d) Torque held over the step [Nm or N].
+  [[nodiscard]] VectorMap held_torque() { return {raw_->held_torque, dof_}; }
+  /// (e) The velocity right after this node; asking for it switches the channel on.
+  [[nodiscard]] VectorMap node_velocity() {
+    raw_->has_node_velocity = 1;
+    return {raw_->node_velocity, dof_};
+  }
+  /// Energy that the planner's own filter took out and put in at this node [J], for the log.
+  void set_accounts(double filter_work_J, double recovery_work_J) {
+    raw_->filter_work_J = filter_work_J;
+    raw_->recovery_work_J = recovery_work_J;
+  }
+  /// Ends the run: the planner knows no way on. The cause is one line; what does not fit is cut off.
+  void give_up(std::string_view cause) {
+    raw_->state = HAMELIN_PLANNER_GAVE_UP;
+    const std::size_t size = std::min(cause.size(), sizeof raw_->cause - 1);
+    std::copy_n(cause.data(), size, raw_->cause);
+    raw_->cause[size] = '\0';
+  }
+  [[nodiscard]] hamelin_command& raw() { return *raw_; }
+
+ private:
+  hamelin_command* raw_;
+  Eigen::Index dof_;
+};
+
+/// Services of the host. May be called in the constructor and in tick.
+class Host {
+ public:
+  explicit Host(const hamelin_host& raw) : raw_(&raw) {}
+
+  void info(std::string_view line) const { log(HAMELIN_LOG_INFO, line); }
+  void warning(std::string_view line) const { log(HAMELIN_LOG_WARNING, line); }
+  /// Contacts of the control spheres at any q, obstacles standing where they are now.
+  /// @param q dof numbers
+  /// @return how many there are; more than out.size() means that the farthest are left out
+  [[nodiscard]] std::size_t closest_points(std::span<const double> q, double influence_m,
+                                           std::span<hamelin_contact> out) const {
+    return raw_->closest_points(raw_->context, q.data(), influence_m, out.data(), out.size());
+  }
+
+ private:
+  void log(std::int32_t level, std::string_view line) const {
+    raw_->log(raw_->context, level, line.data(), line.size());
+  }
+  const hamelin_host* raw_;
+};
+
+/// A planner. Besides tick it has a constructor (const Host&, const Setup&, const Json& params), where params are checked
+/// against the plugin's schema and complete, and, if it wants, `static double influence_m(const Json& params)`: how far
+/// obstacles matter to it [m]. Constructors report bad input by throwing Error.
+class Planner {
+ public:
+  Planner() = default;
+  Planner(const Planner&) = delete;
+  Planner& operator=(const Planner&) = delete;
+  virtual ~Planner() = default;
+  /// Answers a tick. Must not allocate. An exception ends the run as a defect.
+  virtual void tick(const Tick& tick, Command& command) = 0;
+};
+
+namespace detail {
+
+/// The line behind an exception that must not cross the border, cut to size and nul-terminated.
+void write_current_exception(char* error, std::size_t error_size) noexcept;
+
+template <class Type>
+struct Glue {
+  struct Instance {
+    template <class... Args>
+    explicit Instance(std::size_t n, const Args&... args) : dof(n), planner(args...) {}
+    std::size_t dof;
+    Type planner;
+  };
+
+  static std::int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json,
+                             std::size_t params_size, void** out, char* error, std::size_t error_size) noexcept {
+    try {
+      const Json params = parse_json({params_json, params_size}, "params");
+      *out = std::make_unique<Instance>(setup->dof, Host(*host), Setup(*setup), params).release();
+      return 0;
+    } catch (...) {
+      write_current_exception(error, error_size);
+      return 1;
+    }
+  }
+  static std::int32_t tick(void* instance, const hamelin_tick* tick, hamelin_command* command, char* error,
+                           std::size_t error_size) noexcept {
+    try {
+      auto& self = *static_cast<Instance*>(instance);
+      Command view(*command, self.dof);
+      self.planner.tick(Tick(*tick, self.dof), view);
+      return 0;
+    } catch (...) {
+      write_current_exception(error, error_size);
+      return 1;
+    }
+  }
+  static void destroy(void* instance) noexcept { delete static_cast<Instance*>(instance); }
+  static double influence_m(const char* params_json, std::size_t params_size) noexcept {
+    try {
+      if constexpr (requires(const Json& params) { Type::influence_m(params); })
+        return Type::influence_m(parse_json({params_json, params_size}, "params"));
+    } catch (...) {
+      // The same parameters reach create next, which has a way to say what is wrong.
+    }
+    return -1.0;
+  }
+};
+
+}  // namespace detail
+}  // namespace hamelin::planning
+
+/// Makes a plugin of a Planner: once in one file of the plugin, outside any namespace. The only place that catches
+/// exceptions; none crosses the border. The texts must be string literals or otherwise live for ever.
+#define HAMELIN_PLANNER_PLUGIN(Type, plugin_name, plugin_version, plugin_description, schema_text)                \
+  extern "C" __attribute__((visibility("default"))) const hamelin_plugin* hamelin_plugin_entry(void);             \
+  extern "C" const hamelin_plugin* hamelin_plugin_entry(void) {                                                   \
+    using HamelinGlue = ::hamelin::planning::detail::Glue<Type>;                                                  \
+    static const hamelin_plugin plugin = {sizeof(hamelin_plugin), HAMELIN_PLUGIN_ABI_VERSION, plugin_name,        \
+                                          plugin_version,         plugin_description,         schema_text,        \
+                                          &HamelinGlue::create,   &HamelinGlue::tick,         &HamelinGlue::destroy, \
+                                          &HamelinGlue::influence_m};                                             \
+    return &plugin;                                                                                               \
+  }                                                                                                               \
+  static_assert(true, "")

@@ -1,0 +1,77 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hamelin/core/json.hpp"
+#include "hamelin/scene/boxes.hpp"
+#include "hamelin/scene/obstacles.hpp"
+
+namespace hamelin::scene {
+
+/// Which voxels a primitive marks: those it touches, or those whose centre it holds.
+enum class Mark : std::int32_t { touch, centre };
+
+[[nodiscard]] std::string_view to_string(Mark mark) noexcept;
+/// @throws Error usage for anything but "touch" and "centre"
+[[nodiscard]] Mark mark_from(std::string_view name);
+
+/// Random primitives: shape, size, place and turn uniform.
+struct Clutter {
+  std::size_t count = 0;
+  double size_min_m = 0.0, size_max_m = 0.0;  ///< full edges and diameters
+  Box bounds;                                 ///< of the centres
+  std::vector<Ball> keep_out;                 ///< no primitive reaches into these
+  std::uint64_t seed = 1;
+};
+
+struct MakeMapOptions {
+  double resolution_m = 0.02;
+  Mark mark = Mark::touch;
+  std::vector<Obstacle> primitives;   ///< in the map's frame, at rest
+  std::optional<Clutter> clutter;
+  std::optional<Box> free_bounds;     ///< voxels with their centre in here are free unless marked; all else is unknown
+  std::filesystem::path output;       ///< a .bt file
+};
+
+struct MakeReport {
+  std::filesystem::path output;
+  std::string sha256;
+  std::size_t bytes = 0, nodes = 0;
+  std::size_t primitives = 0;         ///< clutter included
+  std::size_t occupied_voxels = 0, free_voxels = 0;
+};
+
+/// The clutter's primitives, the same for the same seed.
+/// @throws Error invalid if the keep-outs leave no room
+[[nodiscard]] std::vector<Obstacle> make_clutter(const Clutter& clutter);
+
+/// Whether a solid primitive and a cube touch. Exact to 1e-9 m; when in doubt they do.
+[[nodiscard]] bool touches(const Obstacle& primitive, const Box& cube);
+
+/// Marks the primitives in an OctoMap and writes it beside, then renames. Same options, same bytes.
+/// @throws Error invalid (sizes, more than 2²⁸ voxels) or io
+MakeReport make_map(const MakeMapOptions& options);
+
+/// Options from a document of the form hamelin.primitives/1 (docs/schema); `output` is left empty.
+/// @throws Error invalid
+[[nodiscard]] MakeMapOptions make_options_from_json(const Json& document, const std::string& where);
+
+struct ProblemOptions {
+  std::filesystem::path robot, spheres;  ///< spheres may be empty
+  std::string tip;                       ///< may be empty
+  double resolution_m = 0.02;
+  Mark mark = Mark::touch;
+  std::filesystem::path output;          ///< the scene; the map stands beside it, with ending .bt
+};
+
+/// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the planner
+/// sees the map, the primitives themselves are there for the judge. Joints go by order.
+/// @throws Error io, parse or invalid
+MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options);
+
+}  // namespace hamelin::scene

@@ -1,0 +1,124 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hamelin/core/json.hpp"
+#include "hamelin/geometry/se3.hpp"
+#include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/obstacles.hpp"
+
+namespace hamelin::scene {
+
+struct RobotRef {
+  std::filesystem::path file;
+  std::optional<std::string> tip;                ///< none: the only leaf
+  std::optional<std::filesystem::path> spheres;  ///< sidecar file
+};
+
+enum class GoalType : std::int32_t { joint, position, pose };
+
+[[nodiscard]] std::string_view to_string(GoalType type) noexcept;
+
+struct Goal {
+  GoalType type = GoalType::joint;
+  Eigen::VectorXd q;           ///< joint [rad or m]
+  geometry::SE3 pose;          ///< position, pose: of the tip in the world; a position's rotation means nothing
+  double tolerance_m = 0.0;    ///< position 0.02, pose 0.01
+  double tolerance_rad = 0.0;  ///< joint 0.05, pose 0.26
+  double speed_max = std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
+};
+
+/// Viscous joint damping [Nms/rad or Ns/m].
+struct JointDamping {
+  bool from_robot = false;     ///< what the robot file gives
+  std::vector<double> values;  ///< else one number for all joints, one per joint, or none
+};
+
+/// A body fixed to the tip.
+struct Payload {
+  double mass_kg = 0.0;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();         ///< centre of mass, tip frame
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();      ///< about the centre of mass, tip frame's axes
+};
+
+/// What of the robot is modelled; by default nothing that could be left out.
+struct ModelFlags {
+  JointDamping joint_damping;
+  bool joint_limits = false, velocity_limits = false, torque_limits = false, self_collision = false;
+  std::optional<Payload> payload;
+};
+
+enum class ActuationType : std::int32_t { ideal, sampled };
+
+[[nodiscard]] std::string_view to_string(ActuationType type) noexcept;
+
+struct Actuation {
+  ActuationType type = ActuationType::ideal;
+  double control_period_s = 0.001;  ///< a whole number of steps; one step under ideal
+  double delay_s = 0.0;
+  double joint_noise_rad = 0.0;
+  double planner_mass_scale = 1.0;
+};
+
+/// A planner or integrator by name, with parameters that only it understands.
+struct Choice {
+  std::string name;
+  Json params = Json::object();
+};
+
+struct StallRule {
+  double speed_m_s = 0.002, distance_m = 0.2, hold_s = 1.0;
+};
+
+/// A scene file, read and checked (hamelin.scene/1; docs/schema/scene.schema.json says what each field means). What is
+/// empty is not modelled.
+struct Scene {
+  std::string name;  ///< the file it came from
+  RobotRef robot;
+  geometry::SE3 base;
+  std::optional<Eigen::Vector3d> gravity_m_s2;
+  Eigen::VectorXd start_q, start_v;  ///< empty: zeros
+  std::vector<Goal> goals;
+  std::optional<MapSpec> map;
+  std::vector<Obstacle> obstacles;
+  ModelFlags model;
+  Actuation actuation;
+  std::optional<Choice> planner;
+  Choice integrator{"hamel-variational", Json::object()};
+  std::optional<StallRule> stall;
+  double step_s = 0.001, duration_s = 10.0;
+  std::uint64_t seed = 1;
+};
+
+/// Reads a scene file; paths inside are taken relative to it.
+/// @throws Error io, parse or invalid: "file: /json/pointer: what is wrong, what was expected"
+[[nodiscard]] Scene read_scene(const std::filesystem::path& file);
+
+/// @param where opens each message and becomes the scene's name
+/// @throws Error invalid
+[[nodiscard]] Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir, const std::string& where);
+
+/// The scene with every default written out; what is not modelled is null. scene_from_json() reads it back as the same.
+[[nodiscard]] Json resolved_json(const Scene& scene);
+
+/// Sets one value by "/json/pointer=VALUE"; VALUE is JSON, else a string. Keys that the file leaves out are made if
+/// the schema knows them.
+/// @throws Error usage, one line that begins with the assignment
+void set_pointer(Json& document, std::string_view assignment);
+
+/// One obstacle in a scene's form. @throws Error invalid, "where: …"
+[[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
+[[nodiscard]] Json to_json(const Obstacle& obstacle);
+
+/// The surroundings of a scene. See Environment.
+[[nodiscard]] inline Environment make_environment(const Scene& scene, double reach, double influence) {
+  return Environment(scene.map, scene.obstacles, scene.base, reach, influence);
+}
+
+}  // namespace hamelin::scene

@@ -1,0 +1,192 @@
+#include "hamelin/scene/environment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::scene {
+
+namespace {
+
+constexpr double cone_cosine = 0.86602540378443865;  // 30°
+
+BoxField field_of(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin) {
+  std::vector<Box> boxes;
+  for (const VoxelBox& box : merge(cells)) boxes.push_back(to_metres(box, resolution));
+  return BoxField(std::move(boxes), origin);
+}
+
+}  // namespace
+
+std::string_view to_string(UnknownPolicy policy) noexcept {
+  switch (policy) {
+    case UnknownPolicy::free: return "free";
+    case UnknownPolicy::slow: return "slow";
+    case UnknownPolicy::block: return "block";
+  }
+  return "unknown";
+}
+
+Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
+                         double reach, double influence)
+    : obstacles_(std::move(obstacles)) {
+  for (const Obstacle& obstacle : obstacles_) check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
+  summary_.obstacles = obstacles_.size();
+  if (!map) return;
+  if (!(reach >= 0.0 && influence >= 0.0 && std::isfinite(reach) && std::isfinite(influence)))
+    throw Error(ErrorCode::usage, fmt::format("{}: reach {} m and influence {} m, expected finite numbers from 0 up",
+                                              map->file.string(), reach, influence));
+  MapData data = read_map(map->file, {map->scale, map->occupancy_threshold});
+  map_pose_ = map->pose;
+  map_pose_inverse_ = map->pose.inverse();
+  const Eigen::Vector3d center = map_pose_inverse_ * base.p();
+  const Ball region{center, reach + influence}, reachable{center, reach};
+
+  const std::vector<Cell> occupied = crop(data.occupied, data.resolution, region);
+  map_ = field_of(occupied, data.resolution, center);
+
+  summary_.has_map = true;
+  summary_.map_file = data.file;
+  summary_.map_sha256 = data.sha256;
+  summary_.resolution_m = data.resolution;
+  summary_.nodes = data.node_count;
+  summary_.leaves = data.occupied.size();
+  summary_.leaves_cropped = occupied.size();
+  summary_.boxes = map_.boxes().size();
+  summary_.unknown = map->unknown;
+  summary_.warnings = std::move(data.warnings);
+  const double ball_volume = 4.0 / 3.0 * std::numbers::pi * reach * reach * reach;
+  if (ball_volume > 0.0)
+    summary_.unknown_share = std::clamp(volume_inside(data.unknown, data.resolution, reachable) / ball_volume, 0.0, 1.0);
+  if (map->unknown != UnknownPolicy::free) {
+    std::vector<Cell> unknown = crop(data.unknown, data.resolution, region);
+    if (map->keep_out_radius_m > 0.0) unknown = cut_out(unknown, data.resolution, {center, map->keep_out_radius_m});
+    unknown_ = field_of(unknown, data.resolution, center);
+    summary_.unknown_boxes = unknown_.boxes().size();
+  }
+  if (!data.occupied.empty() && occupied.empty())
+    summary_.warnings.push_back(fmt::format("no occupied leaf within {:.3g} m of the base: are base, map pose and scale right?",
+                                            region.radius));
+}
+
+Environment::Scratch::Scratch(const Environment& environment, std::size_t spheres)
+    : map_(environment.map_), unknown_(environment.unknown_) {
+  const std::size_t room = spheres * (2 * points_per_sphere + environment.obstacles_.size());
+  found_.reserve(room);
+  order_.reserve(room);
+}
+
+bool Environment::has_obstacles() const noexcept {
+  return !map_.empty() || !obstacles_.empty() || (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
+}
+
+double Environment::clearance_to(const Obstacle& obstacle, std::span<const Eigen::Vector3d> centers,
+                                 std::span<const double> radii, double time_s, double limit) const {
+  const Eigen::Vector3d at = position_at(obstacle, time_s);
+  const double ball = bounding_radius(obstacle);
+  double smallest = limit;
+  for (std::size_t i = 0; i < centers.size(); ++i) {
+    const double near = smallest + radii[i] + ball;
+    if (near <= 0.0 || (centers[i] - at).squaredNorm() >= near * near) continue;
+    smallest = std::min(smallest, closest_on(obstacle, at, centers[i]).distance - radii[i]);
+  }
+  return smallest;
+}
+
+bool Environment::shown(std::size_t obstacle, std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
+                        double time_s, View view) const {
+  const Obstacle& o = obstacles_[obstacle];
+  if (view == View::judge) return exists(o, time_s);
+  if (o.known || !o.visible_within_m) return visible(o, time_s, 0.0);
+  return visible(o, time_s, clearance_to(o, centers, radii, time_s, std::numeric_limits<double>::infinity()));
+}
+
+std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double influence,
+                                 double time_s, Scratch& scratch, std::span<Contact> out, View view) const {
+  auto& found = scratch.found_;
+  found.clear();
+  std::array<BoxHit, points_per_sphere> hits;
+  const auto add = [&](std::size_t sphere, int obstacle, double center_distance, const Eigen::Vector3d& point,
+                       const Eigen::Vector3d& direction, const Eigen::Vector3d& velocity) {
+    found.push_back({static_cast<int>(sphere), obstacle, center_distance - radii[sphere],
+                     centers[sphere] - radii[sphere] * direction, point, direction, velocity});
+  };
+  const auto add_boxes = [&](const BoxField& field, BoxField::Scratch& room, int id, std::size_t sphere) {
+    if (field.empty()) return;
+    const Eigen::Vector3d local = map_pose_inverse_ * centers[sphere];
+    const std::size_t count = field.several(local, influence + radii[sphere], cone_cosine, room, hits);
+    for (std::size_t i = 0; i < count; ++i)
+      add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction, Eigen::Vector3d::Zero());
+  };
+  for (std::size_t sphere = 0; sphere < centers.size(); ++sphere) {
+    add_boxes(map_, scratch.map_, Contact::map, sphere);
+    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, sphere);
+  }
+  for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+    if (!shown(k, centers, radii, time_s, view)) continue;
+    const Obstacle& obstacle = obstacles_[k];
+    const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
+    const double ball = bounding_radius(obstacle);
+    for (std::size_t sphere = 0; sphere < centers.size(); ++sphere) {
+      const double limit = influence + radii[sphere], near = limit + ball;
+      if ((centers[sphere] - at).squaredNorm() > near * near) continue;
+      const SurfacePoint hit = closest_on(obstacle, at, centers[sphere]);
+      if (hit.distance <= limit) add(sphere, static_cast<int>(k), hit.distance, hit.point, hit.direction, velocity);
+    }
+  }
+
+  auto& order = scratch.order_;
+  order.resize(found.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (out.size() < found.size()) {
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()), order.end(),
+                     [&](std::size_t a, std::size_t b) {
+                       return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
+                     });
+    order.resize(out.size());
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    if (found[a].sphere != found[b].sphere) return found[a].sphere < found[b].sphere;
+    return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
+  });
+  for (std::size_t i = 0; i < order.size(); ++i) out[i] = found[order[i]];
+  return found.size();
+}
+
+double Environment::clearance(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
+                              double limit, View view) const {
+  double smallest = limit;
+  BoxHit hit;
+  const auto consider = [&](const BoxField& field) {
+    if (field.empty()) return;
+    std::int32_t hint = -1;
+    for (std::size_t i = 0; i < centers.size(); ++i) {
+      // Beyond contact the search must not end at a sphere's radius: a deeper one may follow.
+      if (!field.nearest(map_pose_inverse_ * centers[i], std::max(0.0, smallest + radii[i]), hit, hint)) continue;
+      hint = hit.box;
+      smallest = std::min(smallest, hit.distance - radii[i]);
+    }
+  };
+  consider(map_);
+  if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
+  for (std::size_t k = 0; k < obstacles_.size(); ++k)
+    if (shown(k, centers, radii, time_s, view)) smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
+  return smallest;
+}
+
+bool Environment::in_slow_space(std::span<const Eigen::Vector3d> centers, std::span<const double> radii) const {
+  if (summary_.unknown != UnknownPolicy::slow || unknown_.empty()) return false;
+  BoxHit hit;
+  for (std::size_t i = 0; i < centers.size(); ++i)
+    if (unknown_.nearest(map_pose_inverse_ * centers[i], radii[i], hit)) return true;
+  return false;
+}
+
+}  // namespace hamelin::scene
