@@ -1,7 +1,8 @@
 # hamelin_plugin(NAME mine SOURCES mine.cpp [SCHEMA params.schema.json] [LINKS ...])
 #
 # Builds NAME.hamelin.so, a planner plugin; the same function in the tree and, after find_package(hamelin), outside it.
-# SCHEMA, the JSON Schema of the planner's parameters, becomes the string literal in the header "params_schema.hpp".
+# SCHEMA, the JSON Schema of the planner's parameters, becomes the string literal `params_schema` in the header
+# "params_schema.hpp". In the tree, TEST_ONLY keeps a plugin out of the install and out of the planners' folder.
 include(GNUInstallDirs)
 
 function(hamelin_plugin)
@@ -10,13 +11,13 @@ function(hamelin_plugin)
     message(FATAL_ERROR "hamelin_plugin: want NAME and SOURCES; unknown: '${arg_UNPARSED_ARGUMENTS}'")
   endif()
   set(target hamelin_plugin_${arg_NAME})
+  set(generated "${CMAKE_CURRENT_BINARY_DIR}/${target}")
   add_library(${target} MODULE ${arg_SOURCES})
   target_link_libraries(${target} PRIVATE hamelin::planning ${arg_LINKS} $<TARGET_NAME_IF_EXISTS:hamelin_options>)
   target_compile_features(${target} PRIVATE cxx_std_20)
   if(arg_SCHEMA)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCHEMA}")
     file(READ "${arg_SCHEMA}" schema)
-    set(generated "${CMAKE_CURRENT_BINARY_DIR}/${target}")
     file(CONFIGURE OUTPUT "${generated}/params_schema.hpp" @ONLY
       CONTENT "#pragma once\ninline constexpr const char* params_schema = R\"hamelin(${schema})hamelin\";\n")
     target_include_directories(${target} PRIVATE "${generated}")
@@ -24,9 +25,12 @@ function(hamelin_plugin)
   set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME ${arg_NAME} SUFFIX ".hamelin.so"
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON CXX_EXTENSIONS OFF
     LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/lib/hamelin/plugins")
-  # Only the entry leaves the file: static libraries linked in must not meet the host's copies.
-  target_link_options(${target} PRIVATE LINKER:--exclude-libs,ALL)
-  if(NOT HAMELIN_SANITIZE)
+  # Only the entry leaves the file: libraries and templates linked in must not meet the host's copies.
+  file(CONFIGURE OUTPUT "${generated}/exports.map" @ONLY
+    CONTENT "{\n  global: hamelin_plugin_entry;\n  local: *;\n};\n")
+  target_link_options(${target} PRIVATE "LINKER:--version-script=${generated}/exports.map")
+  set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS "${generated}/exports.map")
+  if(NOT HAMELIN_SANITIZE)  # whose run-time comes with the program
     target_link_options(${target} PRIVATE LINKER:-z,defs)
   endif()
   if(arg_TEST_ONLY)

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#define VALIJSON_USE_EXCEPTIONS 1  // else it aborts on a bad schema
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>

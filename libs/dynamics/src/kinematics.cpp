@@ -74,11 +74,11 @@ geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
   return geometry::SE3{f.R, f.p} * model.tip_in_frame();
 }
 
-void sphere_centers(const Model& model, const Workspace& ws, Matrix3Xd& centers) {
-  Eigen::Index column = 0;
+void sphere_centers(const Model& model, const Workspace& ws, std::span<Vector3d> centers) {
+  std::size_t i = 0;
   for (const auto& s : model.spheres()) {
     const Frame& f = frame(ws, s.link);
-    centers.col(column++) = f.p + f.R * s.center;
+    centers[i++] = f.p + f.R * s.center;
   }
 }
 

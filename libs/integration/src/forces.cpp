@@ -15,7 +15,7 @@ State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   state.v = v0;
   state.p = VectorXd::Zero(model_.dof());
   state.force_previous = VectorXd::Zero(model_.dof());
-  state.deltas.assign(3, VectorXd::Zero(model_.dof()));
+  state.deltas.assign(4, VectorXd::Zero(model_.dof()));
   begin(state, v0);
   saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   return state;
@@ -26,6 +26,10 @@ StepReport Integrator::step(State& state, const Channels& channels, double h) {
   const long k = state.k;
   const double time = state.time_s;
   const StepReport report = divide(state, channels, h, 0);
+  if (!report.converged) {
+    state = saved_[0];
+    return report;
+  }
   state.k = k + 1;
   state.time_s = time + h;
   return report;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace hamelin::integration {
@@ -20,12 +21,12 @@ Variational::Variational(const Model& model, const Options& options)
     links_ = kernel::VariationalScratch<dynamics::kernel::Planar<double>>(n);
   else
     links_ = kernel::VariationalScratch<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_, &torque_error_})
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_})
     *x = VectorXd::Zero(model.dof());
 }
 
 std::string Variational::criterion() const {
-  return options_.solver == Solver::newton ? fmt::format("|correction of delta|_inf <= {}", options_.tolerance)
+  return options_.solver == Solver::newton ? fmt::format("|error of delta|_inf <= {}", options_.tolerance)
                                            : fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
 }
 
@@ -44,13 +45,18 @@ void Variational::set_velocity(State& state, const VectorXd& v) {
 }
 
 void Variational::guess(const State& state, double h) {
+  if (options_.solver == Solver::feedback) {
+    delta_.setZero();  // the paper's guess θ^k
+    return;
+  }
   const auto& d = state.deltas;
   switch (state.delta_count) {
     case -1: delta_ = h * state.v; break;
     case 0: delta_.setZero(); break;
     case 1: delta_ = d[0]; break;
     case 2: delta_ = 2.0 * d[0] - d[1]; break;
-    default: delta_ = 3.0 * (d[0] - d[1]) + d[2]; break;
+    case 3: delta_ = 3.0 * (d[0] - d[1]) + d[2]; break;
+    default: delta_ = 4.0 * (d[0] + d[2]) - 6.0 * d[1] - d[3]; break;
   }
   if (state.delta_count > 0 && state.step_previous != h) delta_ = d[0] * (h / state.step_previous);
 }
@@ -68,55 +74,77 @@ void Variational::evaluate(const State& state, const Channels& channels, double 
   residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
 }
 
-StepReport Variational::attempt(State& state, const Channels& channels, double h) {
-  StepReport report;
-  report.converged = false;
-  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
-  guess(state, h);
-  const bool newton = options_.solver == Solver::newton;
+bool Variational::factor(const Channels& channels, double h) {
   const double* damping = channels.damping.size() > 0 ? channels.damping.data() : nullptr;
-  const int max_updates = newton ? max_newton_updates : options_.max_updates;
+  if (model_.planar()) return kernel::factor(std::get<1>(model_.chain()), std::get<1>(links_), h, damping);
+  return kernel::factor(std::get<0>(model_.chain()), std::get<0>(links_), h, damping);
+}
+
+void Variational::correct() {
+  if (model_.planar())
+    kernel::correct(std::get<1>(model_.chain()), std::get<1>(links_), residual_.data(), correction_.data());
+  else
+    kernel::correct(std::get<0>(model_.chain()), std::get<0>(links_), residual_.data(), correction_.data());
+}
+
+// The last sweep is needed for p⁺ anyway, and the kept factors turn its residual into the error of Δ: no factorisation
+// is spent on confirming.
+bool Variational::solve_newton(const State& state, const Channels& channels, double h, StepReport& report) {
   for (;;) {
     evaluate(state, channels, h);
     ++report.evaluations;
-    if (!residual_.allFinite()) return report;
-    if (report.converged) break;  // Newton's last correction was small: this sweep was for p⁺
-    if (!newton) {
-      report.residual = residual_.norm() / h;
-      if (report.residual < options_.feedback_tolerance) {
-        report.converged = true;
-        break;
+    if (!residual_.allFinite()) return false;
+    if (report.factorizations > 0) {
+      correct();
+      report.residual = correction_.lpNorm<Eigen::Infinity>();
+      if (report.residual <= options_.tolerance) {
+        // The correction is at hand, so Δ takes it; taking R out of p⁺ = p⁻ + h λ·b moves p⁺ along but for its slow part.
+        delta_ += correction_;
+        plus_ -= residual_;
+        return true;
       }
     }
-    if (report.updates == max_updates) return report;
-    if (newton) {
-      const bool solved =
-          model_.planar() ? kernel::newton(std::get<1>(model_.chain()), std::get<1>(links_), h, residual_.data(), damping,
-                                           correction_.data())
-                          : kernel::newton(std::get<0>(model_.chain()), std::get<0>(links_), h, residual_.data(), damping,
-                                           correction_.data());
-      if (!solved || !correction_.allFinite()) return report;
-      report.residual = correction_.lpNorm<Eigen::Infinity>();
-      report.converged = report.residual <= options_.tolerance;
-    } else {
-      torque_error_ = residual_ * (-h);  // h² M⁻¹ τ_e with τ_e = R/h, (16)
-      dynamics::solve_mass(model_, ws_, state.q, torque_error_, correction_);
-    }
+    if (report.updates == max_newton_updates || !factor(channels, h)) return false;
+    ++report.factorizations;
+    correct();
+    delta_ += correction_;
+    ++report.updates;
+  }
+}
+
+bool Variational::solve_feedback(const State& state, const Channels& channels, double h, StepReport& report) {
+  for (;;) {
+    evaluate(state, channels, h);
+    ++report.evaluations;
+    report.residual = residual_.norm() / h;  // ‖τ_e‖
+    if (!std::isfinite(report.residual)) return false;
+    if (report.residual < options_.feedback_tolerance) return true;
+    if (report.updates == options_.max_updates) return false;
+    residual_ *= -h;  // h² M⁻¹ τ_e with τ_e = R/h, (16)
+    dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);
     delta_ += correction_;
     ++report.updates;
     ++report.factorizations;
   }
-  book_work(report, delta_, 1.0);
+}
+
+StepReport Variational::attempt(State& state, const Channels& channels, double h) {
+  StepReport report;
+  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
+  guess(state, h);
+  report.converged = options_.solver == Solver::newton ? solve_newton(state, channels, h, report)
+                                                       : solve_feedback(state, channels, h, report);
+  if (!report.converged) return report;
+  book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
   // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F
   state.q += delta_;
   state.p = plus_ + 0.5 * h * force_;
   dynamics::gravity_torque(model_, ws_, state.q, gradient_);
   state.p -= 0.5 * h * gradient_;
   const bool same_step = state.step_previous == h && state.delta_count > 0;
-  std::swap(state.deltas[2], state.deltas[1]);
-  std::swap(state.deltas[1], state.deltas[0]);
+  std::rotate(state.deltas.begin(), state.deltas.end() - 1, state.deltas.end());
   state.deltas[0] = delta_;
-  state.delta_count = same_step ? std::min(state.delta_count + 1, 3) : 1;
+  state.delta_count = same_step ? std::min(state.delta_count + 1, 4) : 1;
   state.step_previous = h;
   return report;
 }

@@ -24,11 +24,16 @@ class Variational final : public Integrator {
   void guess(const State& state, double h);
   /// Residual of the left equation at delta_; leaves plus_ and force_.
   void evaluate(const State& state, const Channels& channels, double h);
+  bool factor(const Channels& channels, double h);
+  /// correction_ = what the kept factors make of residual_.
+  void correct();
+  bool solve_newton(const State& state, const Channels& channels, double h, StepReport& report);
+  bool solve_feedback(const State& state, const Channels& channels, double h, StepReport& report);
 
   std::variant<kernel::VariationalScratch<dynamics::kernel::Spatial<double>>,
                kernel::VariationalScratch<dynamics::kernel::Planar<double>>>
       links_;
-  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_, torque_error_;
+  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_;
 };
 
 }  // namespace hamelin::integration

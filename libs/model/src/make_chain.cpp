@@ -1,1 +1,77 @@
-#include "hamelin/model/robot.hpp"
+#include "hamelin/model/make_chain.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::model {
+
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<Vector3d> parse_axes(const std::string& text) {
+  std::vector<Vector3d> axes;
+  std::string_view rest = text;
+  while (true) {
+    const auto comma = rest.find(',');
+    const std::string_view name = rest.substr(0, comma);
+    if (name.size() != 1 || name[0] < 'x' || name[0] > 'z')
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("make-chain: axes '{}': '{}' is no axis, expected a list of x, y, z as x,z,x", text, name));
+    axes.push_back(Vector3d::Unit(name[0] - 'x'));
+    if (comma == std::string_view::npos) return axes;
+    rest.remove_prefix(comma + 1);
+  }
+}
+
+void require_positive(const char* option, double value, double most) {
+  if (!(value > 0.0 && value <= most))
+    throw Error(ErrorCode::usage,
+                fmt::format("make-chain: {} is {}, expected a positive number up to {}", option, value, most));
+}
+
+}  // namespace
+
+Robot make_chain(const ChainOptions& options) {
+  constexpr int links_max = 10000;
+  if (options.links < 1 || options.links > links_max)
+    throw Error(ErrorCode::usage, fmt::format("make-chain: links is {}, expected 1 to {}", options.links, links_max));
+  const double L = options.length_m, m = options.mass_kg, r = options.radius_m;
+  require_positive("length", L, 1e4 / options.links);
+  require_positive("mass", m, 1e9);
+  require_positive("radius", r, 1e3);
+  const std::vector<Vector3d> axes = parse_axes(options.axes);
+
+  // Spheres that touch, but never more than a few a link.
+  const int spheres = static_cast<int>(std::clamp(std::ceil(L / (2.0 * r)), 1.0, 8.0));
+  Robot robot;
+  robot.name = fmt::format("chain{}", options.links);
+  for (int i = 0; i < options.links; ++i) {
+    Link link;
+    link.name = fmt::format("link{}", i + 1);
+    link.parent = i - 1;
+    link.joint.name = fmt::format("j{}", i + 1);
+    const Vector3d& axis = axes[static_cast<std::size_t>(i) % axes.size()];
+    link.joint.screw << axis, Vector3d(0.0, i * L, 0.0).cross(axis);
+    link.com = geometry::SE3(Eigen::Matrix3d::Identity(), Vector3d(0.0, (i + 0.5) * L, 0.0));
+    link.mass_kg = m;
+    const double across = m * (L * L / 12.0 + r * r / 4.0);
+    link.inertia_kg_m2 = Vector3d(across, m * r * r / 2.0, across).asDiagonal();
+    for (int k = 0; k < spheres; ++k) link.spheres.push_back({Vector3d(0.0, L * ((k + 0.5) / spheres - 0.5), 0.0), r});
+    link.segments.push_back({Vector3d(0.0, -0.5 * L, 0.0), Vector3d(0.0, 0.5 * L, 0.0), r});
+    robot.links.push_back(std::move(link));
+    if (i > 0) robot.self_collision_disabled.emplace_back(fmt::format("link{}", i), fmt::format("link{}", i + 1));
+  }
+  robot.tip = {robot.links.back().name, options.links - 1,
+               geometry::SE3(Eigen::Matrix3d::Identity(), Vector3d(0.0, options.links * L, 0.0))};
+  check(robot, "make-chain");
+  return robot;
+}
+
+}  // namespace hamelin::model

@@ -1,2 +1,174 @@
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <set>
+
+#include "hamelin/core/error.hpp"
 #include "hamelin/model/robot.hpp"
-namespace hamelin::model { void check(const Robot&, const std::string&) {} }
+#include "robot_detail.hpp"
+
+namespace hamelin::model {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using geometry::Matrix6d;
+using geometry::SE3;
+
+// Beyond these a number is a typing error or overflows when squared; no arm comes near.
+constexpr double length_max_m = 1e4;
+constexpr double mass_max_kg = 1e9;
+constexpr double inertia_max_kg_m2 = 1e15;
+// Unit vectors and rotations may be off by rounding only: readers normalise.
+constexpr double unit_tolerance = 1e-9;
+// A joint is without inertia if what it moves with the joints behind it free is below this share of what it moves with
+// them locked.
+constexpr double inertia_share_min = 1e-14;
+
+[[noreturn]] void fail(const std::string& where, const std::string& what) {
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
+}
+
+void check_length(const Vector3d& p, const std::string& where, const char* what) {
+  if (!p.allFinite() || p.cwiseAbs().maxCoeff() > length_max_m)
+    fail(where, fmt::format("{} is ({}, {}, {}), expected finite numbers up to {} m", what, p.x(), p.y(), p.z(),
+                            length_max_m));
+}
+
+void check_pose(const SE3& g, const std::string& where, const char* what) {
+  check_length(g.p(), where, what);
+  const double off = (g.R() * g.R().transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(off <= unit_tolerance) || g.R().determinant() < 0.0)
+    fail(where, fmt::format("the rotation of {} is no rotation", what));
+}
+
+void check_joint(const Joint& joint, const std::string& where) {
+  const Vector3d omega = joint.screw.head<3>(), v = joint.screw.tail<3>();
+  check_length(v, where, "the screw's v");
+  if (joint.type == JointType::revolute) {
+    if (!(std::abs(omega.norm() - 1.0) <= unit_tolerance))
+      fail(where, fmt::format("the axis has length {}, expected 1", omega.norm()));
+    if (!(std::abs(omega.dot(v)) <= unit_tolerance * (1.0 + v.norm())))
+      fail(where, fmt::format("the screw has pitch {} m/rad, expected 0 for a revolute joint", omega.dot(v)));
+  } else {
+    if (!omega.isZero(0.0)) fail(where, "the screw of a prismatic joint turns, expected omega = 0");
+    if (!(std::abs(v.norm() - 1.0) <= unit_tolerance))
+      fail(where, fmt::format("the axis has length {}, expected 1", v.norm()));
+  }
+  for (const auto& limit : {joint.lower, joint.upper})
+    if (limit && !std::isfinite(*limit))
+      fail(where, fmt::format("a position limit is {}, expected a finite number", *limit));
+  if (joint.lower && joint.upper && !(*joint.lower < *joint.upper))
+    fail(where, fmt::format("lower limit {} is not below upper limit {}", *joint.lower, *joint.upper));
+  if (joint.velocity_max && !(*joint.velocity_max > 0.0 && std::isfinite(*joint.velocity_max)))
+    fail(where, fmt::format("velocity limit {}, expected a positive number", *joint.velocity_max));
+  if (joint.effort_max && !(*joint.effort_max > 0.0 && std::isfinite(*joint.effort_max)))
+    fail(where, fmt::format("effort limit {}, expected a positive number", *joint.effort_max));
+  if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
+    fail(where, fmt::format("damping {}, expected a number of at least 0", joint.damping));
+}
+
+void check_body(const Link& link, const std::string& where) {
+  check_pose(link.com, where, "the COM frame");
+  if (!(link.mass_kg >= 0.0 && link.mass_kg <= mass_max_kg))
+    fail(where, fmt::format("mass {} kg, expected 0 to {}", link.mass_kg, mass_max_kg));
+  if (link.mass_kg > 0.0 || !link.inertia_kg_m2.isZero(0.0)) {
+    const std::string fault = detail::inertia_fault(link.inertia_kg_m2, true);
+    if (!fault.empty()) fail(where, "inertia " + fault);
+  }
+  for (const auto& sphere : link.spheres) {
+    check_length(sphere.center_m, where, "a sphere's centre");
+    if (!(sphere.radius_m > 0.0 && sphere.radius_m <= length_max_m))
+      fail(where, fmt::format("a sphere's radius is {} m, expected a positive number", sphere.radius_m));
+  }
+  for (const auto& segment : link.segments) {
+    check_length(segment.from_m, where, "a segment's start");
+    check_length(segment.to_m, where, "a segment's end");
+    if (!(segment.radius_m >= 0.0 && segment.radius_m <= length_max_m))
+      fail(where, fmt::format("a segment's radius is {} m, expected a number of at least 0", segment.radius_m));
+  }
+}
+
+// That each joint has inertia to turn or push: composite (all joints behind locked) and articulated (all free), at a
+// bent configuration so that no accidental alignment counts.
+void check_joint_inertia(const Robot& robot, const std::string& where) {
+  const auto n = robot.links.size();
+  std::vector<geometry::Vector6d> screws(n);
+  std::vector<Matrix6d> bodies(n);
+  SE3 moved;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Link& link = robot.links[i];
+    screws[i] = moved.Ad(link.joint.screw);
+    moved = moved * SE3::exp(link.joint.screw * (0.7 + 0.1 * static_cast<double>(i % 7)));
+    Matrix6d inertia = Matrix6d::Zero();
+    inertia.topLeftCorner<3, 3>() = link.inertia_kg_m2;
+    inertia.bottomRightCorner<3, 3>() = link.mass_kg * Matrix3d::Identity();
+    const Matrix6d to_com = (moved * link.com).inverse().Ad();
+    bodies[i] = to_com.transpose() * inertia * to_com;
+  }
+  Matrix6d composite = Matrix6d::Zero(), articulated = Matrix6d::Zero();
+  for (std::size_t i = n; i-- > 0;) {
+    composite += bodies[i];
+    articulated += bodies[i];
+    const double locked = screws[i].dot(composite * screws[i]);
+    const geometry::Vector6d push = articulated * screws[i];
+    const double free = screws[i].dot(push);
+    if (!(locked > 0.0) || !(free > inertia_share_min * locked))
+      fail(where,
+           fmt::format("link '{}': nothing it moves has inertia about joint '{}', expected a positive mass or inertia",
+                       robot.links[i].name, robot.links[i].joint.name));
+    articulated -= push * push.transpose() / free;
+  }
+}
+
+}  // namespace
+
+std::string detail::inertia_fault(const Matrix3d& inertia, bool strict) {
+  // Published figures are rounded; what they miss the inequality by is their last digit.
+  constexpr double triangle_tolerance = 1e-4;
+  constexpr double definite_tolerance = 1e-12;
+  if (!inertia.allFinite() || inertia.cwiseAbs().maxCoeff() > inertia_max_kg_m2)
+    return fmt::format("has an entry that is not a finite number up to {} kg m2", inertia_max_kg_m2);
+  if (inertia != inertia.transpose()) return "is not symmetric";
+  const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  const double least = moments[0], largest = moments[2];
+  const std::string shown =
+      fmt::format("(principal moments {:.6g}, {:.6g}, {:.6g})", moments[0], moments[1], moments[2]);
+  if (strict ? !(least > definite_tolerance * largest) : least < -definite_tolerance * std::abs(largest))
+    return fmt::format("is not positive {} {}", strict ? "definite" : "semi-definite", shown);
+  if (moments[0] + moments[1] < (1.0 - triangle_tolerance) * largest)
+    return fmt::format("breaks the triangle inequality {}: no body has it", shown);
+  return {};
+}
+
+void check(const Robot& robot, const std::string& where) {
+  if (robot.links.empty()) fail(where, "the robot has no moving link, expected at least one");
+  std::set<std::string> links, joints;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link& link = robot.links[i];
+    const std::string place = fmt::format("{}: link '{}'", where, link.name);
+    if (link.name.empty()) fail(where, fmt::format("link {} has no name", i));
+    if (!links.insert(link.name).second) fail(place, "the name is given twice");
+    if (link.parent != static_cast<int>(i) - 1)
+      fail(place,
+           fmt::format("parent is {}, expected {}: links in order, no branches", link.parent, static_cast<int>(i) - 1));
+    const std::string joint_place = fmt::format("{}: joint '{}'", place, link.joint.name);
+    if (link.joint.name.empty()) fail(place, "the joint has no name");
+    if (!joints.insert(link.joint.name).second) fail(joint_place, "the name is given twice");
+    check_joint(link.joint, joint_place);
+    check_body(link, place);
+  }
+  if (robot.tip.link < 0 || robot.tip.link >= robot.dof())
+    fail(where, fmt::format("tip: moves with link {}, expected 0 to {}", robot.tip.link, robot.dof() - 1));
+  check_pose(robot.tip.pose, where + ": tip", "the pose");
+  for (const auto& [a, b] : robot.self_collision_disabled)
+    for (const auto& name : {a, b})
+      if (links.count(name) == 0)
+        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name,
+                                detail::suggestion(name, {links.begin(), links.end()})));
+  check_joint_inertia(robot, where);
+}
+
+}  // namespace hamelin::model

@@ -1,1 +1,280 @@
-#include "hamelin/model/robot.hpp"
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/model/robot_io.hpp"
+#include "robot_detail.hpp"
+
+namespace hamelin::model {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using geometry::SE3;
+
+constexpr const char* schema_name = "hamelin.robot/1";
+
+template <int n>
+Eigen::Matrix<double, n, 1> numbers_of(const Json& numbers) {
+  Eigen::Matrix<double, n, 1> out;
+  for (int i = 0; i < n; ++i) out[i] = numbers[static_cast<std::size_t>(i)].get<double>();
+  return out;
+}
+Vector3d vector_of(const Json& numbers) { return numbers_of<3>(numbers); }
+Json json_of(const Vector3d& v) {
+  return Json::array({v.x(), v.y(), v.z()});
+}
+
+SE3 pose_of(const Json& json, const std::string& where) {
+  try {
+    return {geometry::rotation_from_wxyz(numbers_of<4>(json["quaternion_wxyz"])), vector_of(json["position_m"])};
+  } catch (const Error& e) {
+    throw Error(ErrorCode::invalid, fmt::format("{}/{}", where, e.what()));
+  }
+}
+
+void put_pose(Json& json, const SE3& pose) {
+  const Eigen::Vector4d q = geometry::quaternion_wxyz(pose.R());
+  json["position_m"] = json_of(pose.p());
+  json["quaternion_wxyz"] = {q[0], q[1], q[2], q[3]};
+}
+
+// A list that may be left out.
+const Json& list_of(const Json& json, const char* key) {
+  static const Json none = Json::array();
+  return json.contains(key) ? json[key] : none;
+}
+
+std::optional<double> optional_of(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional<double>(json.get<double>());
+}
+Json json_of(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Joint joint_of(const Json& json) {
+  Joint joint;
+  joint.name = json["name"];
+  joint.type = json["type"] == "revolute" ? JointType::revolute : JointType::prismatic;
+  joint.screw = numbers_of<6>(json["screw"]);
+  joint.lower = optional_of(json["lower"]);
+  joint.upper = optional_of(json["upper"]);
+  joint.velocity_max = optional_of(json["velocity_max"]);
+  joint.effort_max = optional_of(json["effort_max"]);
+  joint.damping = json["damping"];
+  return joint;
+}
+
+Json json_of(const Joint& joint) {
+  Json json{{"name", joint.name}, {"type", joint.type == JointType::revolute ? "revolute" : "prismatic"}};
+  json["screw"] = std::vector<double>(joint.screw.begin(), joint.screw.end());
+  json["lower"] = json_of(joint.lower);
+  json["upper"] = json_of(joint.upper);
+  json["velocity_max"] = json_of(joint.velocity_max);
+  json["effort_max"] = json_of(joint.effort_max);
+  json["damping"] = joint.damping;
+  return json;
+}
+
+Json json_of(const Link& link) {
+  const Matrix3d& I = link.inertia_kg_m2;
+  Json json{{"name", link.name}, {"parent", link.parent}, {"joint", json_of(link.joint)}};
+  put_pose(json["com"], link.com);
+  json["mass_kg"] = link.mass_kg;
+  json["inertia_kg_m2"] = {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
+  json["spheres"] = Json::array();
+  for (const auto& sphere : link.spheres)
+    json["spheres"].push_back({{"center_m", json_of(sphere.center_m)}, {"radius_m", sphere.radius_m}});
+  json["segments"] = Json::array();
+  for (const auto& segment : link.segments)
+    json["segments"].push_back(
+        {{"from_m", json_of(segment.from_m)}, {"to_m", json_of(segment.to_m)}, {"radius_m", segment.radius_m}});
+  return json;
+}
+
+// One pass of R → quaternion → R.
+Matrix3d through_quaternion(const Matrix3d& R) {
+  return geometry::rotation_from_wxyz(geometry::quaternion_wxyz(R));
+}
+
+Matrix3d rounded(Matrix3d R) {
+  // Rounding makes the passes settle, mostly at once; a rotation that keeps alternating between neighbours is turned by
+  // an ulp of its first entry, which starts another sequence.
+  for (int nudge = 0; nudge < 100; ++nudge) {
+    for (int pass = 0; pass < 20; ++pass) {
+      const Matrix3d next = through_quaternion(R);
+      if (next == R) return R;
+      R = next;
+    }
+    Eigen::Vector4d q = geometry::quaternion_wxyz(R);
+    q[1 + nudge % 3] += 1e-16;
+    R = geometry::rotation_from_wxyz(q);
+  }
+  return R;
+}
+
+void take_spheres(Robot& robot, const std::filesystem::path& file) {
+  const detail::SphereFile given = detail::read_spheres(file);
+  std::vector<std::string> names;
+  for (auto& link : robot.links) {
+    link.spheres.clear();
+    names.push_back(link.name);
+  }
+  const auto link_named = [&](const std::string& name) -> Link& {
+    for (auto& link : robot.links)
+      if (link.name == name) return link;
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: the robot has no link '{}'{}", file.string(), name, detail::suggestion(name, names)));
+  };
+  for (const auto& [name, spheres] : given.links) link_named(name).spheres = spheres;
+  for (const auto& [a, b] : given.self_collision_disabled)
+    robot.self_collision_disabled.emplace_back(link_named(a).name, link_named(b).name);
+}
+
+}  // namespace
+
+std::string detail::join(const std::vector<std::string>& names) {
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string detail::suggestion(const std::string& name, const std::vector<std::string>& candidates) {
+  const std::string near = nearest_name(name, candidates);
+  return near.empty() ? "" : fmt::format("; did you mean '{}'?", near);
+}
+
+void detail::round_to_quaternions(Robot& robot) {
+  const auto round = [](const SE3& pose) { return SE3(rounded(pose.R()), pose.p()); };
+  for (auto& link : robot.links) link.com = round(link.com);
+  robot.tip.pose = round(robot.tip.pose);
+}
+
+std::string detail::normalise_screw(Joint& joint, const std::string& where) {
+  constexpr double rounding = 1e-14;  // within this it is a unit vector already, and stays as it is
+  constexpr double worth_a_note = 1e-6;
+  const double length = joint.type == JointType::revolute ? joint.screw.head<3>().norm() : joint.screw.tail<3>().norm();
+  if (!(length > 1e-9 && length < 1e9))
+    throw Error(ErrorCode::invalid, fmt::format("{}: the axis has length {}, expected a direction", where, length));
+  if (std::abs(length - 1.0) > rounding) joint.screw /= length;
+  if (std::abs(length - 1.0) <= worth_a_note) return {};
+  return fmt::format("joint '{}': its axis had length {:.6g} and was normalised", joint.name, length);
+}
+
+detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
+  const std::string where = file.string();
+  const Json document = read_json(file);
+  const auto fail = [&](const std::string& what) {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
+  };
+  const auto number = [&](const Json& value, const std::string& place) {
+    if (!value.is_number()) fail(fmt::format("{}: expected a number", place));
+    return value.get<double>();
+  };
+  if (!document.is_object() || !document.contains("links") || !document["links"].is_object())
+    fail("expected an object whose \"links\" maps link names to lists of spheres");
+  SphereFile out;
+  for (const auto& [name, list] : document["links"].items()) {
+    auto& spheres = out.links[name];
+    if (!list.is_array()) fail(fmt::format("/links/{}: expected a list of spheres", name));
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string place = fmt::format("/links/{}/{}", name, i);
+      const Json& sphere = list[i];
+      if (!sphere.is_object() || sphere.size() != 2 || !sphere.contains("center") || !sphere.contains("radius") ||
+          !sphere["center"].is_array() || sphere["center"].size() != 3)
+        fail(fmt::format("{}: expected {{\"center\": [x, y, z], \"radius\": r}}", place));
+      Sphere s;
+      for (int k = 0; k < 3; ++k)
+        s.center_m[k] = number(sphere["center"][static_cast<std::size_t>(k)], place + "/center");
+      s.radius_m = number(sphere["radius"], place + "/radius");
+      if (!(s.radius_m > 0.0)) fail(fmt::format("{}/radius: {} m, expected a positive number", place, s.radius_m));
+      spheres.push_back(s);
+    }
+  }
+  if (document.contains("self_collision_disabled")) {
+    const Json& pairs = document["self_collision_disabled"];
+    if (!pairs.is_array()) fail("/self_collision_disabled: expected a list of pairs of link names");
+    for (const auto& pair : pairs) {
+      if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
+        fail("/self_collision_disabled: expected a list of pairs of link names");
+      out.self_collision_disabled.emplace_back(pair[0], pair[1]);
+    }
+  }
+  return out;
+}
+
+Robot robot_from_json(const Json& document, const std::string& where) {
+  check_shipped_schema(document, "robot", where);
+  Robot robot;
+  robot.name = document["name"];
+  for (const auto& note : list_of(document, "notes")) robot.notes.push_back(note);
+  std::vector<std::string> names;
+  for (const auto& json : document["links"]) {
+    const std::string place = fmt::format("{}: /links/{}", where, robot.links.size());
+    Link link;
+    link.name = json["name"];
+    link.parent = json["parent"];
+    link.joint = joint_of(json["joint"]);
+    const std::string note = detail::normalise_screw(link.joint, place + "/joint");
+    if (!note.empty()) robot.notes.push_back(note);
+    link.com = pose_of(json["com"], place + "/com");
+    link.mass_kg = json["mass_kg"];
+    const Vector6d I = numbers_of<6>(json["inertia_kg_m2"]);
+    link.inertia_kg_m2 << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
+    for (const auto& sphere : list_of(json, "spheres"))
+      link.spheres.push_back({vector_of(sphere["center_m"]), sphere["radius_m"]});
+    for (const auto& segment : list_of(json, "segments"))
+      link.segments.push_back({vector_of(segment["from_m"]), vector_of(segment["to_m"]), segment["radius_m"]});
+    names.push_back(link.name);
+    robot.links.push_back(std::move(link));
+  }
+  const Json& tip = document["tip"];
+  const auto at = std::find(names.begin(), names.end(), tip["link"].get<std::string>());
+  if (at == names.end())
+    throw Error(ErrorCode::invalid, fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
+                                                tip["link"].get<std::string>(), detail::join(names)));
+  robot.tip = {tip.contains("name") ? tip["name"] : tip["link"], static_cast<int>(at - names.begin()),
+               pose_of(tip, where + ": /tip")};
+  for (const auto& pair : list_of(document, "self_collision_disabled"))
+    robot.self_collision_disabled.emplace_back(pair[0], pair[1]);
+  detail::round_to_quaternions(robot);
+  check(robot, where);
+  return robot;
+}
+
+Json robot_to_json(const Robot& robot) {
+  Json json{{"schema", schema_name}, {"name", robot.name}};
+  const std::string& moving = robot.links.at(static_cast<std::size_t>(robot.tip.link)).name;
+  json["tip"] = {{"link", moving}};
+  if (robot.tip.name != moving) json["tip"]["name"] = robot.tip.name;
+  put_pose(json["tip"], robot.tip.pose);
+  json["links"] = Json::array();
+  for (const auto& link : robot.links) json["links"].push_back(json_of(link));
+  json["self_collision_disabled"] = Json::array();
+  for (const auto& [a, b] : robot.self_collision_disabled)
+    json["self_collision_disabled"].push_back(Json::array({a, b}));
+  if (!robot.notes.empty()) json["notes"] = robot.notes;
+  return json;
+}
+
+Robot read_robot(const std::filesystem::path& file, const RobotOptions& options) {
+  const std::string where = file.string(), extension = file.extension().string();
+  const std::string text = read_file(file);
+  if (extension == ".urdf") return detail::read_urdf(text, where, options);
+  if (extension != ".json")
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: unknown kind of robot file '{}', expected .urdf or .json", where, extension));
+  Robot robot = robot_from_json(parse_json(text, where), where);
+  if (options.tip && *options.tip != robot.tip.name)
+    throw Error(ErrorCode::invalid, fmt::format("{}: no tip '{}': a JSON robot has the one tip it names, '{}'", where,
+                                                *options.tip, robot.tip.name));
+  if (options.spheres) {
+    take_spheres(robot, *options.spheres);
+    check(robot, options.spheres->string());
+  }
+  return robot;
+}
+
+}  // namespace hamelin::model

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <map>
 #include <iterator>
+#include <map>
 #include <tuple>
 
 namespace hamelin::scene {
@@ -67,7 +67,8 @@ class BitGrid {
 };
 
 // Takes blocks out of the grid: as long in x as the run goes, then as far in y, then in z. Leaves the grid empty.
-void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int32_t, 3>& origin, std::vector<VoxelBox>& boxes) {
+void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int32_t, 3>& origin,
+                 std::vector<VoxelBox>& boxes) {
   for (std::int32_t z = used.lo[2]; z < used.hi[2]; ++z) {
     for (std::int32_t y = used.lo[1]; y < used.hi[1]; ++y) {
       for (std::int32_t x = grid.next(used.lo[0], y, z); x < tile; x = grid.next(x, y, z)) {
@@ -82,7 +83,8 @@ void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int3
         while (z1 < used.hi[2] && slice_is_full(z1)) ++z1;
         for (std::int32_t slice = z; slice < z1; ++slice)
           for (std::int32_t row = y; row < y1; ++row) grid.clear_row(x, x1, row, slice);
-        boxes.push_back({{origin[0] + x, origin[1] + y, origin[2] + z}, {origin[0] + x1, origin[1] + y1, origin[2] + z1}});
+        boxes.push_back(
+            {{origin[0] + x, origin[1] + y, origin[2] + z}, {origin[0] + x1, origin[1] + y1, origin[2] + z1}});
       }
     }
   }
@@ -91,15 +93,15 @@ void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int3
 // Joins boxes that share a whole face across `axis`. Returns whether any were.
 bool join(std::vector<VoxelBox>& boxes, std::size_t axis) {
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-  const auto cross_section = [&](const VoxelBox& box) {
-    return std::tie(box.lo[u], box.hi[u], box.lo[v], box.hi[v]);
-  };
+  const auto cross_section = [&](const VoxelBox& box) { return std::tie(box.lo[u], box.hi[u], box.lo[v], box.hi[v]); };
   std::sort(boxes.begin(), boxes.end(), [&](const VoxelBox& a, const VoxelBox& b) {
-    return std::tuple_cat(cross_section(a), std::tie(a.lo[axis])) < std::tuple_cat(cross_section(b), std::tie(b.lo[axis]));
+    return std::tuple_cat(cross_section(a), std::tie(a.lo[axis])) <
+           std::tuple_cat(cross_section(b), std::tie(b.lo[axis]));
   });
   std::vector<VoxelBox> joined;
   for (const VoxelBox& box : boxes) {
-    if (!joined.empty() && cross_section(joined.back()) == cross_section(box) && joined.back().hi[axis] == box.lo[axis]) {
+    if (!joined.empty() && cross_section(joined.back()) == cross_section(box) &&
+        joined.back().hi[axis] == box.lo[axis]) {
       joined.back().hi[axis] = box.hi[axis];
     } else {
       joined.push_back(box);
@@ -198,7 +200,8 @@ Box to_metres(const VoxelBox& box, double resolution) {
 }
 
 Box to_metres(const Cell& cell, double resolution) {
-  return to_metres(VoxelBox{cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}}, resolution);
+  return to_metres(VoxelBox{cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}},
+                   resolution);
 }
 
 }  // namespace hamelin::scene

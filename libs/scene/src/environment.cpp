@@ -27,9 +27,12 @@ BoxField field_of(const std::vector<Cell>& cells, double resolution, const Eigen
 
 std::string_view to_string(UnknownPolicy policy) noexcept {
   switch (policy) {
-    case UnknownPolicy::free: return "free";
-    case UnknownPolicy::slow: return "slow";
-    case UnknownPolicy::block: return "block";
+    case UnknownPolicy::free:
+      return "free";
+    case UnknownPolicy::slow:
+      return "slow";
+    case UnknownPolicy::block:
+      return "block";
   }
   return "unknown";
 }
@@ -64,7 +67,8 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   summary_.warnings = std::move(data.warnings);
   const double ball_volume = 4.0 / 3.0 * std::numbers::pi * reach * reach * reach;
   if (ball_volume > 0.0)
-    summary_.unknown_share = std::clamp(volume_inside(data.unknown, data.resolution, reachable) / ball_volume, 0.0, 1.0);
+    summary_.unknown_share =
+        std::clamp(volume_inside(data.unknown, data.resolution, reachable) / ball_volume, 0.0, 1.0);
   if (map->unknown != UnknownPolicy::free) {
     std::vector<Cell> unknown = crop(data.unknown, data.resolution, region);
     if (map->keep_out_radius_m > 0.0) unknown = cut_out(unknown, data.resolution, {center, map->keep_out_radius_m});
@@ -72,8 +76,8 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
     summary_.unknown_boxes = unknown_.boxes().size();
   }
   if (!data.occupied.empty() && occupied.empty())
-    summary_.warnings.push_back(fmt::format("no occupied leaf within {:.3g} m of the base: are base, map pose and scale right?",
-                                            region.radius));
+    summary_.warnings.push_back(fmt::format(
+        "no occupied leaf within {:.3g} m of the base: are base, map pose and scale right?", region.radius));
 }
 
 Environment::Scratch::Scratch(const Environment& environment, std::size_t spheres)
@@ -108,8 +112,9 @@ bool Environment::shown(std::size_t obstacle, std::span<const Eigen::Vector3d> c
   return visible(o, time_s, clearance_to(o, centers, radii, time_s, std::numeric_limits<double>::infinity()));
 }
 
-std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double influence,
-                                 double time_s, Scratch& scratch, std::span<Contact> out, View view) const {
+std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
+                                 double influence, double time_s, Scratch& scratch, std::span<Contact> out,
+                                 View view) const {
   auto& found = scratch.found_;
   found.clear();
   std::array<BoxHit, points_per_sphere> hits;
@@ -123,7 +128,8 @@ std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::
     const Eigen::Vector3d local = map_pose_inverse_ * centers[sphere];
     const std::size_t count = field.several(local, influence + radii[sphere], cone_cosine, room, hits);
     for (std::size_t i = 0; i < count; ++i)
-      add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction, Eigen::Vector3d::Zero());
+      add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction,
+          Eigen::Vector3d::Zero());
   };
   for (std::size_t sphere = 0; sphere < centers.size(); ++sphere) {
     add_boxes(map_, scratch.map_, Contact::map, sphere);
@@ -177,7 +183,8 @@ double Environment::clearance(std::span<const Eigen::Vector3d> centers, std::spa
   consider(map_);
   if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (shown(k, centers, radii, time_s, view)) smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
+    if (shown(k, centers, radii, time_s, view))
+      smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
   return smallest;
 }
 

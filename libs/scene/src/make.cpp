@@ -24,9 +24,12 @@ constexpr std::int32_t half_key = 1 << 15;
 double half_extent(const Obstacle& o, const Eigen::Vector3d& direction) {
   const Eigen::Vector3d local = o.pose.R().transpose() * direction;
   switch (o.shape) {
-    case Shape::sphere: return o.radius_m;
-    case Shape::box: return 0.5 * o.size_m.dot(local.cwiseAbs());
-    case Shape::cylinder: return 0.5 * o.length_m * std::abs(local.z()) + o.radius_m * std::hypot(local.x(), local.y());
+    case Shape::sphere:
+      return o.radius_m;
+    case Shape::box:
+      return 0.5 * o.size_m.dot(local.cwiseAbs());
+    case Shape::cylinder:
+      return 0.5 * o.length_m * std::abs(local.z()) + o.radius_m * std::hypot(local.x(), local.y());
   }
   return 0.0;
 }
@@ -35,10 +38,12 @@ double half_extent(const Obstacle& o, const Eigen::Vector3d& direction) {
 VoxelBox voxel_range(const Box& box, double resolution, double offset) {
   VoxelBox range;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double lo = std::ceil(box.lo[axis] / resolution - offset), hi = std::floor(box.hi[axis] / resolution - offset) + 1.0;
+    const double lo = std::ceil(box.lo[axis] / resolution - offset),
+                 hi = std::floor(box.hi[axis] / resolution - offset) + 1.0;
     if (!(lo >= -half_key && hi <= half_key))
-      throw Error(ErrorCode::invalid, fmt::format("an OctoMap of resolution {} m ends at ±{} m, expected nothing beyond",
-                                                  resolution, half_key * resolution));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("an OctoMap of resolution {} m ends at ±{} m, expected nothing beyond", resolution,
+                              half_key * resolution));
     range.lo[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(lo);
     range.hi[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::max(lo, hi));
   }
@@ -48,7 +53,8 @@ VoxelBox voxel_range(const Box& box, double resolution, double offset) {
 void check_count(const VoxelBox& range) {
   double count = 1.0;
   for (std::size_t axis = 0; axis < 3; ++axis) count *= range.hi[axis] - range.lo[axis];
-  if (count > 0x1p28) throw Error(ErrorCode::invalid, fmt::format("{:.3g} voxels in one region, expected at most 2^28", count));
+  if (count > 0x1p28)
+    throw Error(ErrorCode::invalid, fmt::format("{:.3g} voxels in one region, expected at most 2^28", count));
 }
 
 template <typename Visit>
@@ -66,9 +72,10 @@ octomap::OcTreeKey key_of(const VoxelBox& voxel) {
 
 Eigen::Matrix3d random_rotation(Rng& rng) {
   // Shoemake's uniform quaternions.
-  const double u = rng.uniform(), a = 2.0 * std::numbers::pi * rng.uniform(), b = 2.0 * std::numbers::pi * rng.uniform();
-  return Eigen::Quaterniond(std::sqrt(u) * std::cos(b), std::sqrt(1.0 - u) * std::sin(a), std::sqrt(1.0 - u) * std::cos(a),
-                            std::sqrt(u) * std::sin(b))
+  const double u = rng.uniform(), a = 2.0 * std::numbers::pi * rng.uniform(),
+               b = 2.0 * std::numbers::pi * rng.uniform();
+  return Eigen::Quaterniond(std::sqrt(u) * std::cos(b), std::sqrt(1.0 - u) * std::sin(a),
+                            std::sqrt(1.0 - u) * std::cos(a), std::sqrt(u) * std::sin(b))
       .normalized()
       .toRotationMatrix();
 }
@@ -86,7 +93,9 @@ Box box_from(const Json& value, const std::string& where) {
 
 }  // namespace
 
-std::string_view to_string(Mark mark) noexcept { return mark == Mark::touch ? "touch" : "centre"; }
+std::string_view to_string(Mark mark) noexcept {
+  return mark == Mark::touch ? "touch" : "centre";
+}
 
 Mark mark_from(std::string_view name) {
   if (name == "touch") return Mark::touch;
@@ -104,8 +113,10 @@ std::vector<Obstacle> make_clutter(const Clutter& clutter) {
   const std::size_t tries_max = 1000 * (clutter.count + 1);
   for (std::size_t tries = 0; made.size() < clutter.count; ++tries) {
     if (tries == tries_max)
-      throw Error(ErrorCode::invalid, fmt::format("clutter: only {} of {} primitives placed in {} tries, expected more room outside "
-                                                  "the keep-outs", made.size(), clutter.count, tries_max));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("clutter: only {} of {} primitives placed in {} tries, expected more room outside "
+                              "the keep-outs",
+                              made.size(), clutter.count, tries_max));
     Obstacle o;
     o.name = fmt::format("clutter{}", made.size());
     o.shape = static_cast<Shape>(rng.below(3));
@@ -115,7 +126,8 @@ std::vector<Obstacle> make_clutter(const Clutter& clutter) {
     o.radius_m = 0.5 * a;
     o.length_m = b;
     Eigen::Vector3d center;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) center[axis] = rng.uniform(clutter.bounds.lo[axis], clutter.bounds.hi[axis]);
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      center[axis] = rng.uniform(clutter.bounds.lo[axis], clutter.bounds.hi[axis]);
     o.pose = {random_rotation(rng), center};
     const bool clear = std::all_of(clutter.keep_out.begin(), clutter.keep_out.end(), [&](const Ball& ball) {
       return closest_on(o, center, ball.center).distance >= ball.radius;
@@ -126,10 +138,11 @@ std::vector<Obstacle> make_clutter(const Clutter& clutter) {
 }
 
 bool touches(const Obstacle& primitive, const Box& cube) {
-  const Eigen::Vector3d center = primitive.pose.p(), middle = 0.5 * (cube.lo + cube.hi), half = 0.5 * (cube.hi - cube.lo);
+  const Eigen::Vector3d center = primitive.pose.p(), middle = 0.5 * (cube.lo + cube.hi),
+                        half = 0.5 * (cube.hi - cube.lo);
   if (closest_on(primitive, center, middle).distance > half.norm()) return false;
-  // Alternating projections onto the two convex bodies converge to a nearest pair. The line between the pair is the normal of
-  // a separating plane if there is one; as long as no plane is found they may touch.
+  // Alternating projections onto the two convex bodies converge to a nearest pair. The line between the pair is the
+  // normal of a separating plane if there is one; as long as no plane is found they may touch.
   Eigen::Vector3d on_cube = middle;
   for (int round = 0; round < 100; ++round) {
     const SurfacePoint hit = closest_on(primitive, center, on_cube);
@@ -167,20 +180,27 @@ MakeReport make_map(const MakeMapOptions& options) {
     if (options.mark == Mark::touch) reach.array() += 0.5 * resolution;
     for_each_voxel(voxel_range({center - reach, center + reach}, resolution, 0.5), [&](const VoxelBox& voxel) {
       const Box cube = to_metres(voxel, resolution);
-      const bool marked = options.mark == Mark::touch ? touches(o, cube)
-                                                      : closest_on(o, center, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
+      const bool marked = options.mark == Mark::touch
+                              ? touches(o, cube)
+                              : closest_on(o, center, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
       if (marked) tree.setNodeValue(key_of(voxel), tree.getClampingThresMaxLog(), true);
     });
   }
-  if (tree.size() == 0) throw Error(ErrorCode::invalid, "the map would be empty, expected primitives, clutter or free bounds");
+  if (tree.size() == 0)
+    throw Error(ErrorCode::invalid, "the map would be empty, expected primitives, clutter or free bounds");
   tree.updateInnerOccupancy();
+  tree.toMaxLikelihood();
   tree.prune();
   for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
     const std::size_t voxels = std::size_t{1} << (3U * (tree.getTreeDepth() - leaf.getDepth()));
     (tree.isNodeOccupied(*leaf) ? report.occupied_voxels : report.free_voxels) += voxels;
   }
+  // OctoMap's own writer of whole files prints; its body is the same.
   std::ostringstream bytes;
-  tree.writeBinary(bytes);
+  bytes << fmt::format(
+      "# Octomap OcTree binary file\n# made by hamelin from {} primitives\n#\nid OcTree\nsize {}\nres {}\ndata\n",
+      primitives.size(), tree.size(), resolution);
+  tree.writeBinaryData(bytes);
   write_file_aside(options.output, bytes.str());
   report.output = options.output;
   report.sha256 = sha256_hex(bytes.str());
@@ -190,7 +210,7 @@ MakeReport make_map(const MakeMapOptions& options) {
 }
 
 MakeMapOptions make_options_from_json(const Json& document, const std::string& where) {
-  check_schema(document, "primitives", where);
+  check_shipped_schema(document, "primitives", where);
   const auto given = [&](const char* key) { return document.contains(key) && !document[key].is_null(); };
   MakeMapOptions options;
   options.resolution_m = document.at("resolution_m").get<double>();
@@ -198,7 +218,8 @@ MakeMapOptions make_options_from_json(const Json& document, const std::string& w
   if (given("free_bounds_m")) options.free_bounds = box_from(document["free_bounds_m"], where + ": /free_bounds_m");
   if (given("obstacles"))
     for (std::size_t i = 0; i < document["obstacles"].size(); ++i)
-      options.primitives.push_back(obstacle_from_json(document["obstacles"][i], fmt::format("{}: /obstacles/{}", where, i)));
+      options.primitives.push_back(
+          obstacle_from_json(document["obstacles"][i], fmt::format("{}: /obstacles/{}", where, i)));
   if (given("clutter")) {
     const Json& from = document["clutter"];
     Clutter clutter;
@@ -247,7 +268,8 @@ MakeReport make_scene_from_problem(const std::filesystem::path& problem, const P
       judged.push_back(std::move(obstacle));
     }
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ErrorCode::invalid, fmt::format("{}: is no problem with start, goal and obstacles: {}", problem.string(), e.what()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is no problem with start, goal and obstacles: {}", problem.string(), e.what()));
   }
   out["obstacles"] = std::move(judged);
   out["model"] = {{"joint_limits", true}, {"velocity_limits", true}, {"torque_limits", true}, {"self_collision", true}};

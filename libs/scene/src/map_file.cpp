@@ -48,8 +48,9 @@ MapFormat format_of(std::string_view bytes, const std::string& where) {
     if (line == first_line_ot) return MapFormat::ot;
   }
   refuse(where, "header line 1",
-         fmt::format("is '{}', expected '{}' or '{}'; a legacy file without header must go through OctoMap's convert_octree",
-                     shown(line), first_line_bt, first_line_ot));
+         fmt::format(
+             "is '{}', expected '{}' or '{}'; a legacy file without header must go through OctoMap's convert_octree",
+             shown(line), first_line_bt, first_line_ot));
 }
 
 template <typename T>
@@ -69,8 +70,9 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
   header.format = format_of(bytes, where);
   const auto ending = std::filesystem::path(where).extension();
   if ((ending == ".bt" && header.format == MapFormat::ot) || (ending == ".ot" && header.format == MapFormat::bt))
-    refuse(where, "header line 1", fmt::format("is that of the other format, expected '{}' in a {} file",
-                                               ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
+    refuse(where, "header line 1",
+           fmt::format("is that of the other format, expected '{}' in a {} file",
+                       ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
   bool has_id = false, has_size = false, has_resolution = false;
   std::size_t at = bytes.find('\n') + 1;
   for (int number = 2;; ++number) {
@@ -105,7 +107,9 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
       if (!parse_number(value, header.resolution))
         refuse(where, place, fmt::format("res '{}' is no number", shown(value)));
       if (!(header.resolution >= resolution_min && header.resolution <= resolution_max))
-        refuse(where, place, fmt::format("res '{}' is out of range, expected {} to {}", shown(value), resolution_min, resolution_max));
+        refuse(
+            where, place,
+            fmt::format("res '{}' is out of range, expected {} to {}", shown(value), resolution_min, resolution_max));
     } else {
       refuse(where, place, fmt::format("'{}' is not known, expected id, size, res or data", shown(line)));
     }
@@ -125,7 +129,6 @@ class BodyCheck {
   std::size_t count_bt() {
     std::size_t nodes = 1;
     walk(max_depth - 1, [&] {  // only inner nodes are stored
-
       const std::size_t begin = at_;
       const unsigned low = byte(), high = byte();
       const unsigned code = low | (high << 8U);
@@ -210,7 +213,8 @@ void collect_cells(const octomap::OcTree& tree, MapData& map) {
       for (unsigned child = 8; child-- > 0;) {
         Cell cell{entry.cell.lo, size};
         for (unsigned axis = 0; axis < 3; ++axis) cell.lo[axis] += (child >> axis) & 1U ? size : 0;
-        stack.push_back({tree.nodeChildExists(entry.node, child) ? tree.getNodeChild(entry.node, child) : nullptr, cell});
+        stack.push_back(
+            {tree.nodeChildExists(entry.node, child) ? tree.getNodeChild(entry.node, child) : nullptr, cell});
       }
     }
   }
@@ -234,8 +238,8 @@ void warn(MapData& map) {
     largest = std::max(largest, cell.size);
   }
   if (huge > 0)
-    map.warnings.push_back(fmt::format("{} occupied leaves are wider than {} m, the widest {} m: kept as single boxes", huge,
-                                       huge_m, largest * map.resolution));
+    map.warnings.push_back(fmt::format("{} occupied leaves are wider than {} m, the widest {} m: kept as single boxes",
+                                       huge, huge_m, largest * map.resolution));
 }
 
 }  // namespace
@@ -252,16 +256,21 @@ MapHeader check_map_bytes(std::string_view bytes, const std::string& where) {
 
 MapData read_map(const std::filesystem::path& file, const ReadMapOptions& options) {
   const std::string where = file.string();
-  const auto invalid = [&](const std::string& what) { throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what)); };
+  const auto invalid = [&](const std::string& what) {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
+  };
   if (options.scale && !(*options.scale > 0.0 && std::isfinite(*options.scale)))
     invalid(fmt::format("scale {} is not allowed, expected a number above 0", *options.scale));
   if (!(options.occupancy_threshold > 0.0 && options.occupancy_threshold < 1.0))
-    invalid(fmt::format("occupancy threshold {} is not allowed, expected above 0 and below 1", options.occupancy_threshold));
+    invalid(fmt::format("occupancy threshold {} is not allowed, expected above 0 and below 1",
+                        options.occupancy_threshold));
   const std::string bytes = read_file(file);
   const MapHeader header = check_map_bytes(bytes, where);
   if (header.resolution > 0.5 && !options.scale)
-    invalid(fmt::format("resolution {} is above 0.5: expected an explicit scale, metres per unit of the file (0.001 if it is in "
-                        "millimetres, 1 if it is meant so)", header.resolution));
+    invalid(fmt::format(
+        "resolution {} is above 0.5: expected an explicit scale, metres per unit of the file (0.001 if it is in "
+        "millimetres, 1 if it is meant so)",
+        header.resolution));
 
   MapData map;
   map.file = where;

@@ -42,16 +42,20 @@ SurfacePoint on_cylinder(double radius, double length, const Eigen::Vector3d& p)
 
 std::string_view to_string(Shape shape) noexcept {
   switch (shape) {
-    case Shape::sphere: return "sphere";
-    case Shape::box: return "box";
-    case Shape::cylinder: return "cylinder";
+    case Shape::sphere:
+      return "sphere";
+    case Shape::box:
+      return "box";
+    case Shape::cylinder:
+      return "cylinder";
   }
   return "unknown";
 }
 
 Eigen::Vector3d position_at(const Obstacle& obstacle, double time_s) {
   if (!obstacle.motion) return obstacle.pose.p();
-  return obstacle.pose.p() + std::sin(2.0 * std::numbers::pi * time_s / obstacle.motion->period_s) * obstacle.motion->amplitude_m;
+  return obstacle.pose.p() +
+         std::sin(2.0 * std::numbers::pi * time_s / obstacle.motion->period_s) * obstacle.motion->amplitude_m;
 }
 
 Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s) {
@@ -62,9 +66,12 @@ Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s) {
 
 double bounding_radius(const Obstacle& obstacle) {
   switch (obstacle.shape) {
-    case Shape::sphere: return obstacle.radius_m;
-    case Shape::box: return 0.5 * obstacle.size_m.norm();
-    case Shape::cylinder: return std::hypot(obstacle.radius_m, 0.5 * obstacle.length_m);
+    case Shape::sphere:
+      return obstacle.radius_m;
+    case Shape::box:
+      return 0.5 * obstacle.size_m.norm();
+    case Shape::cylinder:
+      return std::hypot(obstacle.radius_m, 0.5 * obstacle.length_m);
   }
   return 0.0;
 }
@@ -74,9 +81,15 @@ SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
   const Eigen::Vector3d local = R.transpose() * (p - center);
   SurfacePoint hit;
   switch (obstacle.shape) {
-    case Shape::sphere: hit = on_sphere(obstacle.radius_m, local); break;
-    case Shape::box: hit = on_box(obstacle.size_m, local); break;
-    case Shape::cylinder: hit = on_cylinder(obstacle.radius_m, obstacle.length_m, local); break;
+    case Shape::sphere:
+      hit = on_sphere(obstacle.radius_m, local);
+      break;
+    case Shape::box:
+      hit = on_box(obstacle.size_m, local);
+      break;
+    case Shape::cylinder:
+      hit = on_cylinder(obstacle.radius_m, obstacle.length_m, local);
+      break;
   }
   return {hit.distance, R * hit.point + center, R * hit.direction};
 }
@@ -89,14 +102,16 @@ bool visible(const Obstacle& obstacle, double time_s, double clearance_m) {
 void check(const Obstacle& obstacle, const std::string& where) {
   const auto positive = [&](const char* key, double value) {
     if (!(value > 0.0 && std::isfinite(value)))
-      throw Error(ErrorCode::invalid, fmt::format("{}: a {} needs {} above 0, not {}", where, to_string(obstacle.shape), key, value));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: a {} needs {} above 0, not {}", where, to_string(obstacle.shape), key, value));
   };
   if (obstacle.shape != Shape::box) positive("radius_m", obstacle.radius_m);
   if (obstacle.shape == Shape::cylinder) positive("length_m", obstacle.length_m);
   if (obstacle.shape == Shape::box)
     for (int axis = 0; axis < 3; ++axis) positive("size_m", obstacle.size_m[axis]);
   if (obstacle.motion && !(obstacle.motion->period_s > 0.0))
-    throw Error(ErrorCode::invalid, fmt::format("{}: motion needs period_s above 0, not {}", where, obstacle.motion->period_s));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: motion needs period_s above 0, not {}", where, obstacle.motion->period_s));
 }
 
 }  // namespace hamelin::scene

@@ -12,6 +12,10 @@ namespace hamelin::scene {
 
 namespace {
 
+Eigen::Matrix3d rotation_of(const Quaternion& c) {
+  return Eigen::Quaterniond(c[0], c[1], c[2], c[3]).normalized().toRotationMatrix();
+}
+
 // Reads one JSON object whose form the schema has already vouched for; null is the same as absent.
 class Reader {
  public:
@@ -48,16 +52,17 @@ class Reader {
     const auto values = get<std::vector<double>>(key, {});
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
   }
+  [[nodiscard]] Quaternion quaternion() const {
+    Quaternion c{1.0, 0.0, 0.0, 0.0};
+    if (const Json* value = find("quaternion_wxyz"); value != nullptr)
+      for (std::size_t i = 0; i < c.size(); ++i) c[i] = (*value)[i].get<double>();
+    const double norm = Eigen::Map<const Eigen::Vector4d>(c.data()).norm();
+    if (!(std::abs(norm - 1.0) <= 1e-3))
+      fail("quaternion_wxyz", fmt::format("the norm is {:.6g}, expected a unit quaternion", norm));
+    return c;
+  }
   [[nodiscard]] geometry::SE3 pose() const {
-    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    if (const Json* value = find("quaternion_wxyz"); value != nullptr) {
-      const auto c = value->get<std::vector<double>>();
-      const Eigen::Quaterniond q(c[0], c[1], c[2], c[3]);
-      if (!(std::abs(q.norm() - 1.0) <= 1e-3))
-        fail("quaternion_wxyz", fmt::format("the norm is {:.6g}, expected a unit quaternion", q.norm()));
-      R = q.normalized().toRotationMatrix();
-    }
-    return {R, vector("position_m", Eigen::Vector3d::Zero())};
+    return {rotation_of(quaternion()), vector("position_m", Eigen::Vector3d::Zero())};
   }
   [[noreturn]] void fail(const char* key, const std::string& what) const {
     throw Error(ErrorCode::invalid, fmt::format("{}: {}", place_of(key), what));
@@ -74,9 +79,12 @@ class Reader {
   std::string place_;
 };
 
-Json array(const Eigen::Ref<const Eigen::VectorXd>& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
+Json array(const Eigen::Ref<const Eigen::VectorXd>& v) {
+  return std::vector<double>(v.data(), v.data() + v.size());
+}
 
-Json quaternion_json(const Eigen::Matrix3d& R) {
+Json quaternion_json(const Eigen::Matrix3d& R, const Quaternion& written) {
+  if (rotation_of(written) == R) return written;
   Eigen::Quaterniond q(R);
   if (q.w() < 0.0) q.coeffs() = -q.coeffs();
   return {q.w(), q.x(), q.y(), q.z()};
@@ -100,6 +108,7 @@ Obstacle read_obstacle(const Reader& in) {
   o.length_m = in.get("length_m", 0.0);
   o.size_m = in.vector("size_m", Eigen::Vector3d::Zero());
   o.pose = in.pose();
+  o.quaternion_wxyz = in.quaternion();
   if (in.find("motion") != nullptr) {
     const Reader motion = in.child("motion");
     o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()), motion.get("period_s", 0.0)};
@@ -124,6 +133,7 @@ Goal read_goal(const Reader& in) {
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
   goal.q = in.joints("q");
   goal.pose = in.pose();
+  goal.quaternion_wxyz = in.quaternion();
   goal.tolerance_m = in.get("tolerance_m", joint ? 0.0 : pose ? 0.01 : 0.02);
   goal.tolerance_rad = in.get("tolerance_rad", joint ? 0.05 : pose ? 0.26 : 0.0);
   goal.speed_max = in.get("speed_max", joint ? 0.05 : std::numeric_limits<double>::infinity());
@@ -163,9 +173,11 @@ Actuation read_actuation(const Reader& in, double step_s) {
   actuation.planner_mass_scale = in.get("planner_mass_scale", 1.0);
   const double steps = actuation.control_period_s / step_s;
   if (!(std::round(steps) >= 1.0 && std::abs(steps - std::round(steps)) <= 1e-9 * steps))
-    in.fail("control_period_s", fmt::format("{} s is {} steps of {} s, expected a whole number", actuation.control_period_s, steps, step_s));
+    in.fail("control_period_s", fmt::format("{} s is {} steps of {} s, expected a whole number",
+                                            actuation.control_period_s, steps, step_s));
   if (actuation.type == ActuationType::ideal && std::round(steps) != 1.0)
-    in.fail("control_period_s", fmt::format("{} s is not allowed, ideal actuation has one tick a step ({} s)", actuation.control_period_s, step_s));
+    in.fail("control_period_s", fmt::format("{} s is not allowed, ideal actuation has one tick a step ({} s)",
+                                            actuation.control_period_s, step_s));
   if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
     in.fail("delay_s", fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
   return actuation;
@@ -175,25 +187,32 @@ Actuation read_actuation(const Reader& in, double step_s) {
 
 std::string_view to_string(GoalType type) noexcept {
   switch (type) {
-    case GoalType::joint: return "joint";
-    case GoalType::position: return "position";
-    case GoalType::pose: return "pose";
+    case GoalType::joint:
+      return "joint";
+    case GoalType::position:
+      return "position";
+    case GoalType::pose:
+      return "pose";
   }
   return "unknown";
 }
 
 std::string_view to_string(ActuationType type) noexcept {
   switch (type) {
-    case ActuationType::ideal: return "ideal";
-    case ActuationType::sampled: return "sampled";
+    case ActuationType::ideal:
+      return "ideal";
+    case ActuationType::sampled:
+      return "sampled";
   }
   return "unknown";
 }
 
-Obstacle obstacle_from_json(const Json& document, const std::string& where) { return read_obstacle({document, where}); }
+Obstacle obstacle_from_json(const Json& document, const std::string& where) {
+  return read_obstacle({document, where});
+}
 
 Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir, const std::string& where) {
-  check_schema(document, "scene", where);
+  check_shipped_schema(document, "scene", where);
   const auto resolve = [&](const std::string& path) { return (base_dir / path).lexically_normal(); };
   const Reader in(document, where + ": ");
   Scene scene;
@@ -203,6 +222,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.robot.tip = robot.maybe<std::string>("tip");
   if (const auto spheres = robot.maybe<std::string>("spheres")) scene.robot.spheres = resolve(*spheres);
   scene.base = in.child("base").pose();
+  scene.base_quaternion_wxyz = in.child("base").quaternion();
   if (in.find("gravity_m_s2") != nullptr) scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
   scene.start_q = in.child("start").joints("q");
   scene.start_v = in.child("start").joints("v");
@@ -218,10 +238,13 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
     MapSpec spec;
     spec.file = resolve(map.get<std::string>("file", ""));
     spec.pose = map.pose();
+    spec.quaternion_wxyz = map.quaternion();
     spec.scale = map.maybe<double>("scale");
     spec.occupancy_threshold = map.get("occupancy_threshold", 0.5);
     const auto unknown = map.get<std::string>("unknown", "free");
-    spec.unknown = unknown == "slow" ? UnknownPolicy::slow : unknown == "block" ? UnknownPolicy::block : UnknownPolicy::free;
+    spec.unknown = unknown == "slow"    ? UnknownPolicy::slow
+                   : unknown == "block" ? UnknownPolicy::block
+                                        : UnknownPolicy::free;
     spec.keep_out_radius_m = map.get("keep_out_radius_m", 0.0);
     scene.map = spec;
   }
@@ -231,7 +254,8 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
     scene.planner = Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
   }
   const Reader integrator = in.child("integrator");
-  scene.integrator = {integrator.get<std::string>("name", "hamel-variational"), integrator.get<Json>("params", Json::object())};
+  scene.integrator = {integrator.get<std::string>("name", "hamel-variational"),
+                      integrator.get<Json>("params", Json::object())};
   if (in.find("stall") != nullptr) {
     const Reader stall = in.child("stall");
     scene.stall = StallRule{stall.get("speed_m_s", 0.002), stall.get("distance_m", 0.2), stall.get("hold_s", 1.0)};
@@ -256,9 +280,10 @@ Json to_json(const Obstacle& o) {
   }
   if (o.shape == Shape::cylinder) out["length_m"] = o.length_m;
   out["position_m"] = array(o.pose.p());
-  out["quaternion_wxyz"] = quaternion_json(o.pose.R());
+  out["quaternion_wxyz"] = quaternion_json(o.pose.R(), o.quaternion_wxyz);
   out["motion"] = nullptr;
-  if (o.motion) out["motion"] = {{"type", "sine"}, {"amplitude_m", array(o.motion->amplitude_m)}, {"period_s", o.motion->period_s}};
+  if (o.motion)
+    out["motion"] = {{"type", "sine"}, {"amplitude_m", array(o.motion->amplitude_m)}, {"period_s", o.motion->period_s}};
   out["known"] = o.known;
   out["visible_within_m"] = or_null(o.visible_within_m);
   out["appears_s"] = o.appears_s;
@@ -267,15 +292,15 @@ Json to_json(const Obstacle& o) {
 }
 
 Json resolved_json(const Scene& scene) {
-  const auto pose = [](const geometry::SE3& g) {
-    return Json{{"position_m", array(g.p())}, {"quaternion_wxyz", quaternion_json(g.R())}};
+  const auto pose = [](const geometry::SE3& g, const Quaternion& written) {
+    return Json{{"position_m", array(g.p())}, {"quaternion_wxyz", quaternion_json(g.R(), written)}};
   };
   const auto choice = [](const Choice& c) { return Json{{"name", c.name}, {"params", c.params}}; };
   Json out;
   out["schema"] = "hamelin.scene/1";
   out["robot"] = {{"file", scene.robot.file.string()}, {"tip", or_null(scene.robot.tip)}, {"spheres", nullptr}};
   if (scene.robot.spheres) out["robot"]["spheres"] = scene.robot.spheres->string();
-  out["base"] = pose(scene.base);
+  out["base"] = pose(scene.base, scene.base_quaternion_wxyz);
   out["gravity_m_s2"] = scene.gravity_m_s2 ? array(*scene.gravity_m_s2) : Json(nullptr);
   out["start"] = {{"q", nullptr}, {"v", nullptr}};
   if (scene.start_q.size() > 0) out["start"]["q"] = array(scene.start_q);
@@ -287,7 +312,7 @@ Json resolved_json(const Scene& scene) {
       g["q"] = array(goal.q);
     } else {
       g["position_m"] = array(goal.pose.p());
-      if (goal.type == GoalType::pose) g["quaternion_wxyz"] = quaternion_json(goal.pose.R());
+      if (goal.type == GoalType::pose) g["quaternion_wxyz"] = quaternion_json(goal.pose.R(), goal.quaternion_wxyz);
       g["tolerance_m"] = goal.tolerance_m;
     }
     if (goal.type != GoalType::position) g["tolerance_rad"] = goal.tolerance_rad;
@@ -297,7 +322,7 @@ Json resolved_json(const Scene& scene) {
   out["map"] = nullptr;
   if (scene.map) {
     Json map{{"file", scene.map->file.string()}};
-    map.update(pose(scene.map->pose));
+    map.update(pose(scene.map->pose, scene.map->quaternion_wxyz));
     map["scale"] = or_null(scene.map->scale);
     map["occupancy_threshold"] = scene.map->occupancy_threshold;
     map["unknown"] = to_string(scene.map->unknown);
@@ -311,21 +336,31 @@ Json resolved_json(const Scene& scene) {
   if (model.joint_damping.from_robot) damping = "robot";
   if (model.joint_damping.values.size() == 1) damping = model.joint_damping.values.front();
   if (model.joint_damping.values.size() > 1) damping = model.joint_damping.values;
-  out["model"] = {{"joint_damping", damping}, {"joint_limits", model.joint_limits}, {"velocity_limits", model.velocity_limits},
-                  {"torque_limits", model.torque_limits}, {"self_collision", model.self_collision}, {"payload", nullptr}};
+  out["model"] = {{"joint_damping", damping},
+                  {"joint_limits", model.joint_limits},
+                  {"velocity_limits", model.velocity_limits},
+                  {"torque_limits", model.torque_limits},
+                  {"self_collision", model.self_collision},
+                  {"payload", nullptr}};
   if (model.payload) {
     const Eigen::Matrix3d& I = model.payload->inertia_kg_m2;
-    out["model"]["payload"] = {{"mass_kg", model.payload->mass_kg}, {"position_m", array(model.payload->position_m)},
+    out["model"]["payload"] = {{"mass_kg", model.payload->mass_kg},
+                               {"position_m", array(model.payload->position_m)},
                                {"inertia_kg_m2", {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}}};
   }
   const Actuation& a = scene.actuation;
-  out["actuation"] = {{"type", to_string(a.type)}, {"control_period_s", a.control_period_s}, {"delay_s", a.delay_s},
-                      {"joint_noise_rad", a.joint_noise_rad}, {"planner_mass_scale", a.planner_mass_scale}};
+  out["actuation"] = {{"type", to_string(a.type)},
+                      {"control_period_s", a.control_period_s},
+                      {"delay_s", a.delay_s},
+                      {"joint_noise_rad", a.joint_noise_rad},
+                      {"planner_mass_scale", a.planner_mass_scale}};
   out["planner"] = scene.planner ? choice(*scene.planner) : Json(nullptr);
   out["integrator"] = choice(scene.integrator);
   out["stall"] = nullptr;
   if (scene.stall)
-    out["stall"] = {{"speed_m_s", scene.stall->speed_m_s}, {"distance_m", scene.stall->distance_m}, {"hold_s", scene.stall->hold_s}};
+    out["stall"] = {{"speed_m_s", scene.stall->speed_m_s},
+                    {"distance_m", scene.stall->distance_m},
+                    {"hold_s", scene.stall->hold_s}};
   out["step_s"] = scene.step_s;
   out["duration_s"] = scene.duration_s;
   out["seed"] = scene.seed;
@@ -367,13 +402,15 @@ void set_pointer(Json& document, std::string_view assignment) {
       rule = rule != nullptr && rule->contains("items") ? &(*rule)["items"] : nullptr;
       continue;
     }
-    if (!at->is_object() && !at->is_null()) fail(fmt::format("nothing stands under '{}': its parent is a plain value", token));
+    if (!at->is_object() && !at->is_null())
+      fail(fmt::format("nothing stands under '{}': its parent is a plain value", token));
     const bool has_properties = rule != nullptr && rule->contains("properties");
     if (has_properties && !(*rule)["properties"].contains(token)) {
       std::vector<std::string> known;
       for (const auto& item : (*rule)["properties"].items()) known.push_back(item.key());
       const auto near = nearest_name(token, known);
-      fail(fmt::format("unknown key '{}', expected {}", token, near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'", near)));
+      fail(fmt::format("unknown key '{}', expected {}", token,
+                       near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'", near)));
     }
     if (at->is_null()) *at = Json::object();
     at = &(*at)[token];

@@ -15,10 +15,16 @@ struct VariationalLink {
   typename Space::Motion twist{};     ///< ξ_i
   typename Space::Motion step{};      ///< δξ_i
   typename Space::Force lambda{};     ///< λ_i
-  typename Space::Force w{};          ///< w_i of the elimination
-  typename Space::Force s{};          ///< s_i
+
+  // Factors of the linearisation, kept while momenta() moves on.
+  typename Space::Placement x_kept{};
+  typename Space::Motion a{}, B{};    ///< a_i, B_i
+  typename Space::Force w{}, u{};     ///< w_i, u_i
   typename Space::Operator P{};       ///< δλ_i = P_i δξ_i + s_i
-  typename Space::Scalar inv_d{}, r{};
+  typename Space::Scalar inv_d{};
+
+  typename Space::Force s{};          ///< s_i of the current right-hand side
+  typename Space::Scalar r{};
 };
 
 template <class Space>
@@ -51,50 +57,58 @@ void momenta(const typename Space::Chain& chain, VariationalScratch<Space>& k, c
   }
 }
 
-/// Solves the linearised residual for δΔ after momenta(): eliminates from the tip with δλ_i = P_i δξ_i + s_i, then goes
-/// outwards. `damping` (null = none) adds D_i/2 to the pivots. False where a pivot vanishes.
+/// Factors the linearisation at the point of the last momenta(): eliminates from the tip with δλ_i = P_i δξ_i + s_i.
+/// `damping` (null = none) adds D_i/2 to the pivots. False where a pivot vanishes.
 template <class Space>
-bool newton(const typename Space::Chain& chain, VariationalScratch<Space>& k, double h, const double* residual,
-            const double* damping, double* delta) noexcept {
+bool factor(const typename Space::Chain& chain, VariationalScratch<Space>& k, double h, const double* damping) noexcept {
   const double half = 0.5 * h;
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    k[i].P = Space::general(Space::rigid(chain.links[i]));
-    k[i].s = Space::zero_force();
-  }
+  for (std::size_t i = 0; i < k.size(); ++i) k[i].P = Space::general(Space::rigid(chain.links[i]));
   for (std::size_t i = k.size(); i-- > 0;) {
     const auto& l = chain.links[i];
     auto& link = k[i];
     const auto A = Space::axis(l);
-    const auto a = Space::sum(A, Space::scaled(link.b, -half));                             // a_i
-    const auto B = Space::sum(Space::scaled(A, 1.0 / h), Space::scaled(link.b, 0.5));       // B_i
-    const auto z = Space::ad_T(A, link.lambda);                                             // z_i
-    const auto PB = Space::times(link.P, B);
-    link.w = Space::sum(Space::transposed_times(link.P, a), Space::scaled(z, half));
-    double d = Space::pair(a, PB) + 0.5 * half * Space::pair(link.b, z);
+    link.x_kept = link.x;
+    link.a = Space::sum(A, Space::scaled(link.b, -half));
+    link.B = Space::sum(Space::scaled(A, 1.0 / h), Space::scaled(link.b, 0.5));
+    const auto z = Space::ad_T(A, link.lambda);
+    const auto PB = Space::times(link.P, link.B);
+    link.w = Space::sum(Space::transposed_times(link.P, link.a), Space::scaled(z, half));
+    link.u = Space::sum(PB, Space::scaled(z, -0.5));
+    double d = Space::pair(link.a, PB) + 0.5 * half * Space::pair(link.b, z);
     if (damping != nullptr) d += 0.5 * damping[i];
     // A pivot is an inertia over h; one that is lost in the rounding of its terms has no meaning.
     if (!(std::abs(d) > 1e-14 * std::abs(Space::along_axis(l, PB)))) return false;
     link.inv_d = 1.0 / d;
-    link.r = -residual[i] - Space::pair(a, link.s);
     if (l.parent < 0) continue;
-    const auto u = Space::sum(PB, Space::scaled(z, -0.5));                                  // u_i
     auto rest = link.P;
-    Space::subtract_outer(rest, u, Space::scaled(link.w, link.inv_d));
-    auto& outer = k[static_cast<std::size_t>(l.parent)];
-    Space::add(outer.P, Space::to_parent(l, link.x, rest));
-    const auto carried = Space::sum(link.s, Space::scaled(u, link.r * link.inv_d));
-    outer.s = Space::sum(outer.s, Space::to_parent(l, link.x, carried));
+    Space::subtract_outer(rest, link.u, Space::scaled(link.w, link.inv_d));
+    Space::add(k[static_cast<std::size_t>(l.parent)].P, Space::to_parent(l, link.x, rest));
+  }
+  return true;
+}
+
+/// δΔ of the factored linearisation for a residual: s inwards, then outwards.
+template <class Space>
+void correct(const typename Space::Chain& chain, VariationalScratch<Space>& k, const double* residual,
+             double* delta) noexcept {
+  for (auto& link : k) link.s = Space::zero_force();
+  for (std::size_t i = k.size(); i-- > 0;) {
+    const auto& l = chain.links[i];
+    auto& link = k[i];
+    link.r = (-residual[i] - Space::pair(link.a, link.s)) * link.inv_d;
+    if (l.parent < 0) continue;
+    auto& outer = k[static_cast<std::size_t>(l.parent)].s;
+    const auto carried = Space::sum(link.s, Space::scaled(link.u, link.r));
+    outer = Space::sum(outer, Space::to_parent(l, link.x_kept, carried));
   }
   for (std::size_t i = 0; i < k.size(); ++i) {
     const auto& l = chain.links[i];
     auto& link = k[i];
     const auto y = l.parent < 0 ? Space::zero_motion()
-                                : Space::to_child(l, link.x, k[static_cast<std::size_t>(l.parent)].step);
-    delta[i] = (link.r - Space::pair(y, link.w)) * link.inv_d;
-    link.step = Space::sum(y, Space::scaled(link.b, 0.5 * delta[i]));
-    Space::add_along_axis(l, link.step, delta[i] / h);
+                                : Space::to_child(l, link.x_kept, k[static_cast<std::size_t>(l.parent)].step);
+    delta[i] = link.r - Space::pair(y, link.w) * link.inv_d;
+    link.step = Space::sum(y, Space::scaled(link.B, delta[i]));
   }
-  return true;
 }
 
 }  // namespace hamelin::integration::kernel

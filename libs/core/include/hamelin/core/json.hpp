@@ -24,6 +24,9 @@ using Json = nlohmann::ordered_json;
 /// @throws Error invalid with the first violation: "where: /json/pointer: what is wrong, what was expected"
 void check_schema(const Json& document, const Json& schema, const std::string& where);
 
+/// A schema's name is no schema: see check_shipped_schema.
+void check_schema(const Json& document, std::string_view schema_name, const std::string& where) = delete;
+
 /// Checks against the shipped schema of that name. @throws Error invalid
 void check_shipped_schema(const Json& document, std::string_view schema_name, const std::string& where);
 

@@ -44,7 +44,7 @@ void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);
 /// World pose of the tip, after forward_kinematics.
 [[nodiscard]] geometry::SE3 tip_pose(const Model& model, const Workspace& ws);
 /// World centres of all collision spheres, in the order of Model::spheres(), after forward_kinematics.
-void sphere_centers(const Model& model, const Workspace& ws, Matrix3Xd& centers);
+void sphere_centers(const Model& model, const Workspace& ws, std::span<Eigen::Vector3d> centers);
 
 /// J with ẋ = J v for the world point x that moves with link i, after forward_kinematics; 3 × dof, columns past the link are zero.
 void point_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world, Matrix3Xd& J);

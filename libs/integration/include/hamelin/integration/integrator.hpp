@@ -94,7 +94,7 @@ class Integrator {
   virtual void kick(State& state, const VectorXd& dp) = 0;
   /// Node velocity: p = M(θ^k) v.
   virtual void set_velocity(State& state, const VectorXd& v) = 0;
-  /// One step of h > 0. If it reports converged = false the state must not be used further.
+  /// One step of h > 0. If it reports converged = false no root was found, and the state is as it was.
   [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
   /// Energy at the node, as the scheme defines it (SPEC §3).
   [[nodiscard]] virtual Energy energy(const State& state);

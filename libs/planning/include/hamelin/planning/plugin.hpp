@@ -16,15 +16,18 @@
 #include "hamelin/planning/plugin_abi.h"
 
 /// What the author of a planner includes: thin C++ views over the C structs of plugin_abi.h, a base class, and the
-/// macro that makes a plugin of it. The views copy nothing and live as long as what they show: a Tick and a Command
-/// for one call, a Setup and a Host as long as the planner.
+/// macro that makes a plugin of it. The views own nothing, are cheap to copy, and are good as long as what they show: a
+/// Tick and a Command for one call, a Setup and a Host as long as the planner (keep a copy of the view, not a
+/// reference).
 namespace hamelin::planning {
 
 using ConstVectorMap = Eigen::Map<const Eigen::VectorXd>;
 using VectorMap = Eigen::Map<Eigen::VectorXd>;
 
 /// Three numbers of a C struct as a vector.
-[[nodiscard]] inline Eigen::Vector3d vec3(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
+[[nodiscard]] inline Eigen::Vector3d vec3(const double (&x)[3]) {
+  return {x[0], x[1], x[2]};
+}
 
 /// What holds for a whole run.
 class Setup {
@@ -41,6 +44,11 @@ class Setup {
   [[nodiscard]] std::span<const hamelin_sphere> spheres() const { return {raw_->spheres, raw_->sphere_count}; }
   /// Goals, to be reached in this order.
   [[nodiscard]] std::span<const hamelin_goal> goals() const { return {raw_->goals, raw_->goal_count}; }
+  /// A tick's goal. @throws Error plugin if there is none of that index
+  [[nodiscard]] const hamelin_goal& goal(std::size_t index) const {
+    if (index >= raw_->goal_count) throw Error(ErrorCode::plugin, "there is no goal " + std::to_string(index));
+    return raw_->goals[index];
+  }
   /// Position limits [rad or m]; none where the scene models none.
   [[nodiscard]] std::optional<ConstVectorMap> q_lower() const { return limit(raw_->q_lower); }
   [[nodiscard]] std::optional<ConstVectorMap> q_upper() const { return limit(raw_->q_upper); }
@@ -156,9 +164,9 @@ class Host {
   const hamelin_host* raw_;
 };
 
-/// A planner. Besides tick it has a constructor (const Host&, const Setup&, const Json& params), where params are checked
-/// against the plugin's schema and complete, and, if it wants, `static double influence_m(const Json& params)`: how far
-/// obstacles matter to it [m]. Constructors report bad input by throwing Error.
+/// A planner. Besides tick it has a constructor (const Host&, const Setup&, const Json& params), where params are
+/// checked against the plugin's schema and complete, and, if it wants, `static double influence_m(const Json& params)`:
+/// how far obstacles matter to it [m]. Constructors report bad input by throwing Error.
 class Planner {
  public:
   Planner() = default;
@@ -223,14 +231,14 @@ struct Glue {
 
 /// Makes a plugin of a Planner: once in one file of the plugin, outside any namespace. The only place that catches
 /// exceptions; none crosses the border. The texts must be string literals or otherwise live for ever.
-#define HAMELIN_PLANNER_PLUGIN(Type, plugin_name, plugin_version, plugin_description, schema_text)                \
-  extern "C" __attribute__((visibility("default"))) const hamelin_plugin* hamelin_plugin_entry(void);             \
-  extern "C" const hamelin_plugin* hamelin_plugin_entry(void) {                                                   \
-    using HamelinGlue = ::hamelin::planning::detail::Glue<Type>;                                                  \
-    static const hamelin_plugin plugin = {sizeof(hamelin_plugin), HAMELIN_PLUGIN_ABI_VERSION, plugin_name,        \
-                                          plugin_version,         plugin_description,         schema_text,        \
-                                          &HamelinGlue::create,   &HamelinGlue::tick,         &HamelinGlue::destroy, \
-                                          &HamelinGlue::influence_m};                                             \
-    return &plugin;                                                                                               \
-  }                                                                                                               \
+#define HAMELIN_PLANNER_PLUGIN(Type, plugin_name, plugin_version, plugin_description, schema_text)                     \
+  extern "C" __attribute__((visibility("default"))) const hamelin_plugin* hamelin_plugin_entry(void);                  \
+  extern "C" const hamelin_plugin* hamelin_plugin_entry(void) {                                                        \
+    using HamelinGlue = ::hamelin::planning::detail::Glue<Type>;                                                       \
+    static const hamelin_plugin plugin = {sizeof(hamelin_plugin),   HAMELIN_PLUGIN_ABI_VERSION, plugin_name,           \
+                                          plugin_version,           plugin_description,         schema_text,           \
+                                          &HamelinGlue::create,     &HamelinGlue::tick,         &HamelinGlue::destroy, \
+                                          &HamelinGlue::influence_m};                                                  \
+    return &plugin;                                                                                                    \
+  }                                                                                                                    \
   static_assert(true, "")

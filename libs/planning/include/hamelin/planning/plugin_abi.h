@@ -17,7 +17,7 @@ extern "C" {
 #define HAMELIN_PLUGIN_ABI_VERSION 1u
 #define HAMELIN_PLUGIN_ENTRY_NAME "hamelin_plugin_entry"
 
-/* A sphere of the arm that obstacles are measured from. Listed once, in hamelin_setup. */
+/* A sphere of the arm that obstacles are measured from. Listed once, in hamelin_setup, link by link. */
 typedef struct hamelin_sphere {
   int32_t link;            /* index of the moving link, 0 .. dof - 1 */
   int32_t index_in_link;

@@ -33,8 +33,8 @@ struct Ball {
 /// Volume of the cells inside the ball [m³], exact to the voxels at its surface.
 [[nodiscard]] double volume_inside(const std::vector<Cell>& cells, double resolution, const Ball& ball);
 
-/// Disjoint boxes with exactly the union of the (disjoint) cells. Small cells are painted into bit grids of 256³ voxels and
-/// taken out as greedy blocks; wide ones go as they are; then boxes with a common face are joined. Deterministic.
+/// Disjoint boxes with exactly the union of the (disjoint) cells. Small cells are painted into bit grids of 256³ voxels
+/// and taken out as greedy blocks; wide ones go as they are; then boxes with a common face are joined. Deterministic.
 [[nodiscard]] std::vector<VoxelBox> merge(const std::vector<Cell>& cells);
 
 /// Voxels to metres.

@@ -12,8 +12,8 @@ namespace hamelin::scene {
 
 /// The point of a box nearest to a query point.
 struct BoxHit {
-  double distance = 0.0;  ///< [m]; inside the box: minus the depth below its nearest face
-  std::int32_t box = -1;  ///< index into BoxField::boxes()
+  double distance = 0.0;                                ///< [m]; inside the box: minus the depth below its nearest face
+  std::int32_t box = -1;                                ///< index into BoxField::boxes()
   Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< on the box's surface
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< unit, from the point towards the query; inside: the way out
 };
@@ -57,12 +57,14 @@ class BoxField {
   /// Nearest boxes no farther than `limit`, nearest first, up to out.size(). A box is left out if its direction makes
   /// an angle with cosine above `cone_cosine` with one already taken: a floor of many boxes is one obstacle.
   /// @return how many were written. No allocation if the scratch was made for this field.
-  std::size_t several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch, std::span<BoxHit> out) const;
+  std::size_t several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch,
+                      std::span<BoxHit> out) const;
 
  private:
   static constexpr std::size_t width = 8;
+  using Lanes = std::array<float, width>;
   struct alignas(32) Node {
-    std::array<std::array<float, width>, 3> lo, hi;
+    std::array<Lanes, 3> lo, hi;
     std::array<std::int32_t, width> child;  ///< node if not negative, else −1 − box
     std::int32_t count = 0;                 ///< slots in use, from the front
   };

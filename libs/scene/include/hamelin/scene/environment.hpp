@@ -24,11 +24,12 @@ enum class UnknownPolicy : std::int32_t { free, slow, block };
 /// A map as a scene names it.
 struct MapSpec {
   std::filesystem::path file;
-  geometry::SE3 pose;                 ///< of the map's frame in the world
-  std::optional<double> scale;        ///< metres per unit of the file
+  geometry::SE3 pose;                              ///< of the map's frame in the world
+  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
+  std::optional<double> scale;                     ///< metres per unit of the file
   double occupancy_threshold = 0.5;
   UnknownPolicy unknown = UnknownPolicy::free;
-  double keep_out_radius_m = 0.0;     ///< unknown voxels touched by this ball around the base count as free
+  double keep_out_radius_m = 0.0;  ///< unknown voxels touched by this ball around the base count as free
 };
 
 /// A near obstacle point of one sphere of the arm; world frame. The fields are those of hamelin_contact.
@@ -36,11 +37,11 @@ struct Contact {
   static constexpr int map = -1;      ///< `obstacle`: the map
   static constexpr int unknown = -2;  ///< `obstacle`: unknown space that blocks
   int sphere = 0;
-  int obstacle = map;                 ///< map, unknown, or the obstacle's index
-  double distance = 0.0;              ///< from the sphere's surface [m]; zero or below is contact
-  Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();       ///< on the sphere's surface
+  int obstacle = map;                                   ///< map, unknown, or the obstacle's index
+  double distance = 0.0;                                ///< from the sphere's surface [m]; zero or below is contact
+  Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();  ///< on the sphere's surface
   Eigen::Vector3d obstacle_point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();       ///< unit, from the obstacle towards the sphere
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();          ///< unit, from the obstacle towards the sphere
   Eigen::Vector3d obstacle_velocity = Eigen::Vector3d::Zero();  ///< [m/s]
 };
 
@@ -76,8 +77,8 @@ class Environment {
   /// @param reach distance from the base that no point of the arm exceeds [m]
   /// @param influence the largest distance that will be asked for [m]
   /// @throws Error io, parse or invalid for the map or an obstacle
-  Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base, double reach,
-              double influence);
+  Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
+              double reach, double influence);
 
   class Scratch {
    public:
@@ -116,8 +117,8 @@ class Environment {
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
 
  private:
-  [[nodiscard]] bool shown(std::size_t obstacle, std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
-                           double time_s, View view) const;
+  [[nodiscard]] bool shown(std::size_t obstacle, std::span<const Eigen::Vector3d> centers,
+                           std::span<const double> radii, double time_s, View view) const;
   [[nodiscard]] double clearance_to(const Obstacle& obstacle, std::span<const Eigen::Vector3d> centers,
                                     std::span<const double> radii, double time_s, double limit) const;
 

@@ -32,17 +32,17 @@ struct Clutter {
 struct MakeMapOptions {
   double resolution_m = 0.02;
   Mark mark = Mark::touch;
-  std::vector<Obstacle> primitives;   ///< in the map's frame, at rest
+  std::vector<Obstacle> primitives;  ///< in the map's frame, at rest
   std::optional<Clutter> clutter;
-  std::optional<Box> free_bounds;     ///< voxels with their centre in here are free unless marked; all else is unknown
-  std::filesystem::path output;       ///< a .bt file
+  std::optional<Box> free_bounds;  ///< voxels with their centre in here are free unless marked; all else is unknown
+  std::filesystem::path output;    ///< a .bt file
 };
 
 struct MakeReport {
   std::filesystem::path output;
   std::string sha256;
   std::size_t bytes = 0, nodes = 0;
-  std::size_t primitives = 0;         ///< clutter included
+  std::size_t primitives = 0;  ///< clutter included
   std::size_t occupied_voxels = 0, free_voxels = 0;
 };
 
@@ -66,11 +66,11 @@ struct ProblemOptions {
   std::string tip;                       ///< may be empty
   double resolution_m = 0.02;
   Mark mark = Mark::touch;
-  std::filesystem::path output;          ///< the scene; the map stands beside it, with ending .bt
+  std::filesystem::path output;  ///< the scene; the map stands beside it, with ending .bt
 };
 
-/// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the planner
-/// sees the map, the primitives themselves are there for the judge. Joints go by order.
+/// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the
+/// planner sees the map, the primitives themselves are there for the judge. Joints go by order.
 /// @throws Error io, parse or invalid
 MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options);
 

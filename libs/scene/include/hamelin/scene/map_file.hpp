@@ -28,7 +28,8 @@ struct MapHeader {
 };
 
 /// Checks every byte of a `.bt` or `.ot` file without recursion, before a library sees it: header, depth of at most 16,
-/// no inner node without children, finite log-odds within ±100, node count as stated, nothing missing and nothing behind the end.
+/// no inner node without children, finite log-odds within ±100, node count as stated, nothing missing and nothing
+/// behind the end.
 /// @param where the file's name, opens each message; its ending, if .bt or .ot, must agree with the first line
 /// @throws Error parse, naming the header line or the byte
 [[nodiscard]] MapHeader check_map_bytes(std::string_view bytes, const std::string& where);
@@ -41,8 +42,8 @@ struct ReadMapOptions {
 /// An OctoMap as the cells that matter here. Free space is what neither list holds.
 struct MapData {
   std::string file;
-  std::string sha256;                 ///< of the file's bytes
-  double resolution = 0.0;            ///< edge of a voxel [m], scale applied
+  std::string sha256;       ///< of the file's bytes
+  double resolution = 0.0;  ///< edge of a voxel [m], scale applied
   std::size_t node_count = 0;
   std::size_t free_leaves = 0;
   std::vector<Cell> occupied;         ///< occupied leaves

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -13,6 +14,10 @@ enum class Shape : std::int32_t { sphere, box, cylinder };
 
 [[nodiscard]] std::string_view to_string(Shape shape) noexcept;
 
+/// A rotation as a file wrote it. Kept beside the pose made from it, so that writing the pose and reading it back gives
+/// the same bits; it counts only as long as it still belongs to the pose.
+using Quaternion = std::array<double, 4>;
+
 /// Motion p(t) = p_0 + a sin(2πt/T) along a fixed amplitude a, without turning.
 struct SineMotion {
   Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();
@@ -23,20 +28,21 @@ struct SineMotion {
 struct Obstacle {
   std::string name;
   Shape shape = Shape::sphere;
-  double radius_m = 0.0;                               ///< sphere, cylinder
-  double length_m = 0.0;                               ///< cylinder, along its local z, centred
-  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();    ///< box: full edges
-  geometry::SE3 pose;                                  ///< centre and axes in the world at rest
+  double radius_m = 0.0;                             ///< sphere, cylinder
+  double length_m = 0.0;                             ///< cylinder, along its local z, centred
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  ///< box: full edges
+  geometry::SE3 pose;                                ///< centre and axes in the world at rest
+  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};    ///< see Quaternion
   std::optional<SineMotion> motion;
-  bool known = true;                                   ///< whether the planner is told of it from the start
-  std::optional<double> visible_within_m;              ///< if not known: seen once the arm is this near; none = never
-  double appears_s = 0.0;                              ///< before this time it is not there, for nobody
-  bool judge_only = false;                             ///< counts for the verdict only; the planner never sees it
+  bool known = true;                       ///< whether the planner is told of it from the start
+  std::optional<double> visible_within_m;  ///< if not known: seen once the arm is this near; none = never
+  double appears_s = 0.0;                  ///< before this time it is not there, for nobody
+  bool judge_only = false;                 ///< counts for the verdict only; the planner never sees it
 };
 
 /// Nearest point of an obstacle's surface.
 struct SurfacePoint {
-  double distance = 0.0;  ///< [m]; inside: minus the depth
+  double distance = 0.0;                                ///< [m]; inside: minus the depth
   Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< on the surface, world
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< unit outward, the gradient of the distance, world
 };
@@ -50,10 +56,13 @@ struct SurfacePoint {
 
 /// Exact nearest surface point of the obstacle, its centre put at `center`. Where several are equally near (a centre,
 /// an axis) one of them, always the same.
-[[nodiscard]] SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, const Eigen::Vector3d& p);
+[[nodiscard]] SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
+                                      const Eigen::Vector3d& p);
 
 /// Whether the obstacle is there at all.
-[[nodiscard]] inline bool exists(const Obstacle& obstacle, double time_s) { return time_s >= obstacle.appears_s; }
+[[nodiscard]] inline bool exists(const Obstacle& obstacle, double time_s) {
+  return time_s >= obstacle.appears_s;
+}
 
 /// Whether a planner is shown the obstacle.
 /// @param clearance_m smallest distance between arm and obstacle now

@@ -27,10 +27,11 @@ enum class GoalType : std::int32_t { joint, position, pose };
 
 struct Goal {
   GoalType type = GoalType::joint;
-  Eigen::VectorXd q;           ///< joint [rad or m]
-  geometry::SE3 pose;          ///< position, pose: of the tip in the world; a position's rotation means nothing
-  double tolerance_m = 0.0;    ///< position 0.02, pose 0.01
-  double tolerance_rad = 0.0;  ///< joint 0.05, pose 0.26
+  Eigen::VectorXd q;   ///< joint [rad or m]
+  geometry::SE3 pose;  ///< position, pose: of the tip in the world; a position's rotation means nothing
+  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};              ///< see Quaternion
+  double tolerance_m = 0.0;                                    ///< position 0.02, pose 0.01
+  double tolerance_rad = 0.0;                                  ///< joint 0.05, pose 0.26
   double speed_max = std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
 };
 
@@ -43,8 +44,8 @@ struct JointDamping {
 /// A body fixed to the tip.
 struct Payload {
   double mass_kg = 0.0;
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();         ///< centre of mass, tip frame
-  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();      ///< about the centre of mass, tip frame's axes
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();     ///< centre of mass, tip frame
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the centre of mass, tip frame's axes
 };
 
 /// What of the robot is modelled; by default nothing that could be left out.
@@ -82,6 +83,7 @@ struct Scene {
   std::string name;  ///< the file it came from
   RobotRef robot;
   geometry::SE3 base;
+  Quaternion base_quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
   std::optional<Eigen::Vector3d> gravity_m_s2;
   Eigen::VectorXd start_q, start_v;  ///< empty: zeros
   std::vector<Goal> goals;
@@ -102,7 +104,8 @@ struct Scene {
 
 /// @param where opens each message and becomes the scene's name
 /// @throws Error invalid
-[[nodiscard]] Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir, const std::string& where);
+[[nodiscard]] Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
+                                    const std::string& where);
 
 /// The scene with every default written out; what is not modelled is null. scene_from_json() reads it back as the same.
 [[nodiscard]] Json resolved_json(const Scene& scene);

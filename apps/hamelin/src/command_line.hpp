@@ -1,0 +1,36 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// What the subcommands share in reading the command line.
+namespace hamelin::app {
+
+/// Help that opens with the example (an App's footer).
+class HelpFormatter : public CLI::Formatter {
+ public:
+  HelpFormatter();
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
+};
+
+/// A subcommand whose help opens with `example`.
+CLI::App* add_command(CLI::App& parent, const std::string& name, const std::string& description,
+                      const std::string& example);
+
+/// One line that says what is wrong with a command line, with the nearest known name for an unknown one.
+[[nodiscard]] std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
+
+/// The numbers of a comma list. @throws Error usage naming the option, if it is no such list or has not `count` numbers
+[[nodiscard]] std::vector<double> number_list(const std::string& option, const std::string& text,
+                                              std::optional<std::size_t> count = {});
+
+/// The command line as given.
+[[nodiscard]] std::vector<std::string> command_line();
+void set_command_line(int argc, char** argv);
+
+/// Where planners are looked for: `given`, HAMELIN_PLUGIN_PATH, then beside this program.
+[[nodiscard]] std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given);
+
+}  // namespace hamelin::app

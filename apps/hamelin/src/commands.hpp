@@ -1,0 +1,15 @@
+#pragma once
+#include <CLI/CLI.hpp>
+
+/// The subcommands: each function adds one. Its action runs once the command line is read, and leaves the exit code.
+namespace hamelin::app {
+
+void add_run(CLI::App& app, int& exit_code);
+void add_integrate(CLI::App& app, int& exit_code);
+void add_robot(CLI::App& app, int& exit_code);
+void add_scene(CLI::App& app, int& exit_code);
+void add_plugins(CLI::App& app, int& exit_code);
+void add_validate(CLI::App& app, int& exit_code);
+void add_schema(CLI::App& app, int& exit_code);
+
+}  // namespace hamelin::app

@@ -1,0 +1,51 @@
+#include "document.hpp"
+
+#include <fmt/format.h>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+
+namespace hamelin::app {
+
+std::string_view to_string(Kind kind) noexcept {
+  switch (kind) {
+    case Kind::map: return "map";
+    case Kind::urdf:
+    case Kind::robot: return "robot";
+    case Kind::scene: return "scene";
+    case Kind::result: return "result";
+    case Kind::primitives: return "primitives";
+    case Kind::log: return "log";
+  }
+  return "unknown";
+}
+
+Kind kind_of(const std::filesystem::path& file) {
+  const auto ending = file.extension();
+  if (ending == ".bt" || ending == ".ot") return Kind::map;
+  if (ending == ".urdf") return Kind::urdf;
+  const std::string text = read_file(file);
+  if (text.starts_with("# Octomap")) return Kind::map;
+  const auto first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string::npos) throw Error(ErrorCode::parse, fmt::format("{}: is empty", file.string()));
+  if (text[first] == '<') return Kind::urdf;
+  if (ending == ".jsonl") return Kind::log;
+  if (text[first] != '{')
+    throw Error(ErrorCode::parse, fmt::format("{}: is no map, XML or JSON object", file.string()));
+  // A log is the only format with one object a line.
+  const std::string line = text.substr(0, text.find('\n'));
+  if (const Json head = Json::parse(line, nullptr, false); head.is_object() && head.value("type", Json()) == "header")
+    return Kind::log;
+  const Json document = parse_json(text, file.string());
+  const Json schema = document.value("schema", Json(nullptr));
+  if (schema == "hamelin.robot/1") return Kind::robot;
+  if (schema == "hamelin.scene/1") return Kind::scene;
+  if (schema == "hamelin.result/1") return Kind::result;
+  if (schema == "hamelin.primitives/1") return Kind::primitives;
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1 or "
+                          "hamelin.primitives/1",
+                          file.string(), schema.is_null() ? "missing" : schema.dump()));
+}
+
+}  // namespace hamelin::app

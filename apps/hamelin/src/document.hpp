@@ -1,0 +1,17 @@
+#pragma once
+#include <filesystem>
+#include <string_view>
+
+#include "hamelin/core/json.hpp"
+
+namespace hamelin::app {
+
+/// What a file is, by its content.
+enum class Kind { map, urdf, robot, scene, result, primitives, log };
+
+[[nodiscard]] std::string_view to_string(Kind kind) noexcept;
+
+/// @throws Error io, parse (neither map, XML nor JSON) or invalid (JSON of another schema)
+[[nodiscard]] Kind kind_of(const std::filesystem::path& file);
+
+}  // namespace hamelin::app

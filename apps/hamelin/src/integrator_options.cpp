@@ -1,0 +1,58 @@
+#include "integrator_options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+void require(bool takes, const char* flag, const std::string& integrator) {
+  if (!takes) throw Error(ErrorCode::usage, fmt::format("{}: integrator '{}' does not take it", flag, integrator));
+}
+
+}  // namespace
+
+void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
+  command.add_option("--integrator", flags.integrator,
+                     fmt::format("one of {} (default hamel-variational)", fmt::join(integration::integrator_names(), ", ")))
+      ->type_name("NAME");
+  command.add_option("--alpha", flags.alpha, "hamel: where in the step velocities are taken, 0 to 1 (default 0.5)")
+      ->type_name("A");
+  command.add_option("--start", flags.start, "hamel, hamel-midpoint: published or consistent (default consistent)")
+      ->type_name("HOW");
+  command.add_option("--solver", flags.solver, "root-finding: newton or feedback (default: the integrator's own)")
+      ->type_name("NAME");
+  command.add_option("--tolerance", flags.tolerance,
+                     "of root-finding: newton |delta|_inf [rad or m] (1e-12), feedback |tau_e| [Nm] (1e-8)")
+      ->type_name("E");
+}
+
+Json integrator_params(const IntegratorFlags& flags, const std::string& integrator, Json params) {
+  const bool hamel = integrator == "hamel", midpoint = integrator == "hamel-midpoint";
+  const bool root_finding = hamel || midpoint || integrator == "hamel-variational";
+  if (flags.alpha) {
+    require(hamel, "--alpha", integrator);
+    params["alpha"] = *flags.alpha;
+  }
+  if (flags.start) {
+    require(hamel || midpoint, "--start", integrator);
+    params["start"] = *flags.start;
+  }
+  if (flags.solver) {
+    require(root_finding, "--solver", integrator);
+    params["solver"] = *flags.solver;
+  }
+  if (flags.tolerance) {
+    require(root_finding, "--tolerance", integrator);
+    // each solver reads its own
+    params["tolerance"] = *flags.tolerance;
+    params["feedback_tolerance"] = *flags.tolerance;
+  }
+  return params;
+}
+
+}  // namespace hamelin::app

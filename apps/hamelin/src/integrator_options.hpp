@@ -1,0 +1,22 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "hamelin/integration/integrator.hpp"
+
+/// --integrator and what belongs to it.
+namespace hamelin::app {
+
+struct IntegratorFlags {
+  std::optional<std::string> integrator, start, solver;
+  std::optional<double> alpha, tolerance;
+};
+
+void add_integrator_flags(CLI::App& command, IntegratorFlags& flags);
+
+/// The integrator's parameters: those of the scene where it keeps its integrator, overridden by the flags.
+/// @throws Error usage for a flag the integrator does not know
+[[nodiscard]] Json integrator_params(const IntegratorFlags& flags, const std::string& integrator, Json params);
+
+}  // namespace hamelin::app

@@ -1,0 +1,26 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "hamelin/simulation/run.hpp"
+
+/// What `run` and `integrate` have in common: --every, --log, --result, --json.
+namespace hamelin::app {
+
+struct RecordOptions {
+  long every = 1;
+  std::optional<std::filesystem::path> log, result;
+  bool json = false;
+};
+
+void add_record_options(CLI::App& command, RecordOptions& options);
+
+/// Tries the output paths, runs, writes the result and shows it.
+/// @param input the file the run is about; outputs may not replace it
+/// @return the exit code of the outcome
+[[nodiscard]] int record(const RecordOptions& options, const std::filesystem::path& input,
+                         const std::function<log::Result(const simulation::Watch&)>& simulate);
+
+}  // namespace hamelin::app

@@ -1,0 +1,132 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/log/run_log.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct InfoOptions {
+  std::filesystem::path file;
+  std::optional<std::string> tip;
+  std::optional<std::filesystem::path> spheres;
+  bool json = false;
+};
+
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json describe(const model::Model& model, const std::filesystem::path& file) {
+  const auto& robot = model.robot();
+  Json links = Json::array();
+  double mass = 0.0;
+  for (const auto& link : robot.links) {
+    mass += link.mass_kg;
+    links.push_back({{"name", link.name},
+                     {"joint", link.joint.name},
+                     {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
+                     {"lower", optional(link.joint.lower)},
+                     {"upper", optional(link.joint.upper)},
+                     {"velocity_max", optional(link.joint.velocity_max)},
+                     {"effort_max", optional(link.joint.effort_max)},
+                     {"damping", link.joint.damping},
+                     {"mass_kg", link.mass_kg},
+                     {"spheres", link.spheres.size()},
+                     {"segments", link.segments.size()}});
+  }
+  return {{"file", file.string()},
+          {"name", robot.name},
+          {"dof", robot.dof()},
+          {"planar", model.planar()},
+          {"tip", robot.tip.name},
+          {"tip_link", robot.links[static_cast<std::size_t>(robot.tip.link)].name},
+          {"mass_kg", mass},
+          {"reach_m", model.reach()},
+          {"spheres", model.spheres().size()},
+          {"self_collision_disabled", robot.self_collision_disabled.size()},
+          {"links", links},
+          {"notes", robot.notes}};
+}
+
+std::string cell(const Json& value) { return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>()); }
+
+void print_table(const Json& robot) {
+  fmt::print("{}: {}, {} joints, {}, {:.4g} kg, tip '{}' on link '{}', reach at most {:.3g} m\n", robot["file"].get<std::string>(),
+             robot["name"].get<std::string>(), robot["dof"].get<int>(),
+             robot["planar"].get<bool>() ? "planar: runs in SE(2)" : "spatial: runs in SE(3)", robot["mass_kg"].get<double>(),
+             robot["tip"].get<std::string>(), robot["tip_link"].get<std::string>(), robot["reach_m"].get<double>());
+  constexpr const char* row = "{:<20} {:<20} {:<9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8}\n";
+  fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass", "spheres", "segments");
+  for (const auto& link : robot["links"])
+    fmt::print(row, link["joint"].get<std::string>(), link["name"].get<std::string>(), link["type"].get<std::string>(),
+               cell(link["lower"]), cell(link["upper"]), cell(link["velocity_max"]), cell(link["effort_max"]),
+               cell(link["damping"]), cell(link["mass_kg"]), link["spheres"].get<std::size_t>(), link["segments"].get<std::size_t>());
+  fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
+  if (robot["spheres"] == 0) fmt::print("no collision spheres: obstacles need some, as <collision><sphere> or by --spheres\n");
+  for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
+}
+
+void info(const InfoOptions& options) {
+  const model::Model model(model::read_robot(options.file, {options.tip, options.spheres}));
+  const Json robot = describe(model, options.file);
+  if (options.json)
+    fmt::print("{}\n", robot.dump(2));
+  else
+    print_table(robot);
+}
+
+struct ChainFlags {
+  model::ChainOptions chain;
+  std::filesystem::path output;
+};
+
+void make_chain(const ChainFlags& flags) {
+  const model::Robot robot = model::make_chain(flags.chain);
+  write_file_aside(flags.output, model::robot_to_json(robot).dump(1) + "\n");
+  fmt::print("{}: {} joints\n", flags.output.string(), robot.dof());
+}
+
+}  // namespace
+
+void add_robot(CLI::App& app, int& exit_code) {
+  auto* robot = add_command(app, "robot", "Look at robots and make them", "hamelin robot info data/robots/arm7.urdf");
+  robot->require_subcommand(1);
+
+  auto* info_command =
+      add_command(*robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
+                  "hamelin robot info data/robots/arm7.urdf");
+  const auto info_options = std::make_shared<InfoOptions>();
+  info_command->add_option("file", info_options->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
+  info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")->type_name("LINK");
+  info_command->add_option("--spheres", info_options->spheres, "sidecar file with collision spheres")->type_name("FILE");
+  info_command->add_flag("--json", info_options->json, "print JSON");
+  info_command->callback([info_options, &exit_code] {
+    info(*info_options);
+    exit_code = 0;
+  });
+
+  auto* chain_command = add_command(*robot, "make-chain", "Write a chain of equal links along +y",
+                                    "hamelin robot make-chain --links 7 --axes x,z,x --length 0.2 --mass 1 --radius 0.03 -o chain7.json");
+  const auto chain_flags = std::make_shared<ChainFlags>();
+  auto& chain = chain_flags->chain;
+  chain_command->add_option("--links", chain.links, "how many")->type_name("N")->capture_default_str();
+  chain_command->add_option("--axes", chain.axes, "joint axes, link by link, starting over at the end")->type_name("x,y,z")->capture_default_str();
+  chain_command->add_option("--length", chain.length_m, "of each link [m]")->type_name("L")->capture_default_str();
+  chain_command->add_option("--mass", chain.mass_kg, "of each link [kg]")->type_name("M")->capture_default_str();
+  chain_command->add_option("--radius", chain.radius_m, "of each link [m]")->type_name("R")->capture_default_str();
+  chain_command->add_option("-o,--output", chain_flags->output, "where to write it")->required()->type_name("FILE");
+  chain_command->callback([chain_flags, &exit_code] {
+    make_chain(*chain_flags);
+    exit_code = 0;
+  });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,92 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "document.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "record.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct RunOptions {
+  std::filesystem::path file;
+  std::optional<std::string> planner, integrator;
+  std::optional<double> step_s, duration_s;
+  std::optional<std::uint64_t> seed;
+  std::vector<std::string> set;
+  std::vector<std::filesystem::path> plugin_path;
+  RecordOptions record;
+};
+
+// The scene's document with the flags written into it, so that its own checks speak for them.
+scene::Scene read_scene(const RunOptions& options) {
+  if (const Kind kind = kind_of(options.file); kind != Kind::scene)
+    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
+  Json document = read_json(options.file);
+  const auto choose = [&](const char* key, const std::string& name) {
+    // another planner or integrator does not know the parameters of the scene's
+    if (!document.contains(key) || !document[key].is_object() || document[key].value("name", Json()) != name)
+      document[key] = {{"name", name}};
+  };
+  if (options.planner) choose("planner", *options.planner);
+  if (options.integrator) choose("integrator", *options.integrator);
+  if (options.step_s) document["step_s"] = *options.step_s;
+  if (options.duration_s) document["duration_s"] = *options.duration_s;
+  if (options.seed) document["seed"] = *options.seed;
+  for (const auto& assignment : options.set) scene::set_pointer(document, assignment);
+  return scene::scene_from_json(document, options.file.parent_path(), options.file.string());
+}
+
+// What the robot file knows and the scene does not ask for (SPEC §5).
+void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
+  const auto any = [&](auto&& has) { return std::any_of(robot.links.begin(), robot.links.end(), has); };
+  std::vector<const char*> unused;
+  if (!scene.model.joint_limits && any([](const model::Link& l) { return l.joint.lower || l.joint.upper; }))
+    unused.push_back("joint limits");
+  if (!scene.model.velocity_limits && any([](const model::Link& l) { return l.joint.velocity_max.has_value(); }))
+    unused.push_back("velocity limits");
+  if (!scene.model.torque_limits && any([](const model::Link& l) { return l.joint.effort_max.has_value(); }))
+    unused.push_back("effort limits");
+  if (!scene.model.joint_damping.from_robot && any([](const model::Link& l) { return l.joint.damping != 0.0; }))
+    unused.push_back("damping");
+  if (!unused.empty())
+    note(fmt::format("{}: not modelled by the scene: {}", scene.robot.file.string(), fmt::join(unused, ", ")));
+}
+
+int run(const RunOptions& options) {
+  const scene::Scene scene = read_scene(options);
+  say_what_is_unused(scene, simulation::load_model(scene).robot());
+  return record(options.record, options.file, [&](const simulation::Watch& watch) {
+    return simulation::run(scene, plugin_path(options.plugin_path), watch);
+  });
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  auto* command = add_command(app, "run", "Move a scene's arm to its goal with a planner, in closed loop",
+                              "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json");
+  const auto options = std::make_shared<RunOptions>();
+  command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
+  command->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")->type_name("NAME|PATH");
+  command->add_option("--integrator", options->integrator, "default the scene's, else hamel-variational")->type_name("NAME");
+  command->add_option("--step", options->step_s, "time step [s] (default the scene's)")->type_name("H");
+  command->add_option("--duration", options->duration_s, "longest simulated time [s] (default the scene's)")->type_name("T");
+  command->add_option("--seed", options->seed, "of all random numbers (default the scene's)")->type_name("S");
+  command->add_option("--set", options->set, "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
+      ->type_name("/json/pointer=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  add_record_options(*command, options->record);
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "document.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/log/run_log.hpp"
+#include "hamelin/model/robot_io.hpp"
+#include "hamelin/scene/make.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct ValidateOptions {
+  std::vector<std::filesystem::path> files;
+  std::optional<std::string> tip;
+  std::optional<double> scale;
+};
+
+std::string robot_words(const model::Robot& robot) { return fmt::format("robot, {} joints", robot.dof()); }
+
+std::string map_words(const scene::MapData& map) {
+  return fmt::format("map, resolution {:.4g} m, {} occupied leaves", map.resolution, map.occupied.size());
+}
+
+// A scene is as good as the files it names.
+std::string check_scene(const std::filesystem::path& file) {
+  const scene::Scene scene = scene::read_scene(file);
+  std::string words = fmt::format("scene, {}", robot_words(simulation::load_model(scene).robot()));
+  if (scene.map)
+    words += fmt::format(", {}", map_words(scene::read_map(scene.map->file, {scene.map->scale, scene.map->occupancy_threshold})));
+  return words;
+}
+
+std::string check_file(const std::filesystem::path& file, const ValidateOptions& options) {
+  switch (kind_of(file)) {
+    case Kind::map: {
+      const auto map = scene::read_map(file, {options.scale, 0.5});
+      for (const auto& warning : map.warnings) note(fmt::format("{}: {}", file.string(), warning));
+      return map_words(map);
+    }
+    case Kind::urdf:
+    case Kind::robot: return robot_words(model::read_robot(file, {options.tip, {}}));
+    case Kind::scene: return check_scene(file);
+    case Kind::result: check_shipped_schema(read_json(file), "result", file.string()); return "result";
+    case Kind::primitives:
+      return fmt::format("primitives, {} obstacles", scene::make_options_from_json(read_json(file), file.string()).primitives.size());
+    case Kind::log: {
+      const auto log = log::check_log(file);
+      return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events, log.has_result ? "" : ", no result: unfinished",
+                         log.cut ? ", last line cut" : "");
+    }
+  }
+  return "";
+}
+
+int validate(const ValidateOptions& options) {
+  int code = 0;
+  for (const auto& file : options.files) {
+    try {
+      fmt::print("{}: ok ({})\n", file.string(), check_file(file, options));
+    } catch (const Error& e) {
+      error_line(e.what());
+      code = 2;
+    }
+  }
+  return code;
+}
+
+}  // namespace
+
+void add_validate(CLI::App& app, int& exit_code) {
+  auto* command = add_command(app, "validate", "Check files: robots, scenes, maps, logs, results; told apart by content",
+                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt");
+  const auto options = std::make_shared<ValidateOptions>();
+  command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
+  command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");
+  command->add_option("--scale", options->scale, "metres per unit of a map")->type_name("S");
+  command->callback([options, &exit_code] { exit_code = validate(*options); });
+}
+
+}  // namespace hamelin::app

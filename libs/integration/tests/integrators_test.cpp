@@ -1,0 +1,387 @@
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/test/allocations.hpp"
+#include "hamelin/test/chains.hpp"
+#include "hamelin/test/robots.hpp"
+
+using namespace hamelin;
+using namespace hamelin::integration;
+
+namespace {
+
+const std::filesystem::path reference_file = HAMELIN_SOURCE_DIR "/../shared/reference/integrators.json";
+
+VectorXd vector_of(const Json& numbers) {
+  VectorXd x(static_cast<Eigen::Index>(numbers.size()));
+  for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = numbers[static_cast<std::size_t>(i)];
+  return x;
+}
+
+// Runs and reports the largest number of updates; a step that does not converge fails the test.
+struct Run {
+  State state;
+  int updates_max = 0, factorizations_max = 0;
+  double energy_error_max = 0.0;
+};
+
+Run run(Integrator& integrator, const VectorXd& q0, const VectorXd& v0, double h, long steps,
+        const Channels& channels = {}) {
+  Run out;
+  out.state = integrator.start(q0, v0);
+  const double energy = integrator.energy(out.state).total();
+  for (long k = 0; k < steps; ++k) {
+    const auto report = integrator.step(out.state, channels, h);
+    REQUIRE(report.converged);
+    out.updates_max = std::max(out.updates_max, report.updates);
+    out.factorizations_max = std::max(out.factorizations_max, report.factorizations);
+    out.energy_error_max = std::max(out.energy_error_max, std::abs(integrator.energy(out.state).total() - energy));
+  }
+  return out;
+}
+
+// q(0.5 s) and v(0.5 s) of the cylinder chains by RK4 with 40000 steps of an independent implementation.
+struct Reference {
+  int n;
+  std::vector<double> q0, q, v;
+};
+const std::vector<Reference>& references() {
+  static const std::vector<Reference> all{
+      {3, {0.3, -0.25, 0.4}, {-2.34194673151142, 0.223630086085084, 0.160257721060387},
+       {-9.66556564840169, -0.0258096869410843, 18.8108029912881}},
+      {7, {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6},
+       {-1.19333714080065, 0.0531078097491988, 0.226574331425119, 0.0265211887336785, -0.325661532073833,
+        0.330097906158339, 1.29168507184085},
+       {0.429718920452964, -0.357088757489762, -10.7968666138081, 8.7083051864382, 4.03105633152767, -26.7250837494429,
+        10.9490113735045}}};
+  return all;
+}
+
+VectorXd to_vector(const std::vector<double>& x) { return Eigen::Map<const VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())); }
+
+}  // namespace
+
+TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integration][golden]") {
+  if (!std::filesystem::exists(reference_file)) {
+    WARN("skipped: the reference file is not beside this checkout");
+    return;
+  }
+  const Model model(test::planar3());
+  REQUIRE(model.planar());
+  for (const auto& scheme : read_json(reference_file)["schemes"]) {
+    const std::string name = scheme["scheme"];
+    Options options;
+    options.start = Start::published;
+    options.alpha = scheme.contains("alpha") && scheme["alpha"].is_number() ? scheme["alpha"].get<double>() : 0.5;
+    for (const bool feedback : {true, false}) {
+      if (name == "hamel-variational") {
+        options.solver_given = true;
+        options.solver = feedback ? Solver::feedback : Solver::newton;
+      } else if (!feedback) {
+        continue;
+      }
+      CAPTURE(name, options.alpha, feedback);
+      const auto integrator = make_integrator(name, model, options);
+      State state = integrator->start(VectorXd::Zero(3), VectorXd::Zero(3));
+      const double energy = integrator->energy(state).total();
+      double energy_error = 0.0;
+      for (long k = 1; k <= 10000; ++k) {
+        const auto report = integrator->step(state, {}, 0.01);
+        REQUIRE(report.converged);
+        REQUIRE(report.updates <= 4);
+        energy_error = std::max(energy_error, std::abs(integrator->energy(state).total() - energy));
+        for (const auto& sample : scheme["samples"])
+          if (sample["k"] == k && k <= 1000)
+            CHECK((state.q - vector_of(sample["q"])).lpNorm<Eigen::Infinity>() < 1e-8);
+      }
+      CHECK(energy_error == Approx(scheme["max_energy_error_J"].get<double>()).epsilon(1e-4));
+      if (name == "hamel-variational") CHECK(energy_error <= 1.8e-4);
+    }
+  }
+}
+
+TEST_CASE("observed orders against an independent RK4 reference", "[integration][order]") {
+  struct Expected {
+    std::string name;
+    double order;
+  };
+  const auto expected = GENERATE(Expected{"hamel", 1.0}, Expected{"hamel-midpoint", 2.0}, Expected{"hamel-variational", 2.0},
+                                 Expected{"semi-implicit-euler", 1.0}, Expected{"rk4", 4.0});
+  for (const auto& reference : references()) {
+    CAPTURE(expected.name, reference.n);
+    const Model model(test::spatial_chain(reference.n));
+    std::vector<double> errors;
+    for (const int steps : {250, 500, 1000, 2000}) {
+      const auto integrator = make_integrator(expected.name, model);
+      const auto out = run(*integrator, to_vector(reference.q0), VectorXd::Zero(reference.n), 0.5 / steps, steps);
+      VectorXd v(reference.n);
+      integrator->velocity(out.state, v);
+      errors.push_back((out.state.q - to_vector(reference.q)).norm() + 0.1 * (v - to_vector(reference.v)).norm());
+    }
+    for (std::size_t i = 1; i < errors.size(); ++i)
+      CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(expected.order).margin(0.2));
+  }
+}
+
+TEST_CASE("the published start costs hamel-midpoint its second order", "[integration][order]") {
+  const auto& reference = references()[0];
+  const Model model(test::spatial_chain(3));
+  Options options;
+  options.start = Start::published;
+  std::vector<double> errors;
+  for (const int steps : {500, 1000, 2000})
+    errors.push_back((run(*make_integrator("hamel-midpoint", model, options), to_vector(reference.q0), VectorXd::Zero(3),
+                          0.5 / steps, steps).state.q - to_vector(reference.q)).norm());
+  for (std::size_t i = 1; i < errors.size(); ++i) CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(1.0).margin(0.1));
+}
+
+TEST_CASE("Newton needs at most three solves a step on chains of 3 to 200 links at 1 ms", "[integration][newton]") {
+  const int n = GENERATE(3, 20, 100, 200);
+  const Model model(test::spatial_chain(n));
+  VectorXd q0(n);
+  for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
+  const auto out = run(*make_integrator("hamel-variational", model), q0, VectorXd::Zero(n), 1e-3, 300);
+  CAPTURE(n);
+  CHECK(out.factorizations_max <= 3);
+}
+
+TEST_CASE("one variational step solves the discrete Euler-Lagrange equation made of kinetic and potential energy",
+          "[integration][property]") {
+  // Independent of the recursion: L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] by its values, p_k = −D₁L_d by differences.
+  struct Case {
+    std::uint64_t seed;
+    int n, prismatic_every;
+    bool planar;
+  };
+  const auto c = GENERATE(Case{1, 5, 0, false}, Case{2, 6, 2, false}, Case{3, 4, 3, true});
+  CAPTURE(c.seed);
+  const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar));
+  dynamics::Workspace ws(model);
+  Rng rng(c.seed);
+  const VectorXd q0 = test::random_joints(rng, c.n), v0 = test::random_joints(rng, c.n);
+  const double h = 0.01;
+  const auto integrator = make_integrator("hamel-variational", model);
+  State state = integrator->start(q0, v0);
+  const VectorXd p0 = state.p;
+  REQUIRE(integrator->step(state, {}, h).converged);
+  const auto lagrangian = [&](const VectorXd& a, const VectorXd& b) {
+    const VectorXd mid = 0.5 * (a + b), rate = (b - a) / h;
+    return h * (dynamics::kinetic_energy(model, ws, mid, rate) - 0.5 * dynamics::potential_energy(model, ws, a) -
+                0.5 * dynamics::potential_energy(model, ws, b));
+  };
+  const double e = 1e-5;
+  for (int i = 0; i < c.n; ++i) {
+    VectorXd ap = q0, am = q0, bp = state.q, bm = state.q;
+    ap[i] += e, am[i] -= e, bp[i] += e, bm[i] -= e;
+    CHECK(-(lagrangian(ap, state.q) - lagrangian(am, state.q)) / (2 * e) == Approx(p0[i]).margin(1e-6 * p0.norm()));
+    CHECK((lagrangian(q0, bp) - lagrangian(q0, bm)) / (2 * e) == Approx(state.p[i]).margin(1e-6 * p0.norm()));
+  }
+}
+
+TEST_CASE("all integrators come to the same motion under damping, held torque and gyroscopic terms",
+          "[integration][channels]") {
+  const bool planar = GENERATE(false, true);
+  const Model model(test::random_robot(7, 4, 0, planar));
+  Rng rng(7);
+  const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4);
+  Channels channels;
+  channels.damping = VectorXd::Constant(4, 0.3);
+  channels.held_torque = test::random_joints(rng, 4, 2.0);
+  const Eigen::Vector3d normal = model.robot().links[0].joint.screw.head<3>();
+  channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal}, {3, test::random_vector(rng, 0.2), -1.0 * normal}};
+  const auto truth = run(*make_integrator("rk4", model), q0, v0, 0.5 / 4000, 4000, channels).state;
+  struct Bound {
+    std::string name;
+    double error;
+  };
+  for (const auto& bound : {Bound{"hamel", 2e-3}, Bound{"hamel-midpoint", 2e-6}, Bound{"hamel-variational", 2e-6},
+                            Bound{"semi-implicit-euler", 2e-3}}) {
+    CAPTURE(bound.name);
+    const auto coarse = run(*make_integrator(bound.name, model), q0, v0, 0.5 / 500, 500, channels).state;
+    const auto fine = run(*make_integrator(bound.name, model), q0, v0, 0.5 / 1000, 1000, channels).state;
+    const double error = (fine.q - truth.q).norm(), ratio = (coarse.q - truth.q).norm() / error;
+    CHECK(error < bound.error);
+    CHECK(ratio == Approx(bound.error > 1e-4 ? 2.0 : 4.0).epsilon(0.1));
+  }
+}
+
+TEST_CASE("the booked work closes the energy account of the variational step", "[integration][channels]") {
+  const Model model(test::random_robot(8, 4));
+  Rng rng(8);
+  Channels channels;
+  channels.damping = VectorXd::Constant(4, 0.5);
+  channels.held_torque = test::random_joints(rng, 4, 1.0);
+  channels.gyroscopic = {{2, test::random_vector(rng, 0.2), test::random_vector(rng, 3.0)}};
+  const auto integrator = make_integrator("hamel-variational", model);
+  std::vector<double> errors;
+  for (const int steps : {250, 500, 1000}) {
+    State state = integrator->start(VectorXd::Constant(4, 0.3), VectorXd::Constant(4, 1.0));
+    const double start = integrator->energy(state).total();
+    double booked = 0.0, worst = 0.0;
+    for (int k = 0; k < steps; ++k) {
+      const auto report = integrator->step(state, channels, 1.0 / steps);
+      REQUIRE(report.converged);
+      CHECK(std::abs(report.gyroscopic_work_J) < 1e-14);
+      CHECK(report.dissipated_J >= 0.0);
+      booked += report.held_work_J - report.dissipated_J;
+      worst = std::max(worst, std::abs(integrator->energy(state).total() - start - booked));
+    }
+    errors.push_back(worst);
+  }
+  CHECK(errors[0] / errors[1] == Approx(4.0).epsilon(0.2));
+  CHECK(errors[1] / errors[2] == Approx(4.0).epsilon(0.2));
+}
+
+TEST_CASE("node impulses add momentum, node velocities replace it", "[integration][channels]") {
+  const auto name = GENERATE(as<std::string>{}, "hamel", "hamel-midpoint", "hamel-variational", "semi-implicit-euler", "rk4");
+  CAPTURE(name);
+  const Model model(test::random_robot(9, 4));
+  dynamics::Workspace ws(model);
+  Rng rng(9);
+  const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4), dp = test::random_joints(rng, 4);
+  const auto integrator = make_integrator(name, model);
+  State state = integrator->start(q0, v0);
+  VectorXd v(4), p(4), before(4);
+  integrator->velocity(state, v);
+  CHECK((v - v0).norm() < 1e-12);
+  for (int k = 0; k < 3; ++k) REQUIRE(integrator->step(state, {}, 1e-3).converged);
+  integrator->velocity(state, v);
+  dynamics::momentum(model, ws, state.q, v, before);
+  integrator->kick(state, dp);
+  integrator->velocity(state, v);
+  dynamics::momentum(model, ws, state.q, v, p);
+  CHECK((p - before - dp).norm() < 1e-11);
+  integrator->set_velocity(state, v0);
+  integrator->velocity(state, v);
+  CHECK((v - v0).norm() < 1e-12);
+}
+
+TEST_CASE("the variational step runs backwards along its own way", "[integration][property]") {
+  const Model model(test::spatial_chain(5));
+  const VectorXd q0 = VectorXd::Constant(5, 0.4), v0 = VectorXd::Constant(5, -0.5);
+  const auto integrator = make_integrator("hamel-variational", model);
+  State state = integrator->start(q0, v0);
+  for (int k = 0; k < 500; ++k) REQUIRE(integrator->step(state, {}, 2e-3).converged);
+  VectorXd v(5);
+  integrator->velocity(state, v);
+  State back = integrator->start(state.q, -v);
+  for (int k = 0; k < 500; ++k) REQUIRE(integrator->step(back, {}, 2e-3).converged);
+  integrator->velocity(back, v);
+  CHECK((back.q - q0).lpNorm<Eigen::Infinity>() < 1e-8);
+  CHECK((v + v0).lpNorm<Eigen::Infinity>() < 1e-7);
+}
+
+TEST_CASE("planar and spatial paths integrate one motion", "[integration][property]") {
+  // A joint tilted by a hair forbids the planar path without changing the motion beyond it.
+  auto robot = test::planar3();
+  const Model planar(robot);
+  robot.links[2].joint.screw.head<3>() = Eigen::Vector3d(1.0, 0.0, 2e-9).normalized();
+  const Model spatial(robot);
+  REQUIRE(planar.planar());
+  REQUIRE_FALSE(spatial.planar());
+  const VectorXd q0 = VectorXd::Constant(3, 0.2), v0 = VectorXd::Constant(3, 0.1);
+  for (const auto& name : integrator_names()) {
+    CAPTURE(name);
+    const auto a = run(*make_integrator(name, planar), q0, v0, 0.01, 200).state.q;
+    const auto b = run(*make_integrator(name, spatial), q0, v0, 0.01, 200).state.q;
+    CHECK((a - b).lpNorm<Eigen::Infinity>() < 2e-8);
+  }
+}
+
+TEST_CASE("energy stays bounded without drift over 10^5 steps, and semi-implicit Euler's does not stay near",
+          "[integration][hard]") {
+  const Model model(test::planar3());
+  const auto worst = [&](const std::string& name, long steps) {
+    return run(*make_integrator(name, model), VectorXd::Zero(3), VectorXd::Zero(3), 0.01, steps).energy_error_max;
+  };
+  const double early = worst("hamel-variational", 10000), late = worst("hamel-variational", 100000);
+  CHECK(early < 1.8e-4);
+  CHECK(late < 1.3 * early);
+  CHECK(worst("semi-implicit-euler", 10000) > 100.0 * early);
+  CHECK(worst("hamel", 10000) > 100.0 * early);
+}
+
+TEST_CASE("a step without a root is halved, and an unconverged one is never used", "[integration][hard]") {
+  const int n = 50;  // 50 links of 4 cm: the feedback fails at 3 ms, as measured for the paper's scheme
+  const Model model(test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
+  VectorXd q0(n);
+  for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
+  Options options;
+  options.solver_given = true;
+  options.solver = Solver::feedback;
+  options.max_halvings = 0;
+  const double h = 0.1;
+  const auto stiff = make_integrator("hamel-variational", model, options);
+  State state = stiff->start(q0, VectorXd::Constant(n, 5.0));
+  const VectorXd q_before = state.q, p_before = state.p;
+  const auto refused = stiff->step(state, {}, h);
+  REQUIRE_FALSE(refused.converged);
+  CHECK((state.q - q_before).norm() == 0.0);
+  CHECK((state.p - p_before).norm() == 0.0);
+  CHECK(state.k == 0);
+
+  options.max_halvings = 12;
+  const auto patient = make_integrator("hamel-variational", model, options);
+  state = patient->start(q0, VectorXd::Constant(n, 5.0));
+  const auto report = patient->step(state, {}, h);
+  CHECK(report.converged);
+  CHECK(report.halvings > 0);
+  CHECK(state.k == 1);
+}
+
+TEST_CASE("the step grid from 1e-6 to 0.1 either converges or is refused", "[integration][hard]") {
+  const Model model(test::spatial_chain(7));
+  const VectorXd q0 = VectorXd::Constant(7, 0.3);
+  for (const auto& name : integrator_names()) {
+    for (double h = 1e-6; h < 0.2; h *= 10.0) {
+      CAPTURE(name, h);
+      const auto integrator = make_integrator(name, model);
+      State state = integrator->start(q0, VectorXd::Zero(7));
+      for (int k = 0; k < 20; ++k)
+        if (!integrator->step(state, {}, h).converged) break;
+      CHECK(state.q.allFinite());
+    }
+  }
+}
+
+TEST_CASE("unknown names and solvers are refused with what is known", "[integration][unit]") {
+  const Model model(test::planar3());
+  CHECK_THROWS_WITH(make_integrator("hamel-variatonal", model), Catch::Contains("did you mean 'hamel-variational'"));
+  Options options;
+  options.solver_given = true;
+  CHECK_THROWS_WITH(make_integrator("hamel", model, options), Catch::Contains("feedback"));
+  CHECK_THROWS_WITH(make_integrator("rk4", model, options), Catch::Contains("takes no solver"));
+  CHECK_THROWS_WITH(options_from_json(Json{{"tolerence", 1e-9}}, "scene.json"), Catch::Contains("tolerance"));
+  CHECK_THROWS_AS(options_from_json(Json{{"alpha", 1.5}}, "scene.json"), Error);
+}
+
+#ifndef HAMELIN_SANITIZED
+TEST_CASE("a step does not allocate", "[integration][allocation]") {
+  const bool planar = GENERATE(false, true);
+  const Model model(test::random_robot(10, 6, 0, planar));
+  for (const auto& name : integrator_names()) {
+    CAPTURE(name);
+    const auto integrator = make_integrator(name, model);
+    Channels channels;
+    channels.damping = VectorXd::Constant(6, 0.1);
+    channels.held_torque = VectorXd::Zero(6);
+    channels.gyroscopic = {{2, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX()}};
+    State state = integrator->start(VectorXd::Constant(6, 0.2), VectorXd::Constant(6, 0.3));
+    REQUIRE(integrator->step(state, channels, 1e-3).converged);
+    VectorXd v(6);
+    double sum = 0.0;
+    CHECK(test::allocations_in([&] {
+            sum += integrator->step(state, channels, 1e-3).residual;
+            integrator->velocity(state, v);
+            integrator->kick(state, v);
+            integrator->set_velocity(state, v);
+            sum += integrator->energy(state).total();
+          }) == 0);
+    CHECK(std::isfinite(sum));
+  }
+}
+#endif

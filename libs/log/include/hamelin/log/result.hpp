@@ -1,0 +1,76 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hamelin/core/json.hpp"
+
+namespace hamelin::log {
+
+enum class Outcome : std::int32_t {
+  completed,  ///< free motion ran to its end
+  reached,
+  stalled,
+  collision,
+  timeout,
+  diverged,  ///< a step found no root, or numbers left the finite range
+  defect,    ///< a promise of the program's own is broken: certificate, plugin contract
+  refused,   ///< the start is in contact
+  interrupted,
+};
+[[nodiscard]] std::string_view to_string(Outcome outcome) noexcept;
+/// SPEC §6: 0 done, 1 goal not reached, 2 refused, 3 diverged or defect, 130 interrupted.
+[[nodiscard]] int exit_code(Outcome outcome) noexcept;
+
+/// Statistics over all steps, filled by StepReports.
+struct SolverSummary {
+  long steps = 0;
+  long updates = 0, factorizations = 0, evaluations = 0, halvings = 0;
+  int updates_max = 0;
+  double residual_max = 0.0;
+  std::string criterion;
+  double tolerance = 0.0;
+};
+
+/// One run's outcome: the object of --result (SPEC §6). What does not apply stays empty and is written as null.
+struct Result {
+  std::string scene, integrator;
+  std::optional<std::string> planner;
+  Outcome outcome = Outcome::completed;
+  std::string cause;  ///< empty for plain success
+  double time_s = 0.0;
+  long steps = 0;
+  Eigen::VectorXd q, v;
+  double energy_initial_J = 0.0, energy_final_J = 0.0;
+  double energy_error_max_J = 0.0;  ///< largest |E_k − E_0 − work booked|
+  std::optional<double> min_clearance_m;
+  struct Goal {
+    std::string type;
+    std::size_t index = 0, count = 0;  ///< the goal now aimed at, of how many
+    std::optional<double> error_m, error_rad;
+  };
+  std::optional<Goal> goal;
+  SolverSummary solver;
+  double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0, held_work_J = 0.0;
+  double node_work_J = 0.0;               ///< by node velocities: the law, the filter and recovery together
+  std::optional<double> certified_share;  ///< of all steps; null where nothing can be hit
+  std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified
+  std::uint64_t seed = 0;
+  std::vector<std::string> warnings;
+  // timing: what depends on clock and machine
+  double cpu_s = 0.0;
+  struct TickTime {
+    double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [µs], thread CPU time
+  };
+  std::optional<TickTime> tick_us;
+  Json provenance = Json::object();
+};
+
+/// The result as the JSON object of SPEC §6, schema "hamelin.result/1". Non-finite numbers become null, named in
+/// "warnings".
+[[nodiscard]] Json to_json(const Result& result);
+
+}  // namespace hamelin::log

@@ -1,0 +1,129 @@
+#include "hamelin/log/result.hpp"
+
+#include <fmt/format.h>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/log/run_log.hpp"
+
+namespace hamelin::log {
+
+namespace {
+
+Json array(const Eigen::VectorXd& x) {
+  Json values = Json::array();
+  for (const double value : x) values.push_back(value);
+  return values;
+}
+
+template <typename T>
+Json optional(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json goal(const std::optional<Result::Goal>& goal) {
+  if (!goal) return nullptr;
+  return {{"type", goal->type},
+          {"error_m", optional(goal->error_m)},
+          {"error_rad", optional(goal->error_rad)},
+          {"index", goal->index},
+          {"count", goal->count}};
+}
+
+Json solver(const SolverSummary& s) {
+  const auto mean = [&](long sum) {
+    return s.steps > 0 ? Json(static_cast<double>(sum) / static_cast<double>(s.steps)) : Json(nullptr);
+  };
+  return {{"updates_mean", mean(s.updates)},
+          {"updates_max", s.updates_max},
+          {"factorizations_mean", mean(s.factorizations)},
+          {"evaluations", s.evaluations},
+          {"halvings", s.halvings},
+          {"residual_max", s.residual_max},
+          {"criterion", s.criterion},
+          {"tolerance", s.tolerance}};
+}
+
+}  // namespace
+
+std::string_view to_string(Outcome outcome) noexcept {
+  switch (outcome) {
+    case Outcome::completed:
+      return "completed";
+    case Outcome::reached:
+      return "reached";
+    case Outcome::stalled:
+      return "stalled";
+    case Outcome::collision:
+      return "collision";
+    case Outcome::timeout:
+      return "timeout";
+    case Outcome::diverged:
+      return "diverged";
+    case Outcome::defect:
+      return "defect";
+    case Outcome::refused:
+      return "refused";
+    case Outcome::interrupted:
+      return "interrupted";
+  }
+  return "unknown";
+}
+
+int exit_code(Outcome outcome) noexcept {
+  switch (outcome) {
+    case Outcome::completed:
+    case Outcome::reached:
+      return 0;
+    case Outcome::stalled:
+    case Outcome::collision:
+    case Outcome::timeout:
+      return 1;
+    case Outcome::refused:
+      return 2;
+    case Outcome::diverged:
+    case Outcome::defect:
+      return 3;
+    case Outcome::interrupted:
+      return 130;
+  }
+  return 3;
+}
+
+Json to_json(const Result& r) {
+  Json tick_us = nullptr;
+  if (r.tick_us) tick_us = {{"p50", r.tick_us->p50}, {"p99", r.tick_us->p99}, {"max", r.tick_us->max}};
+  Json document = {{"schema", "hamelin.result/1"},
+                   {"version", std::string(version())},
+                   {"scene", r.scene},
+                   {"planner", optional(r.planner)},
+                   {"integrator", r.integrator},
+                   {"outcome", std::string(to_string(r.outcome))},
+                   {"cause", r.cause.empty() ? Json(nullptr) : Json(r.cause)},
+                   {"time_s", r.time_s},
+                   {"steps", r.steps},
+                   {"q", array(r.q)},
+                   {"v", array(r.v)},
+                   {"energy_initial_J", r.energy_initial_J},
+                   {"energy_final_J", r.energy_final_J},
+                   {"energy_error_max_J", r.energy_error_max_J},
+                   {"min_clearance_m", optional(r.min_clearance_m)},
+                   {"goal", goal(r.goal)},
+                   {"solver", solver(r.solver)},
+                   {"gyroscopic_work_J", r.gyroscopic_work_J},
+                   {"filter_work_J", r.filter_work_J},
+                   {"recovery_work_J", r.recovery_work_J},
+                   {"dissipated_J", r.dissipated_J},
+                   {"held_work_J", r.held_work_J},
+                   {"node_work_J", r.node_work_J},
+                   {"certified_share", optional(r.certified_share)},
+                   {"tightest_step_m", optional(r.tightest_step_m)},
+                   {"seed", r.seed},
+                   {"warnings", r.warnings},
+                   {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
+                   {"provenance", r.provenance}};
+  for (const auto& replaced : null_non_finite(document))
+    document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
+  return document;
+}
+
+}  // namespace hamelin::log

@@ -1,0 +1,218 @@
+#include "hamelin/log/run_log.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <limits>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/log/provenance.hpp"
+#include "hamelin/log/result.hpp"
+
+using namespace hamelin;
+namespace fs = std::filesystem;
+using Catch::Matchers::Contains;
+
+namespace {
+
+// A directory of its own for each test, empty at first.
+fs::path fresh_directory(const std::string& name) {
+  const fs::path directory = fs::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / ("log_" + name);
+  fs::remove_all(directory);
+  fs::create_directories(directory);
+  return directory;
+}
+
+void put(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+Json tick(long k) {
+  return {{"k", k},
+          {"time_s", 0.001 * static_cast<double>(k)},
+          {"q", {0.1}},
+          {"v", {0.0}},
+          {"energy",
+           {{"kinetic_J", 0.0},
+            {"potential_J", 2.7},
+            {"control_J", 0.0},
+            {"gyroscopic_work_J", 0.0},
+            {"filter_work_J", 0.0},
+            {"recovery_work_J", 0.0},
+            {"dissipated_J", 0.0},
+            {"held_work_J", 0.0}}},
+          {"solver", {{"updates", 1}, {"residual", 1e-14}, {"halvings", 0}}}};
+}
+
+const Json header = {{"config", Json::object()}, {"provenance", Json::object()}};
+
+log::Result result() {
+  log::Result r;
+  r.scene = "a.json";
+  r.integrator = "rk4";
+  return r;
+}
+
+std::string what_of_check(const fs::path& file) {
+  try {
+    log::check_log(file);
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a log is read back line by line and fits its schema", "[log][unit]") {
+  const auto file = fresh_directory("whole") / "run.jsonl";
+  {
+    log::RunLog record(file);
+    record.write("header", header);
+    record.write("tick", tick(0));
+    record.write("event", {{"time_s", 0.0}, {"text", "hello"}});
+    record.write("tick", tick(1));
+    record.write("result", log::to_json(result()));
+  }
+  const auto log = log::read_log(file);
+  REQUIRE(log.lines.size() == 5);
+  CHECK_FALSE(log.cut);
+  CHECK(log.lines[0]["schema"] == "hamelin.run/1");
+  CHECK(log.lines[1]["q"] == Json({0.1}));
+  CHECK(log.lines[4]["outcome"] == "completed");
+  for (const auto& line : log.lines) CHECK_NOTHROW(check_shipped_schema(line, "run", "line"));
+  const auto summary = log::check_log(file);
+  CHECK(summary.ticks == 2);
+  CHECK(summary.events == 1);
+  CHECK(summary.has_result);
+  CHECK_FALSE(summary.cut);
+}
+
+TEST_CASE("every line is in the file as soon as it is written", "[log][unit]") {
+  const auto file = fresh_directory("flushed") / "run.jsonl";
+  log::RunLog record(file);
+  record.write("header", header);
+  CHECK(log::read_log(file).lines.size() == 1);
+  record.write("tick", tick(0));
+  CHECK(log::read_log(file).lines.size() == 2);
+}
+
+TEST_CASE("doubles come back bit for bit", "[log][unit]") {
+  const auto file = fresh_directory("bits") / "run.jsonl";
+  const std::vector<double> numbers = {0.1, 1.0 / 3.0, 5e-324, -1.7976931348623157e308, 6.02214076e23};
+  log::RunLog record(file);
+  Json fields = tick(0);
+  fields["q"] = numbers;
+  record.write("tick", fields);
+  CHECK(log::read_log(file).lines.at(0)["q"].get<std::vector<double>>() == numbers);
+}
+
+TEST_CASE("non-finite numbers are written as null and told in an event", "[log][unit]") {
+  const auto file = fresh_directory("nan") / "run.jsonl";
+  {
+    log::RunLog record(file);
+    record.write("header", header);
+    Json fields = tick(0);
+    fields["q"][0] = std::numeric_limits<double>::quiet_NaN();
+    fields["energy"]["kinetic_J"] = -std::numeric_limits<double>::infinity();
+    record.write("tick", fields);
+  }
+  const auto log = log::read_log(file);
+  REQUIRE(log.lines.size() == 3);
+  CHECK(log.lines[1]["q"][0].is_null());
+  CHECK(log.lines[1]["energy"]["kinetic_J"].is_null());
+  CHECK(log.lines[2]["type"] == "event");
+  CHECK_THAT(log.lines[2]["text"].get<std::string>(), Contains("/q/0 is nan") && Contains("/energy/kinetic_J is -inf"));
+  CHECK_NOTHROW(log::check_log(file));
+}
+
+TEST_CASE("a cut line at the end is left out, the lines before it stay", "[log][unit]") {
+  const auto file = fresh_directory("cut") / "run.jsonl";
+  {
+    log::RunLog record(file);
+    record.write("header", header);
+    record.write("tick", tick(0));
+    record.write("tick", tick(1));
+  }
+  fs::resize_file(file, fs::file_size(file) - 20);
+  const auto log = log::read_log(file);
+  CHECK(log.cut);
+  CHECK(log.lines.size() == 2);
+  const auto summary = log::check_log(file);
+  CHECK(summary.cut);
+  CHECK(summary.ticks == 1);
+  CHECK_FALSE(summary.has_result);
+}
+
+TEST_CASE("a broken line before the end is an error that names it", "[log][unit]") {
+  const auto file = fresh_directory("broken") / "run.jsonl";
+  put(file, "{\"type\":\"header\",\"schema\":\"hamelin.run/1\",\"config\":{},\"provenance\":{}}\n{\"type\":\n{}\n");
+  CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl: line 2"));
+}
+
+TEST_CASE("check_log names the line that breaks the rules", "[log][unit]") {
+  const auto directory = fresh_directory("rules");
+  const auto file = directory / "run.jsonl";
+  const auto with = [&](const std::vector<std::pair<const char*, Json>>& lines) {
+    fs::remove(file);
+    log::RunLog record(file);
+    for (const auto& [type, fields] : lines) record.write(type, fields);
+    return what_of_check(file);
+  };
+  CHECK(with({{"header", header}, {"tick", tick(0)}}).empty());
+  CHECK_THAT(with({{"tick", tick(0)}}), Contains("line 1") && Contains("header first"));
+  CHECK_THAT(with({{"header", header}, {"header", header}}), Contains("line 2"));
+  CHECK_THAT(with({{"header", header}, {"tick", tick(1)}, {"tick", tick(1)}}),
+             Contains("line 3: /k") && Contains("rising"));
+  CHECK_THAT(with({{"header", header}, {"result", log::to_json(result())}, {"tick", tick(0)}}), Contains("line 3"));
+  CHECK_THAT(with({{"header", header}, {"note", header}}), Contains("line 2") && Contains("note"));
+  Json extra = tick(1);
+  extra["speed"] = 1;
+  CHECK_THAT(with({{"header", header}, {"tick", tick(0)}, {"tick", extra}}), Contains("line 3") && Contains("speed"));
+  Json short_tick = tick(0);
+  short_tick.erase("q");
+  CHECK_THAT(with({{"header", header}, {"tick", short_tick}}), Contains("line 2") && Contains("'q' is missing"));
+  put(file, "");
+  CHECK_THAT(what_of_check(file), Contains("no whole line"));
+}
+
+TEST_CASE("an unwritable path is refused before anything is written", "[log][unit]") {
+  const auto directory = fresh_directory("unwritable");
+  CHECK_THROWS_WITH(log::RunLog(directory / "absent" / "run.jsonl"),
+                    Contains("run.jsonl: cannot be written: No such file"));
+  CHECK_THROWS_WITH(log::RunLog(directory), Contains("Is a directory"));
+  CHECK_THROWS_AS(log::check_writable(directory / "absent" / "x"), Error);
+}
+
+TEST_CASE("a full disk is an error that names the file", "[log][unit]") {
+  if (!fs::exists("/dev/full")) {
+    WARN("no /dev/full here: skipped");
+    return;
+  }
+  log::RunLog record("/dev/full");
+  CHECK_THROWS_WITH(record.write("header", header), Contains("/dev/full: cannot be written"));
+}
+
+TEST_CASE("a log that is never begun leaves no file, and an old one as it was", "[log][unit]") {
+  const auto directory = fresh_directory("untouched");
+  { const log::RunLog record(directory / "new.jsonl"); }
+  CHECK_FALSE(fs::exists(directory / "new.jsonl"));
+  put(directory / "old.jsonl", "kept\n");
+  { const log::RunLog record(directory / "old.jsonl"); }
+  CHECK(read_file(directory / "old.jsonl") == "kept\n");
+}
+
+TEST_CASE("provenance names machine, build and the inputs with their hashes", "[log][unit]") {
+  const auto file = fresh_directory("provenance") / "input.txt";
+  put(file, "abc");
+  const Json p = log::provenance({file}, {"hamelin", "run"});
+  // FIPS 180-2, appendix B.1
+  CHECK(p["inputs"][0]["sha256"] == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  CHECK(p["inputs"][0]["path"] == file.string());
+  CHECK(p["host"]["cores"].get<long>() >= 1);
+  CHECK_FALSE(p["isa"].get<std::string>().empty());
+  CHECK_FALSE(p["build"]["compiler"].get<std::string>().empty());
+  CHECK(p["versions"]["hamelin"] == std::string(version()));
+  CHECK(p["argv"] == Json({"hamelin", "run"}));
+  CHECK_THROWS_AS(log::provenance({file.parent_path() / "absent"}), Error);
+}

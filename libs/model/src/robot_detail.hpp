@@ -1,0 +1,43 @@
+#pragma once
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hamelin/model/robot.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+/// What the readers share.
+namespace hamelin::model::detail {
+
+/// Spheres by link, and pairs of links that never count as colliding.
+struct SphereFile {
+  std::map<std::string, std::vector<Sphere>> links;
+  std::vector<std::pair<std::string, std::string>> self_collision_disabled;
+};
+
+/// @throws Error io, parse or invalid
+[[nodiscard]] SphereFile read_spheres(const std::filesystem::path& file);
+
+/// @param where the file's name, for messages
+[[nodiscard]] Robot read_urdf(const std::string& text, const std::string& where, const RobotOptions& options);
+
+/// Brings each rotation to one that a quaternion of doubles gives exactly (a change of some 1e-16), so that a robot
+/// survives its JSON form bit for bit.
+void round_to_quaternions(Robot& robot);
+
+/// "a, b, c"
+[[nodiscard]] std::string join(const std::vector<std::string>& names);
+
+/// "; did you mean 'x'?" or nothing.
+[[nodiscard]] std::string suggestion(const std::string& name, const std::vector<std::string>& candidates);
+
+/// Makes the screw's direction a unit vector.
+/// @return what to note, empty if it was one (to 1e-6)
+/// @throws Error invalid if it is zero; `where` opens the message
+[[nodiscard]] std::string normalise_screw(Joint& joint, const std::string& where);
+
+/// How a matrix fails to be the inertia of a body: empty if it is one. `strict`: definite, not only semi-definite.
+[[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool strict);
+
+}  // namespace hamelin::model::detail

@@ -1,0 +1,172 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hamelin/core/json.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/planning/plugin_abi.h"
+
+/// The host's side of the border of plugin_abi.h: finding, loading and checking plugins, and calling their planners.
+/// Loading runs code, so no directory is searched that the caller did not name.
+namespace hamelin::planning {
+
+/// What a host offers its planners.
+class HostServices {
+ public:
+  HostServices() = default;
+  HostServices(const HostServices&) = delete;
+  HostServices& operator=(const HostServices&) = delete;
+  virtual ~HostServices() = default;
+  /// @param level HAMELIN_LOG_INFO or HAMELIN_LOG_WARNING
+  virtual void log(std::int32_t level, std::string_view line) = 0;
+  /// Contacts of the control spheres at q; returns how many there are, writes the nearest out.size() of them.
+  virtual std::size_t closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) = 0;
+};
+
+/// Owns what a hamelin_setup points at. Fill the fields; a planner made from it keeps its own copy.
+struct SetupData {
+  SetupData() = default;
+  /// Everything the model knows: robot, base, gravity, control spheres.
+  /// @param nominal the robot the planner shall believe in
+  explicit SetupData(const model::Model& nominal);
+
+  std::size_t dof = 0;
+  std::string robot_json;
+  Eigen::Vector3d gravity_world_m_s2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d base_position_world_m = Eigen::Vector3d::Zero();
+  Eigen::Vector4d base_quaternion_wxyz{1.0, 0.0, 0.0, 0.0};
+  std::vector<hamelin_sphere> spheres;
+  std::vector<hamelin_goal> goals;       ///< their `q` is filled in from goals_q
+  std::vector<Eigen::VectorXd> goals_q;  ///< one a goal; of size zero unless it is a joint goal
+  /// Limits the scene models: dof numbers, or of size zero where it models none.
+  Eigen::VectorXd q_lower, q_upper, velocity_max, effort_max;
+  double control_period_s = 0.0;
+  double influence_m = 0.0;
+  double map_resolution_m = 0.0;
+  std::uint64_t seed = 0;
+
+  /// Adds a goal. @param q dof numbers for a joint goal, else of size zero
+  void add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q = {});
+  /// The C view; good until the next change. Sets the goals' q.
+  [[nodiscard]] hamelin_setup view();
+};
+
+/// The memory behind a hamelin_command: sized once, cleared before each tick.
+class CommandBuffers {
+ public:
+  /// @param gyroscopic_capacity at least the number of contacts of any tick
+  CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity);
+  CommandBuffers(const CommandBuffers&) = delete;
+  CommandBuffers& operator=(const CommandBuffers&) = delete;
+
+  void clear() noexcept;
+  [[nodiscard]] hamelin_command& raw() noexcept { return raw_; }
+  [[nodiscard]] const hamelin_command& raw() const noexcept { return raw_; }
+  /// The channels, as plugin_abi.h describes them.
+  [[nodiscard]] const Eigen::VectorXd& potential_gradient() const noexcept { return potential_gradient_; }
+  [[nodiscard]] const Eigen::VectorXd& damping() const noexcept { return damping_; }
+  [[nodiscard]] std::span<const hamelin_gyroscopic_term> gyroscopic() const noexcept {
+    return {gyroscopic_.data(), raw_.gyroscopic_count};
+  }
+  [[nodiscard]] const Eigen::VectorXd& held_torque() const noexcept { return held_torque_; }
+  [[nodiscard]] const Eigen::VectorXd& node_velocity() const noexcept { return node_velocity_; }
+
+ private:
+  Eigen::VectorXd potential_gradient_, damping_, held_torque_, node_velocity_;
+  std::vector<hamelin_gyroscopic_term> gyroscopic_;
+  hamelin_command raw_{};
+};
+
+class LoadedPlanner;
+
+/// A loaded plugin. A copyable handle; the shared object stays loaded as long as a handle or a planner of it lives.
+class Plugin {
+ public:
+  /// @throws Error plugin, one line that names the file: absent or no shared object (with the system's reason), no
+  ///   entry symbol, an entry that returns null, another ABI number, a short struct, a null function, no name, or a
+  ///   parameter schema that is not a JSON object
+  [[nodiscard]] static Plugin load(const std::filesystem::path& file);
+
+  [[nodiscard]] const std::filesystem::path& file() const noexcept;
+  [[nodiscard]] const std::string& name() const noexcept;
+  [[nodiscard]] const std::string& version() const noexcept;
+  [[nodiscard]] const std::string& description() const noexcept;
+  /// The JSON Schema of its parameters; unknown keys are errors even where the plugin's text forgot to say so.
+  [[nodiscard]] const Json& params_schema() const noexcept;
+
+  /// How far obstacles matter with these (checked) parameters [m]; none if the plugin does not say.
+  [[nodiscard]] std::optional<double> influence_m(const Json& checked_params) const;
+
+  /// Makes a planner.
+  /// @param setup moved into the planner
+  /// @param services must outlive the planner
+  /// @param checked_params as check_params returned them
+  /// @throws Error plugin with the text of the planner's own error
+  [[nodiscard]] LoadedPlanner create(SetupData setup, HostServices& services, const Json& checked_params) const;
+
+ private:
+  friend class LoadedPlanner;
+  struct Library;
+  explicit Plugin(std::shared_ptr<const Library> library) : library_(std::move(library)) {}
+  std::shared_ptr<const Library> library_;
+};
+
+/// Checks a planner's parameters and fills in defaults.
+/// @param params an object, or null for all defaults
+/// @throws Error invalid naming the planner, the key and what was expected
+[[nodiscard]] Json check_params(const Plugin& plugin, const Json& params);
+
+/// A planner and all that it needs to live.
+class LoadedPlanner {
+ public:
+  ~LoadedPlanner();
+  LoadedPlanner(LoadedPlanner&&) noexcept;
+  LoadedPlanner& operator=(LoadedPlanner&&) noexcept;
+
+  [[nodiscard]] const Plugin& plugin() const noexcept;
+
+  /// Clears `out` and lets the planner fill it. Does not allocate.
+  /// @return false for a defect, with a line in error(): the planner's own text, or an answer that no planner may
+  ///   give (not finite, negative damping, a gyroscopic term on no link, an unknown state)
+  [[nodiscard]] bool tick(const hamelin_tick& tick, CommandBuffers& out) noexcept;
+  /// Why the last tick returned false.
+  [[nodiscard]] std::string_view error() const noexcept;
+
+ private:
+  friend class Plugin;
+  struct Instance;
+  explicit LoadedPlanner(std::unique_ptr<Instance> instance);
+  std::unique_ptr<Instance> instance_;
+};
+
+/// File names end so: NAME.hamelin.so is searched for planner NAME.
+inline constexpr std::string_view plugin_suffix = ".hamelin.so";
+
+/// The directories to search, in order and without repetition: those given, those of HAMELIN_PLUGIN_PATH (parted by
+/// colons), and the program's own.
+[[nodiscard]] std::vector<std::filesystem::path> plugin_directories(const std::vector<std::filesystem::path>& given,
+                                                                    const std::vector<std::filesystem::path>& own);
+
+/// Loads the planner of that name from the first directory that has it, or, if the text has a slash or ends in
+/// plugin_suffix, the file of that path.
+/// @throws Error plugin; if none is found, with every directory searched, what is in it, and the nearest name
+[[nodiscard]] Plugin find_plugin(const std::string& name_or_path,
+                                 const std::vector<std::filesystem::path>& directories);
+
+/// One *.hamelin.so of a directory, loaded or refused.
+struct ListedPlugin {
+  std::filesystem::path file;
+  std::optional<Plugin> plugin;
+  std::string refusal;  ///< one line; empty if loaded
+};
+/// All plugins of the directories, in their order, by file name within each.
+[[nodiscard]] std::vector<ListedPlugin> list_plugins(const std::vector<std::filesystem::path>& directories);
+
+}  // namespace hamelin::planning

@@ -1,0 +1,41 @@
+#include "hamelin/planning/plugin.hpp"
+
+#include <Eigen/Geometry>
+
+#include "hamelin/model/robot_io.hpp"
+
+namespace hamelin::planning {
+
+model::Model Setup::model() const {
+  const std::string where = "nominal robot";
+  const auto& w = raw_->base_quaternion_wxyz;
+  const geometry::SE3 base(Eigen::Quaterniond(w[0], w[1], w[2], w[3]).normalized().toRotationMatrix(),
+                           vec3(raw_->base_position_world_m));
+  return model::Model(model::robot_from_json(parse_json(robot_json(), where), where), base,
+                      vec3(raw_->gravity_world_m_s2));
+}
+
+namespace detail {
+namespace {
+
+void write_line(std::string_view text, char* error, std::size_t error_size) noexcept {
+  if (error_size == 0) return;
+  const std::size_t size = std::min(text.size(), error_size - 1);
+  std::replace_copy(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(size), error, '\n', ' ');
+  error[size] = '\0';
+}
+
+}  // namespace
+
+void write_current_exception(char* error, std::size_t error_size) noexcept {
+  try {
+    throw;
+  } catch (const std::exception& e) {
+    write_line(e.what(), error, error_size);
+  } catch (...) {
+    write_line("an exception that is no std::exception", error, error_size);
+  }
+}
+
+}  // namespace detail
+}  // namespace hamelin::planning

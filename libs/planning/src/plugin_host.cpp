@@ -1,0 +1,441 @@
+#include "hamelin/planning/plugin_host.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+namespace hamelin::planning {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void refuse(const fs::path& file, std::string_view what) {
+  throw Error(ErrorCode::plugin, fmt::format("{}: {}", file.string(), what));
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+// The loader names the file itself; said once is enough.
+std::string system_reason(const fs::path& file) {
+  const char* raw = dlerror();
+  std::string text = raw != nullptr ? one_line(raw) : "unknown reason";
+  const std::string prefix = file.string() + ": ";
+  if (text.compare(0, prefix.size(), prefix) == 0) text.erase(0, prefix.size());
+  return text;
+}
+
+// JSON Schema lets unknown keys pass unless told otherwise; a mistyped parameter must not.
+void forbid_unknown_keys(Json& schema) {
+  if (!schema.is_object() || !schema.contains("properties") || !schema["properties"].is_object()) return;
+  schema["additionalProperties"] = false;
+  for (auto& [key, rule] : schema["properties"].items()) forbid_unknown_keys(rule);
+}
+
+bool finite(const Eigen::VectorXd& x) {
+  return x.allFinite();
+}
+bool finite(const double (&x)[3]) {
+  return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]);
+}
+
+// What is wrong with a planner's answer, or null.
+const char* defect(const CommandBuffers& out, std::size_t dof, std::size_t gyroscopic_capacity) {
+  const hamelin_command& raw = out.raw();
+  if (raw.state != HAMELIN_PLANNER_RUNNING && raw.state != HAMELIN_PLANNER_GAVE_UP) return "unknown planner state";
+  if (std::find(std::begin(raw.cause), std::end(raw.cause), '\0') == std::end(raw.cause))
+    return "cause is not nul-terminated";
+  if (!std::isfinite(raw.potential_J) || !finite(out.potential_gradient())) return "potential is not finite";
+  if (!finite(out.damping())) return "damping is not finite";
+  if (out.damping().minCoeff() < 0.0) return "damping is negative";
+  if (!finite(out.held_torque())) return "held torque is not finite";
+  if (raw.has_node_velocity != 0 && !finite(out.node_velocity())) return "node velocity is not finite";
+  if (raw.gyroscopic_count > gyroscopic_capacity) return "more gyroscopic terms than there is room for";
+  for (const auto& term : out.gyroscopic()) {
+    if (term.link < 0 || static_cast<std::size_t>(term.link) >= dof)
+      return "gyroscopic term on a link that is not there";
+    if (!finite(term.point_link_m) || !finite(term.w_world)) return "gyroscopic term is not finite";
+  }
+  if (!std::isfinite(raw.filter_work_J) || !std::isfinite(raw.recovery_work_J))
+    return "its energy accounts are not finite";
+  return nullptr;
+}
+
+}  // namespace
+
+// ---- SetupData
+
+SetupData::SetupData(const model::Model& nominal)
+    : dof(static_cast<std::size_t>(nominal.dof())),
+      robot_json(model::robot_to_json(nominal.robot()).dump()),
+      gravity_world_m_s2(nominal.gravity()),
+      base_position_world_m(nominal.base().p()) {
+  const Eigen::Quaterniond quaternion(nominal.base().R());
+  base_quaternion_wxyz << quaternion.w(), quaternion.vec();
+  std::int32_t link_index = 0;
+  for (const auto& link : nominal.robot().links) {
+    std::int32_t index_in_link = 0;
+    for (const auto& sphere : link.spheres) {
+      spheres.push_back({link_index,
+                         index_in_link++,
+                         {sphere.center_m.x(), sphere.center_m.y(), sphere.center_m.z()},
+                         sphere.radius_m});
+    }
+    ++link_index;
+  }
+}
+
+void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q) {
+  goals.push_back(goal);
+  goals_q.push_back(q);
+}
+
+hamelin_setup SetupData::view() {
+  for (std::size_t i = 0; i < goals.size(); ++i) goals[i].q = goals_q[i].size() > 0 ? goals_q[i].data() : nullptr;
+  hamelin_setup raw{};
+  raw.struct_size = sizeof raw;
+  raw.dof = dof;
+  raw.robot_json = robot_json.c_str();
+  raw.robot_json_size = robot_json.size();
+  std::copy_n(gravity_world_m_s2.data(), 3, raw.gravity_world_m_s2);
+  std::copy_n(base_position_world_m.data(), 3, raw.base_position_world_m);
+  std::copy_n(base_quaternion_wxyz.data(), 4, raw.base_quaternion_wxyz);
+  raw.spheres = spheres.data();
+  raw.sphere_count = spheres.size();
+  raw.goals = goals.data();
+  raw.goal_count = goals.size();
+  const auto numbers = [](const Eigen::VectorXd& x) { return x.size() > 0 ? x.data() : nullptr; };
+  raw.q_lower = numbers(q_lower);
+  raw.q_upper = numbers(q_upper);
+  raw.velocity_max = numbers(velocity_max);
+  raw.effort_max = numbers(effort_max);
+  raw.control_period_s = control_period_s;
+  raw.influence_m = influence_m;
+  raw.map_resolution_m = map_resolution_m;
+  raw.seed = seed;
+  return raw;
+}
+
+// ---- CommandBuffers
+
+CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity) : gyroscopic_(gyroscopic_capacity) {
+  for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_})
+    x->resize(static_cast<Eigen::Index>(dof));
+  clear();
+}
+
+void CommandBuffers::clear() noexcept {
+  for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_}) x->setZero();
+  raw_ = {};
+  raw_.struct_size = sizeof raw_;
+  raw_.potential_gradient = potential_gradient_.data();
+  raw_.damping = damping_.data();
+  raw_.gyroscopic = gyroscopic_.data();
+  raw_.gyroscopic_capacity = gyroscopic_.size();
+  raw_.held_torque = held_torque_.data();
+  raw_.node_velocity = node_velocity_.data();
+}
+
+// ---- Plugin
+
+struct Plugin::Library {
+  explicit Library(fs::path path) : file(std::move(path)), handle(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+    if (handle == nullptr) refuse(file, fmt::format("cannot be loaded: {}", system_reason(file)));
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+  ~Library() {
+#ifndef HAMELIN_SANITIZED  // their reports need the names of what was loaded
+    if (handle != nullptr) dlclose(handle);
+#endif
+  }
+
+  fs::path file;
+  void* handle;
+  const hamelin_plugin* raw = nullptr;
+  std::string name, version, description;
+  Json params_schema;
+};
+
+Plugin Plugin::load(const fs::path& file) {
+  std::error_code code;
+  const fs::path path = fs::absolute(file, code);
+  if (code || !fs::exists(path, code)) refuse(file, "no such file, expected a planner plugin");
+  if (!fs::is_regular_file(path, code)) refuse(path, "not a regular file, expected a planner plugin");
+  const auto library = std::make_shared<Library>(path);
+
+  void* symbol = dlsym(library->handle, HAMELIN_PLUGIN_ENTRY_NAME);
+  if (symbol == nullptr)
+    refuse(path, fmt::format("no symbol {}, so it is no planner plugin", HAMELIN_PLUGIN_ENTRY_NAME));
+  // POSIX promises that a function's address survives in a void*.
+  const auto* raw = reinterpret_cast<hamelin_plugin_entry_fn>(symbol)();
+  if (raw == nullptr) refuse(path, fmt::format("{} returned null", HAMELIN_PLUGIN_ENTRY_NAME));
+  // The number first: what the other fields mean depends on it.
+  if (raw->abi_version != HAMELIN_PLUGIN_ABI_VERSION)
+    refuse(path,
+           fmt::format("built for plugin ABI {}, this host has ABI {}", raw->abi_version, HAMELIN_PLUGIN_ABI_VERSION));
+  if (raw->struct_size < sizeof(hamelin_plugin))
+    refuse(path, fmt::format("its hamelin_plugin has {} bytes, expected at least {}", raw->struct_size,
+                             sizeof(hamelin_plugin)));
+  using Required = std::pair<const char*, bool>;
+  for (const auto& [what, there] : {Required{"create", raw->create != nullptr}, Required{"tick", raw->tick != nullptr},
+                                    Required{"destroy", raw->destroy != nullptr}})
+    if (!there) refuse(path, fmt::format("its function '{}' is null", what));
+  if (raw->name == nullptr || *raw->name == '\0') refuse(path, "it has no name");
+  const auto text = [](const char* string) { return one_line(string != nullptr ? string : ""); };
+  library->raw = raw;
+  library->name = text(raw->name);
+  library->version = text(raw->version);
+  library->description = text(raw->description);
+  try {
+    library->params_schema =
+        parse_json(raw->params_schema != nullptr ? raw->params_schema : "", "its parameter schema");
+  } catch (const Error& e) {
+    refuse(path, e.what());
+  }
+  if (!library->params_schema.is_object()) refuse(path, "its parameter schema is no JSON object");
+  forbid_unknown_keys(library->params_schema);
+  return Plugin(library);
+}
+
+const fs::path& Plugin::file() const noexcept {
+  return library_->file;
+}
+const std::string& Plugin::name() const noexcept {
+  return library_->name;
+}
+const std::string& Plugin::version() const noexcept {
+  return library_->version;
+}
+const std::string& Plugin::description() const noexcept {
+  return library_->description;
+}
+const Json& Plugin::params_schema() const noexcept {
+  return library_->params_schema;
+}
+
+std::optional<double> Plugin::influence_m(const Json& checked_params) const {
+  if (library_->raw->influence_m == nullptr) return std::nullopt;
+  const std::string text = checked_params.dump();
+  const double answer = library_->raw->influence_m(text.data(), text.size());
+  if (!(answer >= 0.0)) return std::nullopt;
+  return answer;
+}
+
+Json check_params(const Plugin& plugin, const Json& params) {
+  const std::string where = fmt::format("parameters of planner '{}'", plugin.name());
+  const Json given = params.is_null() ? Json::object() : params;
+  if (!given.is_object()) throw Error(ErrorCode::invalid, where + ": /: expected an object");
+  check_schema(given, plugin.params_schema(), where);
+  return with_defaults(given, plugin.params_schema());
+}
+
+// ---- LoadedPlanner
+
+struct LoadedPlanner::Instance {
+  Instance(Plugin p, SetupData s, HostServices& h) : plugin(std::move(p)), setup_data(std::move(s)), services(&h) {
+    setup = setup_data.view();
+    host.struct_size = sizeof host;
+    host.context = this;
+    host.log = &Instance::log;
+    host.closest_points = &Instance::closest_points;
+    error[0] = '\0';
+  }
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+  ~Instance() {
+    if (planner != nullptr) plugin.library_->raw->destroy(planner);
+  }
+
+  // No exception of ours may run through the plugin's frames either: it is kept and ends the call.
+  template <class F>
+  void guarded(F&& call) noexcept {
+    try {
+      call();
+    } catch (const std::exception& e) {
+      fail(e.what());
+    } catch (...) {
+      fail("a host service failed");
+    }
+  }
+  void fail(std::string_view text) noexcept {
+    host_failed = true;
+    const std::size_t size = std::min(text.size(), error.size() - 1);
+    std::copy_n(text.data(), size, error.data());
+    error[size] = '\0';
+  }
+  static void log(void* context, std::int32_t level, const char* text, std::size_t size) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    self.guarded([&] { self.services->log(level, {text, size}); });
+  }
+  static std::size_t closest_points(void* context, const double* q, double influence_m, hamelin_contact* out,
+                                    std::size_t capacity) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::size_t count = 0;
+    self.guarded([&] { count = self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity}); });
+    return count;
+  }
+
+  Plugin plugin;
+  SetupData setup_data;
+  HostServices* services;
+  hamelin_setup setup{};
+  hamelin_host host{};
+  void* planner = nullptr;
+  bool host_failed = false;
+  std::array<char, 512> error{};
+};
+
+LoadedPlanner Plugin::create(SetupData setup, HostServices& services, const Json& checked_params) const {
+  auto instance = std::make_unique<LoadedPlanner::Instance>(*this, std::move(setup), services);
+  const std::string params = checked_params.dump();
+  std::array<char, 512> text{};
+  const auto failed = library_->raw->create(&instance->host, &instance->setup, params.data(), params.size(),
+                                            &instance->planner, text.data(), text.size());
+  text.back() = '\0';
+  std::string why;
+  if (instance->host_failed) {
+    why = instance->error.data();
+  } else if (failed != 0) {
+    why = text.front() != '\0' ? text.data() : "no reason given";
+  } else if (instance->planner == nullptr) {
+    why = "create returned no planner";
+  }
+  if (!why.empty())
+    throw Error(ErrorCode::plugin,
+                one_line(fmt::format("{}: planner '{}' refuses to start: {}", file().string(), name(), why)));
+  return LoadedPlanner(std::move(instance));
+}
+
+LoadedPlanner::LoadedPlanner(std::unique_ptr<Instance> instance) : instance_(std::move(instance)) {}
+LoadedPlanner::~LoadedPlanner() = default;
+LoadedPlanner::LoadedPlanner(LoadedPlanner&&) noexcept = default;
+LoadedPlanner& LoadedPlanner::operator=(LoadedPlanner&&) noexcept = default;
+
+const Plugin& LoadedPlanner::plugin() const noexcept {
+  return instance_->plugin;
+}
+
+bool LoadedPlanner::tick(const hamelin_tick& tick, CommandBuffers& out) noexcept {
+  Instance& self = *instance_;
+  out.clear();
+  self.host_failed = false;
+  self.error[0] = '\0';
+  const std::size_t gyroscopic_capacity = out.raw().gyroscopic_capacity;
+  const auto failed =
+      self.plugin.library_->raw->tick(self.planner, &tick, &out.raw(), self.error.data(), self.error.size());
+  self.error.back() = '\0';
+  if (self.host_failed) return false;
+  if (failed != 0) {
+    if (self.error[0] == '\0') self.fail("no reason given");
+    return false;
+  }
+  if (const char* what = defect(out, self.setup.dof, gyroscopic_capacity); what != nullptr) {
+    self.fail(what);
+    return false;
+  }
+  return true;
+}
+
+std::string_view LoadedPlanner::error() const noexcept {
+  return instance_->error.data();
+}
+
+// ---- finding
+
+namespace {
+
+std::vector<fs::path> plugin_files(const fs::path& directory) {
+  std::vector<fs::path> files;
+  std::error_code code;
+  for (fs::directory_iterator it(directory, code), end; !code && it != end; it.increment(code)) {
+    const std::string name = it->path().filename().string();
+    if (name.size() > plugin_suffix.size() &&
+        std::string_view(name).substr(name.size() - plugin_suffix.size()) == plugin_suffix)
+      files.push_back(it->path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string planner_name(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.substr(0, name.size() - plugin_suffix.size());
+}
+
+}  // namespace
+
+std::vector<fs::path> plugin_directories(const std::vector<fs::path>& given, const std::vector<fs::path>& own) {
+  std::vector<fs::path> all;
+  const auto add = [&](const fs::path& directory) {
+    if (!directory.empty() && std::find(all.begin(), all.end(), directory) == all.end()) all.push_back(directory);
+  };
+  for (const auto& directory : given) add(directory);
+  if (const char* variable = std::getenv("HAMELIN_PLUGIN_PATH"); variable != nullptr) {
+    std::string_view rest = variable;
+    while (!rest.empty()) {
+      const auto colon = rest.find(':');
+      add(fs::path(rest.substr(0, colon)));
+      rest = colon == std::string_view::npos ? std::string_view{} : rest.substr(colon + 1);
+    }
+  }
+  for (const auto& directory : own) add(directory);
+  return all;
+}
+
+Plugin find_plugin(const std::string& name_or_path, const std::vector<fs::path>& directories) {
+  const bool is_path = name_or_path.find('/') != std::string::npos ||
+                       (name_or_path.size() > plugin_suffix.size() &&
+                        name_or_path.substr(name_or_path.size() - plugin_suffix.size()) == plugin_suffix);
+  if (is_path) return Plugin::load(name_or_path);
+  std::string searched;
+  std::vector<std::string> names;
+  for (const auto& directory : directories) {
+    std::vector<std::string> here;
+    for (const auto& file : plugin_files(directory)) {
+      if (planner_name(file) == name_or_path) return Plugin::load(file);
+      here.push_back(planner_name(file));
+    }
+    std::error_code code;
+    const std::string found = !here.empty()                       ? fmt::format("{}", fmt::join(here, ", "))
+                              : fs::is_directory(directory, code) ? "no plugins"
+                                                                  : "no such directory";
+    searched += fmt::format("{}{} ({})", searched.empty() ? "" : "; ", directory.string(), found);
+    names.insert(names.end(), here.begin(), here.end());
+  }
+  const std::string near = nearest_name(name_or_path, names);
+  throw Error(ErrorCode::plugin,
+              fmt::format("planner '{}': not found{}; searched for {}{} in: {}", name_or_path,
+                          near.empty() ? "" : fmt::format(", did you mean '{}'?", near), name_or_path, plugin_suffix,
+                          searched.empty() ? "no directory" : searched));
+}
+
+std::vector<ListedPlugin> list_plugins(const std::vector<fs::path>& directories) {
+  std::vector<ListedPlugin> all;
+  for (const auto& directory : directories) {
+    for (const auto& file : plugin_files(directory)) {
+      ListedPlugin listed{file, std::nullopt, {}};
+      try {
+        listed.plugin = Plugin::load(file);
+      } catch (const Error& e) {
+        listed.refusal = e.what();
+      }
+      all.push_back(std::move(listed));
+    }
+  }
+  return all;
+}
+
+}  // namespace hamelin::planning

@@ -1,0 +1,218 @@
+#include "hamelin/scene/make.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/core/rng.hpp"
+#include "hamelin/scene/map_file.hpp"
+#include "hamelin/scene/scene.hpp"
+#include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/scene_queries.hpp"
+
+namespace {
+
+using namespace hamelin;
+using namespace hamelin::scene;
+using Eigen::Vector3d;
+
+std::filesystem::path temporary(const std::string& name) {
+  return std::filesystem::temp_directory_path() / name;
+}
+
+using Voxels = std::set<std::tuple<int, int, int>>;
+
+Voxels voxels_of(const std::vector<Cell>& cells) {
+  Voxels voxels;
+  for (const Cell& c : cells)
+    for (int x = c.lo[0]; x < c.lo[0] + c.size; ++x)
+      for (int y = c.lo[1]; y < c.lo[1] + c.size; ++y)
+        for (int z = c.lo[2]; z < c.lo[2] + c.size; ++z) voxels.insert({x, y, z});
+  return voxels;
+}
+
+}  // namespace
+
+TEST_CASE("a made map marks the voxels whose centre or any part a sphere holds", "[scene][unit]") {
+  MakeMapOptions options;
+  options.resolution_m = 0.05;
+  options.output = temporary("hamelin_scene_made.bt");
+  Obstacle ball;
+  ball.radius_m = 0.31;
+  ball.pose = {Eigen::Matrix3d::Identity(), {0.11, -0.23, 0.4}};
+  options.primitives = {ball};
+  for (const Mark mark : {Mark::centre, Mark::touch}) {
+    CAPTURE(to_string(mark));
+    options.mark = mark;
+    const MakeReport report = make_map(options);
+    const MapData map = read_map(report.output);
+    CHECK(report.sha256 == map.sha256);
+    CHECK(report.nodes == map.node_count);
+    Voxels expected;
+    for (int x = -20; x < 20; ++x)
+      for (int y = -20; y < 20; ++y)
+        for (int z = -20; z < 20; ++z) {
+          const Vector3d middle = 0.05 * Vector3d(x + 0.5, y + 0.5, z + 0.5);
+          const Vector3d off = (middle - ball.pose.p()).cwiseAbs();
+          const double distance = mark == Mark::centre ? off.norm() : (off.array() - 0.025).max(0.0).matrix().norm();
+          if (distance <= ball.radius_m) expected.insert({x, y, z});
+        }
+    CHECK(voxels_of(map.occupied) == expected);
+    CHECK(report.occupied_voxels == expected.size());
+  }
+  std::filesystem::remove(options.output);
+}
+
+TEST_CASE("touch is exact for turned boxes and cylinders", "[scene][property]") {
+  const auto shape = GENERATE(Shape::box, Shape::cylinder);
+  Rng rng(31);
+  int touching = 0, apart = 0;
+  for (int i = 0; i < 400; ++i) {
+    Clutter clutter;
+    clutter.count = 1;
+    clutter.size_min_m = 0.05;
+    clutter.size_max_m = 0.3;
+    clutter.bounds = {{-0.3, -0.3, -0.3}, {0.3, 0.3, 0.3}};
+    clutter.seed = rng.next();
+    Obstacle o = make_clutter(clutter).front();
+    o.shape = shape;
+    const Box cube{{-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}};
+    // Nearest of a fine grid of the cube's points: an upper bound of the gap, at most half a grid diagonal too large.
+    double sampled = 1.0;
+    const int n = 20;
+    for (int x = 0; x <= n; ++x)
+      for (int y = 0; y <= n; ++y)
+        for (int z = 0; z <= n; ++z) {
+          const Vector3d p = cube.lo + (cube.hi - cube.lo).cwiseProduct(Vector3d(x, y, z)) / n;
+          sampled = std::min(sampled, closest_on(o, o.pose.p(), p).distance);
+        }
+    const double slack = 0.5 * std::sqrt(3.0) * 0.1 / n;
+    if (sampled <= 0.0) {
+      CHECK(touches(o, cube));
+      ++touching;
+    } else if (sampled > slack) {
+      CHECK_FALSE(touches(o, cube));
+      ++apart;
+    }
+  }
+  CHECK(touching > 20);
+  CHECK(apart > 20);
+}
+
+TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
+  MakeMapOptions options;
+  options.resolution_m = 0.1;
+  options.free_bounds = Box{{-1.0, -1.0, 0.0}, {1.0, 1.0, 1.0}};
+  options.output = temporary("hamelin_scene_free.bt");
+  Obstacle slab;
+  slab.shape = Shape::box;
+  slab.size_m = {1.0, 1.0, 0.18};
+  slab.pose = {Eigen::Matrix3d::Identity(), {0.0, 0.0, 0.5}};
+  options.mark = Mark::centre;
+  options.primitives = {slab};
+  const MakeReport report = make_map(options);
+  CHECK(report.occupied_voxels == 10 * 10 * 2);
+  CHECK(report.free_voxels == 20 * 20 * 10 - report.occupied_voxels);
+  std::filesystem::remove(options.output);
+}
+
+TEST_CASE("clutter keeps out of balls and the same seed gives the same bytes", "[scene][unit]") {
+  MakeMapOptions options;
+  options.resolution_m = 0.04;
+  options.output = temporary("hamelin_scene_clutter.bt");
+  Clutter clutter;
+  clutter.count = 30;
+  clutter.size_min_m = 0.05;
+  clutter.size_max_m = 0.2;
+  clutter.bounds = {{-0.8, -0.8, 0.0}, {0.8, 0.8, 1.2}};
+  clutter.keep_out = {{{0.0, 0.0, 0.3}, 0.35}};
+  clutter.seed = 7;
+  options.clutter = clutter;
+  const auto made = make_clutter(clutter);
+  CHECK(made.size() == 30);
+  for (const Obstacle& o : made) CHECK(closest_on(o, o.pose.p(), {0.0, 0.0, 0.3}).distance >= 0.35);
+  const std::string first = make_map(options).sha256;
+  CHECK(make_map(options).sha256 == first);
+  options.clutter->seed = 8;
+  CHECK(make_map(options).sha256 != first);
+  options.clutter->keep_out = {{{0.0, 0.0, 0.6}, 5.0}};
+  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("0 of 30"));
+  std::filesystem::remove(options.output);
+}
+
+TEST_CASE("what cannot be made is refused", "[scene][unit]") {
+  MakeMapOptions options;
+  options.output = temporary("hamelin_scene_none.bt");
+  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("empty"));
+  options.free_bounds = Box{{-300.0, -300.0, -300.0}, {300.0, 300.0, 300.0}};
+  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("2^28"));
+  options.free_bounds = Box{{-1e6, -1.0, -1.0}, {1.0, 1.0, 1.0}};
+  CHECK_THROWS_AS(make_map(options), Error);
+  options.resolution_m = 0.0;
+  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("resolution 0"));
+  CHECK_FALSE(std::filesystem::exists(options.output));
+  CHECK_THROWS_AS(mark_from("center"), Error);
+}
+
+TEST_CASE("the maps in data are those their primitives make", "[scene][unit]") {
+  const auto directory = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps";
+  for (const std::string name : {"shelf", "clutter"}) {
+    CAPTURE(name);
+    const auto source = directory / (name + ".primitives.json");
+    MakeMapOptions options = make_options_from_json(read_json(source), source.string());
+    CHECK(options.resolution_m <= 0.02);
+    options.output = temporary("hamelin_scene_" + name + ".bt");
+    const MakeReport report = make_map(options);
+    CHECK(report.bytes < 200000);
+    CHECK(report.sha256 == sha256_hex(read_file(directory / (name + ".bt"))));
+    CHECK(read_map(directory / (name + ".bt")).warnings.empty());
+    std::filesystem::remove(options.output);
+  }
+}
+
+TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][unit]") {
+  const auto problems = test::shared_data("problems");
+  if (!problems) return;
+  const auto directory = temporary("hamelin_scene_problem");
+  std::filesystem::create_directories(directory);
+  for (const std::string name : {"bookshelf_small_0001", "table_pick_0001", "box_0001"}) {
+    CAPTURE(name);
+    ProblemOptions options;
+    options.robot = directory / "robots" / "panda.urdf";
+    options.spheres = directory / "robots" / "panda.spheres.json";
+    options.tip = "panda_grasptarget";
+    options.resolution_m = 0.04;
+    options.output = directory / (name + ".json");
+    const auto source = *problems / (name + ".json");
+    make_scene_from_problem(source, options);
+    const Json problem = read_json(source);
+    const Scene scene = read_scene(options.output);
+    CHECK(scene.robot.file == options.robot);
+    CHECK(scene.robot.spheres == options.spheres);
+    CHECK(scene.robot.tip == "panda_grasptarget");
+    REQUIRE(scene.goals.size() == 1);
+    CHECK(scene.goals[0].q.size() == 7);
+    CHECK(scene.goals[0].q[2] == problem["goal"][2].get<double>());
+    CHECK(scene.start_q[3] == problem["start"][3].get<double>());
+    CHECK(scene.obstacles.size() == problem["obstacles"].size());
+    REQUIRE(scene.map);
+    // The map is marked by touch, so it holds every primitive: their centres are in contact.
+    const Environment environment = make_environment(scene, 2.5, 0.1);
+    for (const Obstacle& o : scene.obstacles) {
+      CHECK(o.judge_only);
+      const std::vector<Vector3d> center{o.pose.p()};
+      const std::vector<double> radius{0.0};
+      CHECK(environment.clearance(center, radius, 0.0, 1.0, View::planner) <= 0.0);
+    }
+  }
+  CHECK_THROWS_WITH(
+      make_scene_from_problem(directory / "box_0001.json", {"r", "", "", 0.04, Mark::touch, directory / "x.json"}),
+      Catch::Matchers::Contains("is no problem"));
+  std::filesystem::remove_all(directory);
+}

@@ -1,0 +1,191 @@
+#include "hamelin/scene/map_file.hpp"
+
+#include <octomap/OcTree.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/test/scene_data.hpp"
+
+namespace {
+
+using namespace hamelin;
+using namespace hamelin::scene;
+
+std::string refusal(const std::filesystem::path& file, const ReadMapOptions& options = {}) {
+  try {
+    const auto map = read_map(file, options);
+    return {};
+  } catch (const Error& e) {
+    return e.what();
+  }
+}
+
+std::filesystem::path write_temporary(const std::string& name, const std::string& bytes) {
+  const auto file = std::filesystem::temp_directory_path() / name;
+  write_file_aside(file, bytes);
+  return file;
+}
+
+}  // namespace
+
+TEST_CASE("every corrupt map ends as wanted, in one line that names file and place", "[scene][unit]") {
+  const auto directory = test::shared_data("bad_maps");
+  if (!directory) return;
+  std::ifstream index(*directory / "INDEX.tsv");
+  std::string line;
+  std::getline(index, line);
+  std::size_t seen = 0;
+  while (std::getline(index, line)) {
+    std::vector<std::string> columns;
+    std::istringstream fields(line);
+    for (std::string field; std::getline(fields, field, '\t');) columns.push_back(field);
+    if (columns.size() < 2) continue;
+    const std::string &name = columns.front(), &wanted = columns.back();
+    CAPTURE(name, wanted);
+    ++seen;
+    const std::string message = refusal(*directory / name);
+    const bool accept = wanted.rfind("reject", 0) != 0;
+    CHECK(message.empty() == accept);
+    if (accept) continue;
+    CAPTURE(message);
+    CHECK(message.rfind((*directory / name).string() + ": ", 0) == 0);
+    CHECK(message.find('\n') == std::string::npos);
+    const bool placed = message.find("byte ") != std::string::npos || message.find("header") != std::string::npos ||
+                        message.find("resolution 50 ") != std::string::npos;
+    CHECK(placed);
+    if (wanted.find("convert_octree") != std::string::npos) CHECK(message.find("convert_octree") != std::string::npos);
+  }
+  CHECK(seen == 47);
+}
+
+TEST_CASE("an all-occupied map is one box and a warning", "[scene][unit]") {
+  const auto directory = test::shared_data("bad_maps");
+  if (!directory) return;
+  const auto root = read_map(*directory / "e_rootocc.ot");
+  REQUIRE(root.occupied.size() == 1);
+  CHECK(root.occupied[0].lo == std::array<std::int32_t, 3>{-32768, -32768, -32768});
+  CHECK(root.occupied[0].size == 65536);
+  CHECK(root.unknown.empty());
+  CHECK_FALSE(root.warnings.empty());
+  const auto octant = read_map(*directory / "e_depth1occ.bt");
+  REQUIRE(octant.occupied.size() == 1);
+  CHECK(octant.occupied[0].size == 32768);
+  CHECK(octant.unknown.size() == 7);
+  CHECK_FALSE(octant.warnings.empty());
+}
+
+TEST_CASE("a map above 0.5 m resolution is read only with an explicit scale", "[scene][unit]") {
+  const auto directory = test::shared_data("bad_maps");
+  if (!directory) return;
+  const auto file = *directory / "e_mm.bt";
+  CHECK(refusal(file).find("scale") != std::string::npos);
+  CHECK(read_map(file, {0.001, 0.5}).resolution == Approx(0.05));
+  CHECK_FALSE(read_map(file, {1.0, 0.5}).warnings.empty());
+  CHECK(refusal(file, {-1.0, 0.5}).find("scale -1") != std::string::npos);
+  const auto tiny = read_map(file, {1e-6, 0.5});
+  CHECK(std::any_of(tiny.warnings.begin(), tiny.warnings.end(),
+                    [](const std::string& w) { return w.find("below 0.001") != std::string::npos; }));
+}
+
+TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][unit]") {
+  const auto directory = test::shared_data("maps");
+  if (!directory) return;
+  const std::map<std::string, double> maps{
+      {"aurora.bt", 1.0},      {"coal_env.bt", 0.001},          {"drone_orbslam3.bt", 1.0},
+      {"geb079.bt", 1.0},      {"octomap_python_test.bt", 1.0}, {"velma_hanas.bt", 1.0},
+      {"velma_hanas.ot", 1.0}, {"velma_world1.bt", 1.0}};
+  for (const auto& [name, scale] : maps) {
+    CAPTURE(name);
+    const auto file = (*directory / name).string();
+    const auto map = read_map(file, {scale, 0.5});
+    std::unique_ptr<octomap::OcTree> tree;
+    if (name.ends_with(".bt")) {
+      tree = std::make_unique<octomap::OcTree>(file);
+    } else {
+      tree.reset(dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(file)));
+    }
+    REQUIRE(tree);
+    using Key = std::tuple<int, int, int, int>;
+    std::set<Key> theirs, ours;
+    std::size_t free_leaves = 0;
+    for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf) {
+      if (!tree->isNodeOccupied(*leaf)) {
+        ++free_leaves;
+        continue;
+      }
+      const auto key = leaf.getIndexKey();
+      theirs.insert({key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth())});
+    }
+    for (const Cell& cell : map.occupied) ours.insert({cell.lo[0], cell.lo[1], cell.lo[2], cell.size});
+    CHECK(ours.size() == map.occupied.size());
+    CHECK(ours == theirs);
+    CHECK(map.free_leaves == free_leaves);
+    CHECK(map.node_count == tree->size());
+    CHECK(map.resolution == Approx(tree->getResolution() * scale));
+    // Occupied, free and unknown cells fill the cube.
+    double unknown = 0.0, known = 0.0;
+    for (const Cell& cell : map.unknown) unknown += std::pow(static_cast<double>(cell.size), 3);
+    for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf)
+      known += std::pow(2.0, 3.0 * (16 - static_cast<int>(leaf.getDepth())));
+    CHECK(unknown + known == std::pow(2.0, 48));
+  }
+}
+
+TEST_CASE("the occupancy threshold grades a .ot", "[scene][unit]") {
+  octomap::OcTree tree(0.1);
+  // Log-odds 0, 0.1, …, 1.9: the i-th leaf's probability is 1/(1 + exp(−i/10)).
+  for (int i = 0; i < 20; ++i)
+    tree.setNodeValue(octomap::point3d(0.15F + 0.2F * static_cast<float>(i), 0.05F, 0.05F),
+                      0.1F * static_cast<float>(i));
+  tree.updateInnerOccupancy();
+  std::ostringstream out;
+  tree.write(out);
+  const auto file = write_temporary("hamelin_scene_graded.ot", out.str());
+  CHECK(read_map(file, {std::nullopt, 0.5}).occupied.size() == 20);
+  CHECK(read_map(file, {std::nullopt, 1.0 / (1.0 + std::exp(-0.95))}).occupied.size() == 10);
+  CHECK(read_map(file, {std::nullopt, 0.95}).occupied.empty());
+  CHECK(read_map(file, {std::nullopt, 0.95}).free_leaves == 20);
+  CHECK(refusal(file, {std::nullopt, 1.5}).find("occupancy threshold") != std::string::npos);
+  std::filesystem::remove(file);
+}
+
+TEST_CASE("a truncation anywhere in a map is refused", "[scene][property]") {
+  for (const bool binary : {true, false}) {
+    octomap::OcTree tree(0.1);
+    for (int i = 0; i < 40; ++i)
+      tree.updateNode(octomap::point3d(0.1F * static_cast<float>(i % 7), 0.2F * static_cast<float>(i), -0.3F),
+                      i % 3 != 0);
+    tree.updateInnerOccupancy();
+    std::ostringstream out;
+    binary ? tree.writeBinary(out) : tree.write(out);
+    const std::string bytes = out.str(), where = binary ? "cut.bt" : "cut.ot";
+    CAPTURE(where);
+    CHECK(check_map_bytes(bytes, where).node_count == tree.size());
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+      CAPTURE(length);
+      CHECK_THROWS_AS(check_map_bytes(std::string_view(bytes).substr(0, length), where), Error);
+    }
+    CHECK_THROWS_AS(check_map_bytes(bytes + '\0', where), Error);
+  }
+}
+
+TEST_CASE("a map file that cannot be opened is named", "[scene][unit]") {
+  CHECK(refusal("no/such/map.bt").rfind("no/such/map.bt: ", 0) == 0);
+  const auto file = write_temporary("hamelin_scene_not_a_map.bt", std::string(300, '\xff'));
+  CHECK(refusal(file).find("header line 1") != std::string::npos);
+  std::filesystem::remove(file);
+}

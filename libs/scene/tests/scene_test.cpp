@@ -1,0 +1,254 @@
+#include "hamelin/scene/scene.hpp"
+
+#include <catch2/catch.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/json.hpp"
+#include "hamelin/test/scene_data.hpp"
+
+namespace {
+
+using namespace hamelin;
+using namespace hamelin::scene;
+using Eigen::Vector3d;
+
+// One of everything the format knows.
+Json full_document() {
+  return Json::parse(R"({
+    "schema": "hamelin.scene/1",
+    "robot": {"file": "../robots/arm7.urdf", "tip": "flange", "spheres": "../robots/arm7.spheres.json"},
+    "base": {"position_m": [0.1, 0, 0.2], "quaternion_wxyz": [0.7071067811865476, 0, 0, 0.7071067811865476]},
+    "gravity_m_s2": [0, 0, -9.81],
+    "start": {"q": [0, -0.785, 0, -2.356, 0, 1.571, 0.785], "v": [0, 0, 0, 0, 0, 0, 0]},
+    "goals": [
+      {"type": "joint", "q": [0.4, 0.5, 0, -1.8, 0, 2.2, 0.785]},
+      {"type": "position", "position_m": [0.5, 0.1, 0.4]},
+      {"type": "pose", "position_m": [0.5, 0.1, 0.4], "quaternion_wxyz": [0, 1, 0, 0], "tolerance_m": 0.02}
+    ],
+    "map": {"file": "shelf.bt", "position_m": [1, 0, 0], "quaternion_wxyz": [1, 0, 0, 0], "scale": 1,
+            "occupancy_threshold": 0.7, "unknown": "block", "keep_out_radius_m": 0.1},
+    "obstacles": [
+      {"name": "ball", "type": "sphere", "radius_m": 0.06, "position_m": [0.5, 0, 0.5],
+       "motion": {"type": "sine", "amplitude_m": [0.25, 0, 0], "period_s": 6},
+       "known": false, "visible_within_m": 0.15, "appears_s": 2, "judge_only": false},
+      {"name": "can", "type": "cylinder", "radius_m": 0.06, "length_m": 0.2, "position_m": [0.5, 0, 0.5], "judge_only": true},
+      {"type": "box", "size_m": [0.1, 0.2, 0.3], "position_m": [0.5, 0, 0.5]}
+    ],
+    "model": {"joint_damping": [0.1, 0.2], "joint_limits": true, "payload": {"mass_kg": 0.5, "inertia_kg_m2": [1, 2, 3, 0.1, 0.2, 0.3]}},
+    "actuation": {"type": "sampled", "control_period_s": 0.002, "delay_s": 0.001, "joint_noise_rad": 1e-4, "planner_mass_scale": 1.1},
+    "planner": {"name": "hybrid", "params": {"escape": "tree"}},
+    "integrator": {"name": "hamel-variational", "params": {"tolerance": 1e-12}},
+    "stall": {"hold_s": 2},
+    "step_s": 0.001, "duration_s": 30, "seed": 9007199254740991
+  })");
+}
+
+Json small_document() {
+  return Json::parse(R"({"schema": "hamelin.scene/1", "robot": {"file": "r.json"}})");
+}
+
+std::string refusal(const Json& document) {
+  try {
+    (void)scene_from_json(document, ".", "x.json");
+    return {};
+  } catch (const Error& e) {
+    return e.what();
+  }
+}
+
+std::string set_refusal(const std::string& assignment) {
+  Json document = full_document();
+  const Json before = document;
+  try {
+    set_pointer(document, assignment);
+    return {};
+  } catch (const Error& e) {
+    CHECK(document == before);
+    return e.what();
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a full scene is read field by field", "[scene][unit]") {
+  const Scene scene = scene_from_json(full_document(), "data/scenes", "data/scenes/full.json");
+  CHECK(scene.name == "data/scenes/full.json");
+  CHECK(scene.robot.file == "data/robots/arm7.urdf");
+  CHECK(scene.robot.spheres == std::filesystem::path("data/robots/arm7.spheres.json"));
+  CHECK(scene.robot.tip == "flange");
+  CHECK((scene.base * Vector3d(1.0, 0.0, 0.0) - Vector3d(0.1, 1.0, 0.2)).norm() < 1e-15);
+  CHECK(*scene.gravity_m_s2 == Vector3d(0.0, 0.0, -9.81));
+  CHECK(scene.start_q[3] == -2.356);
+  CHECK(scene.start_v.size() == 7);
+  REQUIRE(scene.goals.size() == 3);
+  CHECK(scene.goals[0].type == GoalType::joint);
+  CHECK(scene.goals[0].q[5] == 2.2);
+  CHECK(scene.goals[0].tolerance_rad == 0.05);
+  CHECK(scene.goals[0].speed_max == 0.05);
+  CHECK(scene.goals[1].type == GoalType::position);
+  CHECK(scene.goals[1].tolerance_m == 0.02);
+  CHECK(std::isinf(scene.goals[1].speed_max));
+  CHECK(scene.goals[2].type == GoalType::pose);
+  CHECK(scene.goals[2].tolerance_m == 0.02);
+  CHECK(scene.goals[2].tolerance_rad == 0.26);
+  CHECK(scene.goals[2].pose.R()(2, 2) == -1.0);
+  REQUIRE(scene.map);
+  CHECK(scene.map->file == "data/scenes/shelf.bt");
+  CHECK(scene.map->pose.p().x() == 1.0);
+  CHECK(scene.map->scale == 1.0);
+  CHECK(scene.map->occupancy_threshold == 0.7);
+  CHECK(scene.map->unknown == UnknownPolicy::block);
+  CHECK(scene.map->keep_out_radius_m == 0.1);
+  REQUIRE(scene.obstacles.size() == 3);
+  CHECK(scene.obstacles[0].motion->period_s == 6.0);
+  CHECK_FALSE(scene.obstacles[0].known);
+  CHECK(scene.obstacles[0].visible_within_m == 0.15);
+  CHECK(scene.obstacles[0].appears_s == 2.0);
+  CHECK(scene.obstacles[1].length_m == 0.2);
+  CHECK(scene.obstacles[1].judge_only);
+  CHECK(scene.obstacles[2].size_m.z() == 0.3);
+  CHECK(scene.model.joint_damping.values == std::vector<double>{0.1, 0.2});
+  CHECK(scene.model.joint_limits);
+  CHECK_FALSE(scene.model.torque_limits);
+  CHECK(scene.model.payload->inertia_kg_m2(0, 2) == 0.2);
+  CHECK(scene.actuation.type == ActuationType::sampled);
+  CHECK(scene.actuation.control_period_s == 0.002);
+  CHECK(scene.actuation.planner_mass_scale == 1.1);
+  CHECK(scene.planner->params["escape"] == "tree");
+  CHECK(scene.integrator.params["tolerance"] == 1e-12);
+  CHECK(scene.stall->hold_s == 2.0);
+  CHECK(scene.stall->distance_m == 0.2);
+  CHECK(scene.duration_s == 30.0);
+  CHECK(scene.seed == 9007199254740991ULL);
+}
+
+TEST_CASE("what a scene does not name is not modelled, and null says the same", "[scene][unit]") {
+  Json document = small_document();
+  const Json absent = resolved_json(scene_from_json(document, ".", "x.json"));
+  for (const char* key :
+       {"gravity_m_s2", "start", "goals", "map", "obstacles", "model", "actuation", "planner", "stall"})
+    document[key] = nullptr;
+  CHECK(resolved_json(scene_from_json(document, ".", "x.json")) == absent);
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  CHECK_FALSE(scene.gravity_m_s2);
+  CHECK_FALSE(scene.map);
+  CHECK_FALSE(scene.planner);
+  CHECK_FALSE(scene.stall);
+  CHECK_FALSE(scene.model.joint_limits);
+  CHECK(scene.model.joint_damping.values.empty());
+  CHECK(scene.actuation.control_period_s == scene.step_s);
+  CHECK(scene.integrator.name == "hamel-variational");
+}
+
+TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
+  for (const Json& document : {full_document(), small_document()}) {
+    const Json resolved = resolved_json(scene_from_json(document, "a/b", "x.json"));
+    CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
+    CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")).dump() == resolved.dump());
+    CHECK(scene_from_json(resolved, ".", "x.json").base == scene_from_json(document, "a/b", "x.json").base);
+  }
+  // A pose changed by the program is written as it is now.
+  Scene scene = scene_from_json(full_document(), ".", "x.json");
+  scene.base = geometry::SE3{};
+  CHECK(resolved_json(scene)["base"]["quaternion_wxyz"] == Json{1.0, 0.0, 0.0, 0.0});
+}
+
+TEST_CASE("the format's own example is read", "[scene][unit]") {
+  const auto file = std::filesystem::path(HAMELIN_SOURCE_DIR) / ".." / "shared" / "examples" / "scene.json";
+  if (!std::filesystem::exists(file)) {
+    WARN("skipped: no " << file.string());
+    return;
+  }
+  const Scene scene = read_scene(file);
+  CHECK(scene.goals.size() == 3);
+  CHECK(scene.obstacles.at(0).name == "ball");
+}
+
+TEST_CASE("bad scenes are refused in one line that names file, place and what was expected", "[scene][unit]") {
+  const auto with = [](const std::string& pointer, const Json& value) {
+    Json document = full_document();
+    document[Json::json_pointer(pointer)] = value;
+    return document;
+  };
+  Json no_robot = small_document();
+  no_robot.erase("robot");
+  const std::vector<std::pair<Json, std::string>> cases{
+      {no_robot, "robot"},
+      {Json::array(), "/"},
+      {with("/schema", "hamelin.scene/2"), "/schema"},
+      {with("/gravity", 9.81), "gravity_m_s2"},
+      {with("/gravity_m_s2", Json{0, 9.81}), "/gravity_m_s2"},
+      {with("/step_s", 0), "/step_s"},
+      {with("/step_s", "0.001"), "/step_s"},
+      {with("/seed", -1), "/seed"},
+      {with("/base/quaternion_wxyz", Json{1, 1, 0, 0}), "unit quaternion"},
+      {with("/goals/0/type", "place"), "/goals/0/type"},
+      {with("/goals/0/position_m", Json{0, 0, 0}), "/goals/0/position_m"},
+      {with("/goals/1", Json{{"type", "position"}}), "/goals/1/position_m"},
+      {with("/goals/1/quaternion_wxyz", Json{1, 0, 0, 0}), "/goals/1/quaternion_wxyz"},
+      {with("/goals/2/tolerance_rad", -1), "/goals/2/tolerance_rad"},
+      {with("/obstacles/0/length_m", 1), "/obstacles/0/length_m"},
+      {with("/obstacles/0/radius_m", 0), "/obstacles/0/radius_m"},
+      {with("/obstacles/2/size_m", Json{1, 1}), "/obstacles/2/size_m"},
+      {with("/obstacles/0/motion/type", "saw"), "/obstacles/0/motion/type"},
+      {with("/obstacles/0/motion/period", 3), "'period_s'"},
+      {with("/map/unknown", "wall"), "/map/unknown"},
+      {with("/map/occupancy_threshold", 1), "/map/occupancy_threshold"},
+      {with("/map/scale", 0), "/map/scale"},
+      {with("/model/joint_damping", "file"), "/model/joint_damping"},
+      {with("/actuation/control_period_s", 0.0015), "whole number"},
+      {with("/actuation/type", "ideal"), "one tick a step"},
+      {with("/planner", Json::object()), "name"},
+  };
+  for (const auto& [document, expected] : cases) {
+    const std::string message = refusal(document);
+    CAPTURE(message, expected);
+    CHECK(message.rfind("x.json: ", 0) == 0);
+    CHECK(message.find(expected) != std::string::npos);
+    CHECK(message.find('\n') == std::string::npos);
+  }
+}
+
+TEST_CASE("--set changes what the schema knows and nothing else", "[scene][unit]") {
+  Json document = full_document();
+  set_pointer(document, "/step_s=0.002");
+  set_pointer(document, "/map/unknown=slow");
+  set_pointer(document, "/goals/0/q=[1, 2]");
+  set_pointer(document, "/planner/params/gain=7");
+  set_pointer(document, "/robot/tip=\"5\"");
+  set_pointer(document, "/model/payload=null");
+  CHECK(document["step_s"] == 0.002);
+  CHECK(document["map"]["unknown"] == "slow");
+  CHECK(document["goals"][0]["q"] == Json{1, 2});
+  CHECK(document["planner"]["params"]["gain"] == 7);
+  CHECK(document["robot"]["tip"] == "5");
+  CHECK(document["model"]["payload"].is_null());
+  Json bare = small_document();
+  set_pointer(bare, "/stall/hold_s=3");
+  set_pointer(bare, "/planner/name=apf");
+  CHECK(scene_from_json(bare, ".", "x.json").stall->hold_s == 3.0);
+  CHECK(scene_from_json(bare, ".", "x.json").planner->name == "apf");
+}
+
+TEST_CASE("--set refuses in one line and leaves the document alone", "[scene][unit]") {
+  const std::vector<std::pair<std::string, std::string>> cases{{"/stepp_s=1", "'step_s'"},
+                                                               {"/map/unknwon=free", "'unknown'"},
+                                                               {"/goals/7/q=[1]", "no element '7'"},
+                                                               {"/goals/x=1", "no element 'x'"},
+                                                               {"/step_s", "=VALUE"},
+                                                               {"step_s=1", "=VALUE"},
+                                                               {"", "=VALUE"},
+                                                               {"/step_s/deep=1", "plain value"},
+                                                               {"/a~2b=1", "pointer"},
+                                                               {"/obstacles/0/motion/speed=1", "speed"}};
+  for (const auto& [assignment, expected] : cases) {
+    const std::string message = set_refusal(assignment);
+    CAPTURE(message, expected);
+    CHECK(message.rfind(assignment, 0) == 0);
+    CHECK(message.find(expected) != std::string::npos);
+    CHECK(message.find('\n') == std::string::npos);
+  }
+}

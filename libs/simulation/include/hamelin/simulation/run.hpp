@@ -1,0 +1,49 @@
+#pragma once
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/log/result.hpp"
+#include "hamelin/log/run_log.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::simulation {
+
+/// What a caller may watch and steer while a run goes on.
+struct Watch {
+  log::RunLog* log = nullptr;                    ///< null: nothing is recorded, and nothing is paid for it
+  long every = 1;                                ///< a tick line every so many steps; step 0 and the last always
+  const std::atomic<bool>* stop = nullptr;       ///< set by a signal handler: the record ends properly
+  std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
+};
+
+/// Free motion of a robot: no planner, no obstacles.
+struct FreeMotion {
+  std::string name;                              ///< for the result's "scene"
+  Eigen::VectorXd q0, v0;
+  double step_s = 1e-3, duration_s = 10.0;
+  std::string integrator = "hamel-variational";
+  integration::Options options;
+  Eigen::VectorXd damping;                       ///< empty: none
+  Json provenance = Json::object();              ///< goes into header and result
+};
+
+/// Integrates free motion. The result's outcome is completed, diverged or interrupted.
+/// @throws Error usage if the duration is no whole number of steps (to 1e-9 steps), or sizes do not match
+[[nodiscard]] log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch);
+
+/// Runs a scene in closed loop with its planner: every tick kinematics, closest points, planner, one integrator step,
+/// and a check that the motion between the ticks stayed clear.
+/// @param plugin_directories where planners are looked for, in order
+/// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
+[[nodiscard]] log::Result run(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories,
+                              const Watch& watch);
+
+/// The robot of a scene as a model: file, tip, spheres, payload, base, gravity.
+[[nodiscard]] model::Model load_model(const scene::Scene& scene);
+
+}  // namespace hamelin::simulation

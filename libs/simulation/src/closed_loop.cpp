@@ -1,0 +1,573 @@
+#include "closed_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/log/provenance.hpp"
+
+namespace hamelin::simulation {
+
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// Obstacles are looked for this far where neither planner nor anything else says more.
+constexpr double default_influence_m = 0.2;
+// Motion in unknown space that is to be crossed slowly is asked for at this share of the speed.
+constexpr double slow_speed_scale = 0.25;
+
+Eigen::VectorXd limits_of(const model::Robot& robot, std::optional<double> model::Joint::*member, double unlimited) {
+  VectorXd limits(robot.dof());
+  for (int i = 0; i < robot.dof(); ++i)
+    limits[i] = (robot.links[static_cast<std::size_t>(i)].joint.*member).value_or(unlimited);
+  return limits;
+}
+
+model::Model scaled_masses(const model::Model& plant, double scale) {
+  model::Robot robot = plant.robot();
+  for (auto& link : robot.links) {
+    link.mass_kg *= scale;
+    link.inertia_kg_m2 *= scale;
+  }
+  return model::Model(std::move(robot), plant.base(), plant.gravity());
+}
+
+planning::Plugin plugin_of(const scene::Scene& scene, const std::vector<std::filesystem::path>& directories) {
+  if (!scene.planner)
+    throw Error(ErrorCode::invalid, fmt::format("{}: /planner: is missing, expected the name of a planner", scene.name));
+  return planning::find_plugin(scene.planner->name, directories);
+}
+
+long whole_multiple(double value, double unit, const std::string& where, const char* what) {
+  const double count = std::round(value / unit);
+  if (std::abs(value / unit - count) > 1e-9 * std::max(1.0, count))
+    throw Error(ErrorCode::invalid, fmt::format("{}: /actuation/{}: {} s is no whole number of {} s", where, what, value, unit));
+  return static_cast<long>(count);
+}
+
+double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return Eigen::AngleAxisd(a.transpose() * b).angle();
+}
+
+}  // namespace
+
+ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories)
+    : scene_(scene),
+      plant_(load_model(scene)),
+      ws_(plant_),
+      options_(integration::options_from_json(scene.integrator.params, scene.name + ": /integrator/params")),
+      integrator_(integration::make_integrator(scene.integrator.name, plant_, options_)),
+      noise_(scene.seed),
+      planner_([&] {
+        check_scene();
+        const planning::Plugin plugin = plugin_of(scene, plugin_directories);
+        planner_params_ = planning::check_params(plugin, scene.planner->params);
+        influence_ = plugin.influence_m(planner_params_).value_or(default_influence_m);
+        steps_ = step_count(scene.duration_s, scene.step_s);
+
+        const auto n = plant_.dof();
+        const auto spheres = plant_.spheres().size();
+        environment_ = std::make_unique<scene::Environment>(scene::make_environment(scene, plant_.reach(), influence_));
+        if (environment_->has_obstacles() && spheres == 0)
+          throw Error(ErrorCode::invalid, fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
+                                                      scene.name, plant_.robot().name));
+        scratch_ = std::make_unique<scene::Environment::Scratch>(*environment_, spheres);
+        certificate_ = std::make_unique<Certificate>(plant_, *environment_, influence_);
+        for (const auto& obstacle : environment_->obstacles())
+          hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
+
+        contacts_.resize(spheres * (scene::Environment::points_per_sphere + environment_->obstacles().size()) + 1);
+        shown_.resize(contacts_.size());
+        centers_.resize(spheres);
+        clearance_.assign(spheres, influence_);
+        clearance_before_ = clearance_;
+        for (const auto& sphere : plant_.spheres()) radii_.push_back(sphere.radius);
+        command_ = std::make_unique<planning::CommandBuffers>(static_cast<std::size_t>(n), shown_.size());
+        for (auto* x : {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_})
+          *x = VectorXd::Zero(n);
+        if (scene.model.torque_limits)
+          limits_ = limits_of(plant_.robot(), &model::Joint::effort_max, std::numeric_limits<double>::infinity());
+        channels_.held_torque = VectorXd::Zero(n);
+        channels_.damping = VectorXd::Zero(n);
+        channels_.gyroscopic.reserve(shown_.size());
+        if (scene.actuation.type == scene::ActuationType::sampled) {
+          control_steps_ = std::max(1L, whole_multiple(scene.actuation.control_period_s, scene.step_s, scene.name, "control_period_s"));
+          delay_periods_ = whole_multiple(scene.actuation.delay_s, scene.actuation.control_period_s, scene.name, "delay_s");
+          delayed_.assign(static_cast<std::size_t>(delay_periods_) + 1, VectorXd::Zero(n));
+        }
+        const double mass_scale = scene.actuation.planner_mass_scale;
+        return mass_scale == 1.0
+                   ? plugin.create(setup_data(plant_, influence_), *this, planner_params_)
+                   : plugin.create(setup_data(scaled_masses(plant_, mass_scale), influence_), *this, planner_params_);
+      }()) {
+  inputs_.push_back(scene.robot.file);
+  if (scene.robot.spheres) inputs_.push_back(*scene.robot.spheres);
+  if (scene.map) inputs_.push_back(scene.map->file);
+  inputs_.push_back(planner_.plugin().file());
+}
+
+void ClosedLoop::check_scene() const {
+  const auto sized = [&](const VectorXd& x, const std::string& place) {
+    if (x.size() != plant_.dof())
+      throw Error(ErrorCode::invalid, fmt::format("{}: {}: {} numbers given, expected {}, one a joint of '{}'", scene_.name,
+                                                  place, x.size(), plant_.dof(), plant_.robot().name));
+  };
+  if (scene_.start_q.size() > 0) sized(scene_.start_q, "/start/q");
+  if (scene_.start_v.size() > 0) sized(scene_.start_v, "/start/v");
+  for (std::size_t i = 0; i < scene_.goals.size(); ++i)
+    if (scene_.goals[i].type == scene::GoalType::joint) sized(scene_.goals[i].q, fmt::format("/goals/{}/q", i));
+  if (scene_.goals.empty())
+    throw Error(ErrorCode::invalid, fmt::format("{}: /goals: is empty, expected at least one goal", scene_.name));
+  if (scene_.model.self_collision)
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /model/self_collision: is not modelled in this version, expected false", scene_.name));
+  const auto& damping = scene_.model.joint_damping.values;
+  if (damping.size() > 1 && damping.size() != static_cast<std::size_t>(plant_.dof()))
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}", scene_.name,
+                                                damping.size(), plant_.dof()));
+}
+
+planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double influence) const {
+  planning::SetupData data(nominal);
+  for (const auto& goal : scene_.goals) {
+    hamelin_goal out{};
+    out.type = goal.type == scene::GoalType::joint      ? HAMELIN_GOAL_JOINT
+               : goal.type == scene::GoalType::position ? HAMELIN_GOAL_POSITION
+                                                        : HAMELIN_GOAL_POSE;
+    const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(goal.pose.R());
+    for (int i = 0; i < 3; ++i) out.position_world_m[i] = goal.pose.p()[i];
+    for (int i = 0; i < 4; ++i) out.quaternion_wxyz[i] = wxyz[i];
+    out.tolerance_m = goal.tolerance_m;
+    out.tolerance_rad = goal.tolerance_rad;
+    out.speed_max = goal.speed_max;
+    data.add_goal(out, goal.type == scene::GoalType::joint ? goal.q : VectorXd());
+  }
+  constexpr double none = std::numeric_limits<double>::infinity();
+  const auto& robot = nominal.robot();
+  if (scene_.model.joint_limits) {
+    data.q_lower = limits_of(robot, &model::Joint::lower, -none);
+    data.q_upper = limits_of(robot, &model::Joint::upper, none);
+  }
+  if (scene_.model.velocity_limits) data.velocity_max = limits_of(robot, &model::Joint::velocity_max, none);
+  if (scene_.model.torque_limits) data.effort_max = limits_of(robot, &model::Joint::effort_max, none);
+  data.control_period_s = static_cast<double>(control_steps_) * scene_.step_s;
+  data.influence_m = influence;
+  data.map_resolution_m = environment_->summary().resolution_m;
+  data.seed = scene_.seed;
+  return data;
+}
+
+void ClosedLoop::log(std::int32_t level, std::string_view line) {
+  std::string text = fmt::format("{}: {}", scene_.planner->name, line);
+  if (level == HAMELIN_LOG_WARNING) result_.warnings.push_back(text);
+  if (recorder_ != nullptr)
+    recorder_->event(state_.time_s, text);
+  else
+    early_events_.push_back(std::move(text));
+}
+
+std::size_t ClosedLoop::closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) {
+  if (!environment_->has_obstacles()) return 0;
+  q_shown_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
+  dynamics::forward_kinematics(plant_, ws_, q_shown_);
+  dynamics::sphere_centers(plant_, ws_, centers_);
+  const std::size_t found = environment_->closest(centers_, radii_, std::min(influence_m, influence_), state_.time_s,
+                                                  *scratch_, contacts_);
+  const std::size_t written = std::min({found, contacts_.size(), out.size()});
+  for (std::size_t i = 0; i < written; ++i) out[i] = to_c(contacts_[i]);
+  return found;
+}
+
+void ClosedLoop::look(const VectorXd& q) {
+  dynamics::forward_kinematics(plant_, ws_, q);
+  clearance_now_ = influence_;
+  nearest_sphere_ = -1;
+  contact_count_ = 0;
+  speed_scale_ = 1.0;
+  if (!environment_->has_obstacles()) return;
+  dynamics::sphere_centers(plant_, ws_, centers_);
+  const std::size_t found =
+      environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_, contacts_);
+  contact_count_ = std::min(found, contacts_.size());
+  for (std::size_t i = 0; i < contact_count_; ++i) shown_[i] = to_c(contacts_[i]);
+  std::size_t judged = contact_count_;
+  if (hidden_obstacles_)
+    judged = std::min(contacts_.size(), environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_,
+                                                              contacts_, scene::View::judge));
+  std::fill(clearance_.begin(), clearance_.end(), influence_);
+  for (std::size_t i = 0; i < judged; ++i) {
+    const auto& contact = contacts_[i];
+    auto& clearance = clearance_[static_cast<std::size_t>(contact.sphere)];
+    clearance = std::min(clearance, contact.distance);
+    if (contact.distance < clearance_now_) {
+      clearance_now_ = contact.distance;
+      nearest_sphere_ = contact.sphere;
+      nearest_obstacle_ = contact.obstacle;
+    }
+  }
+  if (scene_.map && scene_.map->unknown == scene::UnknownPolicy::slow && environment_->in_slow_space(centers_, radii_))
+    speed_scale_ = slow_speed_scale;
+}
+
+hamelin_contact ClosedLoop::to_c(const scene::Contact& contact) {
+  hamelin_contact out{};
+  out.sphere = contact.sphere;
+  out.obstacle = contact.obstacle;
+  out.distance_m = contact.distance;
+  for (int i = 0; i < 3; ++i) {
+    out.arm_point_world_m[i] = contact.arm_point[i];
+    out.obstacle_point_world_m[i] = contact.obstacle_point[i];
+    out.direction_world[i] = contact.direction[i];
+    out.obstacle_velocity_world_m_s[i] = contact.obstacle_velocity[i];
+  }
+  return out;
+}
+
+ClosedLoop::GoalError ClosedLoop::goal_error() const {
+  const auto& goal = scene_.goals[std::min(goal_index_, scene_.goals.size() - 1)];
+  const bool slow = v_.lpNorm<Eigen::Infinity>() < goal.speed_max;
+  GoalError error;
+  if (goal.type == scene::GoalType::joint) {
+    error.radians = (state_.q - goal.q).lpNorm<Eigen::Infinity>();
+    error.has_radians = true;
+    error.reached = error.radians < goal.tolerance_rad && slow;
+    return error;
+  }
+  const geometry::SE3 tip = dynamics::tip_pose(plant_, ws_);
+  error.metres = (tip.p() - goal.pose.p()).norm();
+  error.has_metres = true;
+  error.reached = error.metres < goal.tolerance_m && slow;
+  if (goal.type == scene::GoalType::pose) {
+    error.radians = angle_between(tip.R(), goal.pose.R());
+    error.has_radians = true;
+    error.reached = error.reached && error.radians < goal.tolerance_rad;
+  }
+  return error;
+}
+
+bool ClosedLoop::all_reached() {
+  while (goal_index_ < scene_.goals.size() && goal_error().reached) {
+    ++goal_index_;
+    rest_s_ = 0.0;
+    recorder_->event(state_.time_s, fmt::format("goal {} of {} reached", goal_index_, scene_.goals.size()));
+  }
+  return goal_index_ == scene_.goals.size();
+}
+
+// The host's own stall rule: the tip at rest, away from a goal that has a place for it, or joints at rest away from theirs.
+bool ClosedLoop::at_rest_away_from_goal() {
+  if (!scene_.stall) return false;
+  const auto& rule = *scene_.stall;
+  const auto& goal = scene_.goals[goal_index_];
+  const geometry::SE3 tip = dynamics::tip_pose(plant_, ws_);
+  const double speed = dynamics::point_velocity(plant_, ws_, plant_.robot().tip.link, tip.p(), v_).norm();
+  bool away = true;
+  if (goal.type != scene::GoalType::joint) away = (tip.p() - goal.pose.p()).norm() > rule.distance_m;
+  rest_s_ = speed < rule.speed_m_s && away ? rest_s_ + scene_.step_s : 0.0;
+  return rest_s_ >= rule.hold_s;
+}
+
+void ClosedLoop::finish(log::Outcome outcome, std::string cause) {
+  result_.outcome = outcome;
+  result_.cause = std::move(cause);
+  done_ = true;
+}
+
+std::string ClosedLoop::where_nearest() const {
+  const auto& sphere = plant_.spheres()[static_cast<std::size_t>(nearest_sphere_)];
+  const std::string what = nearest_obstacle_ == scene::Contact::map ? "the map"
+                           : nearest_obstacle_ == scene::Contact::unknown
+                               ? "unknown space"
+                               : fmt::format("obstacle '{}'", environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name);
+  return fmt::format("sphere {} of link '{}' is {:.2g} mm inside {}", sphere.index_in_link,
+                     plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_, what);
+}
+
+bool ClosedLoop::ask_planner(long k) {
+  q_shown_ = state_.q;
+  v_shown_ = v_;
+  if (scene_.actuation.joint_noise_rad > 0.0 && scene_.actuation.type == scene::ActuationType::sampled)
+    for (auto& angle : q_shown_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
+  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(k), state_.time_s, q_shown_.data(),
+                          v_shown_.data(),      shown_.data(),                 contact_count_, goal_index_,
+                          speed_scale_};
+  if (!planner_.tick(tick, *command_)) {
+    finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name, k, planner_.error()));
+    return false;
+  }
+  if (command_->raw().state == HAMELIN_PLANNER_GAVE_UP) {
+    finish(log::Outcome::stalled, command_->raw().cause);
+    return false;
+  }
+  return true;
+}
+
+void ClosedLoop::take_gyroscopic_terms() {
+  channels_.gyroscopic.clear();
+  for (const auto& term : command_->gyroscopic())
+    channels_.gyroscopic.push_back({term.link, Vector3d::Map(term.point_link_m), Vector3d::Map(term.w_world)});
+}
+
+void ClosedLoop::limit_torques() {
+  if (limits_.size() == 0) return;
+  auto& held = channels_.held_torque;
+  const VectorXd& wanted = command_->held_torque();
+  held = held.cwiseMin(limits_).cwiseMax(-limits_);
+  double scale = 1.0;
+  if (!channels_.gyroscopic.empty()) {
+    dynamics::gyroscopic_torque(plant_, ws_, state_.q, v_, channels_.gyroscopic, impulse_);
+    for (Eigen::Index i = 0; i < held.size(); ++i) {
+      const double room = limits_[i] - (impulse_[i] > 0.0 ? held[i] : -held[i]);
+      if (std::abs(impulse_[i]) > room) scale = std::min(scale, std::max(0.0, room) / std::abs(impulse_[i]));
+    }
+    if (scale < 1.0)
+      for (auto& term : channels_.gyroscopic) term.w_world *= scale;
+  }
+  if (scale < 1.0 || held != wanted) ++saturated_ticks_;
+}
+
+void ClosedLoop::actuate() {
+  // closing half-kick of the step before, now that the gradient at this node is known
+  gradient_ = command_->potential_gradient();
+  const bool potential = command_->raw().potential_J != 0.0 || !gradient_.isZero(0.0);
+  const double half = 0.5 * scene_.step_s;
+  if (kicked_) {
+    impulse_ = half * (gradient_before_ - gradient_);
+    integrator_->kick(state_, impulse_);
+    integrator_->velocity(state_, v_);
+  }
+  const auto energy = integrator_->energy(state_);
+  ledger_.kinetic = energy.kinetic_J;
+  ledger_.potential = energy.potential_J;
+  ledger_.control = command_->raw().potential_J;
+  recorder_->node(ledger_);
+
+  if (command_->raw().has_node_velocity != 0) {
+    integrator_->set_velocity(state_, command_->node_velocity());
+    ledger_.node +=
+        dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - energy.kinetic_J;
+    ledger_.filter += command_->raw().filter_work_J;
+    ledger_.recovery += command_->raw().recovery_work_J;
+  }
+  channels_.held_torque = command_->held_torque();
+  channels_.damping = command_->damping();
+  take_gyroscopic_terms();
+  limit_torques();
+  add_plant_damping();
+  if (potential) {
+    impulse_ = -half * gradient_;
+    integrator_->kick(state_, impulse_);
+  }
+  gradient_before_ = gradient_;
+  kicked_ = kicked_ || potential;
+}
+
+// What a sampled controller can do: one torque, made of all channels at the tick, held over the control period.
+void ClosedLoop::actuate_sampled() {
+  const auto energy = integrator_->energy(state_);
+  ledger_.kinetic = energy.kinetic_J;
+  ledger_.potential = energy.potential_J;
+  recorder_->node(ledger_);
+  if (state_.k % control_steps_ != 0) return;
+  VectorXd& torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_) % (delay_periods_ + 1))];
+  torque = command_->held_torque() - command_->damping().cwiseProduct(v_) - command_->potential_gradient();
+  take_gyroscopic_terms();
+  if (!channels_.gyroscopic.empty()) {
+    dynamics::gyroscopic_torque(plant_, ws_, state_.q, v_, channels_.gyroscopic, impulse_);
+    torque += impulse_;
+    channels_.gyroscopic.clear();
+  }
+  if (command_->raw().has_node_velocity != 0) {
+    // the velocity change of a node, spread over the period: M (x − v) / T
+    v_shown_ = (command_->node_velocity() - v_) / (static_cast<double>(control_steps_) * scene_.step_s);
+    dynamics::momentum(plant_, ws_, state_.q, v_shown_, impulse_);
+    torque += impulse_;
+    ledger_.filter += command_->raw().filter_work_J;
+    ledger_.recovery += command_->raw().recovery_work_J;
+  }
+  if (limits_.size() > 0) {
+    v_shown_ = torque;
+    torque = torque.cwiseMin(limits_).cwiseMax(-limits_);
+    if (torque != v_shown_) ++saturated_ticks_;
+  }
+  // the slot written delay_periods_ ticks ago is the next one round
+  channels_.held_torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_ + 1) % (delay_periods_ + 1))];
+  channels_.damping.setZero();
+  add_plant_damping();
+}
+
+void ClosedLoop::add_plant_damping() {
+  const auto& damping = scene_.model.joint_damping;
+  if (damping.from_robot)
+    for (int i = 0; i < plant_.dof(); ++i)
+      channels_.damping[i] += plant_.robot().links[static_cast<std::size_t>(i)].joint.damping;
+  else if (damping.values.size() == 1)
+    channels_.damping.array() += damping.values[0];
+  else if (!damping.values.empty())
+    channels_.damping += Eigen::Map<const VectorXd>(damping.values.data(), plant_.dof());
+}
+
+log::Result ClosedLoop::run(const Watch& watch) {
+  Recorder recorder(result_, watch, *integrator_, options_, steps_);
+  recorder_ = &recorder;
+  const auto n = plant_.dof();
+  state_ = integrator_->start(scene_.start_q.size() > 0 ? scene_.start_q : VectorXd::Zero(n),
+                              scene_.start_v.size() > 0 ? scene_.start_v : VectorXd::Zero(n));
+  recorder.header(header());
+  for (const auto& text : early_events_) recorder.event(0.0, text);
+
+  const bool sampled = scene_.actuation.type == scene::ActuationType::sampled;
+  const bool obstacles = environment_->has_obstacles();
+  double min_clearance = influence_;
+  bool certified = true;
+  while (!done_) {
+    const double tick_started = thread_cpu_s();
+    if (kicked_) {
+      impulse_ = -0.5 * scene_.step_s * gradient_before_;
+      integrator_->kick(state_, impulse_);
+    }
+    integrator_->velocity(state_, v_);
+    look(state_.q);
+    min_clearance = std::min(min_clearance, clearance_now_);
+    if (state_.k > 0 && obstacles) {
+      const auto verdict = certificate_->check(ws_, q_before_, state_.q, v_before_, v_, state_.time_s - scene_.step_s,
+                                               scene_.step_s, clearance_before_, clearance_);
+      certified = verdict.certified;
+      ++checked_steps_;
+      if (certified) ++certified_steps_;
+      result_.tightest_step_m = std::min(result_.tightest_step_m.value_or(influence_), verdict.margin_m);
+      if (verdict.contact && clearance_now_ > 0.0)
+        finish(log::Outcome::collision, fmt::format("contact between the nodes {} and {}", state_.k - 1, state_.k));
+      dynamics::forward_kinematics(plant_, ws_, state_.q);
+    }
+    if (!v_.allFinite() || !state_.q.allFinite()) {
+      finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state_.k));
+    } else if (obstacles && clearance_now_ <= 0.0) {
+      finish(state_.k == 0 ? log::Outcome::refused : log::Outcome::collision,
+             fmt::format("{} at {} s", where_nearest(), state_.time_s));
+    } else if (!done_) {
+      if (all_reached())
+        finish(log::Outcome::reached, "");
+      else if (at_rest_away_from_goal())
+        finish(log::Outcome::stalled, fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
+      else if (state_.k == steps_)
+        finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
+      else if (recorder.stopped())
+        finish(log::Outcome::interrupted, "stopped from outside");
+    }
+    if (done_ && state_.k > 0 && !kicked_) {
+      // nothing acts any more; the last node's energies still belong to the account
+      const auto energy = integrator_->energy(state_);
+      ledger_.kinetic = energy.kinetic_J;
+      ledger_.potential = energy.potential_J;
+      recorder.node(ledger_);
+    }
+    if (!done_ && (state_.k % control_steps_ == 0 || !sampled)) (void)ask_planner(state_.k);
+    if (!done_) {
+      if (sampled)
+        actuate_sampled();
+      else
+        actuate();
+    }
+    const double tick_paused = thread_cpu_s();
+    if (recorder.wants_tick(state_.k) || (done_ && recorder.logging())) log_tick(certified);
+    const double tick_resumed = thread_cpu_s();
+    if (done_) break;
+
+    q_before_ = state_.q;
+    std::swap(clearance_before_, clearance_);
+    if (kicked_)
+      integrator_->velocity(state_, v_before_);
+    else
+      v_before_ = !sampled && command_->raw().has_node_velocity != 0 ? command_->node_velocity() : v_;
+    report_ = integrator_->step(state_, channels_, scene_.step_s);
+    if (!report_.converged) {
+      finish(log::Outcome::diverged, fmt::format("step {} of {} s found no root", state_.k + 1, scene_.step_s));
+      recorder.step(report_);
+      if (recorder.logging()) log_tick(false);
+      break;
+    }
+    state_.time_s = static_cast<double>(state_.k) * scene_.step_s;
+    recorder.step(report_);
+    ledger_.book(report_);
+    recorder.tick_time(thread_cpu_s() - tick_resumed + tick_paused - tick_started);
+    recorder.progress(state_.k, state_.time_s, scene_.duration_s);
+  }
+  if (obstacles) result_.min_clearance_m = min_clearance;
+  fill_result();
+  recorder.close(ledger_);
+  recorder_ = nullptr;
+  return result_;
+}
+
+void ClosedLoop::log_tick(bool certified) {
+  Json fields{{"k", state_.k},
+              {"time_s", state_.time_s},
+              {"q", to_json(state_.q)},
+              {"v", to_json(v_)},
+              {"tau", to_json(channels_.held_torque)},
+              {"goal_index", goal_index_},
+              {"clearance_m", nullptr},
+              {"closest", nullptr},
+              {"energy", energy_json(ledger_)},
+              {"solver", solver_json(report_)},
+              {"certified", certified}};
+  if (environment_->has_obstacles()) {
+    fields["clearance_m"] = clearance_now_;
+    if (nearest_sphere_ >= 0) {
+      fields["closest"] = {{"sphere", nearest_sphere_}, {"obstacle", "map"}};
+      if (nearest_obstacle_ == scene::Contact::unknown) fields["closest"]["obstacle"] = "unknown";
+      if (nearest_obstacle_ >= 0)
+        fields["closest"]["obstacle"] = environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name;
+    }
+  }
+  recorder_->tick(state_.k, std::move(fields));
+}
+
+Json ClosedLoop::header() const {
+  Json config = scene::resolved_json(scene_);
+  config["planner"]["params"] = planner_params_;
+  return {{"seed", scene_.seed},
+          {"generator", Rng::name},
+          {"config", std::move(config)},
+          {"robot_notes", plant_.robot().notes},
+          {"plugin",
+           {{"name", planner_.plugin().name()},
+            {"version", planner_.plugin().version()},
+            {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
+          {"provenance", log::provenance(inputs_)}};
+}
+
+void ClosedLoop::fill_result() {
+  result_.scene = scene_.name;
+  result_.planner = planner_.plugin().name();
+  result_.time_s = state_.time_s;
+  result_.steps = state_.k;
+  result_.q = state_.q;
+  result_.v = v_;
+  result_.seed = scene_.seed;
+  const auto& goal = scene_.goals[std::min(goal_index_, scene_.goals.size() - 1)];
+  dynamics::forward_kinematics(plant_, ws_, state_.q);
+  const GoalError error = goal_error();
+  log::Result::Goal out;
+  out.type = scene::to_string(goal.type);
+  out.index = goal_index_;
+  out.count = scene_.goals.size();
+  if (error.has_metres) out.error_m = error.metres;
+  if (error.has_radians) out.error_rad = error.radians;
+  result_.goal = out;
+  if (checked_steps_ > 0)
+    result_.certified_share = static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
+  for (const auto& warning : environment_->summary().warnings) result_.warnings.push_back(warning);
+  if (saturated_ticks_ > 0)
+    result_.warnings.push_back(fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_ticks_, state_.k));
+  result_.provenance = log::provenance(inputs_);
+}
+
+}  // namespace hamelin::simulation

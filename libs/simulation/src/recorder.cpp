@@ -1,0 +1,106 @@
+#include "recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::simulation {
+
+Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
+                   const integration::Options& options, long steps_expected)
+    : result_(result), watch_(watch) {
+  result_.integrator = integrator.name();
+  result_.solver.criterion = integrator.criterion();
+  result_.solver.tolerance =
+      integrator.criterion().starts_with("|tau_e") ? options.feedback_tolerance : options.tolerance;
+  tick_us_.reserve(static_cast<std::size_t>(steps_expected) + 1);
+}
+
+void Recorder::header(const Json& fields) {
+  if (watch_.log != nullptr) watch_.log->write("header", fields);
+}
+
+void Recorder::node(const Ledger& ledger) {
+  if (first_) {
+    first_ = false;
+    first_balance_ = ledger.balance();
+    result_.energy_initial_J = ledger.kinetic + ledger.potential + ledger.control;
+  }
+  result_.energy_error_max_J = std::max(result_.energy_error_max_J, std::abs(ledger.balance() - first_balance_));
+}
+
+void Recorder::step(const integration::StepReport& report) {
+  auto& sums = result_.solver;
+  ++sums.steps;
+  sums.updates += report.updates;
+  sums.factorizations += report.factorizations;
+  sums.evaluations += report.evaluations;
+  sums.halvings += report.halvings;
+  sums.updates_max = std::max(sums.updates_max, report.updates);
+  sums.residual_max = std::max(sums.residual_max, report.residual);
+}
+
+void Recorder::tick(long k, Json fields) {
+  watch_.log->write("tick", fields);
+  last_logged_ = k;
+}
+
+void Recorder::event(double time_s, const std::string& text) {
+  if (watch_.log != nullptr) watch_.log->write("event", {{"time_s", time_s}, {"text", text}});
+}
+
+void Recorder::close(const Ledger& ledger) {
+  result_.energy_final_J = ledger.kinetic + ledger.potential + ledger.control;
+  result_.gyroscopic_work_J = ledger.gyroscopic;
+  result_.held_work_J = ledger.held;
+  result_.dissipated_J = ledger.dissipated;
+  result_.node_work_J = ledger.node;
+  result_.filter_work_J = ledger.filter;
+  result_.recovery_work_J = ledger.recovery;
+  result_.cpu_s = thread_cpu_s() - started_cpu_s_;
+  if (!tick_us_.empty()) {
+    std::sort(tick_us_.begin(), tick_us_.end());
+    const auto at = [&](double share) {
+      return tick_us_[static_cast<std::size_t>(share * static_cast<double>(tick_us_.size() - 1))];
+    };
+    result_.tick_us = log::Result::TickTime{at(0.5), at(0.99), tick_us_.back()};
+  }
+  if (watch_.log != nullptr) watch_.log->write("result", log::to_json(result_));
+}
+
+Json to_json(const Eigen::VectorXd& x) {
+  Json array = Json::array();
+  for (const double value : x) array.push_back(value);
+  return array;
+}
+
+Json energy_json(const Ledger& ledger) {
+  return {{"kinetic_J", ledger.kinetic},         {"potential_J", ledger.potential},
+          {"control_J", ledger.control},         {"gyroscopic_work_J", ledger.gyroscopic},
+          {"filter_work_J", ledger.filter},      {"recovery_work_J", ledger.recovery},
+          {"dissipated_J", ledger.dissipated},   {"held_work_J", ledger.held},
+          {"node_work_J", ledger.node}};
+}
+
+Json solver_json(const integration::StepReport& report) {
+  return {{"updates", report.updates}, {"residual", report.residual}, {"halvings", report.halvings}};
+}
+
+long step_count(double duration_s, double step_s) {
+  const double steps = duration_s / step_s;
+  const double whole = std::round(steps);
+  if (!(step_s > 0.0) || !(duration_s > 0.0) || !std::isfinite(steps))
+    throw Error(ErrorCode::usage,
+                fmt::format("step {} s and duration {} s: both must be positive and finite", step_s, duration_s));
+  if (whole > 1e10) throw Error(ErrorCode::usage, fmt::format("{:.3g} steps are too many, expected at most 1e10", whole));
+  if (std::abs(steps - whole) > 1e-9 * std::max(1.0, whole) || whole < 1.0)
+    throw Error(ErrorCode::usage,
+                fmt::format("duration {} s is no whole number of steps of {} s (it is {} of them)", duration_s, step_s,
+                            steps));
+  return static_cast<long>(whole);
+}
+
+}  // namespace hamelin::simulation

@@ -1,0 +1,80 @@
+#pragma once
+#include <ctime>
+#include <string>
+#include <vector>
+
+#include "hamelin/simulation/run.hpp"
+
+namespace hamelin::simulation {
+
+/// CPU time of this thread [s].
+[[nodiscard]] inline double thread_cpu_s() noexcept {
+  std::timespec t{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// Energies and works up to a node [J]. Kinetic + potential + control − booked stays at its first value but for the
+/// scheme's own error.
+struct Ledger {
+  double kinetic = 0.0, potential = 0.0, control = 0.0;
+  double gyroscopic = 0.0, held = 0.0, dissipated = 0.0;  ///< dissipated counts positive
+  double node = 0.0;                                      ///< by node velocities: law, filter and recovery together
+  double filter = 0.0, recovery = 0.0;                    ///< of these, as the planner accounts for them
+
+  void book(const integration::StepReport& report) noexcept {
+    gyroscopic += report.gyroscopic_work_J;
+    held += report.held_work_J;
+    dissipated += report.dissipated_J;
+  }
+  [[nodiscard]] double balance() const noexcept {
+    return kinetic + potential + control - (gyroscopic + held - dissipated + node);
+  }
+};
+
+/// Gathers a run's figures and writes its log.
+class Recorder {
+ public:
+  Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
+           const integration::Options& options, long steps_expected);
+
+  void header(const Json& fields);
+  /// The node's balance enters energy_error_max_J.
+  void node(const Ledger& ledger);
+  void step(const integration::StepReport& report);
+  void tick_time(double seconds) { tick_us_.push_back(1e6 * seconds); }
+  [[nodiscard]] bool wants_tick(long k) const noexcept {
+    return watch_.log != nullptr && (k % watch_.every == 0 || k == 0);
+  }
+  void tick(long k, Json fields);
+  void event(double time_s, const std::string& text);
+  [[nodiscard]] bool stopped() const noexcept { return watch_.stop != nullptr && watch_.stop->load(); }
+  void progress(long k, double time_s, double duration_s) const {
+    if (watch_.progress && k % 1000 == 0) watch_.progress(time_s, duration_s);
+  }
+  /// Fills the result's sums and writes the closing lines.
+  void close(const Ledger& ledger);
+
+  [[nodiscard]] long last_logged() const noexcept { return last_logged_; }
+  [[nodiscard]] bool logging() const noexcept { return watch_.log != nullptr; }
+  [[nodiscard]] log::Result& result() noexcept { return result_; }
+
+ private:
+  log::Result& result_;
+  const Watch& watch_;
+  std::vector<double> tick_us_;
+  double started_cpu_s_ = thread_cpu_s();
+  double first_balance_ = 0.0;
+  bool first_ = true;
+  long last_logged_ = -1;
+};
+
+/// A joint vector as a JSON array.
+[[nodiscard]] Json to_json(const Eigen::VectorXd& x);
+[[nodiscard]] Json energy_json(const Ledger& ledger);
+[[nodiscard]] Json solver_json(const integration::StepReport& report);
+
+/// Whole number of steps in a duration. @throws Error usage if there is none to 1e-9 steps, or it is zero or too many
+[[nodiscard]] long step_count(double duration_s, double step_s);
+
+}  // namespace hamelin::simulation

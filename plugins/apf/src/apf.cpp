@@ -1,0 +1,118 @@
+#include "hamelin/planning/nominal_arm.hpp"
+#include "params_schema.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using namespace hamelin::planning;
+
+/// V(ρ) = ½ η (1/ρ − 1/ρ0)² and its force −V'(ρ), (18). Below ρ_min the force stays and V goes on as a straight line.
+struct Repulsion {
+  double eta, rho0, rho_min;
+
+  [[nodiscard]] double force(double rho) const {
+    const double r = std::max(rho, rho_min);
+    return eta * (1.0 / r - 1.0 / rho0) / (r * r);
+  }
+  [[nodiscard]] double potential(double rho) const {
+    const double r = std::max(rho, rho_min), s = 1.0 / r - 1.0 / rho0;
+    return 0.5 * eta * s * s + force(r) * (r - std::min(rho, r));
+  }
+};
+
+class Apf : public Planner {
+ public:
+  static double influence_m(const hamelin::Json& params) { return params.at("rho0_m").get<double>(); }
+
+  Apf(const Host&, const Setup& setup, const hamelin::Json& params)
+      : setup_(setup),
+        arm_(setup),
+        k_p_(params.at("k_p").get<double>()),
+        k_v_(params.at("k_v").get<double>()),
+        repulsion_{params.at("eta").get<double>(), params.at("rho0_m").get<double>(),
+                   params.at("distance_min_m").get<double>()},
+        joint_damping_(params.at("joint_damping").get<double>()),
+        by_potential_(params.at("mapping") == "potential"),
+        goal_scaled_(params.at("law") == "wang2018"),
+        gravity_compensation_(params.at("gravity_compensation").get<bool>()),
+        tau_(setup.dof()) {
+    if (repulsion_.rho_min > repulsion_.rho0)
+      throw hamelin::Error(hamelin::ErrorCode::invalid, "/distance_min_m: above rho0_m, expected at most rho0_m");
+  }
+
+  void tick(const Tick& tick, Command& command) override {
+    arm_.update(tick);
+    command.damping().setConstant(joint_damping_);
+    if (by_potential_) {
+      potential(tick, command);
+    } else {
+      operational(tick, command);
+    }
+    if (gravity_compensation_) {
+      tau_.setZero();
+      arm_.add_gravity(tau_);
+      command.held_torque() += tau_;
+    }
+  }
+
+ private:
+  // Of the tip, for joint goals of q; it scales wang2018's repulsion.
+  [[nodiscard]] double goal_distance_squared(const hamelin_goal& goal) const {
+    if (goal.type == HAMELIN_GOAL_JOINT) return (arm_.q() - ConstVectorMap(goal.q, arm_.q().size())).squaredNorm();
+    return (arm_.tip_position() - vec3(goal.position_world_m)).squaredNorm();
+  }
+
+  /// (17), (18), each mapped by (21) at its own point.
+  void operational(const Tick& tick, Command& command) {
+    const hamelin_goal& to = setup_.goal(tick.goal_index());
+    const double scale = goal_scaled_ ? goal_distance_squared(to) : 1.0;
+    double pull = k_p_ * tick.speed_scale();
+    tau_.setZero();
+    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
+      const Vector3d f = scale * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+      arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
+      if (goal_scaled_) pull += 2.0 * repulsion_.potential(c.distance_m);
+    });
+    arm_.add_mapped_attraction(to, pull, k_v_, tau_);
+    command.held_torque() = tau_;
+  }
+
+  /// V = ½ k_p |x_e − x_d|² + Σ V(ρ) and its gradient in joint space.
+  void potential(const Tick& tick, Command& command) {
+    const hamelin_goal& to = setup_.goal(tick.goal_index());
+    const double away = goal_distance_squared(to), scale = goal_scaled_ ? away : 1.0;
+    double pull = k_p_ * tick.speed_scale(), value = 0.0;
+    tau_.setZero();  // −∂V
+    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
+      const double V = repulsion_.potential(c.distance_m);
+      const Vector3d f = scale * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+      arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
+      if (goal_scaled_) {
+        pull += 2.0 * V;
+      } else {
+        value += V;
+      }
+    });
+    if (to.type == HAMELIN_GOAL_JOINT) {
+      tau_ -= pull * (arm_.q() - ConstVectorMap(to.q, arm_.q().size()));
+    } else {
+      const Vector3d tip = arm_.tip_position();
+      arm_.add_force(arm_.tip_link(), tip, -pull * (tip - vec3(to.position_world_m)), tau_);
+    }
+    command.set_potential(value + 0.5 * pull * away);
+    command.potential_gradient() = -tau_;
+  }
+
+  Setup setup_;
+  NominalArm arm_;
+  double k_p_, k_v_;
+  Repulsion repulsion_;
+  double joint_damping_;
+  bool by_potential_, goal_scaled_, gravity_compensation_;
+  Eigen::VectorXd tau_;
+};
+
+}  // namespace
+
+HAMELIN_PLANNER_PLUGIN(Apf, "apf", "0.1.0",
+                       "Artificial potential field: attraction (17), repulsion (18), mapped by (21)", params_schema);

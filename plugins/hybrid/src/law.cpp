@@ -1,0 +1,123 @@
+#include "law.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::hybrid {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// A rotation by one radian weighs as much as this length [m], so that one damped inverse serves both.
+constexpr double rotation_length = 0.25;
+// Damping of (J Jᵀ + λ²)⁻¹, relative to the trace: keeps joint speeds bounded near singular poses.
+constexpr double relative_damping = 0.004;
+constexpr double joint_gain = 4.0;     // [1/s] near a joint target
+constexpr double tip_gain = 3.0;       // [1/s] near a tip target
+constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the middle of the limits
+
+}  // namespace
+
+Law::Law(const planning::Setup& setup, const model::Model& model, const LawParams& params)
+    : params_(params), J_(6, model.dof()), null_(model.dof()), scratch_(model.dof()) {
+  const auto lower = setup.q_lower(), upper = setup.q_upper();
+  if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
+}
+
+void Law::task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal, Vector3d& position,
+                     Vector3d& rotation) const {
+  const geometry::SE3 tip = dynamics::tip_pose(model, ws);
+  position = planning::vec3(goal.position_world_m) - tip.p();
+  rotation.setZero();
+  if (goal.type != HAMELIN_GOAL_POSE) return;
+  const auto& q = goal.quaternion_wxyz;
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix() * tip.R().transpose());
+  rotation = turn.axis() * turn.angle();
+}
+
+double Law::distance(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                     const Target& target) {
+  if (target.via != nullptr) return (*target.via - q).norm();
+  if (target.goal->type == HAMELIN_GOAL_JOINT) return (planning::ConstVectorMap(target.goal->q, q.size()) - q).norm();
+  Vector3d position, rotation;
+  task_error(model, ws, *target.goal, position, rotation);
+  return 2.0 * position.norm() + 0.5 * rotation.norm();
+}
+
+void Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Target& target,
+                  Eigen::VectorXd& u) {
+  if (target.via != nullptr || target.goal->type == HAMELIN_GOAL_JOINT) {
+    if (target.via != nullptr)
+      u = *target.via - q;
+    else
+      u = planning::ConstVectorMap(target.goal->q, q.size()) - q;
+    const double far = u.norm();
+    if (far > 0.0) u *= std::min(joint_gain, params_.cruise_speed / far);
+    return;
+  }
+  Vector3d position, rotation;
+  task_error(model, ws, *target.goal, position, rotation);
+  dynamics::frame_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(), J_);
+  const bool turns = target.goal->type == HAMELIN_GOAL_POSE;
+  Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();
+  if (turns) {
+    J_.topRows<3>() *= rotation_length;
+    const double angle = rotation.norm();
+    if (angle > 0.0) wanted.head<3>() = rotation_length * rotation * std::min(tip_gain, params_.tip_turn / angle);
+  } else {
+    J_.topRows<3>().setZero();
+  }
+  const double far = position.norm();
+  if (far > 0.0) wanted.tail<3>() = position * std::min(tip_gain, params_.tip_speed / far);
+  Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
+  G.diagonal().array() += relative_damping * std::max(1e-6, G.trace());
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
+  u.noalias() = J_.transpose() * factor.solve(wanted).eval();
+  const double fast = u.norm(), limit = 1.5 * params_.cruise_speed;
+  if (fast > limit) u *= limit / fast;
+  if (middle_.size() == 0) return;
+  null_ = centring_gain * (middle_ - q);
+  const Eigen::Matrix<double, 6, 1> disturbs = J_ * null_;
+  scratch_.noalias() = J_.transpose() * factor.solve(disturbs).eval();
+  u += null_ - scratch_;
+}
+
+void Law::repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const {
+  for (const auto& point : points) {
+    const double h = std::max(point.distance - point.margin, 0.0);
+    if (h >= params_.repulsion_range) continue;
+    u += (strength * params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
+          std::max(0.05, point.row.squaredNorm())) * point.row;
+  }
+}
+
+void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
+                const Eigen::MatrixXd& W, const Eigen::VectorXd& v, planning::Command& command) {
+  int last_link = -1;
+  for (const auto& point : points) {
+    const double h = std::max(point.distance - point.margin, 0.01);
+    // the nearest point of a link says where to turn; its neighbours would only repeat it
+    if (h >= params_.steering_range || point.link == last_link) continue;
+    const Vector3d velocity = dynamics::point_velocity(model, ws, point.link, point.arm_point, v);
+    const double speed = velocity.norm();
+    if (speed < 1e-3) continue;
+    const Vector3d ahead = velocity / speed;
+    const double approach = -ahead.dot(point.direction);
+    if (approach <= 0.0) continue;
+    Vector3d side = ahead.cross(point.direction);
+    side = side.norm() > 0.05 ? Vector3d(side.normalized()) : Vector3d(point.direction.unitOrthogonal());
+    scratch_.noalias() = W * point.row;
+    const double mobility = point.row.dot(scratch_);
+    if (mobility < 1e-9) continue;
+    const double rate = params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
+    // side × ahead points to the obstacle's far side: its part along the direction is the sine of the angle, so ≥ 0
+    command.add_gyroscopic(point.link, dynamics::link_pose(model, ws, point.link).inverse() * point.arm_point,
+                           side * (rate / mobility));
+    last_link = point.link;
+  }
+}
+
+}  // namespace hamelin::hybrid

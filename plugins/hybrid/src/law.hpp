@@ -1,0 +1,52 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/plugin.hpp"
+#include "obstacles.hpp"
+
+namespace hamelin::hybrid {
+
+/// What the law aims at: the goal, or an escape's way-point in joint space.
+struct Target {
+  const hamelin_goal* goal = nullptr;
+  const Eigen::VectorXd* via = nullptr;  ///< set: a joint vector to go to instead
+};
+
+struct LawParams {
+  double cruise_speed, tip_speed, tip_turn;
+  double repulsion_range, repulsion_speed;
+  double steering_gain, steering_range;
+};
+
+/// The desired joint velocity without regard to limits: attraction, short repulsion, and gyroscopic terms that steer
+/// around what is approached without doing work.
+class Law {
+ public:
+  Law(const planning::Setup& setup, const model::Model& model, const LawParams& params);
+
+  /// How far off the target is: joint distance, or 2 |position error| + ½ |rotation angle|.
+  [[nodiscard]] double distance(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                                const Target& target);
+  /// u = attraction to the target. Poses at q must stand in ws.
+  void attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Target& target,
+               Eigen::VectorXd& u);
+  /// u += a (1 − h/range) speed / max(1, |a|²) per point within the range of its margin, h = distance − margin,
+  /// weighted by `strength`.
+  void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
+  /// Gyroscopic terms w = m k (v̂ × n)^ for approached points, k = gain α (1/max(h, 1 cm) − 1/range), α = −v̂·n,
+  /// m = 1/(aᵀM⁻¹a): the force w × v turns the velocity away from the obstacle.
+  void steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
+             const Eigen::MatrixXd& W, const Eigen::VectorXd& v, planning::Command& command);
+
+ private:
+  void task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal,
+                  Eigen::Vector3d& position, Eigen::Vector3d& rotation) const;
+
+  LawParams params_;
+  Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
+  dynamics::Matrix6Xd J_;
+  Eigen::VectorXd null_, scratch_;
+};
+
+}  // namespace hamelin::hybrid

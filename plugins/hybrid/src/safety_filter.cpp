@@ -1,0 +1,126 @@
+#include "safety_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hamelin::hybrid {
+
+namespace {
+
+// A pass that moves x by less than this in the metric changes nothing that matters [√J].
+constexpr double settled = 1e-6;
+
+}  // namespace
+
+SafetyFilter::SafetyFilter(int dof, int max_rows)
+    : a_(dof, max_rows), Wa_(dof, max_rows), rows_(static_cast<std::size_t>(max_rows)) {
+  for (auto* x : {&lower_, &upper_, &momentum_lower_, &momentum_upper_, &box_lambda_low_, &box_lambda_high_,
+                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_})
+    *x = Eigen::VectorXd::Zero(dof);
+}
+
+void SafetyFilter::begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W) {
+  M_ = &M;
+  W_ = &W;
+  count_ = 0;
+  has_momentum_box_ = false;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  lower_.setConstant(-none);
+  upper_.setConstant(none);
+}
+
+bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
+  if (count_ == static_cast<int>(rows_.size())) return false;
+  a_.col(count_) = a;
+  Wa_.col(count_).noalias() = *W_ * a;
+  const double size = a.dot(Wa_.col(count_));
+  // A row that no joint moves can neither be kept nor broken.
+  if (size > 1e-12) rows_[static_cast<std::size_t>(count_++)] = {b, floor, 1.0 / size, 0.0};
+  return true;
+}
+
+void SafetyFilter::set_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+  lower_ = lower;
+  upper_ = upper;
+}
+
+void SafetyFilter::set_momentum_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+  momentum_lower_ = lower;
+  momentum_upper_ = upper;
+  has_momentum_box_ = true;
+}
+
+SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
+  Report report;
+  const auto n = x.size();
+  Mx_.noalias() = *M_ * x;
+  report.energy_before_J = 0.5 * x.dot(Mx_);
+  for (auto* lambda : {&box_lambda_low_, &box_lambda_high_, &momentum_lambda_low_, &momentum_lambda_high_})
+    lambda->setZero();
+  for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
+
+  // Raises or lowers one multiplier by what its row lacks; returns the change.
+  const auto relax = [](double& lambda, double lack, double weight) {
+    const double next = std::max(0.0, lambda + lack * weight);
+    const double change = next - lambda;
+    lambda = next;
+    return change;
+  };
+  for (report.passes = 1; report.passes <= max_passes; ++report.passes) {
+    double moved = 0.0;  // squared, in the metric
+    for (int i = 0; i < count_; ++i) {
+      auto& row = rows_[static_cast<std::size_t>(i)];
+      const double change = relax(row.lambda, row.b - a_.col(i).dot(x), row.weight);
+      if (change == 0.0) continue;
+      x.noalias() += change * Wa_.col(i);
+      moved = std::max(moved, change * change / row.weight);
+    }
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double weight = 1.0 / (*W_)(k, k);
+      for (const bool low : {true, false}) {
+        const double lack = low ? lower_[k] - x[k] : x[k] - upper_[k];
+        if (!std::isfinite(lack)) continue;
+        const double change = relax(low ? box_lambda_low_[k] : box_lambda_high_[k], lack, weight);
+        if (change == 0.0) continue;
+        x.noalias() += (low ? change : -change) * W_->col(k);
+        moved = std::max(moved, change * change / weight);
+      }
+    }
+    for (Eigen::Index k = 0; has_momentum_box_ && k < n; ++k) {
+      const double weight = 1.0 / (*M_)(k, k);
+      for (const bool low : {true, false}) {
+        const double p = M_->col(k).dot(x);
+        const double lack = low ? momentum_lower_[k] - p : p - momentum_upper_[k];
+        if (!std::isfinite(lack)) continue;
+        const double change = relax(low ? momentum_lambda_low_[k] : momentum_lambda_high_[k], lack, weight);
+        if (change == 0.0) continue;
+        x[k] += low ? change : -change;  // M⁻¹ (M e_k)
+        moved = std::max(moved, change * change / weight);
+      }
+    }
+    if (moved < settled * settled) break;
+  }
+  report.passes = std::min(report.passes, max_passes);
+
+  for (int i = 0; i < count_; ++i) {
+    const auto& row = rows_[static_cast<std::size_t>(i)];
+    if (row.b > 0.0) report.recovery_J += row.lambda * row.b;
+    const double along = a_.col(i).dot(x);
+    if (row.floor <= 0.0 && along < row.floor) report.scale = std::min(report.scale, row.floor / along);
+  }
+  for (Eigen::Index k = 0; k < n; ++k) {
+    report.recovery_J += std::max(0.0, box_lambda_low_[k] > 0.0 ? box_lambda_low_[k] * lower_[k] : 0.0) +
+                         std::max(0.0, box_lambda_high_[k] > 0.0 ? -box_lambda_high_[k] * upper_[k] : 0.0);
+    if (has_momentum_box_)
+      report.recovery_J +=
+          std::max(0.0, momentum_lambda_low_[k] > 0.0 ? momentum_lambda_low_[k] * momentum_lower_[k] : 0.0) +
+          std::max(0.0, momentum_lambda_high_[k] > 0.0 ? -momentum_lambda_high_[k] * momentum_upper_[k] : 0.0);
+  }
+  if (report.scale < 1.0) x *= report.scale;
+  Mx_.noalias() = *M_ * x;
+  report.energy_after_J = 0.5 * x.dot(Mx_);
+  return report;
+}
+
+}  // namespace hamelin::hybrid

@@ -1,0 +1,45 @@
+#include "hamelin/planning/nominal_arm.hpp"
+#include "params_schema.hpp"
+
+namespace {
+
+using namespace hamelin::planning;
+
+// Springs and dampers towards the goal, the nominal arm held against gravity; obstacles are not looked at.
+class Template : public Planner {
+ public:
+  Template(const Host& host, const Setup& setup, const hamelin::Json& params)
+      : setup_(setup),
+        arm_(setup),
+        stiffness_(params.at("stiffness").get<double>()),
+        damping_(params.at("damping").get<double>()),
+        tau_(setup.dof()) {
+    host.info("template: obstacles are not looked at");
+  }
+
+  void tick(const Tick& tick, Command& command) override {
+    arm_.update(tick);
+    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    tau_.setZero();
+    if (goal.type == HAMELIN_GOAL_JOINT) {
+      tau_ = -stiffness_ * (arm_.q() - ConstVectorMap(goal.q, setup_.dof()));
+    } else {
+      const Eigen::Vector3d tip = arm_.tip_position();
+      arm_.add_force(arm_.tip_link(), tip, -stiffness_ * (tip - vec3(goal.position_world_m)), tau_);
+    }
+    arm_.add_gravity(tau_);
+    command.held_torque() = tau_;
+    command.damping().setConstant(damping_);
+  }
+
+ private:
+  Setup setup_;
+  NominalArm arm_;
+  double stiffness_, damping_;
+  Eigen::VectorXd tau_;
+};
+
+}  // namespace
+
+HAMELIN_PLANNER_PLUGIN(Template, "template", "0.1.0", "Springs to the goal, no avoidance: copy this one",
+                       params_schema);
