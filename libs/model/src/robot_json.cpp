@@ -18,13 +18,17 @@ using geometry::SE3;
 
 constexpr const char* schema_name = "hamelin.robot/1";
 
-template <int n>
-Eigen::Matrix<double, n, 1> numbers_of(const Json& numbers) {
-  Eigen::Matrix<double, n, 1> out;
-  for (int i = 0; i < n; ++i) out[i] = numbers[static_cast<std::size_t>(i)].get<double>();
-  return out;
+template <int size>
+Eigen::Matrix<double, size, 1> numbers_of(const Json& list) {
+  Eigen::Matrix<double, size, 1> numbers;
+  for (int i = 0; i < size; ++i) numbers[i] = list[static_cast<std::size_t>(i)].get<double>();
+  return numbers;
 }
-Vector3d vector_of(const Json& numbers) { return numbers_of<3>(numbers); }
+
+Vector3d vector_of(const Json& list) {
+  return numbers_of<3>(list);
+}
+
 Json json_of(const Vector3d& v) {
   return Json::array({v.x(), v.y(), v.z()});
 }
@@ -58,14 +62,14 @@ Json json_of(const std::optional<double>& value) {
 
 Joint joint_of(const Json& json) {
   Joint joint;
-  joint.name = json["name"];
+  joint.name = json["name"].get<std::string>();
   joint.type = json["type"] == "revolute" ? JointType::revolute : JointType::prismatic;
   joint.screw = numbers_of<6>(json["screw"]);
   joint.lower = optional_of(json["lower"]);
   joint.upper = optional_of(json["upper"]);
   joint.velocity_max = optional_of(json["velocity_max"]);
   joint.effort_max = optional_of(json["effort_max"]);
-  joint.damping = json["damping"];
+  joint.damping = json["damping"].get<double>();
   return joint;
 }
 
@@ -199,7 +203,7 @@ detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
     for (const auto& pair : pairs) {
       if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
         fail("/self_collision_disabled: expected a list of pairs of link names");
-      out.self_collision_disabled.emplace_back(pair[0], pair[1]);
+      out.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
     }
   }
   return out;
@@ -208,25 +212,26 @@ detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
 Robot robot_from_json(const Json& document, const std::string& where) {
   check_shipped_schema(document, "robot", where);
   Robot robot;
-  robot.name = document["name"];
-  for (const auto& note : list_of(document, "notes")) robot.notes.push_back(note);
+  robot.name = document["name"].get<std::string>();
+  for (const auto& note : list_of(document, "notes")) robot.notes.push_back(note.get<std::string>());
   std::vector<std::string> names;
   for (const auto& json : document["links"]) {
     const std::string place = fmt::format("{}: /links/{}", where, robot.links.size());
     Link link;
-    link.name = json["name"];
-    link.parent = json["parent"];
+    link.name = json["name"].get<std::string>();
+    link.parent = json["parent"].get<int>();
     link.joint = joint_of(json["joint"]);
     const std::string note = detail::normalise_screw(link.joint, place + "/joint");
     if (!note.empty()) robot.notes.push_back(note);
     link.com = pose_of(json["com"], place + "/com");
-    link.mass_kg = json["mass_kg"];
+    link.mass_kg = json["mass_kg"].get<double>();
     const Vector6d I = numbers_of<6>(json["inertia_kg_m2"]);
     link.inertia_kg_m2 << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
     for (const auto& sphere : list_of(json, "spheres"))
-      link.spheres.push_back({vector_of(sphere["center_m"]), sphere["radius_m"]});
+      link.spheres.push_back({vector_of(sphere["center_m"]), sphere["radius_m"].get<double>()});
     for (const auto& segment : list_of(json, "segments"))
-      link.segments.push_back({vector_of(segment["from_m"]), vector_of(segment["to_m"]), segment["radius_m"]});
+      link.segments.push_back(
+          {vector_of(segment["from_m"]), vector_of(segment["to_m"]), segment["radius_m"].get<double>()});
     names.push_back(link.name);
     robot.links.push_back(std::move(link));
   }
@@ -235,10 +240,9 @@ Robot robot_from_json(const Json& document, const std::string& where) {
   if (at == names.end())
     throw Error(ErrorCode::invalid, fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
                                                 tip["link"].get<std::string>(), detail::join(names)));
-  robot.tip = {tip.contains("name") ? tip["name"] : tip["link"], static_cast<int>(at - names.begin()),
-               pose_of(tip, where + ": /tip")};
+  robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()), pose_of(tip, where + ": /tip")};
   for (const auto& pair : list_of(document, "self_collision_disabled"))
-    robot.self_collision_disabled.emplace_back(pair[0], pair[1]);
+    robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
   detail::round_to_quaternions(robot);
   check(robot, where);
   return robot;

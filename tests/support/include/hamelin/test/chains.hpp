@@ -1,4 +1,6 @@
 #pragma once
+#include <fmt/format.h>
+
 #include <string>
 
 #include "hamelin/model/robot.hpp"
@@ -11,9 +13,9 @@ inline model::Robot chain_along_y(int n, double length, const Eigen::Matrix3d& i
   robot.name = "chain";
   for (int i = 0; i < n; ++i) {
     model::Link link;
-    link.name = "link" + std::to_string(i + 1);
+    link.name = fmt::format("link{}", i + 1);
     link.parent = i - 1;
-    link.joint.name = "j" + std::to_string(i + 1);
+    link.joint.name = fmt::format("j{}", i + 1);
     const char letter = axes[static_cast<std::size_t>(i) % axes.size()];
     const Eigen::Vector3d axis = letter == 'x'   ? Eigen::Vector3d::UnitX()
                                  : letter == 'y' ? Eigen::Vector3d::UnitY()

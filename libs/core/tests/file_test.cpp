@@ -1,0 +1,91 @@
+#include "hamelin/core/file.hpp"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+
+#include "hamelin/core/error.hpp"
+
+using namespace hamelin;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Folder {
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "hamelin_core.XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::permissions(path, fs::perms::owner_all, ignored);
+    fs::remove_all(path, ignored);
+  }
+  [[nodiscard]] std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator(path), fs::directory_iterator());
+  }
+  fs::path path;
+};
+
+}  // namespace
+
+TEST_CASE("bytes come back as they were written, and nothing else is left in the folder", "[core][unit]") {
+  const Folder folder;
+  const std::string bytes("a\0b\r\n\xff", 6);
+  write_file_aside(folder.path / "f", bytes);
+  CHECK(read_file(folder.path / "f") == bytes);
+  write_file_aside(folder.path / "f", "shorter");
+  CHECK(read_file(folder.path / "f") == "shorter");
+  write_file_aside(folder.path / "empty", "");
+  CHECK(read_file(folder.path / "empty").empty());
+  CHECK(folder.files() == 2);
+}
+
+TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit]") {
+  const Folder folder;
+  SECTION("where a folder stands in the way") {
+    fs::create_directory(folder.path / "taken");
+    std::ofstream(folder.path / "taken" / "inside") << "kept";
+    CHECK_THROWS_WITH(write_file_aside(folder.path / "taken", "new"), Catch::StartsWith((folder.path / "taken").string()));
+    CHECK(read_file(folder.path / "taken" / "inside") == "kept");
+    CHECK(folder.files() == 1);
+  }
+  SECTION("where the folder does not exist") {
+    try {
+      write_file_aside(folder.path / "no" / "f", "new");
+      FAIL("written into nowhere");
+    } catch (const Error& error) {
+      CHECK(error.code() == ErrorCode::io);
+      CHECK_THAT(error.what(), Catch::Contains("/no/f: cannot be written: No such file or directory"));
+    }
+    CHECK(folder.files() == 0);
+  }
+  SECTION("where the folder may not be written to") {
+    if (::geteuid() == 0) {
+      WARN("skipped: root may write everywhere");
+      return;
+    }
+    write_file_aside(folder.path / "f", "old");
+    fs::permissions(folder.path, fs::perms::owner_read | fs::perms::owner_exec);
+    CHECK_THROWS_WITH(write_file_aside(folder.path / "f", "new"), Catch::Contains("Permission denied"));
+    CHECK(read_file(folder.path / "f") == "old");
+    CHECK(folder.files() == 1);
+  }
+}
+
+TEST_CASE("what cannot be read is named with the system's reason", "[core][unit]") {
+  const Folder folder;
+  CHECK_THROWS_WITH(read_file(folder.path / "absent"), Catch::Contains("absent: cannot be opened: No such file or directory"));
+  CHECK_THROWS_WITH(read_file(folder.path), Catch::Contains("is a directory, want a file"));
+}
+
+TEST_CASE("SHA-256 of the standard's examples", "[core][unit]") {
+  // FIPS 180-2, appendix B, and the empty message
+  CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  CHECK(sha256_hex("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq") ==
+        "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  CHECK(sha256_hex("") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+}

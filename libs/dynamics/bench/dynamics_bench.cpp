@@ -1,0 +1,52 @@
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+
+#include "hamelin/dynamics/dynamics.hpp"
+
+using namespace hamelin;
+using Eigen::VectorXd;
+
+namespace {
+
+// A chain of unit links: joint axes x, z, x, … (spatial) or all x (planar).
+model::Robot chain(int n, bool planar) {
+  model::Robot robot;
+  robot.name = "chain";
+  for (int i = 0; i < n; ++i) {
+    model::Link link;
+    link.name = std::to_string(i);
+    link.parent = i - 1;
+    const Eigen::Vector3d axis = planar || i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d at{0.0, 0.2 * i, 0.0};
+    link.joint.screw << axis, -axis.cross(at);
+    link.com = geometry::SE3{Eigen::Matrix3d::Identity(), at + Eigen::Vector3d{0.0, 0.1, 0.0}};
+    link.mass_kg = 1.0;
+    link.inertia_kg_m2 = Eigen::Vector3d(4e-3, 5e-4, 4e-3).asDiagonal();
+    robot.links.push_back(link);
+  }
+  robot.tip = {"tip", n - 1, geometry::SE3{}};
+  return robot;
+}
+
+}  // namespace
+
+TEST_CASE("dynamics over the chain's length", "[!benchmark][dynamics]") {
+  for (const bool planar : {false, true}) {
+    for (const int n : {2, 7, 30, 100}) {
+      const model::Model model(chain(n, planar));
+      dynamics::Workspace ws(model);
+      VectorXd q(n), v(n), x(n);
+      for (int i = 0; i < n; ++i) q[i] = 0.3 * i, v[i] = 0.1 * i;
+      const std::string label = fmt::format("{} {} links", planar ? "SE(2)" : "SE(3)", n);
+      BENCHMARK("ABA, " + label) {
+        dynamics::forward_dynamics(model, ws, q, v, v, x);
+        return x[0];
+      };
+      BENCHMARK("RNEA, " + label) {
+        dynamics::inverse_dynamics(model, ws, q, v, v, x);
+        return x[0];
+      };
+    }
+  }
+}

@@ -1,0 +1,60 @@
+#pragma once
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "hamelin/core/file.hpp"
+#include "hamelin/model/robot_io.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/test/arm_loop.hpp"
+
+namespace hamelin::test {
+
+/// A folder of this process's own, gone with the object.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "hamelin_closed_loop.XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline const std::vector<std::filesystem::path> plugin_directories{HAMELIN_TEST_PLUGIN_DIR,
+                                                                   HAMELIN_TEST_ONLY_PLUGIN_DIR};
+
+/// Writes robot and scene as files, reads them as the program does, and runs.
+inline log::Result run_scene(const ScratchFolder& folder, const Json& document, const simulation::Watch& watch = {},
+                             const model::Robot& robot = planar4()) {
+  write_file_aside(folder.path() / "robot.json", model::robot_to_json(robot).dump(1));
+  write_file_aside(folder.path() / "scene.json", document.dump(1));
+  return simulation::run(scene::read_scene(folder.path() / "scene.json"), plugin_directories, watch);
+}
+
+/// Example 5.2's arm with its tip's goal and nothing else, by apf.
+inline Json scene_52() {
+  return {{"schema", "hamelin.scene/1"},
+          {"robot", {{"file", "robot.json"}}},
+          {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}}}},
+          {"obstacles", Json::array()},
+          {"planner", {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
+          {"step_s", 0.004},
+          {"duration_s", 40.0}};
+}
+
+inline Json ball(const std::string& name, double x, double y, double radius) {
+  return {{"name", name}, {"type", "sphere"}, {"radius_m", radius}, {"position_m", {x, y, 0.0}}};
+}
+
+}  // namespace hamelin::test
