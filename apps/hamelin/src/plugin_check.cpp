@@ -1,0 +1,97 @@
+#include "plugin_check.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/model/make_chain.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+// A host with nothing around the arm and nobody listening.
+class EmptyHost final : public planning::HostServices {
+ public:
+  void log(std::int32_t, std::string_view) override {}
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+};
+
+planning::SetupData setup_for(const model::Model& arm, std::int32_t goal_type) {
+  planning::SetupData data(arm);
+  hamelin_goal goal{};
+  goal.type = goal_type;
+  goal.position_world_m[1] = 0.3;
+  goal.quaternion_wxyz[0] = 1.0;
+  goal.tolerance_m = 0.01;
+  goal.tolerance_rad = 0.05;
+  goal.speed_max = 0.05;
+  data.add_goal(goal, goal_type == HAMELIN_GOAL_JOINT ? Eigen::VectorXd::Constant(arm.dof(), 0.2) : Eigen::VectorXd());
+  data.control_period_s = 1e-3;
+  data.influence_m = 0.2;
+  data.seed = 1;
+  return data;
+}
+
+// All numbers of the answer, to be compared.
+std::vector<double> answer(const planning::CommandBuffers& out) {
+  std::vector<double> numbers{out.raw().potential_J, static_cast<double>(out.raw().state)};
+  for (const auto* x : {&out.potential_gradient(), &out.damping(), &out.held_torque(), &out.node_velocity()})
+    numbers.insert(numbers.end(), x->begin(), x->end());
+  for (const auto& term : out.gyroscopic()) numbers.insert(numbers.end(), term.w_world, term.w_world + 3);
+  return numbers;
+}
+
+std::vector<double> answers_of(const planning::Plugin& plugin, const Json& params, const model::Model& arm,
+                               std::int32_t goal_type) {
+  EmptyHost host;
+  auto planner = plugin.create(setup_for(arm, goal_type), host, params);
+  planning::CommandBuffers out(static_cast<std::size_t>(arm.dof()), 8);
+  hamelin_contact contact{};
+  contact.distance_m = 0.05;
+  contact.direction_world[1] = 1.0;
+  contact.obstacle = HAMELIN_OBSTACLE_MAP;
+  std::vector<double> all;
+  const std::array<double, 2> q{0.1, 0.2}, still{0.0, 0.0}, moving{0.3, -0.4};
+  for (std::uint64_t k = 0; k < 3; ++k) {
+    const hamelin_tick tick{sizeof(hamelin_tick), k, 1e-3 * static_cast<double>(k), q.data(),
+                            k == 0 ? still.data() : moving.data(), &contact, k == 2 ? 1u : 0u, 0, 1.0};
+    if (!planner.tick(tick, out)) throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
+    const auto numbers = answer(out);
+    all.insert(all.end(), numbers.begin(), numbers.end());
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<PluginCheck> check_plugin(const planning::Plugin& plugin) {
+  std::vector<PluginCheck> checks;
+  const auto attempt = [&](std::string what, auto&& action) {
+    try {
+      action();
+      checks.push_back({std::move(what), ""});
+    } catch (const Error& e) {
+      checks.push_back({std::move(what), e.what()});
+    }
+  };
+  checks.push_back({fmt::format("{} {} loads from {}", plugin.name(), plugin.version(), plugin.file().string()), ""});
+  Json params;
+  attempt("default parameters fit the schema", [&] { params = planning::check_params(plugin, Json()); });
+  if (!checks.back().failure.empty()) return checks;
+
+  model::ChainOptions chain;
+  chain.links = 2;
+  const model::Model arm(model::make_chain(chain));
+  const std::array<std::pair<std::int32_t, const char*>, 3> goals{
+      {{HAMELIN_GOAL_JOINT, "joint"}, {HAMELIN_GOAL_POSITION, "position"}, {HAMELIN_GOAL_POSE, "pose"}}};
+  for (const auto& goal : goals)
+    attempt(fmt::format("answers ticks towards a {} goal, the same twice", goal.second), [&] {
+      if (answers_of(plugin, params, arm, goal.first) != answers_of(plugin, params, arm, goal.first))
+        throw Error(ErrorCode::plugin, "two runs from the same seed gave different answers");
+    });
+  return checks;
+}
+
+}  // namespace hamelin::app

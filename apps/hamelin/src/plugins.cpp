@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/core/error.hpp"
+#include "plugin_check.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct ListOptions {
+  std::vector<std::filesystem::path> plugin_path;
+  bool json = false;
+};
+
+struct CheckOptions {
+  std::string plugin;
+  std::vector<std::filesystem::path> plugin_path;
+};
+
+void list(const ListOptions& options) {
+  const auto directories = plugin_path(options.plugin_path);
+  Json all = Json::array();
+  for (const auto& found : planning::list_plugins(directories)) {
+    Json entry{{"file", found.file.string()}};
+    if (found.plugin) {
+      entry["name"] = found.plugin->name();
+      entry["version"] = found.plugin->version();
+      entry["description"] = found.plugin->description();
+      entry["params_schema"] = found.plugin->params_schema();
+    } else {
+      entry["refused"] = found.refusal;
+    }
+    all.push_back(std::move(entry));
+  }
+  if (options.json) {
+    fmt::print("{}\n", all.dump(2));
+    return;
+  }
+  for (const auto& entry : all) {
+    if (entry.contains("refused")) {
+      fmt::print("refused: {}\n", entry["refused"].get<std::string>());
+      continue;
+    }
+    fmt::print("{} {}: {}\n  {}\n", entry["name"].get<std::string>(), entry["version"].get<std::string>(),
+               entry["description"].get<std::string>(), entry["file"].get<std::string>());
+    const Json properties = entry["params_schema"].value("properties", Json::object());
+    for (const auto& [key, rule] : properties.items())
+      fmt::print("    {:<22} {:<14} {}\n", key, rule.contains("default") ? rule["default"].dump() : "",
+                 rule.value("description", ""));
+  }
+  if (all.empty()) {
+    fmt::print("no plugins; searched:\n");
+    for (const auto& directory : directories) fmt::print("  {}\n", directory.string());
+  }
+}
+
+int check(const CheckOptions& options) {
+  const planning::Plugin plugin = planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
+  int code = 0;
+  for (const auto& result : check_plugin(plugin)) {
+    fmt::print("{:<7} {}{}{}\n", result.failure.empty() ? "ok" : "failed", result.what, result.failure.empty() ? "" : ": ",
+               result.failure);
+    if (!result.failure.empty()) code = 1;
+  }
+  return code;
+}
+
+}  // namespace
+
+void add_plugins(CLI::App& app, int& exit_code) {
+  auto* plugins = add_command(app, "plugins", "List and check planner plugins", "hamelin plugins list");
+  plugins->require_subcommand(1);
+
+  auto* list_command = add_command(*plugins, "list", "All planners found, with their parameters", "hamelin plugins list");
+  const auto list_options = std::make_shared<ListOptions>();
+  list_command->add_option("--plugin-path", list_options->plugin_path, "look here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  list_command->add_flag("--json", list_options->json, "print JSON, parameter schemas included");
+  list_command->callback([list_options] { list(*list_options); });
+
+  auto* check_command = add_command(*plugins, "check", "Load a planner and try it on a small arm",
+                                    "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
+  const auto check_options = std::make_shared<CheckOptions>();
+  check_command->add_option("plugin", check_options->plugin, "a plugin's name or path")->required()->type_name("NAME|PATH");
+  check_command->add_option("--plugin-path", check_options->plugin_path, "look here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  check_command->callback([check_options, &exit_code] { exit_code = check(*check_options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,215 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "document.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/scene/make.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+// Without a planner that says how far it looks, surroundings are shown up to here.
+constexpr double shown_influence_m = 0.2;
+
+struct InfoOptions {
+  std::filesystem::path file;
+  std::optional<double> scale;
+  bool json = false;
+};
+
+struct MakeOptions {
+  std::optional<std::filesystem::path> problem, primitives, robot, spheres;
+  std::optional<double> resolution_m;
+  std::string tip, mark;
+  std::size_t clutter = 0;
+  std::uint64_t seed = 1;
+  std::string sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
+  std::vector<std::string> keep_out;
+  std::filesystem::path output;
+};
+
+Json corner(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
+
+// Where a map's occupied cells lie, in its own frame [m].
+Json map_info(const std::filesystem::path& file, std::optional<double> scale) {
+  const auto map = scene::read_map(file, {scale, 0.5});
+  std::array<double, 3> low{}, high{};
+  bool first = true;
+  for (const auto& cell : map.occupied)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double lo = cell.lo[i] * map.resolution, hi = lo + cell.size * map.resolution;
+      low[i] = first ? lo : std::min(low[i], lo);
+      high[i] = first ? hi : std::max(high[i], hi);
+      if (i == 2) first = false;
+    }
+  return {{"file", file.string()},
+          {"kind", "map"},
+          {"resolution_m", map.resolution},
+          {"nodes", map.node_count},
+          {"occupied_leaves", map.occupied.size()},
+          {"free_leaves", map.free_leaves},
+          {"occupied_low_m", map.occupied.empty() ? Json(nullptr) : corner(low)},
+          {"occupied_high_m", map.occupied.empty() ? Json(nullptr) : corner(high)},
+          {"sha256", map.sha256},
+          {"warnings", map.warnings}};
+}
+
+Json scene_info(const std::filesystem::path& file) {
+  const scene::Scene scene = scene::read_scene(file);
+  const model::Model model = simulation::load_model(scene);
+  const auto environment = scene::make_environment(scene, model.reach(), shown_influence_m);
+  const auto& summary = environment.summary();
+  Json goals = Json::array();
+  for (const auto& goal : scene.goals) goals.push_back(scene::to_string(goal.type));
+  Json info{{"file", file.string()},
+            {"kind", "scene"},
+            {"robot", model.robot().name},
+            {"dof", model.dof()},
+            {"spheres", model.spheres().size()},
+            {"reach_m", model.reach()},
+            {"goals", goals},
+            {"planner", scene.planner ? Json(scene.planner->name) : Json(nullptr)},
+            {"integrator", scene.integrator.name},
+            {"obstacles", summary.obstacles},
+            {"map", nullptr},
+            {"clearance_at_start_m", nullptr},
+            {"warnings", summary.warnings}};
+  if (summary.has_map)
+    info["map"] = {{"file", summary.map_file},       {"resolution_m", summary.resolution_m},
+                   {"occupied_leaves", summary.leaves}, {"within_reach", summary.leaves_cropped},
+                   {"boxes", summary.boxes},         {"unknown", scene::to_string(summary.unknown)},
+                   {"unknown_share", summary.unknown_share}};
+  if (environment.has_obstacles() && !model.spheres().empty()) {
+    dynamics::Workspace ws(model);
+    const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+    if (q.size() != model.dof())
+      throw Error(ErrorCode::invalid, fmt::format("{}: /start/q: {} numbers given, expected {}", file.string(), q.size(), model.dof()));
+    dynamics::forward_kinematics(model, ws, q);
+    std::vector<Eigen::Vector3d> centers(model.spheres().size());
+    std::vector<double> radii;
+    for (const auto& sphere : model.spheres()) radii.push_back(sphere.radius);
+    dynamics::sphere_centers(model, ws, centers);
+    info["clearance_at_start_m"] = environment.clearance(centers, radii, 0.0, shown_influence_m);
+  }
+  return info;
+}
+
+void show(const Json& info) {
+  for (const auto& [key, value] : info.items()) {
+    if (key == "warnings") continue;
+    fmt::print("{:<22} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  for (const auto& warning : info["warnings"]) note(warning.get<std::string>());
+}
+
+void info(const InfoOptions& options) {
+  const Kind kind = kind_of(options.file);
+  Json document;
+  if (kind == Kind::map)
+    document = map_info(options.file, options.scale);
+  else if (kind == Kind::scene)
+    document = scene_info(options.file);
+  else
+    throw Error(ErrorCode::usage, fmt::format("{}: is a {}, expected a map or a scene", options.file.string(), to_string(kind)));
+  if (options.json)
+    fmt::print("{}\n", document.dump(2));
+  else
+    show(document);
+}
+
+scene::Clutter clutter_of(const MakeOptions& options) {
+  scene::Clutter clutter;
+  clutter.count = options.clutter;
+  clutter.seed = options.seed;
+  const auto sizes = number_list("--sizes", options.sizes, 2);
+  clutter.size_min_m = sizes[0];
+  clutter.size_max_m = sizes[1];
+  const auto b = number_list("--bounds", options.bounds, 6);
+  clutter.bounds.lo = {b[0], b[1], b[2]};
+  clutter.bounds.hi = {b[3], b[4], b[5]};
+  for (const auto& text : options.keep_out) {
+    const auto k = number_list("--keep-out", text, 4);
+    clutter.keep_out.push_back({{k[0], k[1], k[2]}, k[3]});
+  }
+  return clutter;
+}
+
+scene::MakeReport make_map(const MakeOptions& options) {
+  scene::MakeMapOptions make;
+  if (options.primitives)
+    make = scene::make_options_from_json(read_json(*options.primitives), options.primitives->string());
+  if (options.clutter > 0) {
+    make.clutter = clutter_of(options);
+    if (!make.free_bounds) make.free_bounds = make.clutter->bounds;
+  }
+  if (options.resolution_m) make.resolution_m = *options.resolution_m;
+  if (!options.mark.empty()) make.mark = scene::mark_from(options.mark);
+  make.output = options.output;
+  return scene::make_map(make);
+}
+
+scene::MakeReport make_scene(const MakeOptions& options) {
+  if (!options.robot) throw Error(ErrorCode::usage, "scene make: a problem needs --robot");
+  scene::ProblemOptions make;
+  make.robot = *options.robot;
+  make.spheres = options.spheres.value_or("");
+  make.tip = options.tip;
+  if (options.resolution_m) make.resolution_m = *options.resolution_m;
+  if (!options.mark.empty()) make.mark = scene::mark_from(options.mark);
+  make.output = options.output;
+  return scene::make_scene_from_problem(*options.problem, make);
+}
+
+void make(const MakeOptions& options) {
+  const bool map = options.primitives || options.clutter > 0;
+  if (map == options.problem.has_value())
+    throw Error(ErrorCode::usage, "scene make: give either a problem, or --primitives or --clutter");
+  const auto report = map ? make_map(options) : make_scene(options);
+  fmt::print("{}: {} primitives, {} occupied voxels, {} free, {} nodes, {} bytes, sha256 {}\n", report.output.string(),
+             report.primitives, report.occupied_voxels, report.free_voxels, report.nodes, report.bytes, report.sha256);
+}
+
+}  // namespace
+
+void add_scene(CLI::App& app, int&) {
+  auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them", "hamelin scene info data/maps/shelf.bt");
+  scene->require_subcommand(1);
+
+  auto* info_command = add_command(*scene, "info", "What a map or a scene holds", "hamelin scene info data/scenes/shelf.json");
+  const auto info_options = std::make_shared<InfoOptions>();
+  info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")->required()->type_name("MAP_OR_SCENE");
+  info_command->add_option("--scale", info_options->scale, "metres per unit of the map")->type_name("S");
+  info_command->add_flag("--json", info_options->json, "print JSON");
+  info_command->callback([info_options] { info(*info_options); });
+
+  auto* make_command = add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
+                                   "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
+  const auto options = std::make_shared<MakeOptions>();
+  make_command->add_option("problem", options->problem, "a MotionBenchMaker problem")->type_name("PROBLEM.json");
+  make_command->add_option("--primitives", options->primitives, "spheres, boxes, cylinders (see `hamelin schema print primitives`)")
+      ->type_name("F");
+  make_command->add_option("--clutter", options->clutter, "number of random primitives")->type_name("N");
+  make_command->add_option("--seed", options->seed, "of the clutter (default 1)")->type_name("S");
+  make_command->add_option("--sizes", options->sizes, "smallest and largest edge of clutter [m] (default 0.05,0.2)")->type_name("A,B");
+  make_command->add_option("--bounds", options->bounds, "where clutter goes [m] (default -0.8,-0.8,0,0.8,0.8,1.2)")
+      ->type_name("X,Y,Z,X,Y,Z");
+  make_command->add_option("--keep-out", options->keep_out, "no clutter reaches into this ball [m]; may be repeated")
+      ->type_name("X,Y,Z,R")
+      ->allow_extra_args(false);
+  make_command->add_option("--robot", options->robot, "the problem's robot")->type_name("F");
+  make_command->add_option("--spheres", options->spheres, "its collision spheres")->type_name("F");
+  make_command->add_option("--tip", options->tip, "its tip")->type_name("LINK");
+  make_command->add_option("--resolution", options->resolution_m, "edge of a voxel [m] (default the file's, else 0.02)")->type_name("R");
+  make_command->add_option("--mark", options->mark, "voxels that primitives touch, or whose centre they hold (default touch)")
+      ->type_name("touch|centre");
+  make_command->add_option("-o,--output", options->output, "the map (.bt) or scene (.json) to write")->required()->type_name("F");
+  make_command->callback([options] { make(*options); });
+}
+
+}  // namespace hamelin::app

@@ -2,11 +2,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <string>
 #include <vector>
 
-#include "hamelin/core/file.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/test/readme.hpp"
 
 using namespace hamelin;
 using namespace hamelin::scene;
@@ -31,13 +30,5 @@ const std::size_t count = environment.closest(centers, radii, influence, 0.0, sc
   CHECK(contacts[0].obstacle == Contact::map);
   // The middle board: lower face at 0.61, front edge at 0.60.
   CHECK(contacts[0].distance == Approx(std::hypot(0.1, 0.06) - 0.06).margin(1e-9));
-
-  const std::string readme = read_file(std::filesystem::path(HAMELIN_SOURCE_DIR) / "libs/scene/README.md");
-  const std::string source = read_file(std::filesystem::path(HAMELIN_SOURCE_DIR) / "libs/scene/tests/readme_test.cpp");
-  const auto between = [](const std::string& text, const std::string& open, const std::string& close) {
-    const auto begin = text.find(open) + open.size();
-    return text.substr(begin, text.find(close, begin) - begin);
-  };
-  const std::string shown = between(readme, "```cpp\n", "```");
-  CHECK(shown == between(source, "// [example]\n", "  // [example]"));
+  test::check_readme_example("libs/scene");
 }

@@ -1,0 +1,37 @@
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/test/readme.hpp"
+
+using namespace hamelin;
+
+TEST_CASE("the README's example holds gravity and leaves C v", "[dynamics][unit]") {
+  // clang-format off
+  // [example]
+const model::Model arm(model::make_chain({}));  // seven links of 0.2 m, gravity along -z
+dynamics::Workspace ws(arm);
+const Eigen::VectorXd q = Eigen::VectorXd::Constant(7, 0.3), v = Eigen::VectorXd::Constant(7, -0.2);
+Eigen::VectorXd tau(7), a(7);
+dynamics::gravity_torque(arm, ws, q, tau);
+dynamics::forward_dynamics(arm, ws, q, v, tau, a);  // gravity is held, so M a = -C v
+dynamics::forward_kinematics(arm, ws, q);
+const Eigen::Vector3d tip = dynamics::tip_pose(arm, ws).p();
+dynamics::Matrix3Xd J(3, 7);
+dynamics::point_jacobian(arm, ws, arm.robot().tip.link, tip, J);  // the tip's velocity is J v
+  // [example]
+  // clang-format on
+  Eigen::MatrixXd M(7, 7);
+  Eigen::VectorXd bias(7);
+  dynamics::mass_matrix(arm, ws, q, M);
+  dynamics::bias_torque(arm, ws, q, v, bias);
+  CHECK((M * a + bias - tau).norm() < 1e-12);
+  CHECK(bias.norm() > 1.0);
+  const double e = 1e-6;
+  dynamics::forward_kinematics(arm, ws, q + e * v);
+  const Eigen::Vector3d ahead = dynamics::tip_pose(arm, ws).p();
+  dynamics::forward_kinematics(arm, ws, q - e * v);
+  CHECK(((ahead - dynamics::tip_pose(arm, ws).p()) / (2.0 * e) - J * v).norm() < 1e-9);
+  test::check_readme_example("libs/dynamics");
+}

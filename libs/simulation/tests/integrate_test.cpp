@@ -1,0 +1,61 @@
+#include <atomic>
+#include <catch2/catch.hpp>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/test/chains.hpp"
+
+using namespace hamelin;
+using simulation::FreeMotion;
+
+namespace {
+
+FreeMotion rest(int n, double step_s, double duration_s) {
+  FreeMotion motion;
+  motion.q0 = motion.v0 = Eigen::VectorXd::Zero(n);
+  motion.step_s = step_s;
+  motion.duration_s = duration_s;
+  return motion;
+}
+
+}  // namespace
+
+TEST_CASE("example 5.1 keeps its energy to the published figure", "[simulation][golden]") {
+  const model::Model arm(test::planar3());
+  const auto result = simulation::integrate(arm, rest(3, 0.01, 100.0), {});
+  CHECK(result.outcome == log::Outcome::completed);
+  CHECK(result.steps == 10000);
+  CHECK(result.energy_error_max_J > 1e-5);
+  CHECK(result.energy_error_max_J <= 1.8e-4);
+  CHECK(result.solver.steps == 10000);
+}
+
+TEST_CASE("damping is booked, so that the energy account still closes", "[simulation][energy]") {
+  const model::Model arm(test::planar3());
+  auto motion = rest(3, 0.01, 10.0);
+  motion.damping = Eigen::VectorXd::Constant(3, 0.5);
+  const auto result = simulation::integrate(arm, motion, {});
+  CHECK(result.energy_initial_J - result.energy_final_J == Approx(result.dissipated_J).margin(result.energy_error_max_J));
+  CHECK(result.dissipated_J > 0.1);
+  CHECK(result.energy_error_max_J < 1e-3);
+}
+
+TEST_CASE("a duration that is no whole number of steps, and vectors of the wrong size, are refused", "[simulation][input]") {
+  const model::Model arm(test::planar3());
+  CHECK_THROWS_WITH(simulation::integrate(arm, rest(3, 0.003, 0.01), {}), Catch::Contains("no whole number of steps"));
+  CHECK_THROWS_WITH(simulation::integrate(arm, rest(2, 0.001, 0.01), {}), Catch::Contains("q0: 2 numbers given, expected 3"));
+  CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.0, 1.0), {}), Error);
+  CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.001, -1.0), {}), Error);
+  CHECK(simulation::integrate(arm, rest(3, 0.1, 0.3), {}).steps == 3);  // 0.3/0.1 is not 3 in doubles
+}
+
+TEST_CASE("free motion can be stopped from outside", "[simulation][outcome]") {
+  const model::Model arm(test::planar3());
+  std::atomic<bool> stop = false;
+  simulation::Watch watch;
+  watch.stop = &stop;
+  watch.progress = [&](double time_s, double) { stop = time_s >= 2.0; };
+  const auto result = simulation::integrate(arm, rest(3, 0.001, 10.0), watch);
+  CHECK(result.outcome == log::Outcome::interrupted);
+  CHECK(result.steps == 2000);
+}
