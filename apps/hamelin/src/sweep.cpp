@@ -32,7 +32,8 @@ struct PairsOptions {
 
 scene::Scene read_scene(const PairsOptions& options) {
   if (const Kind kind = kind_of(options.file); kind != Kind::scene)
-    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
   Json document = read_json(options.file);
   if (options.planner) document["planner"] = {{"name", *options.planner}};
   document["duration_s"] = options.duration_s;
@@ -83,8 +84,8 @@ std::string table(const study::Summary& s, const study::DrawnPairs& drawn, doubl
   line("collisions", fmt::format("{}", s.count(log::Outcome::collision)));
   line("clearance", number(s.min_clearance_m, "m at least"));
   if (s.certified_share_mean)
-    line("certified", fmt::format("{:.4f} % of the steps on the mean, {:.4f} % at least", 100.0 * *s.certified_share_mean,
-                                  100.0 * *s.certified_share_min));
+    line("certified", fmt::format("{:.4f} % of the steps on the mean, {:.4f} % at least",
+                                  100.0 * *s.certified_share_mean, 100.0 * *s.certified_share_min));
   line("arrival", fmt::format("{} (median), {} (latest)", number(s.reached_time_s_median, "s"),
                               number(s.reached_time_s_max, "s")));
   line("tick", fmt::format("{} (median p50), {} (median p99), {} (largest p99)", number(s.tick_us_p50_median, "us"),
@@ -104,7 +105,9 @@ int sweep_pairs(const PairsOptions& options) {
   runs.jobs = options.jobs;
   runs.stop = &stop_on_signals();
   const auto begin = clock::now();
-  runs.on_result = [&](std::size_t index, const log::Result& result) { records.write(index, drawn.pairs[index], result); };
+  runs.on_result = [&](std::size_t index, const log::Result& result) {
+    records.write(index, drawn.pairs[index], result);
+  };
   const auto results = study::run_pairs(scene, drawn.pairs, runs);
   const double wall_s = std::chrono::duration<double>(clock::now() - begin).count();
 
@@ -148,7 +151,8 @@ void add_sweep(CLI::App& app, int& exit_code) {
       ->type_name("T")
       ->capture_default_str();
   pairs->add_option("--jobs", options->jobs, "runs at the same time")->type_name("N")->capture_default_str();
-  pairs->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")->type_name("NAME|PATH");
+  pairs->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")
+      ->type_name("NAME|PATH");
   pairs->add_option("--set", options->set, "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);

@@ -49,7 +49,8 @@ TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit
   SECTION("where a folder stands in the way") {
     fs::create_directory(folder.path / "taken");
     std::ofstream(folder.path / "taken" / "inside") << "kept";
-    CHECK_THROWS_WITH(write_file_aside(folder.path / "taken", "new"), Catch::StartsWith((folder.path / "taken").string()));
+    CHECK_THROWS_WITH(write_file_aside(folder.path / "taken", "new"),
+                      Catch::StartsWith((folder.path / "taken").string()));
     CHECK(read_file(folder.path / "taken" / "inside") == "kept");
     CHECK(folder.files() == 1);
   }
@@ -78,7 +79,8 @@ TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit
 
 TEST_CASE("what cannot be read is named with the system's reason", "[core][unit]") {
   const Folder folder;
-  CHECK_THROWS_WITH(read_file(folder.path / "absent"), Catch::Contains("absent: cannot be opened: No such file or directory"));
+  CHECK_THROWS_WITH(read_file(folder.path / "absent"),
+                    Catch::Contains("absent: cannot be opened: No such file or directory"));
   CHECK_THROWS_WITH(read_file(folder.path), Catch::Contains("is a directory, want a file"));
 }
 

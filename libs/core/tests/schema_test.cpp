@@ -67,12 +67,14 @@ TEST_CASE("a wrong type or value is shown with what was expected", "[core][unit]
              Catch::StartsWith("a.json: /mode: \"idle\" is not allowed") && Catch::Contains(R"(["ideal","sampled"])"));
   CHECK_THAT(refusal(R"({"name": "a", "arm": {"file": "f", "q": [1, "x"]}})"),
              Catch::StartsWith("a.json: /arm/q/1: \"x\" is not allowed, expected type number"));
-  CHECK_THAT(refusal(R"({"name": "a", "arm": {"file": "f", "q": [1, 2, 3, 4]}})"), Catch::StartsWith("a.json: /arm/q: "));
+  CHECK_THAT(refusal(R"({"name": "a", "arm": {"file": "f", "q": [1, 2, 3, 4]}})"),
+             Catch::StartsWith("a.json: /arm/q: "));
   CHECK_THAT(refusal("[]"), Catch::StartsWith("a.json: /: [] is not allowed, expected type object"));
 }
 
 TEST_CASE("a long value is cut and one with line breaks stays on one line", "[core][unit]") {
-  const std::string text = refusal(Json{{"name", Json::array({std::string(500, 'x') + "\n"})}, {"arm", {{"file", "f"}}}}.dump());
+  const std::string text =
+      refusal(Json{{"name", Json::array({std::string(500, 'x') + "\n"})}, {"arm", {{"file", "f"}}}}.dump());
   CHECK_THAT(text, Catch::Contains("..."));
   CHECK(text.size() < 200);
 }

@@ -9,8 +9,11 @@ namespace hamelin::integration {
 
 namespace {
 
-// Newton converges quadratically; a step that needs more is not going to.
-constexpr int max_newton_updates = 30;
+// Near a root Newton contracts quadratically, and the guess is near. A first correction beyond this [rad or m], or one
+// that is not well below the one before, is on its way to some other root of the step: better to halve the step.
+constexpr double largest_correction = 1.0;
+constexpr double contraction = 0.5;
+constexpr int max_newton_updates = 30;  // at the worst contraction, from the largest correction to 1e-9
 
 }  // namespace
 
@@ -90,6 +93,7 @@ void Variational::correct() {
 // The last sweep is needed for p⁺ anyway, and the kept factors turn its residual into the error of Δ: no factorisation
 // is spent on confirming.
 bool Variational::solve_newton(const State& state, const Channels& channels, double h, StepReport& report) {
+  double allowed = largest_correction;
   for (;;) {
     evaluate(state, channels, h);
     ++report.evaluations;
@@ -107,6 +111,10 @@ bool Variational::solve_newton(const State& state, const Channels& channels, dou
     if (report.updates == max_newton_updates || !factor(channels, h)) return false;
     ++report.factorizations;
     correct();
+    const double size = correction_.lpNorm<Eigen::Infinity>();
+    if (!(size <= allowed)) return false;
+    // rounding of long chains ends the contraction, not the iteration
+    allowed = std::max(contraction * size, 1e3 * options_.tolerance);
     delta_ += correction_;
     ++report.updates;
   }

@@ -35,15 +35,18 @@ TEST_CASE("damping is booked, so that the energy account still closes", "[simula
   auto motion = rest(3, 0.01, 10.0);
   motion.damping = Eigen::VectorXd::Constant(3, 0.5);
   const auto result = simulation::integrate(arm, motion, {});
-  CHECK(result.energy_initial_J - result.energy_final_J == Approx(result.dissipated_J).margin(result.energy_error_max_J));
+  CHECK(result.energy_initial_J - result.energy_final_J ==
+        Approx(result.dissipated_J).margin(result.energy_error_max_J));
   CHECK(result.dissipated_J > 0.1);
   CHECK(result.energy_error_max_J < 1e-3);
 }
 
-TEST_CASE("a duration that is no whole number of steps, and vectors of the wrong size, are refused", "[simulation][input]") {
+TEST_CASE("a duration that is no whole number of steps, and vectors of the wrong size, are refused",
+          "[simulation][input]") {
   const model::Model arm(test::planar3());
   CHECK_THROWS_WITH(simulation::integrate(arm, rest(3, 0.003, 0.01), {}), Catch::Contains("no whole number of steps"));
-  CHECK_THROWS_WITH(simulation::integrate(arm, rest(2, 0.001, 0.01), {}), Catch::Contains("q0: 2 numbers given, expected 3"));
+  CHECK_THROWS_WITH(simulation::integrate(arm, rest(2, 0.001, 0.01), {}),
+                    Catch::Contains("q0: 2 numbers given, expected 3"));
   CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.0, 1.0), {}), Error);
   CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.001, -1.0), {}), Error);
   CHECK(simulation::integrate(arm, rest(3, 0.1, 0.3), {}).steps == 3);  // 0.3/0.1 is not 3 in doubles

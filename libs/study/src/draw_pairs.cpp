@@ -35,9 +35,10 @@ class Sampler {
     for (int i = 0; i < model_.dof(); ++i) {
       const auto& joint = model_.robot().links[static_cast<std::size_t>(i)].joint;
       if (!joint.lower || !joint.upper)
-        throw Error(ErrorCode::invalid,
-                    fmt::format("{}: /robot: joint '{}' has no position limits, expected both to draw configurations between",
-                                scene.name, joint.name));
+        throw Error(
+            ErrorCode::invalid,
+            fmt::format("{}: /robot: joint '{}' has no position limits, expected both to draw configurations between",
+                        scene.name, joint.name));
       lower_[i] = *joint.lower;
       upper_[i] = *joint.upper;
     }
@@ -68,9 +69,11 @@ class Sampler {
 void check(const PairOptions& options) {
   if (options.count == 0) throw Error(ErrorCode::usage, "0 pairs asked for, expected at least 1");
   if (!(options.min_clearance_m > 0.0 && std::isfinite(options.min_clearance_m)))
-    throw Error(ErrorCode::usage, fmt::format("smallest clearance {} m, expected a positive number", options.min_clearance_m));
+    throw Error(ErrorCode::usage,
+                fmt::format("smallest clearance {} m, expected a positive number", options.min_clearance_m));
   if (!(options.min_distance_rad >= 0.0 && std::isfinite(options.min_distance_rad)))
-    throw Error(ErrorCode::usage, fmt::format("smallest distance {} rad, expected a number from 0 up", options.min_distance_rad));
+    throw Error(ErrorCode::usage,
+                fmt::format("smallest distance {} rad, expected a number from 0 up", options.min_distance_rad));
 }
 
 }  // namespace
@@ -83,11 +86,12 @@ DrawnPairs draw_pairs(const scene::Scene& scene, const PairOptions& options) {
   bool have_start = false;
   while (drawn.pairs.size() < options.count) {
     if (drawn.draws == options.max_draws)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: only {} of {} pairs found in {} draws, {} of them nearer than {} m to something, {} goals "
-                              "nearer than {} rad to their start; expected room for more",
-                              scene.name, drawn.pairs.size(), options.count, drawn.draws, drawn.near_draws,
-                              options.min_clearance_m, drawn.close_goals, options.min_distance_rad));
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{}: only {} of {} pairs found in {} draws, {} of them nearer than {} m to something, {} goals "
+                      "nearer than {} rad to their start; expected room for more",
+                      scene.name, drawn.pairs.size(), options.count, drawn.draws, drawn.near_draws,
+                      options.min_clearance_m, drawn.close_goals, options.min_distance_rad));
     VectorXd& q = have_start ? pair.goal : pair.start;
     sampler.draw(q);
     ++drawn.draws;

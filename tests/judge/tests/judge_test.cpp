@@ -54,8 +54,7 @@ Isometry3d isometry(const urdf::Pose& pose) {
 Ball hull_of(const std::vector<Ball>& balls) {
   Ball hull{Vector3d::Zero(), 0.0};
   for (const auto& ball : balls) hull.center += ball.center / static_cast<double>(balls.size());
-  for (const auto& ball : balls)
-    hull.radius = std::max(hull.radius, (ball.center - hull.center).norm() + ball.radius);
+  for (const auto& ball : balls) hull.radius = std::max(hull.radius, (ball.center - hull.center).norm() + ball.radius);
   return hull;
 }
 
@@ -92,7 +91,8 @@ class Arm {
         const auto& joint = *link->parent_joint;
         Isometry3d step = isometry(joint.parent_to_joint_origin_transform);
         if (const auto angle = angles.find(joint.name); angle != angles.end())
-          step.rotate(Eigen::AngleAxisd(angle->second, Vector3d(joint.axis.x, joint.axis.y, joint.axis.z).normalized()));
+          step.rotate(
+              Eigen::AngleAxisd(angle->second, Vector3d(joint.axis.x, joint.axis.y, joint.axis.z).normalized()));
         g = step * g;
       }
       poses.push_back(g);
@@ -209,14 +209,15 @@ TEST_CASE("the judge sees a contact where there is one", "[judge][unit]") {
   const Judge judge(directory / scene["map"]["file"].get<std::string>());
   REQUIRE(arm.dof() == 7);
   // The shelf's boards stand before the arm: stretched out towards them it must hit one, folded back not.
-  const std::vector<double> into{0.0, 1.2, 0.0, -0.4, 0.0, 1.6, 0.0}, folded{3.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785};
+  const std::vector<double> into{0.0, 1.2, 0.0, -0.4, 0.0, 1.6, 0.0},
+      folded{3.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785};
   CHECK(judge.touches(arm, into, 0.0));
   CHECK_FALSE(judge.touches(arm, folded, 0.0));
 }
 
 TEST_CASE("by FCL's account hybrid reaches the goals of the shelf and the clutter without touching", "[judge][long]") {
-  constexpr int parts_between = 5;        // so four points between two nodes
-  constexpr std::size_t sampled = 50;     // ticks whose distance is compared; FCL takes milliseconds for one
+  constexpr int parts_between = 5;     // so four points between two nodes
+  constexpr std::size_t sampled = 50;  // ticks whose distance is compared; FCL takes milliseconds for one
   constexpr double agreement_m = 1e-4;
   const fs::path directory = fs::path(HAMELIN_SOURCE_DIR) / "data" / "scenes";
   for (const std::string name : {"shelf.json", "clutter.json"}) {

@@ -65,7 +65,7 @@ struct Options {
   Solver solver = Solver::newton;
   double tolerance = 1e-12;       ///< newton: ‖δΔ‖∞ [rad or m]
   double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
-  int max_updates = 100;          ///< feedback; newton gives up after 30
+  int max_updates = 100;          ///< feedback; newton gives up where it does not contract
   int max_halvings = 8;           ///< a step is cut into at most 2^max_halvings pieces
 };
 

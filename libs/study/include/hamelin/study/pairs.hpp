@@ -19,8 +19,8 @@ namespace hamelin::study {
 struct PairOptions {
   std::size_t count = 60;
   std::uint64_t seed = 1;
-  double min_clearance_m = 0.02;     ///< of start and goal, from all that a judge sees at time 0; positive
-  double min_distance_rad = 1.5;     ///< ‖goal − start‖, Euclidean over all joints [rad or m]
+  double min_clearance_m = 0.02;      ///< of start and goal, from all that a judge sees at time 0; positive
+  double min_distance_rad = 1.5;      ///< ‖goal − start‖, Euclidean over all joints [rad or m]
   std::size_t max_draws = 1'000'000;  ///< configurations drawn before giving up
 };
 
@@ -32,9 +32,9 @@ struct Pair {
 /// Pairs, and how hard they were to find.
 struct DrawnPairs {
   std::vector<Pair> pairs;
-  std::size_t draws = 0;         ///< configurations drawn
-  std::size_t near_draws = 0;    ///< of these nearer than min_clearance_m to something
-  std::size_t close_goals = 0;   ///< clear goals that lay within min_distance_rad of their start
+  std::size_t draws = 0;        ///< configurations drawn
+  std::size_t near_draws = 0;   ///< of these nearer than min_clearance_m to something
+  std::size_t close_goals = 0;  ///< clear goals that lay within min_distance_rad of their start
 };
 
 /// Start and goal uniform in the joint limits, drawn anew until they have their clearance and their distance. The first
@@ -55,7 +55,8 @@ struct PairRuns {
 /// Each pair as a run of the scene of its own: its start at rest, its goal as the only one, with the tolerances of the
 /// scene's first goal if that is a joint goal.
 /// @return the results, in the order of the pairs; fewer if stopped
-/// @throws Error as simulation::run does, and what on_result throws, once the runs under way are over; no other is begun
+/// @throws Error as simulation::run does, and what on_result throws, once the runs under way are over; no other is
+/// begun
 std::vector<log::Result> run_pairs(const scene::Scene& scene, const std::vector<Pair>& pairs, const PairRuns& runs);
 
 /// Many results in a few numbers. A median of an even count is the lower of the two in the middle.
@@ -63,7 +64,7 @@ struct Summary {
   std::size_t runs = 0;
   static constexpr std::size_t outcome_count = static_cast<std::size_t>(log::Outcome::interrupted) + 1;
   std::array<std::size_t, outcome_count> outcomes{};  ///< by Outcome
-  std::optional<double> min_clearance_m;                   ///< over all runs
+  std::optional<double> min_clearance_m;              ///< over all runs
   std::optional<double> certified_share_mean, certified_share_min;
   std::optional<double> reached_time_s_median, reached_time_s_max;  ///< simulated, of the runs that reached
   double time_s = 0.0;                                              ///< simulated, all runs

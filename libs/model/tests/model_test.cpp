@@ -1,0 +1,144 @@
+#include "hamelin/model/model.hpp"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/model/robot_io.hpp"
+#include "hamelin/test/robots.hpp"
+
+using namespace hamelin;
+using geometry::SE3;
+
+namespace {
+
+// Pose of a link's COM frame at q by the product of exponentials (3).
+SE3 com_pose(const model::Robot& robot, int link, const Eigen::VectorXd& q) {
+  SE3 g;
+  for (int j = 0; j <= link; ++j) g = g * SE3::exp(robot.links[static_cast<std::size_t>(j)].joint.screw * q[j]);
+  return g * robot.links[static_cast<std::size_t>(link)].com;
+}
+
+}  // namespace
+
+TEST_CASE("nothing of the arm is ever farther from the base than reach", "[model][property]") {
+  const bool planar = GENERATE(false, true);
+  const int prismatic_every = GENERATE(0, 3);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const auto robot = test::random_robot(seed, 6, prismatic_every, planar);
+    const model::Model model(robot);
+    Rng rng(seed);
+    for (int trial = 0; trial < 50; ++trial) {
+      const Eigen::VectorXd q = test::random_joints(rng, 6, prismatic_every > 0 ? 1.0 : 3.0);
+      for (int i = 0; i < 6; ++i) {
+        const SE3 g = com_pose(robot, i, q);
+        for (const auto& sphere : robot.links[static_cast<std::size_t>(i)].spheres)
+          REQUIRE((g * sphere.center_m).norm() + sphere.radius_m <= model.reach() + 1e-12);
+      }
+    }
+  }
+}
+
+TEST_CASE("chains that keep a plane run in SE(2), others in SE(3)", "[model][unit]") {
+  CHECK(model::Model(test::random_robot(1, 5, 0, true)).planar());
+  CHECK(model::Model(test::random_robot(1, 5, 2, true)).planar());
+  CHECK_FALSE(model::Model(test::random_robot(1, 5, 0, false)).planar());
+  auto tilted = test::random_robot(1, 3, 0, true);
+  const Eigen::Vector3d axis = tilted.links[2].joint.screw.head<3>();
+  const Eigen::Vector3d turned = (axis + 1e-6 * axis.unitOrthogonal()).normalized();
+  tilted.links[2].joint.screw << turned, -turned.cross(tilted.links[2].com.p());
+  CHECK_FALSE(model::Model(tilted).planar());
+}
+
+TEST_CASE("axes parallel to a hair still give exact frames", "[model][hard]") {
+  // The common normal of two axes 1e-9 rad apart lies kilometres away; only its direction may be used.
+  for (const double tilt : {1e-15, 1e-12, 1e-9, 1e-6}) {
+    auto robot = test::random_robot(3, 4, 0, true);
+    const Eigen::Vector3d axis = robot.links[1].joint.screw.head<3>();
+    const Eigen::Vector3d turned = (axis + tilt * axis.unitOrthogonal()).normalized();
+    const Eigen::Vector3d at = robot.links[1].com.p();
+    robot.links[1].joint.screw << turned, -turned.cross(at);
+    // an axis across makes it spatial whatever the tilt
+    const Eigen::Vector3d across = axis.unitOrthogonal();
+    robot.links[3].joint.screw << across, -across.cross(robot.links[3].com.p());
+    const model::Model model(robot);
+    REQUIRE_FALSE(model.planar());
+    const auto& chain = std::get<model::SpatialChain>(model.chain());
+    // rebuild the COM frames at q = 0 from the chain's own constants
+    SE3 g = chain.root;
+    for (int i = 0; i < 4; ++i) {
+      const auto& l = chain.links[static_cast<std::size_t>(i)];
+      Eigen::Matrix3d R;
+      R = Eigen::AngleAxisd(std::atan2(l.sin_alpha, l.cos_alpha), Eigen::Vector3d::UnitX()) *
+          Eigen::AngleAxisd(l.offset, Eigen::Vector3d::UnitZ());
+      g = g * SE3(R, Eigen::Vector3d(l.p0.x, l.p0.y, l.p0.z));
+      CAPTURE(tilt, i);
+      const SE3 com = g * model.com_in_frame(i);
+      CHECK((com.R() - robot.links[static_cast<std::size_t>(i)].com.R()).norm() < 1e-13);
+      CHECK((com.p() - robot.links[static_cast<std::size_t>(i)].com.p()).norm() < 1e-13);
+    }
+  }
+}
+
+TEST_CASE("a made chain is the one that the reference figures speak of", "[model][unit]") {
+  model::ChainOptions options;
+  options.links = 4;
+  const auto robot = model::make_chain(options);
+  REQUIRE(robot.dof() == 4);
+  const char axes[] = {'x', 'z', 'x', 'x'};
+  for (int i = 0; i < 4; ++i) {
+    const auto& link = robot.links[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d axis = axes[i] == 'x' ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d at{0.0, 0.2 * i, 0.0};
+    CHECK((link.joint.screw.head<3>() - axis).norm() < 1e-15);
+    CHECK((link.joint.screw.tail<3>() + axis.cross(at)).norm() < 1e-15);
+    CHECK((link.com.p() - Eigen::Vector3d(0.0, 0.2 * i + 0.1, 0.0)).norm() < 1e-15);
+    CHECK(link.inertia_kg_m2(0, 0) == Approx(0.04 / 12.0 + 0.0009 / 4.0));
+    CHECK(link.inertia_kg_m2(1, 1) == Approx(0.0009 / 2.0));
+  }
+  CHECK((robot.tip.pose.p() - Eigen::Vector3d(0.0, 0.8, 0.0)).norm() < 1e-15);
+}
+
+TEST_CASE("a robot written as JSON reads back as the same", "[model][io]") {
+  model::ChainOptions options;
+  options.links = 5;
+  const auto robot = model::make_chain(options);
+  const Json written = model::robot_to_json(robot);
+  const Json again = model::robot_to_json(model::robot_from_json(written, "again"));
+  CHECK(written == again);
+}
+
+TEST_CASE("what no arm can be is refused with one line", "[model][input]") {
+  struct Bad {
+    const char* what;
+    std::function<void(model::Robot&)> spoil;
+    const char* said;
+  };
+  const std::vector<Bad> all{
+      {"no link", [](model::Robot& r) { r.links.clear(); }, "link"},
+      {"negative mass", [](model::Robot& r) { r.links[1].mass_kg = -1.0; }, "mass"},
+      {"NaN inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(0, 0) = std::nan(""); }, "link1"},
+      {"indefinite inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(1, 1) = -0.1; }, "inertia"},
+      {"triangle", [](model::Robot& r) { r.links[1].inertia_kg_m2 = Eigen::Vector3d(1.0, 0.1, 0.1).asDiagonal(); }, "inertia"},
+      {"zero axis", [](model::Robot& r) { r.links[1].joint.screw.setZero(); }, "joint1"},
+      {"crossed limits", [](model::Robot& r) { r.links[1].joint.lower = 1.0, r.links[1].joint.upper = -1.0; }, "limit"},
+  };
+  for (const auto& bad : all) {
+    CAPTURE(bad.what);
+    auto robot = test::random_robot(5, 3);
+    bad.spoil(robot);
+    try {
+      model::check(robot, "bad.json");
+      FAIL("accepted");
+    } catch (const Error& e) {
+      const std::string text = e.what();
+      CHECK(text.find("bad.json") == 0);
+      CHECK(text.find('\n') == std::string::npos);
+      CAPTURE(text);
+      CHECK(text.find(bad.said) != std::string::npos);
+    }
+  }
+}
