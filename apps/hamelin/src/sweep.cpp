@@ -44,8 +44,12 @@ scene::Scene read_scene(const PairsOptions& options) {
 /// One JSON line a run, flushed, so that a kill loses at most one.
 class Records {
  public:
-  explicit Records(const std::optional<fs::path>& file) {
+  Records(const std::optional<fs::path>& file, const fs::path& input) {
     if (!file) return;
+    std::error_code ec;
+    if (fs::equivalent(*file, input, ec))
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: is the input, expected another path for the output", file->string()));
     log::check_writable(*file);
     file_ = *file;
   }
@@ -97,7 +101,7 @@ std::string table(const study::Summary& s, const study::DrawnPairs& drawn, doubl
 int sweep_pairs(const PairsOptions& options) {
   using clock = std::chrono::steady_clock;
   const scene::Scene scene = read_scene(options);
-  Records records(options.output);
+  Records records(options.output, options.file);
   const study::DrawnPairs drawn = study::draw_pairs(scene, options.pairs);
 
   study::PairRuns runs;
@@ -139,7 +143,10 @@ void add_sweep(CLI::App& app, int& exit_code) {
   pairs->add_option("scene", options->file, "a scene file; its own start and goals are not used")
       ->required()
       ->type_name("SCENE.json");
-  pairs->add_option("--count", options->pairs.count, "pairs of start and goal")->type_name("N")->capture_default_str();
+  pairs->add_option("--count", options->pairs.count, "pairs of start and goal")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1L, 1'000'000L));
   pairs->add_option("--seed", options->pairs.seed, "of the pairs")->type_name("S")->capture_default_str();
   pairs->add_option("--min-clearance", options->pairs.min_clearance_m, "of start and goal [m]")
       ->type_name("D")
@@ -150,7 +157,10 @@ void add_sweep(CLI::App& app, int& exit_code) {
   pairs->add_option("--duration", options->duration_s, "longest simulated time of a run [s]")
       ->type_name("T")
       ->capture_default_str();
-  pairs->add_option("--jobs", options->jobs, "runs at the same time")->type_name("N")->capture_default_str();
+  pairs->add_option("--jobs", options->jobs, "runs at the same time")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1L, 1024L));
   pairs->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")
       ->type_name("NAME|PATH");
   pairs->add_option("--set", options->set, "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
