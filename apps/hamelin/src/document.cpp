@@ -15,6 +15,7 @@ std::string_view to_string(Kind kind) noexcept {
     case Kind::scene: return "scene";
     case Kind::result: return "result";
     case Kind::primitives: return "primitives";
+    case Kind::spheres: return "file of collision spheres";
     case Kind::log: return "log";
   }
   return "unknown";
@@ -42,6 +43,7 @@ Kind kind_of(const std::filesystem::path& file) {
   if (schema == "hamelin.scene/1") return Kind::scene;
   if (schema == "hamelin.result/1") return Kind::result;
   if (schema == "hamelin.primitives/1") return Kind::primitives;
+  if (schema.is_null() && document.contains("links") && document["links"].is_object()) return Kind::spheres;
   throw Error(ErrorCode::invalid,
               fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1 or "
                           "hamelin.primitives/1",

@@ -50,6 +50,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::result: check_shipped_schema(read_json(file), "result", file.string()); return "result";
     case Kind::primitives:
       return fmt::format("primitives, {} obstacles", scene::make_options_from_json(read_json(file), file.string()).primitives.size());
+    case Kind::spheres: return fmt::format("collision spheres, {}", model::check_spheres(file));
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events, log.has_result ? "" : ", no result: unfinished",
@@ -75,7 +76,7 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "validate", "Check files: robots, scenes, maps, logs, results; told apart by content",
+  auto* command = add_command(app, "validate", "Check files: robots, collision spheres, scenes, maps, logs, results; told apart by content",
                               "hamelin validate data/scenes/shelf.json data/maps/shelf.bt");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");

@@ -45,7 +45,8 @@ Json parse_json(std::string_view text, const std::string& where) {
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     throw Error(ErrorCode::parse, fmt::format("{}: {}: not JSON: {}", where, position_of(text, e.byte), reason));
   } catch (const nlohmann::json::out_of_range& e) {
-    throw Error(ErrorCode::parse, fmt::format("{}: not JSON: {}", where, e.what()));
+    const std::string_view reason = e.what();  // opens with the exception's name in brackets
+    throw Error(ErrorCode::parse, fmt::format("{}: not JSON: {}", where, reason.substr(reason.find("] ") + 2)));
   }
 }
 

@@ -31,16 +31,19 @@ nlohmann::json::json_pointer pointer_of(const std::vector<std::string>& context)
 const nlohmann::json* schema_at(const nlohmann::json& schema, nlohmann::json::json_pointer pointer) {
   std::vector<std::string> tokens;
   for (; !pointer.empty(); pointer.pop_back()) tokens.insert(tokens.begin(), pointer.back());
-  const nlohmann::json* at = &schema;
-  for (const auto& token : tokens) {
-    while (at->contains("$ref")) {
-      const auto ref = (*at)["$ref"].get<std::string>();
-      at = &schema.at(nlohmann::json::json_pointer(ref.substr(1)));
+  const auto resolved = [&schema](const nlohmann::json* part) {
+    while (part->contains("$ref")) {
+      const auto ref = (*part)["$ref"].get<std::string>();
+      part = &schema.at(nlohmann::json::json_pointer(ref.substr(1)));
     }
+    return part;
+  };
+  const nlohmann::json* at = resolved(&schema);
+  for (const auto& token : tokens) {
     if (at->contains("properties") && (*at)["properties"].contains(token)) {
-      at = &(*at)["properties"][token];
+      at = resolved(&(*at)["properties"][token]);
     } else if (at->contains("items") && (*at)["items"].is_object()) {
-      at = &(*at)["items"];
+      at = resolved(&(*at)["items"]);
     } else {
       return nullptr;
     }

@@ -167,6 +167,12 @@ std::string detail::normalise_screw(Joint& joint, const std::string& where) {
   return fmt::format("joint '{}': its axis had length {:.6g} and was normalised", joint.name, length);
 }
 
+std::size_t check_spheres(const std::filesystem::path& file) {
+  std::size_t count = 0;
+  for (const auto& [name, spheres] : detail::read_spheres(file).links) count += spheres.size();
+  return count;
+}
+
 detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
   const std::string where = file.string();
   const Json document = read_json(file);

@@ -164,6 +164,7 @@ planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double i
 }
 
 void ClosedLoop::log(std::int32_t level, std::string_view line) {
+  if (level == HAMELIN_LOG_INFO && recorder_ != nullptr && !recorder_->logging()) return;  // nobody reads it
   std::string text = fmt::format("{}: {}", scene_.planner->name, line);
   if (level == HAMELIN_LOG_WARNING) result_.warnings.push_back(text);
   if (recorder_ != nullptr)

@@ -1,6 +1,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -18,6 +20,7 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
+constexpr double steering_fade = 0.5;     // joint distance below which steering towards a joint target fades
 constexpr double far_from_goal = 1.0, near_goal = 0.25;  // joint distances between which margins shrink
 
 LawParams law_params(const Json& params) {
@@ -91,7 +94,10 @@ class Hybrid final : public planning::Planner {
     law_.attract(model_, ws_, q_, target, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
     law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-    law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, command);
+    // steering turns faster than the law follows: near a joint target it would make the arm circle
+    const bool joint_target = target.via != nullptr || goal.type == HAMELIN_GOAL_JOINT;
+    law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, joint_target ? std::min(1.0, distance / steering_fade) : 1.0,
+               command);
 
     // the law's velocity one period on, of bounded acceleration
     const double dt = setup_.control_period_s();
@@ -232,6 +238,9 @@ class Hybrid final : public planning::Planner {
           host_.closest_points({via.data(), static_cast<std::size_t>(via.size())}, margin_, contacts_at_);
       return found == 0;
     });
+    std::array<char, 64> line{};
+    const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escape_.count());
+    host_.info({line.data(), static_cast<std::size_t>(size)});
     escaping_ = true;
     escape_until_s_ = now + 1.2 + 0.05 * escape_.count();
     stall_.restart(now);

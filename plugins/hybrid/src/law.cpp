@@ -95,7 +95,8 @@ void Law::repel(std::span<const NearPoint> points, double strength, Eigen::Vecto
 }
 
 void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
-                const Eigen::MatrixXd& W, const Eigen::VectorXd& v, planning::Command& command) {
+                const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command) {
+  if (strength * params_.steering_gain <= 0.0) return;
   int last_link = -1;
   for (const auto& point : points) {
     const double h = std::max(point.distance - point.margin, 0.01);
@@ -112,7 +113,7 @@ void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::s
     scratch_.noalias() = W * point.row;
     const double mobility = point.row.dot(scratch_);
     if (mobility < 1e-9) continue;
-    const double rate = params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
+    const double rate = strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
     // side × ahead points to the obstacle's far side: its part along the direction is the sine of the angle, so ≥ 0
     command.add_gyroscopic(point.link, dynamics::link_pose(model, ws, point.link).inverse() * point.arm_point,
                            side * (rate / mobility));

@@ -35,9 +35,9 @@ class Law {
   /// weighted by `strength`.
   void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
   /// Gyroscopic terms w = m k (v̂ × n)^ for approached points, k = gain α (1/max(h, 1 cm) − 1/range), α = −v̂·n,
-  /// m = 1/(aᵀM⁻¹a): the force w × v turns the velocity away from the obstacle.
+  /// m = 1/(aᵀM⁻¹a): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
   void steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
-             const Eigen::MatrixXd& W, const Eigen::VectorXd& v, planning::Command& command);
+             const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command);
 
  private:
   void task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal,

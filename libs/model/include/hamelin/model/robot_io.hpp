@@ -23,6 +23,11 @@ struct RobotOptions {
 /// @throws Error io, parse or invalid: "file: place: what is wrong, what was expected"
 [[nodiscard]] Robot read_robot(const std::filesystem::path& file, const RobotOptions& options = {});
 
+/// Checks a sidecar with collision spheres by itself: whether its link names fit shows only with its robot.
+/// @return how many spheres it holds
+/// @throws Error io, parse or invalid, as read_robot
+[[nodiscard]] std::size_t check_spheres(const std::filesystem::path& file);
+
 /// A self-contained description, of schema "robot". Reading it back gives the same robot, bit for bit, if the robot
 /// came from read_robot, robot_from_json or make_chain (else its rotations are rounded to quaternions).
 [[nodiscard]] Json robot_to_json(const Robot& robot);

@@ -1,0 +1,27 @@
+#!/bin/bash
+# run_readme.sh SOURCE_DIR PROGRAM_DIR: runs every line of README.md's ```console blocks that begins with `hamelin`, in
+# order, in one fresh folder in which data/ is the checkout's. Each must exit 0.
+set -u
+source_dir=$1
+export PATH="$2:$PATH"
+unset HAMELIN_PLUGIN_PATH
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+ln -s "$source_dir/data" "$work/data"
+cd "$work" || exit 1
+mapfile -t commands < <(awk '/^```console/ {shown = 1; next} /^```/ {shown = 0} shown && /^hamelin / {print}' "$source_dir/README.md")
+if [ "${#commands[@]}" -eq 0 ]; then
+  echo "README.md shows no command of hamelin in a console block"
+  exit 1
+fi
+failed=0
+for command in "${commands[@]}"; do
+  if bash -c "$command" >out.txt 2>err.txt </dev/null; then
+    echo "ok      $command"
+  else
+    echo "failed  $command (exit code $?)"
+    cat err.txt
+    failed=1
+  fi
+done
+exit $failed

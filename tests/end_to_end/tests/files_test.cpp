@@ -1,0 +1,90 @@
+#include "../program.hpp"
+#include "hamelin/test/scene_data.hpp"
+
+using namespace hamelin;
+using test::Bench;
+namespace fs = std::filesystem;
+
+TEST_CASE("every robot, map and scene of data/ validates", "[end_to_end]") {
+  Bench bench;
+  std::vector<std::string> command = {"validate"};
+  for (const char* folder : {"robots", "maps", "scenes"})
+    for (const auto& entry : fs::directory_iterator(fs::path(HAMELIN_SOURCE_DIR) / "data" / folder))
+      command.push_back((fs::path("data") / folder / entry.path().filename()).string());
+  REQUIRE(command.size() > 12);
+  const auto output = bench.run(command);
+  CAPTURE(output.err);
+  CHECK(output.exit_code == 0);
+  CHECK(test::lines_of(output.out).size() == command.size() - 1);
+}
+
+TEST_CASE("the maps of data/ are what scene make builds of their primitives, byte for byte", "[end_to_end]") {
+  Bench bench;
+  for (const std::string name : {"shelf", "clutter"}) {
+    CAPTURE(name);
+    const auto output =
+        bench.run({"scene", "make", "--primitives", "data/maps/" + name + ".primitives.json", "-o", name + ".bt"});
+    REQUIRE(output.exit_code == 0);
+    CHECK((bench.text(name + ".bt") == bench.text("data/maps/" + name + ".bt")));
+  }
+}
+
+TEST_CASE("clutter follows its seed", "[end_to_end]") {
+  Bench bench;
+  const auto make = [&](const std::string& seed, const std::string& file) {
+    REQUIRE(bench.run({"scene", "make", "--clutter", "6", "--seed", seed, "--resolution", "0.05", "-o", file})
+                .exit_code == 0);
+    return bench.text(file);
+  };
+  const std::string first = make("7", "a.bt");
+  CHECK((make("7", "b.bt") == first));
+  CHECK((make("8", "c.bt") != first));
+}
+
+TEST_CASE("public URDFs load with their tips and are refused without, listing the leaves", "[end_to_end]") {
+  const auto robots = test::shared_data("robots");
+  if (!robots) return;
+  Bench bench;
+  const std::vector<std::pair<std::string, std::string>> tips = {{"panda.urdf", "panda_grasptarget"},
+                                                                 {"ur5_robot.urdf", "tool0"}};
+  for (const auto& [file, tip] : tips) {
+    CAPTURE(file, tip);
+    const std::string path = (fs::canonical(*robots) / file).string();
+    const auto with = bench.run({"robot", "info", path, "--tip", tip});
+    CAPTURE(with.err);
+    CHECK(with.exit_code == 0);
+    CHECK_THAT(with.out, Catch::Contains(tip));
+    const auto without = bench.run({"robot", "info", path});
+    CHECK(without.exit_code == 2);
+    CHECK(without.out.empty());
+    CHECK(test::lines_of(without.err).size() == 1);
+    CHECK_THAT(without.err, Catch::Contains("several leaves") && Catch::Contains(tip));
+  }
+}
+
+TEST_CASE("every damaged map ends as its index wants", "[end_to_end]") {
+  const auto folder = test::shared_data("bad_maps");
+  if (!folder) return;
+  Bench bench;
+  const auto index = test::lines_of(read_file(*folder / "INDEX.tsv"));
+  REQUIRE(index.size() > 40);
+  for (std::size_t i = 1; i < index.size(); ++i) {
+    const std::string name = index[i].substr(0, index[i].find('\t'));
+    const std::string wanted = index[i].substr(index[i].rfind('\t') + 1);
+    CAPTURE(name, wanted);
+    const auto output = bench.run({"validate", (fs::canonical(*folder) / name).string()});
+    CAPTURE(output.err);
+    CHECK_THAT(output.err, Catch::Contains(name) || Catch::Equals(""));
+    if (wanted.rfind("reject", 0) == 0) {
+      CHECK(output.exit_code == 2);
+      CHECK(output.out.empty());
+      CHECK(test::lines_of(output.err).size() == 1);
+      if (wanted.find("convert_octree") != std::string::npos) CHECK_THAT(output.err, Catch::Contains("convert_octree"));
+      if (wanted.find("--scale") != std::string::npos) CHECK_THAT(output.err, Catch::Contains("scale"));
+    } else {
+      CHECK(wanted.find("accept") != std::string::npos);
+      CHECK(output.exit_code == 0);
+      if (wanted.find("warn") != std::string::npos) CHECK_THAT(output.err, Catch::Contains("wider than"));
+    }
+  }
+}
