@@ -52,7 +52,9 @@ std::string unknown(const CLI::App* app, const std::string& argument) {
 
 }  // namespace
 
-HelpFormatter::HelpFormatter() { column_width(36); }
+HelpFormatter::HelpFormatter() {
+  column_width(36);
+}
 
 std::string HelpFormatter::make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const {
   if (mode == CLI::AppFormatMode::Sub) return make_expanded(app);
@@ -100,9 +102,13 @@ std::vector<double> number_list(const std::string& option, const std::string& te
   return numbers;
 }
 
-std::vector<std::string> command_line() { return stored_command_line(); }
+std::vector<std::string> command_line() {
+  return stored_command_line();
+}
 
-void set_command_line(int argc, char** argv) { stored_command_line().assign(argv, argv + argc); }
+void set_command_line(int argc, char** argv) {
+  stored_command_line().assign(argv, argv + argc);
+}
 
 std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given) {
   std::vector<std::filesystem::path> own;

@@ -9,14 +9,21 @@ namespace hamelin::app {
 
 std::string_view to_string(Kind kind) noexcept {
   switch (kind) {
-    case Kind::map: return "map";
+    case Kind::map:
+      return "map";
     case Kind::urdf:
-    case Kind::robot: return "robot";
-    case Kind::scene: return "scene";
-    case Kind::result: return "result";
-    case Kind::primitives: return "primitives";
-    case Kind::spheres: return "file of collision spheres";
-    case Kind::log: return "log";
+    case Kind::robot:
+      return "robot";
+    case Kind::scene:
+      return "scene";
+    case Kind::result:
+      return "result";
+    case Kind::primitives:
+      return "primitives";
+    case Kind::spheres:
+      return "file of collision spheres";
+    case Kind::log:
+      return "log";
   }
   return "unknown";
 }

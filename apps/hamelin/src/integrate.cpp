@@ -76,8 +76,8 @@ VectorXd damping_of(const scene::Scene& scene, const model::Robot& robot) {
     values = VectorXd::Constant(n, damping.values[0]);
   } else if (!damping.values.empty()) {
     if (damping.values.size() != static_cast<std::size_t>(n))
-      throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}", scene.name,
-                                                  damping.values.size(), n));
+      throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
+                                                  scene.name, damping.values.size(), n));
     values = Eigen::Map<const VectorXd>(damping.values.data(), n);
   }
   return values;
@@ -113,14 +113,18 @@ void add_integrate(CLI::App& app, int& exit_code) {
       "robot, base, gravity, damping and start are used",
       "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 0.5 --step 0.01 --duration 10");
   const auto options = std::make_shared<IntegrateOptions>();
-  command->add_option("file", options->file, "a scene, or a robot (.urdf or JSON)")->required()->type_name("SCENE_OR_ROBOT");
+  command->add_option("file", options->file, "a scene, or a robot (.urdf or JSON)")
+      ->required()
+      ->type_name("SCENE_OR_ROBOT");
   command->add_option("--tip", options->tip, "link that is the tip (URDF: default the only leaf)")->type_name("LINK");
   add_integrator_flags(*command, options->integrator);
   command->add_option("--step", options->step_s, "time step [s] (default the scene's, else 1e-3)")->type_name("H");
   command->add_option("--duration", options->duration_s, "[s], a whole number of steps (default the scene's, else 10)")
       ->type_name("T");
-  command->add_option("--q0", options->q0, "joints at the start [rad or m] (default the scene's, else 0)")->type_name("a,b,..");
-  command->add_option("--v0", options->v0, "joint velocities at the start (default the scene's, else 0)")->type_name("a,b,..");
+  command->add_option("--q0", options->q0, "joints at the start [rad or m] (default the scene's, else 0)")
+      ->type_name("a,b,..");
+  command->add_option("--v0", options->v0, "joint velocities at the start (default the scene's, else 0)")
+      ->type_name("a,b,..");
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = integrate(*options); });
 }

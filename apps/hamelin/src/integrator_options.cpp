@@ -17,8 +17,10 @@ void require(bool takes, const char* flag, const std::string& integrator) {
 }  // namespace
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
-  command.add_option("--integrator", flags.integrator,
-                     fmt::format("one of {} (default hamel-variational)", fmt::join(integration::integrator_names(), ", ")))
+  command
+      .add_option(
+          "--integrator", flags.integrator,
+          fmt::format("one of {} (default hamel-variational)", fmt::join(integration::integrator_names(), ", ")))
       ->type_name("NAME");
   command.add_option("--alpha", flags.alpha, "hamel: where in the step velocities are taken, 0 to 1 (default 0.5)")
       ->type_name("A");
@@ -26,8 +28,9 @@ void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
       ->type_name("HOW");
   command.add_option("--solver", flags.solver, "root-finding: newton or feedback (default: the integrator's own)")
       ->type_name("NAME");
-  command.add_option("--tolerance", flags.tolerance,
-                     "of root-finding: newton |delta|_inf [rad or m] (1e-12), feedback |tau_e| [Nm] (1e-8)")
+  command
+      .add_option("--tolerance", flags.tolerance,
+                  "of root-finding: newton |delta|_inf [rad or m] (1e-12), feedback |tau_e| [Nm] (1e-8)")
       ->type_name("E");
 }
 

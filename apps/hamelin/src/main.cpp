@@ -21,7 +21,8 @@ int run_command_line(int argc, char** argv) {
   app.footer("hamelin run data/scenes/shelf.json");
   app.set_version_flag("--version", std::string(hamelin::version()), "print the version");
   app.require_subcommand(1);
-  for (const auto add : {add_run, add_integrate, add_robot, add_scene, add_sweep, add_plugins, add_validate, add_schema})
+  for (const auto add :
+       {add_run, add_integrate, add_robot, add_scene, add_sweep, add_plugins, add_validate, add_schema})
     add(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -55,8 +55,15 @@ std::vector<double> answers_of(const planning::Plugin& plugin, const Json& param
   std::vector<double> all;
   const std::array<double, 2> q{0.1, 0.2}, still{0.0, 0.0}, moving{0.3, -0.4};
   for (std::uint64_t k = 0; k < 3; ++k) {
-    const hamelin_tick tick{sizeof(hamelin_tick), k, 1e-3 * static_cast<double>(k), q.data(),
-                            k == 0 ? still.data() : moving.data(), &contact, k == 2 ? 1u : 0u, 0, 1.0};
+    const hamelin_tick tick{sizeof(hamelin_tick),
+                            k,
+                            1e-3 * static_cast<double>(k),
+                            q.data(),
+                            k == 0 ? still.data() : moving.data(),
+                            &contact,
+                            k == 2 ? 1u : 0u,
+                            0,
+                            1.0};
     if (!planner.tick(tick, out)) throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
     const auto numbers = answer(out);
     all.insert(all.end(), numbers.begin(), numbers.end());

@@ -62,8 +62,8 @@ int check(const CheckOptions& options) {
   const planning::Plugin plugin = planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
   int code = 0;
   for (const auto& result : check_plugin(plugin)) {
-    fmt::print("{:<7} {}{}{}\n", result.failure.empty() ? "ok" : "failed", result.what, result.failure.empty() ? "" : ": ",
-               result.failure);
+    fmt::print("{:<7} {}{}{}\n", result.failure.empty() ? "ok" : "failed", result.what,
+               result.failure.empty() ? "" : ": ", result.failure);
     if (!result.failure.empty()) code = 1;
   }
   return code;
@@ -75,7 +75,8 @@ void add_plugins(CLI::App& app, int& exit_code) {
   auto* plugins = add_command(app, "plugins", "List and check planner plugins", "hamelin plugins list");
   plugins->require_subcommand(1);
 
-  auto* list_command = add_command(*plugins, "list", "All planners found, with their parameters", "hamelin plugins list");
+  auto* list_command =
+      add_command(*plugins, "list", "All planners found, with their parameters", "hamelin plugins list");
   const auto list_options = std::make_shared<ListOptions>();
   list_command->add_option("--plugin-path", list_options->plugin_path, "look here first; may be repeated")
       ->type_name("DIR")
@@ -86,7 +87,9 @@ void add_plugins(CLI::App& app, int& exit_code) {
   auto* check_command = add_command(*plugins, "check", "Load a planner and try it on a small arm",
                                     "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
   const auto check_options = std::make_shared<CheckOptions>();
-  check_command->add_option("plugin", check_options->plugin, "a plugin's name or path")->required()->type_name("NAME|PATH");
+  check_command->add_option("plugin", check_options->plugin, "a plugin's name or path")
+      ->required()
+      ->type_name("NAME|PATH");
   check_command->add_option("--plugin-path", check_options->plugin_path, "look here first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);

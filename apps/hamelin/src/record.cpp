@@ -24,8 +24,9 @@ fs::path result_target(const fs::path& file) {
   std::error_code ec;
   const fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
   if (fs::exists(target, ec) && !fs::is_regular_file(target, ec))
-    throw Error(ErrorCode::io, fmt::format("{}: is no regular file, expected a path for the result; --json prints to stdout",
-                                           file.string()));
+    throw Error(
+        ErrorCode::io,
+        fmt::format("{}: is no regular file, expected a path for the result; --json prints to stdout", file.string()));
   log::check_writable(target);
   return target;
 }
@@ -46,9 +47,11 @@ int record(const RecordOptions& options, const fs::path& input,
            const std::function<log::Result(const simulation::Watch&)>& simulate) {
   for (const auto& output : {options.log, options.result})
     if (output && same_file(*output, input))
-      throw Error(ErrorCode::usage, fmt::format("{}: is the input, expected another path for the output", output->string()));
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: is the input, expected another path for the output", output->string()));
   if (options.log && options.result && same_file(*options.log, *options.result))
-    throw Error(ErrorCode::usage, fmt::format("--log and --result are both {}, expected two paths", options.log->string()));
+    throw Error(ErrorCode::usage,
+                fmt::format("--log and --result are both {}, expected two paths", options.log->string()));
   std::optional<fs::path> result_file;
   if (options.result) result_file = result_target(*options.result);
   std::optional<log::RunLog> run_log;

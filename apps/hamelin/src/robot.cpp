@@ -22,7 +22,9 @@ struct InfoOptions {
   bool json = false;
 };
 
-Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json optional(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 Json describe(const model::Model& model, const std::filesystem::path& file) {
   const auto& robot = model.robot();
@@ -56,21 +58,27 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
           {"notes", robot.notes}};
 }
 
-std::string cell(const Json& value) { return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>()); }
+std::string cell(const Json& value) {
+  return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>());
+}
 
 void print_table(const Json& robot) {
-  fmt::print("{}: {}, {} joints, {}, {:.4g} kg, tip '{}' on link '{}', reach at most {:.3g} m\n", robot["file"].get<std::string>(),
-             robot["name"].get<std::string>(), robot["dof"].get<int>(),
-             robot["planar"].get<bool>() ? "planar: runs in SE(2)" : "spatial: runs in SE(3)", robot["mass_kg"].get<double>(),
-             robot["tip"].get<std::string>(), robot["tip_link"].get<std::string>(), robot["reach_m"].get<double>());
+  fmt::print("{}: {}, {} joints, {}, {:.4g} kg, tip '{}' on link '{}', reach at most {:.3g} m\n",
+             robot["file"].get<std::string>(), robot["name"].get<std::string>(), robot["dof"].get<int>(),
+             robot["planar"].get<bool>() ? "planar: runs in SE(2)" : "spatial: runs in SE(3)",
+             robot["mass_kg"].get<double>(), robot["tip"].get<std::string>(), robot["tip_link"].get<std::string>(),
+             robot["reach_m"].get<double>());
   constexpr const char* row = "{:<20} {:<20} {:<9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8}\n";
-  fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass", "spheres", "segments");
+  fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass", "spheres",
+             "segments");
   for (const auto& link : robot["links"])
     fmt::print(row, link["joint"].get<std::string>(), link["name"].get<std::string>(), link["type"].get<std::string>(),
                cell(link["lower"]), cell(link["upper"]), cell(link["velocity_max"]), cell(link["effort_max"]),
-               cell(link["damping"]), cell(link["mass_kg"]), link["spheres"].get<std::size_t>(), link["segments"].get<std::size_t>());
+               cell(link["damping"]), cell(link["mass_kg"]), link["spheres"].get<std::size_t>(),
+               link["segments"].get<std::size_t>());
   fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
-  if (robot["spheres"] == 0) fmt::print("no collision spheres: obstacles need some, as <collision><sphere> or by --spheres\n");
+  if (robot["spheres"] == 0)
+    fmt::print("no collision spheres: obstacles need some, as <collision><sphere> or by --spheres\n");
   for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
 }
 
@@ -100,25 +108,30 @@ void add_robot(CLI::App& app, int& exit_code) {
   auto* robot = add_command(app, "robot", "Look at robots and make them", "hamelin robot info data/robots/arm7.urdf");
   robot->require_subcommand(1);
 
-  auto* info_command =
-      add_command(*robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
-                  "hamelin robot info data/robots/arm7.urdf");
+  auto* info_command = add_command(
+      *robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
+      "hamelin robot info data/robots/arm7.urdf");
   const auto info_options = std::make_shared<InfoOptions>();
   info_command->add_option("file", info_options->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
-  info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")->type_name("LINK");
-  info_command->add_option("--spheres", info_options->spheres, "sidecar file with collision spheres")->type_name("FILE");
+  info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")
+      ->type_name("LINK");
+  info_command->add_option("--spheres", info_options->spheres, "sidecar file with collision spheres")
+      ->type_name("FILE");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options, &exit_code] {
     info(*info_options);
     exit_code = 0;
   });
 
-  auto* chain_command = add_command(*robot, "make-chain", "Write a chain of equal links along +y",
-                                    "hamelin robot make-chain --links 7 --axes x,z,x --length 0.2 --mass 1 --radius 0.03 -o chain7.json");
+  auto* chain_command =
+      add_command(*robot, "make-chain", "Write a chain of equal links along +y",
+                  "hamelin robot make-chain --links 7 --axes x,z,x --length 0.2 --mass 1 --radius 0.03 -o chain7.json");
   const auto chain_flags = std::make_shared<ChainFlags>();
   auto& chain = chain_flags->chain;
   chain_command->add_option("--links", chain.links, "how many")->type_name("N")->capture_default_str();
-  chain_command->add_option("--axes", chain.axes, "joint axes, link by link, starting over at the end")->type_name("x,y,z")->capture_default_str();
+  chain_command->add_option("--axes", chain.axes, "joint axes, link by link, starting over at the end")
+      ->type_name("x,y,z")
+      ->capture_default_str();
   chain_command->add_option("--length", chain.length_m, "of each link [m]")->type_name("L")->capture_default_str();
   chain_command->add_option("--mass", chain.mass_kg, "of each link [kg]")->type_name("M")->capture_default_str();
   chain_command->add_option("--radius", chain.radius_m, "of each link [m]")->type_name("R")->capture_default_str();

@@ -27,7 +27,8 @@ struct RunOptions {
 // The scene's document with the flags written into it, so that its own checks speak for them.
 scene::Scene read_scene(const RunOptions& options) {
   if (const Kind kind = kind_of(options.file); kind != Kind::scene)
-    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
   Json document = read_json(options.file);
   const auto choose = [&](const char* key, const std::string& name) {
     // another planner or integrator does not know the parameters of the scene's
@@ -74,10 +75,13 @@ void add_run(CLI::App& app, int& exit_code) {
                               "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
-  command->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")->type_name("NAME|PATH");
-  command->add_option("--integrator", options->integrator, "default the scene's, else hamel-variational")->type_name("NAME");
+  command->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")
+      ->type_name("NAME|PATH");
+  command->add_option("--integrator", options->integrator, "default the scene's, else hamel-variational")
+      ->type_name("NAME");
   command->add_option("--step", options->step_s, "time step [s] (default the scene's)")->type_name("H");
-  command->add_option("--duration", options->duration_s, "longest simulated time [s] (default the scene's)")->type_name("T");
+  command->add_option("--duration", options->duration_s, "longest simulated time [s] (default the scene's)")
+      ->type_name("T");
   command->add_option("--seed", options->seed, "of all random numbers (default the scene's)")->type_name("S");
   command->add_option("--set", options->set, "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
       ->type_name("/json/pointer=VALUE")

@@ -34,7 +34,9 @@ struct MakeOptions {
   std::filesystem::path output;
 };
 
-Json corner(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
+Json corner(const std::array<double, 3>& x) {
+  return {x[0], x[1], x[2]};
+}
 
 // Where a map's occupied cells lie, in its own frame [m].
 Json map_info(const std::filesystem::path& file, std::optional<double> scale) {
@@ -81,15 +83,19 @@ Json scene_info(const std::filesystem::path& file) {
             {"clearance_at_start_m", nullptr},
             {"warnings", summary.warnings}};
   if (summary.has_map)
-    info["map"] = {{"file", summary.map_file},       {"resolution_m", summary.resolution_m},
-                   {"occupied_leaves", summary.leaves}, {"within_reach", summary.leaves_cropped},
-                   {"boxes", summary.boxes},         {"unknown", scene::to_string(summary.unknown)},
+    info["map"] = {{"file", summary.map_file},
+                   {"resolution_m", summary.resolution_m},
+                   {"occupied_leaves", summary.leaves},
+                   {"within_reach", summary.leaves_cropped},
+                   {"boxes", summary.boxes},
+                   {"unknown", scene::to_string(summary.unknown)},
                    {"unknown_share", summary.unknown_share}};
   if (environment.has_obstacles() && !model.spheres().empty()) {
     dynamics::Workspace ws(model);
     const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
     if (q.size() != model.dof())
-      throw Error(ErrorCode::invalid, fmt::format("{}: /start/q: {} numbers given, expected {}", file.string(), q.size(), model.dof()));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /start/q: {} numbers given, expected {}", file.string(), q.size(), model.dof()));
     dynamics::forward_kinematics(model, ws, q);
     std::vector<Eigen::Vector3d> centers(model.spheres().size());
     std::vector<double> radii;
@@ -116,7 +122,8 @@ void info(const InfoOptions& options) {
   else if (kind == Kind::scene)
     document = scene_info(options.file);
   else
-    throw Error(ErrorCode::usage, fmt::format("{}: is a {}, expected a map or a scene", options.file.string(), to_string(kind)));
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: is a {}, expected a map or a scene", options.file.string(), to_string(kind)));
   if (options.json)
     fmt::print("{}\n", document.dump(2));
   else
@@ -178,25 +185,33 @@ void make(const MakeOptions& options) {
 }  // namespace
 
 void add_scene(CLI::App& app, int&) {
-  auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them", "hamelin scene info data/maps/shelf.bt");
+  auto* scene =
+      add_command(app, "scene", "Look at scenes and maps, and make them", "hamelin scene info data/maps/shelf.bt");
   scene->require_subcommand(1);
 
-  auto* info_command = add_command(*scene, "info", "What a map or a scene holds", "hamelin scene info data/scenes/shelf.json");
+  auto* info_command =
+      add_command(*scene, "info", "What a map or a scene holds", "hamelin scene info data/scenes/shelf.json");
   const auto info_options = std::make_shared<InfoOptions>();
-  info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")->required()->type_name("MAP_OR_SCENE");
+  info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")
+      ->required()
+      ->type_name("MAP_OR_SCENE");
   info_command->add_option("--scale", info_options->scale, "metres per unit of the map")->type_name("S");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options] { info(*info_options); });
 
-  auto* make_command = add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
-                                   "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
+  auto* make_command =
+      add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
+                  "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
   const auto options = std::make_shared<MakeOptions>();
   make_command->add_option("problem", options->problem, "a MotionBenchMaker problem")->type_name("PROBLEM.json");
-  make_command->add_option("--primitives", options->primitives, "spheres, boxes, cylinders (see `hamelin schema print primitives`)")
+  make_command
+      ->add_option("--primitives", options->primitives,
+                   "spheres, boxes, cylinders (see `hamelin schema print primitives`)")
       ->type_name("F");
   make_command->add_option("--clutter", options->clutter, "number of random primitives")->type_name("N");
   make_command->add_option("--seed", options->seed, "of the clutter (default 1)")->type_name("S");
-  make_command->add_option("--sizes", options->sizes, "smallest and largest edge of clutter [m] (default 0.05,0.2)")->type_name("A,B");
+  make_command->add_option("--sizes", options->sizes, "smallest and largest edge of clutter [m] (default 0.05,0.2)")
+      ->type_name("A,B");
   make_command->add_option("--bounds", options->bounds, "where clutter goes [m] (default -0.8,-0.8,0,0.8,0.8,1.2)")
       ->type_name("X,Y,Z,X,Y,Z");
   make_command->add_option("--keep-out", options->keep_out, "no clutter reaches into this ball [m]; may be repeated")
@@ -205,10 +220,14 @@ void add_scene(CLI::App& app, int&) {
   make_command->add_option("--robot", options->robot, "the problem's robot")->type_name("F");
   make_command->add_option("--spheres", options->spheres, "its collision spheres")->type_name("F");
   make_command->add_option("--tip", options->tip, "its tip")->type_name("LINK");
-  make_command->add_option("--resolution", options->resolution_m, "edge of a voxel [m] (default the file's, else 0.02)")->type_name("R");
-  make_command->add_option("--mark", options->mark, "voxels that primitives touch, or whose centre they hold (default touch)")
+  make_command->add_option("--resolution", options->resolution_m, "edge of a voxel [m] (default the file's, else 0.02)")
+      ->type_name("R");
+  make_command
+      ->add_option("--mark", options->mark, "voxels that primitives touch, or whose centre they hold (default touch)")
       ->type_name("touch|centre");
-  make_command->add_option("-o,--output", options->output, "the map (.bt) or scene (.json) to write")->required()->type_name("F");
+  make_command->add_option("-o,--output", options->output, "the map (.bt) or scene (.json) to write")
+      ->required()
+      ->type_name("F");
   make_command->callback([options] { make(*options); });
 }
 

@@ -48,11 +48,12 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                            r["planner"].is_null() ? "" : fmt::format(", planner {}", r["planner"].get<std::string>())));
   if (!r["goal"].is_null()) line("goal", goal_line(r["goal"]));
   if (!r["min_clearance_m"].is_null())
-    line("clearance", fmt::format("{} m at least{}", number(r["min_clearance_m"]),
-                                  r["certified_share"].is_null()
-                                      ? ""
-                                      : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
-                                                    100.0 * r["certified_share"].get<double>(), number(r["tightest_step_m"]))));
+    line("clearance",
+         fmt::format("{} m at least{}", number(r["min_clearance_m"]),
+                     r["certified_share"].is_null()
+                         ? ""
+                         : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
+                                       100.0 * r["certified_share"].get<double>(), number(r["tightest_step_m"]))));
   line("q", joints(r["q"]));
   line("energy", fmt::format("{} J at first, {} J at last, largest error {} J", number(r["energy_initial_J"]),
                              number(r["energy_final_J"]), number(r["energy_error_max_J"], 3)));

@@ -16,7 +16,9 @@ namespace {
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch it");
 
-void on_signal(int) { stop_requested.store(true); }
+void on_signal(int) {
+  stop_requested.store(true);
+}
 
 std::string one_line(std::string_view text) {
   std::string line(text);
@@ -40,9 +42,13 @@ double now_s() {
 
 }  // namespace
 
-void error_line(std::string_view text) { fmt::print(stderr, "hamelin: {}\n", one_line(text)); }
+void error_line(std::string_view text) {
+  fmt::print(stderr, "hamelin: {}\n", one_line(text));
+}
 
-void note(std::string_view text) { fmt::print(stderr, "hamelin: note: {}\n", one_line(text)); }
+void note(std::string_view text) {
+  fmt::print(stderr, "hamelin: note: {}\n", one_line(text));
+}
 
 std::string coloured(std::string_view text, Colour colour) {
   static const bool wanted = wants_colour();

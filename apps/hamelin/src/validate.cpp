@@ -22,7 +22,9 @@ struct ValidateOptions {
   std::optional<double> scale;
 };
 
-std::string robot_words(const model::Robot& robot) { return fmt::format("robot, {} joints", robot.dof()); }
+std::string robot_words(const model::Robot& robot) {
+  return fmt::format("robot, {} joints", robot.dof());
+}
 
 std::string map_words(const scene::MapData& map) {
   return fmt::format("map, resolution {:.4g} m, {} occupied leaves", map.resolution, map.occupied.size());
@@ -33,7 +35,8 @@ std::string check_scene(const std::filesystem::path& file) {
   const scene::Scene scene = scene::read_scene(file);
   std::string words = fmt::format("scene, {}", robot_words(simulation::load_model(scene).robot()));
   if (scene.map)
-    words += fmt::format(", {}", map_words(scene::read_map(scene.map->file, {scene.map->scale, scene.map->occupancy_threshold})));
+    words += fmt::format(
+        ", {}", map_words(scene::read_map(scene.map->file, {scene.map->scale, scene.map->occupancy_threshold})));
   return words;
 }
 
@@ -45,16 +48,22 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       return map_words(map);
     }
     case Kind::urdf:
-    case Kind::robot: return robot_words(model::read_robot(file, {options.tip, {}}));
-    case Kind::scene: return check_scene(file);
-    case Kind::result: check_shipped_schema(read_json(file), "result", file.string()); return "result";
+    case Kind::robot:
+      return robot_words(model::read_robot(file, {options.tip, {}}));
+    case Kind::scene:
+      return check_scene(file);
+    case Kind::result:
+      check_shipped_schema(read_json(file), "result", file.string());
+      return "result";
     case Kind::primitives:
-      return fmt::format("primitives, {} obstacles", scene::make_options_from_json(read_json(file), file.string()).primitives.size());
-    case Kind::spheres: return fmt::format("collision spheres, {}", model::check_spheres(file));
+      return fmt::format("primitives, {} obstacles",
+                         scene::make_options_from_json(read_json(file), file.string()).primitives.size());
+    case Kind::spheres:
+      return fmt::format("collision spheres, {}", model::check_spheres(file));
     case Kind::log: {
       const auto log = log::check_log(file);
-      return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events, log.has_result ? "" : ", no result: unfinished",
-                         log.cut ? ", last line cut" : "");
+      return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,
+                         log.has_result ? "" : ", no result: unfinished", log.cut ? ", last line cut" : "");
     }
   }
   return "";
@@ -76,8 +85,9 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "validate", "Check files: robots, collision spheres, scenes, maps, logs, results; told apart by content",
-                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt");
+  auto* command = add_command(
+      app, "validate", "Check files: robots, collision spheres, scenes, maps, logs, results; told apart by content",
+      "hamelin validate data/scenes/shelf.json data/maps/shelf.bt");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");

@@ -61,7 +61,8 @@ std::string expectation(const nlohmann::json& rule) {
   std::vector<std::string> parts;
   const auto add = [&](const char* key, const char* words) {
     if (rule.contains(key))
-      parts.push_back(fmt::format("{} {}", words, rule[key].is_string() ? rule[key].get<std::string>() : rule[key].dump()));
+      parts.push_back(
+          fmt::format("{} {}", words, rule[key].is_string() ? rule[key].get<std::string>() : rule[key].dump()));
   };
   add("type", "type");
   add("enum", "one of");
@@ -128,7 +129,9 @@ void check_schema(const Json& document, const Json& schema, const std::string& w
   throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, violation(plain_schema, plain, deepest)));
 }
 
-std::string_view schema_text(std::string_view name) { return embedded_schema(fmt::format("{}.schema.json", name)); }
+std::string_view schema_text(std::string_view name) {
+  return embedded_schema(fmt::format("{}.schema.json", name));
+}
 
 void check_shipped_schema(const Json& document, std::string_view schema_name, const std::string& where) {
   const auto text = schema_text(schema_name);

@@ -72,6 +72,16 @@ TEST_CASE("a wrong type or value is shown with what was expected", "[core][unit]
   CHECK_THAT(refusal("[]"), Catch::StartsWith("a.json: /: [] is not allowed, expected type object"));
 }
 
+TEST_CASE("an unknown key is named with its hint where the schema speaks by reference, too", "[core][unit]") {
+  const Json referring = Json::parse(R"({
+    "type": "object",
+    "properties": {"links": {"type": "array", "items": {"$ref": "#/definitions/link"}}},
+    "definitions": {"link": {"type": "object", "additionalProperties": false, "properties": {"mass_kg": {"type": "number"}}}}
+  })");
+  CHECK(refusal(R"({"links": [{"mass_kg": 1}, {"mas_kg": 1}]})", referring) ==
+        "a.json: /links/1: unknown key 'mas_kg', expected 'mass_kg'?");
+}
+
 TEST_CASE("a long value is cut and one with line breaks stays on one line", "[core][unit]") {
   const std::string text =
       refusal(Json{{"name", Json::array({std::string(500, 'x') + "\n"})}, {"arm", {{"file", "f"}}}}.dump());

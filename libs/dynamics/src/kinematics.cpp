@@ -34,13 +34,17 @@ Frame child_frame(const model::PlanarLink& l, const kernel::Planar<double>::Plac
   return out;
 }
 
-const Frame& frame(const Workspace& ws, int link) { return ws.frames[static_cast<std::size_t>(link)]; }
+const Frame& frame(const Workspace& ws, int link) {
+  return ws.frames[static_cast<std::size_t>(link)];
+}
 
 bool slides(const Model& model, int link) {
   return model.robot().links[static_cast<std::size_t>(link)].joint.type == model::JointType::prismatic;
 }
 
-int parent(const Model& model, int link) { return model.robot().links[static_cast<std::size_t>(link)].parent; }
+int parent(const Model& model, int link) {
+  return model.robot().links[static_cast<std::size_t>(link)].parent;
+}
 
 // How joint j moves a world point that it carries.
 Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const Vector3d& point) {

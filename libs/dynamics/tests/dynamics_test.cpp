@@ -22,7 +22,8 @@ struct Dense {
 
   SE3 com_pose(int link, const VectorXd& q) const {
     SE3 g = model.base();
-    for (int j = 0; j <= link; ++j) g = g * SE3::exp(model.robot().links[static_cast<std::size_t>(j)].joint.screw * q[j]);
+    for (int j = 0; j <= link; ++j)
+      g = g * SE3::exp(model.robot().links[static_cast<std::size_t>(j)].joint.screw * q[j]);
     return g * model.robot().links[static_cast<std::size_t>(link)].com;
   }
   MatrixXd mass(const VectorXd& q) const {
@@ -75,7 +76,9 @@ struct Case {
   bool planar;
 };
 
-SE3 a_base() { return SE3::exp((geometry::SE3::Tangent() << 0.3, -0.5, 0.8, 0.2, -0.1, 0.4).finished()); }
+SE3 a_base() {
+  return SE3::exp((geometry::SE3::Tangent() << 0.3, -0.5, 0.8, 0.2, -0.1, 0.4).finished());
+}
 
 }  // namespace
 
@@ -158,8 +161,8 @@ TEST_CASE("kinematics equal the product of exponentials, Jacobians its differenc
     const Matrix3d spin = (gp.R() - gm.R()) / (2.0 * e) * dense.com_pose(link, q).R().transpose();
     CHECK((spin - geometry::hat(Vector3d(J6.col(j).head<3>()))).norm() < 1e-8);
   }
-  CHECK((tip_pose(model, ws).p() - dense.com_pose(c.n - 1, q) *
-                                       (model.robot().links.back().com.inverse() * model.robot().tip.pose.p()))
+  CHECK((tip_pose(model, ws).p() -
+         dense.com_pose(c.n - 1, q) * (model.robot().links.back().com.inverse() * model.robot().tip.pose.p()))
             .norm() < 1e-13);
 }
 

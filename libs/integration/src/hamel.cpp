@@ -18,16 +18,19 @@ Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
   for (auto* x : {&delta_, &correction_, &mid_, &rate_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
 }
 
-std::string Hamel::criterion() const { return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance); }
+std::string Hamel::criterion() const {
+  return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
+}
 
 template <class F>
 decltype(auto) Hamel::with_links(F&& f) {
-  if (model_.planar())
-    return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
+  if (model_.planar()) return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
   return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
 }
 
-void Hamel::begin(State& state, const VectorXd& v0) { set_velocity(state, v0); }
+void Hamel::begin(State& state, const VectorXd& v0) {
+  set_velocity(state, v0);
+}
 
 void Hamel::set_velocity(State& state, const VectorXd& v) {
   state.v = v;
@@ -42,15 +45,17 @@ void Hamel::set_velocity(State& state, const VectorXd& v) {
     for (std::size_t i = 0; i < k.size(); ++i) {
       const auto& l = chain.links[i];
       const auto x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
-      k[i].twist = l.parent < 0 ? Space::zero_motion()
-                                : Space::to_child(l, x, k[static_cast<std::size_t>(l.parent)].twist);
+      k[i].twist =
+          l.parent < 0 ? Space::zero_motion() : Space::to_child(l, x, k[static_cast<std::size_t>(l.parent)].twist);
       Space::add_along_axis(l, k[i].twist, v[static_cast<Eigen::Index>(i)]);
       std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
     }
   });
 }
 
-void Hamel::kick(State& state, const VectorXd& dp) { state.p += dp; }
+void Hamel::kick(State& state, const VectorXd& dp) {
+  state.p += dp;
+}
 
 void Hamel::load(const State& state) {
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
@@ -61,8 +66,8 @@ void Hamel::load(const State& state) {
       std::memcpy(&twist, state.memory.data() + width * i, sizeof(twist));
       k[i].x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
       const auto mu = Space::momentum(l, twist);
-      k[i].before = Space::scaled(
-          Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * state.step_previous)), -1.0);
+      k[i].before =
+          Space::scaled(Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * state.step_previous)), -1.0);
     }
   });
 }
@@ -99,8 +104,8 @@ Energy Hamel::energy(const State& state) {
   mid_ = state.q - 0.5 * delta;
   Energy energy{dynamics::kinetic_energy(model_, ws_, mid_, rate_), 0.0};
   mid_ = state.q - delta;
-  energy.potential_J = 0.5 * (dynamics::potential_energy(model_, ws_, mid_) +
-                              dynamics::potential_energy(model_, ws_, state.q));
+  energy.potential_J =
+      0.5 * (dynamics::potential_energy(model_, ws_, mid_) + dynamics::potential_energy(model_, ws_, state.q));
   return energy;
 }
 

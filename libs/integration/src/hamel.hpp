@@ -5,10 +5,11 @@
 
 namespace hamelin::integration {
 
-/// The published scheme: (9), (13), Algorithm 1 with the feedback (15)–(16); and hamel-midpoint, the same with the twists
-/// (9) transported at θ^k + Δ/2 and α = ½. In impulse form, with h' the step before (0 right after a consistent start,
-/// h after a published one), the equation at node k is
-///   A_i · f_i = 0,  f_i = Adᵀ f_{i+1} + I ξ − I ξ' − (1−α) h adᵀ(ξ) I ξ − α h' adᵀ(ξ') I ξ' + ½(h + h') ∂U − ½h F − ½h' F',
+/// The published scheme: (9), (13), Algorithm 1 with the feedback (15)–(16); and hamel-midpoint, the same with the
+/// twists (9) transported at θ^k + Δ/2 and α = ½. In impulse form, with h' the step before (0 right after a consistent
+/// start, h after a published one), the equation at node k is
+///   A_i · f_i = 0,  f_i = Adᵀ f_{i+1} + I ξ − I ξ' − (1−α) h adᵀ(ξ) I ξ − α h' adᵀ(ξ') I ξ' + ½(h + h') ∂U − ½h F −
+///   ½h' F',
 /// which is h times (13) for equal steps.
 class Hamel final : public Integrator {
  public:
@@ -29,9 +30,9 @@ class Hamel final : public Integrator {
 
   template <class Space>
   struct Link {
-    typename Space::Placement x{};      ///< at θ^k
-    typename Space::Motion twist{};     ///< ξ^{k+α}
-    typename Space::Force before{};     ///< −(I ξ' + α h' adᵀ(ξ') I ξ')
+    typename Space::Placement x{};   ///< at θ^k
+    typename Space::Motion twist{};  ///< ξ^{k+α}
+    typename Space::Force before{};  ///< −(I ξ' + α h' adᵀ(ξ') I ξ')
     typename Space::Force force{};
   };
   template <class Space>

@@ -17,8 +17,7 @@ constexpr int max_newton_updates = 30;  // at the worst contraction, from the la
 
 }  // namespace
 
-Variational::Variational(const Model& model, const Options& options)
-    : Integrator("hamel-variational", model, options) {
+Variational::Variational(const Model& model, const Options& options) : Integrator("hamel-variational", model, options) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::VariationalScratch<dynamics::kernel::Planar<double>>(n);
@@ -33,13 +32,17 @@ std::string Variational::criterion() const {
                                            : fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
 }
 
-void Variational::begin(State& state, const VectorXd& v0) { set_velocity(state, v0); }
+void Variational::begin(State& state, const VectorXd& v0) {
+  set_velocity(state, v0);
+}
 
 void Variational::velocity(const State& state, VectorXd& v) {
   dynamics::solve_mass(model_, ws_, state.q, state.p, v);
 }
 
-void Variational::kick(State& state, const VectorXd& dp) { state.p += dp; }
+void Variational::kick(State& state, const VectorXd& dp) {
+  state.p += dp;
+}
 
 void Variational::set_velocity(State& state, const VectorXd& v) {
   dynamics::momentum(model_, ws_, state.q, v, state.p);
@@ -54,12 +57,24 @@ void Variational::guess(const State& state, double h) {
   }
   const auto& d = state.deltas;
   switch (state.delta_count) {
-    case -1: delta_ = h * state.v; break;
-    case 0: delta_.setZero(); break;
-    case 1: delta_ = d[0]; break;
-    case 2: delta_ = 2.0 * d[0] - d[1]; break;
-    case 3: delta_ = 3.0 * (d[0] - d[1]) + d[2]; break;
-    default: delta_ = 4.0 * (d[0] + d[2]) - 6.0 * d[1] - d[3]; break;
+    case -1:
+      delta_ = h * state.v;
+      break;
+    case 0:
+      delta_.setZero();
+      break;
+    case 1:
+      delta_ = d[0];
+      break;
+    case 2:
+      delta_ = 2.0 * d[0] - d[1];
+      break;
+    case 3:
+      delta_ = 3.0 * (d[0] - d[1]) + d[2];
+      break;
+    default:
+      delta_ = 4.0 * (d[0] + d[2]) - 6.0 * d[1] - d[3];
+      break;
   }
   if (state.delta_count > 0 && state.step_previous != h) delta_ = d[0] * (h / state.step_previous);
 }
@@ -102,7 +117,8 @@ bool Variational::solve_newton(const State& state, const Channels& channels, dou
       correct();
       report.residual = correction_.lpNorm<Eigen::Infinity>();
       if (report.residual <= options_.tolerance) {
-        // The correction is at hand, so Δ takes it; taking R out of p⁺ = p⁻ + h λ·b moves p⁺ along but for its slow part.
+        // The correction is at hand, so Δ takes it; taking R out of p⁺ = p⁻ + h λ·b moves p⁺ along but for its slow
+        // part.
         delta_ += correction_;
         plus_ -= residual_;
         return true;

@@ -51,9 +51,12 @@ struct Reference {
 };
 const std::vector<Reference>& references() {
   static const std::vector<Reference> all{
-      {3, {0.3, -0.25, 0.4}, {-2.34194673151142, 0.223630086085084, 0.160257721060387},
+      {3,
+       {0.3, -0.25, 0.4},
+       {-2.34194673151142, 0.223630086085084, 0.160257721060387},
        {-9.66556564840169, -0.0258096869410843, 18.8108029912881}},
-      {7, {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6},
+      {7,
+       {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6},
        {-1.19333714080065, 0.0531078097491988, 0.226574331425119, 0.0265211887336785, -0.325661532073833,
         0.330097906158339, 1.29168507184085},
        {0.429718920452964, -0.357088757489762, -10.7968666138081, 8.7083051864382, 4.03105633152767, -26.7250837494429,
@@ -61,7 +64,9 @@ const std::vector<Reference>& references() {
   return all;
 }
 
-VectorXd to_vector(const std::vector<double>& x) { return Eigen::Map<const VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())); }
+VectorXd to_vector(const std::vector<double>& x) {
+  return Eigen::Map<const VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
+}
 
 }  // namespace
 
@@ -95,8 +100,7 @@ TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integr
         REQUIRE(report.updates <= 4);
         energy_error = std::max(energy_error, std::abs(integrator->energy(state).total() - energy));
         for (const auto& sample : scheme["samples"])
-          if (sample["k"] == k && k <= 1000)
-            CHECK((state.q - vector_of(sample["q"])).lpNorm<Eigen::Infinity>() < 1e-8);
+          if (sample["k"] == k && k <= 1000) CHECK((state.q - vector_of(sample["q"])).lpNorm<Eigen::Infinity>() < 1e-8);
       }
       CHECK(energy_error == Approx(scheme["max_energy_error_J"].get<double>()).epsilon(1e-4));
       if (name == "hamel-variational") CHECK(energy_error <= 1.8e-4);
@@ -109,8 +113,9 @@ TEST_CASE("observed orders against an independent RK4 reference", "[integration]
     std::string name;
     double order;
   };
-  const auto expected = GENERATE(Expected{"hamel", 1.0}, Expected{"hamel-midpoint", 2.0}, Expected{"hamel-variational", 2.0},
-                                 Expected{"semi-implicit-euler", 1.0}, Expected{"rk4", 4.0});
+  const auto expected =
+      GENERATE(Expected{"hamel", 1.0}, Expected{"hamel-midpoint", 2.0}, Expected{"hamel-variational", 2.0},
+               Expected{"semi-implicit-euler", 1.0}, Expected{"rk4", 4.0});
   for (const auto& reference : references()) {
     CAPTURE(expected.name, reference.n);
     const Model model(test::spatial_chain(reference.n));
@@ -134,9 +139,13 @@ TEST_CASE("the published start costs hamel-midpoint its second order", "[integra
   options.start = Start::published;
   std::vector<double> errors;
   for (const int steps : {500, 1000, 2000})
-    errors.push_back((run(*make_integrator("hamel-midpoint", model, options), to_vector(reference.q0), VectorXd::Zero(3),
-                          0.5 / steps, steps).state.q - to_vector(reference.q)).norm());
-  for (std::size_t i = 1; i < errors.size(); ++i) CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(1.0).margin(0.1));
+    errors.push_back((run(*make_integrator("hamel-midpoint", model, options), to_vector(reference.q0),
+                          VectorXd::Zero(3), 0.5 / steps, steps)
+                          .state.q -
+                      to_vector(reference.q))
+                         .norm());
+  for (std::size_t i = 1; i < errors.size(); ++i)
+    CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(1.0).margin(0.1));
 }
 
 TEST_CASE("Newton needs at most three solves a step on chains of 3 to 200 links at 1 ms", "[integration][newton]") {
@@ -151,7 +160,8 @@ TEST_CASE("Newton needs at most three solves a step on chains of 3 to 200 links 
 
 TEST_CASE("one variational step solves the discrete Euler-Lagrange equation made of kinetic and potential energy",
           "[integration][property]") {
-  // Independent of the recursion: L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] by its values, p_k = −D₁L_d by differences.
+  // Independent of the recursion: L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] by its values, p_k = −D₁L_d by
+  // differences.
   struct Case {
     std::uint64_t seed;
     int n, prismatic_every;
@@ -192,7 +202,8 @@ TEST_CASE("all integrators come to the same motion under damping, held torque an
   channels.damping = VectorXd::Constant(4, 0.3);
   channels.held_torque = test::random_joints(rng, 4, 2.0);
   const Eigen::Vector3d normal = model.robot().links[0].joint.screw.head<3>();
-  channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal}, {3, test::random_vector(rng, 0.2), -1.0 * normal}};
+  channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal},
+                         {3, test::random_vector(rng, 0.2), -1.0 * normal}};
   const auto truth = run(*make_integrator("rk4", model), q0, v0, 0.5 / 4000, 4000, channels).state;
   for (const auto& name : integrator_names()) {
     if (name == "rk4") continue;
@@ -236,7 +247,8 @@ TEST_CASE("the booked work closes the energy account of the variational step", "
 }
 
 TEST_CASE("node impulses add momentum, node velocities replace it", "[integration][channels]") {
-  const auto name = GENERATE(as<std::string>{}, "hamel", "hamel-midpoint", "hamel-variational", "semi-implicit-euler", "rk4");
+  const auto name =
+      GENERATE(as<std::string>{}, "hamel", "hamel-midpoint", "hamel-variational", "semi-implicit-euler", "rk4");
   CAPTURE(name);
   const Model model(test::random_robot(9, 4));
   dynamics::Workspace ws(model);

@@ -19,7 +19,9 @@ constexpr double parallel_sine = 1e-14;
 // Below this a chain's axes count as parallel for the choice of SE(2): rounding in files is larger than in doubles.
 constexpr double planar_sine = 1e-9;
 
-Vec3<double> small(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Vec3<double> small(const Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
 
 Vector3d axis_of(const Joint& joint) {
   return joint.type == JointType::revolute ? joint.screw.head<3>() : joint.screw.tail<3>();
@@ -98,7 +100,8 @@ std::vector<SE3> spatial_frames(const Robot& robot) {
   return frames;
 }
 
-SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base, const Vector3d& gravity) {
+SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base,
+                           const Vector3d& gravity) {
   SpatialChain chain;
   chain.root = base * frames[0];
   chain.gravity = small(chain.root.R().transpose() * gravity);

@@ -122,7 +122,8 @@ TEST_CASE("what no arm can be is refused with one line", "[model][input]") {
       {"negative mass", [](model::Robot& r) { r.links[1].mass_kg = -1.0; }, "mass"},
       {"NaN inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(0, 0) = std::nan(""); }, "link1"},
       {"indefinite inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(1, 1) = -0.1; }, "inertia"},
-      {"triangle", [](model::Robot& r) { r.links[1].inertia_kg_m2 = Eigen::Vector3d(1.0, 0.1, 0.1).asDiagonal(); }, "inertia"},
+      {"triangle", [](model::Robot& r) { r.links[1].inertia_kg_m2 = Eigen::Vector3d(1.0, 0.1, 0.1).asDiagonal(); },
+       "inertia"},
       {"zero axis", [](model::Robot& r) { r.links[1].joint.screw.setZero(); }, "joint1"},
       {"crossed limits", [](model::Robot& r) { r.links[1].joint.lower = 1.0, r.links[1].joint.upper = -1.0; }, "limit"},
   };

@@ -212,7 +212,7 @@ TEST_CASE("bad scenes are refused in one line that names file, place and what wa
   }
 }
 
-TEST_CASE("--set changes what the schema knows and nothing else", "[scene][unit]") {
+TEST_CASE("set_pointer changes what the schema knows and nothing else", "[scene][unit]") {
   Json document = full_document();
   set_pointer(document, "/step_s=0.002");
   set_pointer(document, "/map/unknown=slow");
@@ -233,7 +233,7 @@ TEST_CASE("--set changes what the schema knows and nothing else", "[scene][unit]
   CHECK(scene_from_json(bare, ".", "x.json").planner->name == "apf");
 }
 
-TEST_CASE("--set refuses in one line and leaves the document alone", "[scene][unit]") {
+TEST_CASE("set_pointer refuses in one line and leaves the document alone", "[scene][unit]") {
   const std::vector<std::pair<std::string, std::string>> cases{{"/stepp_s=1", "'step_s'"},
                                                                {"/map/unknwon=free", "'unknown'"},
                                                                {"/goals/7/q=[1]", "no element '7'"},

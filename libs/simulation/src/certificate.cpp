@@ -31,20 +31,20 @@ Certificate::Certificate(const model::Model& model, const scene::Environment& en
     radii_.push_back(sphere.radius);
     double length = sphere.center.norm();
     for (int j = sphere.link; j >= 0; --j) {
-      const bool slides =
-          model.robot().links[static_cast<std::size_t>(j)].joint.type == model::JointType::prismatic;
+      const bool slides = model.robot().links[static_cast<std::size_t>(j)].joint.type == model::JointType::prismatic;
       lever_(static_cast<Eigen::Index>(s), j) = slides ? 1.0 : length;
       length += hop[static_cast<std::size_t>(j)];
     }
   }
   for (const auto& obstacle : environment.obstacles())
     if (obstacle.motion)
-      obstacle_speed_ = std::max(obstacle_speed_, 2.0 * std::numbers::pi * obstacle.motion->amplitude_m.norm() /
-                                                      obstacle.motion->period_s);
+      obstacle_speed_ = std::max(
+          obstacle_speed_, 2.0 * std::numbers::pi * obstacle.motion->amplitude_m.norm() / obstacle.motion->period_s);
 }
 
-Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& q_next,
-                                        const Eigen::VectorXd& v, const Eigen::VectorXd& v_next, double time_s, double h,
+Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                                        const Eigen::VectorXd& q_next, const Eigen::VectorXd& v,
+                                        const Eigen::VectorXd& v_next, double time_s, double h,
                                         std::span<const double> from, std::span<const double> to) {
   Verdict verdict;
   verdict.margin_m = limit_;

@@ -19,8 +19,8 @@ class Certificate {
 
   struct Verdict {
     bool certified = true;
-    double margin_m = 0.0;   ///< the smallest (d + d' − L)/2 met, or the clearance of the contact
-    bool contact = false;    ///< a sub-check met a clearance of zero or below
+    double margin_m = 0.0;  ///< the smallest (d + d' − L)/2 met, or the clearance of the contact
+    bool contact = false;   ///< a sub-check met a clearance of zero or below
   };
 
   /// @param from, to clearances of all spheres at both nodes, capped at the limit
@@ -42,10 +42,10 @@ class Certificate {
   const model::Model& model_;
   const scene::Environment& environment_;
   double limit_;
-  bool contact_ = false;             ///< whether the bisections of this check met contact
-  double obstacle_speed_ = 0.0;      ///< no obstacle is faster [m/s]
-  Eigen::MatrixXd lever_;            ///< spheres × dof: how far joint j moves sphere s at most [m/rad or 1]
-  Eigen::VectorXd travel_;           ///< joint displacements of one step, straying included
+  bool contact_ = false;         ///< whether the bisections of this check met contact
+  double obstacle_speed_ = 0.0;  ///< no obstacle is faster [m/s]
+  Eigen::MatrixXd lever_;        ///< spheres × dof: how far joint j moves sphere s at most [m/rad or 1]
+  Eigen::VectorXd travel_;       ///< joint displacements of one step, straying included
   Eigen::VectorXd between_;
   std::vector<Eigen::Vector3d> centers_;
   std::vector<double> radii_;

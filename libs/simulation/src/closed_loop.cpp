@@ -40,15 +40,27 @@ model::Model scaled_masses(const model::Model& plant, double scale) {
 
 planning::Plugin plugin_of(const scene::Scene& scene, const std::vector<std::filesystem::path>& directories) {
   if (!scene.planner)
-    throw Error(ErrorCode::invalid, fmt::format("{}: /planner: is missing, expected the name of a planner", scene.name));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /planner: is missing, expected the name of a planner", scene.name));
   return planning::find_plugin(scene.planner->name, directories);
 }
 
 long whole_multiple(double value, double unit, const std::string& where, const char* what) {
   const double count = std::round(value / unit);
   if (std::abs(value / unit - count) > 1e-9 * std::max(1.0, count))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /actuation/{}: {} s is no whole number of {} s", where, what, value, unit));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /actuation/{}: {} s is no whole number of {} s", where, what, value, unit));
   return static_cast<long>(count);
+}
+
+// What another library refuses, with the scene's name in front.
+template <class F>
+auto in_scene(const scene::Scene& scene, const char* place, F&& f) {
+  try {
+    return f();
+  } catch (const Error& e) {
+    throw Error(e.code(), fmt::format("{}: {}: {}", scene.name, place, e.what()));
+  }
 }
 
 double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
@@ -67,16 +79,18 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
       planner_([&] {
         check_scene();
         const planning::Plugin plugin = plugin_of(scene, plugin_directories);
-        planner_params_ = planning::check_params(plugin, scene.planner->params);
+        planner_params_ =
+            in_scene(scene, "/planner/params", [&] { return planning::check_params(plugin, scene.planner->params); });
         influence_ = plugin.influence_m(planner_params_).value_or(default_influence_m);
-        steps_ = step_count(scene.duration_s, scene.step_s);
+        steps_ = in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
 
         const auto n = plant_.dof();
         const auto spheres = plant_.spheres().size();
         environment_ = std::make_unique<scene::Environment>(scene::make_environment(scene, plant_.reach(), influence_));
         if (environment_->has_obstacles() && spheres == 0)
-          throw Error(ErrorCode::invalid, fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
-                                                      scene.name, plant_.robot().name));
+          throw Error(ErrorCode::invalid,
+                      fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
+                                  scene.name, plant_.robot().name));
         scratch_ = std::make_unique<scene::Environment::Scratch>(*environment_, spheres);
         certificate_ = std::make_unique<Certificate>(plant_, *environment_, influence_);
         for (const auto& obstacle : environment_->obstacles())
@@ -97,8 +111,10 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         channels_.damping = VectorXd::Zero(n);
         channels_.gyroscopic.reserve(shown_.size());
         if (scene.actuation.type == scene::ActuationType::sampled) {
-          control_steps_ = std::max(1L, whole_multiple(scene.actuation.control_period_s, scene.step_s, scene.name, "control_period_s"));
-          delay_periods_ = whole_multiple(scene.actuation.delay_s, scene.actuation.control_period_s, scene.name, "delay_s");
+          control_steps_ = std::max(
+              1L, whole_multiple(scene.actuation.control_period_s, scene.step_s, scene.name, "control_period_s"));
+          delay_periods_ =
+              whole_multiple(scene.actuation.delay_s, scene.actuation.control_period_s, scene.name, "delay_s");
           delayed_.assign(static_cast<std::size_t>(delay_periods_) + 1, VectorXd::Zero(n));
         }
         const double mass_scale = scene.actuation.planner_mass_scale;
@@ -115,8 +131,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
 void ClosedLoop::check_scene() const {
   const auto sized = [&](const VectorXd& x, const std::string& place) {
     if (x.size() != plant_.dof())
-      throw Error(ErrorCode::invalid, fmt::format("{}: {}: {} numbers given, expected {}, one a joint of '{}'", scene_.name,
-                                                  place, x.size(), plant_.dof(), plant_.robot().name));
+      throw Error(ErrorCode::invalid, fmt::format("{}: {}: {} numbers given, expected {}, one a joint of '{}'",
+                                                  scene_.name, place, x.size(), plant_.dof(), plant_.robot().name));
   };
   if (scene_.start_q.size() > 0) sized(scene_.start_q, "/start/q");
   if (scene_.start_v.size() > 0) sized(scene_.start_v, "/start/v");
@@ -129,8 +145,8 @@ void ClosedLoop::check_scene() const {
                 fmt::format("{}: /model/self_collision: is not modelled in this version, expected false", scene_.name));
   const auto& damping = scene_.model.joint_damping.values;
   if (damping.size() > 1 && damping.size() != static_cast<std::size_t>(plant_.dof()))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}", scene_.name,
-                                                damping.size(), plant_.dof()));
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
+                                                scene_.name, damping.size(), plant_.dof()));
 }
 
 planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double influence) const {
@@ -178,8 +194,8 @@ std::size_t ClosedLoop::closest_points(std::span<const double> q, double influen
   q_shown_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
   dynamics::forward_kinematics(plant_, ws_, q_shown_);
   dynamics::sphere_centers(plant_, ws_, centers_);
-  const std::size_t found = environment_->closest(centers_, radii_, std::min(influence_m, influence_), state_.time_s,
-                                                  *scratch_, contacts_);
+  const std::size_t found =
+      environment_->closest(centers_, radii_, std::min(influence_m, influence_), state_.time_s, *scratch_, contacts_);
   const std::size_t written = std::min({found, contacts_.size(), out.size()});
   for (std::size_t i = 0; i < written; ++i) out[i] = to_c(contacts_[i]);
   return found;
@@ -193,8 +209,7 @@ void ClosedLoop::look(const VectorXd& q) {
   speed_scale_ = 1.0;
   if (!environment_->has_obstacles()) return;
   dynamics::sphere_centers(plant_, ws_, centers_);
-  const std::size_t found =
-      environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_, contacts_);
+  const std::size_t found = environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_, contacts_);
   contact_count_ = std::min(found, contacts_.size());
   for (std::size_t i = 0; i < contact_count_; ++i) shown_[i] = to_c(contacts_[i]);
   std::size_t judged = contact_count_;
@@ -261,7 +276,8 @@ bool ClosedLoop::all_reached() {
   return goal_index_ == scene_.goals.size();
 }
 
-// The host's own stall rule: the tip at rest, away from a goal that has a place for it, or joints at rest away from theirs.
+// The host's own stall rule: the tip at rest, away from a goal that has a place for it, or joints at rest away from
+// theirs.
 bool ClosedLoop::at_rest_away_from_goal() {
   if (!scene_.stall) return false;
   const auto& rule = *scene_.stall;
@@ -282,10 +298,11 @@ void ClosedLoop::finish(log::Outcome outcome, std::string cause) {
 
 std::string ClosedLoop::where_nearest() const {
   const auto& sphere = plant_.spheres()[static_cast<std::size_t>(nearest_sphere_)];
-  const std::string what = nearest_obstacle_ == scene::Contact::map ? "the map"
-                           : nearest_obstacle_ == scene::Contact::unknown
-                               ? "unknown space"
-                               : fmt::format("obstacle '{}'", environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name);
+  const std::string what =
+      nearest_obstacle_ == scene::Contact::map ? "the map"
+      : nearest_obstacle_ == scene::Contact::unknown
+          ? "unknown space"
+          : fmt::format("obstacle '{}'", environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name);
   return fmt::format("sphere {} of link '{}' is {:.2g} mm inside {}", sphere.index_in_link,
                      plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_, what);
 }
@@ -295,8 +312,10 @@ bool ClosedLoop::ask_planner(long k) {
   v_shown_ = v_;
   if (scene_.actuation.joint_noise_rad > 0.0 && scene_.actuation.type == scene::ActuationType::sampled)
     for (auto& angle : q_shown_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(k), state_.time_s, q_shown_.data(),
-                          v_shown_.data(),      shown_.data(),                 contact_count_, goal_index_,
+  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(k),
+                          state_.time_s,        q_shown_.data(),
+                          v_shown_.data(),      shown_.data(),
+                          contact_count_,       goal_index_,
                           speed_scale_};
   if (!planner_.tick(tick, *command_)) {
     finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name, k, planner_.error()));
@@ -351,8 +370,7 @@ void ClosedLoop::actuate() {
 
   if (command_->raw().has_node_velocity != 0) {
     integrator_->set_velocity(state_, command_->node_velocity());
-    ledger_.node +=
-        dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - energy.kinetic_J;
+    ledger_.node += dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - energy.kinetic_J;
     ledger_.filter += command_->raw().filter_work_J;
     ledger_.recovery += command_->raw().recovery_work_J;
   }
@@ -567,7 +585,8 @@ void ClosedLoop::fill_result() {
     result_.certified_share = static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
   for (const auto& warning : environment_->summary().warnings) result_.warnings.push_back(warning);
   if (saturated_ticks_ > 0)
-    result_.warnings.push_back(fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_ticks_, state_.k));
+    result_.warnings.push_back(
+        fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_ticks_, state_.k));
   result_.provenance = log::provenance(inputs_);
 }
 

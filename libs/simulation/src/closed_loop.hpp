@@ -83,7 +83,7 @@ class ClosedLoop final : private planning::HostServices {
   integration::StepReport report_;
   Eigen::VectorXd v_, q_before_, v_before_, gradient_, gradient_before_, impulse_, limits_;
   std::vector<Eigen::VectorXd> delayed_;
-  bool kicked_ = false;            ///< a closing half-kick is owed
+  bool kicked_ = false;  ///< a closing half-kick is owed
   double speed_scale_ = 1.0;
 
   // surroundings at this node

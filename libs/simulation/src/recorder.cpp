@@ -78,10 +78,10 @@ Json to_json(const Eigen::VectorXd& x) {
 }
 
 Json energy_json(const Ledger& ledger) {
-  return {{"kinetic_J", ledger.kinetic},         {"potential_J", ledger.potential},
-          {"control_J", ledger.control},         {"gyroscopic_work_J", ledger.gyroscopic},
-          {"filter_work_J", ledger.filter},      {"recovery_work_J", ledger.recovery},
-          {"dissipated_J", ledger.dissipated},   {"held_work_J", ledger.held},
+  return {{"kinetic_J", ledger.kinetic},       {"potential_J", ledger.potential},
+          {"control_J", ledger.control},       {"gyroscopic_work_J", ledger.gyroscopic},
+          {"filter_work_J", ledger.filter},    {"recovery_work_J", ledger.recovery},
+          {"dissipated_J", ledger.dissipated}, {"held_work_J", ledger.held},
           {"node_work_J", ledger.node}};
 }
 
@@ -95,11 +95,11 @@ long step_count(double duration_s, double step_s) {
   if (!(step_s > 0.0) || !(duration_s > 0.0) || !std::isfinite(steps))
     throw Error(ErrorCode::usage,
                 fmt::format("step {} s and duration {} s: both must be positive and finite", step_s, duration_s));
-  if (whole > 1e10) throw Error(ErrorCode::usage, fmt::format("{:.3g} steps are too many, expected at most 1e10", whole));
+  if (whole > 1e10)
+    throw Error(ErrorCode::usage, fmt::format("{:.3g} steps are too many, expected at most 1e10", whole));
   if (std::abs(steps - whole) > 1e-9 * std::max(1.0, whole) || whole < 1.0)
-    throw Error(ErrorCode::usage,
-                fmt::format("duration {} s is no whole number of steps of {} s (it is {} of them)", duration_s, step_s,
-                            steps));
+    throw Error(ErrorCode::usage, fmt::format("duration {} s is no whole number of steps of {} s (it is {} of them)",
+                                              duration_s, step_s, steps));
   return static_cast<long>(whole);
 }
 

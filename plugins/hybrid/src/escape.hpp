@@ -68,9 +68,9 @@ class Escape {
 
   Rng rng_;
   Eigen::VectorXd lower_, upper_, weights_, via_;
-  Eigen::MatrixXd drawn_;       ///< one column a candidate
+  Eigen::MatrixXd drawn_;  ///< one column a candidate
   Eigen::VectorXd scores_;
-  Eigen::MatrixXd crumb_;       ///< where it stalled, and where it went from there
+  Eigen::MatrixXd crumb_;  ///< where it stalled, and where it went from there
   int crumbs_ = 0, count_ = 0;
 };
 

@@ -37,9 +37,10 @@ VectorXd lever_weights(const model::Model& model) {
   dynamics::forward_kinematics(model, ws, VectorXd::Zero(n));
   VectorXd lever = VectorXd::Zero(n);
   for (int j = n - 1; j >= 0; --j) {
-    double beyond = j + 1 < n ? lever[j + 1] + (ws.frames[static_cast<std::size_t>(j) + 1].p -
-                                                ws.frames[static_cast<std::size_t>(j)].p).norm()
-                              : (dynamics::tip_pose(model, ws).p() - ws.frames[static_cast<std::size_t>(j)].p).norm();
+    double beyond =
+        j + 1 < n ? lever[j + 1] +
+                        (ws.frames[static_cast<std::size_t>(j) + 1].p - ws.frames[static_cast<std::size_t>(j)].p).norm()
+                  : (dynamics::tip_pose(model, ws).p() - ws.frames[static_cast<std::size_t>(j)].p).norm();
     for (const auto& sphere : model.spheres())
       if (sphere.link == j) beyond = std::max(beyond, sphere.center.norm());
     lever[j] = beyond;
@@ -96,8 +97,8 @@ class Hybrid final : public planning::Planner {
     law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
     // steering turns faster than the law follows: near a joint target it would make the arm circle
     const bool joint_target = target.via != nullptr || goal.type == HAMELIN_GOAL_JOINT;
-    law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, joint_target ? std::min(1.0, distance / steering_fade) : 1.0,
-               command);
+    law_.steer(model_, ws_, obstacles_.points(), Minv_, v_,
+               joint_target ? std::min(1.0, distance / steering_fade) : 1.0, command);
 
     // the law's velocity one period on, of bounded acceleration
     const double dt = setup_.control_period_s();
@@ -118,8 +119,8 @@ class Hybrid final : public planning::Planner {
     stall_.restart(time_s);
     std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), contact_radius_);
     if (goal.type != HAMELIN_GOAL_JOINT) return;
-    const std::size_t found = host_.closest_points({goal.q, static_cast<std::size_t>(setup_.dof())}, contact_radius_,
-                                                   contacts_at_);
+    const std::size_t found =
+        host_.closest_points({goal.q, static_cast<std::size_t>(setup_.dof())}, contact_radius_, contacts_at_);
     for (std::size_t i = 0; i < std::min(found, contacts_at_.size()); ++i) {
       auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contacts_at_[i].sphere)];
       clearance = std::min(clearance, contacts_at_[i].distance_m);
@@ -174,9 +175,8 @@ class Hybrid final : public planning::Planner {
     for (const auto& point : obstacles_.points()) {
       const double x = point.distance - point.margin;
       const double b = point.obstacle_speed - (x > 0.0 ? approach_limit(x, braking(point.row)) : rate_ * x);
-      const double floor = point.obstacle_speed == 0.0
-                               ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
-                               : std::numeric_limits<double>::infinity();
+      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
+                                                       : std::numeric_limits<double>::infinity();
       (void)filter_.add_row(point.row, b, floor);
     }
     const auto velocity_max = setup_.velocity_max();
@@ -299,6 +299,7 @@ class Hybrid final : public planning::Planner {
 }  // namespace
 }  // namespace hamelin::hybrid
 
-HAMELIN_PLANNER_PLUGIN(hamelin::hybrid::Hybrid, "hybrid", "0.1.0",
-                       "attraction, energy-neutral steering and short repulsion under a safety filter, with escape from stalls",
-                       params_schema);
+HAMELIN_PLANNER_PLUGIN(
+    hamelin::hybrid::Hybrid, "hybrid", "0.1.0",
+    "attraction, energy-neutral steering and short repulsion under a safety filter, with escape from stalls",
+    params_schema);

@@ -27,8 +27,8 @@ Law::Law(const planning::Setup& setup, const model::Model& model, const LawParam
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
 
-void Law::task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal, Vector3d& position,
-                     Vector3d& rotation) const {
+void Law::task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal,
+                     Vector3d& position, Vector3d& rotation) const {
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
   position = planning::vec3(goal.position_world_m) - tip.p();
   rotation.setZero();
@@ -47,8 +47,8 @@ double Law::distance(const model::Model& model, const dynamics::Workspace& ws, c
   return 2.0 * position.norm() + 0.5 * rotation.norm();
 }
 
-void Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Target& target,
-                  Eigen::VectorXd& u) {
+void Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                  const Target& target, Eigen::VectorXd& u) {
   if (target.via != nullptr || target.goal->type == HAMELIN_GOAL_JOINT) {
     if (target.via != nullptr)
       u = *target.via - q;
@@ -90,7 +90,8 @@ void Law::repel(std::span<const NearPoint> points, double strength, Eigen::Vecto
     const double h = std::max(point.distance - point.margin, 0.0);
     if (h >= params_.repulsion_range) continue;
     u += (strength * params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
-          std::max(0.05, point.row.squaredNorm())) * point.row;
+          std::max(0.05, point.row.squaredNorm())) *
+         point.row;
   }
 }
 

@@ -10,11 +10,11 @@ namespace hamelin::hybrid {
 /// One near obstacle point as the law and the filter use it.
 struct NearPoint {
   int sphere = 0, link = 0;
-  double distance = 0.0;         ///< [m]
-  double margin = 0.0;           ///< wanted here [m]
-  double obstacle_speed = 0.0;   ///< n · v_obs: the obstacle comes this fast [m/s]
+  double distance = 0.0;                 ///< [m]
+  double margin = 0.0;                   ///< wanted here [m]
+  double obstacle_speed = 0.0;           ///< n · v_obs: the obstacle comes this fast [m/s]
   Eigen::Vector3d arm_point, direction;  ///< world; direction from the obstacle to the arm
-  Eigen::VectorXd row;           ///< a = Jᵀ n: a · v is the rate of the distance but for the obstacle's own motion
+  Eigen::VectorXd row;  ///< a = Jᵀ n: a · v is the rate of the distance but for the obstacle's own motion
 };
 
 /// The contacts that count in a tick, bounded in number: of each link the nearest few with each obstacle.

@@ -6,8 +6,8 @@ namespace hamelin::hybrid {
 
 /// The nearest admissible velocity in the metric of kinetic energy:
 ///   x = argmin ½ (x − ũ)ᵀ M (x − ũ)  subject to rows a_i · x ≥ b_i, a box on x, a box on the momentum M x,
-/// by Hildreth's dual Gauss–Seidel: each row in turn moves x along M⁻¹ a_i until it holds, never giving back more than it
-/// took. The dual starts at zero and only rises, so after any number of passes
+/// by Hildreth's dual Gauss–Seidel: each row in turn moves x along M⁻¹ a_i until it holds, never giving back more than
+/// it took. The dual starts at zero and only rises, so after any number of passes
 ///   ½ xᵀMx ≤ ½ ũᵀMũ + Σ λ_i b_i,
 /// and where no right-hand side is positive the filter cannot add kinetic energy. What rows with b_i > 0 (that demand
 /// motion) add is at most λ_i b_i, and is accounted for apart.

@@ -7,10 +7,10 @@
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/allocations.hpp"
 
-using hamelin::Rng;
-using hamelin::hybrid::SafetyFilter;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using hamelin::Rng;
+using hamelin::hybrid::SafetyFilter;
 
 namespace {
 
@@ -80,7 +80,8 @@ TEST_CASE("the filter finds the nearest admissible velocity in the kinetic metri
   CHECK(report.recovery_J == 0.0);
 }
 
-TEST_CASE("kinetic energy never rises where standing still is admitted, after any number of passes", "[hybrid][property]") {
+TEST_CASE("kinetic energy never rises where standing still is admitted, after any number of passes",
+          "[hybrid][property]") {
   const int passes = GENERATE(1, 2, 5, 12);
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
     Rng rng(seed);
@@ -88,10 +89,12 @@ TEST_CASE("kinetic energy never rises where standing still is admitted, after an
     const MatrixXd M = random_mass(rng, n), W = M.inverse();
     SafetyFilter filter(n, 32);
     filter.begin(M, W);
-    for (int i = 0; i < m; ++i) (void)filter.add_row(random_vector(rng, n), -rng.uniform(0.0, 1.0), -rng.uniform(0.0, 0.5));
+    for (int i = 0; i < m; ++i)
+      (void)filter.add_row(random_vector(rng, n), -rng.uniform(0.0, 1.0), -rng.uniform(0.0, 0.5));
     filter.set_box(VectorXd::Constant(n, -rng.uniform(0.0, 2.0)), VectorXd::Constant(n, rng.uniform(0.0, 2.0)));
     if (seed % 2 == 0)
-      filter.set_momentum_box(VectorXd::Constant(n, -rng.uniform(0.0, 2.0)), VectorXd::Constant(n, rng.uniform(0.0, 2.0)));
+      filter.set_momentum_box(VectorXd::Constant(n, -rng.uniform(0.0, 2.0)),
+                              VectorXd::Constant(n, rng.uniform(0.0, 2.0)));
     VectorXd x = random_vector(rng, n, 3.0);
     const auto report = filter.project(x, passes);
     CAPTURE(seed, passes);

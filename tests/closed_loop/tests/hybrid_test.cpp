@@ -16,7 +16,8 @@ log::Result run(const std::string& name, const std::vector<std::string>& setting
 
 }  // namespace
 
-TEST_CASE("hybrid reaches the goals in shelf and clutter, clear and certified, with its accounts in order", "[hybrid][closed_loop]") {
+TEST_CASE("hybrid reaches the goals in shelf and clutter, clear and certified, with its accounts in order",
+          "[hybrid][closed_loop]") {
   const auto scene = GENERATE(as<std::string>{}, "shelf.json", "clutter.json");
   CAPTURE(scene);
   const auto result = run(scene);
@@ -43,8 +44,8 @@ TEST_CASE("hybrid gives up with a cause where it has no escape", "[hybrid][close
 }
 
 TEST_CASE("hybrid keeps clear with other seeds, integrators and steps", "[hybrid][closed_loop]") {
-  const auto setting = GENERATE(as<std::string>{}, "/seed=2", "/step_s=0.002", "/integrator/name=rk4", "/integrator/name=semi-implicit-euler",
-                                "/integrator/name=hamel-midpoint");
+  const auto setting = GENERATE(as<std::string>{}, "/seed=2", "/step_s=0.002", "/integrator/name=rk4",
+                                "/integrator/name=semi-implicit-euler", "/integrator/name=hamel-midpoint");
   CAPTURE(setting);
   const auto result = run("shelf.json", {setting});
   CHECK(result.outcome == log::Outcome::reached);

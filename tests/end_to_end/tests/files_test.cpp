@@ -29,11 +29,26 @@ TEST_CASE("the maps of data/ are what scene make builds of their primitives, byt
   }
 }
 
+TEST_CASE("schema print gives the schemas as shipped", "[end_to_end]") {
+  Bench bench;
+  int printed = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(HAMELIN_SOURCE_DIR) / "docs" / "schema")) {
+    const std::string file = entry.path().filename().string(), name = file.substr(0, file.find('.'));
+    CAPTURE(name);
+    const auto output = bench.run({"schema", "print", name});
+    CHECK(output.exit_code == 0);
+    CHECK(parse_json(output.out, "standard output") == read_json(entry.path()));
+    ++printed;
+  }
+  CHECK(printed >= 6);
+}
+
 TEST_CASE("clutter follows its seed", "[end_to_end]") {
   Bench bench;
   const auto make = [&](const std::string& seed, const std::string& file) {
-    REQUIRE(bench.run({"scene", "make", "--clutter", "6", "--seed", seed, "--resolution", "0.05", "-o", file})
-                .exit_code == 0);
+    REQUIRE(
+        bench.run({"scene", "make", "--clutter", "6", "--seed", seed, "--resolution", "0.05", "-o", file}).exit_code ==
+        0);
     return bench.text(file);
   };
   const std::string first = make("7", "a.bt");

@@ -10,20 +10,20 @@ namespace hamelin::integration::kernel {
 template <class Space>
 struct VariationalLink {
   typename Space::Placement x{};
-  typename Space::Motion carried{};   ///< X_i = Ad(g⁻¹) ξ_{i−1}
-  typename Space::Motion b{};         ///< b_i = ad(X_i) A_i
-  typename Space::Motion twist{};     ///< ξ_i
-  typename Space::Motion step{};      ///< δξ_i
-  typename Space::Force lambda{};     ///< λ_i
+  typename Space::Motion carried{};  ///< X_i = Ad(g⁻¹) ξ_{i−1}
+  typename Space::Motion b{};        ///< b_i = ad(X_i) A_i
+  typename Space::Motion twist{};    ///< ξ_i
+  typename Space::Motion step{};     ///< δξ_i
+  typename Space::Force lambda{};    ///< λ_i
 
   // Factors of the linearisation, kept while momenta() moves on.
   typename Space::Placement x_kept{};
-  typename Space::Motion a{}, B{};    ///< a_i, B_i
-  typename Space::Force w{}, u{};     ///< w_i, u_i
-  typename Space::Operator P{};       ///< δλ_i = P_i δξ_i + s_i
+  typename Space::Motion a{}, B{};  ///< a_i, B_i
+  typename Space::Force w{}, u{};   ///< w_i, u_i
+  typename Space::Operator P{};     ///< δλ_i = P_i δξ_i + s_i
   typename Space::Scalar inv_d{};
 
-  typename Space::Force s{};          ///< s_i of the current right-hand side
+  typename Space::Force s{};  ///< s_i of the current right-hand side
   typename Space::Scalar r{};
 };
 
@@ -38,8 +38,8 @@ void momenta(const typename Space::Chain& chain, VariationalScratch<Space>& k, c
     const auto& l = chain.links[i];
     auto& link = k[i];
     link.x = Space::place(l, mid[i]);
-    link.carried = l.parent < 0 ? Space::zero_motion()
-                                : Space::to_child(l, link.x, k[static_cast<std::size_t>(l.parent)].twist);
+    link.carried =
+        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, link.x, k[static_cast<std::size_t>(l.parent)].twist);
     link.b = Space::ad(link.carried, Space::axis(l));
     link.twist = link.carried;
     Space::add_along_axis(l, link.twist, rate[i]);
@@ -60,7 +60,8 @@ void momenta(const typename Space::Chain& chain, VariationalScratch<Space>& k, c
 /// Factors the linearisation at the point of the last momenta(): eliminates from the tip with δλ_i = P_i δξ_i + s_i.
 /// `damping` (null = none) adds D_i/2 to the pivots. False where a pivot vanishes.
 template <class Space>
-bool factor(const typename Space::Chain& chain, VariationalScratch<Space>& k, double h, const double* damping) noexcept {
+bool factor(const typename Space::Chain& chain, VariationalScratch<Space>& k, double h,
+            const double* damping) noexcept {
   const double half = 0.5 * h;
   for (std::size_t i = 0; i < k.size(); ++i) k[i].P = Space::general(Space::rigid(chain.links[i]));
   for (std::size_t i = k.size(); i-- > 0;) {

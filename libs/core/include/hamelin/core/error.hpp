@@ -8,11 +8,11 @@ namespace hamelin {
 
 /// What kind of thing went wrong. The program maps every one of them to exit code 2.
 enum class ErrorCode : std::int32_t {
-  usage,       ///< the caller asked for something that makes no sense
-  io,          ///< a file that cannot be read or written
-  parse,       ///< a file that is not what its format promises
-  invalid,     ///< well-formed input whose content is not acceptable
-  plugin,      ///< a plugin that cannot be loaded or refuses its parameters
+  usage,    ///< the caller asked for something that makes no sense
+  io,       ///< a file that cannot be read or written
+  parse,    ///< a file that is not what its format promises
+  invalid,  ///< well-formed input whose content is not acceptable
+  plugin,   ///< a plugin that cannot be loaded or refuses its parameters
 };
 
 [[nodiscard]] std::string_view to_string(ErrorCode code) noexcept;

@@ -10,15 +10,17 @@
 /// caller; velocity, acceleration and torque pair as watts. Equations as in SPEC §2 and the README of this library.
 namespace hamelin::dynamics {
 
-using model::Model;
 using Eigen::VectorXd;
+using model::Model;
 using Matrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 using Matrix6Xd = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 /// τ = M(q) a + C(q, v) v + ∂U(q): recursive Newton–Euler.
-void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a, VectorXd& tau);
+void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a,
+                      VectorXd& tau);
 /// a = M(q)⁻¹ (τ − C v − ∂U): articulated-body algorithm.
-void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau, VectorXd& a);
+void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau,
+                      VectorXd& a);
 /// C(q, v) v + ∂U(q).
 void bias_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& tau);
 /// ∂U(q): the torque that holds the arm against gravity.
@@ -38,7 +40,8 @@ void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::Ma
 /// World poses of all links at q, kept in ws until the next call. The functions below read them.
 void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);
 /// World position of a point fixed in link i's COM frame, after forward_kinematics.
-[[nodiscard]] Eigen::Vector3d point_position(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_link);
+[[nodiscard]] Eigen::Vector3d point_position(const Model& model, const Workspace& ws, int link,
+                                             const Eigen::Vector3d& point_link);
 /// World pose of link i's COM frame, after forward_kinematics.
 [[nodiscard]] geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link);
 /// World pose of the tip, after forward_kinematics.
@@ -46,16 +49,19 @@ void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);
 /// World centres of all collision spheres, in the order of Model::spheres(), after forward_kinematics.
 void sphere_centers(const Model& model, const Workspace& ws, std::span<Eigen::Vector3d> centers);
 
-/// J with ẋ = J v for the world point x that moves with link i, after forward_kinematics; 3 × dof, columns past the link are zero.
-void point_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world, Matrix3Xd& J);
+/// J with ẋ = J v for the world point x that moves with link i, after forward_kinematics; 3 × dof, columns past the
+/// link are zero.
+void point_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
+                    Matrix3Xd& J);
 /// [J_ω; J_x] of that point: 6 × dof, angular rows first, world axes.
-void frame_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world, Matrix6Xd& J);
+void frame_jacobian(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
+                    Matrix6Xd& J);
 /// row = Jᵀ d for a world point x moving with link i and a world direction d: how the joints move x along d. O(depth).
 void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
                               const Eigen::Vector3d& direction_world, VectorXd& row);
 /// World velocity of a world point that moves with link i, after forward_kinematics.
-[[nodiscard]] Eigen::Vector3d point_velocity(const Model& model, const Workspace& ws, int link, const Eigen::Vector3d& point_world,
-                                             const VectorXd& v);
+[[nodiscard]] Eigen::Vector3d point_velocity(const Model& model, const Workspace& ws, int link,
+                                             const Eigen::Vector3d& point_world, const VectorXd& v);
 
 /// At `point_link` (link's COM frame) of link `link` acts the force w × (velocity of that point), w in the world frame
 /// [N s/m]: it turns motion and does no work.
@@ -71,7 +77,7 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, con
 
 /// Operational-space inertia M_x of (21), the inverse of Λ⁻¹ = J M⁻¹ Jᵀ (3 × 3, world axes), damped: eigenvalue d of
 /// Λ⁻¹ becomes d/(d² + λ²), so a lost direction gets zero, not 1/λ.
-[[nodiscard]] Eigen::Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J,
-                                                  double damping = 1e-3);
+[[nodiscard]] Eigen::Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q,
+                                                  const Matrix3Xd& J, double damping = 1e-3);
 
 }  // namespace hamelin::dynamics

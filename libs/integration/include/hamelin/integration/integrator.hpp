@@ -29,11 +29,11 @@ struct State {
   double time_s = 0.0;
   long k = 0;
   VectorXd q, v, p;
-  VectorXd memory;            ///< hamel: body twists of the last step, dof × (6 or 3)
-  VectorXd force_previous;    ///< hamel: generalised force of the last step
-  double step_previous = 0.0; ///< hamel: 0 right after a (consistent) start
+  VectorXd memory;               ///< hamel: body twists of the last step, dof × (6 or 3)
+  VectorXd force_previous;       ///< hamel: generalised force of the last step
+  double step_previous = 0.0;    ///< hamel: 0 right after a (consistent) start
   std::vector<VectorXd> deltas;  ///< last displacements, newest first, for the guess
-  int delta_count = 0;        ///< how many of them are valid
+  int delta_count = 0;           ///< how many of them are valid
 };
 
 /// What one step did.
@@ -45,8 +45,8 @@ struct StepReport {
   int halvings = 0;        ///< how often the step was halved to find a root
   double residual = 0.0;   ///< the figure the criterion looks at, of the accepted step
   double gyroscopic_work_J = 0.0;
-  double dissipated_J = 0.0;   ///< by channel (b), positive
-  double held_work_J = 0.0;    ///< by channel (d)
+  double dissipated_J = 0.0;  ///< by channel (b), positive
+  double held_work_J = 0.0;   ///< by channel (d)
 };
 
 struct Energy {
@@ -59,17 +59,18 @@ enum class Solver : std::int32_t { newton, feedback };
 
 /// Settings of all integrators; each takes what concerns it and refuses what it cannot do.
 struct Options {
-  double alpha = 0.5;             ///< hamel: where in the step velocities are taken, 0 .. 1
+  double alpha = 0.5;  ///< hamel: where in the step velocities are taken, 0 .. 1
   Start start = Start::consistent;
-  bool solver_given = false;      ///< whether `solver` was asked for, or the scheme's own default holds
+  bool solver_given = false;  ///< whether `solver` was asked for, or the scheme's own default holds
   Solver solver = Solver::newton;
-  double tolerance = 1e-12;       ///< newton: ‖δΔ‖∞ [rad or m]
+  double tolerance = 1e-12;          ///< newton: ‖δΔ‖∞ [rad or m]
   double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
-  int max_updates = 100;          ///< feedback; newton gives up where it does not contract
-  int max_halvings = 8;           ///< a step is cut into at most 2^max_halvings pieces
+  int max_updates = 100;             ///< feedback; newton gives up where it does not contract
+  int max_halvings = 8;              ///< a step is cut into at most 2^max_halvings pieces
 };
 
-/// Options from a scene's or command line's parameters {"alpha":…, "start":…, "solver":…, "tolerance":…, "max_halvings":…}.
+/// Options from a scene's or command line's parameters {"alpha":…, "start":…, "solver":…, "tolerance":…,
+/// "max_halvings":…}.
 /// @throws Error invalid naming `where` and the key
 [[nodiscard]] Options options_from_json(const Json& params, const std::string& where);
 

@@ -49,7 +49,7 @@ struct Result {
   std::optional<double> min_clearance_m;
   struct Goal {
     std::string type;
-    std::size_t index = 0, count = 0;  ///< the goal now aimed at, of how many
+    std::size_t index = 0, count = 0;  ///< how many goals are reached, of how many
     std::optional<double> error_m, error_rad;
   };
   std::optional<Goal> goal;

@@ -14,11 +14,11 @@ struct SpatialLink {
   int parent;
   bool prismatic;
   double cos_alpha, sin_alpha;
-  double offset;                     ///< [rad]
-  geometry::Vec3<double> p0;         ///< [m]
-  double mass;                       ///< [kg]
-  geometry::Vec3<double> moment;     ///< mass × COM, own frame [kg m]
-  geometry::Sym3<double> inertia;    ///< about the frame's origin [kg m²]
+  double offset;                   ///< [rad]
+  geometry::Vec3<double> p0;       ///< [m]
+  double mass;                     ///< [kg]
+  geometry::Vec3<double> moment;   ///< mass × COM, own frame [kg m]
+  geometry::Sym3<double> inertia;  ///< about the frame's origin [kg m²]
 };
 
 /// Constants of one link in SE(2): from the parent's frame  p · R(angle).
@@ -26,12 +26,12 @@ struct SpatialLink {
 struct PlanarLink {
   int parent;
   bool prismatic;
-  double direction;                  ///< +1 or −1: the joint's axis along the plane's normal or against it
-  double offset;                     ///< [rad]
-  double p0x, p0y;                   ///< [m]
-  double mass;                       ///< [kg]
-  double moment_x, moment_y;         ///< mass × COM [kg m]
-  double inertia;                    ///< about the frame's origin [kg m²]
+  double direction;           ///< +1 or −1: the joint's axis along the plane's normal or against it
+  double offset;              ///< [rad]
+  double p0x, p0y;            ///< [m]
+  double mass;                ///< [kg]
+  double moment_x, moment_y;  ///< mass × COM [kg m]
+  double inertia;             ///< about the frame's origin [kg m²]
 };
 
 /// A chain in one of the two groups. `root` is the world pose of the constant frame that parents −1 means; for planar
@@ -40,13 +40,13 @@ struct SpatialChain {
   std::vector<SpatialLink> links;
   geometry::SE3 root;
   geometry::Vec3<double> gravity;
-  double potential_constant;         ///< what U = −Σ m g·p counts besides the sweep's root-frame part [J]
+  double potential_constant;  ///< what U = −Σ m g·p counts besides the sweep's root-frame part [J]
 };
 struct PlanarChain {
   std::vector<PlanarLink> links;
   geometry::SE3 root;
   double gravity_x, gravity_y;
-  double potential_constant;         ///< as above, out-of-plane offsets included [J]
+  double potential_constant;  ///< as above, out-of-plane offsets included [J]
 };
 
 }  // namespace hamelin::model

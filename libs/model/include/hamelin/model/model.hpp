@@ -28,7 +28,9 @@ class Model {
   [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept { return chain_; }
 
   /// Pose of link i's COM frame in its joint-aligned frame (constant).
-  [[nodiscard]] const geometry::SE3& com_in_frame(int link) const { return com_in_frame_[static_cast<std::size_t>(link)]; }
+  [[nodiscard]] const geometry::SE3& com_in_frame(int link) const {
+    return com_in_frame_[static_cast<std::size_t>(link)];
+  }
   /// Pose of the tip in its link's joint-aligned frame (constant).
   [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept { return tip_in_frame_; }
 
@@ -41,8 +43,8 @@ class Model {
   /// The collision spheres of all links, link by link.
   [[nodiscard]] const std::vector<PlacedSphere>& spheres() const noexcept { return spheres_; }
 
-  /// An upper bound of the distance from the base to any point of any sphere or the tip, over all q; infinite never: prismatic
-  /// joints count their limits, unlimited ones 1 m. [m]
+  /// An upper bound of the distance from the base to any point of any sphere or the tip, over all q; infinite never:
+  /// prismatic joints count their limits, unlimited ones 1 m. [m]
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
  private:

@@ -17,11 +17,11 @@ enum class JointType : std::int32_t { revolute, prismatic };
 struct Joint {
   std::string name;
   JointType type = JointType::revolute;
-  Vector6d screw = Vector6d::Zero();    ///< S = [ω; v], spatial, base frame, at q = 0; |ω| = 1, or ω = 0 and |v| = 1
-  std::optional<double> lower, upper;   ///< position limits [rad or m]; none = unlimited
-  std::optional<double> velocity_max;   ///< [rad/s or m/s]
-  std::optional<double> effort_max;     ///< [Nm or N]
-  double damping = 0.0;                 ///< viscous, as the robot file gives it; used only where a scene says so
+  Vector6d screw = Vector6d::Zero();   ///< S = [ω; v], spatial, base frame, at q = 0; |ω| = 1, or ω = 0 and |v| = 1
+  std::optional<double> lower, upper;  ///< position limits [rad or m]; none = unlimited
+  std::optional<double> velocity_max;  ///< [rad/s or m/s]
+  std::optional<double> effort_max;    ///< [Nm or N]
+  double damping = 0.0;                ///< viscous, as the robot file gives it; used only where a scene says so
 };
 
 /// Collision sphere. Coordinates in the link's COM frame.
@@ -39,9 +39,9 @@ struct Segment {
 /// One moving body with the joint that carries it.
 struct Link {
   std::string name;
-  int parent = -1;       ///< index of the parent link, −1 for the base; always less than the link's own index
+  int parent = -1;  ///< index of the parent link, −1 for the base; always less than the link's own index
   Joint joint;
-  geometry::SE3 com;     ///< pose of the COM frame in the base frame at q = 0
+  geometry::SE3 com;  ///< pose of the COM frame in the base frame at q = 0
   double mass_kg = 0.0;
   Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the COM, in the COM frame
   std::vector<Sphere> spheres;
@@ -51,8 +51,8 @@ struct Link {
 /// The last link's point that goals speak of.
 struct Tip {
   std::string name;
-  int link = 0;          ///< index of the link it moves with
-  geometry::SE3 pose;    ///< in the base frame at q = 0
+  int link = 0;        ///< index of the link it moves with
+  geometry::SE3 pose;  ///< in the base frame at q = 0
 };
 
 /// An open chain as a file describes it, brought to one form: screws and poses in the base frame at q = 0, everything
@@ -67,8 +67,9 @@ struct Robot {
   [[nodiscard]] int dof() const noexcept { return static_cast<int>(links.size()); }
 };
 
-/// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws, positive mass
-/// wherever a joint moves it, inertia positive definite with the triangle inequality, finite numbers, lower < upper.
+/// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws,
+/// positive mass wherever a joint moves it, inertia positive definite with the triangle inequality, finite numbers,
+/// lower < upper.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 

@@ -19,7 +19,7 @@ extern "C" {
 
 /* A sphere of the arm that obstacles are measured from. Listed once, in hamelin_setup, link by link. */
 typedef struct hamelin_sphere {
-  int32_t link;            /* index of the moving link, 0 .. dof - 1 */
+  int32_t link; /* index of the moving link, 0 .. dof - 1 */
   int32_t index_in_link;
   double center_link_m[3];
   double radius_m;
@@ -29,12 +29,12 @@ typedef struct hamelin_sphere {
 
 /* One near obstacle point of one control sphere. */
 typedef struct hamelin_contact {
-  int32_t sphere;                    /* index into hamelin_setup.spheres */
-  int32_t obstacle;                  /* HAMELIN_OBSTACLE_MAP, or the index of the scene's obstacle */
-  double distance_m;                 /* from the sphere's surface; zero or below is contact */
-  double arm_point_world_m[3];       /* on the sphere's surface */
+  int32_t sphere;              /* index into hamelin_setup.spheres */
+  int32_t obstacle;            /* HAMELIN_OBSTACLE_MAP, or the index of the scene's obstacle */
+  double distance_m;           /* from the sphere's surface; zero or below is contact */
+  double arm_point_world_m[3]; /* on the sphere's surface */
   double obstacle_point_world_m[3];
-  double direction_world[3];         /* unit, from the obstacle towards the sphere: the gradient of the distance */
+  double direction_world[3]; /* unit, from the obstacle towards the sphere: the gradient of the distance */
   double obstacle_velocity_world_m_s[3];
 } hamelin_contact;
 
@@ -42,9 +42,9 @@ enum { HAMELIN_GOAL_JOINT = 0, HAMELIN_GOAL_POSITION = 1, HAMELIN_GOAL_POSE = 2 
 
 typedef struct hamelin_goal {
   int32_t type;
-  double position_world_m[3];        /* position, pose: where the tip shall be */
-  double quaternion_wxyz[4];         /* pose */
-  const double* q;                   /* joint: dof numbers, else null */
+  double position_world_m[3]; /* position, pose: where the tip shall be */
+  double quaternion_wxyz[4];  /* pose */
+  const double* q;            /* joint: dof numbers, else null */
   double tolerance_m, tolerance_rad, speed_max;
 } hamelin_goal;
 
@@ -52,27 +52,27 @@ typedef struct hamelin_goal {
 typedef struct hamelin_gyroscopic_term {
   int32_t link;
   double point_link_m[3];
-  double w_world[3];                 /* [N s/m] */
+  double w_world[3]; /* [N s/m] */
 } hamelin_gyroscopic_term;
 
 /* What holds for a whole run; handed to create. The strings and spans stay valid as long as the planner lives. */
 typedef struct hamelin_setup {
   uint32_t struct_size;
   size_t dof;
-  const char* robot_json;            /* the nominal robot, hamelin.robot/1, resolved; gravity and base follow */
+  const char* robot_json; /* the nominal robot, hamelin.robot/1, resolved; gravity and base follow */
   size_t robot_json_size;
   double gravity_world_m_s2[3];
-  double base_position_world_m[3];   /* pose of the robot's base frame */
+  double base_position_world_m[3]; /* pose of the robot's base frame */
   double base_quaternion_wxyz[4];
   const hamelin_sphere* spheres;
   size_t sphere_count;
-  const hamelin_goal* goals;         /* to be reached in this order */
+  const hamelin_goal* goals; /* to be reached in this order */
   size_t goal_count;
   /* Limits the scene models: dof numbers each, or null where it models none. Unlimited joints hold +-infinity. */
   const double *q_lower, *q_upper, *velocity_max, *effort_max;
-  double control_period_s;           /* dt between two ticks */
-  double influence_m;                /* contacts are listed up to this distance, asked from the plugin */
-  double map_resolution_m;           /* zero without a map */
+  double control_period_s; /* dt between two ticks */
+  double influence_m;      /* contacts are listed up to this distance, asked from the plugin */
+  double map_resolution_m; /* zero without a map */
   uint64_t seed;
 } hamelin_setup;
 
@@ -81,11 +81,11 @@ typedef struct hamelin_tick {
   uint32_t struct_size;
   uint64_t k;
   double time_s;
-  const double *q, *v;               /* dof numbers each */
-  const hamelin_contact* contacts;   /* several a sphere, nearest first within a sphere, spheres in order */
+  const double *q, *v;             /* dof numbers each */
+  const hamelin_contact* contacts; /* several a sphere, nearest first within a sphere, spheres in order */
   size_t contact_count;
   size_t goal_index;
-  double speed_scale;                /* 1, or less where the arm is in unknown space and the scene says "slow" */
+  double speed_scale; /* 1, or less where the arm is in unknown space and the scene says "slow" */
 } hamelin_tick;
 
 enum { HAMELIN_PLANNER_RUNNING = 0, HAMELIN_PLANNER_GAVE_UP = 1 };
@@ -100,20 +100,20 @@ enum { HAMELIN_PLANNER_RUNNING = 0, HAMELIN_PLANNER_GAVE_UP = 1 };
  */
 typedef struct hamelin_command {
   uint32_t struct_size;
-  int32_t state;                               /* HAMELIN_PLANNER_RUNNING, ... */
-  char cause[128];                             /* with GAVE_UP: why, nul-terminated, one line */
+  int32_t state;   /* HAMELIN_PLANNER_RUNNING, ... */
+  char cause[128]; /* with GAVE_UP: why, nul-terminated, one line */
   double potential_J;
-  double* potential_gradient;                  /* dof */
-  double* damping;                             /* dof, non-negative */
-  hamelin_gyroscopic_term* gyroscopic;         /* room for gyroscopic_capacity, at least one for each contact */
+  double* potential_gradient;          /* dof */
+  double* damping;                     /* dof, non-negative */
+  hamelin_gyroscopic_term* gyroscopic; /* room for gyroscopic_capacity, at least one for each contact */
   size_t gyroscopic_capacity;
   size_t gyroscopic_count;
-  double* held_torque;                         /* dof */
-  double* node_velocity;                       /* dof */
+  double* held_torque;   /* dof */
+  double* node_velocity; /* dof */
   int32_t has_node_velocity;
   /* Accounts of the planner's own for the log: energy taken out (negative) or put in at this node [J]. */
-  double filter_work_J;                        /* by rows that admit standing still: never above zero */
-  double recovery_work_J;                      /* by rows that demand motion: inside a margin, past a limit, ... */
+  double filter_work_J;   /* by rows that admit standing still: never above zero */
+  double recovery_work_J; /* by rows that demand motion: inside a margin, past a limit, ... */
 } hamelin_command;
 
 enum { HAMELIN_LOG_INFO = 0, HAMELIN_LOG_WARNING = 1 };
@@ -136,7 +136,7 @@ typedef struct hamelin_plugin {
   const char* name;
   const char* version;
   const char* description;
-  const char* params_schema;         /* JSON Schema (draft-07) of the parameters: defaults, ranges, units */
+  const char* params_schema; /* JSON Schema (draft-07) of the parameters: defaults, ranges, units */
   /*
    * Makes a planner from checked parameters with all defaults filled in. Returns 0 and sets *out; else writes a
    * nul-terminated line to `error` (error_size bytes) and leaves *out alone. Never throws.

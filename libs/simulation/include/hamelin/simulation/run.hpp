@@ -15,21 +15,21 @@ namespace hamelin::simulation {
 
 /// What a caller may watch and steer while a run goes on.
 struct Watch {
-  log::RunLog* log = nullptr;                    ///< null: nothing is recorded, and nothing is paid for it
-  long every = 1;                                ///< a tick line every so many steps; step 0 and the last always
-  const std::atomic<bool>* stop = nullptr;       ///< set by a signal handler: the record ends properly
+  log::RunLog* log = nullptr;               ///< null: nothing is recorded, and nothing is paid for it
+  long every = 1;                           ///< a tick line every so many steps; step 0 and the last always
+  const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: the record ends properly
   std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
 };
 
 /// Free motion of a robot: no planner, no obstacles.
 struct FreeMotion {
-  std::string name;                              ///< for the result's "scene"
+  std::string name;  ///< for the result's "scene"
   Eigen::VectorXd q0, v0;
   double step_s = 1e-3, duration_s = 10.0;
   std::string integrator = "hamel-variational";
   integration::Options options;
-  Eigen::VectorXd damping;                       ///< empty: none
-  Json provenance = Json::object();              ///< goes into header and result
+  Eigen::VectorXd damping;           ///< empty: none
+  Json provenance = Json::object();  ///< goes into header and result
 };
 
 /// Integrates free motion. The result's outcome is completed, diverged or interrupted.

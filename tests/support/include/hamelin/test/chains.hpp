@@ -32,7 +32,9 @@ inline model::Robot chain_along_y(int n, double length, const Eigen::Matrix3d& i
 }
 
 /// Example 5.1 of the paper: three planar links of 0.1 m, unit masses and inertias.
-inline model::Robot planar3() { return chain_along_y(3, 0.1, Eigen::Matrix3d::Identity(), "x"); }
+inline model::Robot planar3() {
+  return chain_along_y(3, 0.1, Eigen::Matrix3d::Identity(), "x");
+}
 
 /// Spatial chain of solid cylinders, radius 0.03 m, length 0.2 m, axes x, z, x, …
 inline model::Robot spatial_chain(int n) {

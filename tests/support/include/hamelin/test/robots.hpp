@@ -21,7 +21,8 @@ inline Eigen::VectorXd random_joints(Rng& rng, int n, double size = 1.0) {
 inline Eigen::Matrix3d random_inertia(Rng& rng) {
   // second moments of a random box, turned: positive and within the triangle inequality
   const Eigen::Vector3d d = (random_vector(rng).cwiseAbs().array() + 0.1).square();
-  const Eigen::Matrix3d R = Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d R =
+      Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized()).toRotationMatrix();
   const Eigen::Matrix3d inertia = (d.sum() * Eigen::Matrix3d::Identity() - Eigen::Matrix3d(d.asDiagonal())) * 0.1;
   const Eigen::Matrix3d turned = R * inertia * R.transpose();
   return 0.5 * (turned + turned.transpose());

@@ -119,9 +119,7 @@ struct Planar {
   static Inertia rigid(const Link& l) noexcept {
     return {S(l.inertia), S(-l.moment_y), S(l.moment_x), S(l.mass), S(0), S(l.mass)};
   }
-  static Operator general(const Inertia& P) noexcept {
-    return {P.ww, P.wx, P.wy, P.wx, P.xx, P.xy, P.wy, P.xy, P.yy};
-  }
+  static Operator general(const Inertia& P) noexcept { return {P.ww, P.wx, P.wy, P.wx, P.xx, P.xy, P.wy, P.xy, P.yy}; }
   static Moment moment(const Link& l) noexcept { return {S(l.mass), S(l.moment_x), S(l.moment_y)}; }
   static Force momentum(const Link& l, const Motion& m) noexcept { return times(rigid(l), m); }
 

@@ -97,12 +97,13 @@ struct Spatial {
   static Sym3<S> rotated(const Link& l, const Placement& x, const Sym3<S>& a) noexcept {
     // about z by the joint's angle, then about x by α; written with differences so that rounding stays small
     const S dz = a.xx - a.yy, cs = x.c * x.s, ss = x.s * x.s, kz = dz * ss + S(2) * a.xy * cs;
-    const Sym3<S> b{a.xx - kz,           dz * cs + a.xy * (S(1) - S(2) * ss), x.c * a.xz - x.s * a.yz, a.yy + kz,
-                    x.s * a.xz + x.c * a.yz, a.zz};
+    const Sym3<S> b{
+        a.xx - kz, dz * cs + a.xy * (S(1) - S(2) * ss), x.c * a.xz - x.s * a.yz, a.yy + kz, x.s * a.xz + x.c * a.yz,
+        a.zz};
     const S ca = l.cos_alpha, sa = l.sin_alpha;
     const S dx = b.yy - b.zz, cas = ca * sa, sas = sa * sa, kx = dx * sas + S(2) * b.yz * cas;
-    return {b.xx,      ca * b.xy - sa * b.xz,                    sa * b.xy + ca * b.xz,
-            b.yy - kx, dx * cas + b.yz * (S(1) - S(2) * sas), b.zz + kx};
+    return {b.xx,     ca * b.xy - sa * b.xz, sa * b.xy + ca * b.xz, b.yy - kx, dx * cas + b.yz * (S(1) - S(2) * sas),
+            b.zz + kx};
   }
   /// Adᵀ(g⁻¹) P Ad(g⁻¹).
   static Inertia to_parent(const Link& l, const Placement& x, const Inertia& P) noexcept {
@@ -154,7 +155,8 @@ struct Spatial {
   static Moment moment(const Link& l) noexcept { return {S(l.mass), vec(l.moment)}; }
   static Force momentum(const Link& l, const Motion& m) noexcept {
     const Vec3<S> h = vec(l.moment);
-    const Sym3<S> I{S(l.inertia.xx), S(l.inertia.xy), S(l.inertia.xz), S(l.inertia.yy), S(l.inertia.yz), S(l.inertia.zz)};
+    const Sym3<S> I{S(l.inertia.xx), S(l.inertia.xy), S(l.inertia.xz),
+                    S(l.inertia.yy), S(l.inertia.yz), S(l.inertia.zz)};
     return {I * m.w + cross(h, m.v), m.v * S(l.mass) - cross(h, m.w)};
   }
 
@@ -177,7 +179,8 @@ struct Spatial {
   }
   /// P − u wᵀ.
   static void subtract_outer(Operator& P, const Force& u, const Force& w) noexcept {
-    P = {minus_outer(P.A, u.t, w.t), minus_outer(P.B, u.t, w.f), minus_outer(P.C, u.f, w.t), minus_outer(P.D, u.f, w.f)};
+    P = {minus_outer(P.A, u.t, w.t), minus_outer(P.B, u.t, w.f), minus_outer(P.C, u.f, w.t),
+         minus_outer(P.D, u.f, w.f)};
   }
   static void add(Inertia& P, const Inertia& Q) noexcept { P = {P.A + Q.A, P.M + Q.M, P.H + Q.H}; }
   static void add(Operator& P, const Operator& Q) noexcept { P = {P.A + Q.A, P.B + Q.B, P.C + Q.C, P.D + Q.D}; }
@@ -212,8 +215,10 @@ struct Spatial {
   /// The wrench about the frame's origin that moves the rigid link so (gravity enters through the root's acceleration).
   static Force inertial_force(const Link& l, const Flow& k) noexcept {
     const Vec3<S> h = vec(l.moment);
-    const Sym3<S> I{S(l.inertia.xx), S(l.inertia.xy), S(l.inertia.xz), S(l.inertia.yy), S(l.inertia.yz), S(l.inertia.zz)};
-    return {I * k.dw + cross(k.w, I * k.w) + cross(h, k.a), k.a * S(l.mass) + cross(k.dw, h) + cross(k.w, cross(k.w, h))};
+    const Sym3<S> I{S(l.inertia.xx), S(l.inertia.xy), S(l.inertia.xz),
+                    S(l.inertia.yy), S(l.inertia.yz), S(l.inertia.zz)};
+    return {I * k.dw + cross(k.w, I * k.w) + cross(h, k.a),
+            k.a * S(l.mass) + cross(k.dw, h) + cross(k.w, cross(k.w, h))};
   }
   /// −g · (first moment), the potential energy of everything about the root's origin.
   static S potential(const Chain& chain, const Moment& k) noexcept { return -dot(vec(chain.gravity), k.h); }

@@ -92,8 +92,8 @@ void solve_factored(const typename Space::Chain& chain, Scratch<Space>& k, const
   }
   for (std::size_t i = 0; i < k.size(); ++i) {
     const auto& l = chain.links[i];
-    auto m = l.parent < 0 ? Space::zero_motion()
-                          : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
+    auto m =
+        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
     x[i] = k[i].u - k[i].inv_d * Space::pair(m, k[i].column);
     Space::add_along_axis(l, m, x[i]);
     k[i].motion = m;
@@ -124,8 +124,8 @@ template <class Space>
 void twists(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* v) noexcept {
   for (std::size_t i = 0; i < k.size(); ++i) {
     const auto& l = chain.links[i];
-    auto m = l.parent < 0 ? Space::zero_motion()
-                          : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
+    auto m =
+        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
     Space::add_along_axis(l, m, v[i]);
     k[i].motion = m;
   }
