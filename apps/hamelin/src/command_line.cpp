@@ -84,6 +84,10 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   return fmt::format("{}{} (see {} --help)", place, text, full_name(at));
 }
 
+CLI::Range whole_number() {
+  return {0L, (1L << 53) - 1L};
+}
+
 std::vector<double> number_list(const std::string& option, const std::string& text, std::optional<std::size_t> count) {
   std::vector<double> numbers;
   for (std::size_t begin = 0; begin <= text.size();) {

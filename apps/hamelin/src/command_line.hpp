@@ -22,6 +22,9 @@ CLI::App* add_command(CLI::App& parent, const std::string& name, const std::stri
 /// One line that says what is wrong with a command line, with the nearest known name for an unknown one.
 [[nodiscard]] std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
+/// A check for unsigned options: 0 to 2^53 - 1, what a scene's seed may be. CLI11 reads -1 as the largest number.
+[[nodiscard]] CLI::Range whole_number();
+
 /// The numbers of a comma list. @throws Error usage naming the option, if it is no such list or has not `count` numbers
 [[nodiscard]] std::vector<double> number_list(const std::string& option, const std::string& text,
                                               std::optional<std::size_t> count = {});

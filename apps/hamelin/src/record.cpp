@@ -22,7 +22,7 @@ bool same_file(const fs::path& a, const fs::path& b) {
 // A result is renamed into place, so only a regular file may stand there, and a link is followed first.
 fs::path result_target(const fs::path& file) {
   std::error_code ec;
-  const fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
+  fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
   if (fs::exists(target, ec) && !fs::is_regular_file(target, ec))
     throw Error(
         ErrorCode::io,

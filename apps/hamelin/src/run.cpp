@@ -82,7 +82,9 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("--step", options->step_s, "time step [s] (default the scene's)")->type_name("H");
   command->add_option("--duration", options->duration_s, "longest simulated time [s] (default the scene's)")
       ->type_name("T");
-  command->add_option("--seed", options->seed, "of all random numbers (default the scene's)")->type_name("S");
+  command->add_option("--seed", options->seed, "of all random numbers (default the scene's)")
+      ->type_name("S")
+      ->check(whole_number());
   command->add_option("--set", options->set, "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);

@@ -208,8 +208,12 @@ void add_scene(CLI::App& app, int&) {
       ->add_option("--primitives", options->primitives,
                    "spheres, boxes, cylinders (see `hamelin schema print primitives`)")
       ->type_name("F");
-  make_command->add_option("--clutter", options->clutter, "number of random primitives")->type_name("N");
-  make_command->add_option("--seed", options->seed, "of the clutter (default 1)")->type_name("S");
+  make_command->add_option("--clutter", options->clutter, "number of random primitives")
+      ->type_name("N")
+      ->check(whole_number());
+  make_command->add_option("--seed", options->seed, "of the clutter (default 1)")
+      ->type_name("S")
+      ->check(whole_number());
   make_command->add_option("--sizes", options->sizes, "smallest and largest edge of clutter [m] (default 0.05,0.2)")
       ->type_name("A,B");
   make_command->add_option("--bounds", options->bounds, "where clutter goes [m] (default -0.8,-0.8,0,0.8,0.8,1.2)")

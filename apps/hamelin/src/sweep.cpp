@@ -147,7 +147,10 @@ void add_sweep(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1'000'000L));
-  pairs->add_option("--seed", options->pairs.seed, "of the pairs")->type_name("S")->capture_default_str();
+  pairs->add_option("--seed", options->pairs.seed, "of the pairs")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(whole_number());
   pairs->add_option("--min-clearance", options->pairs.min_clearance_m, "of start and goal [m]")
       ->type_name("D")
       ->capture_default_str();

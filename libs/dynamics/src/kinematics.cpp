@@ -160,7 +160,7 @@ Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& 
       inverse.col(c).noalias() = J * ws.column_out;
     }
     const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(0.5 * (inverse + inverse.transpose()));
-    const Vector3d d = eigen.eigenvalues();
+    const Vector3d& d = eigen.eigenvalues();
     const Vector3d damped = d.array() / (d.array().square() + damping * damping);
     return eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose();
   });

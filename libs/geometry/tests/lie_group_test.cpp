@@ -226,18 +226,3 @@ TEST_CASE("quaternions and rotation matrices agree, and a quaternion must be uni
   CHECK_THROWS_AS(rotation_from_wxyz(Eigen::Vector4d::Zero()), hamelin::Error);
   CHECK_THROWS_AS(rotation_from_wxyz(Eigen::Vector4d::Constant(std::nan(""))), hamelin::Error);
 }
-
-TEST_CASE("a point on a turning and sliding body: the README's example", "[geometry][unit]") {
-  // README example begins
-  const Vector6d screw = (Vector6d() << 0.0, 0.0, 1.0, 0.0, -0.5, 0.0).finished();  // about z through (0.5, 0, 0)
-  const SE3 g = SE3::exp(screw * (pi / 2.0));
-  const Eigen::Vector3d moved = g * Eigen::Vector3d(1.0, 0.0, 0.0);  // (0.5, 0.5, 0)
-  const Vector6d seen_from_body = g.inverse().Ad(screw);             // the same screw: exp commutes with it
-  const Vector6d wrench = (Vector6d() << 0.0, 0.0, 2.0, 0.0, 0.0, 0.0).finished();
-  const double power = wrench.dot(g.Ad(screw)), same = g.Ad_T(wrench).dot(screw);  // [W] at 1 rad/s
-  // README example ends
-  CHECK((moved - Eigen::Vector3d(0.5, 0.5, 0.0)).norm() < 1e-15);
-  CHECK((seen_from_body - screw).norm() < 1e-15);
-  CHECK(power == Approx(2.0));
-  CHECK(same == Approx(power));
-}

@@ -21,7 +21,7 @@ void null_non_finite(Json& value, const std::string& pointer, std::vector<std::s
     replaced.push_back(fmt::format("{} is {}", pointer, number));
     value = nullptr;
   } else if (value.is_object()) {
-    for (auto& [key, item] : value.items()) null_non_finite(item, pointer + "/" + key, replaced);
+    for (auto& [key, item] : value.items()) null_non_finite(item, fmt::format("{}/{}", pointer, key), replaced);
   } else if (value.is_array()) {
     for (std::size_t i = 0; i < value.size(); ++i)
       null_non_finite(value[i], fmt::format("{}/{}", pointer, i), replaced);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -146,16 +147,19 @@ std::string detail::inertia_fault(const Matrix3d& inertia, bool strict) {
 void check(const Robot& robot, const std::string& where) {
   if (robot.links.empty()) fail(where, "the robot has no moving link, expected at least one");
   std::set<std::string> links, joints;
+  const auto printable = [](const std::string& name) {
+    return !name.empty() && std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < ' '; });
+  };
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link& link = robot.links[i];
+    if (!printable(link.name) || !printable(link.joint.name))
+      fail(where, fmt::format("link {}: it or its joint has no name, or one with control characters", i));
     const std::string place = fmt::format("{}: link '{}'", where, link.name);
-    if (link.name.empty()) fail(where, fmt::format("link {} has no name", i));
     if (!links.insert(link.name).second) fail(place, "the name is given twice");
     if (link.parent != static_cast<int>(i) - 1)
       fail(place,
            fmt::format("parent is {}, expected {}: links in order, no branches", link.parent, static_cast<int>(i) - 1));
     const std::string joint_place = fmt::format("{}: joint '{}'", place, link.joint.name);
-    if (link.joint.name.empty()) fail(place, "the joint has no name");
     if (!joints.insert(link.joint.name).second) fail(joint_place, "the name is given twice");
     check_joint(link.joint, joint_place);
     check_body(link, place);

@@ -5,6 +5,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "hamelin/core/rng.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "robot_detail.hpp"
 
@@ -107,15 +108,18 @@ Matrix3d through_quaternion(const Matrix3d& R) {
 
 Matrix3d rounded(Matrix3d R) {
   // Rounding makes the passes settle, mostly at once; a rotation that keeps alternating between neighbours is turned by
-  // an ulp of its first entry, which starts another sequence.
-  for (int nudge = 0; nudge < 100; ++nudge) {
-    for (int pass = 0; pass < 20; ++pass) {
+  // some roundings, which starts another sequence.
+  constexpr int tries = 100, passes = 20;
+  constexpr double roundings = 4e-16;
+  Rng rng(0);
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    for (int pass = 0; pass < passes; ++pass) {
       const Matrix3d next = through_quaternion(R);
       if (next == R) return R;
       R = next;
     }
     Eigen::Vector4d q = geometry::quaternion_wxyz(R);
-    q[1 + nudge % 3] += 1e-16;
+    for (double& component : q) component += rng.uniform(-roundings, roundings);
     R = geometry::rotation_from_wxyz(q);
   }
   return R;

@@ -30,7 +30,10 @@ using geometry::SE3;
 // TinyXML and urdfdom recurse into the tree of elements.
 constexpr int nesting_max = 100;
 
-[[noreturn]] void fail(ErrorCode code, const std::string& where, const std::string& what) {
+// One line, whatever the file's names and values hold.
+[[noreturn]] void fail(ErrorCode code, const std::string& where, std::string what) {
+  std::replace_if(
+      what.begin(), what.end(), [](unsigned char c) { return c < ' '; }, ' ');
   throw Error(code, fmt::format("{}: {}", where, what));
 }
 
@@ -110,7 +113,8 @@ void check_numbers(const TiXmlElement& element, const std::string& where, const 
     const bool mass = element.ValueStr() == "mass" && a->NameTStr() == "value";
     const int count = mass ? 1 : numbers_in(a->NameTStr());
     if (count == 0) continue;
-    const std::vector<std::string_view> words = words_of(a->ValueStr());
+    // urdfdom takes blanks around the numbers of a list, not around a single one.
+    const auto words = count == 1 ? std::vector<std::string_view>{a->ValueStr()} : words_of(a->ValueStr());
     const bool good = static_cast<int>(words.size()) == count && std::all_of(words.begin(), words.end(), is_number);
     if (!good)
       fail(ErrorCode::parse, at_line(where, element.Row()),
@@ -137,6 +141,16 @@ void check_once(const TiXmlElement& element, const std::string& where, const std
   }
 }
 
+void check_attributes(const TiXmlElement& parent, const char* tag, std::initializer_list<const char*> attributes,
+                      const std::string& where, const std::string& owner) {
+  const TiXmlElement* element = parent.FirstChildElement(tag);
+  if (element == nullptr)
+    fail(ErrorCode::parse, at_line(where, parent.Row()), fmt::format("{}: <{}> is missing", owner, tag));
+  for (const char* attribute : attributes)
+    if (element->Attribute(attribute) == nullptr)
+      fail(ErrorCode::parse, at_line(where, element->Row()), fmt::format("{}: <{}> has no {}", owner, tag, attribute));
+}
+
 void outline_link(const TiXmlElement& element, const std::string& where, Outline& outline) {
   const std::string name = text_of(element.Attribute("name")), place = at_line(where, element.Row());
   if (name.empty()) fail(ErrorCode::parse, place, "a <link> has no name");
@@ -147,6 +161,8 @@ void outline_link(const TiXmlElement& element, const std::string& where, Outline
   check_once(element, where, owner, {"inertial"});
   if (const TiXmlElement* inertial = element.FirstChildElement("inertial"); inertial != nullptr) {
     check_once(*inertial, where, owner, {"origin", "mass", "inertia"});
+    check_attributes(*inertial, "mass", {"value"}, where, owner);
+    check_attributes(*inertial, "inertia", {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}, where, owner);
     check_numbers(*inertial, where, owner);
   }
   for (const TiXmlElement* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
@@ -174,7 +190,14 @@ void outline_joint(const TiXmlElement& element, const std::string& where, Outlin
     fail(ErrorCode::invalid, place, fmt::format("{} is given twice, first in line {}", owner, before->second));
   check_once(element, where, owner, {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"});
   check_numbers(element, where, owner);
+  constexpr std::array<std::string_view, 6> types{"revolute", "continuous", "prismatic", "fixed", "floating", "planar"};
+  const std::string type = text_of(element.Attribute("type"));
+  if (std::find(types.begin(), types.end(), type) == types.end())
+    fail(ErrorCode::parse, place,
+         fmt::format("{}: its type is '{}', expected one of {}", owner, type, fmt::join(types, ", ")));
   const TiXmlElement* limit = element.FirstChildElement("limit");
+  if (limit != nullptr || type == "revolute" || type == "prismatic")
+    check_attributes(element, "limit", {"effort", "velocity"}, where, owner);
   if (limit != nullptr && (limit->Attribute("lower") != nullptr || limit->Attribute("upper") != nullptr))
     outline.limits_given.insert(name);
   for (const char* tag : {"safety_controller", "calibration"})
@@ -270,8 +293,6 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& 
   if (model && listener.errors.empty()) return model;
   std::string reason = listener.errors.empty() ? "not a URDF robot" : listener.errors.front();
   if (listener.errors.size() > 1) reason += fmt::format(" ({})", listener.errors.back());
-  for (char& c : reason)
-    if (c == '\n' || c == '\r') c = ' ';
   // urdfdom names the element in brackets or quotes; the longest name found says where.
   int line = 0;
   std::size_t longest = 0;

@@ -68,7 +68,7 @@ struct Robot {
 };
 
 /// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws,
-/// positive mass wherever a joint moves it, inertia positive definite with the triangle inequality, finite numbers,
+/// inertia about its joint in whatever a joint moves, inertias positive with the triangle inequality, finite numbers,
 /// lower < upper.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);

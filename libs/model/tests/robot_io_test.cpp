@@ -1,0 +1,650 @@
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/core/rng.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+using namespace hamelin;
+using namespace hamelin::model;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path data = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
+const fs::path shared = fs::path(HAMELIN_SOURCE_DIR "/../shared/data/robots");
+
+/// A file that lives as long as the value.
+class Scratch {
+ public:
+  Scratch(const std::string& name, const std::string& text)
+      : folder_(fs::temp_directory_path() / unique()), file_(folder_ / name) {
+    fs::create_directories(folder_);
+    write_file_aside(file_, text);
+  }
+  ~Scratch() { fs::remove_all(folder_); }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const fs::path& file() const { return file_; }
+
+ private:
+  static std::string unique() {
+    std::string name = (fs::temp_directory_path() / "hamelin-robot-XXXXXX").string();
+    const int made = ::mkstemp(name.data());
+    if (made < 0) throw std::runtime_error("no temporary file");
+    ::close(made);
+    fs::remove(name);
+    return fs::path(name).filename().string();
+  }
+  fs::path folder_, file_;
+};
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const auto at = text.find(what);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + what);
+  return text.replace(at, what.size(), by);
+}
+
+std::string message_of(const std::string& name, const std::string& text, const RobotOptions& options = {}) {
+  const Scratch scratch(name, text);
+  try {
+    (void)read_robot(scratch.file(), options);
+  } catch (const Error& e) {
+    std::string what = e.what();
+    // The file's name opens the line.
+    REQUIRE(what.rfind(scratch.file().string() + ":", 0) == 0);
+    return what.substr(scratch.file().string().size());
+  }
+  return "no error";
+}
+
+Robot read_text(const std::string& name, const std::string& text, const RobotOptions& options = {}) {
+  const Scratch scratch(name, text);
+  return read_robot(scratch.file(), options);
+}
+
+bool noted(const Robot& robot, const std::string& text) {
+  return std::any_of(robot.notes.begin(), robot.notes.end(),
+                     [&](const std::string& note) { return note.find(text) != std::string::npos; });
+}
+
+const std::string inertial = R"(<inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+      <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>)";
+
+/// Two joints, a fixed tip.
+const std::string arm = R"(<?xml version="1.0"?>
+<robot name="arm">
+  <link name="base"/>
+  <link name="upper">)" +
+                        inertial + R"(
+  </link>
+  <link name="lower">)" +
+                        inertial + R"(
+    <collision><origin xyz="0 0 0.1"/><geometry><sphere radius="0.05"/></geometry></collision>
+  </link>
+  <link name="tool"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="2" effort="50" velocity="3"/><dynamics damping="0.5"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="upper"/><child link="lower"/><origin xyz="0 0 0.4"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.2" effort="20" velocity="1"/>
+  </joint>
+  <joint name="mount" type="fixed">
+    <parent link="lower"/><child link="tool"/><origin xyz="0 0 0.25" rpy="0 0 1"/>
+  </joint>
+</robot>
+)";
+
+void check_same(const Robot& a, const Robot& b) {
+  REQUIRE(a.dof() == b.dof());
+  CHECK(a.name == b.name);
+  CHECK(a.notes == b.notes);
+  CHECK(a.self_collision_disabled == b.self_collision_disabled);
+  CHECK(a.tip.name == b.tip.name);
+  CHECK(a.tip.link == b.tip.link);
+  CHECK(a.tip.pose == b.tip.pose);
+  for (std::size_t i = 0; i < a.links.size(); ++i) {
+    const Link &x = a.links[i], &y = b.links[i];
+    CHECK(x.name == y.name);
+    CHECK(x.parent == y.parent);
+    CHECK(x.joint.name == y.joint.name);
+    CHECK(x.joint.type == y.joint.type);
+    CHECK(x.joint.screw == y.joint.screw);
+    CHECK(x.joint.lower == y.joint.lower);
+    CHECK(x.joint.upper == y.joint.upper);
+    CHECK(x.joint.velocity_max == y.joint.velocity_max);
+    CHECK(x.joint.effort_max == y.joint.effort_max);
+    CHECK(x.joint.damping == y.joint.damping);
+    CHECK(x.com == y.com);
+    CHECK(x.mass_kg == y.mass_kg);
+    CHECK(x.inertia_kg_m2 == y.inertia_kg_m2);
+    REQUIRE(x.spheres.size() == y.spheres.size());
+    for (std::size_t k = 0; k < x.spheres.size(); ++k) {
+      CHECK(x.spheres[k].center_m == y.spheres[k].center_m);
+      CHECK(x.spheres[k].radius_m == y.spheres[k].radius_m);
+    }
+    REQUIRE(x.segments.size() == y.segments.size());
+    for (std::size_t k = 0; k < x.segments.size(); ++k) {
+      CHECK(x.segments[k].from_m == y.segments[k].from_m);
+      CHECK(x.segments[k].to_m == y.segments[k].to_m);
+      CHECK(x.segments[k].radius_m == y.segments[k].radius_m);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a URDF's joints, limits, spheres and tip come out in the base frame at q = 0", "[model][robot]") {
+  const Robot robot = read_text("arm.urdf", arm);
+  REQUIRE(robot.dof() == 2);
+  CHECK(robot.name == "arm");
+  CHECK(robot.links[0].joint.screw == (Vector6d() << 0, 1, 0, -0.3, 0, 0).finished());  // −ω × (0, 0, 0.3)
+  CHECK(robot.links[1].joint.type == JointType::prismatic);
+  CHECK(robot.links[1].joint.screw == (Vector6d() << 0, 0, 0, 0, 0, 1).finished());
+  CHECK(robot.links[0].joint.lower == -1.0);
+  CHECK(robot.links[0].joint.upper == 2.0);
+  CHECK(robot.links[0].joint.effort_max == 50.0);
+  CHECK(robot.links[0].joint.velocity_max == 3.0);
+  CHECK(robot.links[0].joint.damping == 0.5);
+  CHECK((robot.links[1].com.p() - Vector3d(0, 0, 0.8)).norm() < 1e-15);
+  REQUIRE(robot.links[1].spheres.size() == 1);
+  CHECK(robot.links[1].spheres[0].center_m.norm() < 1e-15);  // at the COM
+  CHECK(robot.tip.name == "tool");
+  CHECK(robot.tip.link == 1);
+  CHECK((robot.tip.pose.p() - Vector3d(0, 0, 0.95)).norm() < 1e-15);
+  CHECK(robot.tip.pose.R()(1, 0) == Approx(std::sin(1.0)));
+  CHECK(noted(robot, "lumped into link 'lower': tool"));
+  CHECK(noted(robot, "base: base (does not move"));
+}
+
+TEST_CASE("the inertial frame's rotation is honoured", "[model][robot]") {
+  const Robot robot = read_text(
+      "arm.urdf", replaced(arm, R"(<origin xyz="0 0 0.1"/><mass)", R"(<origin xyz="0 0 0.1" rpy="0 0 0.5"/><mass)"));
+  const Matrix3d& R = robot.links[0].com.R();
+  CHECK(R(0, 0) == Approx(std::cos(0.5)));
+  CHECK(R(1, 0) == Approx(std::sin(0.5)));
+  CHECK(robot.links[0].inertia_kg_m2 == Matrix3d(Vector3d(0.02, 0.02, 0.01).asDiagonal()));
+}
+
+TEST_CASE("lumping keeps mass, COM, inertia and spheres: against a cloud of points", "[model][robot]") {
+  // Two bodies of point masses; the second hangs on the first by a fixed joint and a locked one. The reference sums the
+  // points, the reader only sees each body's mass, COM and inertia.
+  Rng rng(7);
+  const auto cloud = [&] {
+    std::vector<std::pair<double, Vector3d>> points;
+    for (int i = 0; i < 5; ++i)
+      points.emplace_back(rng.uniform(0.1, 1.0),
+                          Vector3d(rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2)));
+    return points;
+  };
+  struct Sum {
+    double mass = 0.0;
+    Vector3d center = Vector3d::Zero();
+    Matrix3d inertia = Matrix3d::Zero();
+  };
+  const auto sum_of = [](const std::vector<std::pair<double, Vector3d>>& points) {
+    Sum sum;
+    for (const auto& point : points) {
+      sum.mass += point.first;
+      sum.center += point.first * point.second;
+    }
+    sum.center /= sum.mass;
+    for (const auto& point : points) {
+      const Vector3d r = point.second - sum.center;
+      sum.inertia += point.first * (r.dot(r) * Matrix3d::Identity() - r * r.transpose());
+    }
+    return sum;
+  };
+  const auto first = cloud(), second = cloud();
+  const auto text_of = [&](const std::vector<std::pair<double, Vector3d>>& points) {
+    const Sum s = sum_of(points);
+    const auto number = [](double x) { return Json(x).dump(); };
+    const Matrix3d& I = s.inertia;
+    return "<inertial><origin xyz=\"" + number(s.center.x()) + " " + number(s.center.y()) + " " + number(s.center.z()) +
+           "\"/><mass value=\"" + number(s.mass) + "\"/><inertia ixx=\"" + number(I(0, 0)) + "\" ixy=\"" +
+           number(I(0, 1)) + "\" ixz=\"" + number(I(0, 2)) + "\" iyy=\"" + number(I(1, 1)) + "\" iyz=\"" +
+           number(I(1, 2)) + "\" izz=\"" + number(I(2, 2)) + "\"/></inertial>";
+  };
+  const std::string text = R"(<robot name="lump"><link name="base"/><link name="arm">)" + text_of(first) + R"(</link>
+    <link name="plate"/><link name="hand">)" +
+                           text_of(second) + R"(<collision><origin xyz="0.1 0.2 0.3" rpy="1 2 3"/>
+    <geometry><sphere radius="0.01"/></geometry></collision></link><link name="tip"/>
+    <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 1" rpy="0 0 0.3"/><axis xyz="0 1 0"/></joint>
+    <joint name="glue" type="fixed"><parent link="arm"/><child link="plate"/><origin xyz="0.1 0 0" rpy="0.4 0 0"/></joint>
+    <joint name="finger" type="prismatic"><parent link="plate"/><child link="hand"/><origin xyz="0 0.2 0" rpy="0 -0.7 0"/>
+      <axis xyz="1 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="end" type="fixed"><parent link="arm"/><child link="tip"/><origin xyz="0 0 1"/></joint></robot>)";
+  RobotOptions options;
+  options.tip = "tip";
+  const Robot robot = read_text("lump.urdf", text, options);
+  REQUIRE(robot.dof() == 1);
+  const Link& link = robot.links[0];
+
+  // Places of the two bodies in the base frame, by plain rotations.
+  const Matrix3d R_arm = Eigen::AngleAxisd(0.3, Vector3d::UnitZ()).toRotationMatrix();
+  const Matrix3d R_plate = R_arm * Eigen::AngleAxisd(0.4, Vector3d::UnitX()).toRotationMatrix();
+  const Matrix3d R_hand = R_plate * Eigen::AngleAxisd(-0.7, Vector3d::UnitY()).toRotationMatrix();
+  const Vector3d p_arm(0, 0, 1), p_plate = p_arm + R_arm * Vector3d(0.1, 0, 0),
+                                 p_hand = p_plate + R_plate * Vector3d(0, 0.2, 0);
+  std::vector<std::pair<double, Vector3d>> all;
+  for (const auto& point : first) all.emplace_back(point.first, p_arm + R_arm * point.second);
+  for (const auto& point : second) all.emplace_back(point.first, p_hand + R_hand * point.second);
+  const Sum expected = sum_of(all);
+  CHECK(link.mass_kg == Approx(expected.mass).epsilon(1e-14));
+  CHECK((link.com.p() - expected.center).norm() < 1e-14);
+  CHECK((link.com.R() - R_arm).norm() < 1e-14);  // axes of the moving link's URDF frame
+  CHECK((link.com.R() * link.inertia_kg_m2 * link.com.R().transpose() - expected.inertia).norm() < 1e-13);
+  REQUIRE(link.spheres.size() == 1);
+  CHECK((link.com * link.spheres[0].center_m - (p_hand + R_hand * Vector3d(0.1, 0.2, 0.3))).norm() < 1e-14);
+  CHECK(noted(robot, "locked at 0: finger (prismatic)"));
+  CHECK(noted(robot, "lumped into link 'arm': tip, plate, hand"));
+  CHECK_FALSE(link.joint.lower.has_value());  // continuous
+}
+
+TEST_CASE("what a URDF offers and is not used is noted", "[model][robot]") {
+  SECTION("no spheres") {
+    const Robot robot = read_text("arm.urdf", replaced(arm, "<sphere radius=\"0.05\"/>", "<box size=\"1 1 1\"/>"));
+    CHECK(noted(robot, "no collision spheres"));
+    CHECK(noted(robot, "1 <collision><box>"));
+  }
+  SECTION("visuals, transmissions, friction") {
+    std::string text =
+        replaced(arm, "<link name=\"tool\"/>",
+                 "<link name=\"tool\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link>");
+    text = replaced(text, "</robot>", "<transmission name=\"t\"/><gazebo/></robot>");
+    text = replaced(text, "damping=\"0.5\"", "damping=\"0.5\" friction=\"0.1\"");
+    const Robot robot = read_text("arm.urdf", text);
+    CHECK(noted(robot, "1 <visual>"));
+    CHECK(noted(robot, "1 <transmission>"));
+    CHECK(noted(robot, "1 <gazebo>"));
+    CHECK(noted(robot, "friction 0.1 ignored"));
+  }
+  SECTION("zero effort and velocity") {
+    const Robot robot =
+        read_text("arm.urdf", replaced(arm, "effort=\"50\" velocity=\"3\"", "effort=\"0\" velocity=\"0\""));
+    CHECK(noted(robot, "joint 'shoulder': effort=\"0\""));
+    CHECK(noted(robot, "joint 'shoulder': velocity=\"0\""));
+    CHECK_FALSE(robot.links[0].joint.effort_max.has_value());
+    CHECK_FALSE(robot.links[0].joint.velocity_max.has_value());
+  }
+  SECTION("an axis that is no unit vector") {
+    const Robot robot = read_text("arm.urdf", replaced(arm, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 2 0\"/>"));
+    CHECK(noted(robot, "joint 'shoulder': its axis had length 2"));
+    CHECK(robot.links[0].joint.screw.head<3>() == Vector3d::UnitY());
+  }
+  SECTION("inertia without mass, where it is lumped") {
+    const Robot robot = read_text("arm.urdf", replaced(arm, "<link name=\"tool\"/>",
+                                                       "<link name=\"tool\"><inertial><mass value=\"0\"/><inertia "
+                                                       "ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" "
+                                                       "izz=\"1\"/></inertial></link>"));
+    CHECK(noted(robot, "warning: link 'tool' has inertia but no mass"));
+    CHECK(robot.links[1].mass_kg == 2.0);
+    CHECK(robot.links[1].inertia_kg_m2(0, 0) == Approx(1.02));
+  }
+  SECTION("mimic on a fixed joint") {
+    const Robot robot = read_text(
+        "arm.urdf", replaced(arm, "<parent link=\"lower\"/>", "<parent link=\"lower\"/><mimic joint=\"slide\"/>"));
+    CHECK(noted(robot, "joint 'mount': <mimic> ignored"));
+  }
+  SECTION("spheres on the base") {
+    const Robot robot = read_text(
+        "arm.urdf",
+        replaced(arm, "<link name=\"base\"/>",
+                 "<link name=\"base\"><collision><geometry><sphere radius=\"0.1\"/></geometry></collision></link>"));
+    CHECK(noted(robot, "1 collision spheres on the base"));
+    CHECK(robot.links[0].spheres.empty());
+  }
+}
+
+TEST_CASE("a massless moving link is accepted only where what it carries has inertia about its joint",
+          "[model][robot]") {
+  // A universal joint: the cross piece weighs nothing, its joint turns the lower link.
+  const std::string cross = replaced(replaced(arm, inertial, ""), "type=\"prismatic\"", "type=\"revolute\"");
+  CHECK(read_text("arm.urdf", cross).links[0].mass_kg == 0.0);
+  // Two joints on one axis: the cross piece turns, and nothing has to follow.
+  const std::string coaxial =
+      replaced(replaced(cross, "<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 1 0\"/>"), "<origin xyz=\"0 0 0.4\"/>", "");
+  CHECK_THAT(message_of("arm.urdf", coaxial),
+             Catch::Contains("link 'upper': nothing it moves has inertia about joint 'shoulder'"));
+  CHECK_THAT(message_of("arm.urdf", replaced(replaced(arm, inertial, ""), inertial, "")),
+             Catch::Contains("nothing it moves has inertia"));
+}
+
+TEST_CASE("a bad URDF is refused in one line that says where and what", "[model][robot]") {
+  struct Bad {
+    const char* what;
+    std::string text;
+    const char* says;
+  };
+  const std::vector<Bad> list{
+      {"empty", "", "the file is empty"},
+      {"blank", " \n\n ", "the file is empty"},
+      {"binary", std::string("<robot>\0</robot>", 16), "not text"},
+      {"not XML", "this is not XML", "not XML"},
+      {"cut", arm.substr(0, arm.size() / 2), "not XML"},
+      {"mismatched tags", replaced(arm, "</robot>", "</robots>"), "not XML"},
+      {"wrong root", "<sdf><model/></sdf>", "line 1: expected <robot> as the root, found <sdf>"},
+      {"xacro", replaced(arm, "<link name=\"base\"/>", "<xacro:macro name=\"x\"/><link name=\"base\"/>"),
+       "xacro source"},
+      {"no link", "<robot name=\"r\"/>", "the robot has no <link>"},
+      {"no name", replaced(arm, "<link name=\"tool\"/>", "<link/>"), "a <link> has no name"},
+      {"deep",
+       "<robot name=\"r\">" +
+           [] {
+             std::string open;
+             for (int i = 0; i < 100000; ++i) open += "<a>";
+             return open;
+           }(),
+       "nest deeper than 100"},
+      {"link twice", replaced(arm, "<link name=\"tool\"/>", "<link name=\"tool\"/><link name=\"base\"/>"),
+       "link 'base' is given twice, first in line 3"},
+      {"joint twice", replaced(arm, "<joint name=\"slide\"", "<joint name=\"shoulder\""),
+       "joint 'shoulder' is given twice"},
+      {"missing parent", replaced(arm, "<parent link=\"base\"/>", "<parent link=\"bse\"/>"),
+       "its parent 'bse' is no link of the file; did you mean 'base'?"},
+      {"no child", replaced(arm, "<child link=\"upper\"/>", ""), "joint 'shoulder' has no <child link=...>"},
+      {"two parents",
+       replaced(arm, "<parent link=\"lower\"/><child link=\"tool\"/>",
+                "<parent link=\"base\"/><child link=\"lower\"/>"),
+       "link 'lower' is the child of two joints, 'slide' and 'mount'"},
+      {"cycle", replaced(arm, "<parent link=\"base\"/>", "<parent link=\"tool\"/>"), "cycle"},
+      {"whole cycle", R"(<robot name="r"><link name="a"/><link name="b"/>
+        <joint name="x" type="fixed"><parent link="a"/><child link="b"/></joint>
+        <joint name="y" type="fixed"><parent link="b"/><child link="a"/></joint></robot>)",
+       "root"},
+      {"two roots", replaced(arm, "<link name=\"base\"/>", "<link name=\"base\"/><link name=\"other\"/>"), "root"},
+      {"NaN mass", replaced(arm, "<mass value=\"2\"/>", "<mass value=\"nan\"/>"),
+       "link 'upper': <mass>: value=\"nan\", expected a finite number"},
+      {"infinite inertia", replaced(arm, "ixx=\"0.02\"", "ixx=\"inf\""), "<inertia>: ixx=\"inf\""},
+      {"garbage number", replaced(arm, "ixx=\"0.02\"", "ixx=\"0.02kg\""), "ixx=\"0.02kg\", expected a finite number"},
+      {"value over two lines", replaced(arm, "ixx=\"0.02\"", "ixx=\"0.02\nkg\""), "expected a finite number"},
+      {"overflow", replaced(arm, "upper=\"2\"", "upper=\"1e999\""), "joint 'shoulder': <limit>: upper=\"1e999\""},
+      {"huge", replaced(arm, "<origin xyz=\"0 0 0.3\"/>", "<origin xyz=\"0 0 1e200\"/>"),
+       "expected finite numbers up to"},
+      {"two coordinates", replaced(arm, "<origin xyz=\"0 0 0.3\"/>", "<origin xyz=\"0 0.3\"/>"),
+       "xyz=\"0 0.3\", expected three finite numbers"},
+      {"negative mass", replaced(arm, "<mass value=\"2\"/>", "<mass value=\"-2\"/>"), "link 'upper': mass -2 kg"},
+      {"missing mass", replaced(arm, "<mass value=\"2\"/>", ""), "link 'upper': <mass> is missing"},
+      {"indefinite inertia", replaced(arm, "ixx=\"0.02\"", "ixx=\"-0.02\""),
+       "link 'upper': inertia is not positive semi-definite"},
+      {"triangle", replaced(arm, "izz=\"0.01\"", "izz=\"0.05\""),
+       "link 'upper': inertia breaks the triangle inequality"},
+      {"point mass",
+       replaced(arm, "ixx=\"0.02\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.01\"",
+                "ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\""),
+       "inertia is not positive definite"},
+      {"zero axis", replaced(arm, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>"),
+       "joint 'shoulder': the axis has length 0"},
+      {"no limits", replaced(arm, "lower=\"-1\" upper=\"2\"", ""),
+       "joint 'shoulder': lower limit 0 is not below upper limit 0"},
+      {"limits swapped", replaced(arm, "lower=\"-1\" upper=\"2\"", "lower=\"2\" upper=\"-1\""),
+       "lower limit 2 is not below upper limit -1"},
+      {"no effort", replaced(arm, "effort=\"50\" ", ""), "line 14: joint 'shoulder': <limit> has no effort"},
+      {"negative effort", replaced(arm, "effort=\"50\"", "effort=\"-50\""), "effort limit -50"},
+      {"negative damping", replaced(arm, "damping=\"0.5\"", "damping=\"-0.5\""), "damping -0.5"},
+      {"floating", replaced(arm, "type=\"prismatic\"", "type=\"floating\""), "joint 'slide': its type is floating"},
+      {"planar", replaced(arm, "type=\"prismatic\"", "type=\"planar\""), "joint 'slide': its type is planar"},
+      {"unknown type", replaced(arm, "type=\"prismatic\"", "type=\"helical\""),
+       "joint 'slide': its type is 'helical', expected one of revolute"},
+      {"mimic", replaced(arm, "<parent link=\"upper\"/>", "<parent link=\"upper\"/><mimic joint=\"shoulder\"/>"),
+       "joint 'slide': it moves and mimics 'shoulder'"},
+      {"zero sphere", replaced(arm, "radius=\"0.05\"", "radius=\"0\""), "radius 0 m, expected a positive number"},
+      {"inertial twice", replaced(arm, inertial, inertial + inertial), "link 'upper': <inertial> is given twice"},
+      {"nothing moves", R"(<robot name="r"><link name="a"/></robot>)", "no joint moves between 'a' and the tip 'a'"},
+      {"several leaves", replaced(arm, "<parent link=\"lower\"/>", "<parent link=\"upper\"/>"),
+       "several leaves, name one as the tip: tool, lower"},
+  };
+  REQUIRE(list.size() >= 40);
+  for (const Bad& bad : list) {
+    const std::string message = message_of("bad.urdf", bad.text);
+    CAPTURE(bad.what);
+    CHECK_THAT(message, Catch::Contains(bad.says));
+    CHECK(message.find('\n') == std::string::npos);
+  }
+}
+
+TEST_CASE("a file that is no robot file is refused", "[model][robot]") {
+  CHECK_THROWS_AS(read_robot(data), Error);  // a directory
+  CHECK_THROWS_AS(read_robot(data / "absent.urdf"), Error);
+  CHECK_THAT(message_of("arm.txt", arm), Catch::Contains("unknown kind of robot file '.txt', expected .urdf or .json"));
+  RobotOptions options;
+  options.tip = "toll";
+  CHECK_THAT(message_of("arm.urdf", arm, options),
+             Catch::Contains("no link 'toll' for the tip; did you mean 'tool'?; leaves are: tool"));
+}
+
+TEST_CASE("a bad JSON robot is refused with its place", "[model][robot]") {
+  const Json good = robot_to_json(make_chain({}));
+  const auto message = [&](const std::string& pointer, const Json& value) {
+    Json bad = good;
+    bad[Json::json_pointer(pointer)] = value;
+    return message_of("bad.json", bad.dump());
+  };
+  CHECK_THAT(message_of("bad.json", ""), Catch::Contains("not JSON"));
+  CHECK_THAT(message_of("bad.json", "[]"), Catch::Contains("/"));
+  CHECK_THAT(message("/links/0/mass_kg", "one"), Catch::Contains("/links/0/mass_kg"));
+  CHECK_THAT(message("/links/0/mass_kg", -1), Catch::Contains("/links/0/mass_kg"));
+  CHECK_THAT(message("/links/0/mass", 1), Catch::Contains("unknown key 'mass'"));
+  CHECK_THAT(message("/links/0/com/quaternion_wxyz", {1, 1, 0, 0}),
+             Catch::Contains("/links/0/com/quaternion_wxyz: the norm is 1.414"));
+  CHECK_THAT(message("/links/1/name", "a\nb"), Catch::Contains("control characters"));
+  CHECK_THAT(message("/links/1/parent", -1), Catch::Contains("link 'link2': parent is -1, expected 0"));
+  CHECK_THAT(message("/links/1/name", "link1"), Catch::Contains("link 'link1': the name is given twice"));
+  CHECK_THAT(message("/links/1/joint/name", "j1"), Catch::Contains("joint 'j1': the name is given twice"));
+  CHECK_THAT(message("/links/0/joint/screw", {0, 0, 0, 0, 0, 0}),
+             Catch::Contains("/links/0/joint: the axis has length 0"));
+  CHECK_THAT(message("/links/0/joint/screw", {1, 0, 0, 1, 0, 0}), Catch::Contains("pitch"));
+  CHECK_THAT(message("/links/0/joint/type", "prismatic"), Catch::Contains("/links/0/joint: the axis has length 0"));
+  CHECK_THAT(message("/links/1/joint/type", "prismatic"),
+             Catch::Contains("joint 'j2': the screw of a prismatic joint turns"));
+  CHECK_THAT(message("/links/0/inertia_kg_m2", {1, 1, 3, 0, 0, 0}), Catch::Contains("triangle inequality"));
+  CHECK_THAT(message("/links/0/inertia_kg_m2", {1, 1, 1, 2, 0, 0}), Catch::Contains("not positive definite"));
+  CHECK_THAT(message("/links/0/spheres/0/radius_m", 0), Catch::Contains("/links/0/spheres/0/radius_m"));
+  CHECK_THAT(message("/tip/link", "link9"), Catch::Contains("/tip/link: no link 'link9'"));
+  CHECK_THAT(message("/self_collision_disabled/0/0", "lnk1"), Catch::Contains("no link 'lnk1'; did you mean 'link1'?"));
+  Json wrong_limits = good;
+  wrong_limits["links"][0]["joint"]["lower"] = 1;
+  wrong_limits["links"][0]["joint"]["upper"] = 0;
+  CHECK_THAT(message_of("bad.json", wrong_limits.dump()),
+             Catch::Contains("joint 'j1': lower limit 1 is not below upper limit 0"));
+  RobotOptions options;
+  options.tip = "hand";
+  CHECK_THAT(message_of("good.json", good.dump(), options),
+             Catch::Contains("no tip 'hand': a JSON robot has the one tip it names, 'link7'"));
+}
+
+TEST_CASE("a robot survives its JSON form bit for bit", "[model][robot]") {
+  std::vector<Robot> robots{make_chain({}), read_text("arm.urdf", arm), read_robot(data / "planar3.json"),
+                            read_robot(data / "planar4.json")};
+  RobotOptions options;
+  options.spheres = data / "arm7.spheres.json";
+  robots.push_back(read_robot(data / "arm7.urdf", options));
+  // Rotations of all kinds: chains with tilted COM frames.
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    Rng rng(seed);
+    Json json = robot_to_json(make_chain({2}));
+    Eigen::Vector4d q(rng.normal(), rng.normal(), rng.normal(), rng.normal());
+    q.normalize();
+    json["links"][0]["com"]["quaternion_wxyz"] = {q[0], q[1], q[2], q[3]};
+    json["links"][1]["joint"]["screw"] = {0.6 * (1.0 + 1e-9), 0, 0.8, 0, 0, 0};
+    robots.push_back(robot_from_json(json, "tilted"));
+  }
+  for (const Robot& robot : robots) {
+    const Json json = robot_to_json(robot);
+    const Robot again = robot_from_json(parse_json(json.dump(), "again"), "again");
+    check_same(robot, again);
+    CHECK(robot_to_json(again).dump() == json.dump());
+  }
+}
+
+TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
+  const Scratch spheres(
+      "spheres.json",
+      R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}], "tool": [{"center": [0.1, 0, 0], "radius": 0.2}],
+    "upper": [{"center": [0, 0, 0.2], "radius": 0.1}]}, "self_collision_disabled": [["upper", "lower"]]})");
+  RobotOptions options;
+  options.spheres = spheres.file();
+  const Robot robot = read_text("arm.urdf", arm, options);
+  CHECK(noted(robot, "the file's own 1 collision spheres are replaced by those of spheres.json"));
+  REQUIRE(robot.links[1].spheres.size() == 2);
+  const Link& lower = robot.links[1];
+  CHECK((lower.com * lower.spheres[0].center_m - Vector3d(0, 0, 0.7)).norm() < 1e-15);
+  CHECK((lower.com * lower.spheres[1].center_m - Vector3d(0.1 * std::cos(1.0), 0.1 * std::sin(1.0), 0.95)).norm() <
+        1e-15);
+  // The tool's sphere belongs to 'lower' and is in no listed pair.
+  CHECK(robot.self_collision_disabled.empty());
+
+  const auto refused = [&](const std::string& text) {
+    const Scratch bad("bad.json", text);
+    RobotOptions with_bad;
+    with_bad.spheres = bad.file();
+    try {
+      (void)read_text("arm.urdf", arm, with_bad);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  CHECK_THAT(refused("{}"), Catch::Contains("bad.json: expected an object whose \"links\""));
+  CHECK_THAT(refused(R"({"links": {"lover": []}})"), Catch::Contains("no link 'lover'; did you mean 'lower'?"));
+  CHECK_THAT(refused(R"({"links": {"lower": [{"center": [0, 0], "radius": 1}]}})"), Catch::Contains("/links/lower/0"));
+  CHECK_THAT(refused(R"({"links": {"lower": [{"center": [0, 0, 0], "radius": -1}]}})"),
+             Catch::Contains("/links/lower/0/radius"));
+  CHECK_THAT(refused(R"({"links": {}, "self_collision_disabled": [["lower"]]})"),
+             Catch::Contains("pairs of link names"));
+}
+
+TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[model][robot]") {
+  const Robot robot = make_chain({4, "x,z,x", 0.2, 1.0, 0.03});
+  REQUIRE(robot.dof() == 4);
+  for (int i = 0; i < 4; ++i) {
+    CAPTURE(i);
+    const Link& link = robot.links[static_cast<std::size_t>(i)];
+    const Vector3d axis = i % 3 == 1 ? Vector3d::UnitZ() : Vector3d::UnitX();
+    const Vector3d origin(0, 0.2 * i, 0);
+    CHECK(link.joint.screw.head<3>() == axis);
+    CHECK((link.joint.screw.tail<3>() + axis.cross(origin)).norm() < 1e-15);
+    CHECK((link.com.p() - (origin + Vector3d(0, 0.1, 0))).norm() < 1e-15);
+    CHECK(link.inertia_kg_m2(0, 0) == Approx(0.04 / 12 + 0.0009 / 4));
+    CHECK(link.inertia_kg_m2(1, 1) == Approx(0.00045));
+    CHECK(link.inertia_kg_m2(2, 2) == link.inertia_kg_m2(0, 0));
+    CHECK(link.segments.size() == 1);
+    CHECK_FALSE(link.spheres.empty());
+  }
+  CHECK((robot.tip.pose.p() - Vector3d(0, 0.8, 0)).norm() < 1e-15);
+  CHECK_NOTHROW(make_chain({200, "x,y,z", 0.04, 0.1, 0.01}));
+  for (const ChainOptions& bad :
+       {ChainOptions{0}, ChainOptions{20000}, ChainOptions{3, ""}, ChainOptions{3, "x,w"}, ChainOptions{3, "x,"},
+        ChainOptions{3, "x", 0.0}, ChainOptions{3, "x", 0.2, -1.0}, ChainOptions{3, "x", 0.2, 1.0, std::nan("")}})
+    CHECK_THROWS_AS(make_chain(bad), Error);
+}
+
+TEST_CASE("public URDFs load with their tips, and without one name the leaves", "[model][robot]") {
+  if (!fs::exists(shared)) {
+    WARN("no shared robots here: skipped");
+    return;
+  }
+  const auto leaves_of = [](const fs::path& file) {
+    try {
+      (void)read_robot(file);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  SECTION("panda") {
+    CHECK_THAT(leaves_of(shared / "panda.urdf"),
+               Catch::Contains("name one as the tip: panda_leftfinger, panda_rightfinger, panda_grasptarget"));
+    RobotOptions options;
+    options.tip = "panda_grasptarget";
+    options.spheres = shared / "panda_spheres.json";
+    const Robot robot = read_robot(shared / "panda.urdf", options);
+    REQUIRE(robot.dof() == 7);
+    CHECK(robot.tip.name == "panda_grasptarget");
+    CHECK((robot.tip.pose.p() - Vector3d(0.088, 0, 0.333 + 0.316 + 0.384 - 0.107 - 0.105)).norm() < 1e-9);
+    CHECK(robot.links[6].mass_kg == Approx(0.2 + 0.81 + 0.1 + 0.1));
+    CHECK(robot.links[6].spheres.size() == 5 + 18 + 2 + 2);
+    CHECK(noted(robot, "lumped into link 'panda_link7': panda_link8, panda_hand"));
+    CHECK(noted(robot, "warning: link 'panda_grasptarget' has inertia but no mass"));
+    CHECK(noted(robot, "joint 'panda_finger_joint2': <mimic> ignored"));
+    CHECK(noted(robot, "1 collision spheres on the base"));
+    CHECK(robot.links[0].joint.effort_max == 87.0);
+    CHECK(std::count(robot.self_collision_disabled.begin(), robot.self_collision_disabled.end(),
+                     std::make_pair(std::string("panda_link1"), std::string("panda_link2"))) == 1);
+  }
+  SECTION("ur5") {
+    CHECK_THAT(leaves_of(shared / "ur5_robot.urdf"),
+               Catch::Contains("ee_link") && Catch::Contains("tool0") && Catch::Contains("base"));
+    RobotOptions options;
+    options.tip = "tool0";
+    const Robot robot = read_robot(shared / "ur5_robot.urdf", options);
+    REQUIRE(robot.dof() == 6);
+    CHECK(noted(robot, "no collision spheres"));
+    CHECK(robot.links[2].joint.lower == Approx(-3.14159265359));
+  }
+}
+
+TEST_CASE("the example robot file's form is read", "[model][robot]") {
+  const fs::path example = fs::path(HAMELIN_SOURCE_DIR "/../shared/examples/robot.json");
+  if (!fs::exists(example)) {
+    WARN("no shared examples here: skipped");
+    return;
+  }
+  // The example is shortened to one link, so its tip and pair name links it lacks.
+  Json json = read_json(example);
+  json["tip"]["link"] = "link1";
+  json["self_collision_disabled"] = Json::array();
+  const Robot robot = robot_from_json(json, "example");
+  CHECK(robot_to_json(robot) == json);
+}
+
+TEST_CASE("arm7's spheres cover it and no two links more than a joint apart overlap at the ready pose",
+          "[model][robot]") {
+  RobotOptions options;
+  options.spheres = data / "arm7.spheres.json";
+  const Robot robot = read_robot(data / "arm7.urdf", options);
+  REQUIRE(robot.dof() == 7);
+  CHECK(robot.tip.name == "flange");
+  CHECK((robot.tip.pose.p() - Vector3d(0.088, 0, 0.333 + 0.316 + 0.384 - 0.107)).norm() < 1e-12);
+  const std::vector<double> ready{0, -0.785, 0, -2.356, 0, 1.571, 0.785};
+  // World places by the product of exponentials.
+  std::vector<std::vector<std::pair<Vector3d, double>>> placed;
+  geometry::SE3 moved;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < 7; ++i) {
+    const Link& link = robot.links[i];
+    moved = moved * geometry::SE3::exp(link.joint.screw * ready[i]);
+    placed.emplace_back();
+    for (const Sphere& sphere : link.spheres)
+      placed.back().emplace_back(moved * (link.com * sphere.center_m), sphere.radius_m);
+    count += link.spheres.size();
+    CHECK_FALSE(link.spheres.empty());
+    CHECK(link.joint.lower < ready[i]);
+    CHECK(link.joint.upper > ready[i]);
+    CHECK(link.joint.effort_max == (i < 4 ? 87.0 : 12.0));
+    CHECK(link.joint.velocity_max == (i < 4 ? 2.175 : 2.61));
+  }
+  CHECK(count >= 40);
+  CHECK(count <= 60);
+  for (std::size_t a = 0; a < 7; ++a)
+    for (std::size_t b = a + 2; b < 7; ++b)
+      for (const auto& x : placed[a])
+        for (const auto& y : placed[b]) {
+          CAPTURE(a, b, x.first.transpose(), y.first.transpose());
+          CHECK((x.first - y.first).norm() > x.second + y.second);
+        }
+}
