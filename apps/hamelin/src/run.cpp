@@ -4,10 +4,10 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "document.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "record.hpp"
+#include "scene_flags.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -16,33 +16,10 @@ namespace {
 
 struct RunOptions {
   std::filesystem::path file;
-  std::optional<std::string> planner, integrator;
-  std::optional<double> step_s, duration_s;
-  std::optional<std::uint64_t> seed;
-  std::vector<std::string> set;
+  SceneFlags flags;
   std::vector<std::filesystem::path> plugin_path;
   RecordOptions record;
 };
-
-// The scene's document with the flags written into it, so that its own checks speak for them.
-scene::Scene read_scene(const RunOptions& options) {
-  if (const Kind kind = kind_of(options.file); kind != Kind::scene)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
-  Json document = read_json(options.file);
-  const auto choose = [&](const char* key, const std::string& name) {
-    // another planner or integrator does not know the parameters of the scene's
-    if (!document.contains(key) || !document[key].is_object() || document[key].value("name", Json()) != name)
-      document[key] = {{"name", name}};
-  };
-  if (options.planner) choose("planner", *options.planner);
-  if (options.integrator) choose("integrator", *options.integrator);
-  if (options.step_s) document["step_s"] = *options.step_s;
-  if (options.duration_s) document["duration_s"] = *options.duration_s;
-  if (options.seed) document["seed"] = *options.seed;
-  for (const auto& assignment : options.set) scene::set_pointer(document, assignment);
-  return scene::scene_from_json(document, options.file.parent_path(), options.file.string());
-}
 
 // What the robot file knows and the scene does not ask for (SPEC §5).
 void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
@@ -61,7 +38,7 @@ void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
 }
 
 int run(const RunOptions& options) {
-  const scene::Scene scene = read_scene(options);
+  const scene::Scene scene = read_scene(options.file, options.flags);
   say_what_is_unused(scene, simulation::load_model(scene).robot());
   return record(options.record, options.file, [&](const simulation::Watch& watch) {
     return simulation::run(scene, plugin_path(options.plugin_path), watch);
@@ -75,17 +52,19 @@ void add_run(CLI::App& app, int& exit_code) {
                               "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
-  command->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")
+  command->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  command->add_option("--integrator", options->integrator, "default the scene's, else hamel-variational")
+  command->add_option("--integrator", options->flags.integrator, "default the scene's, else hamel-variational")
       ->type_name("NAME");
-  command->add_option("--step", options->step_s, "time step [s] (default the scene's)")->type_name("H");
-  command->add_option("--duration", options->duration_s, "longest simulated time [s] (default the scene's)")
+  command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")->type_name("H");
+  command->add_option("--duration", options->flags.duration_s, "longest simulated time [s] (default the scene's)")
       ->type_name("T");
-  command->add_option("--seed", options->seed, "of all random numbers (default the scene's)")
+  command->add_option("--seed", options->flags.seed, "of all random numbers (default the scene's)")
       ->type_name("S")
       ->check(whole_number());
-  command->add_option("--set", options->set, "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
+  command
+      ->add_option("--set", options->flags.set,
+                   "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
   command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")

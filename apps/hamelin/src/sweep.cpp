@@ -6,10 +6,10 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "document.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/study/pairs.hpp"
+#include "scene_flags.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -21,25 +21,12 @@ namespace fs = std::filesystem;
 struct PairsOptions {
   fs::path file;
   study::PairOptions pairs;
-  double duration_s = 20.0;
+  SceneFlags flags;
   std::size_t jobs = 1;
-  std::optional<std::string> planner;
-  std::vector<std::string> set;
   std::vector<fs::path> plugin_path;
   bool json = false;
   std::optional<fs::path> output;
 };
-
-scene::Scene read_scene(const PairsOptions& options) {
-  if (const Kind kind = kind_of(options.file); kind != Kind::scene)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: is a {}, expected a scene", options.file.string(), to_string(kind)));
-  Json document = read_json(options.file);
-  if (options.planner) document["planner"] = {{"name", *options.planner}};
-  document["duration_s"] = options.duration_s;
-  for (const auto& assignment : options.set) scene::set_pointer(document, assignment);
-  return scene::scene_from_json(document, options.file.parent_path(), options.file.string());
-}
 
 /// One JSON line a run, flushed, so that a kill loses at most one.
 class Records {
@@ -100,7 +87,7 @@ std::string table(const study::Summary& s, const study::DrawnPairs& drawn, doubl
 
 int sweep_pairs(const PairsOptions& options) {
   using clock = std::chrono::steady_clock;
-  const scene::Scene scene = read_scene(options);
+  const scene::Scene scene = read_scene(options.file, options.flags);
   Records records(options.output, options.file);
   const study::DrawnPairs drawn = study::draw_pairs(scene, options.pairs);
 
@@ -157,16 +144,17 @@ void add_sweep(CLI::App& app, int& exit_code) {
   pairs->add_option("--min-distance", options->pairs.min_distance_rad, "between start and goal, Euclidean [rad]")
       ->type_name("D")
       ->capture_default_str();
-  pairs->add_option("--duration", options->duration_s, "longest simulated time of a run [s]")
+  options->flags.duration_s = 20.0;
+  pairs->add_option("--duration", options->flags.duration_s, "longest simulated time of a run [s]")
       ->type_name("T")
       ->capture_default_str();
   pairs->add_option("--jobs", options->jobs, "runs at the same time")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1024L));
-  pairs->add_option("--planner", options->planner, "a plugin's name or path (default the scene's)")
+  pairs->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  pairs->add_option("--set", options->set, "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
+  pairs->add_option("--set", options->flags.set, "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
   pairs->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")

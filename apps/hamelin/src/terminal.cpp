@@ -1,6 +1,8 @@
 #include "terminal.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <memory>
 
 namespace hamelin::app {
 
@@ -24,6 +27,16 @@ std::string one_line(std::string_view text) {
   std::string line(text);
   std::replace(line.begin(), line.end(), '\n', ' ');
   return line;
+}
+
+// Messages go to stderr, one line each, with the program's name in front.
+spdlog::logger& messages() {
+  static const auto logger = [] {
+    auto made = std::make_shared<spdlog::logger>("hamelin", std::make_shared<spdlog::sinks::stderr_sink_st>());
+    made->set_pattern("%n: %v");
+    return made;
+  }();
+  return *logger;
 }
 
 bool wants_colour() {
@@ -43,11 +56,11 @@ double now_s() {
 }  // namespace
 
 void error_line(std::string_view text) {
-  fmt::print(stderr, "hamelin: {}\n", one_line(text));
+  messages().error("{}", one_line(text));
 }
 
 void note(std::string_view text) {
-  fmt::print(stderr, "hamelin: note: {}\n", one_line(text));
+  messages().info("note: {}", one_line(text));
 }
 
 std::string coloured(std::string_view text, Colour colour) {

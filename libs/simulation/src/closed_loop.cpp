@@ -122,6 +122,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
                    ? plugin.create(setup_data(plant_, influence_), *this, planner_params_)
                    : plugin.create(setup_data(scaled_masses(plant_, mass_scale), influence_), *this, planner_params_);
       }()) {
+  if (std::error_code ec; std::filesystem::is_regular_file(scene.name, ec)) inputs_.emplace_back(scene.name);
   inputs_.push_back(scene.robot.file);
   if (scene.robot.spheres) inputs_.push_back(*scene.robot.spheres);
   if (scene.map) inputs_.push_back(scene.map->file);

@@ -1,0 +1,28 @@
+#include "scene_flags.hpp"
+
+#include <fmt/format.h>
+
+#include "document.hpp"
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::app {
+
+scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags) {
+  if (const Kind kind = kind_of(file); kind != Kind::scene)
+    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a scene", file.string(), to_string(kind)));
+  Json document = read_json(file);
+  const auto choose = [&](const char* key, const std::string& name) {
+    // another planner or integrator does not know the parameters of the scene's
+    if (!document.contains(key) || !document[key].is_object() || document[key].value("name", Json()) != name)
+      document[key] = {{"name", name}};
+  };
+  if (flags.planner) choose("planner", *flags.planner);
+  if (flags.integrator) choose("integrator", *flags.integrator);
+  if (flags.step_s) document["step_s"] = *flags.step_s;
+  if (flags.duration_s) document["duration_s"] = *flags.duration_s;
+  if (flags.seed) document["seed"] = *flags.seed;
+  for (const auto& assignment : flags.set) scene::set_pointer(document, assignment);
+  return scene::scene_from_json(document, file.parent_path(), file.string());
+}
+
+}  // namespace hamelin::app
