@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "hamelin/core/error.hpp"
+#include "terminal.hpp"
 
 namespace hamelin::app {
 
@@ -12,6 +13,11 @@ namespace {
 
 void require(bool takes, const char* flag, const std::string& integrator) {
   if (!takes) throw Error(ErrorCode::usage, fmt::format("{}: integrator '{}' does not take it", flag, integrator));
+}
+
+// Schemes are compared by changing their name alone, so what belongs to the published ones is no error elsewhere.
+void say_unused(const char* flag, const std::string& integrator) {
+  note(fmt::format("{}: means nothing to integrator '{}', ignored", flag, integrator));
 }
 
 }  // namespace
@@ -37,14 +43,10 @@ void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
 Json integrator_params(const IntegratorFlags& flags, const std::string& integrator, Json params) {
   const bool hamel = integrator == "hamel", midpoint = integrator == "hamel-midpoint";
   const bool root_finding = hamel || midpoint || integrator == "hamel-variational";
-  if (flags.alpha) {
-    require(hamel, "--alpha", integrator);
-    params["alpha"] = *flags.alpha;
-  }
-  if (flags.start) {
-    require(hamel || midpoint, "--start", integrator);
-    params["start"] = *flags.start;
-  }
+  if (flags.alpha) params["alpha"] = *flags.alpha;
+  if (flags.alpha && !hamel) say_unused("--alpha", integrator);
+  if (flags.start) params["start"] = *flags.start;
+  if (flags.start && !hamel && !midpoint) say_unused("--start", integrator);
   if (flags.solver) {
     require(root_finding, "--solver", integrator);
     params["solver"] = *flags.solver;

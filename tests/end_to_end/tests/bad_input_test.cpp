@@ -129,8 +129,6 @@ std::vector<Case> cases() {
       flag_case("an unknown integrator", {"integrate", robot, "--integrator", "warp"}, {"'warp'", "hamel-variational"}),
       flag_case("an alpha beyond 1", {"integrate", robot, "--integrator", "hamel", "--alpha", "2"},
                 {"/alpha", "at most 1"}),
-      flag_case("an alpha where none belongs", {"integrate", robot, "--integrator", "rk4", "--alpha", "1"},
-                {"--alpha", "rk4"}),
       flag_case("q0 of the wrong length", {"integrate", robot, "--q0", "1,2"}, {"--q0", "expected 3"}),
       flag_case("q0 that is no list", {"integrate", robot, "--q0", "1,x,2"}, {"--q0", "'x'"}),
       flag_case("a step of zero", {"integrate", robot, "--step", "0"}, {"step 0", "positive"}),

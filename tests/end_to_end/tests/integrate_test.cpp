@@ -94,3 +94,15 @@ TEST_CASE("integrate says what of a scene it ignores", "[end_to_end]") {
   CHECK_THAT(output.err, Catch::Contains("note: ") && Catch::Contains("planner 'hybrid'") &&
                              Catch::Contains("the map") && Catch::Contains("goal(s)"));
 }
+
+TEST_CASE("flags of the published schemes mean nothing to others, which integrate says", "[end_to_end]") {
+  Bench bench;
+  const std::vector<std::string> plain{"integrate", "data/robots/planar3.json", "--duration", "0.1", "--json"};
+  std::vector<std::string> flagged = plain;
+  for (const char* flag : {"--alpha", "0.25", "--start", "published"}) flagged.emplace_back(flag);
+  const auto output = bench.run(flagged);
+  CHECK(output.exit_code == 0);
+  CHECK_THAT(output.err, Catch::Contains("--alpha: means nothing to integrator 'hamel-variational'") &&
+                             Catch::Contains("--start: means nothing to integrator 'hamel-variational'"));
+  CHECK(Json::parse(output.out)["q"] == Json::parse(bench.run(plain).out)["q"]);
+}
