@@ -77,7 +77,8 @@ TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integr
   }
   const Model model(test::planar3());
   REQUIRE(model.planar());
-  for (const auto& scheme : read_json(reference_file)["schemes"]) {
+  const Json reference = read_json(reference_file);  // a range over a temporary's element would outlive it
+  for (const auto& scheme : reference["schemes"]) {
     const std::string name = scheme["scheme"];
     Options options;
     options.start = Start::published;
