@@ -439,7 +439,8 @@ log::Result ClosedLoop::run(const Watch& watch) {
   const auto n = plant_.dof();
   state_ = integrator_->start(scene_.start_q.size() > 0 ? scene_.start_q : VectorXd::Zero(n),
                               scene_.start_v.size() > 0 ? scene_.start_v : VectorXd::Zero(n));
-  recorder.header(header());
+  result_.provenance = log::provenance(inputs_);
+  if (recorder.logging()) recorder.header(header());
   for (const auto& text : early_events_) recorder.event(0.0, text);
 
   const bool sampled = scene_.actuation.type == scene::ActuationType::sampled;
@@ -561,7 +562,7 @@ Json ClosedLoop::header() const {
            {{"name", planner_.plugin().name()},
             {"version", planner_.plugin().version()},
             {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
-          {"provenance", log::provenance(inputs_)}};
+          {"provenance", result_.provenance}};
 }
 
 void ClosedLoop::fill_result() {
@@ -588,7 +589,6 @@ void ClosedLoop::fill_result() {
   if (saturated_ticks_ > 0)
     result_.warnings.push_back(
         fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_ticks_, state_.k));
-  result_.provenance = log::provenance(inputs_);
 }
 
 }  // namespace hamelin::simulation
