@@ -53,7 +53,6 @@ class Hybrid final : public planning::Planner {
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
         setup_(setup),
-        params_(params),
         model_(setup.model()),
         ws_(model_),
         law_(setup, model_, law_params(params)),
@@ -69,6 +68,7 @@ class Hybrid final : public planning::Planner {
         margin_(std::max(params["margin_m"].get<double>(), 0.5 * setup.map_resolution_m())),
         goal_margin_(std::min(params["goal_margin_m"].get<double>(), margin_)),
         passes_(params["filter_passes"]),
+        max_escapes_(params["max_escapes"]),
         escapes_(params["escape"] == "memory"),
         contact_radius_(params["contact_radius_m"]),
         clearance_at_goal_(setup.spheres().size()),
@@ -228,7 +228,7 @@ class Hybrid final : public planning::Planner {
       return;
     }
     if (!stalled) return;
-    if (!escapes_ || escape_.count() >= params_["max_escapes"].get<int>()) {
+    if (!escapes_ || escape_.count() >= max_escapes_) {
       command.give_up(cause());
       return;
     }
@@ -274,7 +274,6 @@ class Hybrid final : public planning::Planner {
 
   planning::Host host_;
   planning::Setup setup_;
-  Json params_;
   model::Model model_;
   dynamics::Workspace ws_;
   Law law_;
@@ -283,7 +282,7 @@ class Hybrid final : public planning::Planner {
   StallWatch stall_;
   Escape escape_;
   double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, margin_, goal_margin_;
-  int passes_;
+  int passes_, max_escapes_;
   bool escapes_;
   double contact_radius_;
   std::vector<double> clearance_at_goal_;
