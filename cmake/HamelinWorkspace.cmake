@@ -22,7 +22,8 @@ target_compile_options(hamelin_options INTERFACE
   -ffp-contract=off
   $<$<BOOL:${HAMELIN_WERROR}>:-Werror>
   $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
-target_link_options(hamelin_options INTERFACE $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
+# The build-id in the program is how a replay knows that it is the same build.
+target_link_options(hamelin_options INTERFACE LINKER:--build-id=sha1 $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
 if(HAMELIN_SANITIZE)
   list(JOIN HAMELIN_SANITIZE "," _sanitizers)
   target_compile_options(hamelin_options INTERFACE -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all)

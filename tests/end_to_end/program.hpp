@@ -75,6 +75,7 @@ class Bench {
     std::filesystem::create_directories((work_ / file).parent_path());
     std::ofstream(work_ / file, std::ios::binary) << text;
   }
+  [[nodiscard]] std::filesystem::path path(const std::filesystem::path& file) const { return work_ / file; }
   [[nodiscard]] std::string text(const std::filesystem::path& file) const { return read_file(work_ / file); }
   [[nodiscard]] Json json(const std::filesystem::path& file) const { return read_json(work_ / file); }
   [[nodiscard]] bool has(const std::filesystem::path& file) const { return std::filesystem::exists(work_ / file); }

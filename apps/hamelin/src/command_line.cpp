@@ -7,8 +7,9 @@
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/json.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "help.hpp"
+#include "terminal.hpp"
 
 namespace hamelin::app {
 
@@ -25,67 +26,84 @@ const CLI::App* innermost(const CLI::App* app) {
   return app;
 }
 
-std::string full_name(const CLI::App* app) {
-  return app->get_parent() == nullptr ? app->get_name() : full_name(app->get_parent()) + " " + app->get_name();
-}
-
-std::vector<std::string> command_names(const CLI::App* app) {
+std::vector<std::string> command_names(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const auto* command : app->get_subcommands({})) names.push_back(command->get_name());
+  for (const auto* command : shown_commands(app)) names.push_back(command->get_name());
   return names;
 }
 
-std::string unknown(const CLI::App* app, const std::string& argument) {
+std::string did_you_mean(const std::string& name, const std::vector<std::string>& names) {
+  const auto near = nearest_name(name, names);
+  return near.empty() ? "" : fmt::format(", did you mean '{}'?", near);
+}
+
+std::string unknown(const CLI::App& app, const std::string& argument) {
   const bool option = argument.starts_with("-");
   std::vector<std::string> names;
   if (option) {
-    for (const auto* known : app->get_options())
-      for (const auto& name : known->get_lnames()) names.push_back("--" + name);
+    for (const CLI::App* at = &app; at != nullptr; at = at->get_parent())
+      for (const auto* known : at->get_options())
+        for (const auto& name : known->get_lnames()) names.push_back("--" + name);
   } else {
     names = command_names(app);
   }
-  const auto near = nearest_name(argument.substr(0, argument.find('=')), names);
-  const std::string hint = near.empty() ? "" : fmt::format(", did you mean '{}'?", near);
+  if (option && std::find(names.begin(), names.end(), argument.substr(0, argument.find('='))) != names.end())
+    return fmt::format("option '{}' belongs after the command", argument);
   const char* what = option ? "unknown option" : names.empty() ? "unexpected argument" : "unknown command";
-  return fmt::format("{} '{}'{}", what, argument, hint);
+  return fmt::format("{} '{}'{}", what, argument, did_you_mean(argument.substr(0, argument.find('=')), names));
 }
 
 }  // namespace
 
-HelpFormatter::HelpFormatter() {
-  column_width(36);
-}
-
-std::string HelpFormatter::make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const {
-  if (mode == CLI::AppFormatMode::Sub) return make_expanded(app);
-  return fmt::format("Example:\n  {}\n\n{}{}{}{}{}", app->get_footer(), make_description(app), make_usage(app, name),
-                     make_positionals(app), make_groups(app, mode), make_subcommands(app, mode));
-}
-
 CLI::App* add_command(CLI::App& parent, const std::string& name, const std::string& description,
-                      const std::string& example) {
+                      const std::string& examples) {
   auto* command = parent.add_subcommand(name, description);
-  command->footer(example);
+  command->footer(examples);
+  command->fallthrough();
   return command;
+}
+
+CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values) {
+  const auto check = [values](const std::string& given) {
+    if (std::find(values.begin(), values.end(), given) != values.end()) return std::string();
+    return fmt::format("'{}' is not known, expected one of {}{}", given, fmt::join(values, ", "),
+                       did_you_mean(given, values));
+  };
+  return option->check(CLI::Validator(check, fmt::format("{{{}}}", fmt::join(values, ","))));
+}
+
+std::string full_name(const CLI::App& command) {
+  return command.get_parent() == nullptr ? command.get_name()
+                                         : full_name(*command.get_parent()) + " " + command.get_name();
+}
+
+const CLI::App* find_command(const CLI::App& parent, const std::string& name) {
+  for (const auto* command : shown_commands(parent))
+    if (command->get_name() == name) return command;
+  throw Error(ErrorCode::usage, unknown(parent, name));
 }
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = innermost(&app);
   std::string text;
   if (const auto rest = app.remaining(true); !rest.empty()) {
-    text = unknown(at, rest.front());
-  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !command_names(at).empty()) {
-    text = fmt::format("a command is missing, expected one of {}", fmt::join(command_names(at), ", "));
+    text = unknown(*at, rest.front());
+  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !command_names(*at).empty()) {
+    text = fmt::format("a command is missing, expected one of {}", fmt::join(command_names(*at), ", "));
   } else {
     text = error.what();
     std::replace(text.begin(), text.end(), '\n', ' ');
   }
-  const std::string place = at == &app ? "" : full_name(at).substr(app.get_name().size() + 1) + ": ";
-  return fmt::format("{}{} (see {} --help)", place, text, full_name(at));
+  const std::string place = at == &app ? "" : full_name(*at).substr(app.get_name().size() + 1) + ": ";
+  return fmt::format("{}{} (see {} --help)", place, text, full_name(*at));
 }
 
 CLI::Range whole_number() {
   return {0L, (1L << 53) - 1L};
+}
+
+void print_json(const Json& document) {
+  fmt::print("{}\n", document.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
 std::vector<double> number_list(const std::string& option, const std::string& text, std::optional<std::size_t> count) {
@@ -123,7 +141,11 @@ std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem
     own.push_back(prefix / "lib" / "hamelin" / "plugins");
     if (std::string(HAMELIN_LIBDIR) != "lib") own.push_back(prefix / HAMELIN_LIBDIR / "hamelin" / "plugins");
   }
-  return planning::plugin_directories(given, own);
+  auto directories = planning::plugin_directories(given, own);
+  std::string list;
+  for (const auto& directory : directories) list += (list.empty() ? "" : ", ") + directory.string();
+  detail(fmt::format("planners are looked for in {}", list));
+  return directories;
 }
 
 }  // namespace hamelin::app

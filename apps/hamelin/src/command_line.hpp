@@ -5,25 +5,35 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/core/json.hpp"
+
 /// What the subcommands share in reading the command line.
 namespace hamelin::app {
 
-/// Help that opens with the example (an App's footer).
-class HelpFormatter : public CLI::Formatter {
- public:
-  HelpFormatter();
-  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
-};
+/// The group of the options that each command takes, before and after its name.
+inline constexpr const char* everywhere = "Everywhere";
 
-/// A subcommand whose help opens with `example`.
+/// A subcommand whose help opens with `examples`, one a line.
 CLI::App* add_command(CLI::App& parent, const std::string& name, const std::string& description,
-                      const std::string& example);
+                      const std::string& examples);
+
+/// Refuses all but these values, with the nearest one; help and completion offer them. Returns the option.
+CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values);
+
+/// "hamelin scene info"
+[[nodiscard]] std::string full_name(const CLI::App& command);
+
+/// The subcommand of that name. @throws Error usage with the nearest name
+[[nodiscard]] const CLI::App* find_command(const CLI::App& parent, const std::string& name);
 
 /// One line that says what is wrong with a command line, with the nearest known name for an unknown one.
 [[nodiscard]] std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
 /// A check for unsigned options: 0 to 2^53 - 1, what a scene's seed may be. CLI11 reads -1 as the largest number.
 [[nodiscard]] CLI::Range whole_number();
+
+/// Prints a document on stdout, for --json.
+void print_json(const Json& document);
 
 /// The numbers of a comma list. @throws Error usage naming the option, if it is no such list or has not `count` numbers
 [[nodiscard]] std::vector<double> number_list(const std::string& option, const std::string& text,

@@ -6,11 +6,17 @@ namespace hamelin::app {
 
 void add_run(CLI::App& app, int& exit_code);
 void add_integrate(CLI::App& app, int& exit_code);
+void add_replay(CLI::App& app, int& exit_code);
+void add_export(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);
 void add_scene(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);
 void add_plugins(CLI::App& app, int& exit_code);
 void add_validate(CLI::App& app, int& exit_code);
 void add_schema(CLI::App& app, int& exit_code);
+void add_help(CLI::App& app, int& exit_code);
+void add_completion(CLI::App& app, int& exit_code);
+/// Hidden: the build writes the manual pages with it.
+void add_man(CLI::App& app, int& exit_code);
 
 }  // namespace hamelin::app

@@ -4,6 +4,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "terminal.hpp"
 
 namespace hamelin::app {
 
@@ -28,16 +29,18 @@ std::string_view to_string(Kind kind) noexcept {
   return "unknown";
 }
 
-Kind kind_of(const std::filesystem::path& file) {
+namespace {
+
+Kind recognized(const std::filesystem::path& file) {
   const auto ending = file.extension();
   if (ending == ".bt" || ending == ".ot") return Kind::map;
+  if (ending == ".jsonl" || ending == ".zst") return Kind::log;
   if (ending == ".urdf") return Kind::urdf;
   const std::string text = read_file(file);
   if (text.starts_with("# Octomap")) return Kind::map;
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) throw Error(ErrorCode::parse, fmt::format("{}: is empty", file.string()));
   if (text[first] == '<') return Kind::urdf;
-  if (ending == ".jsonl") return Kind::log;
   if (text[first] != '{')
     throw Error(ErrorCode::parse, fmt::format("{}: is no map, XML or JSON object", file.string()));
   // A log is the only format with one object a line.
@@ -55,6 +58,14 @@ Kind kind_of(const std::filesystem::path& file) {
               fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1 or "
                           "hamelin.primitives/1",
                           file.string(), schema.is_null() ? "missing" : schema.dump()));
+}
+
+}  // namespace
+
+Kind kind_of(const std::filesystem::path& file) {
+  const Kind kind = recognized(file);
+  detail(fmt::format("reading {}: a {}", file.string(), to_string(kind)));
+  return kind;
 }
 
 }  // namespace hamelin::app

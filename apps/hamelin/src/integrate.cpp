@@ -6,18 +6,16 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/log/provenance.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "integrator_options.hpp"
 #include "record.hpp"
+#include "scene_flags.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
 
 namespace {
-
-using Eigen::VectorXd;
 
 struct IntegrateOptions {
   std::filesystem::path file;
@@ -25,13 +23,6 @@ struct IntegrateOptions {
   IntegratorFlags integrator;
   std::optional<double> step_s, duration_s;
   RecordOptions record;
-};
-
-// What is integrated, before flags have their say.
-struct Motion {
-  model::Model model;
-  scene::Scene scene;  ///< of a bare robot: all defaults
-  std::vector<std::filesystem::path> inputs;
 };
 
 void say_what_is_ignored(const scene::Scene& scene) {
@@ -43,65 +34,45 @@ void say_what_is_ignored(const scene::Scene& scene) {
   if (!ignored.empty()) note(fmt::format("{}: free motion, ignored: {}", scene.name, fmt::join(ignored, ", ")));
 }
 
-Motion read_motion(const IntegrateOptions& options) {
+// The scene, or for a bare robot one with all defaults.
+scene::Scene read_motion(const IntegrateOptions& options) {
   const Kind kind = kind_of(options.file);
+  scene::Scene scene;
   if (kind == Kind::scene) {
-    scene::Scene scene = scene::read_scene(options.file);
-    if (options.tip) scene.robot.tip = options.tip;
+    scene = scene::read_scene(options.file);
     say_what_is_ignored(scene);
-    std::vector<std::filesystem::path> inputs = {options.file, scene.robot.file};
-    if (scene.robot.spheres) inputs.push_back(*scene.robot.spheres);
-    return {simulation::load_model(scene), std::move(scene), std::move(inputs)};
-  }
-  if (kind != Kind::urdf && kind != Kind::robot)
+  } else if (kind == Kind::urdf || kind == Kind::robot) {
+    scene.name = options.file.string();
+    scene.robot.file = options.file;
+    scene.gravity_m_s2 = Eigen::Vector3d{0.0, 0.0, -9.81};
+  } else {
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: is a {}, expected a robot or a scene", options.file.string(), to_string(kind)));
-  return {model::Model(model::read_robot(options.file, {options.tip, {}})), {}, {options.file}};
-}
-
-VectorXd joint_vector(const char* option, const std::optional<std::string>& given, const VectorXd& otherwise, int dof) {
-  if (!given) return otherwise.size() > 0 ? otherwise : VectorXd::Zero(dof);
-  const auto numbers = number_list(option, *given, static_cast<std::size_t>(dof));
-  return Eigen::Map<const VectorXd>(numbers.data(), dof);
-}
-
-VectorXd damping_of(const scene::Scene& scene, const model::Robot& robot) {
-  const auto& damping = scene.model.joint_damping;
-  const int n = robot.dof();
-  VectorXd values;
-  if (damping.from_robot) {
-    values.resize(n);
-    for (int i = 0; i < n; ++i) values[i] = robot.links[static_cast<std::size_t>(i)].joint.damping;
-  } else if (damping.values.size() == 1) {
-    values = VectorXd::Constant(n, damping.values[0]);
-  } else if (!damping.values.empty()) {
-    if (damping.values.size() != static_cast<std::size_t>(n))
-      throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
-                                                  scene.name, damping.values.size(), n));
-    values = Eigen::Map<const VectorXd>(damping.values.data(), n);
   }
-  return values;
+  if (options.tip) scene.robot.tip = options.tip;
+  return scene;
+}
+
+void set_joints(const char* option, const std::optional<std::string>& given, int dof, Eigen::VectorXd& joints) {
+  if (!given) return;
+  const auto numbers = number_list(option, *given, static_cast<std::size_t>(dof));
+  joints = Eigen::Map<const Eigen::VectorXd>(numbers.data(), dof);
 }
 
 int integrate(const IntegrateOptions& options) {
-  const Motion motion = read_motion(options);
-  const auto& model = motion.model;
-  simulation::FreeMotion free;
-  free.name = options.file.string();
-  free.q0 = joint_vector("--q0", options.q0, motion.scene.start_q, model.dof());
-  free.v0 = joint_vector("--v0", options.v0, motion.scene.start_v, model.dof());
-  free.step_s = options.step_s.value_or(motion.scene.step_s);
-  free.duration_s = options.duration_s.value_or(motion.scene.duration_s);
-  free.integrator = options.integrator.integrator.value_or(motion.scene.integrator.name);
-  const bool scenes_own = free.integrator == motion.scene.integrator.name;
-  const Json params = integrator_params(options.integrator, free.integrator,
-                                        scenes_own ? motion.scene.integrator.params : Json(Json::object()));
-  free.options = integration::options_from_json(params, "integrator " + free.integrator);
-  free.damping = damping_of(motion.scene, model.robot());
-  return record(options.record, options.file, [&](const simulation::Watch& watch) {
-    free.provenance = log::provenance(motion.inputs, command_line());
-    return simulation::integrate(model, free, watch);
-  });
+  scene::Scene scene = read_motion(options);
+  const model::Model model = simulation::load_model(scene);
+  set_joints("--q0", options.q0, model.dof(), scene.start_q);
+  set_joints("--v0", options.v0, model.dof(), scene.start_v);
+  scene.step_s = options.step_s.value_or(scene.step_s);
+  scene.duration_s = options.duration_s.value_or(scene.duration_s);
+  const std::string name = options.integrator.integrator.value_or(scene.integrator.name);
+  // another integrator does not know the parameters of the scene's
+  if (name != scene.integrator.name) scene.integrator = {name, Json::object()};
+  scene.integrator.params = integrator_params(options.integrator, name, scene.integrator.params);
+  const auto motion = simulation::free_motion(scene, model);
+  return record(options.record, files_of(scene),
+                [&](const simulation::Watch& watch) { return simulation::integrate(model, motion, watch); });
 }
 
 }  // namespace
@@ -111,7 +82,8 @@ void add_integrate(CLI::App& app, int& exit_code) {
       app, "integrate",
       "Let a robot move freely: no planner, no obstacles. A bare robot falls under -9.81 m/s^2 along z; of a scene, "
       "robot, base, gravity, damping and start are used",
-      "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 0.5 --step 0.01 --duration 10");
+      "hamelin integrate data/robots/planar3.json --step 0.01 --duration 100\n"
+      "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 1 --step 0.01 --log f.jsonl");
   const auto options = std::make_shared<IntegrateOptions>();
   command->add_option("file", options->file, "a scene, or a robot (.urdf or JSON)")
       ->required()

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "command_line.hpp"
 #include "hamelin/core/error.hpp"
 #include "terminal.hpp"
 
@@ -23,17 +24,16 @@ void say_unused(const char* flag, const std::string& integrator) {
 }  // namespace
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
-  command
-      .add_option(
-          "--integrator", flags.integrator,
-          fmt::format("one of {} (default hamel-variational)", fmt::join(integration::integrator_names(), ", ")))
+  one_of(
+      command.add_option("--integrator", flags.integrator, "time stepping (default the scene's or hamel-variational)"),
+      integration::integrator_names())
       ->type_name("NAME");
   command.add_option("--alpha", flags.alpha, "hamel: where in the step velocities are taken, 0 to 1 (default 0.5)")
       ->type_name("A");
-  command.add_option("--start", flags.start, "hamel, hamel-midpoint: published or consistent (default consistent)")
-      ->type_name("HOW");
-  command.add_option("--solver", flags.solver, "root-finding: newton or feedback (default: the integrator's own)")
-      ->type_name("NAME");
+  one_of(command.add_option("--start", flags.start, "of hamel and hamel-midpoint (default consistent)"),
+         {"published", "consistent"});
+  one_of(command.add_option("--solver", flags.solver, "root-finding (default the integrator's own)"),
+         {"newton", "feedback"});
   command
       .add_option("--tolerance", flags.tolerance,
                   "of root-finding: newton |delta|_inf [rad or m] (1e-12), feedback |tau_e| [Nm] (1e-8)")

@@ -19,6 +19,7 @@ struct ListOptions {
 struct CheckOptions {
   std::string plugin;
   std::vector<std::filesystem::path> plugin_path;
+  bool json = false;
 };
 
 void list(const ListOptions& options) {
@@ -37,7 +38,7 @@ void list(const ListOptions& options) {
     all.push_back(std::move(entry));
   }
   if (options.json) {
-    fmt::print("{}\n", all.dump(2));
+    print_json(all);
     return;
   }
   for (const auto& entry : all) {
@@ -60,23 +61,30 @@ void list(const ListOptions& options) {
 
 int check(const CheckOptions& options) {
   const planning::Plugin plugin = planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
-  int code = 0;
-  for (const auto& result : check_plugin(plugin)) {
-    fmt::print("{:<7} {}{}{}\n", result.failure.empty() ? "ok" : "failed", result.what,
-               result.failure.empty() ? "" : ": ", result.failure);
-    if (!result.failure.empty()) code = 1;
+  const auto results = check_plugin(plugin);
+  Json all = Json::array();
+  bool failed = false;
+  for (const auto& result : results) {
+    const bool ok = result.failure.empty();
+    failed = failed || !ok;
+    all.push_back({{"check", result.what}, {"ok", ok}, {"failure", ok ? Json(nullptr) : Json(result.failure)}});
+    if (!options.json) fmt::print("{:<7} {}{}{}\n", ok ? "ok" : "failed", result.what, ok ? "" : ": ", result.failure);
   }
-  return code;
+  if (options.json) print_json(all);
+  return failed ? 1 : 0;
 }
 
 }  // namespace
 
 void add_plugins(CLI::App& app, int& exit_code) {
-  auto* plugins = add_command(app, "plugins", "List and check planner plugins", "hamelin plugins list");
+  auto* plugins = add_command(app, "plugins", "List and check planner plugins",
+                              "hamelin plugins list\n"
+                              "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
   plugins->require_subcommand(1);
 
-  auto* list_command =
-      add_command(*plugins, "list", "All planners found, with their parameters", "hamelin plugins list");
+  auto* list_command = add_command(*plugins, "list", "All planners found, with their parameters",
+                                   "hamelin plugins list\n"
+                                   "hamelin plugins list --plugin-path build/lib/hamelin/plugins --json");
   const auto list_options = std::make_shared<ListOptions>();
   list_command->add_option("--plugin-path", list_options->plugin_path, "look here first; may be repeated")
       ->type_name("DIR")
@@ -85,6 +93,7 @@ void add_plugins(CLI::App& app, int& exit_code) {
   list_command->callback([list_options] { list(*list_options); });
 
   auto* check_command = add_command(*plugins, "check", "Load a planner and try it on a small arm",
+                                    "hamelin plugins check gyro\n"
                                     "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
   const auto check_options = std::make_shared<CheckOptions>();
   check_command->add_option("plugin", check_options->plugin, "a plugin's name or path")
@@ -93,6 +102,7 @@ void add_plugins(CLI::App& app, int& exit_code) {
   check_command->add_option("--plugin-path", check_options->plugin_path, "look here first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
+  check_command->add_flag("--json", check_options->json, "print JSON");
   check_command->callback([check_options, &exit_code] { exit_code = check(*check_options); });
 }
 

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "output.hpp"
 #include "summary.hpp"
 #include "terminal.hpp"
 
@@ -14,21 +17,28 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool same_file(const fs::path& a, const fs::path& b) {
-  std::error_code ec;
-  return fs::weakly_canonical(a, ec) == fs::weakly_canonical(b, ec);
+// Above this a log's size is worth a word before the run begins.
+constexpr double large_log_bytes = 100e6;
+
+std::string bytes(double count) {
+  return count >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * count) : fmt::format("{:.0f} MB", std::max(1.0, 1e-6 * count));
 }
 
-// A result is renamed into place, so only a regular file may stand there, and a link is followed first.
-fs::path result_target(const fs::path& file) {
+// How large the log may become, if that is much, or more than there is room for.
+void announce_size(const log::RunLog& run_log, double ticks, int dof) {
+  const double size = log::estimated_bytes(dof, ticks, run_log.compressed());
   std::error_code ec;
-  fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
-  if (fs::exists(target, ec) && !fs::is_regular_file(target, ec))
-    throw Error(
-        ErrorCode::io,
-        fmt::format("{}: is no regular file, expected a path for the result; --json prints to stdout", file.string()));
-  log::check_writable(target);
-  return target;
+  const auto space = fs::space(fs::absolute(run_log.file(), ec).parent_path(), ec);
+  const double room = ec ? size : static_cast<double>(space.available);
+  const std::string foretold = fmt::format("{}: may grow to about {}", run_log.file().string(), bytes(size));
+  const char* remedy =
+      run_log.compressed() ? "--every K makes it smaller" : "--every K or a name that ends in .zst makes it smaller";
+  if (size > room)
+    note(fmt::format("{}, but only {} are free; {}", foretold, bytes(room), remedy));
+  else if (size > large_log_bytes)
+    note(fmt::format("{}; {}", foretold, remedy));
+  else
+    detail(foretold);
 }
 
 }  // namespace
@@ -38,36 +48,37 @@ void add_record_options(CLI::App& command, RecordOptions& options) {
       ->type_name("K")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1'000'000'000L));
-  command.add_option("--log", options.log, "write the run to a JSON Lines file, line by line")->type_name("OUT.jsonl");
+  command.add_option("--log", options.log, "write the run to a JSON Lines file; compressed if its name ends in .zst")
+      ->type_name("OUT.jsonl");
   command.add_option("--result", options.result, "write the result to a JSON file")->type_name("OUT.json");
   command.add_flag("--json", options.json, "print the result as JSON instead of a summary");
 }
 
-int record(const RecordOptions& options, const fs::path& input,
+int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
            const std::function<log::Result(const simulation::Watch&)>& simulate) {
-  for (const auto& output : {options.log, options.result})
-    if (output && same_file(*output, input))
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: is the input, expected another path for the output", output->string()));
   if (options.log && options.result && same_file(*options.log, *options.result))
     throw Error(ErrorCode::usage,
                 fmt::format("--log and --result are both {}, expected two paths", options.log->string()));
   std::optional<fs::path> result_file;
-  if (options.result) result_file = result_target(*options.result);
+  if (options.result) result_file = output_target(*options.result, inputs);
   std::optional<log::RunLog> run_log;
-  if (options.log) run_log.emplace(*options.log);
+  if (options.log) {
+    check_output(*options.log, inputs);
+    run_log.emplace(*options.log);
+  }
 
   simulation::Watch watch;
   watch.log = run_log ? &*run_log : nullptr;
   watch.every = options.every;
+  watch.argv = command_line();
   watch.stop = &stop_on_signals();
+  if (run_log) watch.announce = [&run_log](double ticks, int dof) { announce_size(*run_log, ticks, dof); };
   log::Result result;
   {
     Progress progress;
     watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
     result = simulate(watch);
   }
-  result.provenance["argv"] = command_line();
   const Json document = log::to_json(result);
   const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (result_file) write_file_aside(*result_file, text);
@@ -77,7 +88,7 @@ int record(const RecordOptions& options, const fs::path& input,
     std::vector<fs::path> written;
     if (options.log) written.push_back(*options.log);
     if (options.result) written.push_back(*options.result);
-    fmt::print("{}", summary(document, written));
+    report(summary(document, written));
   }
   const int code = log::exit_code(result.outcome);
   if (code == 2 || code == 3)

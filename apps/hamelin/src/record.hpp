@@ -18,9 +18,9 @@ struct RecordOptions {
 void add_record_options(CLI::App& command, RecordOptions& options);
 
 /// Tries the output paths, runs, writes the result and shows it.
-/// @param input the file the run is about; outputs may not replace it
+/// @param inputs the files the run depends on; outputs may not replace them
 /// @return the exit code of the outcome
-[[nodiscard]] int record(const RecordOptions& options, const std::filesystem::path& input,
+[[nodiscard]] int record(const RecordOptions& options, const std::vector<std::filesystem::path>& inputs,
                          const std::function<log::Result(const simulation::Watch&)>& simulate);
 
 }  // namespace hamelin::app

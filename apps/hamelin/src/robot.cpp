@@ -10,6 +10,7 @@
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/model/robot_io.hpp"
+#include "terminal.hpp"
 
 namespace hamelin::app {
 
@@ -86,7 +87,7 @@ void info(const InfoOptions& options) {
   const model::Model model(model::read_robot(options.file, {options.tip, options.spheres}));
   const Json robot = describe(model, options.file);
   if (options.json)
-    fmt::print("{}\n", robot.dump(2));
+    print_json(robot);
   else
     print_table(robot);
 }
@@ -94,23 +95,30 @@ void info(const InfoOptions& options) {
 struct ChainFlags {
   model::ChainOptions chain;
   std::filesystem::path output;
+  bool json = false;
 };
 
 void make_chain(const ChainFlags& flags) {
   const model::Robot robot = model::make_chain(flags.chain);
   write_file_aside(flags.output, model::robot_to_json(robot).dump(1) + "\n");
-  fmt::print("{}: {} joints\n", flags.output.string(), robot.dof());
+  if (flags.json)
+    print_json({{"file", flags.output.string()}, {"dof", robot.dof()}});
+  else
+    report(fmt::format("{}: {} joints\n", flags.output.string(), robot.dof()));
 }
 
 }  // namespace
 
 void add_robot(CLI::App& app, int& exit_code) {
-  auto* robot = add_command(app, "robot", "Look at robots and make them", "hamelin robot info data/robots/arm7.urdf");
+  auto* robot = add_command(app, "robot", "Look at robots and make them",
+                            "hamelin robot info data/robots/arm7.urdf\n"
+                            "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json");
   robot->require_subcommand(1);
 
   auto* info_command = add_command(
       *robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
-      "hamelin robot info data/robots/arm7.urdf");
+      "hamelin robot info data/robots/arm7.urdf\n"
+      "hamelin robot info data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json --json");
   const auto info_options = std::make_shared<InfoOptions>();
   info_command->add_option("file", info_options->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
   info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")
@@ -125,7 +133,8 @@ void add_robot(CLI::App& app, int& exit_code) {
 
   auto* chain_command =
       add_command(*robot, "make-chain", "Write a chain of equal links along +y",
-                  "hamelin robot make-chain --links 7 --axes x,z,x --length 0.2 --mass 1 --radius 0.03 -o chain7.json");
+                  "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json\n"
+                  "hamelin robot make-chain --links 3 --axes z --length 0.3 --mass 2 --radius 0.05 -o planar.json");
   const auto chain_flags = std::make_shared<ChainFlags>();
   auto& chain = chain_flags->chain;
   chain_command->add_option("--links", chain.links, "how many")->type_name("N")->capture_default_str();
@@ -136,6 +145,7 @@ void add_robot(CLI::App& app, int& exit_code) {
   chain_command->add_option("--mass", chain.mass_kg, "of each link [kg]")->type_name("M")->capture_default_str();
   chain_command->add_option("--radius", chain.radius_m, "of each link [m]")->type_name("R")->capture_default_str();
   chain_command->add_option("-o,--output", chain_flags->output, "where to write it")->required()->type_name("FILE");
+  chain_command->add_flag("--json", chain_flags->json, "print what was written as JSON");
   chain_command->callback([chain_flags, &exit_code] {
     make_chain(*chain_flags);
     exit_code = 0;

@@ -40,7 +40,7 @@ void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
 int run(const RunOptions& options) {
   const scene::Scene scene = read_scene(options.file, options.flags);
   say_what_is_unused(scene, simulation::load_model(scene).robot());
-  return record(options.record, options.file, [&](const simulation::Watch& watch) {
+  return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
     return simulation::run(scene, plugin_path(options.plugin_path), watch);
   });
 }
@@ -48,8 +48,11 @@ int run(const RunOptions& options) {
 }  // namespace
 
 void add_run(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "run", "Move a scene's arm to its goal with a planner, in closed loop",
-                              "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json");
+  auto* command =
+      add_command(app, "run", "Move a scene's arm to its goal with a planner, in closed loop",
+                  "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json\n"
+                  "hamelin run data/scenes/clutter.json --planner apf --duration 5\n"
+                  "hamelin run data/scenes/shelf.json --set /planner/params/cruise_speed=1 --log slow.jsonl.zst");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
   command->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")

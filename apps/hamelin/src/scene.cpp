@@ -32,6 +32,7 @@ struct MakeOptions {
   std::string sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
   std::vector<std::string> keep_out;
   std::filesystem::path output;
+  bool json = false;
 };
 
 Json corner(const std::array<double, 3>& x) {
@@ -125,7 +126,7 @@ void info(const InfoOptions& options) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: is a {}, expected a map or a scene", options.file.string(), to_string(kind)));
   if (options.json)
-    fmt::print("{}\n", document.dump(2));
+    print_json(document);
   else
     show(document);
 }
@@ -177,20 +178,32 @@ void make(const MakeOptions& options) {
   const bool map = options.primitives || options.clutter > 0;
   if (map == options.problem.has_value())
     throw Error(ErrorCode::usage, "scene make: give either a problem, or --primitives or --clutter");
-  const auto report = map ? make_map(options) : make_scene(options);
-  fmt::print("{}: {} primitives, {} occupied voxels, {} free, {} nodes, {} bytes, sha256 {}\n", report.output.string(),
-             report.primitives, report.occupied_voxels, report.free_voxels, report.nodes, report.bytes, report.sha256);
+  const auto made = map ? make_map(options) : make_scene(options);
+  if (options.json)
+    print_json({{"file", made.output.string()},
+                {"primitives", made.primitives},
+                {"occupied_voxels", made.occupied_voxels},
+                {"free_voxels", made.free_voxels},
+                {"nodes", made.nodes},
+                {"bytes", made.bytes},
+                {"sha256", made.sha256}});
+  else
+    report(fmt::format("{}: {} primitives, {} occupied voxels, {} free, {} nodes, {} bytes, sha256 {}\n",
+                       made.output.string(), made.primitives, made.occupied_voxels, made.free_voxels, made.nodes,
+                       made.bytes, made.sha256));
 }
 
 }  // namespace
 
 void add_scene(CLI::App& app, int&) {
-  auto* scene =
-      add_command(app, "scene", "Look at scenes and maps, and make them", "hamelin scene info data/maps/shelf.bt");
+  auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them",
+                            "hamelin scene info data/maps/shelf.bt\n"
+                            "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
   scene->require_subcommand(1);
 
-  auto* info_command =
-      add_command(*scene, "info", "What a map or a scene holds", "hamelin scene info data/scenes/shelf.json");
+  auto* info_command = add_command(*scene, "info", "What a map or a scene holds",
+                                   "hamelin scene info data/scenes/shelf.json\n"
+                                   "hamelin scene info data/maps/clutter.bt --json");
   const auto info_options = std::make_shared<InfoOptions>();
   info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")
       ->required()
@@ -201,13 +214,15 @@ void add_scene(CLI::App& app, int&) {
 
   auto* make_command =
       add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
-                  "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
+                  "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt\n"
+                  "hamelin scene make --clutter 30 --seed 4 --keep-out 0,0,0.3,0.4 -o clutter.bt\n"
+                  "hamelin scene make problem.json --robot arm.urdf --spheres arm.spheres.json -o scene.json");
   const auto options = std::make_shared<MakeOptions>();
   make_command->add_option("problem", options->problem, "a MotionBenchMaker problem")->type_name("PROBLEM.json");
   make_command
       ->add_option("--primitives", options->primitives,
                    "spheres, boxes, cylinders (see `hamelin schema print primitives`)")
-      ->type_name("F");
+      ->type_name("FILE.json");
   make_command->add_option("--clutter", options->clutter, "number of random primitives")
       ->type_name("N")
       ->check(whole_number());
@@ -221,17 +236,18 @@ void add_scene(CLI::App& app, int&) {
   make_command->add_option("--keep-out", options->keep_out, "no clutter reaches into this ball [m]; may be repeated")
       ->type_name("X,Y,Z,R")
       ->allow_extra_args(false);
-  make_command->add_option("--robot", options->robot, "the problem's robot")->type_name("F");
-  make_command->add_option("--spheres", options->spheres, "its collision spheres")->type_name("F");
+  make_command->add_option("--robot", options->robot, "the problem's robot")->type_name("FILE");
+  make_command->add_option("--spheres", options->spheres, "its collision spheres")->type_name("FILE.json");
   make_command->add_option("--tip", options->tip, "its tip")->type_name("LINK");
   make_command->add_option("--resolution", options->resolution_m, "edge of a voxel [m] (default the file's, else 0.02)")
       ->type_name("R");
-  make_command
-      ->add_option("--mark", options->mark, "voxels that primitives touch, or whose centre they hold (default touch)")
-      ->type_name("touch|centre");
+  one_of(make_command->add_option("--mark", options->mark,
+                                  "voxels that primitives touch, or whose centre they hold (default touch)"),
+         {"touch", "centre"});
   make_command->add_option("-o,--output", options->output, "the map (.bt) or scene (.json) to write")
       ->required()
-      ->type_name("F");
+      ->type_name("FILE");
+  make_command->add_flag("--json", options->json, "print what was written as JSON");
   make_command->callback([options] { make(*options); });
 }
 

@@ -25,4 +25,11 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
+std::vector<std::filesystem::path> files_of(const scene::Scene& scene) {
+  std::vector<std::filesystem::path> files = {scene.name, scene.robot.file};
+  if (scene.robot.spheres) files.push_back(*scene.robot.spheres);
+  if (scene.map) files.push_back(scene.map->file);
+  return files;
+}
+
 }  // namespace hamelin::app

@@ -21,4 +21,7 @@ struct SceneFlags {
 /// @throws Error as scene::scene_from_json does, and for a file that is no scene
 [[nodiscard]] scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags);
 
+/// The files that a scene is made of.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const scene::Scene& scene);
+
 }  // namespace hamelin::app

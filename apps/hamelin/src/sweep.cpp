@@ -89,17 +89,23 @@ int sweep_pairs(const PairsOptions& options) {
   using clock = std::chrono::steady_clock;
   const scene::Scene scene = read_scene(options.file, options.flags);
   Records records(options.output, options.file);
-  const study::DrawnPairs drawn = study::draw_pairs(scene, options.pairs);
+  const study::DrawnPairs drawn = [&] {
+    const Phase phase("drawing pairs");
+    return study::draw_pairs(scene, options.pairs);
+  }();
 
   study::PairRuns runs;
   runs.plugin_directories = plugin_path(options.plugin_path);
   runs.jobs = options.jobs;
   runs.stop = &stop_on_signals();
   const auto begin = clock::now();
+  std::optional<Progress> progress(std::in_place, "pairs run");
   runs.on_result = [&](std::size_t index, const log::Result& result) {
     records.write(index, drawn.pairs[index], result);
+    progress->show(static_cast<double>(index + 1), static_cast<double>(drawn.pairs.size()));
   };
   const auto results = study::run_pairs(scene, drawn.pairs, runs);
+  progress.reset();
   const double wall_s = std::chrono::duration<double>(clock::now() - begin).count();
 
   const study::Summary summary = study::summarize(results);
@@ -107,9 +113,9 @@ int sweep_pairs(const PairsOptions& options) {
     Json document = study::to_json(summary);
     document["draws"] = {{"all", drawn.draws}, {"near", drawn.near_draws}, {"close_goals", drawn.close_goals}};
     document["timing"]["wall_s"] = wall_s;
-    fmt::print("{}\n", document.dump(2));
+    print_json(document);
   } else {
-    fmt::print("{}", table(summary, drawn, wall_s));
+    report(table(summary, drawn, wall_s));
   }
   if (results.size() < drawn.pairs.size() || summary.count(log::Outcome::interrupted) > 0)
     return log::exit_code(log::Outcome::interrupted);
@@ -122,10 +128,14 @@ int sweep_pairs(const PairsOptions& options) {
 }  // namespace
 
 void add_sweep(CLI::App& app, int& exit_code) {
-  auto* sweep = add_command(app, "sweep", "Run many problems", "hamelin sweep pairs data/scenes/shelf.json --count 20");
+  auto* sweep = add_command(app, "sweep", "Run many problems",
+                            "hamelin sweep pairs data/scenes/shelf.json --count 20\n"
+                            "hamelin sweep pairs data/scenes/shelf.json --planner apf --json");
   sweep->require_subcommand(1);
   auto* pairs = add_command(*sweep, "pairs", "Run a scene between random clear joint configurations",
-                            "hamelin sweep pairs data/scenes/shelf.json --count 20 --jobs 2 -o shelf.jsonl");
+                            "hamelin sweep pairs data/scenes/shelf.json --count 20\n"
+                            "hamelin sweep pairs data/scenes/shelf.json --count 20 --jobs 2 -o shelf.jsonl\n"
+                            "hamelin sweep pairs data/scenes/shelf.json --planner apf --json");
   const auto options = std::make_shared<PairsOptions>();
   pairs->add_option("scene", options->file, "a scene file; its own start and goals are not used")
       ->required()

@@ -39,14 +39,20 @@ spdlog::logger& messages() {
   return *logger;
 }
 
-bool wants_colour() {
-  const char* no_colour = std::getenv("NO_COLOR");
+bool dumb_terminal() {
   const char* term = std::getenv("TERM");
-  return ::isatty(STDOUT_FILENO) != 0 && (no_colour == nullptr || *no_colour == '\0') &&
-         (term == nullptr || std::string_view(term) != "dumb");
+  return term != nullptr && std::string_view(term) == "dumb";
 }
 
-// Only for how often progress is shown; no result depends on it.
+bool& no_colour() {
+  static bool wanted = [] {
+    const char* variable = std::getenv("NO_COLOR");
+    return ::isatty(STDOUT_FILENO) == 0 || dumb_terminal() || (variable != nullptr && *variable != '\0');
+  }();
+  return wanted;
+}
+
+// Only for what is told of progress and phases; no result depends on it.
 double now_s() {
   std::timespec t{};
   ::clock_gettime(CLOCK_MONOTONIC, &t);
@@ -63,27 +69,56 @@ void note(std::string_view text) {
   messages().info("note: {}", one_line(text));
 }
 
+void detail(std::string_view text) {
+  messages().debug("{}", one_line(text));
+}
+
+void report(std::string_view text) {
+  if (messages().should_log(spdlog::level::info)) fmt::print("{}", text);
+}
+
+void set_loudness(Loudness loudness) {
+  messages().set_level(loudness == Loudness::quiet     ? spdlog::level::err
+                       : loudness == Loudness::verbose ? spdlog::level::debug
+                                                       : spdlog::level::info);
+}
+
+Phase::Phase(std::string_view what) : what_(what), begin_s_(now_s()) {}
+
+Phase::~Phase() {
+  detail(fmt::format("{}: {:.3f} s", what_, now_s() - begin_s_));
+}
+
+void set_no_colour() {
+  no_colour() = true;
+}
+
 std::string coloured(std::string_view text, Colour colour) {
-  static const bool wanted = wants_colour();
-  if (!wanted || colour == Colour::none) return std::string(text);
+  if (no_colour() || colour == Colour::none) return std::string(text);
   const int code = colour == Colour::good ? 32 : colour == Colour::fair ? 33 : 31;
   return fmt::format("\033[{}m{}\033[0m", code, text);
 }
 
-Progress::Progress() : terminal_(::isatty(STDERR_FILENO) != 0) {}
+Progress::Progress(std::string what)
+    : what_(std::move(what)), counting_(::isatty(STDERR_FILENO) != 0 && !dumb_terminal()), last_shown_s_(now_s()) {}
 
 Progress::~Progress() {
-  if (shown_) fmt::print(stderr, "\r{:40}\r", "");
+  if (counting_ && shown_) fmt::print(stderr, "\r{:60}\r", "");
 }
 
-void Progress::show(double time_s, double duration_s) {
-  if (!terminal_) return;
+void Progress::show(double done, double all) {
+  if (!messages().should_log(spdlog::level::info)) return;
   const double now = now_s();
-  if (shown_ && now - last_shown_s_ < 0.1) return;
-  fmt::print(stderr, "\r{:.1f} of {:.1f} s simulated ", time_s, duration_s);
-  std::fflush(stderr);
-  shown_ = true;
+  if (now - last_shown_s_ < (counting_ ? 0.1 : 10.0)) return;
   last_shown_s_ = now;
+  shown_ = true;
+  const std::string line = fmt::format("{:.4g} of {:.4g} {}", done, all, what_);
+  if (!counting_) {
+    messages().info("{}", line);
+    return;
+  }
+  fmt::print(stderr, "\r{} ", line);
+  std::fflush(stderr);
 }
 
 const std::atomic<bool>& stop_on_signals() {

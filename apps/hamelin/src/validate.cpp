@@ -6,7 +6,7 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/log/run_log.hpp"
+#include "hamelin/log/read_log.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
@@ -20,6 +20,7 @@ struct ValidateOptions {
   std::vector<std::filesystem::path> files;
   std::optional<std::string> tip;
   std::optional<double> scale;
+  bool json = false;
 };
 
 std::string robot_words(const model::Robot& robot) {
@@ -71,27 +72,38 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
 
 int validate(const ValidateOptions& options) {
   int code = 0;
+  Json all = Json::array();
   for (const auto& file : options.files) {
+    Json entry{{"file", file.string()}, {"ok", true}, {"holds", nullptr}, {"error", nullptr}};
     try {
-      fmt::print("{}: ok ({})\n", file.string(), check_file(file, options));
+      const std::string words = check_file(file, options);
+      entry["holds"] = words;
+      if (!options.json) report(fmt::format("{}: ok ({})\n", file.string(), words));
     } catch (const Error& e) {
       error_line(e.what());
+      entry["ok"] = false;
+      entry["error"] = e.what();
       code = 2;
     }
+    all.push_back(std::move(entry));
   }
+  if (options.json) print_json(all);
   return code;
 }
 
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(
-      app, "validate", "Check files: robots, collision spheres, scenes, maps, logs, results; told apart by content",
-      "hamelin validate data/scenes/shelf.json data/maps/shelf.bt");
+  auto* command = add_command(app, "validate",
+                              "Check robots, collision spheres, scenes, maps, logs and results, told apart by content",
+                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
+                              "hamelin validate arm.urdf --tip tool0\n"
+                              "hamelin validate run.jsonl --json");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");
   command->add_option("--scale", options->scale, "metres per unit of a map")->type_name("S");
+  command->add_flag("--json", options->json, "print JSON, an entry a file");
   command->callback([options, &exit_code] { exit_code = validate(*options); });
 }
 

@@ -51,10 +51,25 @@ TEST_CASE("keys keep the order in which they were written", "[core][unit]") {
 TEST_CASE("the nearest name is one within a third of its letters, or none", "[core][unit]") {
   const std::vector<std::string> names{"duration_s", "step_s", "seed"};
   CHECK(nearest_name("duraton_s", names) == "duration_s");
-  CHECK(nearest_name("sede", {"seed", "step_s"}).empty());  // two changes in four letters
+  CHECK(nearest_name("sdee", {"sxex", "step_s"}).empty());  // two changes in four letters
   CHECK(nearest_name("sed", names) == "seed");
   CHECK(nearest_name("gravity", names).empty());
   CHECK(nearest_name("step_s", names) == "step_s");
   CHECK(nearest_name("", names).empty());
   CHECK(nearest_name("x", {}).empty());
+}
+
+TEST_CASE("two neighbours swapped are one slip, and capitals none", "[core][unit]") {
+  CHECK(nearest_name("sede", {"seed", "step_s"}) == "seed");
+  CHECK(nearest_name("rnu", {"run", "robot"}) == "run");
+  CHECK(nearest_name("--setp", {"--set", "--step", "--seed"}) == "--set");  // one slip from both: the first
+  CHECK(nearest_name("RK4", {"hamel", "rk4"}) == "rk4");
+  CHECK(nearest_name("abcd", {"badc"}).empty());  // two swaps in four letters
+}
+
+TEST_CASE("no name is near that shares less than half of its letters", "[core][unit]") {
+  CHECK(nearest_name("x", {"y"}).empty());
+  CHECK(nearest_name("q0", {"v0"}).empty());
+  CHECK(nearest_name("a", {"ab"}).empty());
+  CHECK(nearest_name("rn", {"run"}) == "run");
 }

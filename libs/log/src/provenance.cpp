@@ -1,9 +1,13 @@
 #include "hamelin/log/provenance.hpp"
 
+#include <elf.h>
+#include <gnu/libc-version.h>
+#include <link.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
 #include <Eigen/Core>
+#include <cstring>
 #include <fstream>
 #include <string_view>
 
@@ -33,13 +37,56 @@ Json known(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
+bool has_fma() {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports("fma") != 0 && __builtin_cpu_supports("avx2") != 0;
+#else
+  return false;
+#endif
+}
+
 Json host() {
   std::string os = line_value("/etc/os-release", "PRETTY_NAME", '=');
   utsname system{};
   if (::uname(&system) == 0) os += (os.empty() ? "" : ", ") + std::string(system.sysname) + " " + system.release;
   return {{"os", known(os)},
           {"cpu", known(line_value("/proc/cpuinfo", "model name", ':'))},
-          {"cores", ::sysconf(_SC_NPROCESSORS_ONLN)}};
+          {"cores", ::sysconf(_SC_NPROCESSORS_ONLN)},
+          {"fma", has_fma()}};
+}
+
+// The build-id note of the program itself, the first object listed; empty if the linker made none.
+std::string build_id() {
+  std::string id;
+  dl_iterate_phdr(
+      [](dl_phdr_info* object, std::size_t, void* out) {
+        for (int i = 0; i < object->dlpi_phnum; ++i) {
+          const auto& segment = object->dlpi_phdr[i];
+          if (segment.p_type != PT_NOTE) continue;
+          const std::size_t align = segment.p_align == 8 ? 8 : 4;
+          const auto padded = [align](std::size_t size) { return (size + align - 1) / align * align; };
+          const char* at = reinterpret_cast<const char*>(object->dlpi_addr + segment.p_vaddr);  // NOLINT
+          const char* const end = at + segment.p_memsz;
+          while (at + sizeof(ElfW(Nhdr)) <= end) {
+            ElfW(Nhdr) note;
+            std::memcpy(&note, at, sizeof note);
+            const char* const name = at + sizeof note;
+            const char* const bytes = name + padded(note.n_namesz);
+            if (note.n_type == NT_GNU_BUILD_ID && note.n_namesz == 4 && std::memcmp(name, "GNU", 4) == 0) {
+              for (std::size_t b = 0; b < note.n_descsz; ++b) {
+                constexpr const char* digits = "0123456789abcdef";
+                const auto byte = static_cast<unsigned char>(bytes[b]);
+                *static_cast<std::string*>(out) += {digits[byte >> 4U], digits[byte & 15U]};
+              }
+              return 1;
+            }
+            at = bytes + padded(note.n_descsz);
+          }
+        }
+        return 1;  // no other object
+      },
+      &id);
+  return id;
 }
 
 // The instruction set this code was compiled for.
@@ -61,15 +108,18 @@ constexpr const char* isa() {
 
 }  // namespace
 
-Json provenance(const std::vector<std::filesystem::path>& inputs, const std::vector<std::string>& argv) {
+Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>& argv) {
   Json hashed = Json::array();
-  for (const auto& file : inputs) hashed.push_back({{"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
+  for (const auto& [role, file] : inputs)
+    hashed.push_back({{"role", role}, {"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
+  std::error_code ec;
   const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                             std::to_string(EIGEN_MINOR_VERSION);
   return {{"host", host()},
           {"isa", isa()},
           {"build",
-           {{"compiler", HAMELIN_COMPILER},
+           {{"id", known(build_id())},
+            {"compiler", HAMELIN_COMPILER},
             {"flags", HAMELIN_BUILD_FLAGS},
             {"type", known(HAMELIN_BUILD_TYPE)},
             {"sanitizers", known(HAMELIN_SANITIZERS)}}},
@@ -77,7 +127,9 @@ Json provenance(const std::vector<std::filesystem::path>& inputs, const std::vec
            {{"hamelin", std::string(version())},
             {"git_commit", known(HAMELIN_GIT_COMMIT)},
             {"eigen", eigen},
-            {"octomap", known(HAMELIN_OCTOMAP_VERSION)}}},
+            {"octomap", known(HAMELIN_OCTOMAP_VERSION)},
+            {"libc", gnu_get_libc_version()}}},
+          {"cwd", known(std::filesystem::current_path(ec).string())},
           {"argv", argv},
           {"inputs", hashed}};
 }

@@ -1,17 +1,26 @@
-#include <fmt/format.h>
+#include "hamelin/log/read_log.hpp"
 
+#include <fmt/format.h>
+#include <zstd.h>
+#include <zstd_errors.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <map>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
-#include "hamelin/log/run_log.hpp"
 
 namespace hamelin::log {
 
 namespace {
 
-std::string place(const std::filesystem::path& file, std::size_t index) {
-  return fmt::format("{}: line {}", file.string(), index + 1);
+constexpr std::size_t chunk = std::size_t{1} << 16;
+// Ours hold 256 lines; a file compressed by hand is one frame. What is larger is no log but a trap.
+constexpr std::size_t largest_frame = std::size_t{1} << 30;
+
+std::string place(const std::filesystem::path& file, std::size_t line) {
+  return fmt::format("{}: line {}", file.string(), line);
 }
 
 // The schema of one kind of line, with what it refers to.
@@ -33,71 +42,195 @@ Json array_of(const Json& schema) {
   return outer;
 }
 
+// The line's type, if it is one of ours. @throws Error invalid
+std::string type_of(const Json& line, const std::string& where) {
+  const Json type = line.value("type", Json(nullptr));
+  for (const char* known : {"header", "tick", "event", "result"})
+    if (type == known) return known;
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: type {}, expected header, tick, event or result", where, type.dump()));
+}
+
+// Lines of one type with where they stood, checked many at a time: that is fast, and only where something is wrong one
+// by one names the line.
+class Batch {
+ public:
+  explicit Batch(const std::string& type) : schema_(line_schema(type)), many_(array_of(schema_)) {}
+  void add(Json line, std::string where) {
+    lines_.push_back(std::move(line));
+    places_.push_back(std::move(where));
+    if (lines_.size() == 1000) check();
+  }
+  void check() {
+    try {
+      check_schema(lines_, many_, "log");
+    } catch (const Error&) {
+      for (std::size_t i = 0; i < lines_.size(); ++i) check_schema(lines_[i], schema_, places_[i]);
+      throw;
+    }
+    lines_ = Json::array();
+    places_.clear();
+  }
+
+ private:
+  Json schema_, many_, lines_ = Json::array();
+  std::vector<std::string> places_;
+};
+
 }  // namespace
 
-LogLines read_log(const std::filesystem::path& file) {
-  const std::string text = read_file(file);
-  LogLines log;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const auto end = text.find('\n', begin);
-    if (end == std::string::npos) {
-      log.cut = true;
-      break;
-    }
-    const std::string where = place(file, log.lines.size());
-    log.lines.push_back(parse_json(std::string_view(text).substr(begin, end - begin), where));
-    if (!log.lines.back().is_object())
-      throw Error(ErrorCode::parse, fmt::format("{}: no JSON object, expected one a line", where));
-    begin = end + 1;
+struct LogReader::Decompressor {
+  ZSTD_DCtx* context = ZSTD_createDCtx();
+  std::string input, frame;
+  std::size_t at = 0;                  ///< read up to here in `input`
+  std::size_t offset = 0, number = 1;  ///< where the frame begins in the file, and its number
+  std::size_t taken = 0;               ///< bytes of the file taken in so far
+
+  Decompressor() {
+    if (context == nullptr) throw std::bad_alloc();
   }
+  ~Decompressor() { ZSTD_freeDCtx(context); }
+  Decompressor(const Decompressor&) = delete;
+  Decompressor& operator=(const Decompressor&) = delete;
+};
+
+LogReader::LogReader(const std::filesystem::path& file) : file_(file) {
+  std::error_code ec;
+  if (std::filesystem::is_directory(file, ec))
+    throw Error(ErrorCode::io, fmt::format("{}: cannot be read: Is a directory", file.string()));
+  errno = 0;
+  in_.open(file, std::ios::binary);
+  if (!in_)
+    throw Error(ErrorCode::io, fmt::format("{}: cannot be read: {}", file.string(),
+                                           errno != 0 ? std::strerror(errno) : "the stream failed"));
+  constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
+  std::string first(magic.size(), '\0');
+  in_.read(first.data(), static_cast<std::streamsize>(first.size()));
+  first.resize(static_cast<std::size_t>(in_.gcount()));
+  in_.clear();
+  in_.seekg(0);
+  if (!first.empty() && magic.starts_with(first)) decompressor_ = std::make_unique<Decompressor>();
+}
+
+LogReader::~LogReader() = default;
+
+std::string LogReader::where() const {
+  return place(file_, lines_);
+}
+
+bool LogReader::read_more() {
+  const auto fill = [this](std::string& bytes) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + chunk);
+    in_.read(bytes.data() + before, static_cast<std::streamsize>(chunk));
+    const auto got = static_cast<std::size_t>(in_.gcount());
+    bytes.resize(before + got);
+    if (in_.bad()) throw Error(ErrorCode::io, fmt::format("{}: cannot be read: the stream failed", file_.string()));
+    return got;
+  };
+  if (!decompressor_) return fill(text_) > 0;
+
+  auto& d = *decompressor_;
+  const auto damaged = [&](const std::string& what) {
+    return Error(ErrorCode::parse,
+                 fmt::format("{}: frame {} at byte {}: {}", file_.string(), d.number, d.offset, what));
+  };
+  for (;;) {
+    if (d.at == d.input.size()) {
+      d.input.clear();
+      d.at = 0;
+      if (fill(d.input) == 0) {
+        // what a crash left of a frame is of no use: without its end nothing vouches for it
+        cut_ = d.taken > d.offset;
+        return false;
+      }
+    }
+    const std::size_t before = d.frame.size();
+    d.frame.resize(before + ZSTD_DStreamOutSize());
+    ZSTD_inBuffer in{d.input.data(), d.input.size(), d.at};
+    ZSTD_outBuffer out{d.frame.data(), d.frame.size(), before};
+    const std::size_t left = ZSTD_decompressStream(d.context, &out, &in);
+    if (ZSTD_isError(left) != 0) throw damaged(fmt::format("is damaged ({})", ZSTD_getErrorName(left)));
+    d.taken += in.pos - d.at;
+    d.at = in.pos;
+    d.frame.resize(out.pos);
+    if (d.frame.size() > largest_frame) throw damaged("holds more than 1 GiB, expected a log of hamelin");
+    if (left == 0) {
+      text_ += d.frame;
+      d.frame.clear();
+      d.offset = d.taken;
+      ++d.number;
+      return true;
+    }
+  }
+}
+
+bool LogReader::next_text(std::string_view& line) {
+  std::size_t end = text_.find('\n', at_);
+  while (end == std::string::npos) {
+    text_.erase(0, at_);
+    at_ = 0;
+    const std::size_t searched = text_.size();
+    if (!read_more()) {
+      cut_ = cut_ || !text_.empty();
+      return false;
+    }
+    end = text_.find('\n', searched);
+  }
+  ++lines_;
+  line = std::string_view(text_).substr(at_, end - at_);
+  at_ = end + 1;
+  return true;
+}
+
+bool LogReader::next(Json& line) {
+  std::string_view text;
+  if (!next_text(text)) return false;
+  line = parse_json(text, where());
+  if (!line.is_object()) throw Error(ErrorCode::parse, fmt::format("{}: no JSON object, expected one a line", where()));
+  return true;
+}
+
+LogLines read_log(const std::filesystem::path& file) {
+  LogReader reader(file);
+  LogLines log;
+  for (Json line; reader.next(line);) log.lines.push_back(std::move(line));
+  log.cut = reader.cut();
   return log;
 }
 
+void check_line(const Json& line, const std::string& where) {
+  check_schema(line, line_schema(type_of(line, where)), where);
+}
+
 LogSummary check_log(const std::filesystem::path& file) {
-  const LogLines log = read_log(file);
+  LogReader reader(file);
   LogSummary summary;
-  summary.cut = log.cut;
-  if (log.lines.empty())
-    throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a header", file.string()));
-  std::map<std::string, std::vector<std::size_t>> by_type;
+  std::map<std::string, Batch> batches;
   double k_before = -1.0;
-  for (std::size_t i = 0; i < log.lines.size(); ++i) {
-    const Json& line = log.lines[i];
-    const Json type = line.value("type", Json(nullptr));
-    const bool header = type == "header", tick = type == "tick", event = type == "event", result = type == "result";
-    if (!header && !tick && !event && !result)
+  for (Json line; reader.next(line);) {
+    const std::string where = reader.where();
+    const std::string type = type_of(line, where);
+    if ((type == "header") != (reader.lines() == 1))
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: type {}, expected header, tick, event or result", place(file, i), type.dump()));
-    if (header != (i == 0))
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: type {}, expected the header first, and only there", place(file, i), type.dump()));
+                  fmt::format("{}: type \"{}\", expected the header first, and only there", where, type));
     if (summary.has_result)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: stands behind the result, expected nothing there", place(file, i)));
-    by_type[type.get<std::string>()].push_back(i);
-    summary.ticks += tick ? 1 : 0;
-    summary.events += event ? 1 : 0;
-    summary.has_result = result;
-    if (tick && line.contains("k") && line["k"].is_number()) {
+      throw Error(ErrorCode::invalid, fmt::format("{}: stands behind the result, expected nothing there", where));
+    summary.ticks += type == "tick" ? 1 : 0;
+    summary.events += type == "event" ? 1 : 0;
+    summary.has_result = type == "result";
+    if (type == "tick" && line.contains("k") && line["k"].is_number()) {
       const double k = line["k"].get<double>();
       if (k <= k_before)
-        throw Error(ErrorCode::invalid,
-                    fmt::format("{}: /k: {} after {}, expected rising steps", place(file, i), k, k_before));
+        throw Error(ErrorCode::invalid, fmt::format("{}: /k: {} after {}, expected rising steps", where, k, k_before));
       k_before = k;
     }
+    batches.try_emplace(type, type).first->second.add(std::move(line), where);
   }
-  for (const auto& [type, indices] : by_type) {
-    const Json schema = line_schema(type);
-    Json all = Json::array();
-    for (const auto i : indices) all.push_back(log.lines[i]);
-    // All at once is fast; one by one, only where something is wrong, names the line.
-    try {
-      check_schema(all, array_of(schema), file.string());
-    } catch (const Error&) {
-      for (const auto i : indices) check_schema(log.lines[i], schema, place(file, i));
-      throw;
-    }
-  }
+  summary.cut = reader.cut();
+  if (reader.lines() == 0)
+    throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a header", file.string()));
+  for (auto& [type, batch] : batches) batch.check();
   return summary;
 }
 

@@ -103,6 +103,7 @@ Json to_json(const Result& r) {
                    {"steps", r.steps},
                    {"q", array(r.q)},
                    {"v", array(r.v)},
+                   {"v_abs_max", r.v_abs_max.size() > 0 ? array(r.v_abs_max) : Json(nullptr)},
                    {"energy_initial_J", r.energy_initial_J},
                    {"energy_final_J", r.energy_final_J},
                    {"energy_error_max_J", r.energy_error_max_J},

@@ -3,6 +3,7 @@
 
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/result.hpp"
+#include "hamelin/log/read_log.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/test/readme.hpp"
 
@@ -16,7 +17,8 @@ TEST_CASE("the README's example writes a log that checks", "[log][unit]") {
   // [example]
 {
   log::RunLog run(file);
-  run.write("header", {{"config", {{"step_s", 0.001}}}, {"provenance", log::provenance({})}});
+  run.write("header", {{"program", "integrate"}, {"scene", "spring.json"}, {"every", 1}, {"joints", Json::array()},
+                       {"config", {{"step_s", 0.001}}}, {"provenance", log::provenance({})}});
   run.write("event", {{"time_s", 0.0}, {"text", "a spring joins in"}});
   log::Result result;
   result.scene = "spring.json";

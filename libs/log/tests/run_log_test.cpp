@@ -6,7 +6,9 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "hamelin/core/rng.hpp"
 #include "hamelin/log/provenance.hpp"
+#include "hamelin/log/read_log.hpp"
 #include "hamelin/log/result.hpp"
 
 using namespace hamelin;
@@ -44,7 +46,8 @@ Json tick(long k) {
           {"solver", {{"updates", 1}, {"residual", 1e-14}, {"halvings", 0}}}};
 }
 
-const Json header = {{"config", Json::object()}, {"provenance", Json::object()}};
+const Json header = {{"program", "integrate"},   {"scene", "a.json"},       {"every", 1},
+                     {"config", Json::object()}, {"joints", Json::array()}, {"provenance", Json::object()}};
 
 log::Result result() {
   log::Result r;
@@ -146,7 +149,7 @@ TEST_CASE("a cut line at the end is left out, the lines before it stay", "[log][
 
 TEST_CASE("a broken line before the end is an error that names it", "[log][unit]") {
   const auto file = fresh_directory("broken") / "run.jsonl";
-  put(file, "{\"type\":\"header\",\"schema\":\"hamelin.run/1\",\"config\":{},\"provenance\":{}}\n{\"type\":\n{}\n");
+  put(file, "{\"type\":\"header\"}\n{\"type\":\n{}\n");
   CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl: line 2"));
 }
 
@@ -174,6 +177,114 @@ TEST_CASE("check_log names the line that breaks the rules", "[log][unit]") {
   CHECK_THAT(with({{"header", header}, {"tick", short_tick}}), Contains("line 2") && Contains("'q' is missing"));
   put(file, "");
   CHECK_THAT(what_of_check(file), Contains("no whole line"));
+}
+
+TEST_CASE("a log named .zst is compressed, and read back as the same lines", "[log][zstd]") {
+  const auto directory = fresh_directory("zstd");
+  for (const char* name : {"run.jsonl", "run.jsonl.zst"}) {
+    log::RunLog record(directory / name);
+    record.write("header", header);
+    for (long k = 0; k < 1000; ++k) record.write("tick", tick(k));
+    record.write("result", log::to_json(result()));
+  }
+  CHECK(log::read_log(directory / "run.jsonl.zst").lines == log::read_log(directory / "run.jsonl").lines);
+  CHECK(log::check_log(directory / "run.jsonl.zst").ticks == 1000);
+  CHECK(fs::file_size(directory / "run.jsonl.zst") * 3 < fs::file_size(directory / "run.jsonl"));
+}
+
+TEST_CASE("a compressed log has its header at once, and loses at most a frame of lines", "[log][zstd]") {
+  const auto file = fresh_directory("frames") / "run.jsonl.zst";
+  log::RunLog record(file);
+  record.write("header", header);
+  CHECK(log::read_log(file).lines.size() == 1);
+  const long ticks = static_cast<long>(log::RunLog::lines_per_frame) + 10;
+  for (long k = 0; k < ticks; ++k) record.write("tick", tick(k));
+  CHECK(log::read_log(file).lines.size() == 1 + log::RunLog::lines_per_frame);
+  record.flush();
+  CHECK(log::read_log(file).lines.size() == 1 + static_cast<std::size_t>(ticks));
+}
+
+TEST_CASE("a log cut anywhere is read up to its last whole line or frame", "[log][zstd]") {
+  const auto directory = fresh_directory("cuts");
+  for (const char* name : {"run.jsonl", "run.jsonl.zst"}) {
+    CAPTURE(name);
+    std::vector<std::uintmax_t> ends = {0};  // of what is whole, in bytes
+    std::vector<std::size_t> lines = {0};
+    {
+      log::RunLog record(directory / name);
+      const auto write = [&](const char* type, const Json& fields) {
+        record.write(type, fields);
+        const auto size = fs::file_size(directory / name);
+        lines.push_back(lines.back());
+        if (size != ends.back()) lines.back() = ends.size();
+        ends.push_back(size);
+      };
+      write("header", header);
+      for (long k = 0; k < 700; ++k) write("tick", tick(k));
+      write("result", log::to_json(result()));
+    }
+    const std::string whole = read_file(directory / name);
+    const auto all = log::read_log(directory / name).lines;
+    Rng random(7);
+    for (int i = 0; i < 200; ++i) {
+      const auto at = static_cast<std::uintmax_t>(random.uniform(0.0, static_cast<double>(whole.size())));
+      CAPTURE(at);
+      put(directory / "cut", whole.substr(0, at));
+      // the last write that ended before the cut
+      std::size_t wanted = 0;
+      bool clean = at == 0;
+      for (std::size_t n = 1; n < ends.size(); ++n) {
+        if (ends[n] <= at) wanted = lines[n];
+        clean = clean || ends[n] == at;
+      }
+      const auto read = log::read_log(directory / "cut");
+      REQUIRE(read.lines.size() == wanted);
+      CHECK(read.cut != clean);
+      CHECK(std::equal(read.lines.begin(), read.lines.end(), all.begin()));
+    }
+  }
+}
+
+TEST_CASE("a damaged frame is named, and a file compressed by hand is read", "[log][zstd]") {
+  const auto directory = fresh_directory("damaged");
+  const auto file = directory / "run.jsonl.zst";
+  {
+    log::RunLog record(file);
+    record.write("header", header);
+    for (long k = 0; k < 600; ++k) record.write("tick", tick(k));
+  }
+  std::string bytes = read_file(file);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
+  put(file, bytes);
+  CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl.zst: frame ") && Contains("is damaged"));
+}
+
+TEST_CASE("the size foretold is right to a factor of two", "[log][unit]") {
+  const auto directory = fresh_directory("size");
+  for (const int dof : {3, 7, 20})
+    for (const char* name : {"run.jsonl", "run.jsonl.zst"}) {
+      CAPTURE(dof, name);
+      Rng random(3);
+      {
+        log::RunLog record(directory / name);
+        for (long k = 0; k < 2000; ++k) {
+          Json fields = tick(k);
+          const auto numbers = [&] {
+            std::vector<double> some(static_cast<std::size_t>(dof));
+            for (auto& number : some) number = random.uniform(-1.0, 1.0);
+            return some;
+          };
+          for (const char* key : {"q", "v", "tau"}) fields[key] = numbers();
+          for (const char* key : {"held", "node"}) fields["channels"][key] = numbers();
+          for (auto& [key, value] : fields["energy"].items()) value = random.uniform(0.0, 1.0);
+          record.write("tick", fields);
+        }
+      }
+      const double size = static_cast<double>(fs::file_size(directory / name));
+      const double foretold = log::estimated_bytes(dof, 2000.0, std::string(name).ends_with(".zst"));
+      CHECK(foretold < 2.0 * size);
+      CHECK(foretold > 0.5 * size);
+    }
 }
 
 TEST_CASE("an unwritable path is refused before anything is written", "[log][unit]") {
@@ -205,14 +316,30 @@ TEST_CASE("a log that is never begun leaves no file, and an old one as it was", 
 TEST_CASE("provenance names machine, build and the inputs with their hashes", "[log][unit]") {
   const auto file = fresh_directory("provenance") / "input.txt";
   put(file, "abc");
-  const Json p = log::provenance({file}, {"hamelin", "run"});
+  const Json p = log::provenance({{"robot", file}}, {"hamelin", "run"});
   // FIPS 180-2, appendix B.1
   CHECK(p["inputs"][0]["sha256"] == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   CHECK(p["inputs"][0]["path"] == file.string());
+  CHECK(p["inputs"][0]["role"] == "robot");
+  CHECK(p["build"]["id"].get<std::string>().size() == 40);
   CHECK(p["host"]["cores"].get<long>() >= 1);
   CHECK_FALSE(p["isa"].get<std::string>().empty());
   CHECK_FALSE(p["build"]["compiler"].get<std::string>().empty());
   CHECK(p["versions"]["hamelin"] == std::string(version()));
   CHECK(p["argv"] == Json({"hamelin", "run"}));
-  CHECK_THROWS_AS(log::provenance({file.parent_path() / "absent"}), Error);
+  CHECK_THROWS_AS(log::provenance({{"map", file.parent_path() / "absent"}}), Error);
+}
+
+TEST_CASE("the tick in docs/logs.md is one", "[log][docs]") {
+  const std::string page = read_file(fs::path(HAMELIN_SOURCE_DIR) / "docs/logs.md");
+  const auto begin = page.find("```json\n") + 8;
+  const Json tick = parse_json(page.substr(begin, page.find("```", begin) - begin), "docs/logs.md");
+  CHECK(tick["type"] == "tick");
+  CHECK_NOTHROW(log::check_line(tick, "docs/logs.md"));
+  // tau is the sum of its channels
+  for (std::size_t i = 0; i < tick["tau"].size(); ++i) {
+    double sum = 0.0;
+    for (const auto& [channel, torque] : tick["channels"].items()) sum += torque[i].get<double>();
+    CHECK(sum == Approx(tick["tau"][i].get<double>()).epsilon(1e-14));
+  }
 }

@@ -9,6 +9,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/provenance.hpp"
+#include "plant.hpp"
 
 namespace hamelin::simulation {
 
@@ -103,10 +104,12 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         clearance_before_ = clearance_;
         for (const auto& sphere : plant_.spheres()) radii_.push_back(sphere.radius);
         command_ = std::make_unique<planning::CommandBuffers>(static_cast<std::size_t>(n), shown_.size());
-        for (auto* x : {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_})
+        for (auto* x :
+             {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_, &tau_})
           *x = VectorXd::Zero(n);
         if (scene.model.torque_limits)
           limits_ = limits_of(plant_.robot(), &model::Joint::effort_max, std::numeric_limits<double>::infinity());
+        plant_damping_ = plant_damping(scene, plant_.robot());
         channels_.held_torque = VectorXd::Zero(n);
         channels_.damping = VectorXd::Zero(n);
         channels_.gyroscopic.reserve(shown_.size());
@@ -122,11 +125,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
                    ? plugin.create(setup_data(plant_, influence_), *this, planner_params_)
                    : plugin.create(setup_data(scaled_masses(plant_, mass_scale), influence_), *this, planner_params_);
       }()) {
-  if (std::error_code ec; std::filesystem::is_regular_file(scene.name, ec)) inputs_.emplace_back(scene.name);
-  inputs_.push_back(scene.robot.file);
-  if (scene.robot.spheres) inputs_.push_back(*scene.robot.spheres);
-  if (scene.map) inputs_.push_back(scene.map->file);
-  inputs_.push_back(planner_.plugin().file());
+  inputs_ = inputs_of(scene);
+  if (scene.map) inputs_.push_back({"map", scene.map->file});
+  inputs_.push_back({"plugin", planner_.plugin().file()});
 }
 
 void ClosedLoop::check_scene() const {
@@ -144,10 +145,6 @@ void ClosedLoop::check_scene() const {
   if (scene_.model.self_collision)
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: /model/self_collision: is not modelled in this version, expected false", scene_.name));
-  const auto& damping = scene_.model.joint_damping.values;
-  if (damping.size() > 1 && damping.size() != static_cast<std::size_t>(plant_.dof()))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
-                                                scene_.name, damping.size(), plant_.dof()));
 }
 
 planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double influence) const {
@@ -379,7 +376,7 @@ void ClosedLoop::actuate() {
   channels_.damping = command_->damping();
   take_gyroscopic_terms();
   limit_torques();
-  add_plant_damping();
+  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
   if (potential) {
     impulse_ = -half * gradient_;
     integrator_->kick(state_, impulse_);
@@ -419,18 +416,7 @@ void ClosedLoop::actuate_sampled() {
   // the slot written delay_periods_ ticks ago is the next one round
   channels_.held_torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_ + 1) % (delay_periods_ + 1))];
   channels_.damping.setZero();
-  add_plant_damping();
-}
-
-void ClosedLoop::add_plant_damping() {
-  const auto& damping = scene_.model.joint_damping;
-  if (damping.from_robot)
-    for (int i = 0; i < plant_.dof(); ++i)
-      channels_.damping[i] += plant_.robot().links[static_cast<std::size_t>(i)].joint.damping;
-  else if (damping.values.size() == 1)
-    channels_.damping.array() += damping.values[0];
-  else if (!damping.values.empty())
-    channels_.damping += Eigen::Map<const VectorXd>(damping.values.data(), plant_.dof());
+  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
 }
 
 log::Result ClosedLoop::run(const Watch& watch) {
@@ -439,8 +425,8 @@ log::Result ClosedLoop::run(const Watch& watch) {
   const auto n = plant_.dof();
   state_ = integrator_->start(scene_.start_q.size() > 0 ? scene_.start_q : VectorXd::Zero(n),
                               scene_.start_v.size() > 0 ? scene_.start_v : VectorXd::Zero(n));
-  result_.provenance = log::provenance(inputs_);
-  if (recorder.logging()) recorder.header(header());
+  result_.provenance = log::provenance(inputs_, watch.argv);
+  if (recorder.logging()) recorder.header(header(), plant_.robot(), steps_);
   for (const auto& text : early_events_) recorder.event(0.0, text);
 
   const bool sampled = scene_.actuation.type == scene::ActuationType::sampled;
@@ -467,6 +453,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
         finish(log::Outcome::collision, fmt::format("contact between the nodes {} and {}", state_.k - 1, state_.k));
       dynamics::forward_kinematics(plant_, ws_, state_.q);
     }
+    recorder.observe(clearance_now_, certified, v_);
     if (!v_.allFinite() || !state_.q.allFinite()) {
       finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state_.k));
     } else if (obstacles && clearance_now_ <= 0.0) {
@@ -479,7 +466,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
         finish(log::Outcome::stalled, fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
       else if (state_.k == steps_)
         finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
-      else if (recorder.stopped())
+      else if (recorder.stopped(state_.k))
         finish(log::Outcome::interrupted, "stopped from outside");
     }
     if (done_ && state_.k > 0 && !kicked_) {
@@ -497,7 +484,10 @@ log::Result ClosedLoop::run(const Watch& watch) {
         actuate();
     }
     const double tick_paused = thread_cpu_s();
-    if (recorder.wants_tick(state_.k) || (done_ && recorder.logging())) log_tick(certified);
+    if (recorder.wants_tick(state_.k) || (done_ && recorder.logging())) {
+      if (!done_) gather_torques();
+      log_tick(certified);
+    }
     const double tick_resumed = thread_cpu_s();
     if (done_) break;
 
@@ -511,7 +501,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
     if (!report_.converged) {
       finish(log::Outcome::diverged, fmt::format("step {} of {} s found no root", state_.k + 1, scene_.step_s));
       recorder.step(report_);
-      if (recorder.logging()) log_tick(false);
+      if (recorder.logging()) log_tick(certified);
       break;
     }
     state_.time_s = static_cast<double>(state_.k) * scene_.step_s;
@@ -527,18 +517,42 @@ log::Result ClosedLoop::run(const Watch& watch) {
   return result_;
 }
 
+void ClosedLoop::gather_torques() {
+  tau_ = channels_.held_torque;
+  channel_torques_ = Json::object();
+  if (!channels_.held_torque.isZero(0.0)) channel_torques_["held"] = to_json(channels_.held_torque);
+  if (scene_.actuation.type == scene::ActuationType::sampled) return;
+  const auto add = [this](const char* channel, const VectorXd& torque) {
+    tau_ += torque;
+    channel_torques_[channel] = to_json(torque);
+  };
+  if (!gradient_.isZero(0.0)) add("potential", -gradient_);
+  if (!command_->damping().isZero(0.0)) add("damping", -command_->damping().cwiseProduct(v_));
+  if (!channels_.gyroscopic.empty()) {
+    dynamics::gyroscopic_torque(plant_, ws_, state_.q, v_, channels_.gyroscopic, impulse_);
+    add("gyroscopic", impulse_);
+  }
+  if (command_->raw().has_node_velocity != 0) {
+    // what would bring the node's change of velocity about within one step: M (x − v) / h
+    v_shown_ = (command_->node_velocity() - v_) / scene_.step_s;
+    dynamics::momentum(plant_, ws_, state_.q, v_shown_, impulse_);
+    add("node", impulse_);
+  }
+}
+
 void ClosedLoop::log_tick(bool certified) {
   Json fields{{"k", state_.k},
               {"time_s", state_.time_s},
               {"q", to_json(state_.q)},
               {"v", to_json(v_)},
-              {"tau", to_json(channels_.held_torque)},
+              {"tau", to_json(tau_)},
               {"goal_index", goal_index_},
               {"clearance_m", nullptr},
               {"closest", nullptr},
               {"energy", energy_json(ledger_)},
               {"solver", solver_json(report_)},
               {"certified", certified}};
+  if (!done_) fields["channels"] = channel_torques_;
   if (environment_->has_obstacles()) {
     fields["clearance_m"] = clearance_now_;
     if (nearest_sphere_ >= 0) {
@@ -552,9 +566,11 @@ void ClosedLoop::log_tick(bool certified) {
 }
 
 Json ClosedLoop::header() const {
-  Json config = scene::resolved_json(scene_);
+  Json config = resolved_config(scene_);
   config["planner"]["params"] = planner_params_;
-  return {{"seed", scene_.seed},
+  return {{"program", "run"},
+          {"scene", scene_.name},
+          {"seed", scene_.seed},
           {"generator", Rng::name},
           {"config", std::move(config)},
           {"robot_notes", plant_.robot().notes},

@@ -46,12 +46,13 @@ class ClosedLoop final : private planning::HostServices {
   void actuate_sampled();
   void take_gyroscopic_terms();
   void limit_torques();
-  void add_plant_damping();
   [[nodiscard]] static hamelin_contact to_c(const scene::Contact& contact);
   [[nodiscard]] bool at_rest_away_from_goal();
   void finish(log::Outcome outcome, std::string cause);
   [[nodiscard]] std::string where_nearest() const;
   [[nodiscard]] Json header() const;
+  /// The torques of each channel at this node, for the log: tau_ and channel_torques_.
+  void gather_torques();
   void log_tick(bool certified);
   void fill_result();
 
@@ -64,7 +65,7 @@ class ClosedLoop final : private planning::HostServices {
   std::unique_ptr<scene::Environment::Scratch> scratch_;
   std::unique_ptr<Certificate> certificate_;
   Json planner_params_;
-  std::vector<std::filesystem::path> inputs_;
+  std::vector<log::Input> inputs_;
   double influence_ = 0.0;
   bool hidden_obstacles_ = false;  ///< the judge sees what the planner does not
   long control_steps_ = 1, delay_periods_ = 0, steps_ = 0;
@@ -81,10 +82,12 @@ class ClosedLoop final : private planning::HostServices {
   integration::State state_;
   integration::Channels channels_;
   integration::StepReport report_;
-  Eigen::VectorXd v_, q_before_, v_before_, gradient_, gradient_before_, impulse_, limits_;
+  Eigen::VectorXd v_, q_before_, v_before_, gradient_, gradient_before_, impulse_, limits_, plant_damping_;
   std::vector<Eigen::VectorXd> delayed_;
   bool kicked_ = false;  ///< a closing half-kick is owed
   double speed_scale_ = 1.0;
+  Eigen::VectorXd tau_;  ///< only where a log is written
+  Json channel_torques_;
 
   // surroundings at this node
   std::vector<Eigen::Vector3d> centers_;

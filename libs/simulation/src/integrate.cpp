@@ -1,9 +1,35 @@
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "hamelin/core/error.hpp"
+#include "plant.hpp"
 #include "recorder.hpp"
 
 namespace hamelin::simulation {
+
+FreeMotion free_motion(const scene::Scene& given, const model::Model& model) {
+  scene::Scene scene = given;
+  scene.planner.reset();
+  scene.stall.reset();
+  scene.goals.clear();
+  scene.map.reset();
+  scene.obstacles.clear();
+  scene.actuation = {};
+  scene.actuation.control_period_s = scene.step_s;
+  FreeMotion motion;
+  motion.name = scene.name;
+  motion.q0 = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+  motion.v0 = scene.start_v.size() > 0 ? scene.start_v : Eigen::VectorXd::Zero(model.dof());
+  motion.step_s = scene.step_s;
+  motion.duration_s = scene.duration_s;
+  motion.integrator = scene.integrator.name;
+  motion.options = integration::options_from_json(scene.integrator.params, scene.name + ": /integrator/params");
+  motion.damping = plant_damping(scene, model.robot());
+  motion.config = resolved_config(scene);
+  motion.inputs = inputs_of(scene);
+  return motion;
+}
 
 log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch) {
   const auto sized = [&](const Eigen::VectorXd& x, const char* what) {
@@ -18,15 +44,14 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
 
   log::Result result;
   result.scene = motion.name;
-  result.provenance = motion.provenance;
+  result.provenance = log::provenance(motion.inputs, watch.argv);
   Recorder recorder(result, watch, *integrator, motion.options, 0);
-  recorder.header({{"config",
-                    {{"q0", to_json(motion.q0)},
-                     {"v0", to_json(motion.v0)},
-                     {"step_s", motion.step_s},
-                     {"duration_s", motion.duration_s},
-                     {"integrator", integrator->name()}}},
-                   {"provenance", motion.provenance}});
+  recorder.header({{"program", "integrate"},
+                   {"scene", motion.name},
+                   {"config", motion.config},
+                   {"robot_notes", model.robot().notes},
+                   {"provenance", result.provenance}},
+                  model.robot(), steps);
 
   integration::Channels channels;
   channels.damping = motion.damping;
@@ -34,20 +59,25 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   integration::StepReport report;
   Eigen::VectorXd v(model.dof());
   Ledger ledger;
+  const auto log_tick = [&] {
+    recorder.tick(state.k, {{"k", state.k},
+                            {"time_s", state.time_s},
+                            {"q", to_json(state.q)},
+                            {"v", to_json(v)},
+                            {"energy", energy_json(ledger)},
+                            {"solver", solver_json(report)}});
+    recorder.write_waiting_tick();
+  };
   for (;;) {
     const auto energy = integrator->energy(state);
     ledger.kinetic = energy.kinetic_J;
     ledger.potential = energy.potential_J;
     recorder.node(ledger);
-    const bool over = state.k == steps || !report.converged || recorder.stopped();
-    if (recorder.wants_tick(state.k) || (over && recorder.logging())) {
+    const bool over = state.k == steps || recorder.stopped(state.k);
+    if (recorder.logging()) {  // the velocity costs a sweep, and nothing else here asks for it
       integrator->velocity(state, v);
-      recorder.tick(state.k, {{"k", state.k},
-                              {"time_s", state.time_s},
-                              {"q", to_json(state.q)},
-                              {"v", to_json(v)},
-                              {"energy", energy_json(ledger)},
-                              {"solver", solver_json(report)}});
+      recorder.observe(std::numeric_limits<double>::infinity(), true, v);
+      if (recorder.wants_tick(state.k) || over) log_tick();
     }
     if (over) break;
     report = integrator->step(state, channels, motion.step_s);
@@ -60,6 +90,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
       result.outcome = log::Outcome::diverged;
       result.cause = fmt::format("step {} of {} s found no root, halved down to {:.3g} s", state.k + 1, motion.step_s,
                                  motion.step_s / static_cast<double>(1 << motion.options.max_halvings));
+      if (recorder.logging()) log_tick();
       break;
     }
   }
@@ -69,6 +100,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   result.q = state.q;
   integrator->velocity(state, v);
   result.v = v;
+  result.v_abs_max.resize(0);  // not looked at without a log, so not with one either
   recorder.close(ledger);
   return result;
 }

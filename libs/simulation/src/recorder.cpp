@@ -9,6 +9,16 @@
 
 namespace hamelin::simulation {
 
+namespace {
+
+// Largest magnitude of each number so far.
+void grow(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
+  if (largest.size() == 0) largest.setZero(v.size());
+  largest = largest.cwiseMax(v.cwiseAbs());
+}
+
+}  // namespace
+
 Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
                    const integration::Options& options, long steps_expected)
     : result_(result), watch_(watch) {
@@ -19,8 +29,16 @@ Recorder::Recorder(log::Result& result, const Watch& watch, const integration::I
   tick_us_.reserve(static_cast<std::size_t>(steps_expected) + 1);
 }
 
-void Recorder::header(const Json& fields) {
-  if (watch_.log != nullptr) watch_.log->write("header", fields);
+void Recorder::header(Json fields, const model::Robot& robot, long steps) {
+  if (watch_.log == nullptr) return;
+  fields["every"] = watch_.every;
+  fields["joints"] = Json::array();
+  for (const auto& link : robot.links)
+    fields["joints"].push_back({{"name", link.joint.name},
+                                {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"}});
+  watch_.log->write("header", fields);
+  if (watch_.announce)
+    watch_.announce(std::ceil(static_cast<double>(steps) / static_cast<double>(watch_.every)), robot.dof());
 }
 
 void Recorder::node(const Ledger& ledger) {
@@ -29,7 +47,17 @@ void Recorder::node(const Ledger& ledger) {
     first_balance_ = ledger.balance();
     result_.energy_initial_J = ledger.kinetic + ledger.potential + ledger.control;
   }
-  result_.energy_error_max_J = std::max(result_.energy_error_max_J, std::abs(ledger.balance() - first_balance_));
+  const double error = std::abs(ledger.balance() - first_balance_);
+  result_.energy_error_max_J = std::max(result_.energy_error_max_J, error);
+  since_.energy_error_J = std::max(since_.energy_error_J, error);
+}
+
+void Recorder::observe(double clearance_m, bool certified, const Eigen::VectorXd& v) {
+  grow(result_.v_abs_max, v);
+  if (!logging()) return;
+  since_.clearance_m = std::min(since_.clearance_m, clearance_m);
+  since_.certified = since_.certified && certified;
+  grow(since_.v_abs, v);
 }
 
 void Recorder::step(const integration::StepReport& report) {
@@ -41,14 +69,43 @@ void Recorder::step(const integration::StepReport& report) {
   sums.halvings += report.halvings;
   sums.updates_max = std::max(sums.updates_max, report.updates);
   sums.residual_max = std::max(sums.residual_max, report.residual);
+  since_.updates = std::max(since_.updates, report.updates);
+  since_.residual = std::max(since_.residual, report.residual);
+  since_.halvings += report.halvings;
+}
+
+void Recorder::tick_time(double seconds) {
+  tick_us_.push_back(1e6 * seconds);
+  since_.tick_us = std::max(since_.tick_us, tick_us_.back());
+  if (waiting_) {
+    (*waiting_)["timing"]["tick_us"] = tick_us_.back();
+    write_waiting_tick();
+  }
 }
 
 void Recorder::tick(long k, Json fields) {
-  watch_.log->write("tick", fields);
+  if (k == last_logged_) return;
   last_logged_ = k;
+  if (watch_.every > 1 && k > 0) {
+    fields["extrema"] = {{"clearance_m", nullptr},         {"energy_error_J", since_.energy_error_J},
+                         {"v_abs", to_json(since_.v_abs)}, {"updates", since_.updates},
+                         {"residual", since_.residual},    {"halvings", since_.halvings},
+                         {"certified", since_.certified}};
+    if (std::isfinite(since_.clearance_m)) fields["extrema"]["clearance_m"] = since_.clearance_m;
+    if (since_.tick_us > 0.0) fields["timing"]["tick_us_max"] = since_.tick_us;
+  }
+  since_ = {};
+  waiting_ = std::move(fields);
+}
+
+void Recorder::write_waiting_tick() {
+  if (!waiting_) return;
+  watch_.log->write("tick", *waiting_);
+  waiting_.reset();
 }
 
 void Recorder::event(double time_s, const std::string& text) {
+  write_waiting_tick();
   if (watch_.log != nullptr) watch_.log->write("event", {{"time_s", time_s}, {"text", text}});
 }
 
@@ -60,6 +117,7 @@ void Recorder::close(const Ledger& ledger) {
   result_.node_work_J = ledger.node;
   result_.filter_work_J = ledger.filter;
   result_.recovery_work_J = ledger.recovery;
+  write_waiting_tick();
   result_.cpu_s = thread_cpu_s() - started_cpu_s_;
   if (!tick_us_.empty()) {
     std::sort(tick_us_.begin(), tick_us_.end());

@@ -1,5 +1,7 @@
 #pragma once
 #include <ctime>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,28 +40,43 @@ class Recorder {
   Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
            const integration::Options& options, long steps_expected);
 
-  void header(const Json& fields);
+  /// @param ticks how many steps there can be
+  void header(Json fields, const model::Robot& robot, long steps);
   /// The node's balance enters energy_error_max_J.
   void node(const Ledger& ledger);
   void step(const integration::StepReport& report);
-  void tick_time(double seconds) { tick_us_.push_back(1e6 * seconds); }
+  /// What is looked at besides, at every node.
+  void observe(double clearance_m, bool certified, const Eigen::VectorXd& v);
+  /// The tick's own time is known last; with it the tick's line is written.
+  void tick_time(double seconds);
   [[nodiscard]] bool wants_tick(long k) const noexcept {
     return watch_.log != nullptr && (k % watch_.every == 0 || k == 0);
   }
+  /// The line of a tick, once a node; it waits for tick_time() or close().
   void tick(long k, Json fields);
+  void write_waiting_tick();
   void event(double time_s, const std::string& text);
-  [[nodiscard]] bool stopped() const noexcept { return watch_.stop != nullptr && watch_.stop->load(); }
+  [[nodiscard]] bool stopped(long k) const noexcept {
+    return (watch_.stop != nullptr && watch_.stop->load()) || watch_.stop_at == k ||
+           (watch_.log != nullptr && watch_.log->enough());
+  }
   void progress(long k, double time_s, double duration_s) const {
     if (watch_.progress && k % 1000 == 0) watch_.progress(time_s, duration_s);
   }
   /// Fills the result's sums and writes the closing lines.
   void close(const Ledger& ledger);
 
-  [[nodiscard]] long last_logged() const noexcept { return last_logged_; }
   [[nodiscard]] bool logging() const noexcept { return watch_.log != nullptr; }
-  [[nodiscard]] log::Result& result() noexcept { return result_; }
 
  private:
+  /// Extrema of what happened since the last tick line, so that a log with few lines hides nothing.
+  struct Extrema {
+    double clearance_m = std::numeric_limits<double>::infinity(), energy_error_J = 0.0, residual = 0.0, tick_us = 0.0;
+    int updates = 0;
+    long halvings = 0;
+    bool certified = true;
+    Eigen::VectorXd v_abs;
+  };
   log::Result& result_;
   const Watch& watch_;
   std::vector<double> tick_us_;
@@ -67,6 +84,8 @@ class Recorder {
   double first_balance_ = 0.0;
   bool first_ = true;
   long last_logged_ = -1;
+  Extrema since_;
+  std::optional<Json> waiting_;
 };
 
 /// A joint vector as a JSON array.

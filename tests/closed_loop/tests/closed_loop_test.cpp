@@ -4,6 +4,7 @@
 
 #include "../scratch_scene.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/log/read_log.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/chains.hpp"
 

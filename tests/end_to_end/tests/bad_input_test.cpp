@@ -119,7 +119,7 @@ std::vector<Case> cases() {
       flag_case("a log in a missing folder", {"run", scene, "--log", "none/l.jsonl"},
                 {"none/l.jsonl", "cannot be written"}),
       flag_case("a folder as result", {"run", scene, "--result", "data"}, {"data", "no regular file"}),
-      flag_case("the input as result", {"run", scene, "--result", scene}, {scene, "is the input"}),
+      flag_case("the input as result", {"run", scene, "--result", scene}, {scene, "is an input"}),
       flag_case("a misspelt flag", {"run", scene, "--planer", "apf"}, {"--planer", "'--planner'?"}),
       flag_case("a misspelt command", {"intgrate", robot}, {"intgrate", "'integrate'?"}),
       flag_case("a step that is no number", {"run", scene, "--step", "abc"}, {"--step", "abc"}),

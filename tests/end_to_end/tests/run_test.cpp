@@ -150,7 +150,7 @@ TEST_CASE("every subcommand has help that opens with an example", "[end_to_end]"
     command.emplace_back("--help");
     const auto output = bench.run(command);
     CHECK(output.exit_code == 0);
-    CHECK_THAT(output.out, Catch::StartsWith("Example:\n  hamelin " + command.front()));
+    CHECK_THAT(output.out, Catch::StartsWith("Examples:\n  hamelin " + command.front()));
     CHECK(output.err.empty());
   }
 }

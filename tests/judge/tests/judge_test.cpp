@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "hamelin/core/json.hpp"
-#include "hamelin/log/run_log.hpp"
+#include "hamelin/log/read_log.hpp"
 #include "hamelin/simulation/run.hpp"
 
 // What judges here shares no code with hamelin: urdfdom reads the arm, Eigen places it, OctoMap reads the map, FCL

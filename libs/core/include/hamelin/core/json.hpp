@@ -34,7 +34,8 @@ void check_shipped_schema(const Json& document, std::string_view schema_name, co
 /// nested objects included.
 [[nodiscard]] Json with_defaults(Json document, const Json& schema);
 
-/// The candidate nearest to `name` by edit distance, or empty if none is near: for "did you mean".
+/// The candidate nearest to `name`, or empty if none is near (edits up to a third of its letters, a swap of neighbours
+/// being one edit, and less than half of the longer name): for "did you mean".
 [[nodiscard]] std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 
 }  // namespace hamelin

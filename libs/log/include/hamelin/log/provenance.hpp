@@ -7,12 +7,19 @@
 
 namespace hamelin::log {
 
-/// Where and from what a run was made: {host {os, cpu, cores}, isa, build {compiler, flags, type, sanitizers}, versions
-/// {hamelin, git_commit, eigen, octomap}, argv, inputs [{path, sha256}]}. What is not known is null.
-/// @param inputs files the run depends on, hashed in this order
+/// A file that a run depends on: a scene, robot, spheres, map or plugin.
+struct Input {
+  std::string role;
+  std::filesystem::path file;
+};
+
+/// Where and from what a run was made: {host {os, cpu, cores, fma}, isa, build {id, compiler, flags, type, sanitizers},
+/// versions {hamelin, git_commit, eigen, octomap, libc}, cwd, argv, inputs [{role, path, sha256}]}. What is not known
+/// is null. `build/id` is the linker's build-id of the program; `fma` says whether the C library's functions may fuse
+/// multiplications and additions, since that may change their last bit.
+/// @param inputs hashed in this order
 /// @param argv the command line, as given
 /// @throws Error io for an input that cannot be read
-[[nodiscard]] Json provenance(const std::vector<std::filesystem::path>& inputs,
-                              const std::vector<std::string>& argv = {});
+[[nodiscard]] Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>& argv = {});
 
 }  // namespace hamelin::log

@@ -44,6 +44,7 @@ struct Result {
   double time_s = 0.0;
   long steps = 0;
   Eigen::VectorXd q, v;
+  Eigen::VectorXd v_abs_max;  ///< largest speed of each joint at any node [rad/s or m/s]; empty in free motion
   double energy_initial_J = 0.0, energy_final_J = 0.0;
   double energy_error_max_J = 0.0;  ///< largest |E_k − E_0 − work booked|
   std::optional<double> min_clearance_m;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/log/provenance.hpp"
 #include "hamelin/log/result.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -15,10 +16,14 @@ namespace hamelin::simulation {
 
 /// What a caller may watch and steer while a run goes on.
 struct Watch {
-  log::RunLog* log = nullptr;               ///< null: nothing is recorded, and nothing is paid for it
+  log::LineSink* log = nullptr;             ///< null: nothing is recorded, and nothing is paid for it
   long every = 1;                           ///< a tick line every so many steps; step 0 and the last always
+  std::vector<std::string> argv;            ///< the command line, for the provenance
   const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: the record ends properly
+  std::optional<long> stop_at;              ///< as if stopped at this step: repeats a run that was interrupted
   std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
+  /// Called once before a run that is logged: tick lines to come at most, and joints.
+  std::function<void(double ticks, int dof)> announce;
 };
 
 /// Free motion of a robot: no planner, no obstacles.
@@ -28,9 +33,15 @@ struct FreeMotion {
   double step_s = 1e-3, duration_s = 10.0;
   std::string integrator = "hamel-variational";
   integration::Options options;
-  Eigen::VectorXd damping;           ///< empty: none
-  Json provenance = Json::object();  ///< goes into header and result
+  Eigen::VectorXd damping;         ///< empty: none
+  Json config = Json::object();    ///< for the log's header: a scene's form, see free_motion()
+  std::vector<log::Input> inputs;  ///< files it was read from
 };
+
+/// What a scene says of free motion: start, damping, step, duration, integrator. Planner, goals and obstacles are left
+/// out, of its config too.
+/// @throws Error invalid for integrator parameters or numbers that do not fit the robot
+[[nodiscard]] FreeMotion free_motion(const scene::Scene& scene, const model::Model& model);
 
 /// Integrates free motion. The result's outcome is completed, diverged or interrupted.
 /// @throws Error usage if the duration is no whole number of steps (to 1e-9 steps), or sizes do not match

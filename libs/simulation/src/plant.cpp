@@ -1,5 +1,8 @@
-#include <Eigen/Eigenvalues>
+#include "plant.hpp"
 
+#include <fmt/format.h>
+
+#include "hamelin/core/error.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/simulation/run.hpp"
 
@@ -34,6 +37,39 @@ model::Model load_model(const scene::Scene& scene) {
   model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres});
   if (scene.model.payload) add_payload(robot, *scene.model.payload);
   return model::Model(std::move(robot), scene.base, scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
+}
+
+Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& robot) {
+  const auto& damping = scene.model.joint_damping;
+  const int n = robot.dof();
+  if (damping.from_robot) {
+    Eigen::VectorXd values(n);
+    for (int i = 0; i < n; ++i) values[i] = robot.links[static_cast<std::size_t>(i)].joint.damping;
+    return values;
+  }
+  if (damping.values.empty()) return {};
+  if (damping.values.size() == 1) return Eigen::VectorXd::Constant(n, damping.values[0]);
+  if (damping.values.size() != static_cast<std::size_t>(n))
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
+                                                scene.name, damping.values.size(), n));
+  return Eigen::Map<const Eigen::VectorXd>(damping.values.data(), n);
+}
+
+std::vector<log::Input> inputs_of(const scene::Scene& scene) {
+  std::vector<log::Input> inputs;
+  std::error_code ec;
+  if (scene.name != scene.robot.file && std::filesystem::is_regular_file(scene.name, ec))
+    inputs.push_back({"scene", scene.name});
+  inputs.push_back({"robot", scene.robot.file});
+  if (scene.robot.spheres) inputs.push_back({"spheres", *scene.robot.spheres});
+  return inputs;
+}
+
+Json resolved_config(const scene::Scene& scene) {
+  Json config = scene::resolved_json(scene);
+  Json& params = config["integrator"]["params"];
+  params = with_defaults(params, Json::parse(schema_text("integrator")));
+  return config;
 }
 
 }  // namespace hamelin::simulation

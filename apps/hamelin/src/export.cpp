@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/log/trajectory.hpp"
+#include "output.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct ExportOptions {
+  std::filesystem::path file;
+  std::string format = "csv";
+  std::optional<double> rate_Hz;
+  std::optional<std::filesystem::path> output;
+};
+
+int export_motion(const ExportOptions& options) {
+  std::filesystem::path target;
+  if (options.output) target = output_target(*options.output, {options.file});
+  log::Trajectory trajectory = log::read_trajectory(options.file);
+  if (options.rate_Hz) trajectory = log::resampled(trajectory, *options.rate_Hz);
+  const std::string text =
+      options.format == "csv" ? log::to_csv(trajectory) : log::to_joint_trajectory(trajectory).dump(1) + "\n";
+  if (!options.output) {
+    fmt::print("{}", text);
+    return 0;
+  }
+  write_file_aside(target, text);
+  const auto& points = trajectory.points;
+  note(fmt::format("{}: {} points, {} joints, {:.6g} s", options.output->string(), points.size(),
+                   trajectory.joints.size(), points.back().time_s - points.front().time_s));
+  return 0;
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, int& exit_code) {
+  auto* command = add_command(
+      app, "export", "Write the motion in a log for other programs: a table, or a ROS 2 JointTrajectory as JSON",
+      "hamelin export shelf.jsonl -o shelf.csv\n"
+      "hamelin export shelf.jsonl --format ros --rate 100 -o shelf-trajectory.json");
+  const auto options = std::make_shared<ExportOptions>();
+  command->add_option("log", options->file, "a log, plain or zstd")->required()->type_name("LOG");
+  one_of(command->add_option("--format", options->format, "csv, or ros: trajectory_msgs/msg/JointTrajectory's fields")
+             ->type_name("NAME")
+             ->capture_default_str(),
+         {"csv", "ros"});
+  command->add_option("--rate", options->rate_Hz, "points a second, interpolated (default: every logged tick)")
+      ->type_name("HZ");
+  command->add_option("-o,--output", options->output, "the file to write (default: standard output)")
+      ->type_name("FILE");
+  command->callback([options, &exit_code] { exit_code = export_motion(*options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,139 @@
+#include "hamelin/simulation/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "document.hpp"
+#include "hamelin/core/error.hpp"
+#include "record.hpp"
+#include "scene_flags.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+// Where a run is repeated by another build or processor, rounding differs from the first step on; smooth motion
+// carries that along, and a planner's decisions may fall the other way.
+constexpr double tolerance_elsewhere = 1e-6;
+
+struct ReplayOptions {
+  std::filesystem::path file;
+  bool verify = false;
+  std::optional<double> tolerance;
+  std::vector<std::filesystem::path> plugin_path;
+  RecordOptions record;
+};
+
+Json difference_json(const std::optional<simulation::Verdict::Difference>& difference) {
+  if (!difference) return nullptr;
+  Json json = {{"line", difference->line},
+               {"type", difference->type},
+               {"k", nullptr},
+               {"time_s", nullptr},
+               {"field", difference->field},
+               {"logged", difference->logged},
+               {"replayed", difference->replayed}};
+  if (difference->k) json["k"] = *difference->k;
+  if (difference->time_s) json["time_s"] = *difference->time_s;
+  return json;
+}
+
+std::string words(const simulation::Verdict::Difference& d) {
+  std::string place = fmt::format("line {}", d.line);
+  if (d.k) place = fmt::format("tick {} ({:.6g} s), {}", *d.k, d.time_s.value_or(0.0), place);
+  if (d.type != "tick") place += fmt::format(", {}", d.type);
+  return fmt::format("{}{}: logged {}, replayed {}", place, d.field.empty() ? "" : ", " + d.field, d.logged,
+                     d.replayed);
+}
+
+int verify(const ReplayOptions& options) {
+  const auto recorded = simulation::read_header(options.file);
+  const double tolerance = options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_elsewhere);
+  for (const auto& line : recorded.other_build) note(fmt::format("{}: {}", options.file.string(), line));
+  if (!recorded.other_build.empty() && !options.tolerance)
+    note(fmt::format("another build or machine: compared within {:g} of max(1, |logged|), not to the bit", tolerance));
+  simulation::Watch watch;
+  watch.stop = &stop_on_signals();
+  simulation::Verdict verdict;
+  {
+    Progress progress;
+    watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
+    verdict = simulation::verify(options.file, tolerance, plugin_path(options.plugin_path), watch);
+  }
+  const bool equal = !verdict.beyond && !verdict.stopped;
+  if (options.record.json) {
+    print_json({{"log", options.file.string()},
+                {"equal", equal},
+                {"to_the_bit", !verdict.to_the_bit && !verdict.stopped},
+                {"tolerance", tolerance},
+                {"finished", verdict.finished},
+                {"lines", verdict.lines},
+                {"ticks", verdict.ticks},
+                {"largest_difference", verdict.largest},
+                {"first_difference", difference_json(verdict.to_the_bit)},
+                {"beyond_tolerance", difference_json(verdict.beyond)},
+                {"other_build", recorded.other_build}});
+  } else {
+    const std::string extent = fmt::format("{} lines, {} ticks{}", verdict.lines, verdict.ticks,
+                                           verdict.finished ? "" : ", as far as this unfinished log goes");
+    std::string text;
+    if (verdict.stopped)
+      text = fmt::format("stopped; up to there, {}, no difference found", extent);
+    else if (verdict.beyond)
+      text = fmt::format("differs: {}", words(*verdict.beyond));
+    else if (verdict.to_the_bit)
+      text = fmt::format("equal within {:g} ({}); largest difference {:.2g}, the first at {}", tolerance, extent,
+                         verdict.largest, words(*verdict.to_the_bit));
+    else
+      text = fmt::format("equal to the bit ({})", extent);
+    const Colour colour = equal ? Colour::good : verdict.stopped ? Colour::fair : Colour::bad;
+    fmt::print("{}: {}\n", options.file.string(), coloured(text, colour));
+  }
+  return verdict.stopped ? 130 : equal ? 0 : 1;
+}
+
+int replay(const ReplayOptions& options) {
+  if (const Kind kind = kind_of(options.file); kind != Kind::log)
+    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a log", options.file.string(), to_string(kind)));
+  if (options.verify) {
+    if (options.record.log || options.record.result)
+      throw Error(ErrorCode::usage, "--verify: writes nothing, expected neither --log nor --result with it");
+    return verify(options);
+  }
+  if (options.tolerance) throw Error(ErrorCode::usage, "--tolerance: means nothing without --verify");
+  const auto recorded = simulation::read_header(options.file);
+  std::vector<std::filesystem::path> inputs = files_of(recorded.scene);
+  inputs.push_back(options.file);
+  return record(options.record, inputs, [&](const simulation::Watch& watch) {
+    return simulation::repeat(recorded, plugin_path(options.plugin_path), watch);
+  });
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  auto* command = add_command(app, "replay", "Run again what a log says was run, and compare",
+                              "hamelin replay shelf.jsonl --verify\n"
+                              "hamelin replay shelf.jsonl --result again.json");
+  const auto options = std::make_shared<ReplayOptions>();
+  command->add_option("log", options->file, "a log, plain or zstd")->required()->type_name("LOG");
+  command->add_flag("--verify", options->verify,
+                    "compare every line with the log: to the bit on the same build and instruction set, else within "
+                    "1e-6; exit code 1 where they differ");
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   "with --verify: numbers may differ by this times max(1, |logged|); 0 means to the bit")
+      ->type_name("E")
+      ->check(CLI::Range(0.0, 1e300));
+  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  add_record_options(*command, options->record);
+  command->callback([options, &exit_code] { exit_code = replay(*options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,152 @@
+#include "hamelin/log/trajectory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/log/read_log.hpp"
+
+namespace hamelin::log {
+
+namespace {
+
+using Eigen::VectorXd;
+
+VectorXd vector_of(const Json& numbers) {
+  VectorXd x(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    x[static_cast<Eigen::Index>(i)] =
+        numbers[i].is_null() ? std::numeric_limits<double>::quiet_NaN() : numbers[i].get<double>();
+  return x;
+}
+
+// A field of CSV: quoted where it must be.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted(1, '"');
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  quoted += '"';
+  return quoted;
+}
+
+void append_numbers(std::string& row, const VectorXd& x) {
+  for (const double number : x) row += std::isfinite(number) ? fmt::format(",{}", number) : ",";
+}
+
+// Whole seconds and the nanoseconds beyond.
+Json duration(double time_s) {
+  double seconds = std::floor(time_s);
+  double nanoseconds = std::round((time_s - seconds) * 1e9);
+  if (nanoseconds >= 1e9) {
+    seconds += 1.0;
+    nanoseconds = 0.0;
+  }
+  return {{"sec", static_cast<std::int64_t>(seconds)}, {"nanosec", static_cast<std::int64_t>(nanoseconds)}};
+}
+
+Json finite_array(const VectorXd& x, double time_s, const char* what) {
+  Json array = Json::array();
+  for (const double number : x) {
+    if (!std::isfinite(number))
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{} at {} s: is not finite, expected numbers; CSV leaves such cells empty", what, time_s));
+    array.push_back(number);
+  }
+  return array;
+}
+
+}  // namespace
+
+Trajectory read_trajectory(const std::filesystem::path& log) {
+  LogReader reader(log);
+  Trajectory trajectory;
+  Json line;
+  if (!reader.next(line) || line.value("type", Json()) != "header")
+    throw Error(ErrorCode::invalid, fmt::format("{}: has no header, expected a log of hamelin", log.string()));
+  check_line(line, reader.where());
+  for (const auto& joint : line["joints"]) trajectory.joints.push_back(joint["name"].get<std::string>());
+  const auto joints = static_cast<Eigen::Index>(trajectory.joints.size());
+  while (reader.next(line)) {
+    if (line.value("type", Json()) != "tick") continue;
+    check_line(line, reader.where());
+    Trajectory::Point point{line["time_s"].get<double>(), vector_of(line["q"]), vector_of(line["v"]),
+                            vector_of(line.value("tau", Json::array()))};
+    if (point.q.size() != joints || point.v.size() != joints || (point.tau.size() != 0 && point.tau.size() != joints))
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: joint vectors of another length, expected {}", reader.where(), joints));
+    if (!trajectory.points.empty() && !(point.time_s > trajectory.points.back().time_s))
+      throw Error(ErrorCode::invalid, fmt::format("{}: /time_s: {} s after {} s, expected rising times", reader.where(),
+                                                  point.time_s, trajectory.points.back().time_s));
+    trajectory.points.push_back(std::move(point));
+  }
+  if (trajectory.points.empty())
+    throw Error(ErrorCode::invalid, fmt::format("{}: has no tick, expected some motion", log.string()));
+  return trajectory;
+}
+
+Trajectory resampled(const Trajectory& trajectory, double rate_Hz) {
+  if (!std::isfinite(rate_Hz) || rate_Hz <= 0.0)
+    throw Error(ErrorCode::usage, fmt::format("rate {} Hz: expected a positive number", rate_Hz));
+  const auto& points = trajectory.points;
+  Trajectory out{trajectory.joints, {}};
+  if (points.empty()) return out;
+  const double begin = points.front().time_s, span = points.back().time_s - begin;
+  if (span * rate_Hz > 1e8)
+    throw Error(ErrorCode::usage,
+                fmt::format("rate {} Hz: makes {:.3g} points, expected at most 1e8", rate_Hz, span * rate_Hz));
+  // a sample that meets the last point but for rounding is the last point
+  const auto whole = static_cast<long>(std::ceil(span * rate_Hz - 1e-6));
+  std::size_t at = 0;
+  for (long i = 0; i < whole; ++i) {
+    const double time_s = begin + static_cast<double>(i) / rate_Hz;
+    while (at + 2 < points.size() && points[at + 1].time_s <= time_s) ++at;
+    const auto &a = points[at], &b = points[at + 1];
+    const double h = b.time_s - a.time_s, u = (time_s - a.time_s) / h;
+    const double u2 = u * u, u3 = u2 * u;
+    out.points.push_back(
+        {time_s,
+         (2 * u3 - 3 * u2 + 1) * a.q + (u3 - 2 * u2 + u) * h * a.v + (3 * u2 - 2 * u3) * b.q + (u3 - u2) * h * b.v,
+         6 * (u2 - u) / h * (a.q - b.q) + (3 * u2 - 4 * u + 1) * a.v + (3 * u2 - 2 * u) * b.v, a.tau});
+  }
+  out.points.push_back(points.back());
+  return out;
+}
+
+std::string to_csv(const Trajectory& trajectory) {
+  const bool torques = std::any_of(trajectory.points.begin(), trajectory.points.end(),
+                                   [](const auto& point) { return point.tau.size() > 0; });
+  std::string text = "time_s";
+  for (const char* kind : {"q_", "v_", "tau_"}) {
+    if (!torques && kind[0] == 't') continue;
+    for (const auto& joint : trajectory.joints) text += fmt::format(",{}", field(fmt::format("{}{}", kind, joint)));
+  }
+  text += '\n';
+  for (const auto& point : trajectory.points) {
+    text += fmt::format("{}", point.time_s);
+    append_numbers(text, point.q);
+    append_numbers(text, point.v);
+    append_numbers(text, point.tau);
+    text += '\n';
+  }
+  return text;
+}
+
+Json to_joint_trajectory(const Trajectory& trajectory) {
+  Json points = Json::array();
+  const double begin = trajectory.points.empty() ? 0.0 : trajectory.points.front().time_s;
+  for (const auto& point : trajectory.points)
+    points.push_back({{"positions", finite_array(point.q, point.time_s, "q")},
+                      {"velocities", finite_array(point.v, point.time_s, "v")},
+                      {"accelerations", Json::array()},
+                      {"effort", finite_array(point.tau, point.time_s, "tau")},
+                      {"time_from_start", duration(point.time_s - begin)}});
+  return {{"header", {{"stamp", {{"sec", 0}, {"nanosec", 0}}}, {"frame_id", ""}}},
+          {"joint_names", trajectory.joints},
+          {"points", points}};
+}
+
+}  // namespace hamelin::log

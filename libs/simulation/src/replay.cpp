@@ -1,0 +1,242 @@
+#include "hamelin/simulation/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/log/provenance.hpp"
+#include "hamelin/log/read_log.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+
+namespace hamelin::simulation {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string short_hash(const std::string& sha256) {
+  return sha256.substr(0, 12);
+}
+
+// Where an input is now, and its hash; empty if it is nowhere.
+struct Found {
+  fs::path file;
+  std::string sha256;
+};
+
+// The first of the places that has the very file; else the first that has one of that name.
+Found find_input(const fs::path& named, const std::string& sha256, const fs::path& cwd, const fs::path& log) {
+  Found first;
+  for (const auto& place : {named, cwd / named, log.parent_path() / named, log.parent_path() / named.filename()}) {
+    std::error_code ec;
+    if (!fs::is_regular_file(place, ec)) continue;
+    Found here{place, sha256_hex(read_file(place))};
+    if (here.sha256 == sha256) return here;
+    if (first.file.empty()) first = std::move(here);
+  }
+  return first;
+}
+
+// Text of a value at a pointer of a document, "" where there is none.
+std::string text_at(const Json& document, const char* pointer) {
+  const Json::json_pointer at(pointer);
+  if (!document.contains(at)) return "";
+  const Json& value = document[at];
+  return value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
+}
+
+std::vector<std::string> differences_of_build(const Json& then) {
+  std::vector<std::string> lines;
+  const Json now = log::provenance({});
+  const std::pair<const char*, const char*> bits_depend_on[] = {{"/build/id", "build"},
+                                                                {"/isa", "instruction set"},
+                                                                {"/versions/libc", "C library"},
+                                                                {"/host/fma", "fused operations in the C library"}};
+  for (const auto& [pointer, what] : bits_depend_on) {
+    const auto before = text_at(then, pointer), here = text_at(now, pointer);
+    if (before != here)
+      lines.push_back(fmt::format("{}: {} then, {} now", what, before.empty() ? "unknown" : before,
+                                  here.empty() ? "unknown" : here));
+  }
+  return lines;
+}
+
+// What the run was made from; a file's place may differ, its content is checked by its hash.
+void forget_places(Json& header) {
+  for (const char* pointer : {"/config/robot/file", "/config/robot/spheres", "/config/map/file"})
+    if (const Json::json_pointer at(pointer); header.contains(at)) header[at] = nullptr;
+}
+
+std::string shown(const Json& value) {
+  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() > 80) text = text.substr(0, 77) + "...";
+  return text;
+}
+
+// Compares the lines of a run with those of a log as they come.
+class Comparison final : public log::LineSink {
+ public:
+  Comparison(const fs::path& log, double tolerance) : reader_(log), tolerance_(tolerance) {}
+
+  [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
+  /// To be called at the end: whether the log has more to say.
+  void finish() {
+    Json logged;
+    if (!enough_ && reader_.next(logged)) differ("", logged, Json("the run had ended"), logged);
+  }
+
+ private:
+  void take(Json replayed) override {
+    Json logged;
+    if (enough_) return;
+    if (!reader_.next(logged)) {  // an unfinished log: so far, so good
+      enough_ = true;
+      return;
+    }
+    if (logged.value("type", "") == "tick" && logged.contains("k")) {
+      k_ = logged["k"].get<long>();
+      time_s_ = logged["time_s"].get<double>();
+    }
+    for (Json* line : {&logged, &replayed}) {
+      line->erase("timing");
+      line->erase("provenance");
+      if (line->value("type", "") == "header") forget_places(*line);
+    }
+    compare("", logged, replayed, logged);
+    if (enough_) return;
+    ++verdict_.lines;
+    verdict_.ticks += logged["type"] == "tick" ? 1 : 0;
+    verdict_.finished = logged["type"] == "result";
+  }
+
+  void compare(const std::string& at, const Json& a, const Json& b, const Json& line) {
+    if (enough_) return;
+    if (a.is_object() && b.is_object()) {
+      for (const auto& [key, value] : a.items())
+        if (b.contains(key))
+          compare(at + "/" + key, value, b[key], line);
+        else
+          differ(at + "/" + key, value, Json("missing"), line);
+      for (const auto& [key, value] : b.items())
+        if (!a.contains(key)) differ(at + "/" + key, Json("missing"), value, line);
+    } else if (a.is_array() && b.is_array() && a.size() == b.size()) {
+      for (std::size_t i = 0; i < a.size(); ++i) compare(fmt::format("{}/{}", at, i), a[i], b[i], line);
+    } else if (a.is_number_float() && b.is_number_float()) {
+      const double x = a.get<double>(), y = b.get<double>();
+      if (std::bit_cast<std::uint64_t>(x) == std::bit_cast<std::uint64_t>(y)) return;
+      const double error = std::abs(x - y) / std::max(1.0, std::abs(x));
+      verdict_.largest = std::max(verdict_.largest, error);
+      differ(at, a, b, line, error <= tolerance_);
+    } else if (a != b) {
+      differ(at, a, b, line);
+    }
+  }
+
+  void differ(const std::string& field, const Json& logged, const Json& replayed, const Json& line,
+              bool tolerated = false) {
+    if (enough_) return;
+    const Verdict::Difference found{reader_.lines(), line.value("type", "line"), k_, time_s_, field, shown(logged),
+                                    shown(replayed)};
+    if (!verdict_.to_the_bit) verdict_.to_the_bit = found;
+    if (tolerated && tolerance_ > 0.0) return;
+    verdict_.beyond = found;
+    enough_ = true;
+  }
+
+  log::LogReader reader_;
+  double tolerance_;
+  Verdict verdict_;
+  std::optional<long> k_;
+  std::optional<double> time_s_;
+};
+
+// The step at which the log says that the run was stopped.
+std::optional<long> stopped_at(const fs::path& log) {
+  log::LogReader reader(log);
+  std::string last;
+  for (std::string_view line; reader.next_text(line);) last = line;
+  const Json result = Json::parse(last, nullptr, false);
+  if (!result.is_object() || result.value("type", Json()) != "result" ||
+      result.value("outcome", Json()) != "interrupted" || !result.contains("steps") ||
+      !result["steps"].is_number_integer())
+    return {};
+  return result["steps"].get<long>();
+}
+
+}  // namespace
+
+Recorded read_header(const Json& header, const fs::path& log) {
+  const std::string where = log.string() + ": line 1";
+  if (header.value("type", Json()) != "header")
+    throw Error(ErrorCode::invalid, fmt::format("{}: is no header, expected a log of hamelin", where));
+  log::check_line(header, where);
+
+  Recorded recorded;
+  recorded.program = header["program"] == "integrate" ? Recorded::Program::integrate : Recorded::Program::run;
+  recorded.every = header["every"].get<long>();
+  const Json& provenance = header["provenance"];
+  recorded.other_build = differences_of_build(provenance);
+
+  Json config = header["config"];
+  const std::pair<const char*, const char*> places[] = {
+      {"robot", "/robot/file"}, {"spheres", "/robot/spheres"}, {"map", "/map/file"}};
+  const fs::path cwd = text_at(provenance, "/cwd");
+  for (const auto& [role, pointer] : places) {
+    const Json::json_pointer at(pointer);
+    if (!config.contains(at) || !config[at].is_string()) continue;
+    std::string sha256;
+    for (const auto& input : provenance.value("inputs", Json::array()))
+      if (text_at(input, "/role") == role) sha256 = text_at(input, "/sha256");
+    const std::string named = config[at].get<std::string>();
+    const Found found = find_input(named, sha256, cwd, log);
+    if (found.file.empty()) {
+      recorded.changed.push_back(fmt::format("{}: is missing, expected the {} of this log", named, role));
+    } else {
+      if (found.sha256 != sha256)
+        recorded.changed.push_back(
+            fmt::format("{}: has changed since the log was written: SHA-256 {}..., expected {}...", found.file.string(),
+                        short_hash(found.sha256), sha256.empty() ? "one in the header" : short_hash(sha256)));
+      config[at] = found.file.string();
+    }
+  }
+  recorded.scene = scene::scene_from_json(config, {}, where + ": /config");
+  recorded.scene.name = header["scene"].get<std::string>();
+  return recorded;
+}
+
+Recorded read_header(const fs::path& log) {
+  log::LogReader reader(log);
+  Json header;
+  if (!reader.next(header))
+    throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a log of hamelin", log.string()));
+  return read_header(header, log);
+}
+
+log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories, const Watch& watch) {
+  if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front());
+  if (recorded.program == Recorded::Program::run) return run(recorded.scene, plugin_directories, watch);
+  const model::Model model = load_model(recorded.scene);
+  return integrate(model, free_motion(recorded.scene, model), watch);
+}
+
+Verdict verify(const fs::path& log, double tolerance, const std::vector<fs::path>& plugin_directories,
+               const Watch& watch) {
+  const Recorded recorded = read_header(log);
+  Comparison comparison(log, tolerance);
+  Watch compared = watch;
+  compared.log = &comparison;
+  compared.every = recorded.every;
+  compared.stop_at = stopped_at(log);
+  compared.announce = nullptr;
+  (void)repeat(recorded, plugin_directories, compared);
+  comparison.finish();
+  Verdict verdict = comparison.verdict();
+  verdict.stopped = watch.stop != nullptr && watch.stop->load();
+  return verdict;
+}
+
+}  // namespace hamelin::simulation
