@@ -8,6 +8,7 @@ void add_run(CLI::App& app, int& exit_code);
 void add_integrate(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_export(CLI::App& app, int& exit_code);
+void add_report(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);
 void add_scene(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);

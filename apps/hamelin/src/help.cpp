@@ -27,7 +27,7 @@ const std::vector<HelpSection>& about_the_program() {
         {"130", "interrupted; what was recorded so far is written"}}},
       {"Environment",
        {{"HAMELIN_PLUGIN_PATH", "directories to look for planners in, separated by colons"},
-        {"HAMELIN_ISA", "instructions to use: x86-64, v3 or v4 (default the best the machine has)"},
+        {"HAMELIN_ISA", "x86-64, v3 or v4: refuse to run unless this is the build's instruction set"},
         {"NO_COLOR, TERM=dumb", "no colour, as --no-color; a dumb terminal gets no counting line either"}}}};
   return sections;
 }

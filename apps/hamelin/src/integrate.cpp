@@ -22,6 +22,7 @@ struct IntegrateOptions {
   std::optional<std::string> tip, q0, v0;
   IntegratorFlags integrator;
   std::optional<double> step_s, duration_s;
+  bool print_config = false;
   RecordOptions record;
 };
 
@@ -71,6 +72,10 @@ int integrate(const IntegrateOptions& options) {
   if (name != scene.integrator.name) scene.integrator = {name, Json::object()};
   scene.integrator.params = integrator_params(options.integrator, name, scene.integrator.params);
   const auto motion = simulation::free_motion(scene, model);
+  if (options.print_config) {
+    print_json(motion.config);
+    return 0;
+  }
   return record(options.record, files_of(scene),
                 [&](const simulation::Watch& watch) { return simulation::integrate(model, motion, watch); });
 }
@@ -97,6 +102,9 @@ void add_integrate(CLI::App& app, int& exit_code) {
       ->type_name("a,b,..");
   command->add_option("--v0", options->v0, "joint velocities at the start (default the scene's, else 0)")
       ->type_name("a,b,..");
+  command->add_flag(
+      "--print-config", options->print_config,
+      "print what would be integrated as a scene with every default, and leave; paths are as seen from here");
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = integrate(*options); });
 }

@@ -6,6 +6,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "help.hpp"
 #include "terminal.hpp"
 
@@ -24,7 +25,7 @@ struct Purpose {
 const std::vector<Purpose>& commands() {
   static const std::vector<Purpose> all{
       {"Run things", {add_run, add_integrate, add_replay, add_sweep}},
-      {"Look at things", {add_robot, add_scene, add_plugins}},
+      {"Look at things", {add_report, add_robot, add_scene, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},
       {"Help", {add_help, add_completion}},
       {"", {add_man}},
@@ -47,6 +48,7 @@ void add_everywhere(CLI::App& app) {
 }
 
 int run_command_line(int argc, char** argv) {
+  hamelin::check_instruction_set();
   set_command_line(argc, argv);
   const Phase phase("in all");
   int exit_code = 0;

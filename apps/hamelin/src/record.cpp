@@ -75,6 +75,7 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
   if (run_log) watch.announce = [&run_log](double ticks, int dof) { announce_size(*run_log, ticks, dof); };
   log::Result result;
   {
+    const Phase phase("running");
     Progress progress;
     watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
     result = simulate(watch);

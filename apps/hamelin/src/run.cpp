@@ -18,6 +18,7 @@ struct RunOptions {
   std::filesystem::path file;
   SceneFlags flags;
   std::vector<std::filesystem::path> plugin_path;
+  bool print_config = false;
   RecordOptions record;
 };
 
@@ -39,6 +40,10 @@ void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
 
 int run(const RunOptions& options) {
   const scene::Scene scene = read_scene(options.file, options.flags);
+  if (options.print_config) {
+    print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
+    return 0;
+  }
   say_what_is_unused(scene, simulation::load_model(scene).robot());
   return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
     return simulation::run(scene, plugin_path(options.plugin_path), watch);
@@ -57,7 +62,9 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
   command->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  command->add_option("--integrator", options->flags.integrator, "default the scene's, else hamel-variational")
+  one_of(command->add_option("--integrator", options->flags.integrator,
+                             "time stepping (default the scene's, else hamel-variational)"),
+         integration::integrator_names())
       ->type_name("NAME");
   command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")->type_name("H");
   command->add_option("--duration", options->flags.duration_s, "longest simulated time [s] (default the scene's)")
@@ -73,6 +80,8 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
+  command->add_flag("--print-config", options->print_config,
+                    "print the scene with every default as it would be run, and leave; paths are as seen from here");
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

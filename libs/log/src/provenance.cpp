@@ -13,6 +13,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "hamelin/core/isa.hpp"
 
 namespace hamelin::log {
 
@@ -89,23 +90,6 @@ std::string build_id() {
   return id;
 }
 
-// The instruction set this code was compiled for.
-constexpr const char* isa() {
-#if defined(__AVX512F__) && defined(__AVX512VL__)
-  return "x86-64-v4";
-#elif defined(__AVX2__) && defined(__FMA__)
-  return "x86-64-v3";
-#elif defined(__SSE4_2__)
-  return "x86-64-v2";
-#elif defined(__x86_64__)
-  return "x86-64";
-#elif defined(__aarch64__)
-  return "aarch64";
-#else
-  return "other";
-#endif
-}
-
 }  // namespace
 
 Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>& argv) {
@@ -116,7 +100,7 @@ Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>
   const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                             std::to_string(EIGEN_MINOR_VERSION);
   return {{"host", host()},
-          {"isa", isa()},
+          {"isa", std::string(instruction_set())},
           {"build",
            {{"id", known(build_id())},
             {"compiler", HAMELIN_COMPILER},

@@ -54,6 +54,11 @@ struct FreeMotion {
 [[nodiscard]] log::Result run(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories,
                               const Watch& watch);
 
+/// The scene as a document with every default written out, the planner's and the integrator's too: a log's `config`.
+/// Paths are as seen from here.
+/// @throws Error for parameters that are wrong, or a planner that is not found
+[[nodiscard]] Json full_config(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories);
+
 /// The robot of a scene as a model: file, tip, spheres, payload, base, gravity.
 [[nodiscard]] model::Model load_model(const scene::Scene& scene);
 

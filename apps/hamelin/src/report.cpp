@@ -1,0 +1,95 @@
+#include "hamelin/report/report.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/core/json.hpp"
+#include "output.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReportOptions {
+  std::vector<fs::path> logs;
+  fs::path output;
+  report::Options page;
+  bool json = false;
+};
+
+// The page without runs, beside this program: the build makes it where it finds Node.js.
+fs::path page_template() {
+  std::error_code ec;
+  const auto program = fs::read_symlink("/proc/self/exe", ec);
+  const auto file = program.parent_path().parent_path() / "share" / "hamelin" / "report" / "page.html";
+  if (ec || !fs::is_regular_file(file, ec))
+    throw Error(ErrorCode::io,
+                fmt::format("{}: is missing: the page was not built because Node.js with npm was missing when hamelin "
+                            "was built; install both (Debian: apt install nodejs npm) and build hamelin again",
+                            file.string()));
+  return file;
+}
+
+Json json_of(const report::RunSummary& run) {
+  return {{"name", run.name},   {"log", run.log.string()}, {"outcome", run.outcome}, {"time_s", run.time_s},
+          {"ticks", run.ticks}, {"frames", run.frames},    {"notes", run.notes}};
+}
+
+int make_report(const ReportOptions& options) {
+  const fs::path target = output_target(options.output, options.logs);
+  const fs::path template_file = page_template();
+  report::Data data;
+  {
+    const Phase phase("reading the logs");
+    data = report::make_data(options.logs, options.page);
+  }
+  std::string page;
+  {
+    const Phase phase("packing the page");
+    page = report::make_page(read_file(template_file), data.bytes, template_file.string());
+  }
+  write_file_aside(target, page);
+  Json summary{{"page", options.output.string()}, {"bytes", page.size()}, {"runs", Json::array()}};
+  for (const auto& run : data.runs) {
+    summary["runs"].push_back(json_of(run));
+    for (const auto& text : run.notes) note(fmt::format("{}: {}", run.log.string(), text));
+    if (!options.json)
+      report(fmt::format("{}: {} at {:.6g} s, {} ticks, drawn at {}\n", run.name, run.outcome, run.time_s, run.ticks,
+                         run.frames));
+  }
+  if (options.json)
+    fmt::print("{}\n", summary.dump(2, ' ', false, Json::error_handler_t::replace));
+  else
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(page.size())));
+  return 0;
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, int& exit_code) {
+  auto* command =
+      add_command(app, "report", "Make one HTML page of logs: the arm replayed in its map, plots; opens offline",
+                  "hamelin report shelf.jsonl -o shelf.html\n"
+                  "hamelin report apf.jsonl gyro.jsonl hybrid.jsonl -o compared.html");
+  const auto options = std::make_shared<ReportOptions>();
+  command->add_option("logs", options->logs, "logs, plain or zstd; several are shown side by side")
+      ->required()
+      ->type_name("LOG...");
+  command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("PAGE.html");
+  command->add_option("--frames", options->page.frames_max, "poses of the arm per run at most")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(2L, 100000L));
+  command->add_flag("--json", options->json, "print what was made as JSON");
+  command->callback([options, &exit_code] { exit_code = make_report(*options); });
+}
+
+}  // namespace hamelin::app
