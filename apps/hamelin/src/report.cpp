@@ -31,10 +31,13 @@ fs::path page_template() {
   const auto program = fs::read_symlink("/proc/self/exe", ec);
   const auto file = program.parent_path().parent_path() / "share" / "hamelin" / "report" / "page.html";
   if (ec || !fs::is_regular_file(file, ec))
-    throw Error(ErrorCode::io,
-                fmt::format("{}: is missing: the page was not built because Node.js with npm was missing when hamelin "
-                            "was built; install both (Debian: apt install nodejs npm) and build hamelin again",
-                            file.string()));
+    throw Error(
+        ErrorCode::io,
+        fmt::format(
+            "{}: is missing: the page was not built because Node.js, npm or its registry was missing when hamelin "
+            "was built (or HAMELIN_BUILD_REPORT was OFF); install them (Debian: apt install nodejs npm) "
+            "and build hamelin again",
+            file.string()));
   return file;
 }
 

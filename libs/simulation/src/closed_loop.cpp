@@ -305,25 +305,25 @@ std::string ClosedLoop::where_nearest() const {
                      plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_, what);
 }
 
-bool ClosedLoop::ask_planner(long k) {
+bool ClosedLoop::call_planner() {
   q_shown_ = state_.q;
   v_shown_ = v_;
   if (scene_.actuation.joint_noise_rad > 0.0 && scene_.actuation.type == scene::ActuationType::sampled)
     for (auto& angle : q_shown_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(k),
+  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(state_.k),
                           state_.time_s,        q_shown_.data(),
                           v_shown_.data(),      shown_.data(),
                           contact_count_,       goal_index_,
                           speed_scale_};
-  if (!planner_.tick(tick, *command_)) {
-    finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name, k, planner_.error()));
-    return false;
-  }
-  if (command_->raw().state == HAMELIN_PLANNER_GAVE_UP) {
+  return planner_.tick(tick, *command_);
+}
+
+void ClosedLoop::ask_planner() {
+  if (!call_planner())
+    finish(log::Outcome::defect,
+           fmt::format("planner '{}' at step {}: {}", scene_.planner->name, state_.k, planner_.error()));
+  else if (command_->raw().state == HAMELIN_PLANNER_GAVE_UP)
     finish(log::Outcome::stalled, command_->raw().cause);
-    return false;
-  }
-  return true;
 }
 
 void ClosedLoop::take_gyroscopic_terms() {
@@ -350,13 +350,10 @@ void ClosedLoop::limit_torques() {
   if (scale < 1.0 || held != wanted) ++saturated_ticks_;
 }
 
-void ClosedLoop::actuate() {
-  // closing half-kick of the step before, now that the gradient at this node is known
+void ClosedLoop::arrive() {
   gradient_ = command_->potential_gradient();
-  const bool potential = command_->raw().potential_J != 0.0 || !gradient_.isZero(0.0);
-  const double half = 0.5 * scene_.step_s;
   if (kicked_) {
-    impulse_ = half * (gradient_before_ - gradient_);
+    impulse_ = 0.5 * scene_.step_s * (gradient_before_ - gradient_);
     integrator_->kick(state_, impulse_);
     integrator_->velocity(state_, v_);
   }
@@ -365,10 +362,14 @@ void ClosedLoop::actuate() {
   ledger_.potential = energy.potential_J;
   ledger_.control = command_->raw().potential_J;
   recorder_->node(ledger_);
+}
 
+void ClosedLoop::actuate() {
+  arrive();
+  const bool potential = command_->raw().potential_J != 0.0 || !gradient_.isZero(0.0);
   if (command_->raw().has_node_velocity != 0) {
     integrator_->set_velocity(state_, command_->node_velocity());
-    ledger_.node += dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - energy.kinetic_J;
+    ledger_.node += dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - ledger_.kinetic;
     ledger_.filter += command_->raw().filter_work_J;
     ledger_.recovery += command_->raw().recovery_work_J;
   }
@@ -378,11 +379,25 @@ void ClosedLoop::actuate() {
   limit_torques();
   if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
   if (potential) {
-    impulse_ = -half * gradient_;
+    impulse_ = -0.5 * scene_.step_s * gradient_;
     integrator_->kick(state_, impulse_);
   }
   gradient_before_ = gradient_;
   kicked_ = kicked_ || potential;
+}
+
+// Nothing acts any more, but the last node's energies still belong to the account; a control potential's value and its
+// gradient for the closing half-kick are the planner's to know.
+void ClosedLoop::settle() {
+  if (state_.k == 0 || result_.outcome == log::Outcome::diverged) return;
+  if (kicked_) {
+    if (call_planner()) arrive();
+    return;
+  }
+  const auto energy = integrator_->energy(state_);
+  ledger_.kinetic = energy.kinetic_J;
+  ledger_.potential = energy.potential_J;
+  recorder_->node(ledger_);
 }
 
 // What a sampled controller can do: one torque, made of all channels at the tick, held over the control period.
@@ -469,14 +484,11 @@ log::Result ClosedLoop::run(const Watch& watch) {
       else if (recorder.stopped(state_.k))
         finish(log::Outcome::interrupted, "stopped from outside");
     }
-    if (done_ && state_.k > 0 && !kicked_) {
-      // nothing acts any more; the last node's energies still belong to the account
-      const auto energy = integrator_->energy(state_);
-      ledger_.kinetic = energy.kinetic_J;
-      ledger_.potential = energy.potential_J;
-      recorder.node(ledger_);
+    if (done_) settle();
+    if (!done_ && (state_.k % control_steps_ == 0 || !sampled)) {
+      ask_planner();
+      if (done_ && !kicked_) settle();
     }
-    if (!done_ && (state_.k % control_steps_ == 0 || !sampled)) (void)ask_planner(state_.k);
     if (!done_) {
       if (sampled)
         actuate_sampled();
@@ -549,7 +561,7 @@ void ClosedLoop::log_tick(bool certified) {
               {"goal_index", goal_index_},
               {"clearance_m", nullptr},
               {"closest", nullptr},
-              {"energy", energy_json(ledger_)},
+              {"energy", energy_json(recorder_->last_node())},
               {"solver", solver_json(report_)},
               {"certified", certified}};
   if (!done_) fields["channels"] = channel_torques_;

@@ -39,10 +39,16 @@ class ClosedLoop final : private planning::HostServices {
   [[nodiscard]] GoalError goal_error() const;
   /// Skips all goals that are reached; true if none is left.
   bool all_reached();
-  /// Asks the planner; false with result_.outcome set if it gave up or failed.
-  bool ask_planner(long k);
-  /// Puts the planner's answer into channels, kicks and node velocity.
+  /// The planner's answer for this node into command_; false if it failed.
+  [[nodiscard]] bool call_planner();
+  /// The same; ends the run if the planner gave up or failed.
+  void ask_planner();
+  /// The closing half-kick of the step that led here, with the gradient now known; then the node's energies are booked.
+  void arrive();
+  /// Arrives, and puts the planner's answer into channels, kicks and node velocity.
   void actuate();
+  /// Arrives at the last node, where nothing acts any more.
+  void settle();
   void actuate_sampled();
   void take_gyroscopic_terms();
   void limit_torques();

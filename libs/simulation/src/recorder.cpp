@@ -42,6 +42,7 @@ void Recorder::header(Json fields, const model::Robot& robot, long steps) {
 }
 
 void Recorder::node(const Ledger& ledger) {
+  last_node_ = ledger;
   if (first_) {
     first_ = false;
     first_balance_ = ledger.balance();

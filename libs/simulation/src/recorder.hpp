@@ -44,6 +44,8 @@ class Recorder {
   void header(Json fields, const model::Robot& robot, long steps);
   /// The node's balance enters energy_error_max_J.
   void node(const Ledger& ledger);
+  /// As it was then: a node velocity's work comes after it.
+  [[nodiscard]] const Ledger& last_node() const noexcept { return last_node_; }
   void step(const integration::StepReport& report);
   /// What is looked at besides, at every node.
   void observe(double clearance_m, bool certified, const Eigen::VectorXd& v);
@@ -82,6 +84,7 @@ class Recorder {
   std::vector<double> tick_us_;
   double started_cpu_s_ = thread_cpu_s();
   double first_balance_ = 0.0;
+  Ledger last_node_;
   bool first_ = true;
   long last_logged_ = -1;
   Extrema since_;

@@ -1,0 +1,48 @@
+// Numbers and words for people.
+
+const MINUS = '\u2212';
+const tidy = (text) => text.replace(/-/g, MINUS).replace(/e\+?/, 'e');
+
+/** A number with `digits` significant digits; very small and very large ones with an exponent, so none reads 0. */
+export function number(value, digits = 4) {
+  if (value === null || value === undefined || Number.isNaN(value)) return '–';
+  if (value === 0) return '0';
+  if (!Number.isFinite(value)) return value > 0 ? '∞' : `${MINUS}∞`;
+  const size = Math.abs(value);
+  if (size < 1e-3 || size >= 1e6) return tidy(value.toExponential(digits - 1));
+  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+  return tidy(value.toFixed(Math.min(decimals, 12)));
+}
+
+/** Labels of an axis: enough decimals to tell neighbours apart, and `least` significant digits for the largest. */
+export function ticks(splits, increment, least = 3) {
+  const largest = Math.max(...splits.map(Math.abs));
+  if (!(largest > 0)) return splits.map(() => '0');
+  const size = Math.floor(Math.log10(largest) + 1e-9);
+  const fine = Math.floor(Math.log10(increment) + 1e-9);
+  if (size < -3 || size >= 5) {
+    const digits = Math.min(8, Math.max(least - 1, size - fine));
+    return splits.map((v) => (Math.abs(v) < increment * 1e-6 ? '0' : tidy(v.toExponential(digits))));
+  }
+  const decimals = Math.max(0, -fine, least - 1 - size);
+  return splits.map((v) => (Math.abs(v) < increment * 1e-6 ? '0' : tidy(v.toFixed(decimals))));
+}
+
+/** Seconds with milliseconds. */
+export const seconds = (t) => `${t.toFixed(3)} s`;
+
+const UNITS = [
+  ['_wxyz', ''], ['_rad_s2', 'rad/s²'], ['_rad_s', 'rad/s'], ['_m_s2', 'm/s²'], ['_m_s', 'm/s'], ['_kg_m2', 'kg m²'], ['_Nm', 'N m'],
+  ['_rad', 'rad'], ['_kg', 'kg'], ['_us', 'µs'], ['_ns', 'ns'], ['_Hz', 'Hz'], ['_J', 'J'], ['_W', 'W'], ['_N', 'N'], ['_m', 'm'], ['_s', 's'],
+];
+
+/** "energy_error_max_J" → ["energy error max", "J"]. */
+export function words(key) {
+  for (const [suffix, unit] of UNITS) {
+    if (key.length > suffix.length && key.endsWith(suffix)) return [key.slice(0, -suffix.length).replaceAll('_', ' '), unit];
+  }
+  return [key.replaceAll('_', ' '), ''];
+}
+
+/** A unit as it is printed; none for pure numbers. */
+export const unitText = (unit) => ({ us: 'µs', Nm: 'N m', 1: '' })[unit] ?? unit ?? '';

@@ -1,0 +1,326 @@
+// What is drawn around the arm: collision spheres, closest-point lines, force arrows, trail, goals, obstacles, floor.
+import {
+  BufferAttribute, BufferGeometry, Color, GridHelper, Group, InstancedMesh, Line, LineBasicMaterial, Matrix4, Mesh,
+  MeshBasicMaterial, MeshLambertMaterial, Quaternion, TorusGeometry, Vector3,
+} from 'three';
+import { Arm } from './arm.js';
+import { clearanceColor } from './colors.js';
+import { Chain } from './kinematics.js';
+import { BALL, between, CONE, CUBE, DRUM, ROD, still, veil } from './shapes.js';
+
+const matrix = new Matrix4();
+const color = new Color();
+const rgb = [0, 0, 0];
+
+/** Balls in one draw, put one after the other. */
+class Balls {
+  constructor(count, material, order) {
+    this.material = material;
+    this.mesh = still(new InstancedMesh(BALL, material, count));
+    this.mesh.renderOrder = order;
+    this.count = 0;
+  }
+
+  put(p, radius) {
+    this.mesh.setMatrixAt(this.count, matrix.makeScale(radius, radius, radius).setPosition(p[0], p[1], p[2]));
+    return this.count++;
+  }
+
+  publish() {
+    this.mesh.count = this.count;
+    this.mesh.instanceMatrix.needsUpdate = true;
+    if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+  }
+}
+
+/** Collision spheres, coloured by clearance; those beyond the influence distance are faint and grey. */
+export class Spheres {
+  constructor(robot, frames, thin) {
+    this.robot = robot;
+    this.frames = frames;
+    const count = Math.max(1, robot.spheres.length);
+    this.group = new Group();
+    // Spheres within the limbs of a thin arm would not be seen: they are drawn over it.
+    this.near = new Balls(count, new MeshLambertMaterial({ transparent: true, opacity: 0.88, depthTest: !thin }), 2);
+    this.far = new Balls(count, new MeshLambertMaterial(veil(1, 0.16)), 3);
+    this.group.add(this.near.mesh, this.far.mesh);
+    /** x, y, z, radius of each sphere, world; the map uses them too. */
+    this.balls = new Float32Array(4 * robot.spheres.length);
+    this.p = [0, 0, 0];
+  }
+
+  paint(colors) {
+    this.far.material.color.set(colors.beyond);
+    this.contact = colors.contact;
+  }
+
+  follow(chain, k) {
+    const { spheres } = this.robot;
+    const { clearance, influence } = this.frames;
+    this.near.count = this.far.count = 0;
+    spheres.forEach((sphere, i) => {
+      chain.point(sphere.link, sphere.center_m, this.p);
+      this.balls.set(this.p, 4 * i);
+      this.balls[4 * i + 3] = sphere.radius_m;
+      const d = clearance ? clearance[k * spheres.length + i] : NaN;
+      if (!(d < influence)) {
+        this.far.put(this.p, sphere.radius_m);
+        return;
+      }
+      const slot = this.near.put(this.p, sphere.radius_m * 1.004);
+      if (d <= 0) color.set(this.contact);
+      else color.setRGB(...clearanceColor(d / influence, rgb), 'srgb');
+      this.near.mesh.setColorAt(slot, color);
+    });
+    this.near.publish();
+    this.far.publish();
+  }
+}
+
+/** Thin rods with a dot at the obstacle's end. */
+export class Contacts {
+  constructor(frames, reach) {
+    this.contacts = frames.contacts;
+    this.reach = reach;
+    this.material = new MeshBasicMaterial();
+    const most = this.contacts ? Math.max(1, ...this.contacts.count) : 1;
+    this.rods = still(new InstancedMesh(ROD, this.material, most));
+    this.dots = still(new InstancedMesh(BALL, this.material, 2 * most));
+    this.group = new Group();
+    this.group.add(this.rods, this.dots);
+    this.shown = 0;
+  }
+
+  paint(colors) {
+    this.material.color.set(colors.line);
+  }
+
+  follow(k) {
+    this.shown = this.contacts?.count[k] ?? 0;
+    const r = 0.0022 * this.reach;
+    for (let i = 0; i < this.shown; ++i) {
+      const at = 6 * (this.contacts.first[k] + i);
+      const a = this.contacts.points.subarray(at, at + 3);
+      const b = this.contacts.points.subarray(at + 3, at + 6);
+      this.rods.setMatrixAt(i, between(a, b, r, matrix));
+      this.dots.setMatrixAt(2 * i, matrix.makeScale(2.2 * r, 2.2 * r, 2.2 * r).setPosition(...a));
+      this.dots.setMatrixAt(2 * i + 1, matrix.makeScale(3.4 * r, 3.4 * r, 3.4 * r).setPosition(...b));
+    }
+    this.rods.count = this.shown;
+    this.dots.count = 2 * this.shown;
+    this.rods.instanceMatrix.needsUpdate = this.dots.instanceMatrix.needsUpdate = true;
+  }
+}
+
+/** One arrow a channel, from the tip. */
+export class Forces {
+  constructor(frames, reach) {
+    this.group = new Group();
+    this.reach = reach;
+    this.arrows = frames.forces.map(({ channel, f }) => {
+      const material = new MeshLambertMaterial();
+      const shaft = still(new Mesh(ROD, material));
+      const head = still(new Mesh(CONE, material));
+      const group = new Group();
+      group.add(shaft, head);
+      this.group.add(group);
+      return { channel, f, material, shaft, head, group, on: true };
+    });
+    this.f = [0, 0, 0];
+  }
+
+  paint(colors) {
+    for (const { channel, material } of this.arrows) {
+      material.color.set(colors.channels[channel] ?? colors.axis);
+      material.emissive.set(material.color).multiplyScalar(0.35);
+    }
+  }
+
+  /** @param {number} metres length of 1 N */
+  follow(tip, k, a, metres) {
+    for (const arrow of this.arrows) {
+      const { f } = arrow;
+      for (let c = 0; c < 3; ++c) {
+        const here = f[3 * k + c];
+        const next = f[3 * k + 3 + c];
+        this.f[c] = a > 0 && !Number.isNaN(next) ? here + a * (next - here) : here;
+      }
+      const length = Math.hypot(...this.f) * metres;
+      arrow.group.visible = arrow.on && length > 0.004 * this.reach;
+      if (!arrow.group.visible) continue;
+      const r = 0.0055 * this.reach;
+      const headLength = Math.min(0.45 * length, 0.05 * this.reach);
+      const end = tip.map((c, i) => c + this.f[i] * metres);
+      const neck = tip.map((c, i) => c + this.f[i] * metres * (1 - headLength / length));
+      between(tip, neck, r, arrow.shaft.matrix);
+      between(neck, end, Math.min(2.6 * r, 0.6 * headLength), arrow.head.matrix);
+    }
+  }
+}
+
+/** Path of the tip: travelled as a rod, ahead as a thin line. */
+export class Trail {
+  /** @param {Float32Array} tips x, y, z of each frame */
+  constructor(tips, reach) {
+    const count = tips.length / 3;
+    this.tips = tips;
+    this.radius = 0.0028 * reach;
+    this.material = new MeshBasicMaterial();
+    this.past = still(new InstancedMesh(ROD, this.material, Math.max(1, count)));
+    for (let k = 0; k + 1 < count; ++k) this.lay(k, tips.subarray(3 * k + 3, 3 * k + 6));
+    this.lineMaterial = new LineBasicMaterial();
+    this.line = new Line(new BufferGeometry().setAttribute('position', new BufferAttribute(tips, 3)), this.lineMaterial);
+    this.group = new Group();
+    this.group.add(this.past, this.line);
+  }
+
+  paint(colors, accent) {
+    this.material.color.set(accent);
+    this.lineMaterial.color.set(colors.trailRest);
+  }
+
+  /** Rods up to frame k, and one from there to the tip, which stands between two frames. */
+  follow(tip, k) {
+    this.past.count = 0;
+    if (!this.tips.length) return;
+    if (this.cut !== undefined && this.cut !== k) this.lay(this.cut, this.tips.subarray(3 * this.cut + 3, 3 * this.cut + 6));
+    this.cut = k;
+    this.lay(k, tip);
+    this.past.count = k + 1;
+    this.past.instanceMatrix.needsUpdate = true;
+  }
+
+  lay(k, end) {
+    if (end.length === 3) this.past.setMatrixAt(k, between(this.tips.subarray(3 * k, 3 * k + 3), end, this.radius, matrix));
+  }
+}
+
+const AXES = [[1, 0, 0, '#d43d3d'], [0, 1, 0, '#2f9e44'], [0, 0, 1, '#2b6fd6']];
+
+/** Three rods in red, green and blue: a frame. */
+export function frame(size) {
+  const group = new Group();
+  for (const [x, y, z, paint] of AXES) {
+    const rod = still(new Mesh(ROD, new MeshBasicMaterial({ color: paint })));
+    between([0, 0, 0], [x * size, y * size, z * size], 0.055 * size, rod.matrix);
+    group.add(rod);
+  }
+  return group;
+}
+
+/** Targets: a ring and a dot, a frame for poses, a ghost of the arm for joint goals. The one aimed at stands out. */
+export class Goals {
+  constructor(world) {
+    const { robot, reach_m: reach } = world;
+    this.group = new Group();
+    this.current = -1;
+    this.ghosts = 0;
+    this.items = world.goals.map((goal) => {
+      const group = new Group();
+      const material = new MeshLambertMaterial({ transparent: true });
+      let at = goal.position_m;
+      let ghost = null;
+      if (goal.type === 'joint') {
+        const chain = new Chain(robot).move(goal.q);
+        at = chain.tip([0, 0, 0]);
+        ghost = new Arm(robot, reach, { ghost: true });
+        ghost.follow(chain);
+        this.group.add(ghost.group);
+        ++this.ghosts;
+      }
+      const ball = new Mesh(BALL, material);
+      ball.scale.setScalar(0.011 * reach);
+      const ring = new Mesh(new TorusGeometry(0.034 * reach, 0.0035 * reach, 8, 40), material);
+      const cross = new Mesh(ring.geometry, material);
+      cross.rotation.x = Math.PI / 2;
+      group.add(ball, ring, cross);
+      if (goal.type === 'pose') {
+        const [w, x, y, z] = goal.quaternion_wxyz;
+        const axes = frame(0.09 * reach);
+        axes.quaternion.copy(new Quaternion(x, y, z, w));
+        group.add(axes);
+      }
+      group.position.fromArray(at);
+      this.group.add(group);
+      return { goal, at, group, material, ghost };
+    });
+  }
+
+  paint(colors) {
+    this.colors = colors;
+    for (const { ghost } of this.items) ghost?.paint(colors, colors.goal);
+    const current = this.current;
+    this.current = -1;
+    this.aim(Math.max(0, current));
+  }
+
+  /** @param {number} index goal aimed at; past the last: all are reached */
+  aim(index) {
+    if (index === this.current || !this.colors) return;
+    this.current = index;
+    this.items.forEach(({ group, material, ghost }, i) => {
+      const now = i === Math.min(index, this.items.length - 1);
+      material.color.set(now ? this.colors.goal : this.colors.goalIdle);
+      material.emissive.set(material.color).multiplyScalar(0.4);
+      material.opacity = now ? 1 : 0.55;
+      group.scale.setScalar(now ? 1 : 0.6);
+      if (ghost) ghost.group.visible = now;
+    });
+  }
+}
+
+/** Primitive obstacles; some move, some appear late. */
+export class Obstacles {
+  constructor(obstacles, planarNormal) {
+    this.group = new Group();
+    this.moving = 0;
+    this.items = obstacles.map((o) => {
+      const material = new MeshLambertMaterial(o.judge_only || planarNormal ? { transparent: true, opacity: o.judge_only ? 0.35 : 0.9 } : {});
+      const geometry = o.shape === 'sphere' ? BALL : o.shape === 'cylinder' ? DRUM : CUBE;
+      const mesh = new Mesh(geometry, material);
+      const [w, x, y, z] = o.quaternion_wxyz ?? [1, 0, 0, 0];
+      mesh.quaternion.set(x, y, z, w).normalize();
+      if (o.shape === 'sphere') mesh.scale.setScalar(o.radius_m);
+      else if (o.shape === 'box') mesh.scale.fromArray(o.size_m);
+      else {
+        mesh.scale.set(o.radius_m, o.length_m, o.radius_m);
+        // The unit drum stands along y, the obstacle along its own z.
+        mesh.quaternion.multiply(new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2));
+      }
+      if (o.motion) ++this.moving;
+      this.group.add(mesh);
+      return { o, mesh, material };
+    });
+  }
+
+  paint(colors) {
+    for (const { o, material } of this.items) material.color.set(o.judge_only ? colors.judge : colors.obstacle);
+  }
+
+  follow(t) {
+    for (const { o, mesh } of this.items) {
+      mesh.visible = t >= (o.appears_s ?? 0);
+      const s = o.motion ? Math.sin((2 * Math.PI * t) / o.motion.period_s) : 0;
+      mesh.position.set(...o.position_m.map((c, i) => c + (o.motion ? s * o.motion.amplitude_m[i] : 0)));
+    }
+  }
+}
+
+/** A grid under the arm, or in the plane of a planar one. */
+export class Floor {
+  constructor(step, half, center, normal) {
+    this.args = [2 * half, Math.round((2 * half) / step)];
+    this.center = center;
+    this.normal = new Vector3(...normal).normalize();
+    this.group = new Group();
+  }
+
+  paint(colors) {
+    this.group.clear();
+    const grid = new GridHelper(...this.args, colors.gridMajor, colors.gridMinor);
+    grid.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), this.normal);
+    grid.position.fromArray(this.center);
+    grid.renderOrder = -1;
+    this.group.add(grid);
+  }
+}

@@ -1,0 +1,113 @@
+// The picture of one run: map, arm and markers, following its replay.
+import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
+import { Arm } from './arm.js';
+import { runColor, theme } from './colors.js';
+import { Contacts, Floor, Forces, frame, Goals, Obstacles, Spheres, Trail } from './markers.js';
+import { Voxels } from './voxels.js';
+
+export class RunScene {
+  constructor(replay, floor) {
+    const { world, frames } = replay;
+    const reach = world.reach_m;
+    this.replay = replay;
+    this.reach = reach;
+    this.scene = new Scene();
+    this.hemisphere = new HemisphereLight();
+    this.sun = new DirectionalLight();
+    this.sun.position.set(0.6, -1, 1.6);
+    this.scene.add(this.hemisphere, this.sun);
+
+    this.voxels = world.map && world.map.level.length ? new Voxels(world.map) : null;
+    this.arm = new Arm(world.robot, reach);
+    this.spheres = new Spheres(world.robot, frames, Math.min(...this.arm.radii) > Math.max(0, ...world.robot.spheres.map((s) => s.radius_m)));
+    this.contacts = new Contacts(frames, reach);
+    this.forces = new Forces(frames, reach);
+    this.trail = new Trail(replay.tips, reach);
+    this.goals = new Goals(world);
+    this.obstacles = new Obstacles(world.obstacles ?? [], world.robot.planar_normal);
+    this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
+    this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? frame(0.07 * reach) : new Group();
+    this.tipFrame.matrixAutoUpdate = false;
+    this.parts = [this.floor, this.voxels, this.obstacles, this.goals, this.arm, this.spheres, this.contacts, this.forces, this.trail].filter(Boolean);
+    for (const part of this.parts) this.scene.add(part.group);
+    this.scene.add(this.tipFrame);
+    this.balls = this.ballsOf(world.robot);
+    this.paint();
+  }
+
+  /** Who is asked how near a cell is: the spheres, else points along segments, else along the skeleton. */
+  ballsOf(robot) {
+    if (robot.spheres.length) return null;
+    const bars = robot.segments.length
+      ? robot.segments
+      : robot.skeleton.slice(1).map((to, i) => ({ link: i, from_m: robot.skeleton[i], to_m: to, radius_m: 0 }));
+    const list = [];
+    for (const { link, from_m: from, to_m: to, radius_m: radius } of bars) {
+      const count = Math.max(1, Math.ceil(Math.hypot(...to.map((c, i) => c - from[i])) / (0.03 * this.reach)));
+      for (let s = 0; s <= count; ++s) list.push({ link, p: from.map((c, i) => c + ((to[i] - c) * s) / count), radius });
+    }
+    return { list, out: new Float32Array(4 * list.length) };
+  }
+
+  nearBalls() {
+    if (!this.balls) return this.spheres.balls;
+    const p = [0, 0, 0];
+    this.balls.list.forEach(({ link, p: at, radius }, i) => {
+      this.balls.out.set(this.replay.chain.point(link, at, p), 4 * i);
+      this.balls.out[4 * i + 3] = radius;
+    });
+    return this.balls.out;
+  }
+
+  paint() {
+    const colors = theme();
+    const accent = runColor(this.replay.index);
+    this.hemisphere.color.set(colors.sky);
+    this.hemisphere.groundColor.set(colors.ground);
+    this.hemisphere.intensity = colors.ambient;
+    this.sun.intensity = colors.sun;
+    for (const part of this.parts) part.paint(colors, accent);
+  }
+
+  /** Takes over the view's settings. */
+  apply(settings) {
+    const { show } = settings;
+    this.settings = settings;
+    if (this.voxels) {
+      this.voxels.group.visible = show.map;
+      this.voxels.setOpacity(settings.opacity);
+      this.voxels.setClip(settings.clip);
+    }
+    this.arm.group.visible = show.arm;
+    this.spheres.group.visible = show.spheres;
+    this.contacts.group.visible = show.lines;
+    this.forces.group.visible = show.forces;
+    for (const arrow of this.forces.arrows) arrow.on = settings.channels[arrow.channel] ?? true;
+    this.trail.group.visible = show.trail;
+    this.goals.group.visible = show.goals;
+    this.tipFrame.visible = show.goals;
+    this.obstacles.group.visible = show.obstacles;
+    this.floor.group.visible = show.floor;
+  }
+
+  follow(t) {
+    const { replay, settings } = this;
+    const { chain, k, a, tip } = replay;
+    this.arm.follow(chain);
+    this.spheres.follow(chain, replay.nearest);
+    this.contacts.follow(replay.nearest);
+    this.forces.follow(tip, k, a, settings.metresPerNewton);
+    this.trail.follow(tip, k);
+    this.goals.aim(replay.goalIndex);
+    this.obstacles.follow(t);
+    const pose = chain.link(replay.world.robot.tip_link);
+    // prettier-ignore
+    this.tipFrame.matrix.set(
+      pose[0], pose[1], pose[2], tip[0],
+      pose[3], pose[4], pose[5], tip[1],
+      pose[6], pose[7], pose[8], tip[2], 0, 0, 0, 1);
+    if (!this.voxels) return;
+    if (settings.near === null) this.voxels.showAll();
+    else this.voxels.showNear(this.nearBalls(), settings.near);
+  }
+}

@@ -1,0 +1,139 @@
+// The bar at the foot of the page: play, step, time, speed, and the events as ticks.
+import { runColor } from './colors.js';
+import { h, icon } from './dom.js';
+import { seconds } from './format.js';
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+
+export class Timeline {
+  /**
+   * @param {object[]} runs
+   * @param {number} duration [s]
+   * @param {(t: number) => void} setTime
+   */
+  constructor(runs, duration, setTime) {
+    this.runs = runs;
+    this.duration = duration;
+    this.setTime = setTime;
+    this.now = 0;
+    this.speed = 1;
+    this.playing = false;
+    const button = (name, title, action) => h('button', { type: 'button', class: 'icon', title, 'aria-label': title, onclick: action }, icon(name));
+    this.play = button('play', 'Play (space)', () => this.toggle());
+    this.play.classList.add('play');
+    this.range = h('input', { type: 'range', min: 0, max: duration, step: 'any', class: 'time', 'aria-label': 'Time [s]', oninput: () => this.jump(Number(this.range.value)) });
+    this.range.value = 0;
+    this.readout = h('output', { class: 'readout', 'aria-label': 'Time' });
+    this.rate = h('select', { 'aria-label': 'Speed', title: 'Speed', onchange: () => { this.speed = Number(this.rate.value); } }, SPEEDS.map((s) => h('option', { value: s, selected: s === 1 }, `${s}×`)));
+    this.tip = h('div', { class: 'event-tip', hidden: true });
+    this.ticks = h('div', { class: 'event-ticks', style: `--rows:${runs.length}` });
+    this.element = h('section', { class: 'timeline', 'aria-label': 'Time' },
+      h('div', { class: 'buttons' }, button('start', 'To the start (Home)', () => this.jump(0)), button('back', 'One frame back (left arrow)', () => this.step(-1)), this.play, button('forward', 'One frame on (right arrow)', () => this.step(1))),
+      this.readout,
+      h('div', { class: 'track' }, this.ticks, this.range, this.tip),
+      h('label', { class: 'speed' }, h('span', {}, 'Speed'), this.rate),
+    );
+    this.addTicks();
+    addEventListener('keydown', (event) => this.key(event));
+  }
+
+  addTicks() {
+    this.runs.forEach((run, row) => {
+      for (const event of run.events) {
+        if (event.t === null || event.t === undefined) continue;
+        const text = `${seconds(event.t)} · ${this.runs.length > 1 ? `${run.name}: ` : ''}${event.text}`;
+        const tick = h('button', { type: 'button', tabIndex: -1, 'aria-label': text, onclick: () => this.jump(event.t) });
+        tick.dataset.run = row;
+        const share = this.duration > 0 ? event.t / this.duration : 0;
+        tick.style.setProperty('--at', share);
+        tick.style.setProperty('--row', row);
+        tick.addEventListener('pointerenter', () => {
+          this.tip.textContent = text;
+          this.tip.hidden = false;
+          this.tip.style.setProperty('--at', Math.min(0.93, Math.max(0.07, share)));
+        });
+        tick.addEventListener('pointerleave', () => { this.tip.hidden = true; });
+        this.ticks.append(tick);
+      }
+    });
+    this.paint();
+  }
+
+  paint() {
+    for (const tick of this.ticks.children) tick.style.background = runColor(Number(tick.dataset.run));
+  }
+
+  /** Time by hand: playing goes on from there. */
+  jump(t) {
+    this.setTime(t);
+  }
+
+  /** To the next frame of any run, or the one before. */
+  step(direction) {
+    this.pause();
+    let next = direction > 0 ? this.duration : 0;
+    for (const { frames } of this.runs) {
+      for (const t of frames.t) {
+        if (direction > 0 && t > this.now + 1e-9 && t < next) next = t;
+        if (direction < 0 && t < this.now - 1e-9 && t > next) next = t;
+      }
+    }
+    this.setTime(next);
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.start();
+  }
+
+  start() {
+    if (this.now >= this.duration) this.setTime(0);
+    this.playing = true;
+    this.face('pause', 'Pause (space)');
+    let before = performance.now();
+    const tick = (clock) => {
+      if (!this.playing) return;
+      // After a pause of the page itself (a hidden tab) the replay goes on where it stood.
+      const passed = Math.min(Math.max(0, clock - before), 250) / 1000;
+      before = clock;
+      const t = Math.min(this.duration, this.now + passed * this.speed);
+      this.setTime(t);
+      if (t >= this.duration) this.pause();
+      else requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  pause() {
+    this.playing = false;
+    this.face('play', 'Play (space)');
+  }
+
+  face(name, title) {
+    this.play.replaceChildren(icon(name));
+    this.play.title = title;
+    this.play.setAttribute('aria-label', title);
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const { target } = event;
+    const own = target === this.range;
+    const takesArrows = !own && (target.matches?.('input[type=range], select, textarea, input[type=text]') ?? false);
+    const takesSpace = target.matches?.('button, select, summary, textarea, input[type=checkbox], input[type=text], a') ?? false;
+    const actions = { ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), Home: () => this.jump(0), End: () => this.jump(this.duration) };
+    if (event.key === ' ' && !takesSpace) this.toggle();
+    else if (actions[event.key] && !takesArrows) actions[event.key]();
+    else return;
+    event.preventDefault();
+  }
+
+  showTime(t) {
+    this.now = t;
+    this.range.value = t;
+    this.range.style.setProperty('--done', this.duration > 0 ? t / this.duration : 0);
+    this.range.setAttribute('aria-valuetext', seconds(t));
+    const text = `${t.toFixed(3)} / ${seconds(this.duration)}`;
+    if (this.readout.textContent !== text) this.readout.textContent = text;
+  }
+}

@@ -1,0 +1,284 @@
+// The map: the faces of its cells lie in a texture, and each instance draws a block of them. Faces between two cells are left out
+// while the whole map is shown. (One instanced cube a cell looks simpler, but where WebGL is done in software, 20,000 of them take
+// half a second a picture.)
+import {
+  Color, DataTexture, DoubleSide, FloatType, FrontSide, Group, InstancedBufferGeometry, Matrix4, Mesh, RGBAFormat, ShaderMaterial, Uint16BufferAttribute, Vector4,
+} from 'three';
+import { poseOf, transform } from './kinematics.js';
+
+const BLOCK = 1024;
+const WIDTH = 1024;
+
+/** Indices of BLOCK squares of 4 corners. */
+function blockOfFaces() {
+  const geometry = new InstancedBufferGeometry();
+  geometry.setIndex(new Uint16BufferAttribute(Array.from({ length: BLOCK }, (_, i) => [0, 1, 3, 0, 3, 2].map((corner) => 4 * i + corner)).flat(), 1));
+  return geometry;
+}
+
+// A texel is a face: centre of its cell [m] and 8·level + face; face 0, 1 = −x, +x, then y and z.
+const VERTEX = `
+uniform highp sampler2D uFaces;
+uniform mat4 uPose;
+uniform int uCount;
+uniform float uHalf;
+varying vec3 vLocal;
+varying vec3 vWorld;
+flat varying vec3 vNormal;
+void main() {
+  int i = gl_InstanceID * ${BLOCK} + gl_VertexID / 4;
+  vec4 texel = texelFetch(uFaces, ivec2(i % ${WIDTH}, i / ${WIDTH}), 0);
+  int code = int(texel.w);
+  int axis = (code & 7) >> 1;
+  float side = float(code & 1) * 2.0 - 1.0;
+  vec2 corner = vec2(ivec2(gl_VertexID, gl_VertexID >> 1) & 1) * 2.0 - 1.0;
+  corner.x *= side;
+  vec3 normal = axis == 0 ? vec3(side, 0.0, 0.0) : axis == 1 ? vec3(0.0, side, 0.0) : vec3(0.0, 0.0, side);
+  vec3 square = axis == 0 ? vec3(0.0, corner) : axis == 1 ? vec3(corner.y, 0.0, corner.x) : vec3(corner, 0.0);
+  vLocal = vec3(corner, 0.0);
+  vec4 world = uPose * vec4(texel.xyz + uHalf * exp2(float(code >> 3)) * (square + normal), 1.0);
+  vWorld = world.xyz;
+  vNormal = mat3(uPose) * normal;
+  gl_Position = i < uCount ? projectionMatrix * viewMatrix * world : vec4(2.0, 2.0, 2.0, 1.0);
+}`;
+
+// Light comes from above and a little from -y; edges of a cell are darker while they are wide enough to be seen apart.
+// Where the clip plane cuts a cell open, its far walls are seen from within: painted flat, they look like the cut itself.
+const FRAGMENT = `
+varying vec3 vLocal;
+varying vec3 vWorld;
+flat varying vec3 vNormal;
+uniform vec3 uBottom, uTop, uCap;
+uniform vec4 uClip;
+uniform float uLow, uHigh, uOpacity;
+void main() {
+  #ifdef CLIP
+  if (dot(uClip.xyz, vWorld) + uClip.w < 0.0) discard;
+  #endif
+  float pixel = max(fwidth(vLocal.x), fwidth(vLocal.y));
+  float line = smoothstep(0.94 - 1.5 * pixel, 0.96, max(abs(vLocal.x), abs(vLocal.y))) * (1.0 - smoothstep(0.2, 0.6, pixel));
+  float light = 0.7 + 0.28 * vNormal.z + 0.16 * dot(vNormal, vec3(0.4, -0.75, 0.0));
+  vec3 color = mix(uBottom, uTop, clamp((vWorld.z - uLow) / max(uHigh - uLow, 1e-6), 0.0, 1.0)) * light * (1.0 - 0.2 * line);
+  gl_FragColor = vec4(gl_FrontFacing ? color : uCap, uOpacity);
+  #include <colorspace_fragment>
+}`;
+
+const MASK = `
+varying vec3 vWorld;
+uniform vec4 uClip;
+void main() {
+  #ifdef CLIP
+  if (dot(uClip.xyz, vWorld) + uClip.w < 0.0) discard;
+  #endif
+  gl_FragColor = vec4(1.0);
+}`;
+
+/** Per cell, a bit for each face that no cell of the same or a larger size covers. */
+function exposed(lo, level) {
+  const levels = [...new Set(level)].sort((a, b) => a - b);
+  const key = (x, y, z) => ((x + 65536) * 131072 + (y + 65536)) * 131072 + (z + 65536); // below 2^51, so exact
+  const tables = new Map(levels.map((l) => [l, new Set()]));
+  for (let i = 0; i < level.length; ++i) tables.get(level[i]).add(key(lo[3 * i], lo[3 * i + 1], lo[3 * i + 2]));
+  const bits = new Uint8Array(level.length);
+  const at = [0, 0, 0];
+  for (let i = 0; i < level.length; ++i) {
+    for (let face = 0; face < 6; ++face) {
+      for (let a = 0; a < 3; ++a) at[a] = lo[3 * i + a];
+      at[face >> 1] += face & 1 ? 2 ** level[i] : -1;
+      const covered = levels.some((l) => {
+        if (l < level[i]) return false;
+        const size = 2 ** l;
+        const [x, y, z] = at.map((c) => Math.floor(c / size) * size);
+        return tables.get(l).has(key(x, y, z));
+      });
+      if (!covered) bits[i] |= 1 << face;
+    }
+  }
+  return bits;
+}
+
+export class Voxels {
+  constructor(map) {
+    const count = map.level.length;
+    this.total = count;
+    this.pose = poseOf(map.position_m, map.quaternion_wxyz);
+    /** Centre and half edge of each cell [m], map frame. */
+    this.cells = new Float32Array(4 * count);
+    this.lo = [Infinity, Infinity, Infinity];
+    this.hi = [-Infinity, -Infinity, -Infinity];
+    const world = [0, 0, 0];
+    for (let i = 0; i < count; ++i) {
+      const half = 0.5 * map.resolution_m * 2 ** map.level[i];
+      for (let a = 0; a < 3; ++a) this.cells[4 * i + a] = map.lo[3 * i + a] * map.resolution_m + half;
+      this.cells[4 * i + 3] = half;
+      this.center(i, world);
+      for (let a = 0; a < 3; ++a) {
+        this.lo[a] = Math.min(this.lo[a], world[a] - half);
+        this.hi[a] = Math.max(this.hi[a], world[a] + half);
+      }
+    }
+    this.level = map.level;
+    this.outside = exposed(map.lo, map.level);
+    this.texture = this.textureFor(1);
+    const p = this.pose;
+    this.uniforms = {
+      uFaces: { value: this.texture }, uCount: { value: 0 }, uHalf: { value: 0.5 * map.resolution_m }, uClip: { value: new Vector4(0, 0, 0, 1) }, uOpacity: { value: 1 },
+      uPose: { value: new Matrix4().set(p[0], p[1], p[2], p[9], p[3], p[4], p[5], p[10], p[6], p[7], p[8], p[11], 0, 0, 0, 1) },
+      uLow: { value: this.lo[2] }, uHigh: { value: this.hi[2] }, uBottom: { value: new Color() }, uTop: { value: new Color() }, uCap: { value: new Color() },
+    };
+    const pass = (fragmentShader, more) => new ShaderMaterial({ vertexShader: VERTEX, fragmentShader, uniforms: this.uniforms, transparent: true, ...more });
+    this.paintPass = pass(FRAGMENT, {});
+    // A translucent map is laid down in depth first, so that one layer of it is blended, whatever the order of the cells.
+    this.depthPass = pass(MASK, { colorWrite: false });
+    this.geometry = blockOfFaces();
+    this.mesh = new Mesh(this.geometry, this.paintPass);
+    this.mask = new Mesh(this.geometry, this.depthPass);
+    this.mesh.renderOrder = 11;
+    this.mask.renderOrder = 10;
+    this.group = new Group();
+    for (const mesh of [this.mask, this.mesh]) {
+      mesh.frustumCulled = false;
+      this.group.add(mesh);
+    }
+    this.list = new Float32Array(0);
+    this.all = false;
+    this.showAll();
+  }
+
+  /** World position of a cell's centre [m]. */
+  center(i, out) {
+    return transform(this.pose, this.cells.subarray(4 * i, 4 * i + 3), out);
+  }
+
+  /** Cells are tinted by height. */
+  paint(colors) {
+    this.uniforms.uBottom.value.set(colors.voxel);
+    this.uniforms.uTop.value.set(colors.voxelTop);
+    this.uniforms.uCap.value.set(colors.cap);
+  }
+
+  setOpacity(opacity) {
+    this.uniforms.uOpacity.value = opacity;
+    this.mesh.visible = opacity > 0;
+    this.mask.visible = opacity > 0 && opacity < 1;
+  }
+
+  /** Keeps what lies on one side of a plane across a world axis; null keeps all. */
+  setClip(clip) {
+    const sign = clip?.flip ? 1 : -1;
+    if (clip) this.uniforms.uClip.value.set(0, 0, 0, -sign * clip.at).setComponent(clip.axis, sign);
+    const side = clip ? DoubleSide : FrontSide;
+    if (this.paintPass.side === side) return;
+    this.cut = Boolean(clip);
+    this.all = false;
+    for (const material of [this.paintPass, this.depthPass]) {
+      material.side = side;
+      // A program of its own: one that may discard cannot skip hidden fragments early.
+      material.defines = clip ? { CLIP: 1 } : {};
+      material.needsUpdate = true;
+    }
+  }
+
+  showAll() {
+    if (this.all) return;
+    this.all = true;
+    this.begin();
+    // A cut opens the map: then the faces between cells are its inside.
+    for (let i = 0; i < this.total; ++i) this.put(i, this.cut ? 63 : this.outside[i]);
+    this.publish();
+  }
+
+  /**
+   * Keeps the cells whose box is within `distance` of a ball.
+   * @param {Float32Array} balls x, y, z, radius of each [m], world
+   */
+  showNear(balls, distance) {
+    this.all = false;
+    const count = balls.length / 4;
+    const near = this.toMap(balls);
+    const lo = [Infinity, Infinity, Infinity];
+    const hi = [-Infinity, -Infinity, -Infinity];
+    for (let j = 0; j < count; ++j) {
+      near[4 * j + 3] += distance;
+      for (let a = 0; a < 3; ++a) {
+        lo[a] = Math.min(lo[a], near[4 * j + a] - near[4 * j + 3]);
+        hi[a] = Math.max(hi[a], near[4 * j + a] + near[4 * j + 3]);
+      }
+    }
+    const { cells } = this;
+    this.begin();
+    let last = 0; // neighbours in the list are neighbours in space: the ball that kept one cell is asked first for the next
+    for (let i = 0; i < 4 * this.total; i += 4) {
+      const x = cells[i];
+      const y = cells[i + 1];
+      const z = cells[i + 2];
+      const half = cells[i + 3];
+      if (x + half < lo[0] || x - half > hi[0] || y + half < lo[1] || y - half > hi[1] || z + half < lo[2] || z - half > hi[2]) continue;
+      for (let step = 0; step < count; ++step) {
+        const j = step === 0 ? last : step <= last ? step - 1 : step;
+        const dx = Math.max(0, Math.abs(near[4 * j] - x) - half);
+        const dy = Math.max(0, Math.abs(near[4 * j + 1] - y) - half);
+        const dz = Math.max(0, Math.abs(near[4 * j + 2] - z) - half);
+        const r = near[4 * j + 3];
+        if (dx * dx + dy * dy + dz * dz <= r * r) {
+          last = j;
+          this.put(i / 4, 63);
+          break;
+        }
+      }
+    }
+    this.publish();
+  }
+
+  /** Balls in the map frame: Rᵀ (p − t). */
+  toMap(balls) {
+    if (this.list.length !== balls.length) this.list = new Float32Array(balls.length);
+    const p = this.pose;
+    for (let j = 0; j < balls.length; j += 4) {
+      const x = balls[j] - p[9];
+      const y = balls[j + 1] - p[10];
+      const z = balls[j + 2] - p[11];
+      for (let a = 0; a < 3; ++a) this.list[j + a] = p[a] * x + p[3 + a] * y + p[6 + a] * z;
+      this.list[j + 3] = balls[j + 3];
+    }
+    return this.list;
+  }
+
+  begin() {
+    this.shown = 0;
+    this.faces = 0;
+  }
+
+  /** Takes in the faces of a cell whose bits are set. */
+  put(i, bits) {
+    if (4 * (this.faces + 6) > this.texture.image.data.length) this.grow();
+    const { data } = this.texture.image;
+    for (let face = 0; face < 6; ++face) {
+      if (!(bits & (1 << face))) continue;
+      const at = 4 * this.faces++;
+      data[at] = this.cells[4 * i];
+      data[at + 1] = this.cells[4 * i + 1];
+      data[at + 2] = this.cells[4 * i + 2];
+      data[at + 3] = 8 * this.level[i] + face;
+    }
+    ++this.shown;
+  }
+
+  textureFor(rows) {
+    return new DataTexture(new Float32Array(4 * WIDTH * rows), WIDTH, rows, RGBAFormat, FloatType);
+  }
+
+  grow() {
+    const old = this.texture;
+    this.texture = this.textureFor(2 * old.image.height);
+    this.texture.image.data.set(old.image.data);
+    this.uniforms.uFaces.value = this.texture;
+    old.dispose();
+  }
+
+  publish() {
+    this.uniforms.uCount.value = this.faces;
+    this.geometry.instanceCount = Math.ceil(this.faces / BLOCK);
+    this.texture.needsUpdate = true;
+  }
+}

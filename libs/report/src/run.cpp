@@ -1,0 +1,446 @@
+#include "run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::report {
+
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+// A page holds that many joint angles, events and joints' lines, however long the chain or the log.
+constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24;
+
+// Columns behind the joints' q, v and tau, in the order of a tick's row.
+enum Column : std::size_t {
+  clearance,
+  goal_m,
+  goal_rad,
+  kinetic,
+  potential,
+  control,
+  gyroscopic,
+  filter,
+  recovery,
+  dissipated,
+  held,
+  node,
+  energy_error,
+  updates,
+  halvings,
+  residual,
+  tick_us,
+  tick_us_max,
+  columns
+};
+
+Error bad(const log::LogReader& reader, const std::string& what) {
+  return Error(ErrorCode::invalid, fmt::format("{}: {}", reader.where(), what));
+}
+
+const Json* find(const Json& object, const char* key) {
+  const auto at = object.find(key);
+  return at == object.end() || at->is_null() ? nullptr : &*at;
+}
+
+// A member that must be an object where it is there.
+const Json& part(const Json& line, const char* key, const log::LogReader& reader) {
+  static const Json empty = Json::object();
+  const Json* at = find(line, key);
+  if (at == nullptr) return empty;
+  if (!at->is_object()) throw bad(reader, fmt::format("/{}: expected an object", key));
+  return *at;
+}
+
+// A number, or NaN for null or none.
+double number(const Json& object, const char* key, const log::LogReader& reader) {
+  const Json* at = find(object, key);
+  if (at == nullptr) return unknown;
+  if (!at->is_number()) throw bad(reader, fmt::format("{}: expected a number", key));
+  return at->get<double>();
+}
+
+// One number a joint; null becomes NaN. Empty where there is none.
+VectorXd joint_vector(const Json& object, const char* key, int dof, const log::LogReader& reader) {
+  const Json* at = find(object, key);
+  if (at == nullptr) return {};
+  if (!at->is_array() || at->size() != static_cast<std::size_t>(dof))
+    throw bad(reader, fmt::format("{}: expected {} numbers, one a joint", key, dof));
+  VectorXd x(dof);
+  for (int i = 0; i < dof; ++i) {
+    const Json& value = (*at)[static_cast<std::size_t>(i)];
+    if (!value.is_number() && !value.is_null()) throw bad(reader, fmt::format("{}/{}: expected a number", key, i));
+    x[i] = value.is_null() ? unknown : value.get<double>();
+  }
+  return x;
+}
+
+std::size_t frames_of(const Options& options, int dof) {
+  return std::clamp<std::size_t>(joint_values_max / static_cast<std::size_t>(dof), 2, options.frames_max);
+}
+
+}  // namespace
+
+Run::Run(const Json& header, const simulation::Recorded& recorded, const World& world, const Options& options)
+    : world_(world),
+      recorded_(recorded),
+      ws_(world.model),
+      plotted_joints_(std::min<std::size_t>(static_cast<std::size_t>(world.model.dof()), plotted_joints_max)),
+      row_(3 * plotted_joints_ + columns, unknown),
+      bins_(row_.size(), options.plot_points_max),
+      sample_(frames_of(options, world.model.dof())),
+      config_(header["config"]),
+      provenance_(header["provenance"]) {
+  const auto& links = world.model.robot().links;
+  const Json& joints = header["joints"];
+  bool same = joints.size() == links.size();
+  for (std::size_t i = 0; same && i < links.size(); ++i) same = joints[i]["name"] == links[i].joint.name;
+  if (!same)
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: its joints are not those of the log, expected the robot as it was run",
+                            recorded.scene.robot.file.string()));
+  notes_ = recorded.changed;
+  if (recorded.every > 1)
+    notes_.push_back(
+        fmt::format("the log has a tick every {} steps; clearance, energy error, updates, residual and "
+                    "the longest tick are over all steps",
+                    recorded.every));
+
+  const auto unit = [](bool first, bool second, const char* one, const char* other) {
+    return first && second ? fmt::format("{}, {}", one, other) : std::string(first ? one : other);
+  };
+  bool turns = false, slides = false, has_place = false, has_joints = false;
+  for (const auto& link : links) (link.joint.type == model::JointType::revolute ? turns : slides) = true;
+  for (const auto& goal : world.goals) (goal.type == scene::GoalType::joint ? has_joints : has_place) = true;
+  const std::string cut = plotted_joints_ < links.size() ? fmt::format(" (first {})", plotted_joints_) : "";
+  std::size_t column = 0;
+  for (auto [id, title, of] : {std::tuple("q", "joint angles", unit(turns, slides, "rad", "m")),
+                               std::tuple("v", "joint rates", unit(turns, slides, "rad/s", "m/s")),
+                               std::tuple("tau", "joint torques", unit(turns, slides, "Nm", "N"))}) {
+    plots_.push_back({id, title + cut, of, {}, false});
+    for (std::size_t i = 0; i < plotted_joints_; ++i) plots_.back().lines.emplace_back(links[i].joint.name, column++);
+  }
+  const auto add = [&](const char* id, const char* title, const std::string& of, bool small_numbers,
+                       std::initializer_list<std::pair<const char*, Column>> lines) {
+    plots_.push_back({id, title, of, {}, small_numbers});
+    for (const auto& [label, at] : lines) plots_.back().lines.emplace_back(label, column + at);
+  };
+  add("clearance", "clearance", "m", false, {{"smallest", clearance}});
+  if (has_place) add("goal", "distance to the goal", "m", false, {{"tip", goal_m}});
+  if (has_joints)
+    add(has_place ? "goal_joint" : "goal", "distance to the joint goal", unit(turns, slides, "rad", "m"), false,
+        {{"largest joint error", goal_rad}});
+  add("energy", "energy ledger", "J", false,
+      {{"kinetic", kinetic},
+       {"potential", potential},
+       {"control", control},
+       {"gyroscopic work", gyroscopic},
+       {"filter work", filter},
+       {"recovery work", recovery},
+       {"dissipated", dissipated},
+       {"held work", held},
+       {"node work", node}});
+  add("energy_error", "energy error", "J", true, {{"|E - E0 - work booked|", energy_error}});
+  add("solver", "solver updates per step", "1", true, {{"updates", updates}, {"halvings", halvings}});
+  add("residual", "solver residual", "1", true, {{"residual", residual}});
+  add("tick_us", "time of one tick", "µs", true, {{"tick", tick_us}, {"longest since the line before", tick_us_max}});
+}
+
+void Run::take(Json line, const log::LogReader& reader) {
+  const Json type = line.value("type", Json());
+  if (!result_.is_null()) throw bad(reader, "stands behind the result, expected nothing there");
+  if (type == "tick") {
+    take_tick(line, reader);
+  } else if (type == "event") {
+    const Json* text = find(line, "text");
+    if (text == nullptr || !text->is_string()) throw bad(reader, "text: expected one line of text");
+    const double t = number(line, "time_s", reader);
+    if (events_.size() < events_max)
+      events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
+    else
+      ++events_left_out_;
+  } else if (type == "result") {
+    log::check_line(line, reader.where());
+    line.erase("type");
+    result_ = std::move(line);
+  } else {
+    throw bad(reader, fmt::format("type {}, expected tick, event or result", type.dump()));
+  }
+}
+
+void Run::take_tick(const Json& line, const log::LogReader& reader) {
+  const int dof = world_.model.dof();
+  const double k = number(line, "k", reader), t = number(line, "time_s", reader);
+  if (!(k > k_before_)) throw bad(reader, fmt::format("k: {} after {}, expected rising steps", k, k_before_));
+  if (!std::isfinite(t) || (ticks_ > 0 && !(t > time_s_)))
+    throw bad(reader, fmt::format("time_s: {} after {}, expected rising times", t, time_s_));
+  k_before_ = k;
+  time_s_ = t;
+
+  Frame frame;
+  frame.time_s = t;
+  frame.q = joint_vector(line, "q", dof, reader);
+  if (frame.q.size() == 0) throw bad(reader, "q: is missing, expected one number a joint");
+  if (const double goals = number(line, "goal_index", reader); goals >= 0.0 && goals < 65535.0)
+    frame.goal_index = static_cast<std::size_t>(goals);
+  const Json* channels = find(line, "channels");
+  if (channels != nullptr)
+    for (std::size_t i = 0; i < channel_names.size(); ++i)
+      frame.channels[i] = joint_vector(part(line, "channels", reader), channel_names[i], dof, reader);
+
+  std::fill(row_.begin(), row_.end(), unknown);
+  const auto joints = [&](std::size_t at, const VectorXd& x) {
+    if (x.size() > 0) std::copy_n(x.data(), plotted_joints_, &row_[at * plotted_joints_]);
+  };
+  joints(0, frame.q);
+  joints(1, joint_vector(line, "v", dof, reader));
+  joints(2, joint_vector(line, "tau", dof, reader));
+  double* const row = &row_[3 * plotted_joints_];
+  const Json& energy = part(line, "energy", reader);
+  const Json& solver = part(line, "solver", reader);
+  const Json& timing = part(line, "timing", reader);
+  const Json& extrema = part(line, "extrema", reader);
+
+  row[clearance] = number(line, "clearance_m", reader);
+  const std::pair<Column, const char*> entries[] = {{kinetic, "kinetic_J"},       {potential, "potential_J"},
+                                                    {control, "control_J"},       {gyroscopic, "gyroscopic_work_J"},
+                                                    {filter, "filter_work_J"},    {recovery, "recovery_work_J"},
+                                                    {dissipated, "dissipated_J"}, {held, "held_work_J"},
+                                                    {node, "node_work_J"}};
+  for (const auto& [column, key] : entries) row[column] = number(energy, key, reader);
+  const double balance =
+      row[kinetic] + row[potential] + row[control] - (row[gyroscopic] + row[held] - row[dissipated] + row[node]);
+  if (ticks_ == 0) first_balance_ = balance;
+  row[energy_error] = std::abs(balance - first_balance_);
+  row[updates] = number(solver, "updates", reader);
+  row[halvings] = number(solver, "halvings", reader);
+  row[residual] = number(solver, "residual", reader);
+  row[tick_us] = number(timing, "tick_us", reader);
+  row[tick_us_max] = number(timing, "tick_us_max", reader);
+  if (!extrema.empty()) {
+    if (!std::isnan(row[clearance])) row[clearance] = number(extrema, "clearance_m", reader);
+    row[energy_error] = number(extrema, "energy_error_J", reader);
+    row[updates] = number(extrema, "updates", reader);
+    row[halvings] = number(extrema, "halvings", reader);
+    row[residual] = number(extrema, "residual", reader);
+  }
+  ++ticks_;
+  if (frame.q.allFinite()) {
+    goal_distance(frame);
+    bins_.add(t, row_);
+    sample_.add(std::move(frame));
+  } else {
+    ++not_finite_;
+    bins_.add(t, row_);
+  }
+}
+
+void Run::goal_distance(const Frame& frame) {
+  if (world_.goals.empty()) return;
+  double* const row = &row_[3 * plotted_joints_];
+  const auto& goal = world_.goals[std::min(frame.goal_index, world_.goals.size() - 1)];
+  if (goal.type == scene::GoalType::joint) {
+    if (goal.q.size() == frame.q.size()) row[goal_rad] = (frame.q - goal.q).lpNorm<Eigen::Infinity>();
+    return;
+  }
+  dynamics::forward_kinematics(world_.model, ws_, frame.q);
+  row[goal_m] = (dynamics::tip_pose(world_.model, ws_).p() - goal.pose.p()).norm();
+}
+
+Json Run::finish(const log::LogReader& reader, Container& container, RunSummary& summary) {
+  std::vector<Frame> frames = sample_.take();
+  if (frames.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has no tick with finite joint angles, expected a run", summary.log.string()));
+  if (reader.cut()) notes_.push_back("the log ends in the middle of a line or frame, which is left out");
+  if (result_.is_null()) notes_.push_back("the log has no result: the run was not finished");
+  if (not_finite_ > 0)
+    notes_.push_back(fmt::format("{} ticks have joint angles that are not finite: they are not drawn", not_finite_));
+  if (events_left_out_ > 0) notes_.push_back(fmt::format("{} events more are in the log", events_left_out_));
+  notes_.insert(notes_.end(), world_.notes.begin(), world_.notes.end());
+  if (recorded_.scene.map && world_.json["map"].is_null())
+    notes_.push_back("without the map that was run there are no clearances and closest points");
+
+  const auto text = [](const Json& object, const char* key) {
+    const Json* at = object.is_object() ? find(object, key) : nullptr;
+    return at != nullptr && at->is_string() ? *at : Json(nullptr);
+  };
+  const Json outcome = text(result_, "outcome"), cause = text(result_, "cause");
+  summary.outcome = outcome.is_null() ? "unfinished" : outcome.get<std::string>();
+  summary.time_s = time_s_;
+  summary.ticks = ticks_;
+  summary.frames = frames.size();
+  summary.notes = notes_;
+  Json run;
+  run["log"] = summary.log.filename().string();
+  run["scene"] = recorded_.scene.name;
+  run["planner"] = recorded_.scene.planner ? Json(recorded_.scene.planner->name) : Json(nullptr);
+  run["integrator"] = recorded_.scene.integrator.name;
+  run["outcome"] = summary.outcome;
+  run["cause"] = cause == "" ? Json(nullptr) : cause;
+  run["result"] = std::move(result_);
+  run["config"] = std::move(config_);
+  run["provenance"] = std::move(provenance_);
+  run["notes"] = notes_;
+  run["frames"] = frames_json(frames, container);
+  run["events"] = std::move(events_);
+  run["plots"] = plots_json(container);
+  return run;
+}
+
+Json Run::frames_json(const std::vector<Frame>& frames, Container& container) {
+  constexpr double angle_step = 1e-6, clearance_step = 1e-4, deepest = -0.5, point_step = 1e-4;
+  constexpr int force_bits = 10;
+  constexpr std::size_t contacts_max = 6;
+  const model::Model& model = world_.model;
+  const std::size_t spheres = model.spheres().size();
+
+  std::vector<double> t, q, radii;
+  std::vector<std::uint16_t> goal_index;
+  for (const auto& sphere : model.spheres()) radii.push_back(sphere.radius);
+  std::vector<Vector3d> centers(spheres);
+  scene::Environment::Scratch scratch(world_.environment, spheres);
+  std::vector<scene::Contact> found(
+      spheres * (2 * scene::Environment::points_per_sphere + world_.environment.obstacles().size()) + 1);
+  std::vector<double> clearances, points;
+  std::vector<std::uint8_t> counts;
+  std::array<std::vector<double>, channel_names.size()> forces;
+  std::array<bool, channel_names.size()> acts{};
+  dynamics::Matrix3Xd J(3, model.dof());
+  VectorXd pushed(model.dof());
+
+  for (const Frame& frame : frames) {
+    t.push_back(frame.time_s);
+    q.insert(q.end(), frame.q.begin(), frame.q.end());
+    goal_index.push_back(static_cast<std::uint16_t>(frame.goal_index));
+    dynamics::forward_kinematics(model, ws_, frame.q);
+    if (world_.judged) {
+      dynamics::sphere_centers(model, ws_, centers);
+      const std::size_t count =
+          std::min(found.size(), world_.environment.closest(centers, radii, world_.influence_m, frame.time_s, scratch,
+                                                            found, scene::View::judge));
+      std::vector<const scene::Contact*> nearest(spheres, nullptr);
+      for (std::size_t i = 0; i < count; ++i) {
+        auto& known = nearest[static_cast<std::size_t>(found[i].sphere)];
+        if (known == nullptr || found[i].distance < known->distance) known = &found[i];
+      }
+      for (const auto* contact : nearest) clearances.push_back(contact != nullptr ? contact->distance : unknown);
+      nearest.erase(std::remove(nearest.begin(), nearest.end(), nullptr), nearest.end());
+      std::stable_sort(nearest.begin(), nearest.end(),
+                       [](const auto* a, const auto* b) { return a->distance < b->distance; });
+      if (nearest.size() > contacts_max) nearest.resize(contacts_max);
+      counts.push_back(static_cast<std::uint8_t>(nearest.size()));
+      for (const auto* contact : nearest)
+        for (const auto* point : {&contact->arm_point, &contact->obstacle_point})
+          points.insert(points.end(), point->begin(), point->end());
+    }
+    const bool any =
+        std::any_of(frame.channels.begin(), frame.channels.end(), [](const auto& x) { return x.size() > 0; });
+    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+    if (any) {
+      dynamics::point_jacobian(model, ws_, model.robot().tip.link, dynamics::tip_pose(model, ws_).p(), J);
+      inertia = dynamics::operational_inertia(model, ws_, frame.q, J);
+    }
+    for (std::size_t i = 0; i < channel_names.size(); ++i) {
+      Vector3d force = Vector3d::Zero();
+      if (frame.channels[i].size() > 0) {
+        dynamics::solve_mass(model, ws_, frame.q, frame.channels[i], pushed);
+        force = inertia * (J * pushed);
+        acts[i] = acts[i] || !force.isZero(0.0);
+      }
+      forces[i].insert(forces[i].end(), force.begin(), force.end());
+    }
+  }
+
+  Json json{{"t", container.stepped(t, recorded_.scene.step_s)},
+            {"q", container.stepped(q, angle_step)},
+            {"goal_index", container.exact(goal_index)},
+            {"clearance", nullptr},
+            {"influence_m", world_.influence_m},
+            {"contacts", nullptr}};
+  if (world_.judged) {
+    json["clearance"] = container.bounded(clearances, clearance_step, deepest);
+    json["contacts"] = {{"count", container.exact(counts)}, {"points", container.centred(points, point_step)}};
+  }
+  json["forces"] = Json::array();
+  for (std::size_t i = 0; i < channel_names.size(); ++i)
+    if (acts[i])
+      json["forces"].push_back({{"channel", channel_names[i]}, {"f", container.relative(forces[i], force_bits)}});
+  return json;
+}
+
+Json Run::marks(const Plot& plot, double largest) const {
+  Json marks = Json::array();
+  const std::string_view id = plot.id;
+  const auto& scene = recorded_.scene;
+  const auto add = [&marks](double y, const std::string& label) {
+    for (const auto& mark : marks)
+      if (mark["y"] == y) return;
+    marks.push_back({{"y", y}, {"label", label}});
+  };
+  if (id == "clearance") {
+    add(0.0, "contact");
+    const Json params = scene.planner ? scene.planner->params : Json::object();
+    for (const auto& [key, label] : {std::pair("margin_m", "margin"), std::pair("contact_radius_m", "looked for"),
+                                     std::pair("rho0_m", "influence")})
+      if (const Json* at = find(params, key); at != nullptr && at->is_number()) add(at->get<double>(), label);
+  } else if (id == "goal" || id == "goal_joint") {
+    const bool of_joints = plot.lines.front().second == 3 * plotted_joints_ + goal_rad;
+    for (const auto& goal : world_.goals)
+      if ((goal.type == scene::GoalType::joint) == of_joints)
+        add(of_joints ? goal.tolerance_rad : goal.tolerance_m, "tolerance");
+  } else if (id == "v" || id == "tau") {
+    // A limit far above what happens would only squash the lines.
+    for (std::size_t i = 0; i < plotted_joints_; ++i) {
+      const auto& joint = world_.model.robot().links[i].joint;
+      const auto limit = id == "v" ? joint.velocity_max : joint.effort_max;
+      const bool kept = id == "v" ? scene.model.velocity_limits : scene.model.torque_limits;
+      if (!kept || !limit || *limit > 1.5 * largest) continue;
+      add(*limit, "limit");
+      add(-*limit, "limit");
+    }
+  }
+  return marks;
+}
+
+Json Run::plots_json(Container& container) const {
+  constexpr int bits = 12;
+  Json plots = Json::array();
+  const Json t = container.stepped(bins_.times(), recorded_.scene.step_s);
+  for (const Plot& plot : plots_) {
+    Json series = Json::array();
+    double largest = 0.0;
+    for (const auto& [label, column] : plot.lines) {
+      const std::vector<double> y = bins_.values(column);
+      const bool known = std::any_of(y.begin(), y.end(), [](double value) { return !std::isnan(value); });
+      const bool moves =
+          std::any_of(y.begin(), y.end(), [](double value) { return value != 0.0 && !std::isnan(value); });
+      // Work that is never done is no line of the ledger; nor are halvings that never were.
+      if (!known || (!moves && !series.empty())) continue;
+      for (const double value : y) largest = std::isnan(value) ? largest : std::max(largest, std::abs(value));
+      series.push_back(
+          {{"label", label}, {"y", plot.small_numbers ? container.relative(y, bits) : container.levels(y)}});
+    }
+    if (series.empty()) continue;
+    plots.push_back({{"id", plot.id},
+                     {"title", plot.title},
+                     {"unit", plot.unit},
+                     {"t", t},
+                     {"series", std::move(series)},
+                     {"marks", marks(plot, largest)}});
+  }
+  return plots;
+}
+
+}  // namespace hamelin::report

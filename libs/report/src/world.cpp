@@ -1,0 +1,274 @@
+#include "world.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+#include <limits>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "hamelin/core/file.hpp"
+#include "hamelin/simulation/run.hpp"
+
+namespace hamelin::report {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// What a page shows fluently; beyond it cells that nobody sees are left out, then small ones drawn as larger ones.
+constexpr std::size_t cells_max = 60000;
+
+// Clearances are told up to this share of the reach, between these bounds [m].
+constexpr double influence_share = 0.15, influence_least = 0.3, influence_most = 5.0;
+
+Json array(const Eigen::Ref<const Eigen::VectorXd>& x) {
+  Json out = Json::array();
+  for (const double value : x) out.push_back(value);
+  return out;
+}
+
+Json pose_json(const geometry::SE3& pose) {
+  return {{"position_m", array(pose.p())}, {"quaternion_wxyz", array(geometry::quaternion_wxyz(pose.R()))}};
+}
+
+// ---- robot
+
+Json robot_json(const model::Model& model) {
+  const model::Robot& robot = model.robot();
+  Json joints = Json::array(), spheres = Json::array(), segments = Json::array(), points = Json::array();
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const model::Link& link = robot.links[i];
+    joints.push_back({{"name", link.joint.name},
+                      {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
+                      {"screw", array(link.joint.screw)},
+                      {"link", link.name}});
+    for (const auto& sphere : link.spheres)
+      spheres.push_back({{"link", i}, {"center_m", array(link.com * sphere.center_m)}, {"radius_m", sphere.radius_m}});
+    for (const auto& segment : link.segments)
+      segments.push_back({{"link", i},
+                          {"from_m", array(link.com * segment.from_m)},
+                          {"to_m", array(link.com * segment.to_m)},
+                          {"radius_m", segment.radius_m}});
+  }
+  for (const Vector3d& point : skeleton(robot)) points.push_back(array(point));
+  Json normal = nullptr;
+  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) normal = array(planar->root.R().col(2));
+  return {{"name", robot.name},   {"base", pose_json(model.base())}, {"joints", std::move(joints)},
+          {"skeleton", points},   {"tip_link", robot.tip.link},      {"spheres", std::move(spheres)},
+          {"segments", segments}, {"planar_normal", normal}};
+}
+
+// ---- map
+
+using Key = std::tuple<std::int32_t, std::int32_t, std::int32_t, std::int32_t>;  // size, z, y, x
+
+Key key_of(const scene::Cell& cell) {
+  return {cell.size, cell.lo[2], cell.lo[1], cell.lo[0]};
+}
+
+// The cell of that size in the octree's grid that holds the voxel; sizes are powers of two.
+scene::Cell around(const std::array<std::int32_t, 3>& voxel, std::int32_t size) {
+  scene::Cell cell{voxel, size};
+  for (auto& lo : cell.lo) lo &= ~(size - 1);  // towards −∞, as the tree counts
+  return cell;
+}
+
+class Occupancy {
+ public:
+  explicit Occupancy(const std::vector<scene::Cell>& cells) {
+    for (const auto& cell : cells) {
+      keys_.insert(key_of(cell));
+      largest_ = std::max(largest_, cell.size);
+    }
+  }
+
+  /// Whether no face of the cell can be seen.
+  [[nodiscard]] bool hides(const scene::Cell& cell) const {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const bool up : {false, true}) {
+        scene::Cell beside = cell;
+        beside.lo[axis] += up ? cell.size : -cell.size;
+        if (!covers(beside, axis, up)) return false;
+      }
+    return true;
+  }
+
+ private:
+  /// Whether the side of `cell` that looks against the axis (up) or along it is occupied all over.
+  [[nodiscard]] bool covers(const scene::Cell& cell, std::size_t axis, bool up) const {
+    for (std::int32_t size = cell.size; size <= largest_; size *= 2)
+      if (keys_.count(key_of(around(cell.lo, size))) > 0) return true;
+    if (cell.size == 1) return false;
+    const std::int32_t half = cell.size / 2;
+    for (unsigned part = 0; part < 4; ++part) {
+      scene::Cell quarter{cell.lo, half};
+      if (!up) quarter.lo[axis] += half;
+      if ((part & 1U) != 0) quarter.lo[(axis + 1) % 3] += half;
+      if ((part & 2U) != 0) quarter.lo[(axis + 2) % 3] += half;
+      if (!covers(quarter, axis, up)) return false;
+    }
+    return true;
+  }
+
+  std::set<Key> keys_;
+  std::int32_t largest_ = 1;
+};
+
+// The cells with those below a size drawn as whole cells of that size.
+std::vector<scene::Cell> coarsened(const std::vector<scene::Cell>& cells, std::int32_t size) {
+  std::set<Key> seen;
+  std::vector<scene::Cell> out;
+  for (const auto& cell : cells) {
+    const scene::Cell wide = around(cell.lo, std::max(size, cell.size));
+    if (seen.insert(key_of(wide)).second) out.push_back(wide);
+  }
+  return out;
+}
+
+Json map_json(const scene::MapSpec& spec, const model::Model& model, double influence, Container& container,
+              std::vector<std::string>& notes) {
+  const scene::MapData data = scene::read_map(spec.file, {spec.scale, spec.occupancy_threshold});
+  const Vector3d center = spec.pose.inverse() * model.base().p();
+  std::vector<scene::Cell> cells = scene::crop(data.occupied, data.resolution, {center, model.reach() + influence});
+  std::size_t left_out = 0;
+  if (cells.size() > cells_max) {
+    const Occupancy occupancy(cells);
+    const auto seen =
+        std::remove_if(cells.begin(), cells.end(), [&](const auto& cell) { return occupancy.hides(cell); });
+    left_out = static_cast<std::size_t>(cells.end() - seen);
+    cells.erase(seen, cells.end());
+  }
+  std::int32_t size = 1;
+  for (const std::size_t visible = cells.size(); cells.size() > cells_max;) {
+    cells = coarsened(cells, size *= 2);
+    if (cells.size() <= cells_max)
+      notes.push_back(
+          fmt::format("the map's {} visible cells are drawn {} m wide at least, {} m is its resolution; "
+                      "clearances are from the map itself",
+                      visible, size * data.resolution, data.resolution));
+  }
+  std::sort(cells.begin(), cells.end(), [](const auto& a, const auto& b) { return key_of(a) < key_of(b); });
+  std::vector<std::int16_t> lo;
+  std::vector<std::uint8_t> level;
+  for (const auto& cell : cells) {
+    for (const std::int32_t at : cell.lo) lo.push_back(static_cast<std::int16_t>(at));
+    level.push_back(static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(cell.size))));
+  }
+  Json json{{"file", spec.file.string()}, {"resolution_m", data.resolution}};
+  json.update(pose_json(spec.pose));
+  json["lo"] = container.exact(lo);
+  json["level"] = container.exact(level);
+  json["left_out"] = left_out;
+  return json;
+}
+
+// ---- obstacles and goals
+
+Json obstacle_json(const scene::Obstacle& obstacle) {
+  Json json{{"name", obstacle.name}, {"shape", scene::to_string(obstacle.shape)}};
+  if (obstacle.shape == scene::Shape::box) {
+    json["size_m"] = array(obstacle.size_m);
+  } else {
+    json["radius_m"] = obstacle.radius_m;
+  }
+  if (obstacle.shape == scene::Shape::cylinder) json["length_m"] = obstacle.length_m;
+  json.update(pose_json(obstacle.pose));
+  json["motion"] = nullptr;
+  if (obstacle.motion)
+    json["motion"] = {{"amplitude_m", array(obstacle.motion->amplitude_m)}, {"period_s", obstacle.motion->period_s}};
+  json["appears_s"] = obstacle.appears_s;
+  json["judge_only"] = obstacle.judge_only;
+  return json;
+}
+
+Json goal_json(const scene::Goal& goal) {
+  Json json{{"type", scene::to_string(goal.type)}};
+  if (goal.type == scene::GoalType::joint) {
+    json["q"] = array(goal.q);
+    json["tolerance_rad"] = goal.tolerance_rad;
+    return json;
+  }
+  json["position_m"] = array(goal.pose.p());
+  if (goal.type == scene::GoalType::pose) {
+    json["quaternion_wxyz"] = array(geometry::quaternion_wxyz(goal.pose.R()));
+    json["tolerance_rad"] = goal.tolerance_rad;
+  }
+  json["tolerance_m"] = goal.tolerance_m;
+  return json;
+}
+
+}  // namespace
+
+// With p_i = r_i + B_i s_i, B_i the axis (or all of space), the sum of |p_i − p_(i−1)|² is least where
+// B_iᵀ(2 p_i − p_(i−1) − p_(i+1)) = 0: eliminated joint by joint as p_i = A_i p_(i+1) + b_i, from the base outwards.
+std::vector<Vector3d> skeleton(const model::Robot& robot) {
+  const std::size_t n = robot.links.size();
+  std::vector<Matrix3d> A(n);
+  std::vector<Vector3d> points(n + 1);
+  Matrix3d A_before = Matrix3d::Zero();
+  Vector3d b_before = Vector3d::Zero();  // the base's origin
+  for (std::size_t i = 0; i < n; ++i) {
+    const model::Joint& joint = robot.links[i].joint;
+    const Matrix3d W = 2.0 * Matrix3d::Identity() - A_before;
+    Vector3d r = Vector3d::Zero();
+    Matrix3d BK;
+    if (joint.type == model::JointType::revolute) {
+      const Vector3d axis = joint.screw.head<3>();
+      r = axis.cross(joint.screw.tail<3>());
+      BK = axis * axis.transpose() / axis.dot(W * axis);
+    } else {
+      BK = W.inverse();
+    }
+    A[i] = BK;
+    points[i] = r + BK * (b_before - W * r);
+    A_before = A[i];
+    b_before = points[i];
+  }
+  points[n] = robot.tip.pose.p();
+  for (std::size_t i = n; i-- > 0;) points[i] += A[i] * points[i + 1];
+  return points;
+}
+
+std::string world_key(const simulation::Recorded& recorded) {
+  const Json config = scene::resolved_json(recorded.scene);
+  Json key;
+  for (const char* part : {"robot", "base", "map", "obstacles", "goals"}) key[part] = config[part];
+  key["payload"] = config["model"]["payload"];
+  const auto content = [&key](const Json::json_pointer& file) {
+    if (!key.contains(file) || !key[file].is_string()) return;
+    std::error_code ec;
+    const std::filesystem::path path = key[file].get<std::string>();
+    if (std::filesystem::is_regular_file(path, ec)) key[file] = sha256_hex(read_file(path));
+  };
+  for (const char* file : {"/robot/file", "/robot/spheres", "/map/file"}) content(Json::json_pointer(file));
+  return key.dump();
+}
+
+std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::string key, bool map_at_hand,
+                                  Container& container) {
+  const scene::Scene& scene = recorded.scene;
+  model::Model model = simulation::load_model(scene);
+  const double influence = std::clamp(influence_share * model.reach(), influence_least, influence_most);
+  auto world =
+      std::make_unique<World>(World{std::move(key), std::move(model), scene.goals, {}, false, influence, {}, {}});
+  const double reach = world->model.reach();
+  const auto map = map_at_hand ? scene.map : std::nullopt;
+  world->environment = scene::Environment(map, scene.obstacles, scene.base, reach, influence);
+  world->judged = (map_at_hand || !scene.map) && world->environment.has_obstacles() && !world->model.spheres().empty();
+  Json goals = Json::array(), obstacles = Json::array();
+  for (const auto& goal : scene.goals) goals.push_back(goal_json(goal));
+  for (const auto& obstacle : scene.obstacles) obstacles.push_back(obstacle_json(obstacle));
+  world->json = {{"robot", robot_json(world->model)},
+                 {"goals", std::move(goals)},
+                 {"map", map ? map_json(*map, world->model, influence, container, world->notes) : Json(nullptr)},
+                 {"obstacles", std::move(obstacles)},
+                 {"reach_m", reach}};
+  return world;
+}
+
+}  // namespace hamelin::report

@@ -1,0 +1,323 @@
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "decode.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/distance.hpp"
+
+using namespace hamelin;
+using Eigen::Vector3d;
+using test::Decoded;
+using test::triple;
+using test::vector_of;
+
+namespace {
+
+// T_i = exp(S_1 q_1)…exp(S_i q_i) of the page's contract, from the data alone.
+std::vector<geometry::SE3> poses(const Json& robot, const Eigen::VectorXd& q) {
+  std::vector<geometry::SE3> T;
+  geometry::SE3 now;
+  for (std::size_t i = 0; i < robot["joints"].size(); ++i) {
+    const Eigen::VectorXd screw = vector_of(robot["joints"][i]["screw"]);
+    now = now * geometry::SE3::exp(screw * q[static_cast<Eigen::Index>(i)]);
+    T.push_back(now);
+  }
+  return T;
+}
+
+geometry::SE3 pose_of(const Json& pose) {
+  return {geometry::rotation_from_wxyz(vector_of(pose["quaternion_wxyz"])), vector_of(pose["position_m"])};
+}
+
+Eigen::VectorXd q_of(const std::vector<double>& q, std::size_t frame, int dof) {
+  return Eigen::VectorXd::Map(&q.at(frame * static_cast<std::size_t>(dof)), dof);
+}
+
+}  // namespace
+
+TEST_CASE("the poses are ticks of the log, first and last among them, evenly chosen", "[report]") {
+  const auto log = test::scratch("frames") / "run.jsonl";
+  (void)test::log_run(test::shelf(0.5), log);
+  const auto ticks = test::ticks_of(log);
+  for (const std::size_t most : {2UL, 3UL, 100UL, 2000UL}) {
+    const auto data = report::make_data({log}, {most, 1500});
+    const Decoded page(data.bytes);
+    const Json& frames = page.head["runs"][0]["frames"];
+    const auto t = page(frames["t"]), q = page(frames["q"]), goal = page(frames["goal_index"]);
+    REQUIRE(t.size() <= most);
+    REQUIRE(t.size() >= std::min(most / 2, ticks.size()));
+    REQUIRE(q.size() == 7 * t.size());
+    CHECK(data.runs.at(0).frames == t.size());
+    CHECK(data.runs.at(0).ticks == ticks.size());
+    std::size_t at = 0;
+    std::vector<std::size_t> chosen;
+    for (std::size_t f = 0; f < t.size(); ++f) {
+      while (at < ticks.size() && ticks[at]["time_s"].get<double>() < t[f] - 1e-9) ++at;
+      REQUIRE(at < ticks.size());
+      REQUIRE(ticks[at]["time_s"].get<double>() == t[f]);
+      REQUIRE((vector_of(ticks[at]["q"]) - q_of(q, f, 7)).lpNorm<Eigen::Infinity>() <= 0.51e-6);
+      REQUIRE(goal[f] == ticks[at]["goal_index"].get<double>());
+      chosen.push_back(at);
+    }
+    CHECK(chosen.front() == 0);
+    CHECK(chosen.back() == ticks.size() - 1);
+    for (std::size_t f = 2; f + 1 < chosen.size(); ++f) REQUIRE(chosen[f] - chosen[f - 1] == chosen[1] - chosen[0]);
+  }
+}
+
+TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the model has them", "[report]") {
+  const auto folder = test::scratch("kinematics");
+  scene::Scene scene = test::shelf(0.01);
+  scene.model.payload = scene::Payload{1.0, {0.01, 0.02, 0.05}, 0.01 * Eigen::Matrix3d::Identity()};
+  scene::Scene planar = scene::read_scene(test::checkout("data/scenes/paper_51.json"));
+  planar.base = geometry::SE3(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {1, 2, 3});
+  planar.duration_s = planar.step_s;
+  (void)test::log_run(scene, folder / "arm.jsonl");
+  (void)test::log_run(planar, folder / "planar.jsonl");
+  const Decoded page(report::make_data({folder / "arm.jsonl", folder / "planar.jsonl"}).bytes);
+  REQUIRE(page.head["worlds"].size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Json& robot = page.head["worlds"][i]["robot"];
+    const model::Model model = simulation::load_model(i == 0 ? scene : planar);
+    const geometry::SE3 base = pose_of(robot["base"]);
+    dynamics::Workspace ws(model);
+    const Eigen::VectorXd q = Eigen::VectorXd::LinSpaced(model.dof(), -1.2, 1.7);
+    const auto T = poses(robot, q);
+    const auto place = [&](const Json& link, const Json& point) -> Vector3d {
+      return base * (T.at(link.get<std::size_t>()) * Vector3d(vector_of(point)));
+    };
+    dynamics::forward_kinematics(model, ws, q);
+    std::vector<Vector3d> centers(model.spheres().size());
+    dynamics::sphere_centers(model, ws, centers);
+    REQUIRE(robot["spheres"].size() == centers.size());
+    for (std::size_t s = 0; s < centers.size(); ++s) {
+      REQUIRE((place(robot["spheres"][s]["link"], robot["spheres"][s]["center_m"]) - centers[s]).norm() < 1e-12);
+      REQUIRE(robot["spheres"][s]["radius_m"] == model.spheres()[s].radius);
+    }
+    const auto& links = model.robot().links;
+    std::size_t segments = 0;
+    for (std::size_t k = 0; k < links.size(); ++k)
+      for (const auto& segment : links[k].segments) {
+        const Json& drawn = robot["segments"].at(segments++);
+        const auto at = [&](const Vector3d& p) { return dynamics::point_position(model, ws, static_cast<int>(k), p); };
+        REQUIRE((place(drawn["link"], drawn["from_m"]) - at(segment.from_m)).norm() < 1e-12);
+        REQUIRE((place(drawn["link"], drawn["to_m"]) - at(segment.to_m)).norm() < 1e-12);
+      }
+    CHECK(robot["segments"].size() == segments);
+    const Json& skeleton = robot["skeleton"];
+    REQUIRE(skeleton.size() == links.size() + 1);
+    CHECK((place(robot["tip_link"], skeleton.back()) - dynamics::tip_pose(model, ws).p()).norm() < 1e-12);
+    // A point on its joint's axis is one point of both links that the joint holds together.
+    for (std::size_t k = 1; k < links.size(); ++k)
+      REQUIRE((place(k, skeleton[k]) - place(k - 1, skeleton[k])).norm() < 1e-12);
+    if (const auto* chain = std::get_if<model::PlanarChain>(&model.chain()))
+      CHECK((vector_of(robot["planar_normal"]) - chain->root.R().col(2)).norm() < 1e-12);
+    else
+      CHECK(robot["planar_normal"].is_null());
+  }
+}
+
+TEST_CASE("skeletons look like their arms", "[report]") {
+  const auto folder = test::scratch("skeleton");
+  scene::Scene scene = scene::read_scene(test::checkout("data/scenes/paper_52_hybrid.json"));
+  scene.planner.reset();
+  scene.duration_s = scene.step_s;
+  (void)test::log_run(scene, folder / "planar.jsonl");
+  (void)test::log_run(test::shelf(0.01), folder / "arm.jsonl");
+  const Decoded page(report::make_data({folder / "planar.jsonl", folder / "arm.jsonl"}).bytes);
+  const Json& planar = page.head["worlds"][0]["robot"]["skeleton"];
+  for (std::size_t i = 0; i <= 4; ++i)
+    CHECK((vector_of(planar[i]) - Vector3d(static_cast<double>(i), 0, 0)).norm() < 1e-12);
+  // The arm's elbow, 82.5 mm before the column of its shoulder and wrist (its URDF's joint origins).
+  const Json& arm = page.head["worlds"][1]["robot"]["skeleton"];
+  CHECK((vector_of(arm[1]) - Vector3d(0, 0, 0.333)).norm() < 1e-9);
+  CHECK((vector_of(arm[3]) - Vector3d(0.0825, 0, 0.649)).norm() < 1e-9);
+  CHECK((vector_of(arm[5]) - Vector3d(0, 0, 1.033)).norm() < 1e-9);
+}
+
+TEST_CASE("clearances and closest points are those to the cells that the page shows", "[report]") {
+  const auto log = test::scratch("clearance") / "run.jsonl";
+  (void)test::log_run(test::shelf(2.5), log);
+  const Decoded page(report::make_data({log}, {20, 100}).bytes);
+  const Json &world = page.head["worlds"][0], &robot = world["robot"], &frames = page.head["runs"][0]["frames"];
+  CHECK(world["map"]["left_out"] == 0);
+  const auto lo = page(world["map"]["lo"]), level = page(world["map"]["level"]);
+  const geometry::SE3 base = pose_of(robot["base"]), map = pose_of(world["map"]);
+  const double resolution = world["map"]["resolution_m"], influence = frames["influence_m"];
+  std::vector<scene::Box> boxes;
+  for (std::size_t c = 0; c < level.size(); ++c) {
+    const Vector3d corner = triple(lo, c);
+    boxes.push_back({corner * resolution, (corner + Vector3d::Constant(std::exp2(level[c]))) * resolution});
+  }
+  const auto q = page(frames["q"]), clearance = page(frames["clearance"]), points = page(frames["contacts"]["points"]);
+  const auto count = page(frames["contacts"]["count"]);
+  const std::size_t spheres = robot["spheres"].size();
+  REQUIRE(clearance.size() == count.size() * spheres);
+  std::size_t near = 0, contact = 0;
+  for (std::size_t f = 0; f < count.size(); ++f) {
+    const auto T = poses(robot, q_of(q, f, 7));
+    std::vector<double> distances;
+    for (std::size_t s = 0; s < spheres; ++s) {
+      const Json& sphere = robot["spheres"][s];
+      const Vector3d center =
+          map.inverse() * (base * (T.at(sphere["link"].get<std::size_t>()) * Vector3d(vector_of(sphere["center_m"]))));
+      double distance = std::numeric_limits<double>::infinity();
+      for (const auto& box : boxes)
+        distance = std::min(distance, scene::closest_on_box(center, box).distance - sphere["radius_m"].get<double>());
+      const double told = clearance[f * spheres + s];
+      if (distance > influence + 1e-4) {
+        REQUIRE(std::isnan(told));
+      } else if (distance < influence - 1e-4) {
+        REQUIRE(std::abs(told - distance) < 0.6e-4);  // steps of 0.1 mm, q to 1e-6
+        ++near;
+      }
+      if (!std::isnan(told)) distances.push_back(told);
+    }
+    std::sort(distances.begin(), distances.end());
+    REQUIRE(count[f] == static_cast<double>(std::min<std::size_t>(6, distances.size())));
+    for (std::size_t c = 0; c < static_cast<std::size_t>(count[f]); ++c, ++contact)
+      REQUIRE(std::abs((triple(points, 2 * contact) - triple(points, 2 * contact + 1)).norm() - distances[c]) < 4e-4);
+  }
+  CHECK(near > 100);
+  CHECK(points.size() == 6 * contact);
+}
+
+TEST_CASE("a force at the tip is its channel's torque through the damped operational-space inertia", "[report]") {
+  const auto log = test::scratch("forces") / "run.jsonl";
+  const scene::Scene scene = test::shelf(0.6);
+  (void)test::log_run(scene, log);
+  const Decoded page(report::make_data({log}).bytes);
+  const Json& frames = page.head["runs"][0]["frames"];
+  const auto ticks = test::ticks_of(log);
+  const auto t = page(frames["t"]);
+  REQUIRE(t.size() == ticks.size());
+  const model::Model model = simulation::load_model(scene);
+  dynamics::Workspace ws(model);
+  REQUIRE(frames["forces"].size() >= 2);
+  for (const Json& channel : frames["forces"]) {
+    const auto f = page(channel["f"]);
+    for (std::size_t k = 0; k + 1 < ticks.size(); k += 50) {
+      const Eigen::VectorXd q = vector_of(ticks[k]["q"]);
+      Vector3d expected = Vector3d::Zero();
+      if (const auto& torques = ticks[k]["channels"]; torques.contains(channel["channel"])) {
+        Eigen::MatrixXd M(7, 7);
+        dynamics::mass_matrix(model, ws, q, M);
+        dynamics::forward_kinematics(model, ws, q);
+        dynamics::Matrix3Xd J(3, 7);
+        dynamics::point_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(), J);
+        const Eigen::MatrixXd inverse = M.inverse();
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(J * inverse * J.transpose());
+        const Vector3d d = eigen.eigenvalues();
+        const Vector3d damped = (d.array() / (d.array().square() + 1e-6)).matrix();
+        expected = eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose() *
+                   (J * inverse * vector_of(torques[channel["channel"]]));
+      }
+      CAPTURE(channel["channel"], k);
+      REQUIRE((triple(f, k) - expected).norm() <= 2e-3 * expected.norm() + 1e-12);  // ten bits
+    }
+  }
+}
+
+TEST_CASE("binned lines keep the smallest and largest value of every bin, in their order", "[report]") {
+  const auto log = test::scratch("bins") / "run.jsonl";
+  scene::Scene scene = scene::read_scene(test::checkout("data/scenes/paper_51.json"));
+  scene.step_s = 0.002;
+  scene.duration_s = 6.0;
+  (void)test::log_run(scene, log);
+  const auto ticks = test::ticks_of(log);
+  REQUIRE(ticks.size() == 3001);
+  for (const std::size_t most : {4UL, 101UL, 1500UL, 5000UL}) {
+    const Decoded page(report::make_data({log}, {2, most}).bytes);
+    const Json& plot = page.plot(0, "v");
+    const auto t = page(plot["t"]);
+    REQUIRE(t.size() <= most);
+    REQUIRE(t.size() >= std::min(ticks.size(), most / 4));
+    for (std::size_t joint = 0; joint < 3; ++joint) {
+      const Json& packed = plot["series"][joint]["y"];
+      const auto y = page(packed);
+      REQUIRE(y.size() == t.size());
+      const double level = packed["scale"];
+      const auto value = [&](std::size_t k) { return ticks[k]["v"][joint].get<double>(); };
+      std::size_t k = 0;
+      for (std::size_t p = 0; p < t.size();) {
+        REQUIRE(ticks[k]["time_s"].get<double>() == Approx(t[p]).margin(1e-12));
+        const bool single = most == 5000 || p + 1 == t.size();
+        const double end = single ? t[p] : t[p + 1];
+        std::size_t lo = k, hi = k;
+        for (; k < ticks.size() && ticks[k]["time_s"].get<double>() <= end + 1e-9; ++k) {
+          if (value(k) < value(lo)) lo = k;
+          if (value(k) > value(hi)) hi = k;
+        }
+        const bool rising = lo <= hi;
+        REQUIRE(std::abs(y[p] - value(rising ? lo : hi)) <= 0.51 * level);
+        if (!single) REQUIRE(std::abs(y[p + 1] - value(rising ? hi : lo)) <= 0.51 * level);
+        p += single ? 1 : 2;
+      }
+      CHECK(k == ticks.size());
+    }
+  }
+}
+
+TEST_CASE("the plotted energy error peaks at the result's, with all ticks and with every tenth", "[report]") {
+  const auto folder = test::scratch("energy");
+  for (const long every : {1L, 10L}) {
+    for (const std::string name : {"shelf", "free", "potential"}) {
+      scene::Scene scene = test::shelf(1.0);
+      if (name == "free") scene.planner.reset();
+      if (name == "potential")
+        scene.planner = scene::Choice{"apf", {{"mapping", "potential"}, {"gravity_compensation", true}}};
+      const auto log = folder / (name + ".jsonl");
+      const auto result = test::log_run(scene, log, every);
+      const Decoded page(report::make_data({log}).bytes);
+      const auto error = page(page.plot(0, "energy_error")["series"][0]["y"]);
+      double largest = 0.0;
+      for (const double e : error) largest = std::isnan(e) ? largest : std::max(largest, e);
+      CAPTURE(name, every);
+      REQUIRE(result.energy_error_max_J > 0.0);
+      CHECK(largest == Approx(result.energy_error_max_J).epsilon(1e-3));
+      CHECK(page.head["runs"][0]["notes"].size() == (every > 1 ? 1U : 0U));
+    }
+  }
+}
+
+TEST_CASE("runs of one scene share a world, and are told apart by name", "[report]") {
+  const auto folder = test::scratch("worlds");
+  scene::Scene scene = test::shelf(0.02);
+  (void)test::log_run(scene, folder / "a.jsonl");
+  (void)test::log_run(scene, folder / "b.jsonl.zst");
+  scene.goals.resize(1);
+  (void)test::log_run(scene, folder / "c.jsonl");
+  scene.planner.reset();
+  (void)test::log_run(scene, folder / "free.jsonl");
+  const auto data = report::make_data(
+      {folder / "a.jsonl", folder / "b.jsonl.zst", folder / "c.jsonl", folder / "free.jsonl", folder / "a.jsonl"});
+  const Decoded page(data.bytes);
+  CHECK(page.head["format"] == "hamelin.report/1");
+  CHECK(page.head["title"] == "shelf.json");
+  CHECK(page.head["worlds"].size() == 3);
+  std::vector<int> worlds;
+  std::vector<std::string> names;
+  for (const Json& run : page.head["runs"]) {
+    worlds.push_back(run["world"]);
+    names.push_back(run["name"]);
+  }
+  CHECK(worlds == std::vector<int>{0, 0, 1, 2, 0});
+  CHECK(names ==
+        std::vector<std::string>{"hybrid a #1", "hybrid b.jsonl", "hybrid c", "hamel-variational", "hybrid a #5"});
+  CHECK(page.head["runs"][0]["frames"]["q"] == page.head["runs"][4]["frames"]["q"]);  // equal arrays are kept once
+  CHECK(page.head["runs"][0]["result"]["outcome"] == "timeout");
+  CHECK(page.head["runs"][0]["config"]["planner"]["name"] == "hybrid");
+}
+
+TEST_CASE("equal inputs give equal bytes", "[report]") {
+  const auto folder = test::scratch("same");
+  (void)test::log_run(test::shelf(0.1), folder / "a.jsonl");
+  const std::string data = report::make_data({folder / "a.jsonl"}).bytes;
+  CHECK(report::make_data({folder / "a.jsonl"}).bytes == data);
+  const std::string page = "<x>" + std::string(report::token) + "</x>";
+  CHECK(report::make_page(page, data, "t") == report::make_page(page, data, "t"));
+}

@@ -1,0 +1,132 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+
+#include "../scratch_scene.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/log/read_log.hpp"
+
+using namespace hamelin;
+using test::ball;
+using test::run_scene;
+using test::scene_52;
+using test::ScratchFolder;
+
+namespace {
+
+Json scene_of(const Json& planner) {
+  Json scene = scene_52();
+  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
+  scene["planner"] = planner;
+  scene["step_s"] = 0.001;
+  scene["duration_s"] = 2.5;
+  return scene;
+}
+
+std::vector<Json> ticks_of(const ScratchFolder& folder, const Json& scene, long every) {
+  log::RunLog log(folder.path() / "run.jsonl");
+  simulation::Watch watch;
+  watch.log = &log;
+  watch.every = every;
+  (void)run_scene(folder, scene, watch);
+  std::vector<Json> ticks;
+  for (auto& line : log::read_log(log.file()).lines)
+    if (line["type"] == "tick") ticks.push_back(std::move(line));
+  return ticks;
+}
+
+// What the docs say keeps its first value.
+double balance(const Json& tick) {
+  const auto energy = [&](const char* key) { return tick["energy"][key].get<double>(); };
+  return energy("kinetic_J") + energy("potential_J") + energy("control_J") - energy("gyroscopic_work_J") -
+         energy("held_work_J") + energy("dissipated_J") - energy("node_work_J");
+}
+
+Eigen::VectorXd vector_of(const Json& numbers) {
+  Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
+  return x;
+}
+
+}  // namespace
+
+TEST_CASE("the logged torques are those that move the arm, in every channel", "[simulation][log]") {
+  const ScratchFolder folder;
+  const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
+  dynamics::Workspace ws(model);
+  const std::vector<std::pair<Json, std::vector<std::string>>> planners = {
+      {{{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}, {"joint_damping", 1.0}}}},
+       {"potential", "damping"}},
+      {{{"name", "gyro"}}, {"held", "damping", "gyroscopic"}},
+      {{{"name", "hybrid"}}, {"node"}}};
+  for (const auto& [planner, channels] : planners) {
+    CAPTURE(planner);
+    const auto ticks = ticks_of(folder, scene_of(planner), 1);
+    REQUIRE(ticks.size() > 1000);
+    std::map<std::string, int> seen;
+    double largest = 0.0, scale = 0.0;
+    for (std::size_t i = 0; i + 2 < ticks.size(); ++i) {
+      const auto q = vector_of(ticks[i]["q"]), v = vector_of(ticks[i]["v"]), tau = vector_of(ticks[i]["tau"]);
+      Eigen::VectorXd sum = Eigen::VectorXd::Zero(4), expected(4);
+      for (const auto& [channel, torque] : ticks[i]["channels"].items()) {
+        sum += vector_of(torque);
+        ++seen[channel];
+      }
+      REQUIRE((sum - tau).norm() <= 1e-12 * (1.0 + tau.norm()));
+      const Eigen::VectorXd moved = (vector_of(ticks[i + 1]["v"]) - v) / 0.001;
+      dynamics::forward_dynamics(model, ws, q, v, tau, expected);
+      largest = std::max(largest, (moved - expected).norm());
+      scale = std::max(scale, expected.norm());
+    }
+    CAPTURE(largest, scale);
+    CHECK(scale > 0.5);
+    CHECK(largest < 0.05 * scale);  // one step's change of the acceleration
+    for (const auto& channel : channels) CHECK(seen[channel] > 0);
+  }
+}
+
+TEST_CASE("the energies in a log balance at every tick, the last too, in every channel", "[simulation][log]") {
+  const ScratchFolder folder;
+  Json potential = {{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
+  for (const Json& planner : {potential, Json{{"name", "gyro"}}, Json{{"name", "hybrid"}}}) {
+    CAPTURE(planner);
+    const auto ticks = ticks_of(folder, scene_of(planner), 1);
+    double error = 0.0, work = 0.0;
+    for (const auto& tick : ticks) {
+      error = std::max(error, std::abs(balance(tick) - balance(ticks[0])));
+      for (const char* key : {"held_work_J", "node_work_J", "control_J"})
+        work = std::max(work, std::abs(tick["energy"][key].get<double>()));
+    }
+    CHECK(work > 0.1);
+    CHECK(error < 1e-3 * work);
+  }
+}
+
+TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation][log]") {
+  const ScratchFolder folder;
+  const Json scene = scene_of({{"name", "gyro"}});
+  const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37);
+  REQUIRE(few.size() == (all.size() - 1 + 36) / 37 + 1);
+  CHECK_FALSE(all[1].contains("extrema"));
+  CHECK_FALSE(few[0].contains("extrema"));
+  std::size_t from = 1;
+  for (std::size_t i = 1; i < few.size(); ++i) {
+    const Json& extrema = few[i]["extrema"];
+    double clearance = 1e9, error = 0.0, speed = 0.0;
+    int updates = 0;
+    const auto to = few[i]["k"].get<std::size_t>();
+    for (std::size_t k = from; k <= to; ++k) {
+      clearance = std::min(clearance, all[k]["clearance_m"].get<double>());
+      error = std::max(error, std::abs(balance(all[k]) - balance(all[0])));
+      speed = std::max(speed, std::abs(all[k]["v"][2].get<double>()));
+      updates = std::max(updates, all[k]["solver"]["updates"].get<int>());
+    }
+    CAPTURE(from, to);
+    CHECK(extrema["clearance_m"] == clearance);
+    CHECK(extrema["energy_error_J"].get<double>() == Approx(error).margin(1e-15));
+    CHECK(extrema["v_abs"][2] == speed);
+    CHECK(extrema["updates"] == updates);
+    CHECK(few[i]["q"] == all[to]["q"]);
+    from = to + 1;
+  }
+}

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# run.sh PROGRAM TEMPLATE WORK: makes reports of real runs and drives them in a headless Chromium.
+# Exit code 77 where Node.js, Chromium or the page is missing: the test is skipped then, and says why.
+set -euo pipefail
+program=$1 template=$2 work=$3
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+source=$(cd "$here/../.." && pwd)
+
+skip() {
+  echo "skipped: $1"
+  exit 77
+}
+[[ -f "$template" ]] || skip "the page was not built (Node.js with npm was missing, or the registry)"
+command -v npm >/dev/null || skip "npm is missing"
+[[ -n "${CHROMIUM:-}" ]] || command -v chromium >/dev/null || command -v chromium-headless-shell >/dev/null ||
+  skip "Chromium is missing"
+
+mkdir -p "$work"
+cp "$source"/libs/report/page/{package.json,package-lock.json,.npmrc} "$work"
+(cd "$work" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) || skip "npm cannot fetch playwright-core: $(tail -n 1 "$work/npm.log")"
+
+cd "$source"
+run() { # SCENE PLANNER LOG; a planner that does not arrive is no failure here
+  local code=0
+  "$program" run "$1" --planner "$2" --log "$work/$3" --quiet || code=$?
+  ((code <= 1)) || exit "$code"
+}
+for planner in apf gyro hybrid; do
+  run data/scenes/shelf.json "$planner" "shelf-$planner.jsonl.zst"
+  run "data/scenes/paper_52_$planner.json" "$planner" "paper_52-$planner.jsonl"
+done
+"$program" report "$work"/shelf-{apf,gyro,hybrid}.jsonl.zst -o "$work/shelf.html"
+"$program" report "$work"/paper_52-{apf,gyro,hybrid}.jsonl -o "$work/paper_52.html"
+HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html" NODE_MODULES="$work/node_modules" node --test "$here/page.test.mjs"
