@@ -1,5 +1,5 @@
 // A picture of a report page.
-//   node shot.mjs PAGE.html OUT.png [--time T] [--size WxH] [--dark] [--full] [--run "JavaScript in the page"]
+//   node shot.mjs PAGE.html OUT.png [--time T] [--size WxH] [--scale N] [--dark] [--full] [--run "JavaScript in the page"]
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { parseArgs } from 'node:util';
@@ -7,17 +7,17 @@ import { launch } from './browser.mjs';
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
-  options: { time: { type: 'string' }, size: { type: 'string', default: '1440x900' }, dark: { type: 'boolean' }, full: { type: 'boolean' }, run: { type: 'string' } },
+  options: { time: { type: 'string' }, size: { type: 'string', default: '1440x900' }, scale: { type: 'string', default: '1' }, dark: { type: 'boolean' }, full: { type: 'boolean' }, run: { type: 'string' } },
 });
 const [file, out] = positionals;
 if (!out) {
-  process.stderr.write('shot.mjs: expected PAGE.html OUT.png [--time T] [--size WxH] [--dark] [--full] [--run SCRIPT]\n');
+  process.stderr.write('shot.mjs: expected PAGE.html OUT.png [--time T] [--size WxH] [--scale N] [--dark] [--full] [--run SCRIPT]\n');
   process.exit(1);
 }
 const [width, height] = values.size.split('x').map(Number);
 const browser = await launch();
 try {
-  const page = await browser.newPage({ viewport: { width, height }, colorScheme: values.dark ? 'dark' : 'light' });
+  const page = await browser.newPage({ viewport: { width, height }, deviceScaleFactor: Number(values.scale), colorScheme: values.dark ? 'dark' : 'light' });
   page.on('pageerror', (error) => process.stderr.write(`page error: ${error.message}\n`));
   page.on('console', (message) => message.type() === 'error' && process.stderr.write(`console: ${message.text()}\n`));
   await page.goto(pathToFileURL(path.resolve(file)).href);

@@ -51,7 +51,7 @@ std::string words(const simulation::Verdict::Difference& d) {
 }
 
 int verify(const ReplayOptions& options) {
-  const auto recorded = simulation::read_header(options.file);
+  const auto recorded = simulation::read_header(options.file, plugin_path(options.plugin_path));
   const double tolerance = options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_elsewhere);
   for (const auto& line : recorded.other_build) note(fmt::format("{}: {}", options.file.string(), line));
   if (!recorded.other_build.empty() && !options.tolerance)
@@ -105,7 +105,7 @@ int replay(const ReplayOptions& options) {
     return verify(options);
   }
   if (options.tolerance) throw Error(ErrorCode::usage, "--tolerance: means nothing without --verify");
-  const auto recorded = simulation::read_header(options.file);
+  const auto recorded = simulation::read_header(options.file, plugin_path(options.plugin_path));
   std::vector<std::filesystem::path> inputs = files_of(recorded.scene);
   inputs.push_back(options.file);
   return record(options.record, inputs, [&](const simulation::Watch& watch) {

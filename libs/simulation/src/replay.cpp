@@ -49,6 +49,13 @@ std::string text_at(const Json& document, const char* pointer) {
   return value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
 }
 
+// The SHA-256 of the input with that role; empty if there was none.
+std::string logged_hash(const Json& header, std::string_view role) {
+  for (const auto& input : header["provenance"].value("inputs", Json::array()))
+    if (text_at(input, "/role") == role) return text_at(input, "/sha256");
+  return "";
+}
+
 std::vector<std::string> differences_of_build(const Json& then) {
   std::vector<std::string> lines;
   const Json now = log::provenance({});
@@ -97,14 +104,15 @@ class Comparison final : public log::LineSink {
       enough_ = true;
       return;
     }
-    if (logged.value("type", "") == "tick" && logged.contains("k")) {
-      k_ = logged["k"].get<long>();
-      time_s_ = logged["time_s"].get<double>();
+    // What the log says is not trusted: the place is the replayed line's.
+    if (replayed["type"] == "tick") {
+      k_ = replayed["k"].get<long>();
+      time_s_ = replayed["time_s"].get<double>();
     }
     for (Json* line : {&logged, &replayed}) {
       line->erase("timing");
       line->erase("provenance");
-      if (line->value("type", "") == "header") forget_places(*line);
+      if (line->value("type", Json()) == "header") forget_places(*line);
     }
     compare("", logged, replayed, logged);
     if (enough_) return;
@@ -139,8 +147,10 @@ class Comparison final : public log::LineSink {
   void differ(const std::string& field, const Json& logged, const Json& replayed, const Json& line,
               bool tolerated = false) {
     if (enough_) return;
-    const Verdict::Difference found{reader_.lines(), line.value("type", "line"), k_, time_s_, field, shown(logged),
-                                    shown(replayed)};
+    const Json type = line.value("type", Json());
+    const Verdict::Difference found{
+        reader_.lines(), type.is_string() ? type.get<std::string>() : "line", k_, time_s_, field, shown(logged),
+        shown(replayed)};
     if (!verdict_.to_the_bit) verdict_.to_the_bit = found;
     if (tolerated && tolerance_ > 0.0) return;
     verdict_.beyond = found;
@@ -188,9 +198,7 @@ Recorded read_header(const Json& header, const fs::path& log) {
   for (const auto& [role, pointer] : places) {
     const Json::json_pointer at(pointer);
     if (!config.contains(at) || !config[at].is_string()) continue;
-    std::string sha256;
-    for (const auto& input : provenance.value("inputs", Json::array()))
-      if (text_at(input, "/role") == role) sha256 = text_at(input, "/sha256");
+    const std::string sha256 = logged_hash(header, role);
     const std::string named = config[at].get<std::string>();
     const Found found = find_input(named, sha256, cwd, log);
     if (found.file.empty()) {
@@ -208,12 +216,20 @@ Recorded read_header(const Json& header, const fs::path& log) {
   return recorded;
 }
 
-Recorded read_header(const fs::path& log) {
+Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_directories) {
   log::LogReader reader(log);
   Json header;
   if (!reader.next(header))
     throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a log of hamelin", log.string()));
-  return read_header(header, log);
+  Recorded recorded = read_header(header, log);
+  if (recorded.program == Recorded::Program::run && recorded.scene.planner) {
+    const auto plugin = planning::find_plugin(recorded.scene.planner->name, plugin_directories);
+    const std::string then = logged_hash(header, "plugin"), now = sha256_hex(read_file(plugin.file()));
+    if (then != now)
+      recorded.other_build.push_back(
+          fmt::format("planner '{}': SHA-256 {}... then, {}... now", plugin.name(), short_hash(then), short_hash(now)));
+  }
+  return recorded;
 }
 
 log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories, const Watch& watch) {
@@ -225,7 +241,7 @@ log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin
 
 Verdict verify(const fs::path& log, double tolerance, const std::vector<fs::path>& plugin_directories,
                const Watch& watch) {
-  const Recorded recorded = read_header(log);
+  const Recorded recorded = read_header(log, plugin_directories);
   Comparison comparison(log, tolerance);
   Watch compared = watch;
   compared.log = &comparison;

@@ -160,6 +160,13 @@ TEST_CASE("a log of another build is compared within a tolerance, and says so", 
   CHECK(same.exit_code == 0);
   CHECK_THAT(same.err, Contains("build: 0123456789") && Contains("instruction set: v9 then"));
   CHECK_THAT(same.out, Contains("equal to the bit"));
+  header = parse_json(test::lines_of(bench.text("run.jsonl"))[0], "header");
+  for (auto& input : header["provenance"]["inputs"])
+    if (input["role"] == "plugin") input["sha256"] = std::string(64, '0');
+  auto with_other_plugin = lines;
+  with_other_plugin[0] = header.dump();
+  bench.put("plugin.jsonl", joined(with_other_plugin));
+  CHECK_THAT(bench.run({"replay", "plugin.jsonl", "--verify"}).err, Contains("planner 'gyro': SHA-256 000000000000"));
 
   Json tick = parse_json(lines[300], "tick");
   tick["q"][1] = tick["q"][1].get<double>() + 1e-9;
@@ -234,4 +241,46 @@ TEST_CASE("no output replaces a file that the scene needs", "[end_to_end][files]
     CHECK_THAT(output.err, Contains("maps/shelf.bt: is an input"));
   }
   CHECK(bench.text("maps/shelf.bt") == map);
+}
+
+TEST_CASE("whatever a log holds, replay, report, export and validate end with an exit code and one line",
+          "[end_to_end][replay]") {
+  Bench bench;
+  REQUIRE(bench.run({"run", "data/scenes/paper_52_gyro.json", "--duration", "0.2", "--log", "run.jsonl"}).exit_code ==
+          1);
+  const auto lines = test::lines_of(bench.text("run.jsonl"));
+  const std::vector<Json> values = {nullptr, true, -1, 1e308, "", "x", Json::array(), Json::object(), Json({1}), 1.5};
+  Rng random(29);
+  const auto pick = [&](std::size_t count) {
+    return static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(count)));
+  };
+  for (int i = 0; i < 60; ++i) {
+    const std::size_t at = i % 2 == 0 ? 0 : pick(lines.size());
+    Json document = parse_json(lines[at], "line");
+    // down to some place, and another value there
+    Json* place = &document;
+    while (place->is_structured() && !place->empty() && (place == &document || pick(4) != 0)) {
+      auto next = place->begin();
+      std::advance(next, static_cast<std::ptrdiff_t>(pick(place->size())));
+      place = &*next;
+    }
+    *place = values[pick(values.size())];
+    auto altered = lines;
+    altered[at] = document.dump();
+    bench.put("altered.jsonl", joined(altered));
+    const std::vector<std::vector<std::string>> commands = {{"replay", "altered.jsonl", "--verify"},
+                                                            {"report", "altered.jsonl", "-o", "altered.html"},
+                                                            {"export", "altered.jsonl"},
+                                                            {"validate", "altered.jsonl"}};
+    for (const auto& command : commands) {
+      CAPTURE(command, altered[at]);
+      const auto output = bench.run(command);
+      CHECK(output.exit_code >= 0);
+      CHECK(output.exit_code <= 2);
+      if (output.exit_code != 2) continue;
+      const auto told = test::lines_of(output.err);
+      CHECK(std::count_if(told.begin(), told.end(),
+                          [](const std::string& line) { return line.find("note:") == line.npos; }) == 1);
+    }
+  }
 }

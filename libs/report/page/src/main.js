@@ -105,7 +105,7 @@ async function start() {
   const row = h('div', { class: 'panels' }, panels.map((panel) => panel.element));
   const viewSection = h('section', { class: 'view', 'aria-label': 'Replay' }, row);
   const plots = h('section', { class: 'plots', 'aria-label': 'Plots' },
-    h('div', { class: 'plots-head' }, h('h2', {}, 'Plots'), h('p', { class: 'quiet' }, 'Click sets the time · drag zooms · Shift-drag scrubs'), board.sharing, board.resetButton),
+    h('div', { class: 'plots-head' }, h('h2', {}, 'Plots'), h('p', { class: 'quiet' }, 'Click: set the time · Drag: zoom · Shift-drag: move the time'), board.sharing, board.resetButton),
     board.overlays.length > 0 && h('div', { class: 'overlays' }, board.overlays.map((group) => group.element)),
     !alone && h('div', { class: 'plot-cells column-heads', 'aria-hidden': 'true' }, runs.map((run, i) => h('div', {}, named(run, i)))),
     board.groups.map((group) => group.element));

@@ -234,7 +234,10 @@ class Group {
       const baseline = y + (y - top < 16 * px ? 13 : -4) * px;
       let right = left + width - 4 * px;
       for (const other of taken) if (Math.abs(other.baseline - baseline) < 13 * px) right = Math.min(right, other.left - 12 * px);
-      taken.push({ baseline, left: right - ctx.measureText(text).width });
+      const start = right - ctx.measureText(text).width;
+      // Where many marks lie together, the first names stand for them.
+      if (start < left + 0.5 * width) continue;
+      taken.push({ baseline, left: start });
       ctx.fillText(text, right, baseline);
     }
     ctx.restore();

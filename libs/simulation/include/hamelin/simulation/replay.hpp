@@ -28,8 +28,10 @@ struct Recorded {
 /// @throws Error invalid for a header that is none, or of a scene that cannot be read
 [[nodiscard]] Recorded read_header(const Json& header, const std::filesystem::path& log);
 
-/// The same of a log's first line. @throws Error io or parse too
-[[nodiscard]] Recorded read_header(const std::filesystem::path& log);
+/// The same of a log's first line; a planner of another build than then is told in `other_build` too.
+/// @throws Error io or parse too
+[[nodiscard]] Recorded read_header(const std::filesystem::path& log,
+                                   const std::vector<std::filesystem::path>& plugin_directories);
 
 /// Does it again; `every` and what stops it are the watch's.
 /// @throws Error as run() and integrate() do
