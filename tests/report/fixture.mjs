@@ -1,5 +1,5 @@
 // Made-up runs in the report's container, so that the page can be built and tested without the program.
-//   node fixture.mjs TEMPLATE.html OUT_DIR      writes one.html, two.html, three.html, planar.html
+//   node fixture.mjs TEMPLATE.html OUT_DIR      writes one.html, two.html, three.html, four.html, planar.html
 // The shapes and motions are invented; only the format (hamelin.report/1) is the program's.
 import { readFileSync, writeFileSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
@@ -308,7 +308,7 @@ export function page(template, kind) {
 }
 
 /** Writes the pages and returns their paths. */
-export function writePages(templateFile, folder, kinds = ['one', 'two', 'three', 'planar']) {
+export function writePages(templateFile, folder, kinds = ['one', 'three', 'planar']) {
   const template = readFileSync(templateFile, 'utf8');
   mkdirSync(folder, { recursive: true });
   return kinds.map((kind) => {

@@ -1,6 +1,7 @@
 // Drives report pages in a headless Chromium.
-//   HAMELIN_PAGES      pages made by `hamelin report`, separated as in PATH; else pages are made from
-//   HAMELIN_TEMPLATE   the built template, with the runs of fixture.mjs
+//   HAMELIN_PAGES      pages made by `hamelin report`, separated as in PATH
+//   HAMELIN_TEMPLATE   the built template; filled with the runs of fixture.mjs it makes more pages
+//   HAMELIN_FIXTURES   which of these, e.g. one,planar
 //   CHROMIUM, NODE_MODULES   see browser.mjs
 import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -15,7 +16,8 @@ import { writePages } from './fixture.mjs';
 const folder = mkdtempSync(path.join(os.tmpdir(), 'hamelin-page-'));
 const given = (process.env.HAMELIN_PAGES ?? '').split(path.delimiter).filter(Boolean);
 if (!given.length && !process.env.HAMELIN_TEMPLATE) throw new Error('set HAMELIN_PAGES to pages or HAMELIN_TEMPLATE to the built template');
-const files = given.length ? given : writePages(process.env.HAMELIN_TEMPLATE, folder);
+const made = process.env.HAMELIN_TEMPLATE ? writePages(process.env.HAMELIN_TEMPLATE, folder, process.env.HAMELIN_FIXTURES?.split(',')) : [];
+const files = [...given, ...made];
 
 // ---- The page's data, read without the page's code ----
 
@@ -104,7 +106,7 @@ async function open(file, { viewport = { width: 1440, height: 900 }, init, ...op
   return { page, heard };
 }
 
-/** Pixels of one or two pictures: distinct colours of the first, share of pixels that differ. */
+/** Pixels of one or two pictures: distinct colours of the first, and whether both are the same. */
 async function look(first, second = null) {
   return lab.evaluate(async (pictures) => {
     const decode = async (base64) => {
@@ -117,16 +119,25 @@ async function look(first, second = null) {
       return new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
     };
     const [a, b] = await Promise.all(pictures.map(decode));
-    let differing = 0;
-    if (b) for (let i = 0; i < a.length; ++i) if (a[i] !== b[i]) ++differing;
-    return { colors: new Set(a).size, changed: b ? differing / a.length : 0, same: b ? a.length === b.length && differing === 0 : true };
+    return { colors: new Set(a).size, same: !b || (a.length === b.length && a.every((pixel, i) => pixel === b[i])) };
   }, [first, second].filter(Boolean).map((buffer) => buffer.toString('base64')));
 }
 
-const picture = async (page) => {
+const shot = async (page) => {
   await settle(page);
   return page.locator('.panels').screenshot();
 };
+
+/** The picture, once two in a row are the same: on a busy machine what was drawn is shown a little later. */
+async function picture(page) {
+  let last = await shot(page);
+  for (let tries = 0; tries < 8; ++tries) {
+    const next = await shot(page);
+    if (next.equals(last)) return next;
+    last = next;
+  }
+  throw new Error('the picture does not come to rest');
+}
 const time = (page) => page.evaluate(() => window.hamelin.time());
 const setTime = (page, t) => page.evaluate((value) => window.hamelin.setTime(value), t);
 const counts = (page) => page.evaluate(() => window.hamelin.counts());
@@ -139,15 +150,22 @@ const drag = (locator, value) => locator.evaluate((input, v) => {
   input.dispatchEvent(new Event('input', { bubbles: true }));
 }, value);
 
+/** Whether the picture becomes the same as another, or differs from it. */
+async function becomes(page, other, same) {
+  for (let tries = 0; tries < 4; ++tries) {
+    if ((await look(other, await picture(page))).same === same) return true;
+  }
+  return false;
+}
+
 /** Fails unless the picture changes by the action, and comes back by the undoing. */
 async function changes(page, what, act, undo) {
-  const before_ = await picture(page);
+  const start = await picture(page);
   await act();
-  const during = await picture(page);
-  assert.ok((await look(before_, during)).changed > 0, `${what}: the picture does not change`);
+  assert.ok(await becomes(page, start, false), `${what}: the picture does not change`);
   if (!undo) return;
   await undo();
-  assert.ok((await look(before_, await picture(page))).same, `${what}: the picture does not come back`);
+  assert.ok(await becomes(page, start, true), `${what}: the picture does not come back`);
 }
 
 for (const file of files) {
@@ -216,10 +234,10 @@ for (const file of files) {
     assert.ok(Math.abs((await time(page)) - 0.6 * duration) < 0.02 * duration);
     const moved = await page.evaluate(() => window.hamelin.pose(0));
     assert.ok(Math.hypot(...moved.map((c, i) => c - pose[i])) > 1e-3, 'the tip stays');
-    assert.ok((await look(first, await picture(page))).changed > 0.002, 'the picture stays');
+    assert.ok(await becomes(page, first, false), 'the picture stays');
     assert.match(await page.locator('.readout').textContent(), /^\d+\.\d{3} \/ \d+\.\d{3} s$/);
     await setTime(page, 0);
-    assert.ok((await look(first, await picture(page))).same, 'time 0 looks otherwise the second time');
+    assert.ok(await becomes(page, first, true), 'time 0 looks otherwise the second time');
     assert.deepEqual(heard.errors, []);
     await page.close();
   });
@@ -381,20 +399,19 @@ for (const file of files) {
       }
       const obstacles = worldOf(json.runs[0]).obstacles;
       const { period_s: period } = obstacles.find((o) => o.motion).motion;
-      const at = async (t) => {
-        await setTime(page, t);
-        return picture(page);
-      };
       // Only the picture counts here, not the figures over it.
       await page.addStyleTag({ content: '.hud { visibility: hidden; }' });
-      const [start, quarter] = [await at(0), await at(Math.min(period / 4, duration))];
-      assert.ok((await look(start, quarter)).changed > 0, 'nothing moves');
+      const start = await picture(page);
+      await setTime(page, Math.min(period / 4, duration));
+      assert.ok(await becomes(page, start, false), 'nothing moves');
       const late = obstacles.find((o) => o.appears_s > 0 && o.appears_s < duration);
       if (late) {
         // Half a period later the moving ones stand where they stood; what appeared since is new.
         const later = Math.ceil(late.appears_s / (period / 2)) * (period / 2);
-        assert.ok((await look(start, await at(later))).changed > 0, `${late.name} does not appear`);
-        assert.ok((await look(start, await at(later - period / 2))).same, `${late.name} is there too early`);
+        await setTime(page, later - period / 2);
+        assert.ok(await becomes(page, start, true), `${late.name} is there too early`);
+        await setTime(page, later);
+        assert.ok(await becomes(page, start, false), `${late.name} does not appear`);
       }
       await page.close();
     });
@@ -624,9 +641,9 @@ for (const file of files) {
   });
 }
 
-if (!given.length) {
+if (made.length) {
   test('small numbers keep their digits: no axis of the energy error reads only 0', async () => {
-    const { page } = await open(files[0], {
+    const { page } = await open(made[0], {
       init: () => {
         // What the plots write on their canvases.
         window.written = [];
@@ -642,7 +659,7 @@ if (!given.length) {
     await page.close();
   });
 
-  test('an empty template and a damaged container say what is wrong', async () => {
+  test('an empty template says what is wrong', async () => {
     const page = await browser.newPage();
     await page.goto(pathToFileURL(path.resolve(process.env.HAMELIN_TEMPLATE)).href);
     await page.getByRole('alert').waitFor();

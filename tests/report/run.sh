@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# run.sh PROGRAM TEMPLATE WORK: makes reports of real runs and drives them in a headless Chromium.
+# run.sh PROGRAM TEMPLATE WORK: makes reports of runs and drives them in a headless Chromium.
 # Exit code 77 where Node.js, Chromium or the page is missing: the test is skipped then, and says why.
 set -euo pipefail
 program=$1 template=$2 work=$3
@@ -31,4 +31,6 @@ for planner in apf gyro hybrid; do
 done
 "$program" report "$work"/shelf-{apf,gyro,hybrid}.jsonl.zst -o "$work/shelf.html"
 "$program" report "$work"/paper_52-{apf,gyro,hybrid}.jsonl -o "$work/paper_52.html"
-HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html" NODE_MODULES="$work/node_modules" node --test "$here/page.test.mjs"
+# Real runs, and made-up ones for what no scene in data/ has: obstacles that move or come late, a prismatic joint.
+export HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html" HAMELIN_TEMPLATE=$template HAMELIN_FIXTURES=one,planar
+NODE_MODULES="$work/node_modules" node --test "$here/page.test.mjs"

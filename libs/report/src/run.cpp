@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -380,7 +381,7 @@ Json Run::frames_json(const std::vector<Frame>& frames, Container& container) {
   return json;
 }
 
-Json Run::marks(const Plot& plot, double largest) const {
+Json Run::marks(const Plot& plot) const {
   Json marks = Json::array();
   const std::string_view id = plot.id;
   const auto& scene = recorded_.scene;
@@ -401,14 +402,30 @@ Json Run::marks(const Plot& plot, double largest) const {
       if ((goal.type == scene::GoalType::joint) == of_joints)
         add(of_joints ? goal.tolerance_rad : goal.tolerance_m, "tolerance");
   } else if (id == "v" || id == "tau") {
-    // A limit far above what happens would only squash the lines.
+    // Joints of one limit share its line, which is drawn where one of them comes near; a limit far above what happens
+    // would only squash the lines.
+    const std::size_t first = (id == "v" ? 1 : 2) * plotted_joints_;
+    if (!(id == "v" ? scene.model.velocity_limits : scene.model.torque_limits)) return marks;
+    struct Shared {
+      std::vector<std::string> joints;
+      bool near = false;
+    };
+    std::map<double, Shared> limits;
     for (std::size_t i = 0; i < plotted_joints_; ++i) {
       const auto& joint = world_.model.robot().links[i].joint;
       const auto limit = id == "v" ? joint.velocity_max : joint.effort_max;
-      const bool kept = id == "v" ? scene.model.velocity_limits : scene.model.torque_limits;
-      if (!kept || !limit || *limit > 1.5 * largest) continue;
-      add(*limit, "limit");
-      add(-*limit, "limit");
+      if (!limit) continue;
+      auto& shared = limits[*limit];
+      shared.joints.push_back(joint.name);
+      for (const double value : bins_.values(first + i)) shared.near = shared.near || std::abs(value) > *limit / 1.5;
+    }
+    for (const auto& [limit, shared] : limits) {
+      if (!shared.near) continue;
+      const std::string who = shared.joints.size() == plotted_joints_ ? "limit"
+                              : shared.joints.size() <= 4 ? fmt::format("limit of {}", fmt::join(shared.joints, ", "))
+                                                          : fmt::format("limit of {} joints", shared.joints.size());
+      add(limit, who);
+      add(-limit, who);
     }
   }
   return marks;
@@ -420,7 +437,6 @@ Json Run::plots_json(Container& container) const {
   const Json t = container.stepped(bins_.times(), recorded_.scene.step_s);
   for (const Plot& plot : plots_) {
     Json series = Json::array();
-    double largest = 0.0;
     for (const auto& [label, column] : plot.lines) {
       const std::vector<double> y = bins_.values(column);
       const bool known = std::any_of(y.begin(), y.end(), [](double value) { return !std::isnan(value); });
@@ -428,7 +444,6 @@ Json Run::plots_json(Container& container) const {
           std::any_of(y.begin(), y.end(), [](double value) { return value != 0.0 && !std::isnan(value); });
       // Work that is never done is no line of the ledger; nor are halvings that never were.
       if (!known || (!moves && !series.empty())) continue;
-      for (const double value : y) largest = std::isnan(value) ? largest : std::max(largest, std::abs(value));
       series.push_back(
           {{"label", label}, {"y", plot.small_numbers ? container.relative(y, bits) : container.levels(y)}});
     }
@@ -438,7 +453,7 @@ Json Run::plots_json(Container& container) const {
                      {"unit", plot.unit},
                      {"t", t},
                      {"series", std::move(series)},
-                     {"marks", marks(plot, largest)}});
+                     {"marks", marks(plot)}});
   }
   return plots;
 }

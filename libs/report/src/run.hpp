@@ -53,7 +53,7 @@ class Run {
   /// With what the log does not say: clearances, closest points, forces at the tip.
   [[nodiscard]] Json frames_json(const std::vector<Frame>& frames, Container& container);
   [[nodiscard]] Json plots_json(Container& container) const;
-  [[nodiscard]] Json marks(const Plot& plot, double largest) const;
+  [[nodiscard]] Json marks(const Plot& plot) const;
 
   const World& world_;
   simulation::Recorded recorded_;

@@ -15,7 +15,8 @@ class Panel {
   constructor(run, i, alone, goals) {
     this.goals = goals;
     const plot = (id) => run.plots.find((candidate) => candidate.id === id && candidate.series.length);
-    this.figures = [['clearance', plot('clearance')], ['to the goal', plot('goal')]].filter(([, found]) => found);
+    this.figures = [['clearance', ['clearance']], ['to the goal', ['goal', 'goal_joint']]]
+      .map(([label, ids]) => [label, ids.map(plot).filter(Boolean)]).filter(([, found]) => found.length);
     this.values = this.figures.map(() => h('output', {}));
     this.goal = h('output', {});
     this.over = h('span', { class: 'over', hidden: true }, 'run has ended');
@@ -27,11 +28,13 @@ class Panel {
   }
 
   showTime(t, replay) {
-    this.figures.forEach(([, plot], j) => {
-      // A plot of metres and radians has one unit a line.
-      const units = plot.unit.split(/, */).map(unitText);
-      const last = plot.t[plot.t.length - 1];
-      const parts = plot.series.map(({ y }, s) => [valueAt(plot.t, y, Math.min(t, last)), units[Math.min(s, units.length - 1)]]).filter(([value]) => Number.isFinite(value));
+    this.figures.forEach(([, plots], j) => {
+      const parts = plots.flatMap((plot) => {
+        // A plot of metres and radians has one unit a line.
+        const units = plot.unit.split(/, */).map(unitText);
+        const last = plot.t[plot.t.length - 1];
+        return plot.series.map(({ y }, s) => [valueAt(plot.t, y, Math.min(t, last)), units[Math.min(s, units.length - 1)]]);
+      }).filter(([value]) => Number.isFinite(value));
       this.values[j].textContent = parts.map(([value, unit]) => `${number(value, 3)} ${unit}`).join(', ') || '–';
     });
     const index = replay.goalIndex;
