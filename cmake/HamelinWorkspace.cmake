@@ -26,7 +26,9 @@ target_compile_options(hamelin_options INTERFACE
 target_link_options(hamelin_options INTERFACE LINKER:--build-id=sha1 $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
 if(HAMELIN_SANITIZE)
   list(JOIN HAMELIN_SANITIZE "," _sanitizers)
-  target_compile_options(hamelin_options INTERFACE -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_compile_options(hamelin_options INTERFACE -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    # GCC takes what a sanitizer adds for uses of what is not set.
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(hamelin_options INTERFACE -fsanitize=${_sanitizers})
   target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
 endif()

@@ -146,7 +146,7 @@ void add_completion(CLI::App& app, int& exit_code) {
                                  "hamelin completion bash > ~/.local/share/bash-completion/completions/hamelin");
   const auto shell = std::make_shared<std::string>();
   one_of(completion->add_option("shell", *shell, "whose completion"), {"bash"})->required()->type_name("SHELL");
-  completion->callback([&app, &exit_code] {
+  completion->callback([&app, shell, &exit_code] {  // the option writes to `shell`
     fmt::print("{}", bash_script(app));
     exit_code = 0;
   });

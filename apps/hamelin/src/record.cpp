@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 // Above this a log's size is worth a word before the run begins.
-constexpr double large_log_bytes = 100e6;
+constexpr double large_log_bytes = 50e6;
 
 std::string bytes(double count) {
   return count >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * count) : fmt::format("{:.0f} MB", std::max(1.0, 1e-6 * count));

@@ -77,7 +77,7 @@ class Hybrid final : public planning::Planner {
     for (auto* x : {&q_, &v_, &u_, &x_, &bias_, &momentum_, &lower_, &upper_, &scratch_}) *x = VectorXd::Zero(n);
     M_ = Minv_ = Eigen::MatrixXd::Identity(n, n);
     identity_ = Eigen::MatrixXd::Identity(n, n);
-    llt_ = Eigen::LLT<Eigen::MatrixXd>(n);
+    llt_.compute(identity_);  // takes its memory now
   }
 
   static double influence_m(const Json& params) { return params["contact_radius_m"]; }

@@ -23,7 +23,7 @@ Json scene_of(const Json& planner) {
   return scene;
 }
 
-std::vector<Json> ticks_of(const ScratchFolder& folder, const Json& scene, long every) {
+std::vector<Json> ticks_of(const ScratchFolder& folder, const Json& scene, long every, Json* result = nullptr) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -31,7 +31,10 @@ std::vector<Json> ticks_of(const ScratchFolder& folder, const Json& scene, long 
   (void)run_scene(folder, scene, watch);
   std::vector<Json> ticks;
   for (auto& line : log::read_log(log.file()).lines)
-    if (line["type"] == "tick") ticks.push_back(std::move(line));
+    if (line["type"] == "tick")
+      ticks.push_back(std::move(line));
+    else if (line["type"] == "result" && result != nullptr)
+      *result = std::move(line);
   return ticks;
 }
 
@@ -105,7 +108,8 @@ TEST_CASE("the energies in a log balance at every tick, the last too, in every c
 TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation][log]") {
   const ScratchFolder folder;
   const Json scene = scene_of({{"name", "gyro"}});
-  const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37);
+  Json result;
+  const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37, &result);
   REQUIRE(few.size() == (all.size() - 1 + 36) / 37 + 1);
   CHECK_FALSE(all[1].contains("extrema"));
   CHECK_FALSE(few[0].contains("extrema"));
@@ -129,4 +133,7 @@ TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation
     CHECK(few[i]["q"] == all[to]["q"]);
     from = to + 1;
   }
+  double fastest = 0.0;
+  for (const auto& tick : all) fastest = std::max(fastest, std::abs(tick["v"][2].get<double>()));
+  CHECK(result["v_abs_max"][2] == fastest);
 }

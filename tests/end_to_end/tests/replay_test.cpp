@@ -130,6 +130,26 @@ TEST_CASE("a run stopped by Ctrl-C has a proper end, and is repeated to the same
   }
 }
 
+TEST_CASE("a run that is killed leaves a log that is read, verified and reported as unfinished",
+          "[end_to_end][replay]") {
+  for (const std::string log : {"run.jsonl", "run.jsonl.zst"}) {
+    CAPTURE(log);
+    Bench bench;
+    const auto child =
+        bench.start({"integrate", "data/robots/planar3.json", "--duration", "100000", "--step", "0.01", "--log", log});
+    while (!bench.has(log) || std::filesystem::file_size(bench.path(log)) < 200'000) ::usleep(1000);
+    ::kill(child, SIGKILL);
+    CHECK(bench.finish(child).exit_code == -SIGKILL);
+    const auto told = bench.run({"validate", log});
+    CHECK(told.exit_code == 0);
+    CHECK_THAT(told.out, Contains("no result: unfinished"));
+    const Json verdict = test::run_json(bench, {"replay", log, "--verify"});
+    CHECK(verdict["to_the_bit"] == true);
+    CHECK(verdict["finished"] == false);
+    if (log.ends_with(".zst")) CHECK(verdict["ticks"].get<long>() % 256 == 0);
+  }
+}
+
 TEST_CASE("a log finds its inputs from anywhere, and names one that has changed", "[end_to_end][replay]") {
   Bench bench;
   bench.put("in/robot.json", read_file(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots/planar3.json"));

@@ -140,7 +140,7 @@ TEST_CASE("plugins check passes every planner of ours", "[end_to_end]") {
   }
 }
 
-TEST_CASE("--print-config prints a scene that runs to the same result", "[end_to_end]") {
+TEST_CASE("the scene that --print-config prints runs to the same result", "[end_to_end]") {
   Bench bench;
   for (const char* command : {"run", "integrate"}) {
     CAPTURE(command);
