@@ -2,8 +2,8 @@
 #include <filesystem>
 
 #include "hamelin/log/provenance.hpp"
-#include "hamelin/log/result.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/log/result.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/test/readme.hpp"
 

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
-#include "hamelin/model/make_chain.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/model/make_chain.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/readme.hpp"
 
