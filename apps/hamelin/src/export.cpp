@@ -16,7 +16,7 @@ namespace {
 struct ExportOptions {
   std::filesystem::path file;
   std::string format = "csv";
-  std::optional<double> rate_Hz;
+  std::optional<double> rate_hz;
   std::optional<std::filesystem::path> output;
 };
 
@@ -24,7 +24,7 @@ int export_motion(const ExportOptions& options) {
   std::filesystem::path target;
   if (options.output) target = output_target(*options.output, {options.file});
   log::Trajectory trajectory = log::read_trajectory(options.file);
-  if (options.rate_Hz) trajectory = log::resampled(trajectory, *options.rate_Hz);
+  if (options.rate_hz) trajectory = log::resampled(trajectory, *options.rate_hz);
   const std::string text =
       options.format == "csv" ? log::to_csv(trajectory) : log::to_joint_trajectory(trajectory).dump(1) + "\n";
   if (!options.output) {
@@ -51,7 +51,7 @@ void add_export(CLI::App& app, int& exit_code) {
              ->type_name("NAME")
              ->capture_default_str(),
          {"csv", "ros"});
-  command->add_option("--rate", options->rate_Hz, "points a second, interpolated (default: every logged tick)")
+  command->add_option("--rate", options->rate_hz, "points a second, interpolated (default: every logged tick)")
       ->type_name("HZ");
   command->add_option("-o,--output", options->output, "the file to write (default: standard output)")
       ->type_name("FILE");

@@ -88,21 +88,21 @@ Trajectory read_trajectory(const std::filesystem::path& log) {
   return trajectory;
 }
 
-Trajectory resampled(const Trajectory& trajectory, double rate_Hz) {
-  if (!std::isfinite(rate_Hz) || rate_Hz <= 0.0)
-    throw Error(ErrorCode::usage, fmt::format("rate {} Hz: expected a positive number", rate_Hz));
+Trajectory resampled(const Trajectory& trajectory, double rate_hz) {
+  if (!std::isfinite(rate_hz) || rate_hz <= 0.0)
+    throw Error(ErrorCode::usage, fmt::format("rate {} Hz: expected a positive number", rate_hz));
   const auto& points = trajectory.points;
   Trajectory out{trajectory.joints, {}};
   if (points.empty()) return out;
   const double begin = points.front().time_s, span = points.back().time_s - begin;
-  if (span * rate_Hz > 1e8)
+  if (span * rate_hz > 1e8)
     throw Error(ErrorCode::usage,
-                fmt::format("rate {} Hz: makes {:.3g} points, expected at most 1e8", rate_Hz, span * rate_Hz));
+                fmt::format("rate {} Hz: makes {:.3g} points, expected at most 1e8", rate_hz, span * rate_hz));
   // a sample that meets the last point but for rounding is the last point
-  const auto whole = static_cast<long>(std::ceil(span * rate_Hz - 1e-6));
+  const auto whole = static_cast<long>(std::ceil(span * rate_hz - 1e-6));
   std::size_t at = 0;
   for (long i = 0; i < whole; ++i) {
-    const double time_s = begin + static_cast<double>(i) / rate_Hz;
+    const double time_s = begin + static_cast<double>(i) / rate_hz;
     while (at + 2 < points.size() && points[at + 1].time_s <= time_s) ++at;
     const auto &a = points[at], &b = points[at + 1];
     const double h = b.time_s - a.time_s, u = (time_s - a.time_s) / h;

@@ -25,8 +25,8 @@ struct Trajectory {
 
 /// The same motion at a fixed rate from its first to its last point: cubic Hermite in q and v, torques as held. The
 /// last point stays, so the last interval may be shorter.
-/// @param rate_Hz positive and finite @throws Error usage
-[[nodiscard]] Trajectory resampled(const Trajectory& trajectory, double rate_Hz);
+/// @param rate_hz positive and finite @throws Error usage
+[[nodiscard]] Trajectory resampled(const Trajectory& trajectory, double rate_hz);
 
 /// Comma-separated values (RFC 4180): time_s, then q_, v_ and tau_ of each joint; what is not finite is left empty.
 [[nodiscard]] std::string to_csv(const Trajectory& trajectory);
