@@ -24,7 +24,7 @@ void check_output(const fs::path& file, const std::vector<fs::path>& inputs) {
 
 fs::path output_target(const fs::path& file, const std::vector<fs::path>& inputs) {
   std::error_code ec;
-  const fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
+  fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
   if (fs::exists(target, ec) && !fs::is_regular_file(target, ec))
     throw Error(ErrorCode::io, fmt::format("{}: is no regular file, expected a path for the output", file.string()));
   check_output(target, inputs);

@@ -29,7 +29,7 @@ struct ReportOptions {
 fs::path page_template() {
   std::error_code ec;
   const auto program = fs::read_symlink("/proc/self/exe", ec);
-  const auto file = program.parent_path().parent_path() / "share" / "hamelin" / "report" / "page.html";
+  auto file = program.parent_path().parent_path() / "share" / "hamelin" / "report" / "page.html";
   if (ec || !fs::is_regular_file(file, ec))
     throw Error(
         ErrorCode::io,
