@@ -132,14 +132,18 @@ void set_command_line(int argc, char** argv) {
   stored_command_line().assign(argv, argv + argc);
 }
 
-std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given) {
-  std::vector<std::filesystem::path> own;
+std::optional<std::filesystem::path> prefix() {
   std::error_code ec;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
-  if (!ec) {
-    const auto prefix = program.parent_path().parent_path();
-    own.push_back(prefix / "lib" / "hamelin" / "plugins");
-    if (std::string(HAMELIN_LIBDIR) != "lib") own.push_back(prefix / HAMELIN_LIBDIR / "hamelin" / "plugins");
+  if (ec) return {};
+  return program.parent_path().parent_path();
+}
+
+std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given) {
+  std::vector<std::filesystem::path> own;
+  if (const auto base = prefix()) {
+    own.push_back(*base / "lib" / "hamelin" / "plugins");
+    if (std::string(HAMELIN_LIBDIR) != "lib") own.push_back(*base / HAMELIN_LIBDIR / "hamelin" / "plugins");
   }
   auto directories = planning::plugin_directories(given, own);
   std::string list;

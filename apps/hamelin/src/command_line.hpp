@@ -43,6 +43,9 @@ void print_json(const Json& document);
 [[nodiscard]] std::vector<std::string> command_line();
 void set_command_line(int argc, char** argv);
 
+/// The folder that holds this program's bin/ and what came with it; none if the system does not tell.
+[[nodiscard]] std::optional<std::filesystem::path> prefix();
+
 /// Where planners are looked for: `given`, HAMELIN_PLUGIN_PATH, then beside this program.
 [[nodiscard]] std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given);
 

@@ -50,8 +50,7 @@ std::string words(const simulation::Verdict::Difference& d) {
                      d.replayed);
 }
 
-int verify(const ReplayOptions& options) {
-  const auto recorded = simulation::read_header(options.file, plugin_path(options.plugin_path));
+int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
   const double tolerance = options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_elsewhere);
   for (const auto& line : recorded.other_build) note(fmt::format("{}: {}", options.file.string(), line));
   if (!recorded.other_build.empty() && !options.tolerance)
@@ -62,7 +61,7 @@ int verify(const ReplayOptions& options) {
   {
     Progress progress;
     watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
-    verdict = simulation::verify(options.file, tolerance, plugin_path(options.plugin_path), watch);
+    verdict = simulation::verify(recorded, options.file, tolerance, plugin_path(options.plugin_path), watch);
   }
   const bool equal = !verdict.beyond && !verdict.stopped;
   if (options.record.json) {
@@ -102,7 +101,7 @@ int replay(const ReplayOptions& options) {
   if (options.verify) {
     if (options.record.log || options.record.result)
       throw Error(ErrorCode::usage, "--verify: writes nothing, expected neither --log nor --result with it");
-    return verify(options);
+    return verify(options, simulation::read_header(options.file, plugin_path(options.plugin_path)));
   }
   if (options.tolerance) throw Error(ErrorCode::usage, "--tolerance: means nothing without --verify");
   const auto recorded = simulation::read_header(options.file, plugin_path(options.plugin_path));

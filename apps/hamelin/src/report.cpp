@@ -28,9 +28,8 @@ struct ReportOptions {
 // The page without runs, beside this program: the build makes it where it finds Node.js.
 fs::path page_template() {
   std::error_code ec;
-  const auto program = fs::read_symlink("/proc/self/exe", ec);
-  auto file = program.parent_path().parent_path() / "share" / "hamelin" / "report" / "page.html";
-  if (ec || !fs::is_regular_file(file, ec))
+  auto file = prefix().value_or("/") / "share" / "hamelin" / "report" / "page.html";
+  if (!fs::is_regular_file(file, ec))
     throw Error(
         ErrorCode::io,
         fmt::format(
@@ -69,7 +68,7 @@ int make_report(const ReportOptions& options) {
                          run.frames));
   }
   if (options.json)
-    fmt::print("{}\n", summary.dump(2, ' ', false, Json::error_handler_t::replace));
+    print_json(summary);
   else
     report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(page.size())));
   return 0;

@@ -10,8 +10,10 @@
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/log/result.hpp"
+#include "ticks.hpp"
 
 using namespace hamelin;
+using test::tick;
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
 
@@ -27,23 +29,6 @@ fs::path fresh_directory(const std::string& name) {
 
 void put(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
-}
-
-Json tick(long k) {
-  return {{"k", k},
-          {"time_s", 0.001 * static_cast<double>(k)},
-          {"q", {0.1}},
-          {"v", {0.0}},
-          {"energy",
-           {{"kinetic_J", 0.0},
-            {"potential_J", 2.7},
-            {"control_J", 0.0},
-            {"gyroscopic_work_J", 0.0},
-            {"filter_work_J", 0.0},
-            {"recovery_work_J", 0.0},
-            {"dissipated_J", 0.0},
-            {"held_work_J", 0.0}}},
-          {"solver", {{"updates", 1}, {"residual", 1e-14}, {"halvings", 0}}}};
 }
 
 const Json header = {{"program", "integrate"},   {"scene", "a.json"},       {"every", 1},

@@ -8,6 +8,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/run_log.hpp"
+#include "ticks.hpp"
 
 using namespace hamelin;
 using Catch::Matchers::Contains;
@@ -44,21 +45,12 @@ void write_log(const std::vector<double>& times) {
   for (const double t : times) {
     const auto point = at(t);
     const auto array = [](const Eigen::VectorXd& x) { return Json({x[0], x[1]}); };
-    record.write("tick", {{"k", k++},
-                          {"time_s", t},
-                          {"q", array(point.q)},
-                          {"v", array(point.v)},
-                          {"tau", array(point.tau)},
-                          {"energy",
-                           {{"kinetic_J", 0.0},
-                            {"potential_J", 0.0},
-                            {"control_J", 0.0},
-                            {"gyroscopic_work_J", 0.0},
-                            {"filter_work_J", 0.0},
-                            {"recovery_work_J", 0.0},
-                            {"dissipated_J", 0.0},
-                            {"held_work_J", 0.0}}},
-                          {"solver", {{"updates", 1}, {"residual", 0.0}, {"halvings", 0}}}});
+    Json fields = test::tick(k++);
+    fields["time_s"] = t;
+    fields["q"] = array(point.q);
+    fields["v"] = array(point.v);
+    fields["tau"] = array(point.tau);
+    record.write("tick", fields);
   }
 }
 

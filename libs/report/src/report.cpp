@@ -10,7 +10,6 @@
 
 #include "container.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/simulation/replay.hpp"
 #include "run.hpp"
@@ -39,14 +38,10 @@ Json read_first_line(log::LogReader& reader, const std::filesystem::path& file) 
   return header;
 }
 
-// Whether the scene's map is the very one that the header speaks of.
-bool map_at_hand(const Json& header, const scene::Scene& scene) {
-  std::error_code ec;
-  if (!scene.map || !std::filesystem::is_regular_file(scene.map->file, ec)) return false;
-  for (const Json& input : header["provenance"].value("inputs", Json::array()))
-    if (input.is_object() && input.value("role", Json()) == "map")
-      return input.value("sha256", Json()) == sha256_hex(read_file(scene.map->file));
-  return false;
+// Whether the very map that was run is there.
+bool map_at_hand(const simulation::Recorded& recorded) {
+  return recorded.scene.map && std::none_of(recorded.changed.begin(), recorded.changed.end(),
+                                            [](const auto& changed) { return changed.role == "map"; });
 }
 
 // Runs of one planner are told apart by their logs, and logs of one name by their number.
@@ -86,7 +81,7 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
     log::LogReader reader(file);
     const Json header = read_first_line(reader, file);
     const simulation::Recorded recorded = simulation::read_header(header, file);
-    const bool has_map = map_at_hand(header, recorded.scene);
+    const bool has_map = map_at_hand(recorded);
     std::string key = fmt::format("{}{}", world_key(recorded), has_map ? "" : " without map");
     auto world = std::find_if(worlds.begin(), worlds.end(), [&](const auto& known) { return known->key == key; });
     if (world == worlds.end()) world = worlds.insert(world, make_world(recorded, std::move(key), has_map, container));

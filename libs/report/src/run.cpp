@@ -111,7 +111,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: its joints are not those of the log, expected the robot as it was run",
                             recorded.scene.robot.file.string()));
-  notes_ = recorded.changed;
+  for (const auto& changed : recorded.changed) notes_.push_back(changed.text);
   if (recorded.every > 1)
     notes_.push_back(
         fmt::format("the log has a tick every {} steps; clearance, energy error, updates, residual and "

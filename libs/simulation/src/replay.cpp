@@ -202,12 +202,13 @@ Recorded read_header(const Json& header, const fs::path& log) {
     const std::string named = config[at].get<std::string>();
     const Found found = find_input(named, sha256, cwd, log);
     if (found.file.empty()) {
-      recorded.changed.push_back(fmt::format("{}: is missing, expected the {} of this log", named, role));
+      recorded.changed.push_back({role, fmt::format("{}: is missing, expected the {} of this log", named, role)});
     } else {
       if (found.sha256 != sha256)
         recorded.changed.push_back(
-            fmt::format("{}: has changed since the log was written: SHA-256 {}..., expected {}...", found.file.string(),
-                        short_hash(found.sha256), sha256.empty() ? "one in the header" : short_hash(sha256)));
+            {role, fmt::format("{}: has changed since the log was written: SHA-256 {}..., expected {}...",
+                               found.file.string(), short_hash(found.sha256),
+                               sha256.empty() ? "one in the header" : short_hash(sha256))});
       config[at] = found.file.string();
     }
   }
@@ -233,15 +234,14 @@ Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_di
 }
 
 log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories, const Watch& watch) {
-  if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front());
+  if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front().text);
   if (recorded.program == Recorded::Program::run) return run(recorded.scene, plugin_directories, watch);
   const model::Model model = load_model(recorded.scene);
   return integrate(model, free_motion(recorded.scene, model), watch);
 }
 
-Verdict verify(const fs::path& log, double tolerance, const std::vector<fs::path>& plugin_directories,
-               const Watch& watch) {
-  const Recorded recorded = read_header(log, plugin_directories);
+Verdict verify(const Recorded& recorded, const fs::path& log, double tolerance,
+               const std::vector<fs::path>& plugin_directories, const Watch& watch) {
   Comparison comparison(log, tolerance);
   Watch compared = watch;
   compared.log = &comparison;

@@ -19,7 +19,10 @@ struct Recorded {
   long every = 1;
   /// Files that are missing or not what they were, one line each: "data/maps/shelf.bt: has changed: SHA-256 …". They
   /// are looked for as named, from where the run was started, and from the log's folder.
-  std::vector<std::string> changed;
+  struct Changed {
+    std::string role, text;
+  };
+  std::vector<Changed> changed;
   /// What of this program's build or machine is not as then, one line each: bits may differ.
   std::vector<std::string> other_build;
 };
@@ -60,10 +63,11 @@ struct Verdict {
 /// Runs again what the log says and compares line by line; timing and provenance are left out. Ends at the first
 /// difference beyond the tolerance. An interrupted run is stopped where it was; of an unfinished log the whole lines
 /// are compared.
+/// @param recorded the log's header
 /// @param tolerance for numbers: |a − b| ≤ tolerance · max(1, |a|); zero: the bits
 /// @param watch its log, every and stop_at are not used
 /// @throws Error for a log that cannot be read, inputs that changed, or a planner that is not found
-[[nodiscard]] Verdict verify(const std::filesystem::path& log, double tolerance,
+[[nodiscard]] Verdict verify(const Recorded& recorded, const std::filesystem::path& log, double tolerance,
                              const std::vector<std::filesystem::path>& plugin_directories, const Watch& watch);
 
 }  // namespace hamelin::simulation
