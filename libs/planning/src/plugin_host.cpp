@@ -97,13 +97,18 @@ SetupData::SetupData(const model::Model& nominal)
   }
 }
 
-void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q) {
+void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q, const Eigen::MatrixXd& path) {
   goals.push_back(goal);
   goals_q.push_back(q);
+  paths.push_back(path);
 }
 
 hamelin_setup SetupData::view() {
-  for (std::size_t i = 0; i < goals.size(); ++i) goals[i].q = goals_q[i].size() > 0 ? goals_q[i].data() : nullptr;
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    goals[i].q = goals_q[i].size() > 0 ? goals_q[i].data() : nullptr;
+    goals[i].path = paths[i].size() > 0 ? paths[i].data() : nullptr;
+    goals[i].path_points = static_cast<std::size_t>(paths[i].cols());
+  }
   hamelin_setup raw{};
   raw.struct_size = sizeof raw;
   raw.dof = dof;
@@ -121,7 +126,11 @@ hamelin_setup SetupData::view() {
   raw.q_upper = numbers(q_upper);
   raw.velocity_max = numbers(velocity_max);
   raw.effort_max = numbers(effort_max);
+  raw.effort_rate_max = numbers(effort_rate_max);
   raw.control_period_s = control_period_s;
+  raw.sampled = sampled ? 1 : 0;
+  raw.delay_s = delay_s;
+  raw.self_collision = self_collision ? 1 : 0;
   raw.influence_m = influence_m;
   raw.map_resolution_m = map_resolution_m;
   raw.seed = seed;
@@ -251,6 +260,7 @@ struct LoadedPlanner::Instance {
     host.context = this;
     host.log = &Instance::log;
     host.closest_points = &Instance::closest_points;
+    host.closest_self = &Instance::closest_self;
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -285,6 +295,13 @@ struct LoadedPlanner::Instance {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
     self.guarded([&] { count = self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity}); });
+    return count;
+  }
+  static std::size_t closest_self(void* context, const double* q, double influence_m, hamelin_self_contact* out,
+                                  std::size_t capacity) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::size_t count = 0;
+    self.guarded([&] { count = self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity}); });
     return count;
   }
 

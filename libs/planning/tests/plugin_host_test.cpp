@@ -93,7 +93,7 @@ TEST_CASE("a plugin that is no plugin is refused with one line that names it", "
   };
   expect("no_entry", "no symbol hamelin_plugin_entry, so it is no planner plugin");
   expect("null_entry", "hamelin_plugin_entry returned null");
-  expect("wrong_abi", "built for plugin ABI 7, this host has ABI 1");
+  expect("wrong_abi", "built for plugin ABI 8, this host has ABI 2");
   expect("short_struct", "its hamelin_plugin has 64 bytes, expected at least 72");
   expect("null_create", "its function 'create' is null");
   expect("null_tick", "its function 'tick' is null");
@@ -266,7 +266,7 @@ TEST_CASE("a planner that is not found: every directory, what is there, the near
   const auto listed = list_plugins(directories);
   REQUIRE(listed.size() == 2);
   CHECK_FALSE(listed[0].plugin.has_value());
-  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for plugin ABI 7"));
+  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for plugin ABI 8"));
   REQUIRE(listed[1].plugin.has_value());
   CHECK(listed[1].plugin->version() == "1.0");
 }

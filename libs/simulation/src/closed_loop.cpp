@@ -469,6 +469,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
       dynamics::forward_kinematics(plant_, ws_, state_.q);
     }
     recorder.observe(clearance_now_, certified, v_);
+    if (watch.at_node) watch.at_node(state_.time_s, state_.q);
     if (!v_.allFinite() || !state_.q.allFinite()) {
       finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state_.k));
     } else if (obstacles && clearance_now_ <= 0.0) {

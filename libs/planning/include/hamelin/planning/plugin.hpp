@@ -56,6 +56,17 @@ class Setup {
   [[nodiscard]] std::optional<ConstVectorMap> velocity_max() const { return limit(raw_->velocity_max); }
   /// Torque limits [Nm or N].
   [[nodiscard]] std::optional<ConstVectorMap> effort_max() const { return limit(raw_->effort_max); }
+  /// How fast a held torque may change [Nm/s or N/s].
+  [[nodiscard]] std::optional<ConstVectorMap> effort_rate_max() const { return limit(raw_->effort_rate_max); }
+  /// Whether all channels become one torque held over the control period, and how late it acts [s].
+  [[nodiscard]] bool sampled() const { return raw_->sampled != 0; }
+  [[nodiscard]] double delay_s() const { return raw_->delay_s; }
+  /// Whether self contacts are listed.
+  [[nodiscard]] bool self_collision() const { return raw_->self_collision != 0; }
+  /// A joint goal's path, one column a way-point, the goal itself the last; no columns without a path.
+  [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> path(const hamelin_goal& goal) const {
+    return {goal.path, dof(), static_cast<Eigen::Index>(goal.path_points)};
+  }
   /// Time between two ticks [s].
   [[nodiscard]] double control_period_s() const { return raw_->control_period_s; }
   /// Contacts are listed up to this distance [m].
@@ -85,6 +96,10 @@ class Tick {
   [[nodiscard]] ConstVectorMap v() const { return {raw_->v, dof_}; }
   /// Near obstacle points: spheres in order, nearest first within a sphere.
   [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {raw_->contacts, raw_->contact_count}; }
+  /// Near pairs of parts of the arm itself; empty unless the scene models self-collision.
+  [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
+    return {raw_->self_contacts, raw_->self_contact_count};
+  }
   /// Index into Setup::goals().
   [[nodiscard]] std::size_t goal_index() const { return raw_->goal_index; }
   /// 1, or less where the scene asks for slow motion.
@@ -155,6 +170,11 @@ class Host {
   [[nodiscard]] std::size_t closest_points(std::span<const double> q, double influence_m,
                                            std::span<hamelin_contact> out) const {
     return raw_->closest_points(raw_->context, q.data(), influence_m, out.data(), out.size());
+  }
+  /// Self contacts at any q, in the same way.
+  [[nodiscard]] std::size_t closest_self(std::span<const double> q, double influence_m,
+                                         std::span<hamelin_self_contact> out) const {
+    return raw_->closest_self(raw_->context, q.data(), influence_m, out.data(), out.size());
   }
 
  private:

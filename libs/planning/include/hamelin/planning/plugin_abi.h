@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-#define HAMELIN_PLUGIN_ABI_VERSION 1u
+#define HAMELIN_PLUGIN_ABI_VERSION 2u
 #define HAMELIN_PLUGIN_ENTRY_NAME "hamelin_plugin_entry"
 
 /* A sphere of the arm that obstacles are measured from. Listed once, in hamelin_setup, link by link. */
@@ -38,6 +38,18 @@ typedef struct hamelin_contact {
   double obstacle_velocity_world_m_s[3];
 } hamelin_contact;
 
+/* The base, where a sphere of the arm is meant that does not move. */
+#define HAMELIN_SPHERE_OF_BASE (-1)
+
+/* A near pair of spheres of the arm itself, the nearest of two parts that may touch. Listed where the scene models
+ * self-collision. */
+typedef struct hamelin_self_contact {
+  int32_t sphere_a, sphere_b; /* indices into hamelin_setup.spheres; b may be HAMELIN_SPHERE_OF_BASE */
+  double distance_m;          /* between the surfaces; zero or below is contact */
+  double point_a_world_m[3], point_b_world_m[3]; /* on the surfaces */
+  double direction_world[3];                     /* unit, from b towards a */
+} hamelin_self_contact;
+
 enum { HAMELIN_GOAL_JOINT = 0, HAMELIN_GOAL_POSITION = 1, HAMELIN_GOAL_POSE = 2 };
 
 typedef struct hamelin_goal {
@@ -46,6 +58,10 @@ typedef struct hamelin_goal {
   double quaternion_wxyz[4];  /* pose */
   const double* q;            /* joint: dof numbers, else null */
   double tolerance_m, tolerance_rad, speed_max;
+  /* A joint goal may be the end of a path: joint vectors to be followed, the goal's q the last of them. They guide;
+   * only the end must be reached. Null and 0 without a path. */
+  const double* path; /* path_points * dof numbers, point by point */
+  size_t path_points;
 } hamelin_goal;
 
 /* A gyroscopic term: at this point of this link acts the force w x (velocity of the point). It does no work. */
@@ -70,7 +86,11 @@ typedef struct hamelin_setup {
   size_t goal_count;
   /* Limits the scene models: dof numbers each, or null where it models none. Unlimited joints hold +-infinity. */
   const double *q_lower, *q_upper, *velocity_max, *effort_max;
-  double control_period_s; /* dt between two ticks */
+  const double* effort_rate_max; /* [Nm/s or N/s] of the held torque, under sampled actuation */
+  double control_period_s;       /* dt between two ticks */
+  int32_t sampled; /* 0: channels act as they are; 1: all are summed into one torque, held for control_period_s */
+  double delay_s;  /* under sampled actuation: how late that torque acts */
+  int32_t self_collision;  /* 1: self contacts are listed */
   double influence_m;      /* contacts are listed up to this distance, asked from the plugin */
   double map_resolution_m; /* zero without a map */
   uint64_t seed;
@@ -86,6 +106,8 @@ typedef struct hamelin_tick {
   size_t contact_count;
   size_t goal_index;
   double speed_scale; /* 1, or less where the arm is in unknown space and the scene says "slow" */
+  const hamelin_self_contact* self_contacts; /* in the order of the pairs of parts, up to influence_m */
+  size_t self_contact_count;
 } hamelin_tick;
 
 enum { HAMELIN_PLANNER_RUNNING = 0, HAMELIN_PLANNER_GAVE_UP = 1 };
@@ -128,6 +150,9 @@ typedef struct hamelin_host {
    * where they are now. Writes up to `capacity` of them and returns how many there are; if that is more than capacity,
    * the farthest are left out. */
   size_t (*closest_points)(void* context, const double* q, double influence_m, hamelin_contact* out, size_t capacity);
+  /* [only inside create and tick] Self contacts at any q, in the same way. */
+  size_t (*closest_self)(void* context, const double* q, double influence_m, hamelin_self_contact* out,
+                         size_t capacity);
 } hamelin_host;
 
 typedef struct hamelin_plugin {

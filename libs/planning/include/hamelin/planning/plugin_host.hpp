@@ -28,6 +28,11 @@ class HostServices {
   virtual void log(std::int32_t level, std::string_view line) = 0;
   /// Contacts of the control spheres at q; returns how many there are, writes the nearest out.size() of them.
   virtual std::size_t closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) = 0;
+  /// The same for pairs of parts of the arm itself. None unless overridden.
+  virtual std::size_t closest_self(std::span<const double> /*q*/, double /*influence_m*/,
+                                   std::span<hamelin_self_contact> /*out*/) {
+    return 0;
+  }
 };
 
 /// Owns what a hamelin_setup points at. Fill the fields; a planner made from it keeps its own copy.
@@ -45,15 +50,19 @@ struct SetupData {
   std::vector<hamelin_sphere> spheres;
   std::vector<hamelin_goal> goals;       ///< their `q` is filled in from goals_q
   std::vector<Eigen::VectorXd> goals_q;  ///< one a goal; of size zero unless it is a joint goal
+  std::vector<Eigen::MatrixXd> paths;    ///< one a goal: way-points as columns, or empty
   /// Limits the scene models: dof numbers, or of size zero where it models none.
-  Eigen::VectorXd q_lower, q_upper, velocity_max, effort_max;
+  Eigen::VectorXd q_lower, q_upper, velocity_max, effort_max, effort_rate_max;
   double control_period_s = 0.0;
+  bool sampled = false, self_collision = false;
+  double delay_s = 0.0;
   double influence_m = 0.0;
   double map_resolution_m = 0.0;
   std::uint64_t seed = 0;
 
   /// Adds a goal. @param q dof numbers for a joint goal, else of size zero
-  void add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q = {});
+  /// @param path of a joint goal: way-points as columns, q the last; or empty
+  void add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q = {}, const Eigen::MatrixXd& path = {});
   /// The C view; good until the next change. Sets the goals' q.
   [[nodiscard]] hamelin_setup view();
 };

@@ -21,6 +21,8 @@ struct Watch {
   std::vector<std::string> argv;            ///< the command line, for the provenance
   const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: the record ends properly
   std::optional<long> stop_at;              ///< as if stopped at this step: repeats a run that was interrupted
+  /// Called at every node of a run in closed loop, the first and the last included.
+  std::function<void(double time_s, const Eigen::VectorXd& q)> at_node;
   std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
   /// Called once before a run that is logged: tick lines to come at most, and joints.
   std::function<void(double ticks, int dof)> announce;
