@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "hamelin/core/error.hpp"
@@ -124,6 +125,36 @@ void check_joint_inertia(const Robot& robot, const std::string& where) {
   }
 }
 
+// A part is on one body; what disabled pairs speak of is there.
+void check_parts(const Robot& robot, const std::string& where) {
+  std::map<std::string, int> body_of;
+  for (int i = 0; i < robot.dof(); ++i) body_of.emplace(robot.links[static_cast<std::size_t>(i)].name, i);
+  const auto place = [&](const Sphere& sphere, int body, const std::string& owner) {
+    if (std::any_of(sphere.part.begin(), sphere.part.end(), [](unsigned char c) { return c < ' '; }))
+      fail(where, owner + ": a sphere's part has a name with control characters");
+    if (body_of.emplace(sphere.part, body).first->second != body)
+      fail(where, fmt::format("{}: part '{}' is on another link as well, expected it on one", owner, sphere.part));
+  };
+  for (int i = 0; i < robot.dof(); ++i) {
+    const Link& link = robot.links[static_cast<std::size_t>(i)];
+    for (const Sphere& sphere : link.spheres)
+      if (!sphere.part.empty()) place(sphere, i, fmt::format("link '{}'", link.name));
+  }
+  for (const Sphere& sphere : robot.base_spheres) {
+    if (sphere.part.empty()) fail(where, "base_spheres: a sphere names no part, expected the link that bears it");
+    check_length(sphere.center_m, where + ": base_spheres", "a sphere's centre");
+    if (!(sphere.radius_m > 0.0 && sphere.radius_m <= length_max_m))
+      fail(where, fmt::format("base_spheres: a radius is {} m, expected a positive number", sphere.radius_m));
+    place(sphere, -1, "base_spheres");
+  }
+  std::vector<std::string> names;
+  for (const auto& [name, body] : body_of) names.push_back(name);
+  for (const auto& [a, b] : robot.self_collision_disabled)
+    for (const auto& name : {a, b})
+      if (body_of.count(name) == 0)
+        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name, detail::suggestion(name, names)));
+}
+
 }  // namespace
 
 std::string detail::inertia_fault(const Matrix3d& inertia, bool strict) {
@@ -167,11 +198,7 @@ void check(const Robot& robot, const std::string& where) {
   if (robot.tip.link < 0 || robot.tip.link >= robot.dof())
     fail(where, fmt::format("tip: moves with link {}, expected 0 to {}", robot.tip.link, robot.dof() - 1));
   check_pose(robot.tip.pose, where + ": tip", "the pose");
-  for (const auto& [a, b] : robot.self_collision_disabled)
-    for (const auto& name : {a, b})
-      if (links.count(name) == 0)
-        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name,
-                                detail::suggestion(name, {links.begin(), links.end()})));
+  check_parts(robot, where);
   check_joint_inertia(robot, where);
 }
 

@@ -85,6 +85,16 @@ Json json_of(const Joint& joint) {
   return json;
 }
 
+Sphere sphere_of(const Json& json) {
+  return {vector_of(json["center_m"]), json["radius_m"].get<double>(), json.value("part", "")};
+}
+
+Json json_of(const Sphere& sphere) {
+  Json json{{"center_m", json_of(sphere.center_m)}, {"radius_m", sphere.radius_m}};
+  if (!sphere.part.empty()) json["part"] = sphere.part;
+  return json;
+}
+
 Json json_of(const Link& link) {
   const Matrix3d& I = link.inertia_kg_m2;
   Json json{{"name", link.name}, {"parent", link.parent}, {"joint", json_of(link.joint)}};
@@ -92,8 +102,7 @@ Json json_of(const Link& link) {
   json["mass_kg"] = link.mass_kg;
   json["inertia_kg_m2"] = {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
   json["spheres"] = Json::array();
-  for (const auto& sphere : link.spheres)
-    json["spheres"].push_back({{"center_m", json_of(sphere.center_m)}, {"radius_m", sphere.radius_m}});
+  for (const auto& sphere : link.spheres) json["spheres"].push_back(json_of(sphere));
   json["segments"] = Json::array();
   for (const auto& segment : link.segments)
     json["segments"].push_back(
@@ -132,6 +141,14 @@ void take_spheres(Robot& robot, const std::filesystem::path& file) {
     link.spheres.clear();
     names.push_back(link.name);
   }
+  robot.base_spheres.clear();
+  // A sidecar of a JSON robot speaks of links; pairs of the parts that went with the spheres mean nothing any more.
+  const auto gone = [&](const auto& pair) {
+    return std::find(names.begin(), names.end(), pair.first) == names.end() ||
+           std::find(names.begin(), names.end(), pair.second) == names.end();
+  };
+  auto& disabled = robot.self_collision_disabled;
+  disabled.erase(std::remove_if(disabled.begin(), disabled.end(), gone), disabled.end());
   const auto link_named = [&](const std::string& name) -> Link& {
     for (auto& link : robot.links)
       if (link.name == name) return link;
@@ -237,8 +254,10 @@ Robot robot_from_json(const Json& document, const std::string& where) {
     link.mass_kg = json["mass_kg"].get<double>();
     const Vector6d I = numbers_of<6>(json["inertia_kg_m2"]);
     link.inertia_kg_m2 << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
-    for (const auto& sphere : list_of(json, "spheres"))
-      link.spheres.push_back({vector_of(sphere["center_m"]), sphere["radius_m"].get<double>()});
+    for (const auto& sphere : list_of(json, "spheres")) {
+      link.spheres.push_back(sphere_of(sphere));
+      if (link.spheres.back().part == link.name) link.spheres.back().part.clear();
+    }
     for (const auto& segment : list_of(json, "segments"))
       link.segments.push_back(
           {vector_of(segment["from_m"]), vector_of(segment["to_m"]), segment["radius_m"].get<double>()});
@@ -251,6 +270,7 @@ Robot robot_from_json(const Json& document, const std::string& where) {
     throw Error(ErrorCode::invalid, fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
                                                 tip["link"].get<std::string>(), detail::join(names)));
   robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()), pose_of(tip, where + ": /tip")};
+  for (const auto& sphere : list_of(document, "base_spheres")) robot.base_spheres.push_back(sphere_of(sphere));
   for (const auto& pair : list_of(document, "self_collision_disabled"))
     robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
   detail::round_to_quaternions(robot);
@@ -266,6 +286,10 @@ Json robot_to_json(const Robot& robot) {
   put_pose(json["tip"], robot.tip.pose);
   json["links"] = Json::array();
   for (const auto& link : robot.links) json["links"].push_back(json_of(link));
+  if (!robot.base_spheres.empty()) {
+    json["base_spheres"] = Json::array();
+    for (const auto& sphere : robot.base_spheres) json["base_spheres"].push_back(json_of(sphere));
+  }
   json["self_collision_disabled"] = Json::array();
   for (const auto& [a, b] : robot.self_collision_disabled)
     json["self_collision_disabled"].push_back(Json::array({a, b}));

@@ -351,6 +351,7 @@ class Reader {
     collect_bodies();
     take_spheres();
     for (std::size_t i = 0; i < bodies_.size(); ++i) robot_.links.push_back(moving_link(i));
+    keep_base_spheres();
     robot_.tip = {tip_->name, static_cast<int>(bodies_.size()) - 1, poses_.at(tip_->name)};
     disable_pairs();
     note_the_rest();
@@ -452,7 +453,7 @@ class Reader {
       }
       if (joint.mimic) note("joint '{}': <mimic> ignored, it does not move", joint.name);
     }
-    note("base: {} (does not move; its mass and spheres are left out)", detail::join(still));
+    note("base: {} (does not move; its mass is left out)", detail::join(still));
     if (!locked.empty()) note("not on the way to the tip '{}', locked at 0: {}", tip_->name, detail::join(locked));
     for (const Body& body : bodies_) {
       if (body.members.size() == 1) continue;
@@ -488,7 +489,7 @@ class Reader {
     }
     std::size_t moving = 0, still = 0;
     for (const auto& [name, list] : spheres_.links) (body_of_.at(name) < 0 ? still : moving) += list.size();
-    if (still > 0) note("{} collision spheres on the base do not move and are ignored", still);
+    if (still > 0) note("{} collision spheres on the base do not move: only the arm itself can touch them", still);
     if (moving == 0) note("no collision spheres: the arm meets nothing");
   }
 
@@ -605,33 +606,27 @@ class Reader {
     for (const urdf::Link* member : body.members)
       if (const auto list = spheres_.links.find(member->name); list != spheres_.links.end())
         for (const Sphere& sphere : list->second)
-          out.spheres.push_back({to_com * (poses_.at(member->name) * sphere.center_m), sphere.radius_m});
+          out.spheres.push_back({to_com * (poses_.at(member->name) * sphere.center_m), sphere.radius_m,
+                                 member == body.own ? "" : member->name});
     return out;
   }
 
-  // Moving links a, b are a disabled pair if every pair of their members that bear spheres is listed.
+  void keep_base_spheres() {
+    for (const urdf::Link* link : order_)
+      if (const auto list = spheres_.links.find(link->name); list != spheres_.links.end() && body_of_.at(link->name) < 0)
+        for (const Sphere& sphere : list->second)
+          robot_.base_spheres.push_back({poses_.at(link->name) * sphere.center_m, sphere.radius_m, link->name});
+  }
+
+  // Pairs keep the names of the file; a pair with a link that bears no sphere and does not move by itself means nothing.
   void disable_pairs() {
-    std::set<std::pair<std::string, std::string>> listed;
-    for (const auto& [a, b] : spheres_.self_collision_disabled) {
-      listed.emplace(a, b);
-      listed.emplace(b, a);
-    }
-    if (listed.empty()) return;
-    const auto bears = [&](const urdf::Link* link) {
-      const auto list = spheres_.links.find(link->name);
-      return list != spheres_.links.end() && !list->second.empty();
+    const auto counts = [&](const std::string& name) {
+      const auto list = spheres_.links.find(name);
+      return (list != spheres_.links.end() && !list->second.empty()) ||
+             std::any_of(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.own->name == name; });
     };
-    for (std::size_t a = 0; a < bodies_.size(); ++a)
-      for (std::size_t b = a + 1; b < bodies_.size(); ++b) {
-        bool any = false, all = true;
-        for (const urdf::Link* x : bodies_[a].members)
-          for (const urdf::Link* y : bodies_[b].members)
-            if (bears(x) && bears(y)) {
-              any = true;
-              all = all && listed.count({x->name, y->name}) != 0;
-            }
-        if (any && all) robot_.self_collision_disabled.emplace_back(bodies_[a].own->name, bodies_[b].own->name);
-      }
+    for (const auto& [a, b] : spheres_.self_collision_disabled)
+      if (counts(a) && counts(b)) robot_.self_collision_disabled.emplace_back(a, b);
   }
 
   void note_the_rest() {

@@ -114,6 +114,16 @@ void check_same(const Robot& a, const Robot& b) {
   CHECK(a.name == b.name);
   CHECK(a.notes == b.notes);
   CHECK(a.self_collision_disabled == b.self_collision_disabled);
+  const auto check_spheres = [](const std::vector<Sphere>& x, const std::vector<Sphere>& y) {
+    REQUIRE(x.size() == y.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      CHECK(x[i].center_m == y[i].center_m);
+      CHECK(x[i].radius_m == y[i].radius_m);
+      CHECK(x[i].part == y[i].part);
+    }
+  };
+  check_spheres(a.base_spheres, b.base_spheres);
+  for (std::size_t i = 0; i < a.links.size(); ++i) check_spheres(a.links[i].spheres, b.links[i].spheres);
   CHECK(a.tip.name == b.tip.name);
   CHECK(a.tip.link == b.tip.link);
   CHECK(a.tip.pose == b.tip.pose);
@@ -495,7 +505,8 @@ TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
   const Scratch spheres(
       "spheres.json",
       R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}], "tool": [{"center": [0.1, 0, 0], "radius": 0.2}],
-    "upper": [{"center": [0, 0, 0.2], "radius": 0.1}]}, "self_collision_disabled": [["upper", "lower"]]})");
+    "upper": [{"center": [0, 0, 0.2], "radius": 0.1}], "base": [{"center": [0, 0.3, 0.1], "radius": 0.2}]},
+    "self_collision_disabled": [["upper", "lower"], ["base", "tool"]]})");
   RobotOptions options;
   options.spheres = spheres.file();
   const Robot robot = read_text("arm.urdf", arm, options);
@@ -505,8 +516,15 @@ TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
   CHECK((lower.com * lower.spheres[0].center_m - Vector3d(0, 0, 0.7)).norm() < 1e-15);
   CHECK((lower.com * lower.spheres[1].center_m - Vector3d(0.1 * std::cos(1.0), 0.1 * std::sin(1.0), 0.95)).norm() <
         1e-15);
-  // The tool's sphere belongs to 'lower' and is in no listed pair.
-  CHECK(robot.self_collision_disabled.empty());
+  // What is lumped keeps its name for self-collision, and the base its spheres.
+  CHECK(lower.spheres[0].part.empty());
+  CHECK(lower.spheres[1].part == "tool");
+  REQUIRE(robot.base_spheres.size() == 1);
+  CHECK(robot.base_spheres[0].part == "base");
+  CHECK(robot.base_spheres[0].center_m == Vector3d(0, 0.3, 0.1));
+  using Pair = std::pair<std::string, std::string>;
+  CHECK(robot.self_collision_disabled == std::vector<Pair>{{"upper", "lower"}, {"base", "tool"}});
+  check_same(robot, robot_from_json(parse_json(robot_to_json(robot).dump(), "again"), "again"));
 
   const auto refused = [&](const std::string& text) {
     const Scratch bad("bad.json", text);
@@ -526,6 +544,38 @@ TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
              Catch::Contains("/links/lower/0/radius"));
   CHECK_THAT(refused(R"({"links": {}, "self_collision_disabled": [["lower"]]})"),
              Catch::Contains("pairs of link names"));
+}
+
+TEST_CASE("parts of a JSON robot are checked, and a sidecar replaces them with their pairs", "[model][robot]") {
+  const Scratch spheres("spheres.json", R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}],
+    "tool": [{"center": [0.1, 0, 0], "radius": 0.2}], "base": [{"center": [0, 0, 0], "radius": 0.2}]},
+    "self_collision_disabled": [["upper", "lower"], ["base", "tool"]]})");
+  RobotOptions options;
+  options.spheres = spheres.file();
+  const Json json = robot_to_json(read_text("arm.urdf", arm, options));
+  const auto refused = [&](const std::string& pointer, const Json& value) -> std::string {
+    Json bad = json;
+    bad[Json::json_pointer(pointer)] = value;
+    try {
+      (void)robot_from_json(bad, "robot");
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  CHECK_THAT(refused("/self_collision_disabled/1/1", "tolo"), Catch::Contains("no link 'tolo'; did you mean 'tool'?"));
+  CHECK_THAT(refused("/base_spheres/0/part", "lower"), Catch::Contains("part 'lower' is on another link"));
+  CHECK_THAT(refused("/links/1/spheres/1/part", "upper"), Catch::Contains("part 'upper' is on another link"));
+  CHECK_THAT(refused("/base_spheres/0/radius_m", 0), Catch::Contains("/base_spheres/0/radius_m"));
+  CHECK_THAT(refused("/base_spheres/0", {{"center_m", {0, 0, 0}}, {"radius_m", 0.1}}), Catch::Contains("part"));
+
+  const Scratch replacing("replacing.json", R"({"links": {"upper": [{"center": [0, 0, 0], "radius": 0.1}]}})");
+  const Scratch file("robot.json", json.dump());
+  options.spheres = replacing.file();
+  const Robot robot = read_robot(file.file(), options);
+  CHECK(robot.base_spheres.empty());
+  CHECK(robot.links[1].spheres.empty());
+  CHECK(robot.self_collision_disabled == std::vector<std::pair<std::string, std::string>>{{"upper", "lower"}});
 }
 
 TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[model][robot]") {
@@ -582,6 +632,12 @@ TEST_CASE("public URDFs load with their tips, and without one name the leaves", 
     CHECK(noted(robot, "warning: link 'panda_grasptarget' has inertia but no mass"));
     CHECK(noted(robot, "joint 'panda_finger_joint2': <mimic> ignored"));
     CHECK(noted(robot, "1 collision spheres on the base"));
+    REQUIRE(robot.base_spheres.size() == 1);
+    CHECK(robot.base_spheres[0].part == "panda_link0");
+    CHECK(std::count_if(robot.links[6].spheres.begin(), robot.links[6].spheres.end(),
+                        [](const Sphere& sphere) { return sphere.part == "panda_hand"; }) == 18);
+    CHECK(robot.self_collision_disabled.size() == 34);
+    check_same(robot, robot_from_json(robot_to_json(robot), "again"));
     CHECK(robot.links[0].joint.effort_max == 87.0);
     CHECK(std::count(robot.self_collision_disabled.begin(), robot.self_collision_disabled.end(),
                      std::make_pair(std::string("panda_link1"), std::string("panda_link2"))) == 1);

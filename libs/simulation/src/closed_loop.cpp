@@ -314,7 +314,8 @@ bool ClosedLoop::call_planner() {
                           state_.time_s,        q_shown_.data(),
                           v_shown_.data(),      shown_.data(),
                           contact_count_,       goal_index_,
-                          speed_scale_};
+                          speed_scale_,         nullptr,
+                          0};
   return planner_.tick(tick, *command_);
 }
 

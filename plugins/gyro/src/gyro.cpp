@@ -10,6 +10,20 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using namespace hamelin::planning;
 
+enum class Variant { published, energy_neutral, chang_marsden, garimella };
+
+Variant variant_named(const std::string& name) {
+  if (name == "published") return Variant::published;
+  if (name == "energy-neutral") return Variant::energy_neutral;
+  return name == "chang-marsden" ? Variant::chang_marsden : Variant::garimella;
+}
+
+/// Whether the attraction (17) rests while a point is turned: Algorithm II says so, the sources of the others do not.
+bool lets_go(const std::string& algorithm, Variant variant) {
+  if (algorithm == "by_variant") return variant == Variant::published || variant == Variant::energy_neutral;
+  return algorithm == "published";
+}
+
 class Gyro : public Planner {
  public:
   static double influence_m(const hamelin::Json& params) { return params.at("rho0_m").get<double>(); }
@@ -23,10 +37,12 @@ class Gyro : public Planner {
         rho0_(params.at("rho0_m").get<double>()),
         rho_min_(params.at("distance_min_m").get<double>()),
         joint_damping_(params.at("joint_damping").get<double>()),
-        keep_attraction_(params.at("algorithm") == "keep_attraction"),
-        energy_neutral_(params.at("variant") == "energy-neutral"),
+        variant_(variant_named(params.at("variant"))),
+        lets_go_(lets_go(params.at("algorithm"), variant_)),
         gravity_compensation_(params.at("gravity_compensation").get<bool>()),
         tau_(setup.dof()) {
+    if (rho_min_ > rho0_)
+      throw hamelin::Error(hamelin::ErrorCode::invalid, "/distance_min_m: above rho0_m, expected at most rho0_m");
     if (const auto* plane = std::get_if<hamelin::model::PlanarChain>(&arm_.model().chain()))
       plane_normal_ = plane->root.R().col(2);
   }
@@ -41,31 +57,49 @@ class Gyro : public Planner {
       const Vector3d velocity = arm_.point_velocity(link, point);
       if (!(to_obstacle.dot(velocity) > 0.0)) return;
       turning = true;
-      const Vector3d e = rotation(c.distance_m, to_obstacle, velocity);
+      const Vector3d along = velocity / velocity.stableNorm();  // its squares may be too small to be told from zero
+      const Vector3d axis = turning_axis(to_obstacle, along);
+      const double size = gain(c.distance_m, to_obstacle, along);
       const Matrix3d M_x = arm_.operational_inertia(link, point);
-      if (energy_neutral_) {
-        // ½(M ê + ê M) is the cross product with ½(tr(M) 1 − M) e for any symmetric M.
-        command.add_gyroscopic(link, arm_.in_link(link, point), 0.5 * (M_x.trace() * e - M_x * e));
-      } else {
-        arm_.add_force(link, point, M_x * e.cross(velocity), tau_);
+      switch (variant_) {
+        case Variant::published:
+          arm_.add_force(link, point, M_x * (size * axis).cross(velocity), tau_);
+          break;
+        case Variant::energy_neutral:
+          // ½(M ê + ê M) is the cross product with ½(tr(M) 1 − M) e for any symmetric M.
+          command.add_gyroscopic(link, arm_.in_link(link, point), 0.5 * size * (M_x.trace() * axis - M_x * axis));
+          break;
+        case Variant::chang_marsden:
+        case Variant::garimella: {
+          // The point as a mass: the mean of M_x over the plane it turns in. The force stays in that plane.
+          const double mass = 0.5 * (M_x.trace() - axis.dot(M_x * axis));
+          command.add_gyroscopic(link, arm_.in_link(link, point), mass * size * axis);
+          break;
+        }
       }
     });
-    if (!turning || keep_attraction_)
+    if (!turning || !lets_go_)
       arm_.add_mapped_attraction(setup_.goal(tick.goal_index()), k_p_ * tick.speed_scale(), k_v_, tau_);
     if (gravity_compensation_) arm_.add_gravity(tau_);
     command.held_torque() = tau_;
   }
 
  private:
-  /// The vector of Γ in (20), its size included: Γ ẋ = e × ẋ.
-  [[nodiscard]] Vector3d rotation(double distance, const Vector3d& to_obstacle, const Vector3d& velocity) const {
-    const double speed = velocity.norm();
-    const Vector3d turn = to_obstacle.cross(velocity);
-    const double sine = turn.norm() / speed, cosine = to_obstacle.dot(velocity) / speed;
-    const double angle = std::atan2(sine, cosine);  // arccos of (20), which loses its digits near 0
-    const double size =
-        k_obs_ * std::exp(angle - 1.0) / std::max(distance, rho_min_) / (1.0 + std::exp(distance - rho0_));
-    return size * (sine > 1e-9 ? Vector3d(turn / (sine * speed)) : side(to_obstacle));
+  /// How fast the velocity is turned [1/s]: |Γ|.
+  /// @param to_obstacle, along  unit vectors to the obstacle and along the velocity, less than a right angle apart
+  [[nodiscard]] double gain(double distance, const Vector3d& to_obstacle, const Vector3d& along) const {
+    const double rho = std::max(distance, rho_min_), cosine = to_obstacle.dot(along);
+    if (variant_ == Variant::chang_marsden) return k_obs_ / rho;
+    if (variant_ == Variant::garimella) return k_obs_ * (1.0 / rho - 1.0 / rho0_) * cosine * cosine;
+    const double angle = std::atan2(to_obstacle.cross(along).norm(), cosine);  // arccos of (20) loses digits near 0
+    return k_obs_ * std::exp(angle - 1.0) / rho / (1.0 + std::exp(distance - rho0_));
+  }
+
+  /// ê, the unit vector along ρ × ẋ: the velocity turns about it, away from the obstacle.
+  [[nodiscard]] Vector3d turning_axis(const Vector3d& to_obstacle, const Vector3d& along) const {
+    const Vector3d turn = to_obstacle.cross(along);
+    const double sine = turn.norm();
+    return sine > 1e-9 ? Vector3d(turn / sine) : side(to_obstacle);
   }
 
   /// ê where ρ × ẋ vanishes, head-on: the plane's normal; in space the normal to ρ nearest to the world axis that is
@@ -81,12 +115,13 @@ class Gyro : public Planner {
   Setup setup_;
   NominalArm arm_;
   double k_p_, k_v_, k_obs_, rho0_, rho_min_, joint_damping_;
-  bool keep_attraction_, energy_neutral_, gravity_compensation_;
+  Variant variant_;
+  bool lets_go_, gravity_compensation_;
   Vector3d plane_normal_ = Vector3d::Zero();
   Eigen::VectorXd tau_;
 };
 
 }  // namespace
 
-HAMELIN_PLANNER_PLUGIN(Gyro, "gyro", "0.1.0", "Attraction (17) and gyroscopic avoidance (19), (20): Algorithm II",
-                       params_schema);
+HAMELIN_PLANNER_PLUGIN(Gyro, "gyro", "0.1.0",
+                       "Attraction (17) and gyroscopic avoidance: (19), (20), Chang-Marsden, Garimella", params_schema);

@@ -28,6 +28,7 @@ struct Joint {
 struct Sphere {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
+  std::string part{};  ///< what was lumped into the link and bears the sphere; empty: the link itself
 };
 
 /// Collision capsule (a segment if the radius is zero). Coordinates in the link's COM frame.
@@ -61,6 +62,8 @@ struct Robot {
   std::string name;
   std::vector<Link> links;
   Tip tip;
+  std::vector<Sphere> base_spheres;  ///< of what does not move: base frame, each with its part; for self-collision only
+  /// Pairs of parts that never count as colliding: links, or what was lumped into one or into the base.
   std::vector<std::pair<std::string, std::string>> self_collision_disabled;
   std::vector<std::string> notes;
 
@@ -69,7 +72,7 @@ struct Robot {
 
 /// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws,
 /// inertia about its joint in whatever a joint moves, inertias positive with the triangle inequality, finite numbers,
-/// lower < upper.
+/// lower < upper, each part on one body only, disabled pairs of parts that are there.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 
