@@ -63,7 +63,9 @@ std::vector<double> answers_of(const planning::Plugin& plugin, const Json& param
                             &contact,
                             k == 2 ? 1u : 0u,
                             0,
-                            1.0};
+                            1.0,
+                            nullptr,
+                            0};
     if (!planner.tick(tick, out)) throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
     const auto numbers = answer(out);
     all.insert(all.end(), numbers.begin(), numbers.end());
