@@ -10,6 +10,7 @@
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/model/robot_io.hpp"
+#include "hamelin/scene/self_collision.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -45,6 +46,9 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
                      {"spheres", link.spheres.size()},
                      {"segments", link.segments.size()}});
   }
+  const scene::SelfField self(model);
+  Json notes = robot.notes;
+  if (!self.note().empty()) notes.push_back(self.note());
   return {{"file", file.string()},
           {"name", robot.name},
           {"dof", robot.dof()},
@@ -56,8 +60,10 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
           {"spheres", model.spheres().size()},
           {"base_spheres", robot.base_spheres.size()},
           {"self_collision_disabled", robot.self_collision_disabled.size()},
+          {"self_collision_parts", self.parts().size()},
+          {"self_collision_pairs", self.pairs().size()},
           {"links", links},
-          {"notes", robot.notes}};
+          {"notes", notes}};
 }
 
 std::string cell(const Json& value) {
@@ -81,6 +87,9 @@ void print_table(const Json& robot) {
   fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
   if (robot["spheres"] == 0)
     fmt::print("no collision spheres: obstacles need some, as <collision><sphere> or by --spheres\n");
+  fmt::print("base: {} spheres; self-collision: {} parts, {} pairs that may not touch, {} listed as disabled\n",
+             robot["base_spheres"].get<std::size_t>(), robot["self_collision_parts"].get<std::size_t>(),
+             robot["self_collision_pairs"].get<std::size_t>(), robot["self_collision_disabled"].get<std::size_t>());
   for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
 }
 

@@ -19,6 +19,7 @@ struct PlanFlags {
   std::vector<std::string> goals;
   std::string mark = "touch", sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
   std::vector<std::string> keep_out;
+  std::optional<double> sphere_m, visible_m;
   std::size_t primitives = 30;
   std::uint64_t clutter_seed = 1;
   std::vector<std::filesystem::path> plugin_path;
@@ -52,6 +53,15 @@ int sweep_plan(const PlanFlags& flags) {
   options.on_scene = [&progress](std::size_t done, std::size_t all) {
     progress->show(static_cast<double>(done), static_cast<double>(all));
   };
+  std::vector<std::string> notes;  // for when the bar is gone
+  options.on_note = [&notes](const std::string& text) { notes.push_back(text); };
+  if (flags.sphere_m) {
+    study::SphereOnPath& sphere = options.sphere_on_path.emplace();
+    sphere.radius_m = *flags.sphere_m;
+    sphere.visible_within_m = flags.visible_m;
+    sphere.seed = flags.clutter_seed;
+    sphere.plugin_directories = plugin_path(flags.plugin_path);
+  }
   options.check = [&flags](const study::SweepRun& run) {
     SceneFlags scene_flags;
     scene_flags.planner = run.planner;
@@ -62,6 +72,7 @@ int sweep_plan(const PlanFlags& flags) {
   };
   const study::SweepPlan plan = study::make_plan(flags.output, options);
   progress.reset();
+  for (const auto& text : notes) note(text);
   const auto feasible = static_cast<std::size_t>(
       std::count_if(plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return scene.feasible; }));
   if (flags.json)
@@ -105,7 +116,7 @@ void add_made_scenes(CLI::App& command, PlanFlags& flags) {
   command.add_option("--gain-sets", plan.gains.sets, "so many random gain sets for example 5.2")
       ->type_name("N")
       ->check(CLI::Range(1L, 1'000'000L));
-  command.add_option("--draw-seed", flags.clutter_seed, "of clutter (the first map's), pairs and gains")
+  command.add_option("--draw-seed", flags.clutter_seed, "of clutter (the first map's), pairs, gains and spheres")
       ->type_name("S")
       ->capture_default_str()
       ->check(whole_number());
@@ -118,6 +129,7 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       add_command(sweep, "plan", "Plan runs: problems, scenes, clutter or gain sets, times planners, values and seeds",
                   "hamelin sweep plan problems/*.json --robot arm.urdf --resolution 0.01 --goal pose -o tries\n"
                   "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
+                  "hamelin sweep plan problems/*.json --robot arm.urdf --sphere-on-path 0.06 -o spheres\n"
                   "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
   const auto flags = std::make_shared<PlanFlags>();
   auto& plan = flags->plan;
@@ -130,7 +142,7 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       ->add_option(
           "--planner", plan.planners,
           "a planner, with parameters as hybrid:escape=tree,margin_m=0.01; may be repeated (default the scene's)")
-      ->type_name("NAME:K=V,K=V")
+      ->type_name("NAME")
       ->allow_extra_args(false);
   command->add_option("--set", plan.set, "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
       ->type_name("/json/pointer=VALUE")
@@ -147,10 +159,20 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
   command->add_option("--duration", plan.duration_s, "longest simulated time of a run [s] (default the scene's)")
       ->type_name("T")
       ->check(CLI::PositiveNumber);
-  one_of(command->add_option("--goal", flags->goals, "kinds of a problem's goal; may be repeated (default joint)"),
-         {"joint", "position", "pose"})
-      ->type_name("KIND")
-      ->allow_extra_args(false);
+  auto* goal =
+      one_of(command->add_option("--goal", flags->goals, "kinds of a problem's goal; may be repeated (default joint)"),
+             {"joint", "position", "pose"});
+  goal->type_name("KIND")->allow_extra_args(false);
+  auto* sphere = command->add_option("--sphere-on-path", flags->sphere_m,
+                                     "take hybrid's path for a problem's goal, and put a sphere of this radius on it "
+                                     "[m]; problems where it finds none are left out");
+  sphere->type_name("R")->check(CLI::PositiveNumber)->excludes(goal);
+  command
+      ->add_option("--visible-within", flags->visible_m,
+                   "that sphere is seen once the arm is this near [m] (default from the start)")
+      ->type_name("D")
+      ->check(CLI::PositiveNumber)
+      ->needs(sphere);
   command->add_option("--robot", plan.problem.robot, "the problems' robot")->type_name("FILE");
   command->add_option("--spheres", plan.problem.spheres, "its collision spheres")->type_name("FILE.json");
   command->add_option("--tip", plan.problem.tip, "its tip")->type_name("LINK");

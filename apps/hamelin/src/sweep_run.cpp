@@ -1,10 +1,11 @@
 #include <fmt/format.h>
+#include <sys/prctl.h>
 
+#include <csignal>
 #include <memory>
 #include <thread>
 
 #include "command_line.hpp"
-#include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/study/judge.hpp"
 #include "hamelin/study/sweep.hpp"
@@ -59,6 +60,7 @@ int sweep_run(const RunOptions& options) {
 }
 
 int sweep_one(const OneOptions& options) {
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // a sweep that is killed leaves nothing running
   const scene::Scene scene = read_scene(options.file, options.flags);
   study::Judge judge(scene);
   simulation::Watch watch;
@@ -80,6 +82,7 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
                               "hamelin sweep run tries\n"
                               "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
   const auto options = std::make_shared<RunOptions>();
+  options->sweep.timeout_s = 600.0;
   options->sweep.jobs = std::max(1U, std::thread::hardware_concurrency());
   command->add_option("directory", options->directory, "made by `hamelin sweep plan`")->required()->type_name("DIR");
   command->add_option("--jobs", options->sweep.jobs, "processes at the same time (default one a core)")
@@ -89,6 +92,12 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
   command->add_option("--limit", options->sweep.limit, "at most so many runs now")
       ->type_name("N")
       ->check(whole_number());
+  command
+      ->add_option("--timeout", options->sweep.timeout_s,
+                   "a run that takes longer is killed and recorded as crashed [s of wall clock]")
+      ->type_name("SECONDS")
+      ->default_str("600")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--fresh", options->sweep.fresh, "drop the records that are there, and begin anew");
   command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
       ->type_name("DIR")

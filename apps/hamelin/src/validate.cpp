@@ -83,6 +83,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     }
     case Kind::records:
       return check_records(file);
+    case Kind::summary:
+      check_shipped_schema(read_json(file), "summary", file.string());
+      return "sweep summary";
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,

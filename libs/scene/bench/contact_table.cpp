@@ -1,5 +1,6 @@
-// Prints what Environment::closest and SelfField::closest cost for a scene's arm: per call and per sphere, over random
-// configurations near start and goal, by how near the nearest obstacle is.
+// Prints what Environment::closest and SelfField::closest cost for a scene's arm, over random configurations near start
+// and goal, by how near the nearest obstacle is: poses of that kind, mean number of contacts, time of one call for all
+// spheres of the arm, the same a sphere, time of one call for all pairs of parts of the arm.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -65,8 +66,8 @@ int run(int argc, char** argv) {
   }
   fmt::print("{}: {} spheres, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n", argv[1],
              radii.size(), environment.map_field().boxes().size(), influence, build_ms, self.pairs().size());
-  fmt::print("{:<26} {:>8} {:>10} {:>12} {:>14} {:>12}\n", "nearest obstacle", "poses", "contacts", "us a call",
-             "ns a sphere", "self us");
+  fmt::print("{:<22} {:>8} {:>15} {:>17} {:>22} {:>21}\n", "clearance to obstacles", "poses", "contacts a pose",
+             "obstacles us/pose", "obstacles ns/sphere", "itself us/pose");
   Environment::Scratch scratch(environment, radii.size());
   std::vector<Contact> out(radii.size() * 16);
   std::vector<SelfContact> pairs(self.pairs().size());
@@ -83,7 +84,7 @@ int run(int argc, char** argv) {
       (void)environment.closest(pose.centers, radii, influence, 0.0, scratch, out);
     });
     const double self_us = cost_us(chosen, [&](const Pose& pose) { (void)self.closest(pose.centers, 0.05, pairs); });
-    fmt::print("{:<26} {:>8} {:>10.1f} {:>12.2f} {:>14.0f} {:>12.2f}\n", names[row], chosen.size(),
+    fmt::print("{:<22} {:>8} {:>15.1f} {:>17.2f} {:>22.0f} {:>21.2f}\n", names[row], chosen.size(),
                static_cast<double>(contacts) / static_cast<double>(chosen.size()), us,
                1e3 * us / static_cast<double>(radii.size()), self_us);
   }

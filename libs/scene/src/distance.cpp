@@ -43,7 +43,8 @@ double squared_distance(const Eigen::Vector3d& p, const Box& box) {
   for (int axis = 0; axis < 3; ++axis) {
     const double below = box.lo[axis] - p[axis], above = p[axis] - box.hi[axis];
     const double out = below > above ? below : above;
-    sum += out > 0.0 ? out * out : 0.0;
+    const double o = out > 0.0 ? out : 0.0;
+    sum += o * o;
   }
   return sum;
 }
@@ -169,13 +170,15 @@ struct BoxField::Query {
 
   Query(const Eigen::Vector3d& p, const Eigen::Vector3d& origin) {
     for (int axis = 0; axis < 3; ++axis) {
-      low[static_cast<std::size_t>(axis)] = round_down(p[axis] - origin[axis]);
-      high[static_cast<std::size_t>(axis)] = round_up(p[axis] - origin[axis]);
+      const auto at = static_cast<float>(p[axis] - origin[axis]);
+      const float slack = std::abs(at) * 1.2e-7F + 1e-37F;
+      low[static_cast<std::size_t>(axis)] = at - slack;
+      high[static_cast<std::size_t>(axis)] = at + slack;
     }
   }
 
   // Three subtractions, squares and sums in single precision are off by less than 8 units in the last place.
-  void limit_to(double squared) { bound = round_up(squared * (1.0 + 1e-6)); }
+  void limit_to(double squared) { bound = static_cast<float>(squared * (1.0 + 2e-6)) + 1e-37F; }
 
   void squared_distances(const Node& node, Lanes& out) const {
     for (std::size_t half = 0; half < width; half += 4) {
@@ -307,88 +310,71 @@ bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std:
 std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch,
                               std::span<BoxHit> out) const {
   if (nodes_.empty() || out.empty() || !(limit >= 0.0)) return 0;
-  using Entry = Scratch::Entry;
-  // A short list, the smallest key last; nodes before boxes of the same key, so that equals come in order of index.
-  // What is found next is mostly near, so it finds its place in a few steps from the end.
-  const auto later = [](const Entry& a, const Entry& b) { return a.key != b.key ? a.key > b.key : a.index > b.index; };
-  auto& waiting = scratch.waiting_;
-  waiting.clear();
-  const auto put = [&](const Entry& entry) {
-    waiting.push_back(entry);
-    std::size_t at = waiting.size() - 1;
-    for (; at > 0 && later(entry, waiting[at - 1]); --at) waiting[at] = waiting[at - 1];
-    waiting[at] = entry;
-  };
+  scratch.fit(*this);
+  // All boxes whose bounds are within the limit. Each slot is written and then counted or not: what a slot holds is
+  // hard to foretell, so branches would cost more than this.
   Query query(p, origin_);
   query.limit_to(limit * limit);
-  std::size_t found = 0;
-  // A direction counts as seen by a hair more than the cone asks, so that what is left out early would be later as
-  // well.
-  const double seen_square = cone_cosine * cone_cosine * (1.0 + 1e-9);
-  const bool narrow = cone_cosine > 0.0;
-  const auto in_cone = [&](double along, double square) { return along > 0.0 && along * along > seen_square * square; };
-  // Whether the box's nearest point is seen already.
-  const auto seen_box = [&](const Box& box) {
-    const Eigen::Vector3d away = p - p.cwiseMax(box.lo).cwiseMin(box.hi);
-    const double square = away.squaredNorm();
-    for (std::size_t kept = 0; kept < found; ++kept)
-      if (in_cone(out[kept].direction.dot(away), square)) return true;
-    return false;
-  };
-  // Whether all of a node's slot is: a cone is convex, so its corners decide.
-  const Eigen::Vector3d from_origin = p - origin_;
-  const auto seen_slot = [&](const Node& node, std::size_t slot) {
-    std::array<std::array<double, 2>, 3> away, square;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double at = from_origin[static_cast<Eigen::Index>(axis)];
-      away[axis] = {at - static_cast<double>(node.lo[axis][slot]), at - static_cast<double>(node.hi[axis][slot])};
-      square[axis] = {away[axis][0] * away[axis][0], away[axis][1] * away[axis][1]};
-    }
-    const auto all_in = [&](std::size_t kept) {
-      const Eigen::Vector3d& d = out[kept].direction;
-      for (std::size_t corner = 0; corner < 8; ++corner) {
-        const std::size_t i = corner & 1U, j = corner >> 1U & 1U, k = corner >> 2U;
-        if (!in_cone(d.x() * away[0][i] + d.y() * away[1][j] + d.z() * away[2][k],
-                     square[0][i] + square[1][j] + square[2][k]))
-          return false;
-      }
-      return true;
-    };
-    for (std::size_t kept = 0; kept < found; ++kept)
-      if (all_in(kept)) return true;
-    return false;
-  };
+  query.bound = std::min(query.bound, std::numeric_limits<float>::max());  // slots not in use are at infinity
+  std::int32_t* const nodes = scratch.nodes_.data();
+  std::int32_t* const boxes = scratch.boxes_.data();
+  std::size_t waiting = 1, count = 0;
+  nodes[0] = 0;
   Lanes squares;
-  put({-std::numeric_limits<double>::infinity(), -1});
-  while (!waiting.empty()) {
-    const Entry entry = waiting.back();
-    waiting.pop_back();
-    if (entry.index >= 0) {
-      BoxHit hit = closest_on_box(p, boxes_[static_cast<std::size_t>(entry.index)]);
-      hit.box = entry.index;
-      const bool seen =
-          std::any_of(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found),
-                      [&](const BoxHit& kept) { return kept.direction.dot(hit.direction) > cone_cosine; });
-      if (seen) continue;
-      out[found++] = hit;
-      if (found == out.size()) break;
-      continue;
-    }
-    const Node& node = nodes_[static_cast<std::size_t>(-1 - entry.index)];
+  while (waiting > 0) {
+    const Node& node = nodes_[static_cast<std::size_t>(nodes[--waiting])];
     query.squared_distances(node, squares);
-    for (std::size_t slot = 0; slot < static_cast<std::size_t>(node.count); ++slot) {
-      if (squares[slot] > query.bound) continue;
+    for (std::size_t slot = 0; slot < width; ++slot) {
       const std::int32_t child = node.child[slot];
-      if (child < 0) {
-        const std::int32_t box = -1 - child;
-        const double key = signed_square(p, boxes_[static_cast<std::size_t>(box)]);
-        if (key > limit * limit || (narrow && key > 0.0 && seen_box(boxes_[static_cast<std::size_t>(box)]))) continue;
-        put({key, box});
-      } else {
-        if (narrow && squares[slot] > 0.0F && seen_slot(node, slot)) continue;
-        // A hair below the computed bound, which may itself have been rounded up.
-        put({static_cast<double>(squares[slot]) * (1.0 - 1e-6), -1 - child});
-      }
+      const unsigned near = squares[slot] <= query.bound, leaf = child < 0;
+      nodes[waiting] = child;
+      boxes[count] = -1 - child;
+      waiting += near & ~leaf & 1U;
+      count += near & leaf;
+    }
+  }
+  // Their squared distances, and the way from each one's nearest point to p.
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  double* const key = scratch.key_.data();
+  const std::array<double*, 3> away{scratch.away_[0].data(), scratch.away_[1].data(), scratch.away_[2].data()};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Box& box = boxes_[static_cast<std::size_t>(boxes[i])];
+    double sum = 0.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<Eigen::Index>(axis);
+      const double below = box.lo[a] - p[a], above = p[a] - box.hi[a];
+      away[axis][i] = (above > 0.0 ? above : 0.0) - (below > 0.0 ? below : 0.0);
+      sum += away[axis][i] * away[axis][i];
+    }
+    if (!(sum > 0.0)) sum = signed_square(p, box);
+    key[i] = sum <= limit * limit ? sum : infinity;
+  }
+  // The nearest; what it sees by a hair more than the cone asks, so that what is left out early would be later as well;
+  // the nearest of the rest.
+  const bool narrow = cone_cosine > 0.0;
+  const double seen_square = cone_cosine * cone_cosine * (1.0 + 1e-9);
+  std::size_t found = 0;
+  while (found < out.size()) {
+    double least = infinity;
+    for (std::size_t i = 0; i < count; ++i) least = key[i] < least ? key[i] : least;
+    if (least == infinity) break;
+    std::size_t first = count;
+    for (std::size_t i = 0; i < count; ++i)
+      if (key[i] == least && (first == count || boxes[i] < boxes[first])) first = i;
+    key[first] = infinity;
+    BoxHit hit = closest_on_box(p, boxes_[static_cast<std::size_t>(boxes[first])]);
+    hit.box = boxes[first];
+    const bool seen = std::any_of(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found),
+                                  [&](const BoxHit& kept) { return kept.direction.dot(hit.direction) > cone_cosine; });
+    if (seen) continue;
+    out[found++] = hit;
+    if (!narrow) continue;
+    const Eigen::Vector3d d = hit.direction;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double along = d[0] * away[0][i] + d[1] * away[1][i] + d[2] * away[2][i];
+      const double square = along > 0.0 ? along * along : 0.0;
+      // inside a box nothing is along any way, and its key is not positive
+      key[i] = square > seen_square * std::abs(key[i]) ? infinity : key[i];
     }
   }
   return found;

@@ -153,6 +153,7 @@ Goal read_goal(const Reader& in) {
   joint ? in.refuse("position_m", kind) : in.need("position_m", kind);
   pose ? in.need("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
   if (joint) in.refuse("tolerance_m", kind);
+  if (joint) in.refuse("tip_speed_max_m_s", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
   if (path) {
     goal.path = in.joint_path("q");
@@ -165,6 +166,7 @@ Goal read_goal(const Reader& in) {
   goal.tolerance_m = in.get("tolerance_m", joint ? 0.0 : pose ? 0.01 : 0.02);
   goal.tolerance_rad = in.get("tolerance_rad", joint ? 0.05 : pose ? 0.26 : 0.0);
   goal.speed_max = in.get("speed_max", joint ? 0.05 : std::numeric_limits<double>::infinity());
+  goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
   return goal;
 }
 
@@ -356,6 +358,7 @@ Json resolved_json(const Scene& scene) {
     }
     if (goal.type != GoalType::position) g["tolerance_rad"] = goal.tolerance_rad;
     g["speed_max"] = std::isfinite(goal.speed_max) ? Json(goal.speed_max) : Json(nullptr);
+    if (goal.type != GoalType::joint) g["tip_speed_max_m_s"] = or_null(goal.tip_speed_max_m_s);
     out["goals"].push_back(std::move(g));
   }
   out["map"] = nullptr;

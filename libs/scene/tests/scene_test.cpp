@@ -91,6 +91,7 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.goals[1].type == GoalType::position);
   CHECK(scene.goals[1].tolerance_m == 0.02);
   CHECK(std::isinf(scene.goals[1].speed_max));
+  CHECK_FALSE(scene.goals[1].tip_speed_max_m_s);
   CHECK(scene.goals[2].type == GoalType::pose);
   CHECK(scene.goals[2].tolerance_m == 0.02);
   CHECK(scene.goals[2].tolerance_rad == 0.26);
@@ -190,6 +191,8 @@ TEST_CASE("bad scenes are refused in one line that names file, place and what wa
       {with("/goals/1", Json{{"type", "position"}}), "/goals/1/position_m"},
       {with("/goals/1/quaternion_wxyz", Json{1, 0, 0, 0}), "/goals/1/quaternion_wxyz"},
       {with("/goals/2/tolerance_rad", -1), "/goals/2/tolerance_rad"},
+      {with("/goals/0/tip_speed_max_m_s", 0.05), "/goals/0/tip_speed_max_m_s"},
+      {with("/goals/2/tip_speed_max_m_s", 0), "/goals/2/tip_speed_max_m_s"},
       {with("/obstacles/0/length_m", 1), "/obstacles/0/length_m"},
       {with("/obstacles/0/radius_m", 0), "/obstacles/0/radius_m"},
       {with("/obstacles/2/size_m", Json{1, 1}), "/obstacles/2/size_m"},
@@ -285,6 +288,20 @@ TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[sce
              Catch::Contains("/goals/0/q/1: 1 numbers given, expected 2"));
   CHECK_THAT(refusal({{"type", "joint"}, {"q", {{0.1, 0.2}}}}), Catch::Contains("/goals/0/q/0: is a list"));
   CHECK_THAT(refusal({{"type", "path"}}), Catch::Contains("/goals/0/q: is missing"));
+}
+
+TEST_CASE("a tip's largest speed at its goal is read, and read back", "[scene][unit]") {
+  Json document = full_document();
+  document["goals"][1]["tip_speed_max_m_s"] = 0.05;
+  document["goals"][2]["tip_speed_max_m_s"] = nullptr;
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  CHECK(scene.goals[1].tip_speed_max_m_s == 0.05);
+  CHECK_FALSE(scene.goals[2].tip_speed_max_m_s);
+  const Json resolved = resolved_json(scene);
+  CHECK_FALSE(resolved["goals"][0].contains("tip_speed_max_m_s"));
+  CHECK(resolved["goals"][1]["tip_speed_max_m_s"] == 0.05);
+  CHECK(resolved["goals"][2]["tip_speed_max_m_s"].is_null());
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
 }
 
 TEST_CASE("friction and a torque's rate are read, and read back", "[scene][unit]") {

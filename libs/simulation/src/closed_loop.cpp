@@ -341,6 +341,11 @@ hamelin_self_contact ClosedLoop::to_c(const scene::SelfContact& contact) {
   return out;
 }
 
+double ClosedLoop::tip_speed() const {
+  const Vector3d tip = dynamics::tip_pose(plant_, ws_).p();
+  return dynamics::point_velocity(plant_, ws_, plant_.robot().tip.link, tip, v_).norm();
+}
+
 ClosedLoop::GoalError ClosedLoop::goal_error() const {
   const auto& goal = scene_.goals[std::min(goal_index_, scene_.goals.size() - 1)];
   const bool slow = v_.lpNorm<Eigen::Infinity>() < goal.speed_max;
@@ -354,7 +359,8 @@ ClosedLoop::GoalError ClosedLoop::goal_error() const {
   const geometry::SE3 tip = dynamics::tip_pose(plant_, ws_);
   error.metres = (tip.p() - goal.pose.p()).norm();
   error.has_metres = true;
-  error.reached = error.metres < goal.tolerance_m && slow;
+  error.reached =
+      error.metres < goal.tolerance_m && slow && !(goal.tip_speed_max_m_s && !(tip_speed() < *goal.tip_speed_max_m_s));
   if (goal.type == scene::GoalType::pose) {
     error.radians = angle_between(tip.R(), goal.pose.R());
     error.has_radians = true;
@@ -378,11 +384,10 @@ bool ClosedLoop::at_rest_away_from_goal() {
   if (!scene_.stall) return false;
   const auto& rule = *scene_.stall;
   const auto& goal = scene_.goals[goal_index_];
-  const geometry::SE3 tip = dynamics::tip_pose(plant_, ws_);
-  const double speed = dynamics::point_velocity(plant_, ws_, plant_.robot().tip.link, tip.p(), v_).norm();
   bool away = true;
-  if (goal.type != scene::GoalType::joint) away = (tip.p() - goal.pose.p()).norm() > rule.distance_m;
-  rest_s_ = speed < rule.speed_m_s && away ? rest_s_ + scene_.step_s : 0.0;
+  if (goal.type != scene::GoalType::joint)
+    away = (dynamics::tip_pose(plant_, ws_).p() - goal.pose.p()).norm() > rule.distance_m;
+  rest_s_ = tip_speed() < rule.speed_m_s && away ? rest_s_ + scene_.step_s : 0.0;
   return rest_s_ >= rule.hold_s;
 }
 

@@ -39,6 +39,8 @@ class ClosedLoop final : private planning::HostServices {
   void look(const Eigen::VectorXd& q);
   void look_at_obstacles();
   void look_at_itself();
+  /// Of the tip's point at this node [m/s].
+  [[nodiscard]] double tip_speed() const;
   [[nodiscard]] GoalError goal_error() const;
   /// Skips all goals that are reached; true if none is left.
   bool all_reached();

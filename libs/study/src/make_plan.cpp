@@ -11,6 +11,7 @@
 #include "hamelin/core/rng.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/study/judge.hpp"
+#include "sphere_on_path.hpp"
 
 namespace hamelin::study {
 
@@ -22,6 +23,8 @@ using Labels = std::map<std::string, std::string>;
 // Gain sets: spheres this far apart stand for a link's segment; 0.25 m from the obstacle's centre the nearest of them
 // is at most 0.02²/(8 · 0.25) m = 0.2 mm farther than the segment. Their radius is nothing beside that.
 constexpr double segment_spacing_m = 0.02, segment_radius_m = 1e-4;
+// Gain sets: the tip is slower than this on arrival (SPEC §4).
+constexpr double arrival_tip_speed_m_s = 0.05;
 
 /// A scene file of the plan and what is said of its runs.
 struct Made {
@@ -179,6 +182,9 @@ class Maker {
   void add_file(const fs::path& file) {
     const Json document = read_json(file);
     if (document.is_object() && document.value("schema", Json()) == "hamelin.scene/1") {
+      if (options_.sphere_on_path)
+        throw Error(ErrorCode::usage,
+                    fmt::format("{}: is a scene, expected problems where spheres are put on paths", file.string()));
       const scene::Scene scene = scene::read_scene(file);
       const std::string name = file.stem().string();
       const std::string goal = scene.goals.empty() ? "none" : std::string(scene::type_name(scene.goals.front()));
@@ -204,6 +210,8 @@ class Maker {
     const std::string map = fmt::format("{} m {}", options.resolution_m, scene::to_string(options.mark));
     const std::string family =
         problem.contains("family") && problem["family"].is_string() ? problem["family"].get<std::string>() : name;
+    const Labels labels{{"family", family}, {"problem", name}, {"map", map}};
+    if (options_.sphere_on_path) return add_sphere_on_path(file, options, labels);
     std::optional<Feasibility> found;
     for (const auto type : options_.goals.empty() ? std::vector{scene::GoalType::joint} : options_.goals) {
       const std::string goal(scene::to_string(type));
@@ -212,9 +220,37 @@ class Maker {
       if (!found) found = feasibility(scene::read_scene(options.output), {joints(problem.at("goal"))});
       const fs::path made = scenes() / fmt::format("{}-{}.json", name, goal);
       fs::rename(options.output, made);
-      add_scene_file(made.stem().string(), made, {{"family", family}, {"problem", name}, {"goal", goal}, {"map", map}},
-                     found);
+      Labels all = labels;
+      all["goal"] = goal;
+      add_scene_file(made.stem().string(), made, std::move(all), found);
     }
+  }
+
+  void add_sphere_on_path(const fs::path& file, const scene::ProblemOptions& problem, Labels labels) {
+    const SphereOnPath& wanted = *options_.sphere_on_path;
+    scene::make_scene_from_problem(file, problem);
+    const PathWithSphere found = put_sphere_on_path(problem.output, wanted);
+    Json document = read_json(problem.output);
+    fs::remove(problem.output);
+    if (!found.reason.empty()) {
+      if (options_.on_note) options_.on_note(fmt::format("{}: is left out: {}", file.string(), found.reason));
+      return;
+    }
+    Json points = Json::array();
+    for (const auto& q : found.path) points.push_back(array(q));
+    document["goals"] = {{{"type", "path"}, {"q", std::move(points)}}};
+    Json sphere{{"name", "on the path"},
+                {"type", "sphere"},
+                {"radius_m", wanted.radius_m},
+                {"position_m", {found.center.x(), found.center.y(), found.center.z()}}};
+    if (wanted.visible_within_m) {
+      sphere["known"] = false;
+      sphere["visible_within_m"] = *wanted.visible_within_m;
+    }
+    document["obstacles"].push_back(std::move(sphere));
+    labels["goal"] = "path";
+    labels["sphere"] = wanted.visible_within_m ? fmt::format("seen at {} m", *wanted.visible_within_m) : "known";
+    add_scene(labels.at("problem") + "-path", document, labels);
   }
 
   // The base scene's document with its files as seen from the scenes' directory.
@@ -290,6 +326,11 @@ class Maker {
     document["robot"] = {{"file", robot_file}};
     document.erase("gravity_m_s2");
     document.erase("planner");
+    // half of the sets damp no joint: these go on moving while the tip rests at the goal
+    for (auto& goal : document["goals"]) {
+      goal.erase("speed_max");
+      goal["tip_speed_max_m_s"] = arrival_tip_speed_m_s;
+    }
     document["integrator"] = {{"name", "semi-implicit-euler"}};
     document["step_s"] = 0.004;
     document["duration_s"] = 40;
@@ -380,7 +421,7 @@ class Maker {
     if (run.planner == "apf")
       set("eta", g.eta);
     else
-      set("k_obs", g.k_obs);
+      set(run.planner == "hybrid" ? "steering_gain" : "k_obs", g.k_obs);
   }
 
   [[nodiscard]] std::string own_planner(const Made& made) const {

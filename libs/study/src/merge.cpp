@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -30,6 +31,25 @@ void push(std::vector<double>& values, const std::optional<double>& value) {
 
 std::string text_at(const Json& object, const char* key) {
   return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+}
+
+// Numbers in a cause, such as a depth or a time, differ from run to run.
+std::string without_numbers(const std::string& cause) {
+  std::string out;
+  bool word = false;
+  const char* const end = cause.data() + cause.size();
+  for (const char* at = cause.data(); at != end;) {
+    double number = 0.0;
+    const bool digit = *at >= '0' && *at <= '9';
+    if (digit && !word) {
+      at = std::from_chars(at, end, number).ptr;
+      out += 'N';
+      continue;
+    }
+    word = (*at >= 'a' && *at <= 'z') || (*at >= 'A' && *at <= 'Z') || *at == '_' || (word && digit);
+    out += *at++;
+  }
+  return out;
 }
 
 bool contact_seen(const Json& record) {
@@ -68,19 +88,21 @@ void take(Gathered& into, const MergedRun& merged) {
       if (value.is_number()) g.escapes[name] += value.get<double>();
   if (!reached) {
     const std::string cause = text_at(record, "cause");
-    ++g.causes[cause.empty() ? outcome : fmt::format("{}: {}", outcome, cause)];
+    const bool as_it_is = outcome == "crashed" || outcome == "timeout";
+    ++g.causes[cause.empty() ? outcome : fmt::format("{}: {}", outcome, as_it_is ? cause : without_numbers(cause))];
   }
 }
 
-// The program's build and the hashes of the planners it loaded.
-std::string built_from(const Json& result) {
+// Who made a result: the program and its planner, each by name with its build.
+std::vector<std::pair<std::string, std::string>> makers_of(const Json& result) {
   const Json provenance = result.value("provenance", Json::object());
-  std::string text = provenance.contains("build") ? provenance["build"].value("id", Json()).dump() : "";
+  std::vector<std::pair<std::string, std::string>> makers;
+  if (provenance.contains("build")) makers.emplace_back("the program", provenance["build"].value("id", Json()).dump());
   if (provenance.contains("inputs"))
     for (const Json& input : provenance["inputs"])
       if (input.value("role", Json()) == "plugin")
-        text += fmt::format(" {} {}", input["path"].dump(), input["sha256"].dump());
-  return text;
+        makers.emplace_back(fmt::format("planner {}", text_at(result, "planner")), input["sha256"].dump());
+  return makers;
 }
 
 Group summed_up(Gathered&& from) {
@@ -151,6 +173,7 @@ std::vector<Group> group(const std::vector<MergedRun>& runs, const std::vector<s
     take(into, merged);
   }
   std::vector<Group> groups;
+  groups.reserve(gathered.size());
   for (auto& [key, from] : gathered) groups.push_back(summed_up(std::move(from)));
   return groups;
 }
@@ -186,6 +209,7 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
     g.reached_of_apf_stalled += apf_stalled && reached ? 1U : 0U;
   }
   std::vector<GainGroup> all;
+  all.reserve(groups.size());
   for (auto& [planner, g] : groups) {
     g.interval = wilson(g.reached_of_reference, g.reference);
     all.push_back(std::move(g));
@@ -197,17 +221,16 @@ Merged merge(const std::vector<std::filesystem::path>& directories, const std::v
   Merged merged{read_sweeps(directories), by, {}, {}, {}};
   merged.groups = group(merged.runs, by);
   merged.gains = group_gains(merged.runs);
-  std::set<std::string> builds;
+  std::map<std::string, std::set<std::string>> builds;
   std::size_t missing = 0;
   for (const auto& r : merged.runs) {
-    if (r.record.is_null())
-      ++missing;
-    else if (r.record["result"].is_object())
-      builds.insert(built_from(r.record["result"]));
+    if (r.record.is_null()) ++missing;
+    if (r.record.is_null() || r.record["result"].is_null()) continue;
+    for (const auto& [name, build] : makers_of(r.record["result"])) builds[name].insert(build);
   }
   if (missing > 0) merged.notes.push_back(fmt::format("{} of {} runs have no record yet", missing, merged.runs.size()));
-  if (builds.size() > 1)
-    merged.notes.push_back(fmt::format("the records come from {} builds of program and planners", builds.size()));
+  for (const auto& [name, all] : builds)
+    if (all.size() > 1) merged.notes.push_back(fmt::format("the records come from {} builds of {}", all.size(), name));
   return merged;
 }
 
@@ -252,7 +275,11 @@ Json to_json(const Merged& merged) {
                      {"reached_share_interval", {g.interval.low, g.interval.high}},
                      {"apf_stalled", g.apf_stalled},
                      {"reached_of_apf_stalled", g.reached_of_apf_stalled}});
-  return {{"by", merged.by}, {"groups", std::move(all)}, {"gains", std::move(gains)}, {"notes", merged.notes}};
+  return {{"schema", "hamelin.summary/1"},
+          {"by", merged.by},
+          {"groups", std::move(all)},
+          {"gains", std::move(gains)},
+          {"notes", merged.notes}};
 }
 
 std::string to_table(const Merged& merged) {

@@ -3,20 +3,20 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <set>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/study/sweep.hpp"
-
-extern char** environ;
 
 namespace hamelin::study {
 
@@ -74,6 +74,8 @@ class Pipe {
 struct Child {
   const SweepRun* run;
   pid_t pid = -1;
+  std::chrono::steady_clock::time_point begun = std::chrono::steady_clock::now();
+  bool too_long = false;  ///< and killed for it
   Pipe out, err;
 
   explicit Child(const SweepRun& of) : run(&of) {}
@@ -82,6 +84,7 @@ struct Child {
 
 void spawn(Child& child, const std::vector<std::string>& words) {
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (const auto& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
@@ -97,12 +100,18 @@ void spawn(Child& child, const std::vector<std::string>& words) {
   child.err.close_writer();
 }
 
-/// The file of records, appended to a line at a time.
+/// The file of records, appended to a line at a time, by one sweep at a time.
 class RecordFile {
  public:
-  RecordFile(const fs::path& file, std::size_t keep_bytes)
+  explicit RecordFile(const fs::path& file)
       : name_(file.string()), fd_(::open(name_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666)) {
-    if (fd_ < 0 || ::ftruncate(fd_, static_cast<off_t>(keep_bytes)) != 0 || ::lseek(fd_, 0, SEEK_END) < 0) fail();
+    if (fd_ < 0) fail();
+    if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+    const bool taken = errno == EWOULDBLOCK;
+    if (!taken) fail();
+    ::close(fd_);
+    throw Error(ErrorCode::io,
+                fmt::format("{}: another sweep is writing it, expected one at a time in a directory", name_));
   }
   ~RecordFile() {
     if (fd_ >= 0) ::close(fd_);
@@ -110,6 +119,10 @@ class RecordFile {
   RecordFile(const RecordFile&) = delete;
   RecordFile& operator=(const RecordFile&) = delete;
 
+  /// Drops what follows the first `bytes`; what is appended comes after them.
+  void keep(std::size_t bytes) {
+    if (::ftruncate(fd_, static_cast<off_t>(bytes)) != 0 || ::lseek(fd_, 0, SEEK_END) < 0) fail();
+  }
   void append(const Json& record) {
     const std::string line = record.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     for (std::size_t done = 0; done < line.size();) {
@@ -140,12 +153,11 @@ std::string last_words(std::string text) {
 class Sweep {
  public:
   Sweep(const fs::path& directory, const SweepOptions& options)
-      : directory_(directory), options_(options), plan_(read_plan(directory)) {}
+      : directory_(directory), options_(options), plan_(read_plan(directory)), file_(records_file(directory)) {}
 
   SweepOutcome run() {
     choose();
-    RecordFile file(records_file(directory_), keep_bytes_);
-    file_ = &file;
+    file_.keep(keep_bytes_);
     try {
       while (true) {
         if (stopping()) tell_children();
@@ -222,6 +234,7 @@ class Sweep {
       if (ends[2 * i].revents != 0) children_[i].out.read();
       if (ends[2 * i + 1].revents != 0) children_[i].err.read();
     }
+    if (options_.timeout_s) kill_too_long();
     std::vector<Child> open;
     for (auto& child : children_)
       if (child.open())
@@ -229,6 +242,15 @@ class Sweep {
       else
         end(child);
     children_.swap(open);
+  }
+
+  void kill_too_long() {
+    const auto now = std::chrono::steady_clock::now();
+    for (auto& child : children_) {
+      if (child.too_long || std::chrono::duration<double>(now - child.begun).count() <= *options_.timeout_s) continue;
+      child.too_long = true;
+      ::kill(child.pid, SIGKILL);
+    }
   }
 
   void end(const Child& child) {
@@ -263,14 +285,15 @@ class Sweep {
       record["judge"] = std::move(said["judge"]);
     } else {
       const bool killed = WIFSIGNALED(status);
-      const std::string how = killed ? fmt::format("signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)))
-                                     : fmt::format("exit code {}", WEXITSTATUS(status));
+      const std::string how = child.too_long && killed ? fmt::format("killed after {} s", *options_.timeout_s)
+                              : killed ? fmt::format("signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)))
+                                       : fmt::format("exit code {}", WEXITSTATUS(status));
       record["cause"] = words.empty() ? how : fmt::format("{}: {}", how, words);
       record["crash"] = {{"signal", killed ? Json(WTERMSIG(status)) : Json(nullptr)},
                          {"exit_code", killed ? Json(nullptr) : Json(WEXITSTATUS(status))}};
       ++outcome_.crashed;
     }
-    file_->append(record);
+    file_.append(record);
     ++outcome_.run;
     if (options_.on_done) options_.on_done(outcome_.run, todo_.size());
   }
@@ -278,10 +301,10 @@ class Sweep {
   fs::path directory_;
   const SweepOptions& options_;
   SweepPlan plan_;
+  RecordFile file_;
   std::vector<const SweepRun*> todo_;
   std::size_t next_ = 0, keep_bytes_ = 0;
   std::vector<Child> children_;
-  RecordFile* file_ = nullptr;
   std::optional<Error> failure_;
   SweepOutcome outcome_;
   bool told_ = false;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "../src/sphere_on_path.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
@@ -251,7 +252,9 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
     ++planners[run.labels.at("planner")];
     CHECK(run.gains.size() == 5);
     const std::string last = run.set.back();
-    CHECK(last.starts_with(run.planner == "apf" ? "/planner/params/eta=" : "/planner/params/k_obs="));
+    CHECK(last.starts_with(run.planner == "apf"    ? "/planner/params/eta="
+                           : run.planner == "gyro" ? "/planner/params/k_obs="
+                                                   : "/planner/params/steering_gain="));
   }
   CHECK(planners ==
         std::map<std::string, std::size_t>{{"apf", 3}, {"apf without the obstacle", 3}, {"gyro", 3}, {"hybrid", 3}});
@@ -260,6 +263,8 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
   CHECK(scene.step_s == 0.004);
   CHECK(scene.duration_s == 40.0);
   CHECK_FALSE(scene.gravity_m_s2.has_value());
+  CHECK(scene.goals.at(0).tip_speed_max_m_s == 0.05);
+  CHECK(std::isinf(scene.goals.at(0).speed_max));
   CHECK(scene.obstacles.size() == 1);
   CHECK(scene::read_scene(bench.dir("a") / plan.scenes[1].file).obstacles.empty());
   // along each segment a sphere is never farther than 1 cm, and hardly wider than the segment
@@ -274,6 +279,72 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
       if (nearest > 0.01 + 1e-9) FAIL_CHECK(link.name << " at " << share);
     }
   CHECK(model.spheres().front().radius <= 1e-3);
+}
+
+TEST_CASE("a motion is thinned to a spacing, and loops are cut out of it", "[study][unit]") {
+  const auto at = [](double x, double y) { return Eigen::VectorXd(Eigen::Vector2d(x, y)); };
+  std::vector<Eigen::VectorXd> nodes;
+  for (int i = 0; i <= 100; ++i) nodes.push_back(at(0.01 * i, 0.0));  // there
+  for (int i = 1; i <= 50; ++i) nodes.push_back(at(1.0, 0.01 * i));   // into a pocket
+  for (int i = 49; i >= 0; --i) nodes.push_back(at(1.0, 0.01 * i));   // and out again
+  for (int i = 1; i <= 100; ++i) nodes.push_back(at(1.0 + 0.01 * i, 0.0));
+  const auto path = thinned(nodes, 0.1 + 1e-9);
+  CHECK(path.front() == nodes.front());
+  CHECK(path.back() == nodes.back());
+  CHECK(path.size() == 21);
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    CHECK((path[i] - path[i - 1]).lpNorm<Eigen::Infinity>() <= 0.1 + 1e-9);
+    CHECK(path[i][1] == 0.0);
+  }
+  CHECK(thinned({at(0.0, 0.0)}, 0.1).size() == 1);
+  // a step that is too long as it is stays one
+  CHECK(thinned({at(0.0, 0.0), at(1.0, 0.0)}, 0.1).size() == 2);
+}
+
+TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start and goal", "[study]") {
+  Bench bench;
+  PlanOptions options = bench.problems();
+  options.sphere_on_path.emplace().plugin_directories = {HAMELIN_TEST_PLUGIN_DIR};
+  options.sphere_on_path->visible_within_m = 0.15;
+  std::vector<std::string> notes;
+  options.on_note = [&](const std::string& text) { notes.push_back(text); };
+  const SweepPlan plan = make_plan(bench.dir("a"), options);
+  REQUIRE(notes.size() == 1);
+  CHECK_THAT(notes[0], Catch::Contains("blocked.json: is left out: goal: ") && Catch::EndsWith(" m deep"));
+  REQUIRE(plan.scenes.size() == 1);
+  CHECK(plan.scenes[0].feasible);
+  CHECK(plan.runs.at(0).id == "free-path/hybrid/s1");
+  CHECK(plan.runs.at(0).labels.at("sphere") == "seen at 0.15 m");
+  const scene::Scene scene = scene::read_scene(bench.dir("a") / plan.scenes[0].file);
+  const scene::Obstacle& sphere = scene.obstacles.back();
+  CHECK(sphere.radius_m == 0.06);
+  CHECK_FALSE(sphere.known);
+  CHECK(sphere.visible_within_m == 0.15);
+  CHECK_FALSE(sphere.judge_only);
+  const scene::Goal& goal = scene.goals.at(0);
+  REQUIRE(goal.path.cols() > 2);
+  // where the arm is, by the kinematics that runs use
+  const model::Model model = simulation::load_model(scene);
+  dynamics::Workspace ws(model);
+  std::vector<Eigen::Vector3d> centers(model.spheres().size());
+  const auto clearance = [&](const Eigen::VectorXd& q) {
+    dynamics::forward_kinematics(model, ws, q);
+    dynamics::sphere_centers(model, ws, centers);
+    double nearest = 1e9;
+    for (std::size_t i = 0; i < centers.size(); ++i)
+      nearest = std::min(nearest, (centers[i] - sphere.pose.p()).norm() - model.spheres()[i].radius - sphere.radius_m);
+    return nearest;
+  };
+  CHECK(clearance(scene.start_q) >= 0.02);
+  CHECK(clearance(goal.q) >= 0.02);
+  double nearest = 1e9;
+  Eigen::VectorXd before = scene.start_q;
+  for (const auto& q : goal.path.colwise()) {
+    nearest = std::min(nearest, clearance(q));
+    CHECK((q - before).lpNorm<Eigen::Infinity>() <= 0.1);
+    before = q;
+  }
+  CHECK(nearest < -0.06);
 }
 
 TEST_CASE("options that make no plan are refused in one line", "[study][unit]") {
@@ -297,6 +368,10 @@ TEST_CASE("options that make no plan are refused in one line", "[study][unit]") 
   CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("another file is named 'free-joint' too"));
   options.files = {source_dir / "data/robots/planar3.json"};
   CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("planar3.json: is neither a scene nor a problem"));
+  options.files = {source_dir / "data/scenes/shelf.json"};
+  options.sphere_on_path.emplace();
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("shelf.json: is a scene, expected problems"));
+  options.sphere_on_path.reset();
   options.files.clear();
   options.clutter.maps = 1;
   CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("need --base"));

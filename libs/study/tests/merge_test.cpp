@@ -1,5 +1,7 @@
 #include "hamelin/study/merge.hpp"
 
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -52,7 +54,7 @@ std::vector<MergedRun> hand_made() {
           made("4", "hybrid", record("stalled", 0.05, 9.0, 8.0, "joint limit")),
           made("5", "hybrid", crashed),
           made("6", "hybrid", Json()),
-          made("7", "apf", record("collision", -0.004, 2.0, 1.0, "ran <into> it")),
+          made("7", "apf", record("collision", -0.004, 2.0, 1.0, "ran <into> it, 1.5e-3 m deep at 2 s, at link4")),
           made("8", "apf", record("stalled", 0.05, 9.0, 2.0, "joint limit")),
           made("9", "apf", record("stalled", 0.05, 9.0, 3.0, "joint limit"))};
 }
@@ -120,6 +122,7 @@ TEST_CASE("records made by hand are counted as they are", "[study][unit]") {
   CHECK(apf.contacts == 1);
   CHECK(apf.min_clearance_m == -0.004);
   CHECK(apf.causes.at("stalled: joint limit") == 2);
+  CHECK(apf.causes.count("collision: ran <into> it, N m deep at N s, at link4") == 1);
   CHECK_FALSE(apf.reached_time_s_median.has_value());
 }
 
@@ -180,6 +183,38 @@ TEST_CASE("the page stands alone, escapes what it shows and names the command th
   CHECK_THAT(page, Catch::Contains("hamelin run sweep/scenes/a.json --planner hybrid --set "
                                    "&#39;/planner/params/escape=it&#39;\\&#39;&#39;s&#39; --seed 1"));
   CHECK_THAT(to_table(merged), Catch::Contains("5/6"));
+}
+
+TEST_CASE("a merge tells of runs that are missing and of records from several builds", "[study][unit]") {
+  std::string name = (std::filesystem::temp_directory_path() / "hamelin-merge-XXXXXX").string();
+  REQUIRE(::mkdtemp(name.data()) != nullptr);
+  const std::filesystem::path directory = name;
+  SweepPlan plan;
+  plan.scenes.push_back({"a.json", std::string(64, '0'), true, ""});
+  for (const char* id : {"1", "2", "3"}) {
+    SweepRun run;
+    run.id = id;
+    run.scene = "a.json";
+    run.labels = {{"planner", "p"}};
+    plan.runs.push_back(run);
+  }
+  write_plan(plan, directory);
+  std::ofstream out(records_file(directory));
+  for (const char* id : {"1", "2"}) {
+    Json line{{"schema", "hamelin.record/1"}, {"plan", plan.sha256}, {"id", id}};
+    line.update(record("reached", 0.1, 1.0, 1.0));
+    line["result"]["planner"] = "p";
+    line["result"]["provenance"] = {{"build", {{"id", "b"}}},
+                                    {"inputs", {{{"role", "plugin"}, {"path", "p"}, {"sha256", id}}}}};
+    out << line.dump() << "\n";
+  }
+  out.close();
+  const Merged merged = merge({directory}, {"planner"});
+  std::filesystem::remove_all(directory);
+  CHECK(merged.groups.at(0).planned == 3);
+  CHECK(merged.groups.at(0).reached == 2);
+  CHECK(merged.notes ==
+        std::vector<std::string>{"1 of 3 runs have no record yet", "the records come from 2 builds of planner p"});
 }
 
 TEST_CASE("the summary's JSON says what the groups say", "[study][unit]") {

@@ -1,5 +1,6 @@
 #include "hamelin/study/sweep.hpp"
 
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -228,6 +229,33 @@ TEST_CASE("a stopped sweep ends its children, records none of them, and goes on 
   CHECK(read_records(bench.root(), bench.plan).lines.size() == 1);
   bench.script("");
   CHECK(run_sweep(bench.root(), bench.options()).run == 3);
+}
+
+TEST_CASE("a run that takes too long is killed and recorded, and the others go on", "[study][unit]") {
+  Bench bench(3);
+  bench.script("if [ \"$3\" = p1 ]; then exec sleep 600; fi");
+  SweepOptions options = bench.options();
+  options.timeout_s = 0.5;
+  const SweepOutcome outcome = run_sweep(bench.root(), options);
+  CHECK(outcome.run == 3);
+  CHECK(outcome.crashed == 1);
+  for (const Json& record : read_records(bench.root(), bench.plan).lines) {
+    CHECK(record["outcome"] == (record["id"] == "r1" ? "crashed" : "reached"));
+    if (record["id"] != "r1") continue;
+    CHECK(record["cause"] == "killed after 0.5 s");
+    CHECK(record["crash"]["signal"] == SIGKILL);
+  }
+}
+
+TEST_CASE("two sweeps at a time in one directory are refused", "[study][unit]") {
+  Bench bench(2);
+  SweepOptions options = bench.options();
+  options.jobs = 1;
+  std::string second;
+  options.on_done = [&](std::size_t, std::size_t) { second = bench.message(bench.options()); };
+  CHECK(run_sweep(bench.root(), options).run == 2);
+  CHECK_THAT(second,
+             Catch::EndsWith("records.jsonl: another sweep is writing it, expected one at a time in a directory"));
 }
 
 TEST_CASE("runs are chosen by a part of their id", "[study][unit]") {

@@ -191,6 +191,30 @@ TEST_CASE("goals of every type are judged by their own measure", "[simulation][g
     CHECK(missed.outcome == Outcome::timeout);
     CHECK(*missed.goal->error_rad > 2.0);
   }
+  SECTION("position with the tip's speed, as example 5.2 has it") {
+    const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
+    dynamics::Workspace ws(model);
+    const auto tip_at = [&](const Eigen::VectorXd& q) -> Eigen::Vector3d {
+      dynamics::forward_kinematics(model, ws, q);
+      return dynamics::tip_pose(model, ws).p();
+    };
+    const auto tip_speed = [&](const log::Result& result) {
+      const double h = 1e-6;
+      return (tip_at(result.q + h * result.v) - tip_at(result.q - h * result.v)).norm() / (2.0 * h);
+    };
+    scene["goals"][0].erase("speed_max");
+    const auto fast = run_scene(folder, scene);
+    REQUIRE(fast.outcome == Outcome::reached);
+    const double least = tip_speed(fast) / 3.0;
+    scene["goals"][0]["tip_speed_max_m_s"] = least;
+    const auto slow = run_scene(folder, scene);
+    REQUIRE(slow.outcome == Outcome::reached);
+    CHECK(slow.time_s > fast.time_s);
+    CHECK(*slow.goal->error_m < 0.02);
+    CHECK(tip_speed(slow) < least);
+    // it arrives at the first node at which this holds: one step before it was faster
+    CHECK(tip_speed(slow) > 0.98 * least);
+  }
   SECTION("a list, in its order") {
     scene["goals"] = {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}},
                       {{"type", "joint"}, {"q", {0.4, -0.3, 0.2, 0.5}}}};

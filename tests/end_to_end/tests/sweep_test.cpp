@@ -51,6 +51,7 @@ TEST_CASE("a sweep is planned, run and summed up, and its files fit their schema
   const Json summary = test::run_json(
       bench, {"sweep", "merge", "tries", "--by", "problem", "-o", "summary.json", "--page", "page.html"});
   CHECK(summary == bench.json("summary.json"));
+  CHECK(bench.run({"validate", "summary.json"}).out == "summary.json: ok (sweep summary)\n");
   REQUIRE(summary["groups"].size() == 2);
   const Json &apf = summary["groups"][0], &gyro = summary["groups"][1];
   CHECK(apf["labels"]["problem"] == "paper_52_apf");

@@ -43,15 +43,20 @@ class BoxField {
   class Scratch {
    public:
     Scratch() = default;
-    explicit Scratch(const BoxField& field) { waiting_.reserve(field.nodes_.size() * width); }
+    explicit Scratch(const BoxField& field) { fit(field); }
 
    private:
     friend class BoxField;
-    struct Entry {
-      double key;          ///< squared distance; inside a box: minus the squared depth
-      std::int32_t index;  ///< box if not negative, else −1 − node
-    };
-    std::vector<Entry> waiting_;
+    void fit(const BoxField& field) {
+      if (nodes_.size() > field.nodes_.size() && boxes_.size() > field.boxes_.size()) return;
+      nodes_.resize(field.nodes_.size() + 1);
+      boxes_.resize(field.boxes_.size() + 1);
+      key_.resize(field.boxes_.size());
+      for (auto& along : away_) along.resize(field.boxes_.size());
+    }
+    std::vector<std::int32_t> nodes_, boxes_;  ///< near ones; room for one more than there are
+    std::vector<double> key_;                  ///< squared distance; inside a box: minus the squared depth
+    std::array<std::vector<double>, 3> away_;
   };
 
   /// Nearest boxes no farther than `limit`, nearest first, up to out.size(). A box is left out if its direction makes

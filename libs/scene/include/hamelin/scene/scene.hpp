@@ -34,6 +34,7 @@ struct Goal {
   double tolerance_m = 0.0;                                    ///< position 0.02, pose 0.01
   double tolerance_rad = 0.0;                                  ///< joint 0.05, pose 0.26
   double speed_max = std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
+  std::optional<double> tip_speed_max_m_s;                     ///< position, pose: of the tip at arrival
 };
 
 /// The goal's "type" in a scene file: "path" is a joint goal with way-points.

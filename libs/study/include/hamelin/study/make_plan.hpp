@@ -27,13 +27,24 @@ struct GainScenes {
   std::uint64_t seed = 1;
 };
 
+/// A sphere on the path of a problem's arm: the goal becomes a path in joints, and something stands on it.
+struct SphereOnPath {
+  double radius_m = 0.06;
+  std::optional<double> visible_within_m;  ///< the planner sees it once the arm is this near [m]; none: from the start
+  double clearance_m = 0.02;               ///< of start and goal from it, at least
+  double spacing_rad = 0.1;                ///< of way-points, at most, in the joint that moves most
+  std::uint64_t seed = 1;                  ///< which spheres of the arm are tried first
+  std::vector<std::filesystem::path> plugin_directories;  ///< of hybrid, which makes the path with escape `tree`
+};
+
 /// What a plan is made of: each scene × each planner × each combination of varied values × each seed. Gain sets take
 /// the place of varied values where a scene comes from GainScenes.
 struct PlanOptions {
   std::vector<std::filesystem::path> files;  ///< problems and scenes, told apart by content
   scene::ProblemOptions problem;             ///< robot, spheres, tip, resolution and mark of maps; `output` is not used
   std::vector<scene::GoalType> goals;        ///< of problems; empty: joint
-  std::optional<std::filesystem::path> base;  ///< the scene of clutter and gains
+  std::optional<SphereOnPath> sphere_on_path;  ///< problems take a path for a goal; `goals` is not used
+  std::optional<std::filesystem::path> base;   ///< the scene of clutter and gains
   ClutterScenes clutter;
   GainScenes gains;
   std::vector<std::string> planners;  ///< "NAME" or "NAME:key=value,key=value"; empty: the scene's own
@@ -42,6 +53,7 @@ struct PlanOptions {
   std::vector<std::uint64_t> seeds{1};
   std::optional<double> duration_s;
   std::function<void(std::size_t done, std::size_t all)> on_scene;
+  std::function<void(const std::string& text)> on_note;  ///< a problem that is left out, and why
   /// Called before the plan is written, once for each planner with its values; throws if they are wrong.
   std::function<void(const SweepRun& run)> check;
 };

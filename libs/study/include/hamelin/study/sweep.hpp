@@ -74,6 +74,7 @@ struct SweepOptions {
   std::string only;                  ///< runs whose id holds this; empty: all
   std::optional<std::size_t> limit;  ///< at most so many runs now
   bool fresh = false;                ///< drop the records that are there
+  std::optional<double> timeout_s;   ///< of wall clock: a run that takes longer is killed
   const std::atomic<bool>* stop = nullptr;                         ///< once set, children are told to end
   std::function<void(std::size_t done, std::size_t all)> on_done;  ///< after each record, of those to be run now
 };
@@ -88,7 +89,8 @@ struct SweepOutcome {
 };
 
 /// Runs what has no record yet, each in a process of its own, and appends a record each, flushed. A run that crashes is
-/// recorded as `crashed`, with its signal or exit code and its last words. A child prints one line of JSON,
+/// recorded as `crashed`, with its signal or exit code and its last words; so is one that is killed after `timeout_s`.
+/// A child prints one line of JSON,
 /// {"result": …, "judge": …}, or exits with code 2 and one line that says what is wrong with its input: then no other
 /// run is begun.
 /// @throws Error io, parse or invalid (a plan or scene that is not what was planned); usage for 0 jobs; invalid, naming
