@@ -29,7 +29,7 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
-constexpr double steering_fade = 0.5;     // joint distance below which steering towards a joint target fades
+constexpr double steering_fade = 0.5;     // distance below which steering fades
 constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
 constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
 
@@ -126,10 +126,8 @@ class Hybrid final : public planning::Planner {
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-      // steering turns faster than the law follows: near a joint target it would make the arm circle
-      const bool joint_target = target.via != nullptr || goal.type == HAMELIN_GOAL_JOINT;
-      law_.steer(model_, ws_, obstacles_.points(), Minv_, v_,
-                 joint_target ? std::min(1.0, distance / steering_fade) : 1.0, command);
+      // steering turns faster than the law follows: near a target it would make the arm circle
+      law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
     }
 
     // the law's velocity one period on, of bounded acceleration
@@ -305,12 +303,14 @@ class Hybrid final : public planning::Planner {
       search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_at_);
       return enter(Mode::think, now);
     }
-    const double* aim = goal_->type == HAMELIN_GOAL_JOINT ? goal_->q : nullptr;
-    if (target.via != nullptr) aim = target.via->data();
-    memory_.next(q_, aim, [&](const VectorXd& via) {
-      const auto& margins = margins_.params();
-      return surroundings_.clear(via, margins.away_m, margins.self_m);
-    });
+    const auto distance = [&](const VectorXd& via) {
+      if (target.via == nullptr) dynamics::forward_kinematics(model_, ws_, via);
+      return law_.distance(model_, ws_, via, target);
+    };
+    const auto clear = [&](const VectorXd& via) {
+      return surroundings_.clear(via, margins_.params().away_m, margins_.params().self_m);
+    };
+    memory_.next(q_, distance, clear);
     via_until_s_ = now + 1.2 + 0.05 * escapes_;
     enter(Mode::via, now);
   }

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 // A rotation by one radian weighs as much as this length [m], so that one damped inverse serves both.
 constexpr double rotation_length = 0.25;
 // Damping of (J Jᵀ + λ²)⁻¹, relative to the trace: keeps joint speeds bounded near singular poses.
-constexpr double relative_damping = 0.004;
+constexpr double relative_damping = 0.004, projection_damping = 1e-7;
 constexpr double passing_far = 0.02;  // a via that is passed is given its full speed down to here
 // Distances to the goal between which margins shrink: joint space, tip [m].
 constexpr double joint_near = 0.25, joint_far = 1.0, tip_near_m = 0.02, tip_far_m = 0.12;
@@ -99,15 +99,19 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws, co
   if (far > 0.0) wanted.tail<3>() = position * std::min(params_.tip_gain, params_.tip_speed / far);
   const double rate = 2.0 * wanted.tail<3>().norm() + 0.5 / rotation_length * wanted.head<3>().norm();
   Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
-  G.diagonal().array() += relative_damping * std::max(1e-6, G.trace());
+  const double scale = std::max(1e-6, G.trace());
+  G.diagonal().array() += relative_damping * scale;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
   u.noalias() = J_.transpose() * factor.solve(wanted).eval();
   const double fast = u.norm(), limit = 1.5 * params_.cruise_speed;
   if (fast > limit) u *= limit / fast;
   if (middle_.size() == 0) return rate;
   null_ = centring_gain * (middle_ - q);
+  // The centring must not push the tip off its goal, so this projection is all but undamped.
+  G.diagonal().array() -= (relative_damping - projection_damping) * scale;
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> projector(G);
   const Eigen::Matrix<double, 6, 1> disturbs = J_ * null_;
-  scratch_.noalias() = J_.transpose() * factor.solve(disturbs).eval();
+  scratch_.noalias() = J_.transpose() * projector.solve(disturbs).eval();
   u += null_ - scratch_;
   return rate;
 }

@@ -24,7 +24,7 @@ void Memory::remember(const Eigen::VectorXd& q) {
   ++crumbs_;
 }
 
-void Memory::draw_all(const Eigen::VectorXd& q, const double* goal) {
+void Memory::draw_all(const Eigen::VectorXd& q) {
   ++count_;
   remember(q);
   const double radius = std::min(2.5, 0.4 + 0.2 * count_);
@@ -37,8 +37,7 @@ void Memory::draw_all(const Eigen::VectorXd& q, const double* goal) {
     drawn_.col(c) = draw_;
     double nearest = 1.5;
     for (Eigen::Index k = 0; k < known; ++k) nearest = std::min(nearest, (crumb_.col(k) - drawn_.col(c)).norm());
-    const double off = goal == nullptr ? 0.0 : (planning::ConstVectorMap(goal, q.size()) - drawn_.col(c)).norm();
-    scores_[c] = nearest - 0.5 * off;
+    scores_[c] = nearest;
   }
 }
 

@@ -17,11 +17,16 @@ class Memory {
   [[nodiscard]] const Eigen::VectorXd& via() const noexcept { return via_; }
   /// Forgets all stalls, e.g. at a new goal.
   void restart() { crumbs_ = 0, count_ = 0; }
-  /// Draws the next way-point after a stall at q. @param goal the joint vector aimed at, or null
+  /// Draws the next way-point after a stall at q.
+  /// @param distance how far a way-point is from what is aimed at
   /// @param clear whether the arm may stand at a way-point; asked for the best few only
-  template <class Clear>
-  void next(const Eigen::VectorXd& q, const double* goal, Clear&& clear) {
-    draw_all(q, goal);
+  template <class Distance, class Clear>
+  void next(const Eigen::VectorXd& q, Distance&& distance, Clear&& clear) {
+    draw_all(q);
+    for (Eigen::Index c = 0; c < candidates; ++c) {
+      via_ = drawn_.col(c);
+      scores_[c] -= 0.5 * distance(via_);
+    }
     Eigen::Index best = 0;
     scores_.maxCoeff(&best);
     const Eigen::Index first = best;
@@ -39,8 +44,8 @@ class Memory {
  private:
   static constexpr int candidates = 64, asked = 8;
   void remember(const Eigen::VectorXd& q);
-  /// Counts the stall at q, draws the candidates and scores them.
-  void draw_all(const Eigen::VectorXd& q, const double* goal);
+  /// Counts the stall at q, draws the candidates and scores them by how far they are from all that is remembered.
+  void draw_all(const Eigen::VectorXd& q);
 
   const JointBox& box_;
   Rng rng_;
