@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
+
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "terminal.hpp"
@@ -25,15 +27,29 @@ std::string_view to_string(Kind kind) noexcept {
       return "file of collision spheres";
     case Kind::log:
       return "log";
+    case Kind::sweep:
+      return "sweep plan";
+    case Kind::records:
+      return "file of sweep records";
   }
   return "unknown";
 }
 
 namespace {
 
+// A sweep's records and a run's log are both JSON Lines.
+bool holds_records(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string line;
+  std::getline(in, line);
+  const Json first = Json::parse(line, nullptr, false);
+  return first.is_object() && first.value("schema", Json()) == "hamelin.record/1";
+}
+
 Kind recognized(const std::filesystem::path& file) {
   const auto ending = file.extension();
   if (ending == ".bt" || ending == ".ot") return Kind::map;
+  if (ending == ".jsonl" && holds_records(file)) return Kind::records;
   if (ending == ".jsonl" || ending == ".zst") return Kind::log;
   if (ending == ".urdf") return Kind::urdf;
   const std::string text = read_file(file);
@@ -53,10 +69,11 @@ Kind recognized(const std::filesystem::path& file) {
   if (schema == "hamelin.scene/1") return Kind::scene;
   if (schema == "hamelin.result/1") return Kind::result;
   if (schema == "hamelin.primitives/1") return Kind::primitives;
+  if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema.is_null() && document.contains("links") && document["links"].is_object()) return Kind::spheres;
   throw Error(ErrorCode::invalid,
-              fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1 or "
-                          "hamelin.primitives/1",
+              fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
+                          "hamelin.primitives/1 or hamelin.sweep/1",
                           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

@@ -54,6 +54,7 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
           {"mass_kg", mass},
           {"reach_m", model.reach()},
           {"spheres", model.spheres().size()},
+          {"base_spheres", robot.base_spheres.size()},
           {"self_collision_disabled", robot.self_collision_disabled.size()},
           {"links", links},
           {"notes", robot.notes}};

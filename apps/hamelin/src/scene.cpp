@@ -26,7 +26,7 @@ struct InfoOptions {
 struct MakeOptions {
   std::optional<std::filesystem::path> problem, primitives, robot, spheres;
   std::optional<double> resolution_m;
-  std::string tip, mark;
+  std::string tip, mark, goal;
   std::size_t clutter = 0;
   std::uint64_t seed = 1;
   std::string sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
@@ -69,7 +69,7 @@ Json scene_info(const std::filesystem::path& file) {
   const auto environment = scene::make_environment(scene, model.reach(), shown_influence_m);
   const auto& summary = environment.summary();
   Json goals = Json::array();
-  for (const auto& goal : scene.goals) goals.push_back(scene::to_string(goal.type));
+  for (const auto& goal : scene.goals) goals.push_back(scene::type_name(goal));
   Json info{{"file", file.string()},
             {"kind", "scene"},
             {"robot", model.robot().name},
@@ -170,6 +170,8 @@ scene::MakeReport make_scene(const MakeOptions& options) {
   make.tip = options.tip;
   if (options.resolution_m) make.resolution_m = *options.resolution_m;
   if (!options.mark.empty()) make.mark = scene::mark_from(options.mark);
+  if (options.goal == "position") make.goal = scene::GoalType::position;
+  if (options.goal == "pose") make.goal = scene::GoalType::pose;
   make.output = options.output;
   return scene::make_scene_from_problem(*options.problem, make);
 }
@@ -178,6 +180,8 @@ void make(const MakeOptions& options) {
   const bool map = options.primitives || options.clutter > 0;
   if (map == options.problem.has_value())
     throw Error(ErrorCode::usage, "scene make: give either a problem, or --primitives or --clutter");
+  if (map && !options.goal.empty())
+    throw Error(ErrorCode::usage, "scene make: --goal is for a problem, a map has none");
   const auto made = map ? make_map(options) : make_scene(options);
   if (options.json)
     print_json({{"file", made.output.string()},
@@ -216,7 +220,7 @@ void add_scene(CLI::App& app, int&) {
       add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
                   "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt\n"
                   "hamelin scene make --clutter 30 --seed 4 --keep-out 0,0,0.3,0.4 -o clutter.bt\n"
-                  "hamelin scene make problem.json --robot arm.urdf --spheres arm.spheres.json -o scene.json");
+                  "hamelin scene make problem.json --robot arm.urdf --spheres s.json --goal pose -o scene.json");
   const auto options = std::make_shared<MakeOptions>();
   make_command->add_option("problem", options->problem, "a MotionBenchMaker problem")->type_name("PROBLEM.json");
   make_command
@@ -239,6 +243,10 @@ void add_scene(CLI::App& app, int&) {
   make_command->add_option("--robot", options->robot, "the problem's robot")->type_name("FILE");
   make_command->add_option("--spheres", options->spheres, "its collision spheres")->type_name("FILE.json");
   make_command->add_option("--tip", options->tip, "its tip")->type_name("LINK");
+  one_of(make_command->add_option("--goal", options->goal,
+                                  "what the scene asks for: the problem's joint vector, or where the tip is then "
+                                  "(default joint)"),
+         {"joint", "position", "pose"});
   make_command->add_option("--resolution", options->resolution_m, "edge of a voxel [m] (default the file's, else 0.02)")
       ->type_name("R");
   one_of(make_command->add_option("--mark", options->mark,

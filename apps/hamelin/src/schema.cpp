@@ -10,7 +10,7 @@ namespace hamelin::app {
 
 namespace {
 
-const std::vector<std::string> names = {"robot", "scene", "primitives", "integrator", "run", "result"};
+const std::vector<std::string> names = {"robot", "scene", "primitives", "integrator", "run", "result", "sweep", "record"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

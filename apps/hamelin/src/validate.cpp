@@ -1,15 +1,18 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <sstream>
 
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "hamelin/study/sweep.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -41,6 +44,19 @@ std::string check_scene(const std::filesystem::path& file) {
   return words;
 }
 
+// Each line by itself; that it belongs to its plan is for `hamelin sweep merge` to say.
+std::string check_records(const std::filesystem::path& file) {
+  std::istringstream in(read_file(file));
+  std::size_t count = 0;
+  for (std::string line; std::getline(in, line);) {
+    const std::string where = fmt::format("{}: line {}", file.string(), ++count);
+    const Json record = parse_json(line, where);
+    check_shipped_schema(record, "record", where);
+    if (!record["result"].is_null()) check_shipped_schema(record["result"], "result", where + ": /result");
+  }
+  return fmt::format("sweep records, {}", count);
+}
+
 std::string check_file(const std::filesystem::path& file, const ValidateOptions& options) {
   switch (kind_of(file)) {
     case Kind::map: {
@@ -61,6 +77,12 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
                          scene::make_options_from_json(read_json(file), file.string()).primitives.size());
     case Kind::spheres:
       return fmt::format("collision spheres, {}", model::check_spheres(file));
+    case Kind::sweep: {
+      const auto plan = study::read_plan_file(file);
+      return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());
+    }
+    case Kind::records:
+      return check_records(file);
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,
@@ -94,11 +116,11 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "validate",
-                              "Check robots, collision spheres, scenes, maps, logs and results, told apart by content",
-                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
-                              "hamelin validate arm.urdf --tip tool0\n"
-                              "hamelin validate run.jsonl --json");
+  auto* command = add_command(
+      app, "validate", "Check robots, collision spheres, scenes, maps, logs, results and sweeps, told apart by content",
+      "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
+      "hamelin validate arm.urdf --tip tool0\n"
+      "hamelin validate run.jsonl --json");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");

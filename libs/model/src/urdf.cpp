@@ -613,12 +613,14 @@ class Reader {
 
   void keep_base_spheres() {
     for (const urdf::Link* link : order_)
-      if (const auto list = spheres_.links.find(link->name); list != spheres_.links.end() && body_of_.at(link->name) < 0)
+      if (const auto list = spheres_.links.find(link->name);
+          list != spheres_.links.end() && body_of_.at(link->name) < 0)
         for (const Sphere& sphere : list->second)
           robot_.base_spheres.push_back({poses_.at(link->name) * sphere.center_m, sphere.radius_m, link->name});
   }
 
-  // Pairs keep the names of the file; a pair with a link that bears no sphere and does not move by itself means nothing.
+  // Pairs keep the names of the file; a pair with a link that bears no sphere and does not move by itself means
+  // nothing.
   void disable_pairs() {
     const auto counts = [&](const std::string& name) {
       const auto list = spheres_.links.find(name);

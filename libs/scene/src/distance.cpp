@@ -308,19 +308,61 @@ std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double con
                               std::span<BoxHit> out) const {
   if (nodes_.empty() || out.empty() || !(limit >= 0.0)) return 0;
   using Entry = Scratch::Entry;
-  // A heap with the smallest key on top; nodes before boxes of the same key, so that equals come in order of index.
+  // A short list, the smallest key last; nodes before boxes of the same key, so that equals come in order of index.
+  // What is found next is mostly near, so it finds its place in a few steps from the end.
   const auto later = [](const Entry& a, const Entry& b) { return a.key != b.key ? a.key > b.key : a.index > b.index; };
-  auto& heap = scratch.heap_;
-  heap.clear();
+  auto& waiting = scratch.waiting_;
+  waiting.clear();
+  const auto put = [&](const Entry& entry) {
+    waiting.push_back(entry);
+    std::size_t at = waiting.size() - 1;
+    for (; at > 0 && later(entry, waiting[at - 1]); --at) waiting[at] = waiting[at - 1];
+    waiting[at] = entry;
+  };
   Query query(p, origin_);
   query.limit_to(limit * limit);
   std::size_t found = 0;
+  // A direction counts as seen by a hair more than the cone asks, so that what is left out early would be later as
+  // well.
+  const double seen_square = cone_cosine * cone_cosine * (1.0 + 1e-9);
+  const bool narrow = cone_cosine > 0.0;
+  const auto in_cone = [&](double along, double square) { return along > 0.0 && along * along > seen_square * square; };
+  // Whether the box's nearest point is seen already.
+  const auto seen_box = [&](const Box& box) {
+    const Eigen::Vector3d away = p - p.cwiseMax(box.lo).cwiseMin(box.hi);
+    const double square = away.squaredNorm();
+    for (std::size_t kept = 0; kept < found; ++kept)
+      if (in_cone(out[kept].direction.dot(away), square)) return true;
+    return false;
+  };
+  // Whether all of a node's slot is: a cone is convex, so its corners decide.
+  const Eigen::Vector3d from_origin = p - origin_;
+  const auto seen_slot = [&](const Node& node, std::size_t slot) {
+    std::array<std::array<double, 2>, 3> away, square;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double at = from_origin[static_cast<Eigen::Index>(axis)];
+      away[axis] = {at - static_cast<double>(node.lo[axis][slot]), at - static_cast<double>(node.hi[axis][slot])};
+      square[axis] = {away[axis][0] * away[axis][0], away[axis][1] * away[axis][1]};
+    }
+    const auto all_in = [&](std::size_t kept) {
+      const Eigen::Vector3d& d = out[kept].direction;
+      for (std::size_t corner = 0; corner < 8; ++corner) {
+        const std::size_t i = corner & 1U, j = corner >> 1U & 1U, k = corner >> 2U;
+        if (!in_cone(d.x() * away[0][i] + d.y() * away[1][j] + d.z() * away[2][k],
+                     square[0][i] + square[1][j] + square[2][k]))
+          return false;
+      }
+      return true;
+    };
+    for (std::size_t kept = 0; kept < found; ++kept)
+      if (all_in(kept)) return true;
+    return false;
+  };
   Lanes squares;
-  heap.push_back({-std::numeric_limits<double>::infinity(), -1});
-  while (!heap.empty()) {
-    const Entry entry = heap.front();
-    std::pop_heap(heap.begin(), heap.end(), later);
-    heap.pop_back();
+  put({-std::numeric_limits<double>::infinity(), -1});
+  while (!waiting.empty()) {
+    const Entry entry = waiting.back();
+    waiting.pop_back();
     if (entry.index >= 0) {
       BoxHit hit = closest_on_box(p, boxes_[static_cast<std::size_t>(entry.index)]);
       hit.box = entry.index;
@@ -340,16 +382,62 @@ std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double con
       if (child < 0) {
         const std::int32_t box = -1 - child;
         const double key = signed_square(p, boxes_[static_cast<std::size_t>(box)]);
-        if (key > limit * limit) continue;
-        heap.push_back({key, box});
+        if (key > limit * limit || (narrow && key > 0.0 && seen_box(boxes_[static_cast<std::size_t>(box)]))) continue;
+        put({key, box});
       } else {
+        if (narrow && squares[slot] > 0.0F && seen_slot(node, slot)) continue;
         // A hair below the computed bound, which may itself have been rounded up.
-        heap.push_back({static_cast<double>(squares[slot]) * (1.0 - 1e-6), -1 - child});
+        put({static_cast<double>(squares[slot]) * (1.0 - 1e-6), -1 - child});
       }
-      std::push_heap(heap.begin(), heap.end(), later);
     }
   }
   return found;
+}
+
+FarTable::FarTable(const BoxField& field, const Ball& region, double edge, double exact_up_to) {
+  constexpr std::size_t block = 4;          // cells along a block's edge
+  constexpr std::size_t cells_max = 100;    // along an axis, a multiple of it
+  constexpr double hair = 1e-6;             // far above the rounding of points, cells and floats [m]
+  constexpr double cell_reach = 0.8660255;  // half a cube's diagonal over its edge
+  if (field.empty() || !(region.radius > 0.0)) return;
+  const auto blocks = static_cast<std::size_t>(
+      std::ceil(std::min(2.0 * region.radius / edge, static_cast<double>(cells_max)) / double{block}));
+  cells_ = block * blocks;
+  edge_ = std::max(edge, 2.0 * region.radius / static_cast<double>(cells_));
+  per_edge_ = 1.0 / edge_;
+  low_ = region.center - Eigen::Vector3d::Constant(0.5 * edge_ * static_cast<double>(cells_));
+  bounds_.assign(cells_ * cells_ * cells_, -float_infinity);
+  const auto middle = [&](const std::array<std::size_t, 3>& cell, double half) {
+    return Eigen::Vector3d(low_ + edge_ * Eigen::Vector3d(static_cast<double>(cell[0]) + half,
+                                                          static_cast<double>(cell[1]) + half,
+                                                          static_cast<double>(cell[2]) + half));
+  };
+  BoxHit hit;
+  std::int32_t hint = -1;
+  const auto distance = [&](const Eigen::Vector3d& p) {
+    (void)field.nearest(p, std::numeric_limits<double>::infinity(), hit, hint);
+    hint = hit.box;
+    return hit.distance;
+  };
+  const double block_reach = cell_reach * static_cast<double>(block) * edge_;
+  std::array<std::size_t, 3> first{}, cell{};
+  for (first[0] = 0; first[0] < cells_; first[0] += block)
+    for (first[1] = 0; first[1] < cells_; first[1] += block)
+      for (first[2] = 0; first[2] < cells_; first[2] += block) {
+        const Eigen::Vector3d center = middle(first, 0.5 * double{block});
+        if ((center - region.center).norm() > region.radius + block_reach) continue;
+        const double around = distance(center);
+        const bool coarse = around - block_reach > exact_up_to;
+        // deep inside: nothing is beyond any limit there
+        if (around < -block_reach) continue;
+        for (cell[0] = first[0]; cell[0] < first[0] + block; ++cell[0])
+          for (cell[1] = first[1]; cell[1] < first[1] + block; ++cell[1])
+            for (cell[2] = first[2]; cell[2] < first[2] + block; ++cell[2]) {
+              const Eigen::Vector3d at = middle(cell, 0.5);
+              const double bound = coarse ? around - (at - center).norm() : distance(at);
+              bounds_[(cell[0] * cells_ + cell[1]) * cells_ + cell[2]] = round_down(bound - hair);
+            }
+      }
 }
 
 }  // namespace hamelin::scene

@@ -16,6 +16,9 @@ namespace hamelin::scene {
 namespace {
 
 constexpr double cone_cosine = 0.86602540378443865;  // 30°
+constexpr double far_table_edge_m = 0.05;
+// Tables are exact up to influence + this: no sphere of an arm is much larger.
+constexpr double far_table_radius_m = 0.2;
 
 BoxField field_of(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin) {
   std::vector<Box> boxes;
@@ -54,6 +57,8 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
 
   const std::vector<Cell> occupied = crop(data.occupied, data.resolution, region);
   map_ = field_of(occupied, data.resolution, center);
+  const double exact_up_to = influence + far_table_radius_m;
+  far_from_map_ = FarTable(map_, reachable, far_table_edge_m, exact_up_to);
 
   summary_.has_map = true;
   summary_.map_file = data.file;
@@ -73,6 +78,7 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
     std::vector<Cell> unknown = crop(data.unknown, data.resolution, region);
     if (map->keep_out_radius_m > 0.0) unknown = cut_out(unknown, data.resolution, {center, map->keep_out_radius_m});
     unknown_ = field_of(unknown, data.resolution, center);
+    far_from_unknown_ = FarTable(unknown_, reachable, far_table_edge_m, exact_up_to);
     summary_.unknown_boxes = unknown_.boxes().size();
   }
   if (!data.occupied.empty() && occupied.empty())
@@ -104,17 +110,29 @@ double Environment::clearance_to(const Obstacle& obstacle, std::span<const Eigen
   return smallest;
 }
 
-bool Environment::shown(std::size_t obstacle, std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
-                        double time_s, View view) const {
+bool Environment::shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const {
   const Obstacle& o = obstacles_[obstacle];
-  if (view == View::judge) return exists(o, time_s);
-  if (o.known || !o.visible_within_m) return visible(o, time_s, 0.0);
-  return visible(o, time_s, clearance_to(o, centers, radii, time_s, std::numeric_limits<double>::infinity()));
+  if (!exists(o, time_s)) return false;
+  const bool told = !o.judge_only && (o.known || (obstacle < seen.size() && seen[obstacle] != 0));
+  return view == View::judge || told == (view == View::planner);
+}
+
+int Environment::see(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
+                     std::span<std::uint8_t> seen) const {
+  for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+    const Obstacle& o = obstacles_[k];
+    if (o.known || o.judge_only || !o.visible_within_m || seen[k] != 0 || !exists(o, time_s)) continue;
+    // any limit above visible_within_m will do
+    if (!visible(o, time_s, clearance_to(o, centers, radii, time_s, 2.0 * *o.visible_within_m + 1.0))) continue;
+    seen[k] = 1;
+    return static_cast<int>(k);
+  }
+  return -1;
 }
 
 std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
-                                 double influence, double time_s, Scratch& scratch, std::span<Contact> out,
-                                 View view) const {
+                                 double influence, double time_s, Scratch& scratch, std::span<Contact> out, View view,
+                                 std::span<const std::uint8_t> seen) const {
   auto& found = scratch.found_;
   found.clear();
   std::array<BoxHit, points_per_sphere> hits;
@@ -123,20 +141,23 @@ std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::
     found.push_back({static_cast<int>(sphere), obstacle, center_distance - radii[sphere],
                      centers[sphere] - radii[sphere] * direction, point, direction, velocity});
   };
-  const auto add_boxes = [&](const BoxField& field, BoxField::Scratch& room, int id, std::size_t sphere) {
+  const auto add_boxes = [&](const BoxField& field, const FarTable& far, BoxField::Scratch& room, int id,
+                             std::size_t sphere) {
     if (field.empty()) return;
     const Eigen::Vector3d local = map_pose_inverse_ * centers[sphere];
+    if (far.beyond(local, influence + radii[sphere])) return;
     const std::size_t count = field.several(local, influence + radii[sphere], cone_cosine, room, hits);
     for (std::size_t i = 0; i < count; ++i)
       add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction,
           Eigen::Vector3d::Zero());
   };
-  for (std::size_t sphere = 0; sphere < centers.size(); ++sphere) {
-    add_boxes(map_, scratch.map_, Contact::map, sphere);
-    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, sphere);
+  for (std::size_t sphere = 0; view != View::hidden && sphere < centers.size(); ++sphere) {
+    add_boxes(map_, far_from_map_, scratch.map_, Contact::map, sphere);
+    if (summary_.unknown == UnknownPolicy::block)
+      add_boxes(unknown_, far_from_unknown_, scratch.unknown_, Contact::unknown, sphere);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
-    if (!shown(k, centers, radii, time_s, view)) continue;
+    if (!shown(k, time_s, view, seen)) continue;
     const Obstacle& obstacle = obstacles_[k];
     const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
     const double ball = bounding_radius(obstacle);
@@ -167,24 +188,25 @@ std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::
 }
 
 double Environment::clearance(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-                              double limit, View view) const {
+                              double limit, View view, std::span<const std::uint8_t> seen) const {
   double smallest = limit;
   BoxHit hit;
-  const auto consider = [&](const BoxField& field) {
-    if (field.empty()) return;
+  const auto consider = [&](const BoxField& field, const FarTable& far) {
+    if (field.empty() || view == View::hidden) return;
     std::int32_t hint = -1;
     for (std::size_t i = 0; i < centers.size(); ++i) {
       // Beyond contact the search must not end at a sphere's radius: a deeper one may follow.
-      if (!field.nearest(map_pose_inverse_ * centers[i], std::max(0.0, smallest + radii[i]), hit, hint)) continue;
+      const Eigen::Vector3d local = map_pose_inverse_ * centers[i];
+      const double near = std::max(0.0, smallest + radii[i]);
+      if (far.beyond(local, near) || !field.nearest(local, near, hit, hint)) continue;
       hint = hit.box;
       smallest = std::min(smallest, hit.distance - radii[i]);
     }
   };
-  consider(map_);
-  if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
+  consider(map_, far_from_map_);
+  if (summary_.unknown == UnknownPolicy::block) consider(unknown_, far_from_unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (shown(k, centers, radii, time_s, view))
-      smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
+    if (shown(k, time_s, view, seen)) smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
   return smallest;
 }
 

@@ -12,6 +12,8 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::scene {
@@ -236,6 +238,30 @@ MakeMapOptions make_options_from_json(const Json& document, const std::string& w
   return options;
 }
 
+namespace {
+
+// The problem's goal as the scene shall have it.
+Json goal_json(const Eigen::VectorXd& q, const ProblemOptions& options, const std::string& where) {
+  if (options.goal == GoalType::joint) return {{"type", "joint"}, {"q", std::vector<double>(q.begin(), q.end())}};
+  model::RobotOptions of_robot;
+  if (!options.tip.empty()) of_robot.tip = options.tip;
+  const model::Model model(model::read_robot(options.robot, of_robot));
+  if (q.size() != model.dof())
+    throw Error(ErrorCode::invalid, fmt::format("{}: /goal: {} numbers given, expected {}, one a joint of '{}'", where,
+                                                q.size(), model.dof(), model.robot().name));
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, q);
+  const geometry::SE3 tip = dynamics::tip_pose(model, ws);
+  Json goal{{"type", to_string(options.goal)}, {"position_m", {tip.p().x(), tip.p().y(), tip.p().z()}}};
+  if (options.goal == GoalType::pose) {
+    const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(tip.R());
+    goal["quaternion_wxyz"] = {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
+  }
+  return goal;
+}
+
+}  // namespace
+
 MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options) {
   const Json document = read_json(problem);
   const auto directory = options.output.parent_path();
@@ -255,7 +281,9 @@ MakeReport make_scene_from_problem(const std::filesystem::path& problem, const P
     if (!options.spheres.empty()) out["robot"]["spheres"] = relative(options.spheres);
     out["gravity_m_s2"] = {0.0, 0.0, -9.81};
     out["start"] = {{"q", document.at("start")}};
-    out["goals"] = {{{"type", "joint"}, {"q", document.at("goal")}}};
+    const auto q = document.at("goal").get<std::vector<double>>();
+    const Eigen::Map<const Eigen::VectorXd> goal(q.data(), static_cast<Eigen::Index>(q.size()));
+    out["goals"] = Json::array({goal_json(goal, options, problem.string())});
     out["map"] = {{"file", map.output.filename().string()}};
     for (const Json& from : document.at("obstacles")) {
       Json obstacle{{"name", from.at("name")}, {"type", from.at("type")}};

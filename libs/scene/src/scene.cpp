@@ -49,8 +49,30 @@ class Reader {
     return {(*value)[0].get<double>(), (*value)[1].get<double>(), (*value)[2].get<double>()};
   }
   [[nodiscard]] Eigen::VectorXd joints(const char* key) const {
+    if (const Json* value = find(key); value != nullptr)
+      for (std::size_t i = 0; i < value->size(); ++i)
+        if (!(*value)[i].is_number())
+          fail(fmt::format("{}/{}", key, i).c_str(), "is a list, expected a number: lists make a goal of type path");
     const auto values = get<std::vector<double>>(key, {});
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  }
+  // Way-points as columns.
+  [[nodiscard]] Eigen::MatrixXd joint_path(const char* key) const {
+    const Json& points = *find(key);
+    if (points.empty()) fail(key, "is empty, expected at least one way-point");
+    Eigen::MatrixXd path;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::string place = fmt::format("{}/{}", key, i);
+      if (!points[i].is_array() || points[i].empty())
+        fail(place.c_str(), "expected a way-point, a list of one number per joint");
+      const auto q = points[i].get<std::vector<double>>();
+      const auto size = static_cast<Eigen::Index>(q.size());
+      if (i == 0) path.resize(size, static_cast<Eigen::Index>(points.size()));
+      if (size != path.rows())
+        fail(place.c_str(), fmt::format("{} numbers given, expected {} as in the first way-point", size, path.rows()));
+      path.col(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::VectorXd>(q.data(), size);
+    }
+    return path;
   }
   [[nodiscard]] Quaternion quaternion() const {
     Quaternion c{1.0, 0.0, 0.0, 0.0};
@@ -123,7 +145,8 @@ Obstacle read_obstacle(const Reader& in) {
 Goal read_goal(const Reader& in) {
   Goal goal;
   const auto type = in.get<std::string>("type", "");
-  goal.type = type == "joint" ? GoalType::joint : type == "position" ? GoalType::position : GoalType::pose;
+  const bool path = type == "path";
+  goal.type = type == "joint" || path ? GoalType::joint : type == "position" ? GoalType::position : GoalType::pose;
   const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose;
   const std::string kind = type + " goal";
   joint ? in.need("q", kind) : in.refuse("q", kind);
@@ -131,7 +154,12 @@ Goal read_goal(const Reader& in) {
   pose ? in.need("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
   if (joint) in.refuse("tolerance_m", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
-  goal.q = in.joints("q");
+  if (path) {
+    goal.path = in.joint_path("q");
+    goal.q = goal.path.rightCols(1);
+  } else {
+    goal.q = in.joints("q");
+  }
   goal.pose = in.pose();
   goal.quaternion_wxyz = in.quaternion();
   goal.tolerance_m = in.get("tolerance_m", joint ? 0.0 : pose ? 0.01 : 0.02);
@@ -171,6 +199,8 @@ Actuation read_actuation(const Reader& in, double step_s) {
   actuation.delay_s = in.get("delay_s", 0.0);
   actuation.joint_noise_rad = in.get("joint_noise_rad", 0.0);
   actuation.planner_mass_scale = in.get("planner_mass_scale", 1.0);
+  actuation.torque_rate_max_Nm_s = in.maybe<double>("torque_rate_max_Nm_s");
+  actuation.coulomb_friction_share = in.get("coulomb_friction_share", 0.0);
   const double steps = actuation.control_period_s / step_s;
   if (!(std::round(steps) >= 1.0 && std::abs(steps - std::round(steps)) <= 1e-9 * steps))
     in.fail("control_period_s", fmt::format("{} s is {} steps of {} s, expected a whole number",
@@ -180,6 +210,8 @@ Actuation read_actuation(const Reader& in, double step_s) {
                                             actuation.control_period_s, step_s));
   if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
     in.fail("delay_s", fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
+  if (actuation.type == ActuationType::ideal && actuation.torque_rate_max_Nm_s)
+    in.fail("torque_rate_max_Nm_s", "is not allowed, only sampled actuation has torques that change from tick to tick");
   return actuation;
 }
 
@@ -195,6 +227,10 @@ std::string_view to_string(GoalType type) noexcept {
       return "pose";
   }
   return "unknown";
+}
+
+std::string_view type_name(const Goal& goal) noexcept {
+  return goal.path.size() > 0 ? "path" : to_string(goal.type);
 }
 
 std::string_view to_string(ActuationType type) noexcept {
@@ -307,8 +343,11 @@ Json resolved_json(const Scene& scene) {
   if (scene.start_v.size() > 0) out["start"]["v"] = array(scene.start_v);
   out["goals"] = Json::array();
   for (const Goal& goal : scene.goals) {
-    Json g{{"type", to_string(goal.type)}};
-    if (goal.type == GoalType::joint) {
+    Json g{{"type", type_name(goal)}};
+    if (goal.path.size() > 0) {
+      g["q"] = Json::array();
+      for (Eigen::Index i = 0; i < goal.path.cols(); ++i) g["q"].push_back(array(goal.path.col(i)));
+    } else if (goal.type == GoalType::joint) {
       g["q"] = array(goal.q);
     } else {
       g["position_m"] = array(goal.pose.p());
@@ -353,7 +392,9 @@ Json resolved_json(const Scene& scene) {
                       {"control_period_s", a.control_period_s},
                       {"delay_s", a.delay_s},
                       {"joint_noise_rad", a.joint_noise_rad},
-                      {"planner_mass_scale", a.planner_mass_scale}};
+                      {"planner_mass_scale", a.planner_mass_scale},
+                      {"torque_rate_max_Nm_s", or_null(a.torque_rate_max_Nm_s)},
+                      {"coulomb_friction_share", a.coulomb_friction_share}};
   out["planner"] = scene.planner ? choice(*scene.planner) : Json(nullptr);
   out["integrator"] = choice(scene.integrator);
   out["stall"] = nullptr;

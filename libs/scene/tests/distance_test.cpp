@@ -170,6 +170,29 @@ TEST_CASE("several returns what its definition says", "[scene][property]") {
   }
 }
 
+TEST_CASE("a far table never says far of what is near, and says it of most that is far", "[scene][property]") {
+  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{5}));
+  CAPTURE(seed);
+  Rng rng(seed);
+  const BoxField field(random_boxes(rng, 1 + rng.below(200)));
+  const Ball region{rng.uniform(0.0, 0.5) * test::random_direction(rng), 1.0};
+  const FarTable table(field, region, 0.05, 0.3);
+  int far = 0, said = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector3d p = region.center + 1.2 * rng.uniform() * test::random_direction(rng);
+    const double limit = rng.uniform(0.0, 0.3), truth = test::brute_force_distance(field.boxes(), p);
+    if (table.beyond(p, limit)) {
+      CHECK(truth > limit);
+      ++said;
+    }
+    far += truth > limit + 0.0867 && (p - region.center).norm() < 1.0 ? 1 : 0;  // a cell's diagonal
+  }
+  CHECK(said >= far);
+  CHECK(far > 100);
+  CHECK_FALSE(FarTable().beyond(region.center, 0.0));
+  CHECK_FALSE(FarTable(BoxField(), region, 0.05, 0.3).beyond(region.center, 0.0));
+}
+
 TEST_CASE("queries far from the origin, on wide boxes and on none stay exact", "[scene][unit]") {
   const BoxField none;
   BoxHit hit;

@@ -159,8 +159,21 @@ TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
   std::array<Contact, 8> out;
   CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out) == 0);
   CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::judge) == 2);
-  REQUIRE(environment.closest(near, radii, 0.5, 0.0, scratch, out) == 1);
+  CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::hidden) == 2);
+  // nobody sees what he only thinks of
+  CHECK(environment.closest(near, radii, 0.5, 0.0, scratch, out) == 0);
+  std::array<std::uint8_t, 2> seen{};
+  CHECK(environment.see(far, radii, 0.0, seen) == -1);
+  CHECK(environment.closest(near, radii, 0.5, 0.0, scratch, out, View::planner, seen) == 0);
+  // what came near is remembered
+  CHECK(environment.see(near, radii, 0.0, seen) == 1);
+  CHECK(environment.see(near, radii, 0.0, seen) == -1);
+  CHECK(environment.see(far, radii, 0.0, seen) == -1);
+  REQUIRE(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::planner, seen) == 1);
   CHECK(out[0].obstacle == 1);
+  REQUIRE(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::hidden, seen) == 1);
+  CHECK(out[0].obstacle == 0);
+  CHECK(environment.clearance(far, radii, 0.0, infinity, View::planner, seen) == Approx(0.3));
   CHECK(environment.clearance(far, radii, 0.0, infinity) == Approx(0.3));
   CHECK(environment.clearance(far, radii, 0.0, infinity, View::planner) == infinity);
 }

@@ -1,4 +1,5 @@
 #include "hamelin/scene/make.hpp"
+#include "hamelin/model/robot_io.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -214,5 +215,38 @@ TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][
   CHECK_THROWS_WITH(
       make_scene_from_problem(directory / "box_0001.json", {"r", "", "", 0.04, Mark::touch, directory / "x.json"}),
       Catch::Matchers::Contains("is no problem"));
+  std::filesystem::remove_all(directory);
+}
+
+TEST_CASE("a problem's goal may be asked for as where the tip is then", "[scene][unit]") {
+  const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
+  if (!problems || !robots) return;
+  const auto directory = temporary("hamelin_scene_goal");
+  std::filesystem::create_directories(directory);
+  ProblemOptions options;
+  options.robot = *robots / "panda.urdf";
+  options.tip = "panda_grasptarget";
+  options.resolution_m = 0.04;
+  options.output = directory / "scene.json";
+  const auto source = *problems / "box_0001.json";
+  // the tip by the product of exponentials
+  const auto robot = model::read_robot(options.robot, {options.tip, std::nullopt});
+  const auto q = read_json(source)["goal"].get<std::vector<double>>();
+  geometry::SE3 tip;
+  for (std::size_t i = 0; i < q.size(); ++i)
+    tip = tip * geometry::SE3::exp(geometry::Vector6d(robot.links[i].joint.screw * q[i]));
+  tip = tip * robot.tip.pose;
+  for (const GoalType type : {GoalType::position, GoalType::pose}) {
+    options.goal = type;
+    make_scene_from_problem(source, options);
+    const Scene scene = read_scene(options.output);
+    REQUIRE(scene.goals.size() == 1);
+    CHECK(scene.goals[0].type == type);
+    CHECK((scene.goals[0].pose.p() - tip.p()).norm() < 1e-12);
+    if (type == GoalType::pose) CHECK((scene.goals[0].pose.R() - tip.R()).norm() < 1e-12);
+    CHECK(scene.model.self_collision);
+  }
+  options.robot = directory / "absent.urdf";
+  CHECK_THROWS_AS(make_scene_from_problem(source, options), Error);
   std::filesystem::remove_all(directory);
 }

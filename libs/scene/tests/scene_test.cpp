@@ -252,3 +252,51 @@ TEST_CASE("set_pointer refuses in one line and leaves the document alone", "[sce
     CHECK(message.find('\n') == std::string::npos);
   }
 }
+
+TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[scene][unit]") {
+  Json document = small_document();
+  document["goals"] = {{{"type", "path"}, {"q", {{0.1, 0.2}, {0.3, 0.4}, {0.5, 0.75}}}, {"tolerance_rad", 0.1}}};
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  const Goal& goal = scene.goals.at(0);
+  CHECK(goal.type == GoalType::joint);
+  CHECK(type_name(goal) == "path");
+  REQUIRE(goal.path.cols() == 3);
+  CHECK(goal.path(1, 0) == 0.2);
+  CHECK(goal.q == Eigen::Vector2d(0.5, 0.75));
+  CHECK(goal.tolerance_rad == 0.1);
+  CHECK(goal.speed_max == 0.05);
+  const Json resolved = resolved_json(scene);
+  CHECK(resolved["goals"][0]["q"] == document["goals"][0]["q"]);
+  CHECK(resolved["goals"][0]["type"] == "path");
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+
+  const auto refusal = [&](const Json& changed_goal) -> std::string {
+    document["goals"] = {changed_goal};
+    try {
+      (void)scene_from_json(document, ".", "x.json");
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  CHECK_THAT(refusal({{"type", "path"}, {"q", Json::array()}}), Catch::Contains("/goals/0/q: is empty"));
+  CHECK_THAT(refusal({{"type", "path"}, {"q", {0.1, 0.2}}}), Catch::Contains("/goals/0/q/0: expected a way-point"));
+  CHECK_THAT(refusal({{"type", "path"}, {"q", {{0.1, 0.2}, {0.3}}}}),
+             Catch::Contains("/goals/0/q/1: 1 numbers given, expected 2"));
+  CHECK_THAT(refusal({{"type", "joint"}, {"q", {{0.1, 0.2}}}}), Catch::Contains("/goals/0/q/0: is a list"));
+  CHECK_THAT(refusal({{"type", "path"}}), Catch::Contains("/goals/0/q: is missing"));
+}
+
+TEST_CASE("friction and a torque's rate are read, and read back", "[scene][unit]") {
+  Json document = small_document();
+  document["actuation"] = {{"type", "sampled"}, {"torque_rate_max_Nm_s", 1000.0}, {"coulomb_friction_share", 0.05}};
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  CHECK(scene.actuation.torque_rate_max_Nm_s == 1000.0);
+  CHECK(scene.actuation.coulomb_friction_share == 0.05);
+  const Json resolved = resolved_json(scene);
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+  document["actuation"]["coulomb_friction_share"] = 1.5;
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("coulomb_friction_share"));
+  document["actuation"] = {{"torque_rate_max_Nm_s", 1000.0}};
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("torque_rate_max_Nm_s"));
+}

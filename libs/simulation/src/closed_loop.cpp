@@ -18,8 +18,18 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
+// The arm is looked at this far from itself, at most.
+constexpr double self_influence_max_m = 0.05;
 // Obstacles are looked for this far where neither planner nor anything else says more.
 constexpr double default_influence_m = 0.2;
+// Friction is smooth below this speed [rad/s or m/s].
+constexpr double friction_speed = 0.01;
+// Figures that must be zero are so up to this share of the kinetic energy and 1 J: far above rounding, far below what
+// matters.
+constexpr double rounding_share = 1e-9;
+// What the energy account is off by is the scheme's own: a second-order step that resolves the motion at all (h times
+// its frequency below 0.5) errs by (0.5)²/12 = 2 % of the energy in motion or exchanged.
+constexpr double account_share = 0.02;
 // Motion in unknown space that is to be crossed slowly is asked for at this share of the speed.
 constexpr double slow_speed_scale = 0.25;
 
@@ -93,7 +103,21 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
                       fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
                                   scene.name, plant_.robot().name));
         scratch_ = std::make_unique<scene::Environment::Scratch>(*environment_, spheres);
-        certificate_ = std::make_unique<Certificate>(plant_, *environment_, influence_);
+        if (scene.model.self_collision) {
+          if (spheres == 0)
+            throw Error(ErrorCode::invalid, fmt::format("{}: /model/self_collision: '{}' has no collision spheres, "
+                                                        "expected some or false",
+                                                        scene.name, plant_.robot().name));
+          self_ = std::make_unique<scene::SelfField>(plant_);
+          self_influence_ = std::min(influence_, self_influence_max_m);
+          if (!self_->note().empty()) result_.warnings.push_back(self_->note());
+          self_contacts_.resize(self_->pairs().size());
+          self_shown_.resize(self_->pairs().size());
+          self_clearance_.assign(self_->pairs().size(), self_influence_);
+          self_clearance_before_ = self_clearance_;
+        }
+        certificate_ = std::make_unique<Certificate>(plant_, *environment_, influence_, self_.get(), self_influence_);
+        seen_.assign(environment_->obstacles().size(), 0);
         for (const auto& obstacle : environment_->obstacles())
           hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
 
@@ -104,12 +128,17 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         clearance_before_ = clearance_;
         for (const auto& sphere : plant_.spheres()) radii_.push_back(sphere.radius);
         command_ = std::make_unique<planning::CommandBuffers>(static_cast<std::size_t>(n), shown_.size());
-        for (auto* x :
-             {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_, &tau_})
+        for (auto* x : {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_,
+                        &q_asked_, &node_velocity_, &turning_, &tau_})
           *x = VectorXd::Zero(n);
         if (scene.model.torque_limits)
           limits_ = limits_of(plant_.robot(), &model::Joint::effort_max, std::numeric_limits<double>::infinity());
         plant_damping_ = plant_damping(scene, plant_.robot());
+        if (scene.actuation.coulomb_friction_share > 0.0)
+          friction_ =
+              scene.actuation.coulomb_friction_share * limits_of(plant_.robot(), &model::Joint::effort_max, 0.0);
+        proves_energy_ =
+            scene.actuation.type == scene::ActuationType::ideal && integrator_->name() == "hamel-variational";
         channels_.held_torque = VectorXd::Zero(n);
         channels_.damping = VectorXd::Zero(n);
         channels_.gyroscopic.reserve(shown_.size());
@@ -118,7 +147,11 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
               1L, whole_multiple(scene.actuation.control_period_s, scene.step_s, scene.name, "control_period_s"));
           delay_periods_ =
               whole_multiple(scene.actuation.delay_s, scene.actuation.control_period_s, scene.name, "delay_s");
-          delayed_.assign(static_cast<std::size_t>(delay_periods_) + 1, VectorXd::Zero(n));
+          // until the first torque arrives the arm is held against gravity
+          q_asked_ = scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n);
+          torque_before_ = VectorXd::Zero(n);
+          dynamics::gravity_torque(plant_, ws_, q_asked_, torque_before_);
+          delayed_.assign(static_cast<std::size_t>(delay_periods_) + 1, torque_before_);
         }
         const double mass_scale = scene.actuation.planner_mass_scale;
         return mass_scale == 1.0
@@ -139,12 +172,17 @@ void ClosedLoop::check_scene() const {
   if (scene_.start_q.size() > 0) sized(scene_.start_q, "/start/q");
   if (scene_.start_v.size() > 0) sized(scene_.start_v, "/start/v");
   for (std::size_t i = 0; i < scene_.goals.size(); ++i)
-    if (scene_.goals[i].type == scene::GoalType::joint) sized(scene_.goals[i].q, fmt::format("/goals/{}/q", i));
+    if (scene_.goals[i].type == scene::GoalType::joint)
+      sized(scene_.goals[i].q, fmt::format("/goals/{}/q{}", i, scene_.goals[i].path.size() > 0 ? "/0" : ""));
+  if (scene_.actuation.coulomb_friction_share > 0.0)
+    for (const auto& link : plant_.robot().links)
+      if (!link.joint.effort_max)
+        throw Error(ErrorCode::invalid,
+                    fmt::format("{}: /actuation/coulomb_friction_share: is a share of effort limits, but joint '{}' of "
+                                "'{}' has none",
+                                scene_.name, link.joint.name, plant_.robot().name));
   if (scene_.goals.empty())
     throw Error(ErrorCode::invalid, fmt::format("{}: /goals: is empty, expected at least one goal", scene_.name));
-  if (scene_.model.self_collision)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /model/self_collision: is not modelled in this version, expected false", scene_.name));
 }
 
 planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double influence) const {
@@ -160,7 +198,7 @@ planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double i
     out.tolerance_m = goal.tolerance_m;
     out.tolerance_rad = goal.tolerance_rad;
     out.speed_max = goal.speed_max;
-    data.add_goal(out, goal.type == scene::GoalType::joint ? goal.q : VectorXd());
+    data.add_goal(out, goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
   }
   constexpr double none = std::numeric_limits<double>::infinity();
   const auto& robot = nominal.robot();
@@ -170,7 +208,12 @@ planning::SetupData ClosedLoop::setup_data(const model::Model& nominal, double i
   }
   if (scene_.model.velocity_limits) data.velocity_max = limits_of(robot, &model::Joint::velocity_max, none);
   if (scene_.model.torque_limits) data.effort_max = limits_of(robot, &model::Joint::effort_max, none);
+  if (scene_.actuation.torque_rate_max_Nm_s)
+    data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene_.actuation.torque_rate_max_Nm_s);
+  data.sampled = scene_.actuation.type == scene::ActuationType::sampled;
+  data.delay_s = scene_.actuation.delay_s;
   data.control_period_s = static_cast<double>(control_steps_) * scene_.step_s;
+  data.self_collision = scene_.model.self_collision;
   data.influence_m = influence;
   data.map_resolution_m = environment_->summary().resolution_m;
   data.seed = scene_.seed;
@@ -189,44 +232,86 @@ void ClosedLoop::log(std::int32_t level, std::string_view line) {
 
 std::size_t ClosedLoop::closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) {
   if (!environment_->has_obstacles()) return 0;
-  q_shown_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
-  dynamics::forward_kinematics(plant_, ws_, q_shown_);
+  q_asked_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
+  dynamics::forward_kinematics(plant_, ws_, q_asked_);
   dynamics::sphere_centers(plant_, ws_, centers_);
-  const std::size_t found =
-      environment_->closest(centers_, radii_, std::min(influence_m, influence_), state_.time_s, *scratch_, contacts_);
+  const std::size_t found = environment_->closest(
+      centers_, radii_, std::min(influence_m, influence_), state_.time_s, *scratch_,
+      std::span(contacts_).first(std::min(contacts_.size(), out.size())), scene::View::planner, seen_);
   const std::size_t written = std::min({found, contacts_.size(), out.size()});
   for (std::size_t i = 0; i < written; ++i) out[i] = to_c(contacts_[i]);
+  return found;
+}
+
+std::size_t ClosedLoop::closest_self(std::span<const double> q, double influence_m,
+                                     std::span<hamelin_self_contact> out) {
+  if (!self_) return 0;
+  q_asked_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
+  dynamics::forward_kinematics(plant_, ws_, q_asked_);
+  dynamics::sphere_centers(plant_, ws_, centers_);
+  const auto room = std::span(self_contacts_).first(std::min(self_contacts_.size(), out.size()));
+  const std::size_t found = self_->closest(centers_, std::min(influence_m, self_influence_), room);
+  const std::size_t written = std::min(found, room.size());
+  for (std::size_t i = 0; i < written; ++i) out[i] = to_c(room[i]);
   return found;
 }
 
 void ClosedLoop::look(const VectorXd& q) {
   dynamics::forward_kinematics(plant_, ws_, q);
   clearance_now_ = influence_;
+  self_clearance_now_ = self_influence_;
   nearest_sphere_ = -1;
   contact_count_ = 0;
   speed_scale_ = 1.0;
-  if (!environment_->has_obstacles()) return;
-  dynamics::sphere_centers(plant_, ws_, centers_);
-  const std::size_t found = environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_, contacts_);
-  contact_count_ = std::min(found, contacts_.size());
-  for (std::size_t i = 0; i < contact_count_; ++i) shown_[i] = to_c(contacts_[i]);
-  std::size_t judged = contact_count_;
-  if (hidden_obstacles_)
-    judged = std::min(contacts_.size(), environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_,
-                                                              contacts_, scene::View::judge));
+  const bool obstacles = environment_->has_obstacles();
+  if (obstacles || self_) dynamics::sphere_centers(plant_, ws_, centers_);
+  if (obstacles) look_at_obstacles();
+  if (self_) look_at_itself();
+}
+
+void ClosedLoop::look_at_obstacles() {
   std::fill(clearance_.begin(), clearance_.end(), influence_);
-  for (std::size_t i = 0; i < judged; ++i) {
-    const auto& contact = contacts_[i];
-    auto& clearance = clearance_[static_cast<std::size_t>(contact.sphere)];
-    clearance = std::min(clearance, contact.distance);
-    if (contact.distance < clearance_now_) {
-      clearance_now_ = contact.distance;
-      nearest_sphere_ = contact.sphere;
-      nearest_obstacle_ = contact.obstacle;
+  const auto judge = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& contact = contacts_[i];
+      auto& clearance = clearance_[static_cast<std::size_t>(contact.sphere)];
+      clearance = std::min(clearance, contact.distance);
+      if (contact.distance < clearance_now_) {
+        clearance_now_ = contact.distance;
+        nearest_sphere_ = contact.sphere;
+        nearest_obstacle_ = contact.obstacle;
+      }
     }
-  }
+  };
+  const auto contacts = [&](scene::View view) {
+    return std::min(contacts_.size(), environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_,
+                                                            contacts_, view, seen_));
+  };
+  if (hidden_obstacles_)
+    for (int found = environment_->see(centers_, radii_, state_.time_s, seen_); found >= 0;
+         found = environment_->see(centers_, radii_, state_.time_s, seen_))
+      recorder_->event(state_.time_s, fmt::format("obstacle '{}' comes into sight",
+                                                  environment_->obstacles()[static_cast<std::size_t>(found)].name));
+  contact_count_ = contacts(scene::View::planner);
+  for (std::size_t i = 0; i < contact_count_; ++i) shown_[i] = to_c(contacts_[i]);
+  judge(contact_count_);
+  if (hidden_obstacles_) judge(contacts(scene::View::hidden));
   if (scene_.map && scene_.map->unknown == scene::UnknownPolicy::slow && environment_->in_slow_space(centers_, radii_))
     speed_scale_ = slow_speed_scale;
+}
+
+void ClosedLoop::look_at_itself() {
+  self_contact_count_ = self_->closest(centers_, self_influence_, self_contacts_);
+  std::fill(self_clearance_.begin(), self_clearance_.end(), self_influence_);
+  for (std::size_t i = 0; i < self_contact_count_; ++i) {
+    const auto& contact = self_contacts_[i];
+    self_shown_[i] = to_c(contact);
+    self_clearance_[static_cast<std::size_t>(contact.pair)] = contact.distance;
+    if (contact.distance < self_clearance_now_) {
+      self_clearance_now_ = contact.distance;
+      nearest_pair_ = contact.pair;
+    }
+  }
 }
 
 hamelin_contact ClosedLoop::to_c(const scene::Contact& contact) {
@@ -239,6 +324,19 @@ hamelin_contact ClosedLoop::to_c(const scene::Contact& contact) {
     out.obstacle_point_world_m[i] = contact.obstacle_point[i];
     out.direction_world[i] = contact.direction[i];
     out.obstacle_velocity_world_m_s[i] = contact.obstacle_velocity[i];
+  }
+  return out;
+}
+
+hamelin_self_contact ClosedLoop::to_c(const scene::SelfContact& contact) {
+  hamelin_self_contact out{};
+  out.sphere_a = contact.sphere_a;
+  out.sphere_b = contact.sphere_b;
+  out.distance_m = contact.distance;
+  for (int i = 0; i < 3; ++i) {
+    out.point_a_world_m[i] = contact.point_a[i];
+    out.point_b_world_m[i] = contact.point_b[i];
+    out.direction_world[i] = contact.direction[i];
   }
   return out;
 }
@@ -305,17 +403,29 @@ std::string ClosedLoop::where_nearest() const {
                      plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_, what);
 }
 
+std::string ClosedLoop::parts_of(int pair) const {
+  const auto& both = self_->pairs()[static_cast<std::size_t>(pair)];
+  return fmt::format("'{}' and '{}'", self_->parts()[static_cast<std::size_t>(both.part_a)].name,
+                     self_->parts()[static_cast<std::size_t>(both.part_b)].name);
+}
+
 bool ClosedLoop::call_planner() {
   q_shown_ = state_.q;
   v_shown_ = v_;
   if (scene_.actuation.joint_noise_rad > 0.0 && scene_.actuation.type == scene::ActuationType::sampled)
     for (auto& angle : q_shown_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  const hamelin_tick tick{sizeof(hamelin_tick), static_cast<std::uint64_t>(state_.k),
-                          state_.time_s,        q_shown_.data(),
-                          v_shown_.data(),      shown_.data(),
-                          contact_count_,       goal_index_,
-                          speed_scale_,         nullptr,
-                          0};
+  hamelin_tick tick{};
+  tick.struct_size = sizeof tick;
+  tick.k = static_cast<std::uint64_t>(state_.k);
+  tick.time_s = state_.time_s;
+  tick.q = q_shown_.data();
+  tick.v = v_shown_.data();
+  tick.contacts = shown_.data();
+  tick.contact_count = contact_count_;
+  tick.goal_index = goal_index_;
+  tick.speed_scale = speed_scale_;
+  tick.self_contacts = self_shown_.data();
+  tick.self_contact_count = self_contact_count_;
   return planner_.tick(tick, *command_);
 }
 
@@ -334,21 +444,77 @@ void ClosedLoop::take_gyroscopic_terms() {
 }
 
 void ClosedLoop::limit_torques() {
+  turning_.setZero();
   if (limits_.size() == 0) return;
   auto& held = channels_.held_torque;
   const VectorXd& wanted = command_->held_torque();
   held = held.cwiseMin(limits_).cwiseMax(-limits_);
   double scale = 1.0;
   if (!channels_.gyroscopic.empty()) {
-    dynamics::gyroscopic_torque(plant_, ws_, state_.q, v_, channels_.gyroscopic, impulse_);
+    dynamics::gyroscopic_torque(plant_, ws_, state_.q, v_, channels_.gyroscopic, turning_);
     for (Eigen::Index i = 0; i < held.size(); ++i) {
-      const double room = limits_[i] - (impulse_[i] > 0.0 ? held[i] : -held[i]);
-      if (std::abs(impulse_[i]) > room) scale = std::min(scale, std::max(0.0, room) / std::abs(impulse_[i]));
+      const double room = limits_[i] - (turning_[i] > 0.0 ? held[i] : -held[i]);
+      if (std::abs(turning_[i]) > room) scale = std::min(scale, std::max(0.0, room) / std::abs(turning_[i]));
     }
     if (scale < 1.0)
       for (auto& term : channels_.gyroscopic) term.w_world *= scale;
+    turning_ *= scale;
   }
-  if (scale < 1.0 || held != wanted) ++saturated_ticks_;
+  if (scale < 1.0 || held != wanted) saturated_ = true;
+}
+
+double ClosedLoop::room_for_node_velocity() {
+  if (limits_.size() == 0) return 1.0;
+  // what brings the change about within the step: M (x − v) / h
+  v_shown_ = (command_->node_velocity() - v_) / scene_.step_s;
+  dynamics::momentum(plant_, ws_, state_.q, v_shown_, impulse_);
+  double scale = 1.0;
+  for (Eigen::Index i = 0; i < limits_.size(); ++i) {
+    const double rest = channels_.held_torque[i] + turning_[i];
+    if (!(std::abs(impulse_[i] + rest) > limits_[i] * (1.0 + rounding_share))) continue;
+    const double room = limits_[i] - (impulse_[i] > 0.0 ? rest : -rest);
+    scale = std::min(scale, std::max(0.0, room) / std::abs(impulse_[i]));
+  }
+  if (scale < 1.0) saturated_ = true;
+  return scale;
+}
+
+void ClosedLoop::resist(const VectorXd& v) {
+  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
+  // As a coefficient of viscous damping, kept over the step: it takes energy out whatever the step and the inertia are.
+  for (Eigen::Index i = 0; i < friction_.size(); ++i) {
+    const double speed = std::max(std::abs(v[i]), 1e-9);
+    channels_.damping[i] += friction_[i] * std::tanh(speed / friction_speed) / speed;
+  }
+}
+
+void ClosedLoop::check_accounts() {
+  if (!proves_energy_) return;
+  const auto& answer = command_->raw();
+  const double rounding = rounding_share * (ledger_.kinetic + 1.0);
+  if (answer.filter_work_J > rounding)
+    finish(log::Outcome::defect,
+           fmt::format("planner '{}' at step {}: its filter added {:.3g} J where standing still was admitted, expected "
+                       "none",
+                       scene_.planner->name, state_.k, answer.filter_work_J));
+  else if (answer.recovery_work_J < -rounding)
+    finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: its recovery took out {:.3g} J, expected none",
+                                             scene_.planner->name, state_.k, -answer.recovery_work_J));
+}
+
+void ClosedLoop::check_energy() {
+  if (!proves_energy_ || state_.k == 0 || result_.outcome == log::Outcome::collision) return;
+  const double turned = std::abs(report_.gyroscopic_work_J);
+  if (turned > rounding_share * (ledger_.kinetic + 1.0))
+    finish(log::Outcome::defect,
+           fmt::format("step {}: steering did {:.3g} J of work, expected none", state_.k, report_.gyroscopic_work_J));
+  // a control potential's changes in time are the planner's own, so its account is only reported
+  else if (!has_potential_ && recorder_->energy_error() > account_share * (exchanged_J_ + ledger_.kinetic))
+    finish(
+        log::Outcome::defect,
+        fmt::format("step {}: the energy account is off by {:.3g} J, with {:.3g} J in motion and {:.3g} J exchanged; "
+                    "expected less than {} of them: a smaller step?",
+                    state_.k, recorder_->energy_error(), ledger_.kinetic, exchanged_J_, account_share));
 }
 
 void ClosedLoop::arrive() {
@@ -358,27 +524,46 @@ void ClosedLoop::arrive() {
     integrator_->kick(state_, impulse_);
     integrator_->velocity(state_, v_);
   }
+  has_potential_ = has_potential_ || command_->raw().potential_J != 0.0 || !gradient_.isZero(0.0);
+  book_node(command_->raw().potential_J);
+}
+
+void ClosedLoop::book_node(double control_J) {
   const auto energy = integrator_->energy(state_);
   ledger_.kinetic = energy.kinetic_J;
   ledger_.potential = energy.potential_J;
-  ledger_.control = command_->raw().potential_J;
+  ledger_.control = control_J;
+  const Ledger& last = recorder_->last_node();
+  if (state_.k > 0)
+    for (const auto account : {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
+      exchanged_J_ += std::abs(ledger_.*account - last.*account);
   recorder_->node(ledger_);
+  check_energy();
 }
 
 void ClosedLoop::actuate() {
   arrive();
+  check_accounts();
+  if (done_) return;
   const bool potential = command_->raw().potential_J != 0.0 || !gradient_.isZero(0.0);
-  if (command_->raw().has_node_velocity != 0) {
-    integrator_->set_velocity(state_, command_->node_velocity());
-    ledger_.node += dynamics::kinetic_energy(plant_, ws_, state_.q, command_->node_velocity()) - ledger_.kinetic;
-    ledger_.filter += command_->raw().filter_work_J;
-    ledger_.recovery += command_->raw().recovery_work_J;
-  }
   channels_.held_torque = command_->held_torque();
   channels_.damping = command_->damping();
   take_gyroscopic_terms();
+  saturated_ = false;
   limit_torques();
-  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
+  node_velocity_ = v_;
+  if (command_->raw().has_node_velocity != 0) {
+    const double room = room_for_node_velocity();
+    if (room < 1.0)
+      node_velocity_ += room * (command_->node_velocity() - v_);
+    else
+      node_velocity_ = command_->node_velocity();
+    integrator_->set_velocity(state_, node_velocity_);
+    ledger_.node += dynamics::kinetic_energy(plant_, ws_, state_.q, node_velocity_) - ledger_.kinetic;
+    ledger_.filter += command_->raw().filter_work_J;
+    ledger_.recovery += command_->raw().recovery_work_J;
+  }
+  resist(node_velocity_);
   if (potential) {
     impulse_ = -0.5 * scene_.step_s * gradient_;
     integrator_->kick(state_, impulse_);
@@ -395,19 +580,16 @@ void ClosedLoop::settle() {
     if (call_planner()) arrive();
     return;
   }
-  const auto energy = integrator_->energy(state_);
-  ledger_.kinetic = energy.kinetic_J;
-  ledger_.potential = energy.potential_J;
-  recorder_->node(ledger_);
+  book_node(ledger_.control);
 }
 
 // What a sampled controller can do: one torque, made of all channels at the tick, held over the control period.
 void ClosedLoop::actuate_sampled() {
-  const auto energy = integrator_->energy(state_);
-  ledger_.kinetic = energy.kinetic_J;
-  ledger_.potential = energy.potential_J;
-  recorder_->node(ledger_);
+  book_node(0.0);
+  channels_.damping.setZero();
+  resist(v_);
   if (state_.k % control_steps_ != 0) return;
+  const double period = static_cast<double>(control_steps_) * scene_.step_s;
   VectorXd& torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_) % (delay_periods_ + 1))];
   torque = command_->held_torque() - command_->damping().cwiseProduct(v_) - command_->potential_gradient();
   take_gyroscopic_terms();
@@ -418,21 +600,24 @@ void ClosedLoop::actuate_sampled() {
   }
   if (command_->raw().has_node_velocity != 0) {
     // the velocity change of a node, spread over the period: M (x − v) / T
-    v_shown_ = (command_->node_velocity() - v_) / (static_cast<double>(control_steps_) * scene_.step_s);
-    dynamics::momentum(plant_, ws_, state_.q, v_shown_, impulse_);
-    torque += impulse_;
+    v_shown_ = (command_->node_velocity() - v_) / period;
+    dynamics::momentum(plant_, ws_, q_shown_, v_shown_, impulse_);
+    // as the planner's own model has it: there all masses and inertias are scaled alike
+    torque += scene_.actuation.planner_mass_scale * impulse_;
     ledger_.filter += command_->raw().filter_work_J;
     ledger_.recovery += command_->raw().recovery_work_J;
   }
-  if (limits_.size() > 0) {
-    v_shown_ = torque;
-    torque = torque.cwiseMin(limits_).cwiseMax(-limits_);
-    if (torque != v_shown_) ++saturated_ticks_;
+  v_shown_ = torque;
+  if (limits_.size() > 0) torque = torque.cwiseMin(limits_).cwiseMax(-limits_);
+  if (scene_.actuation.torque_rate_max_Nm_s) {
+    const double change = *scene_.actuation.torque_rate_max_Nm_s * period;
+    torque = torque.cwiseMin((torque_before_.array() + change).matrix())
+                 .cwiseMax((torque_before_.array() - change).matrix());
+    torque_before_ = torque;
   }
+  saturated_ = torque != v_shown_;
   // the slot written delay_periods_ ticks ago is the next one round
   channels_.held_torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_ + 1) % (delay_periods_ + 1))];
-  channels_.damping.setZero();
-  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
 }
 
 log::Result ClosedLoop::run(const Watch& watch) {
@@ -447,7 +632,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
 
   const bool sampled = scene_.actuation.type == scene::ActuationType::sampled;
   const bool obstacles = environment_->has_obstacles();
-  double min_clearance = influence_;
+  double min_clearance = influence_, min_self_clearance = self_influence_;
   bool certified = true;
   while (!done_) {
     const double tick_started = thread_cpu_s();
@@ -458,24 +643,38 @@ log::Result ClosedLoop::run(const Watch& watch) {
     integrator_->velocity(state_, v_);
     look(state_.q);
     min_clearance = std::min(min_clearance, clearance_now_);
-    if (state_.k > 0 && obstacles) {
+    min_self_clearance = std::min(min_self_clearance, self_clearance_now_);
+    const bool touching = (obstacles && clearance_now_ <= 0.0) || (self_ && self_clearance_now_ <= 0.0);
+    if (state_.k > 0 && (obstacles || self_)) {
+      const auto of_spheres = [&](const std::vector<double>& all) {
+        return obstacles ? std::span<const double>(all) : std::span<const double>();
+      };
       const auto verdict = certificate_->check(ws_, q_before_, state_.q, v_before_, v_, state_.time_s - scene_.step_s,
-                                               scene_.step_s, clearance_before_, clearance_);
+                                               scene_.step_s, {of_spheres(clearance_before_), self_clearance_before_},
+                                               {of_spheres(clearance_), self_clearance_});
       certified = verdict.certified;
       ++checked_steps_;
       if (certified) ++certified_steps_;
-      result_.tightest_step_m = std::min(result_.tightest_step_m.value_or(influence_), verdict.margin_m);
-      if (verdict.contact && clearance_now_ > 0.0)
-        finish(log::Outcome::collision, fmt::format("contact between the nodes {} and {}", state_.k - 1, state_.k));
+      result_.tightest_step_m = std::min(result_.tightest_step_m.value_or(verdict.margin_m), verdict.margin_m);
+      if (verdict.contact && !touching)
+        finish(log::Outcome::collision,
+               fmt::format("contact {}between the nodes {} and {}",
+                           verdict.self_pair < 0 ? "" : fmt::format("of {} ", parts_of(verdict.self_pair)),
+                           state_.k - 1, state_.k));
       dynamics::forward_kinematics(plant_, ws_, state_.q);
     }
-    recorder.observe(clearance_now_, certified, v_);
+    recorder.observe(clearance_now_, certified, v_, scene_.step_s);
     if (watch.at_node) watch.at_node(state_.time_s, state_.q);
     if (!v_.allFinite() || !state_.q.allFinite()) {
       finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state_.k));
-    } else if (obstacles && clearance_now_ <= 0.0) {
+    } else if (touching) {
+      const bool itself = !obstacles || clearance_now_ > 0.0;
       finish(state_.k == 0 ? log::Outcome::refused : log::Outcome::collision,
-             fmt::format("{} at {} s", where_nearest(), state_.time_s));
+             fmt::format("{} at {} s",
+                         itself ? fmt::format("the arm touches itself: {} are {:.2g} mm inside each other",
+                                              parts_of(nearest_pair_), -1e3 * self_clearance_now_)
+                                : where_nearest(),
+                         state_.time_s));
     } else if (!done_) {
       if (all_reached())
         finish(log::Outcome::reached, "");
@@ -507,10 +706,12 @@ log::Result ClosedLoop::run(const Watch& watch) {
 
     q_before_ = state_.q;
     std::swap(clearance_before_, clearance_);
+    std::swap(self_clearance_before_, self_clearance_);
     if (kicked_)
       integrator_->velocity(state_, v_before_);
     else
-      v_before_ = !sampled && command_->raw().has_node_velocity != 0 ? command_->node_velocity() : v_;
+      v_before_ = sampled ? v_ : node_velocity_;
+    if (saturated_) ++saturated_steps_;
     report_ = integrator_->step(state_, channels_, scene_.step_s);
     if (!report_.converged) {
       finish(log::Outcome::diverged, fmt::format("step {} of {} s found no root", state_.k + 1, scene_.step_s));
@@ -525,6 +726,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
     recorder.progress(state_.k, state_.time_s, scene_.duration_s);
   }
   if (obstacles) result_.min_clearance_m = min_clearance;
+  if (self_) result_.min_self_clearance_m = min_self_clearance;
   fill_result();
   recorder.close(ledger_);
   recorder_ = nullptr;
@@ -548,7 +750,7 @@ void ClosedLoop::gather_torques() {
   }
   if (command_->raw().has_node_velocity != 0) {
     // what would bring the node's change of velocity about within one step: M (x − v) / h
-    v_shown_ = (command_->node_velocity() - v_) / scene_.step_s;
+    v_shown_ = (node_velocity_ - v_) / scene_.step_s;
     dynamics::momentum(plant_, ws_, state_.q, v_shown_, impulse_);
     add("node", impulse_);
   }
@@ -567,6 +769,8 @@ void ClosedLoop::log_tick(bool certified) {
               {"solver", solver_json(report_)},
               {"certified", certified}};
   if (!done_) fields["channels"] = channel_torques_;
+  if (torques_limited()) fields["saturated"] = saturated_;
+  if (self_) fields["self_clearance_m"] = self_clearance_now_;
   if (environment_->has_obstacles()) {
     fields["clearance_m"] = clearance_now_;
     if (nearest_sphere_ >= 0) {
@@ -607,7 +811,7 @@ void ClosedLoop::fill_result() {
   dynamics::forward_kinematics(plant_, ws_, state_.q);
   const GoalError error = goal_error();
   log::Result::Goal out;
-  out.type = scene::to_string(goal.type);
+  out.type = scene::type_name(goal);
   out.index = goal_index_;
   out.count = scene_.goals.size();
   if (error.has_metres) out.error_m = error.metres;
@@ -616,9 +820,12 @@ void ClosedLoop::fill_result() {
   if (checked_steps_ > 0)
     result_.certified_share = static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
   for (const auto& warning : environment_->summary().warnings) result_.warnings.push_back(warning);
-  if (saturated_ticks_ > 0)
-    result_.warnings.push_back(
-        fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_ticks_, state_.k));
+  if (torques_limited() && state_.k > 0) {
+    result_.saturated_share = static_cast<double>(saturated_steps_) / static_cast<double>(state_.k);
+    if (saturated_steps_ > 0)
+      result_.warnings.push_back(
+          fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_steps_, state_.k));
+  }
 }
 
 }  // namespace hamelin::simulation

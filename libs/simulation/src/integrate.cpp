@@ -76,7 +76,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
     const bool over = state.k == steps || recorder.stopped(state.k);
     if (recorder.logging()) {  // the velocity costs a sweep, and nothing else here asks for it
       integrator->velocity(state, v);
-      recorder.observe(std::numeric_limits<double>::infinity(), true, v);
+      recorder.observe(std::numeric_limits<double>::infinity(), true, v, motion.step_s);
       if (recorder.wants_tick(state.k) || over) log_tick();
     }
     if (over) break;
@@ -100,7 +100,8 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   result.q = state.q;
   integrator->velocity(state, v);
   result.v = v;
-  result.v_abs_max.resize(0);  // not looked at without a log, so not with one either
+  // not looked at without a log, so not with one either
+  for (auto* largest : {&result.v_abs_max, &result.a_abs_max, &result.jerk_abs_max}) largest->resize(0);
   recorder.close(ledger);
   return result;
 }

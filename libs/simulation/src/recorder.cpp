@@ -48,13 +48,25 @@ void Recorder::node(const Ledger& ledger) {
     first_balance_ = ledger.balance();
     result_.energy_initial_J = ledger.kinetic + ledger.potential + ledger.control;
   }
-  const double error = std::abs(ledger.balance() - first_balance_);
-  result_.energy_error_max_J = std::max(result_.energy_error_max_J, error);
-  since_.energy_error_J = std::max(since_.energy_error_J, error);
+  energy_error_ = std::abs(ledger.balance() - first_balance_);
+  result_.energy_error_max_J = std::max(result_.energy_error_max_J, energy_error_);
+  since_.energy_error_J = std::max(since_.energy_error_J, energy_error_);
 }
 
-void Recorder::observe(double clearance_m, bool certified, const Eigen::VectorXd& v) {
+void Recorder::observe(double clearance_m, bool certified, const Eigen::VectorXd& v, double h) {
   grow(result_.v_abs_max, v);
+  if (observed_ == 0) {
+    result_.a_abs_max.setZero(v.size());
+    result_.jerk_abs_max.setZero(v.size());
+    a_.setZero(v.size());
+  } else {
+    a_ = (v - v_last_) / h;
+    grow(result_.a_abs_max, a_);
+    if (observed_ > 1) result_.jerk_abs_max = result_.jerk_abs_max.cwiseMax(((a_ - a_last_) / h).cwiseAbs());
+  }
+  v_last_ = v;
+  a_last_ = a_;
+  ++observed_;
   if (!logging()) return;
   since_.clearance_m = std::min(since_.clearance_m, clearance_m);
   since_.certified = since_.certified && certified;

@@ -44,11 +44,13 @@ class Recorder {
   void header(Json fields, const model::Robot& robot, long steps);
   /// The node's balance enters energy_error_max_J.
   void node(const Ledger& ledger);
+  /// |balance − first balance| at the last node [J].
+  [[nodiscard]] double energy_error() const noexcept { return energy_error_; }
   /// As it was then: a node velocity's work comes after it.
   [[nodiscard]] const Ledger& last_node() const noexcept { return last_node_; }
   void step(const integration::StepReport& report);
-  /// What is looked at besides, at every node.
-  void observe(double clearance_m, bool certified, const Eigen::VectorXd& v);
+  /// What is looked at besides, at every node; h is the step between nodes.
+  void observe(double clearance_m, bool certified, const Eigen::VectorXd& v, double h);
   /// The tick's own time is known last; with it the tick's line is written.
   void tick_time(double seconds);
   [[nodiscard]] bool wants_tick(long k) const noexcept {
@@ -83,7 +85,9 @@ class Recorder {
   const Watch& watch_;
   std::vector<double> tick_us_;
   double started_cpu_s_ = thread_cpu_s();
-  double first_balance_ = 0.0;
+  double first_balance_ = 0.0, energy_error_ = 0.0;
+  Eigen::VectorXd v_last_, a_, a_last_;
+  long observed_ = 0;
   Ledger last_node_;
   bool first_ = true;
   long last_logged_ = -1;

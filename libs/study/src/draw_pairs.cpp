@@ -6,6 +6,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/study/pairs.hpp"
 
@@ -28,6 +29,7 @@ class Sampler {
         upper_(model_.dof()),
         centers_(model_.spheres().size()) {
     for (const auto& sphere : model_.spheres()) radii_.push_back(sphere.radius);
+    if (scene.model.self_collision) self_.emplace(model_);
     if (environment_.has_obstacles() && centers_.empty())
       throw Error(ErrorCode::invalid,
                   fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
@@ -52,13 +54,20 @@ class Sampler {
   [[nodiscard]] bool clear(const VectorXd& q) {
     dynamics::forward_kinematics(model_, ws_, q);
     dynamics::sphere_centers(model_, ws_, centers_);
-    return environment_.clearance(centers_, radii_, 0.0, min_clearance_) >= min_clearance_;
+    return environment_.clearance(centers_, radii_, 0.0, min_clearance_) >= min_clearance_ && clear_of_itself();
   }
 
  private:
+  [[nodiscard]] bool clear_of_itself() const {
+    for (std::size_t pair = 0; self_ && pair < self_->pairs().size(); ++pair)
+      if (self_->distance(pair, centers_, min_clearance_) <= 0.0) return false;
+    return true;
+  }
+
   model::Model model_;
   dynamics::Workspace ws_;
   scene::Environment environment_;
+  std::optional<scene::SelfField> self_;  ///< where the scene models it
   double min_clearance_;
   Rng rng_;
   VectorXd lower_, upper_;

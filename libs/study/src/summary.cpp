@@ -1,39 +1,7 @@
-#include <algorithm>
-#include <cmath>
-
 #include "hamelin/study/pairs.hpp"
+#include "statistics.hpp"
 
 namespace hamelin::study {
-
-namespace {
-
-std::optional<double> median(std::vector<double> values) {
-  if (values.empty()) return std::nullopt;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-std::optional<double> smallest(const std::vector<double>& values) {
-  return values.empty() ? std::nullopt : std::optional(*std::min_element(values.begin(), values.end()));
-}
-
-std::optional<double> largest(const std::vector<double>& values) {
-  return values.empty() ? std::nullopt : std::optional(*std::max_element(values.begin(), values.end()));
-}
-
-std::optional<double> mean(const std::vector<double>& values) {
-  if (values.empty()) return std::nullopt;
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
-
-Json or_null(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-}  // namespace
 
 Summary summarize(const std::vector<log::Result>& results) {
   Summary summary;

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "hamelin/planning/nominal_arm.hpp"
 #include "params_schema.hpp"
 
@@ -34,6 +36,7 @@ class Apf : public Planner {
         joint_damping_(params.at("joint_damping").get<double>()),
         by_potential_(params.at("mapping") == "potential"),
         goal_scaled_(params.at("law") == "wang2018"),
+        goal_exponent_(params.at("goal_exponent").get<double>()),
         gravity_compensation_(params.at("gravity_compensation").get<bool>()),
         tau_(setup.dof()) {
     if (repulsion_.rho_min > repulsion_.rho0)
@@ -56,7 +59,18 @@ class Apf : public Planner {
   }
 
  private:
-  // Of the tip, for joint goals of q; it scales wang2018's repulsion.
+  /// What wang2018 multiplies the repulsion's potential by, and that factor's gradient.
+  struct GoalScale {
+    double value;      ///< r^n, r the tip's distance to the goal, for joint goals that of q
+    double pull_of_V;  ///< n r^(n−2): times x_e − x_d it is the gradient; at the goal itself zero
+  };
+  [[nodiscard]] GoalScale goal_scale(double distance_squared) const {
+    if (!goal_scaled_) return {1.0, 0.0};
+    if (distance_squared == 0.0) return {0.0, 0.0};
+    const double n = goal_exponent_;
+    return {std::pow(distance_squared, 0.5 * n), n * std::pow(distance_squared, 0.5 * n - 1.0)};
+  }
+
   [[nodiscard]] double goal_distance_squared(const hamelin_goal& goal) const {
     if (goal.type == HAMELIN_GOAL_JOINT) return (arm_.q() - ConstVectorMap(goal.q, arm_.q().size())).squaredNorm();
     return (arm_.tip_position() - vec3(goal.position_world_m)).squaredNorm();
@@ -65,33 +79,31 @@ class Apf : public Planner {
   /// (17), (18), each mapped by (21) at its own point.
   void operational(const Tick& tick, Command& command) {
     const hamelin_goal& to = setup_.goal(tick.goal_index());
-    const double scale = goal_scaled_ ? goal_distance_squared(to) : 1.0;
+    const GoalScale scale = goal_scale(goal_distance_squared(to));
     double pull = k_p_ * tick.speed_scale();
     tau_.setZero();
     for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
-      const Vector3d f = scale * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+      const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
       arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
-      if (goal_scaled_) pull += 2.0 * repulsion_.potential(c.distance_m);
+      pull += scale.pull_of_V * repulsion_.potential(c.distance_m);
     });
     arm_.add_mapped_attraction(to, pull, k_v_, tau_);
     command.held_torque() = tau_;
   }
 
-  /// V = ½ k_p |x_e − x_d|² + Σ V(ρ) and its gradient in joint space.
+  /// V = ½ k_p |x_e − x_d|² + Σ V(ρ), for wang2018 Σ V(ρ) |x_e − x_d|^n, and its gradient in joint space.
   void potential(const Tick& tick, Command& command) {
     const hamelin_goal& to = setup_.goal(tick.goal_index());
-    const double away = goal_distance_squared(to), scale = goal_scaled_ ? away : 1.0;
-    double pull = k_p_ * tick.speed_scale(), value = 0.0;
+    const double away = goal_distance_squared(to), k_p = k_p_ * tick.speed_scale();
+    const GoalScale scale = goal_scale(away);
+    double pull = k_p, value = 0.5 * k_p * away;
     tau_.setZero();  // −∂V
     for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
       const double V = repulsion_.potential(c.distance_m);
-      const Vector3d f = scale * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+      const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
       arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
-      if (goal_scaled_) {
-        pull += 2.0 * V;
-      } else {
-        value += V;
-      }
+      pull += scale.pull_of_V * V;
+      value += scale.value * V;
     });
     if (to.type == HAMELIN_GOAL_JOINT) {
       tau_ -= pull * (arm_.q() - ConstVectorMap(to.q, arm_.q().size()));
@@ -99,7 +111,7 @@ class Apf : public Planner {
       const Vector3d tip = arm_.tip_position();
       arm_.add_force(arm_.tip_link(), tip, -pull * (tip - vec3(to.position_world_m)), tau_);
     }
-    command.set_potential(value + 0.5 * pull * away);
+    command.set_potential(value);
     command.potential_gradient() = -tau_;
   }
 
@@ -108,7 +120,9 @@ class Apf : public Planner {
   double k_p_, k_v_;
   Repulsion repulsion_;
   double joint_damping_;
-  bool by_potential_, goal_scaled_, gravity_compensation_;
+  bool by_potential_, goal_scaled_;
+  double goal_exponent_;
+  bool gravity_compensation_;
   Eigen::VectorXd tau_;
 };
 

@@ -18,16 +18,55 @@ test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4(
   return {plugin_file, std::move(params), robot, test::goal_52, test::ball_52};
 }
 
+const std::vector<test::Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
+
 /// A spatial arm of four joints among three balls, two of them near.
 test::ArmLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
   params["rho0_m"] = 5.0;
-  return {plugin_file,
-          std::move(params),
-          test::random_robot(11, 4),
-          {0.3, 0.4, -0.2},
-          {{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}},
-          gravity};
+  return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls, gravity};
 }
+
+/// A joint path's goal, a pose, self contacts: what ArmLoop does not make. One tick of a planner among three balls.
+struct Bare : planning::HostServices {
+  void log(std::int32_t, std::string_view) override {}
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+
+  /// Held torque, then gradient.
+  Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
+                         const Eigen::MatrixXd& path = {}, bool self = false) {
+    params["rho0_m"] = 5.0;
+    test::ArmLoop near(plugin_file, Json{{"rho0_m", 5.0}}, test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls);
+    near.q << 0.3, -0.5, 0.8, 0.4;
+    near.v << 0.7, 0.2, -0.4, 0.5;
+    const auto& contacts = near.contacts();
+    const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
+    planning::SetupData setup(model);
+    setup.influence_m = 5.0;
+    setup.self_collision = self;
+    setup.add_goal(goal, q_goal, path);
+    const auto plugin = planning::Plugin::load(plugin_file);
+    auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
+    hamelin_self_contact touching{};
+    touching.sphere_a = 3;
+    touching.sphere_b = 0;
+    touching.distance_m = 1e-3;
+    touching.direction_world[0] = 1.0;
+    hamelin_tick tick{};
+    tick.struct_size = sizeof tick;
+    tick.q = near.q.data();
+    tick.v = near.v.data();
+    tick.contacts = contacts.data();
+    tick.contact_count = contacts.size();
+    tick.speed_scale = 1.0;
+    tick.self_contacts = &touching;
+    tick.self_contact_count = self ? 1 : 0;
+    planning::CommandBuffers buffers(4, contacts.size());
+    REQUIRE(planner.tick(tick, buffers));
+    Eigen::VectorXd all(8);
+    all << buffers.held_torque(), buffers.potential_gradient();
+    return all;
+  }
+};
 
 }  // namespace
 
@@ -56,9 +95,15 @@ TEST_CASE("apf reaches the goal of example 5.2 when the ball is out of the way",
 }
 
 TEST_CASE("the gradient of apf's potential is the difference quotient of its value", "[apf]") {
-  const std::string law = GENERATE("khatib", "wang2018");
-  CAPTURE(law);
-  auto loop = spatial(Json{{"mapping", "potential"}, {"law", law}, {"joint_damping", 0}});
+  const auto [law, exponent] =
+      GENERATE(table<std::string, double>({{"khatib", 2.0}, {"wang2018", 1.0}, {"wang2018", 2.0}, {"wang2018", 3.5}}));
+  const bool joint_goal = GENERATE(false, true);
+  INFO(law << " " << exponent << " " << joint_goal);
+  test::ArmLoop loop(
+      plugin_file,
+      Json{{"mapping", "potential"}, {"law", law}, {"goal_exponent", exponent}, {"joint_damping", 0}, {"rho0_m", 5.0}},
+      test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls, Eigen::Vector3d::Zero(),
+      joint_goal ? Eigen::VectorXd(Eigen::Vector4d(0.5, -0.2, 0.1, 1.0)) : Eigen::VectorXd());
   loop.q << 0.3, -0.5, 0.8, 0.4;
   REQUIRE(loop.tick());
   REQUIRE(loop.contacts().size() > 3);
@@ -75,6 +120,44 @@ TEST_CASE("the gradient of apf's potential is the difference quotient of its val
       value[side] = loop.buffers.raw().potential_J;
     }
     CHECK(gradient[i] == Approx((value[1] - value[0]) / (2.0 * step)).epsilon(1e-7));
+  }
+}
+
+TEST_CASE("both mappings of wang2018 take Ge and Cui's forces: as they are, or as accelerations by (21)", "[apf]") {
+  // F_rep1 = η (1/ρ − 1/ρ0) (1/ρ²) r^n away from the obstacle, at the link's point; F_rep2 = (n/2) η (1/ρ − 1/ρ0)²
+  // r^(n−1) towards the goal, at the tip; r = |x_e − x_d|.
+  const double n = GENERATE(1.0, 2.0, 3.0), eta = 2.0, rho0 = 5.0;
+  CAPTURE(n);
+  const Eigen::Vector3d goal(0.3, 0.4, -0.2);
+  const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
+  dynamics::Workspace ws(model);
+  for (const std::string mapping : {"operational", "potential"}) {
+    CAPTURE(mapping);
+    auto loop =
+        spatial(Json{{"law", "wang2018"}, {"goal_exponent", n}, {"eta", eta}, {"k_p", 0}, {"mapping", mapping}});
+    loop.q << 0.3, -0.5, 0.8, 0.4;
+    REQUIRE(loop.tick());
+    dynamics::forward_kinematics(model, ws, loop.q);
+    Eigen::VectorXd expected = Eigen::VectorXd::Zero(4);
+    dynamics::Matrix3Xd J(3, 4);
+    const auto add = [&](int link, const Eigen::Vector3d& x, const Eigen::Vector3d& f) {
+      dynamics::point_jacobian(model, ws, link, x, J);
+      const Eigen::Vector3d force =
+          mapping == "operational" ? Eigen::Vector3d(dynamics::operational_inertia(model, ws, loop.q, J) * f) : f;
+      expected += J.transpose() * force;
+    };
+    const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p(), to_goal = (goal - tip).normalized();
+    const double r = (goal - tip).norm();
+    for (const auto& c : loop.contacts()) {  // one sphere a link, so each is its link's nearest
+      const double s = 1.0 / c.distance_m - 1.0 / rho0;
+      const Eigen::Vector3d away = Eigen::Map<const Eigen::Vector3d>(c.direction_world);
+      add(c.sphere, Eigen::Map<const Eigen::Vector3d>(c.arm_point_world_m),
+          eta * s / (c.distance_m * c.distance_m) * std::pow(r, n) * away);
+      add(model.robot().tip.link, tip, 0.5 * n * eta * s * s * std::pow(r, n - 1.0) * to_goal);
+    }
+    const Eigen::VectorXd got =
+        mapping == "operational" ? loop.buffers.held_torque() : Eigen::VectorXd(-loop.buffers.potential_gradient());
+    CHECK((got - expected).norm() < 1e-11 * expected.norm());
   }
 }
 
@@ -167,15 +250,18 @@ TEST_CASE("wang2018's repulsion vanishes at the goal, khatib's does not", "[apf]
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q);
   const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p();
-  const auto torque = [&](const char* law) {
-    test::ArmLoop loop(plugin_file, Json{{"law", law}}, robot, tip, {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
+  const auto torque = [&](const char* law, double exponent) {
+    test::ArmLoop loop(plugin_file, Json{{"law", law}, {"goal_exponent", exponent}}, robot, tip,
+                       {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
     loop.q = q;
     REQUIRE(loop.tick());
     REQUIRE(!loop.contacts().empty());
     return loop.buffers.held_torque().norm();
   };
-  CHECK(torque("wang2018") < 1e-12);
-  CHECK(torque("khatib") > 1.0);
+  CHECK(torque("wang2018", 2.0) < 1e-12);
+  CHECK(torque("wang2018", 1.5) < 1e-4);  // |x_e − x_d| is 1e-16 or nothing here
+  CHECK(std::isfinite(torque("wang2018", 1.0)));
+  CHECK(torque("khatib", 2.0) > 1.0);
 }
 
 TEST_CASE("apf does not allocate in a tick", "[apf]") {
@@ -191,4 +277,26 @@ TEST_CASE("apf refuses parameters that contradict each other", "[apf]") {
   CHECK_THROWS_WITH(example_52(Json{{"rho0_m", 0.01}, {"distance_min_m", 0.1}}),
                     Catch::EndsWith("/distance_min_m: above rho0_m, expected at most rho0_m"));
   CHECK_THROWS_WITH(example_52(Json{{"mapping", "potentail"}}), Catch::Contains("/mapping"));
+}
+
+TEST_CASE("apf goes to the end of a path, to a pose by its position, and past self contacts", "[apf]") {
+  const std::string mapping = GENERATE("operational", "potential"), law = GENERATE("khatib", "wang2018");
+  const Json params{{"mapping", mapping}, {"law", law}};
+  CAPTURE(params);
+  Bare bare;
+  hamelin_goal joint{}, position{}, pose{};
+  joint.type = HAMELIN_GOAL_JOINT;
+  position.type = HAMELIN_GOAL_POSITION;
+  pose.type = HAMELIN_GOAL_POSE;
+  for (auto* goal : {&position, &pose}) Eigen::Map<Eigen::Vector3d>(goal->position_world_m) << 0.3, 0.4, -0.2;
+  pose.quaternion_wxyz[1] = 1.0;
+  const Eigen::Vector4d end(0.5, -0.2, 0.1, 1.0);
+  Eigen::MatrixXd path(4, 3);
+  path << Eigen::Vector4d::Constant(2.0), Eigen::Vector4d::Constant(-1.0), end;
+  const Eigen::VectorXd to_end = bare.answer(params, joint, end), there = bare.answer(params, position);
+  CHECK(to_end.norm() > 1.0);
+  CHECK((to_end - there).norm() > 1.0);
+  CHECK(bare.answer(params, joint, end, path) == to_end);
+  CHECK(bare.answer(params, pose) == there);
+  CHECK(bare.answer(params, position, {}, {}, true) == there);
 }

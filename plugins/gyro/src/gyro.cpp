@@ -18,12 +18,6 @@ Variant variant_named(const std::string& name) {
   return name == "chang-marsden" ? Variant::chang_marsden : Variant::garimella;
 }
 
-/// Whether the attraction (17) rests while a point is turned: Algorithm II says so, the sources of the others do not.
-bool lets_go(const std::string& algorithm, Variant variant) {
-  if (algorithm == "by_variant") return variant == Variant::published || variant == Variant::energy_neutral;
-  return algorithm == "published";
-}
-
 class Gyro : public Planner {
  public:
   static double influence_m(const hamelin::Json& params) { return params.at("rho0_m").get<double>(); }
@@ -38,7 +32,7 @@ class Gyro : public Planner {
         rho_min_(params.at("distance_min_m").get<double>()),
         joint_damping_(params.at("joint_damping").get<double>()),
         variant_(variant_named(params.at("variant"))),
-        lets_go_(lets_go(params.at("algorithm"), variant_)),
+        keep_attraction_(params.at("algorithm") == "keep_attraction"),
         gravity_compensation_(params.at("gravity_compensation").get<bool>()),
         tau_(setup.dof()) {
     if (rho_min_ > rho0_)
@@ -58,27 +52,16 @@ class Gyro : public Planner {
       if (!(to_obstacle.dot(velocity) > 0.0)) return;
       turning = true;
       const Vector3d along = velocity / velocity.stableNorm();  // its squares may be too small to be told from zero
-      const Vector3d axis = turning_axis(to_obstacle, along);
-      const double size = gain(c.distance_m, to_obstacle, along);
+      const Vector3d e = gain(c.distance_m, to_obstacle, along) * turning_axis(to_obstacle, along);
       const Matrix3d M_x = arm_.operational_inertia(link, point);
-      switch (variant_) {
-        case Variant::published:
-          arm_.add_force(link, point, M_x * (size * axis).cross(velocity), tau_);
-          break;
-        case Variant::energy_neutral:
-          // ½(M ê + ê M) is the cross product with ½(tr(M) 1 − M) e for any symmetric M.
-          command.add_gyroscopic(link, arm_.in_link(link, point), 0.5 * size * (M_x.trace() * axis - M_x * axis));
-          break;
-        case Variant::chang_marsden:
-        case Variant::garimella: {
-          // The point as a mass: the mean of M_x over the plane it turns in. The force stays in that plane.
-          const double mass = 0.5 * (M_x.trace() - axis.dot(M_x * axis));
-          command.add_gyroscopic(link, arm_.in_link(link, point), mass * size * axis);
-          break;
-        }
+      if (variant_ == Variant::published) {
+        arm_.add_force(link, point, M_x * e.cross(velocity), tau_);
+      } else {
+        // ½(M ê + ê M) is the cross product with ½(tr(M) 1 − M) e for any symmetric M.
+        command.add_gyroscopic(link, arm_.in_link(link, point), 0.5 * (M_x.trace() * e - M_x * e));
       }
     });
-    if (!turning || !lets_go_)
+    if (!turning || keep_attraction_)
       arm_.add_mapped_attraction(setup_.goal(tick.goal_index()), k_p_ * tick.speed_scale(), k_v_, tau_);
     if (gravity_compensation_) arm_.add_gravity(tau_);
     command.held_torque() = tau_;
@@ -116,7 +99,7 @@ class Gyro : public Planner {
   NominalArm arm_;
   double k_p_, k_v_, k_obs_, rho0_, rho_min_, joint_damping_;
   Variant variant_;
-  bool lets_go_, gravity_compensation_;
+  bool keep_attraction_, gravity_compensation_;
   Vector3d plane_normal_ = Vector3d::Zero();
   Eigen::VectorXd tau_;
 };

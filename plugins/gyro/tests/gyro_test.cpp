@@ -1,6 +1,9 @@
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <numbers>
 
+#include "hamelin/core/error.hpp"
+#include "hamelin/simulation/run.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
 #include "hamelin/test/robots.hpp"
@@ -22,10 +25,111 @@ test::ArmLoop spatial(Json params, const std::vector<test::Ball>& balls) {
 }
 const std::vector<test::Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
 
+Eigen::Vector3d vec(const double (&x)[3]) {
+  return {x[0], x[1], x[2]};
+}
+
+/// A contact of one link with one ball, looked at without the planner's own helpers.
+struct Seen {
+  Eigen::Vector3d rho, velocity;  ///< unit vector to the obstacle; of the arm's point
+  double distance;
+  Eigen::Matrix3d M;
+};
+
+/// All contacts of an arm with one sphere a link, with kinematics of their own.
+std::vector<Seen> look(test::ArmLoop& loop, const model::Robot& robot) {
+  const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, loop.q);
+  std::vector<Seen> all;
+  for (const auto& c : loop.contacts()) {
+    dynamics::Matrix3Xd J(3, model.dof());
+    dynamics::point_jacobian(model, ws, c.sphere, vec(c.arm_point_world_m), J);
+    Seen seen;
+    seen.velocity = J * loop.v;
+    seen.rho = -vec(c.direction_world);  // the points lie the other way round where they are in contact
+    seen.distance = c.distance_m;
+    seen.M = dynamics::operational_inertia(model, ws, loop.q, J);
+    all.push_back(seen);
+  }
+  return all;
+}
+
+/// Point masses in the plane, the setting of Chang and Marsden: two sliding joints along x and y.
+model::Robot point_mass() {
+  model::Robot robot;
+  robot.name = "point";
+  for (int i = 0; i < 2; ++i) {
+    model::Link link;
+    link.name = i == 0 ? "x" : "y";
+    link.parent = i - 1;
+    link.joint.name = link.name;
+    link.joint.type = model::JointType::prismatic;
+    link.joint.screw << 0.0, 0.0, 0.0, i == 0 ? 1.0 : 0.0, i == 0 ? 0.0 : 1.0, 0.0;
+    link.mass_kg = i == 0 ? 1e-6 : 1.0;
+    link.inertia_kg_m2.setIdentity();
+    if (i == 1) link.spheres.push_back({Eigen::Vector3d::Zero(), 0.05});
+    robot.links.push_back(link);
+  }
+  robot.tip = {"tip", 1, geometry::SE3{}};
+  return robot;
+}
+
+/// A joint path's goal, a pose, self contacts: what ArmLoop does not make. One tick of a planner among three balls.
+struct Bare : planning::HostServices {
+  void log(std::int32_t, std::string_view) override {}
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+
+  /// Held torque, then gradient.
+  Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
+                         const Eigen::MatrixXd& path = {}, bool self = false) {
+    params["rho0_m"] = 5.0;
+    test::ArmLoop near(plugin_file, Json{{"rho0_m", 5.0}}, test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls);
+    near.q << 0.3, -0.5, 0.8, 0.4;
+    near.v << 0.7, 0.2, -0.4, 0.5;
+    const auto& contacts = near.contacts();
+    const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
+    planning::SetupData setup(model);
+    setup.influence_m = 5.0;
+    setup.self_collision = self;
+    setup.add_goal(goal, q_goal, path);
+    const auto plugin = planning::Plugin::load(plugin_file);
+    auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
+    hamelin_self_contact touching{};
+    touching.sphere_a = 3;
+    touching.sphere_b = 0;
+    touching.distance_m = 1e-3;
+    touching.direction_world[0] = 1.0;
+    hamelin_tick tick{};
+    tick.struct_size = sizeof tick;
+    tick.q = near.q.data();
+    tick.v = near.v.data();
+    tick.contacts = contacts.data();
+    tick.contact_count = contacts.size();
+    tick.speed_scale = 1.0;
+    tick.self_contacts = &touching;
+    tick.self_contact_count = self ? 1 : 0;
+    planning::CommandBuffers buffers(4, contacts.size());
+    REQUIRE(planner.tick(tick, buffers));
+    Eigen::VectorXd all(8);
+    all << buffers.held_torque(), buffers.potential_gradient();
+    return all;
+  }
+};
+
+/// data/scenes/paper_52_gyro.json as the program runs it.
+log::Result run_52(const std::vector<std::string>& settings) {
+  const std::filesystem::path file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/paper_52_gyro.json";
+  Json document = read_json(file);
+  for (const auto& setting : settings) scene::set_pointer(document, setting);
+  return simulation::run(scene::scene_from_json(document, file.parent_path(), file.string()), {HAMELIN_TEST_PLUGIN_DIR},
+                         {});
+}
+
 }  // namespace
 
 TEST_CASE("gyro arrives in example 5.2, where apf rests", "[gyro]") {
-  const std::string variant = GENERATE("published", "energy-neutral");
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
   const auto result = example_52(Json{{"variant", variant}}).run(40.0);
   CAPTURE(variant, result.time_s, result.distance_m, result.speed_m_s, result.clearance_m);
   CHECK(result.reached);
@@ -103,21 +207,24 @@ TEST_CASE("the neutral torque is Jᵀ ½(MΓ + ΓM) ẋ with Γ of (20)", "[gyro
 }
 
 TEST_CASE("head-on, a planar arm is turned about the plane's normal", "[gyro]") {
-  // Stretched along x, turning as one about the root: the ball stands exactly in a sphere's way.
-  auto loop =
-      test::ArmLoop(plugin_file, Json::object(), test::planar4(), test::goal_52, {{{2.5 + 0.02, 0.4, 0.0}, 0.1}});
+  // Stretched along x, turning as one about the root: the ball stands in the way of the point at 2.5 m, as good as
+  // exactly. With two coordinates of ρ zero, the rule for space would choose x.
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  test::ArmLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(25, 1e-10), test::goal_52,
+                     {{{2.5, 0.4, 0.0}, 0.1}});
   loop.v << 1.0, 0.0, 0.0, 0.0;
   REQUIRE(loop.tick());
-  REQUIRE(loop.buffers.gyroscopic().size() >= 1);
-  for (const auto& term : loop.buffers.gyroscopic()) {
-    CHECK(term.w_world[0] == Approx(0.0).margin(1e-15));
-    CHECK(term.w_world[1] == Approx(0.0).margin(1e-15));
-    CHECK(std::abs(term.w_world[2]) > 1e-3);
-  }
+  REQUIRE(loop.buffers.gyroscopic().size() == 1);
+  const Eigen::Vector3d w = vec(loop.buffers.gyroscopic()[0].w_world);
+  CHECK(w.head<2>().norm() < 1e-15 * w.norm());
+  CHECK(w.z() > 1e-3);
 }
 
 TEST_CASE("head-on in space the side is defined and the same each time", "[gyro]") {
-  const auto answer = [] {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  const auto answer = [&] {
     auto loop = spatial(Json{{"k_p", 0}, {"k_v", 0}}, {});
     loop.q << 0.3, -0.5, 0.8, 0.4;
     loop.v << 0.7, 0.2, -0.4, 0.5;
@@ -130,7 +237,7 @@ TEST_CASE("head-on in space the side is defined and the same each time", "[gyro]
     // The surface point moves otherwise than the centre; a few rounds find the direction both agree on.
     for (int i = 0; i < 200; ++i)
       ahead = dynamics::point_velocity(model, ws, 3, center + 0.05 * ahead, loop.v).normalized();
-    auto with_ball = spatial(Json{{"k_p", 0}, {"k_v", 0}}, {{center + 0.5 * ahead, 0.1}});
+    auto with_ball = spatial(Json{{"k_p", 0}, {"k_v", 0}, {"variant", variant}}, {{center + 0.5 * ahead, 0.1}});
     with_ball.q = loop.q;
     with_ball.v = loop.v;
     REQUIRE(with_ball.tick());
@@ -146,7 +253,9 @@ TEST_CASE("head-on in space the side is defined and the same each time", "[gyro]
 }
 
 TEST_CASE("at rest nothing turns and the goal pulls", "[gyro]") {
-  auto loop = example_52(Json{{"k_p", 1}});
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  auto loop = example_52(Json{{"k_p", 1}, {"variant", variant}});
   loop.q << 0.8, 0.1, -0.1, 0.2;
   REQUIRE(loop.tick());
   REQUIRE(!loop.contacts().empty());
@@ -155,8 +264,10 @@ TEST_CASE("at rest nothing turns and the goal pulls", "[gyro]") {
 }
 
 TEST_CASE("Algorithm II lets go of the goal while turning, keep_attraction does not", "[gyro]") {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
   for (const bool keep : {false, true}) {
-    auto loop = example_52(Json{{"algorithm", keep ? "keep_attraction" : "published"}});
+    auto loop = example_52(Json{{"variant", variant}, {"algorithm", keep ? "keep_attraction" : "published"}});
     loop.q << 0.6, 0.1, -0.1, 0.2;
     loop.v << 1.0, 0.0, 0.0, 0.0;
     REQUIRE(loop.tick());
@@ -180,10 +291,186 @@ TEST_CASE("a joint goal pulls every joint with k_p times its error", "[gyro]") {
 
 TEST_CASE("gyro does not allocate in a tick", "[gyro]") {
 #ifndef HAMELIN_SANITIZED
-  const std::string variant = GENERATE("published", "energy-neutral");
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
   auto loop = spatial(Json{{"variant", variant}}, three_balls);
   loop.v << 0.7, 0.2, -0.4, 0.5;
   REQUIRE(loop.tick());
   CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
 #endif
+}
+
+TEST_CASE("steering that is energy-neutral does no work at 200 random states", "[gyro]") {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  auto loop = spatial(Json{{"variant", variant}}, three_balls);
+  Rng rng(7);
+  int terms = 0;
+  for (int k = 0; k < 200; ++k) {
+    loop.q = test::random_joints(rng, 4, 3.0);
+    loop.v = test::random_joints(rng, 4, 2.0);
+    REQUIRE(loop.tick());
+    double size = 0.0;  // of what cancels
+    for (const auto& seen : look(loop, test::random_robot(11, 4))) size += seen.velocity.squaredNorm();
+    for (const auto& term : loop.buffers.gyroscopic()) {
+      ++terms;
+      size += vec(term.w_world).norm() * loop.v.squaredNorm();
+    }
+    CHECK(std::abs(loop.gyroscopic_torque().dot(loop.v)) <= 1e-13 * size);
+  }
+  CHECK(terms > 200);
+}
+
+TEST_CASE("each neutral variant turns the approaching points with its gain, pushes none nearer and leaves the others",
+          "[gyro]") {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  const model::Robot robot = test::random_robot(11, 4);
+  const std::vector<test::Ball> ball{{{1.2, 0.4, 0.3}, 0.1}};
+  auto loop = spatial(Json{{"variant", variant}, {"k_obs", 2.5}}, ball);
+  Rng rng(8);
+  int approaching = 0, receding = 0;
+  for (int k = 0; k < 100; ++k) {
+    loop.q = test::random_joints(rng, 4, 3.0);
+    loop.v = test::random_joints(rng, 4, 2.0);
+    const auto all = look(loop, robot);
+    REQUIRE(loop.tick());
+    std::size_t at = 0;
+    for (const auto& seen : all) {
+      const double cosine = seen.rho.dot(seen.velocity) / seen.velocity.norm();
+      if (cosine <= 0.0) {
+        ++receding;
+        continue;
+      }
+      ++approaching;
+      REQUIRE(at < loop.buffers.gyroscopic().size());
+      const Eigen::Vector3d w = vec(loop.buffers.gyroscopic()[at++].w_world);
+      const double d = std::max(seen.distance, 1e-3);
+      const double gain = 2.5 * (variant == "chang-marsden" ? 1.0 / d
+                                 : variant == "garimella"
+                                     ? (1.0 / d - 1.0 / 5.0) * cosine * cosine
+                                     : std::exp(std::acos(cosine) - 1.0) / d / (1.0 + std::exp(seen.distance - 5.0)));
+      const Eigen::Vector3d e = gain * seen.rho.cross(seen.velocity).normalized();
+      const Eigen::Vector3d expected = 0.5 * (seen.M.trace() * e - seen.M * e);
+      CHECK((w - expected).norm() <= 1e-9 * expected.norm());
+      const Eigen::Vector3d force = w.cross(seen.velocity);
+      CHECK(force.dot(-seen.rho) >= -1e-12 * force.norm());
+      CHECK(std::abs(force.dot(seen.velocity)) <= 1e-14 * force.norm() * seen.velocity.norm());
+    }
+    CHECK(at == loop.buffers.gyroscopic().size());
+  }
+  CHECK(approaching > 50);
+  CHECK(receding > 50);
+}
+
+TEST_CASE("outside rho0_m nothing turns, and the goal pulls", "[gyro]") {
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  // The ball stands in the way of link 4's only sphere, 0.4 m of air between them.
+  const auto held = [&](double rho0, double k_p) {
+    test::ArmLoop loop(plugin_file, Json{{"variant", variant}, {"rho0_m", rho0}, {"k_p", k_p}}, test::planar4(1),
+                       test::goal_52, {{{3.5, 0.4 + 0.02 + 0.1, 0.0}, 0.1}});
+    loop.v << 1.0, 0.0, 0.0, 0.0;
+    REQUIRE(loop.tick());
+    CHECK(loop.buffers.gyroscopic().size() == (rho0 > 0.4 && variant != "published" ? 1U : 0U));
+    return Eigen::VectorXd(loop.buffers.held_torque());
+  };
+  CHECK(held(0.401, 11.0) == held(0.401, 1.0));
+  CHECK((held(0.399, 11.0) - held(0.399, 1.0)).norm() > 1.0);
+}
+
+TEST_CASE("garimella fades at rho0_m and towards tangential motion, chang-marsden jumps", "[gyro]") {
+  // Link 4's only sphere moves at right angles to the link. |w| over the mass is the gain; the mass is the same for
+  // both variants, so their ratio is the ratio of the gains.
+  const auto turn = [](const char* variant, double air, double bearing) {
+    test::ArmLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(1), test::goal_52,
+                       {{{3.5 + (air + 0.12) * std::sin(bearing), (air + 0.12) * std::cos(bearing), 0.0}, 0.1}});
+    loop.q << 0.0, 0.0, 0.0, 0.0;
+    loop.v << 1.0, 0.0, 0.0, 0.0;
+    REQUIRE(loop.tick());
+    return loop.buffers.gyroscopic().empty() ? 0.0 : vec(loop.buffers.gyroscopic()[0].w_world).norm();
+  };
+  const double edge = 0.5;
+  CHECK(turn("chang-marsden", edge - 1e-9, 0.3) > 1.0);
+  CHECK(turn("garimella", edge - 1e-9, 0.3) < 1e-8 * turn("chang-marsden", edge - 1e-9, 0.3));
+  CHECK(turn("garimella", edge - 1e-4, 0.3) == Approx(10.0 * turn("garimella", edge - 1e-5, 0.3)).epsilon(0.01));
+  // The surface point moves at a little less than a right angle to the link; find where the bearing is tangential.
+  double low = 1.0, high = 2.0;
+  for (int i = 0; i < 60; ++i) (turn("chang-marsden", 0.2, 0.5 * (low + high)) > 0.0 ? low : high) = 0.5 * (low + high);
+  CHECK(high == Approx(std::numbers::pi / 2.0).margin(0.02));
+  CHECK(turn("chang-marsden", 0.2, low - 1e-6) > 1.0);
+  CHECK(turn("chang-marsden", 0.2, high + 1e-6) == 0.0);
+  CHECK(turn("garimella", 0.2, low - 1e-6) < 1e-10);
+  CHECK(turn("garimella", 0.2, low - 1e-2) == Approx(100.0 * turn("garimella", 0.2, low - 1e-3)).epsilon(0.05));
+}
+
+TEST_CASE("a point mass goes round the ball, whatever its line, where the gain is as Chang and Marsden ask", "[gyro]") {
+  // pi V_max with V_max from the energy at the start: 1/2 k_p 3^2 for a mass of 1 kg, so V_max = 3 m/s at k_p = 1.
+  const double offset = GENERATE(0.3, 0.1, 0.02, 1e-4, -0.1, -0.3);
+  CAPTURE(offset);
+  test::ArmLoop loop(plugin_file,
+                     Json{{"variant", "chang-marsden"},
+                          {"algorithm", "keep_attraction"},
+                          {"k_p", 1},
+                          {"k_v", 1.5},
+                          {"joint_damping", 0},
+                          {"k_obs", 3.0 * std::numbers::pi}},
+                     point_mass(), {3.0, 0.0, 0.0}, {{{1.5, 0.0, 0.0}, 0.4}});
+  loop.q << 0.0, offset;
+  const auto result = loop.run(60.0);
+  CAPTURE(result.time_s, result.distance_m, result.clearance_m);
+  CHECK(result.reached);
+  CHECK(result.clearance_m > 0.0);
+  CHECK(result.gyroscopic_work_J < 1e-12);
+}
+
+TEST_CASE("data/scenes/paper_52_gyro.json ends as the README says, without contact and without work of the steering",
+          "[gyro]") {
+  const auto [variant, outcome] = GENERATE(table<std::string, log::Outcome>({{"published", log::Outcome::reached},
+                                                                             {"energy-neutral", log::Outcome::reached},
+                                                                             {"chang-marsden", log::Outcome::reached},
+                                                                             {"garimella", log::Outcome::timeout}}));
+  const auto result = run_52({"/planner/params/variant=" + variant});
+  INFO(variant << " " << result.time_s << " s, clearance " << result.min_clearance_m.value() << " " << result.cause);
+  CHECK(result.outcome == outcome);
+  CHECK(*result.min_clearance_m > 0.0);
+  CHECK(result.certified_share == 1.0);
+  CHECK(std::abs(result.gyroscopic_work_J) < 1e-13);
+}
+
+TEST_CASE("velocities whose squares are too small for a double turn too", "[gyro]") {
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
+  auto loop = example_52(Json{{"variant", variant}});
+  loop.q << 0.6, 0.1, -0.1, 0.2;
+  loop.v << 1e-200, 0.0, 0.0, 0.0;
+  CAPTURE(variant);
+  CHECK(loop.tick());
+  CHECK(loop.buffers.gyroscopic().empty() == (variant == "published"));
+}
+
+TEST_CASE("gyro refuses parameters that contradict each other", "[gyro]") {
+  CHECK_THROWS_WITH(example_52(Json{{"rho0_m", 0.01}, {"distance_min_m", 0.1}}),
+                    Catch::EndsWith("/distance_min_m: above rho0_m, expected at most rho0_m"));
+  CHECK_THROWS_WITH(example_52(Json{{"variant", "chang"}}), Catch::Contains("/variant"));
+}
+
+TEST_CASE("gyro goes to the end of a path, to a pose by its position, and past self contacts", "[gyro]") {
+  const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
+  const Json params{{"variant", variant}, {"algorithm", "keep_attraction"}};
+  CAPTURE(params);
+  Bare bare;
+  hamelin_goal joint{}, position{}, pose{};
+  joint.type = HAMELIN_GOAL_JOINT;
+  position.type = HAMELIN_GOAL_POSITION;
+  pose.type = HAMELIN_GOAL_POSE;
+  for (auto* goal : {&position, &pose}) Eigen::Map<Eigen::Vector3d>(goal->position_world_m) << 0.3, 0.4, -0.2;
+  pose.quaternion_wxyz[1] = 1.0;
+  const Eigen::Vector4d end(0.5, -0.2, 0.1, 1.0);
+  Eigen::MatrixXd path(4, 3);
+  path << Eigen::Vector4d::Constant(2.0), Eigen::Vector4d::Constant(-1.0), end;
+  const Eigen::VectorXd to_end = bare.answer(params, joint, end), there = bare.answer(params, position);
+  CHECK(to_end.norm() > 1.0);
+  CHECK((to_end - there).norm() > 1.0);
+  CHECK(bare.answer(params, joint, end, path) == to_end);
+  CHECK(bare.answer(params, pose) == there);
+  CHECK(bare.answer(params, position, {}, {}, true) == there);
 }

@@ -304,7 +304,6 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][inp
   CHECK_THAT(refusal("/planner", nullptr), Catch::Contains("/planner"));
   CHECK_THAT(refusal("/planner/name", "apff"), Catch::Contains("apf"));
   CHECK_THAT(refusal("/planner/params/k_p", -1), Catch::Contains("k_p"));
-  CHECK_THAT(refusal("/model", {{"self_collision", true}}), Catch::Contains("/model/self_collision"));
   CHECK_THAT(refusal("/model", {{"joint_damping", {1.0, 2.0}}}), Catch::Contains("/model/joint_damping"));
   CHECK_THAT(refusal("/duration_s", 0.0037), Catch::Contains("no whole number of steps"));
   CHECK_THAT(refusal("/actuation", {{"type", "sampled"}, {"control_period_s", 0.006}}),
@@ -329,6 +328,33 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
     });
   };
   (void)allocations(0.2);  // what is made once a process
+  CHECK(allocations(2.0) == allocations(1.0));
+}
+
+TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation]") {
+  const ScratchFolder folder;
+  const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
+  CAPTURE(actuation);
+  model::Robot robot = test::planar4();
+  for (auto& link : robot.links) link.joint.effort_max = 5.0;
+  Json scene = scene_52();
+  scene["obstacles"] = {ball("known", 2.4, 2.2, 0.25), ball("hidden", 2.4, -2.2, 0.25)};
+  scene["obstacles"][1]["known"] = false;
+  scene["obstacles"][1]["visible_within_m"] = 0.5;
+  scene["model"] = {{"self_collision", true}, {"torque_limits", true}};
+  scene["actuation"] = {{"type", actuation}, {"coulomb_friction_share", 0.1}};
+  if (actuation == "sampled") scene["actuation"]["torque_rate_max_Nm_s"] = 100.0;
+  scene["planner"] = {
+      {"name", "probe"},
+      {"params", {{"velocity", {0.01, 0.0, 0.0, 0.02}}, {"think_of", {0.5, 0.5, 0.0, 0.0}}, {"influence_m", 1.0}}}};
+  const auto allocations = [&](double duration_s) {
+    scene["duration_s"] = duration_s;
+    return test::allocations_in([&] {
+      const auto result = run_scene(folder, scene, {}, robot);
+      CHECK(result.outcome == Outcome::timeout);
+    });
+  };
+  (void)allocations(0.2);
   CHECK(allocations(2.0) == allocations(1.0));
 }
 #endif

@@ -44,10 +44,12 @@ struct Result {
   double time_s = 0.0;
   long steps = 0;
   Eigen::VectorXd q, v;
-  Eigen::VectorXd v_abs_max;  ///< largest speed of each joint at any node [rad/s or m/s]; empty in free motion
+  Eigen::VectorXd v_abs_max;     ///< largest speed of each joint at any node [rad/s or m/s]; empty in free motion
+  Eigen::VectorXd a_abs_max;     ///< largest |Δv/h| of each joint between two nodes; empty in free motion
+  Eigen::VectorXd jerk_abs_max;  ///< largest |Δ(Δv/h)/h|; empty in free motion
   double energy_initial_J = 0.0, energy_final_J = 0.0;
   double energy_error_max_J = 0.0;  ///< largest |E_k − E_0 − work booked|
-  std::optional<double> min_clearance_m;
+  std::optional<double> min_clearance_m, min_self_clearance_m;
   struct Goal {
     std::string type;
     std::size_t index = 0, count = 0;  ///< how many goals are reached, of how many
@@ -57,6 +59,7 @@ struct Result {
   SolverSummary solver;
   double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0, held_work_J = 0.0;
   double node_work_J = 0.0;               ///< by node velocities: the law, the filter and recovery together
+  std::optional<double> saturated_share;  ///< of all steps; null where torque limits are not modelled
   std::optional<double> certified_share;  ///< of all steps; null where nothing can be hit
   std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified
   std::uint64_t seed = 0;

@@ -43,7 +43,7 @@ class BoxField {
   class Scratch {
    public:
     Scratch() = default;
-    explicit Scratch(const BoxField& field) { heap_.reserve(field.nodes_.size() * width); }
+    explicit Scratch(const BoxField& field) { waiting_.reserve(field.nodes_.size() * width); }
 
    private:
     friend class BoxField;
@@ -51,7 +51,7 @@ class BoxField {
       double key;          ///< squared distance; inside a box: minus the squared depth
       std::int32_t index;  ///< box if not negative, else −1 − node
     };
-    std::vector<Entry> heap_;
+    std::vector<Entry> waiting_;
   };
 
   /// Nearest boxes no farther than `limit`, nearest first, up to out.size(). A box is left out if its direction makes
@@ -75,6 +75,37 @@ class BoxField {
   std::vector<Box> boxes_;
   std::vector<Node> nodes_;  ///< the root is the first
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+/// Tells by one look into a table that no box of a field is near: lower bounds of the distance at the centres of a
+/// coarse grid over a ball, to which the distance of two points adds. It never errs to the unsafe side.
+class FarTable {
+ public:
+  FarTable() = default;
+  /// @param region where it will be asked; elsewhere it knows nothing
+  /// @param edge of a cell [m], made larger if there were more than 2²⁰ of them
+  /// @param exact_up_to farther than this the bounds are coarse [m]
+  FarTable(const BoxField& field, const Ball& region, double edge, double exact_up_to);
+
+  /// Whether every box is farther from p than `limit`; false also where that is not known.
+  [[nodiscard]] bool beyond(const Eigen::Vector3d& p, double limit) const noexcept {
+    if (bounds_.empty()) return false;
+    const Eigen::Vector3d at = (p - low_) * per_edge_;
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(at[axis] >= 0.0 && at[axis] < static_cast<double>(cells_))) return false;
+    const auto x = static_cast<std::size_t>(at.x()), y = static_cast<std::size_t>(at.y()),
+               z = static_cast<std::size_t>(at.z());
+    const double room = static_cast<double>(bounds_[(x * cells_ + y) * cells_ + z]) - limit;
+    const Eigen::Vector3d off(at.x() - static_cast<double>(x) - 0.5, at.y() - static_cast<double>(y) - 0.5,
+                              at.z() - static_cast<double>(z) - 0.5);
+    return room > 0.0 && off.squaredNorm() * edge_ * edge_ < room * room;
+  }
+
+ private:
+  Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
+  double edge_ = 0.0, per_edge_ = 0.0;
+  std::size_t cells_ = 0;      ///< along each axis
+  std::vector<float> bounds_;  ///< [m], less a hair for all rounding
 };
 
 }  // namespace hamelin::scene

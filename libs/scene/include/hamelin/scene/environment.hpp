@@ -45,8 +45,9 @@ struct Contact {
   Eigen::Vector3d obstacle_velocity = Eigen::Vector3d::Zero();  ///< [m/s]
 };
 
-/// Who looks: a planner is not shown what is judge_only or not yet visible, the judge sees all that is there.
-enum class View : std::int32_t { planner, judge };
+/// Who looks. A planner: the map, and obstacles that are known or were seen (Environment::see), never judge_only ones.
+/// Hidden: only what a planner is not shown. The judge: all that is there.
+enum class View : std::int32_t { planner, hidden, judge };
 
 /// All that the arm can hit, cropped to where it can be. Immutable and shared between threads; each thread brings a
 /// Scratch of its own.
@@ -96,14 +97,23 @@ class Environment {
   /// @param centers, radii the spheres, world [m]
   /// @param influence largest distance from a sphere's surface [m]
   /// @param out receives them; if it is too small, the nearest of all
+  /// @param seen see(): one flag an obstacle; empty: none was seen
   /// @return how many there are, also if out is smaller. No allocation.
   std::size_t closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double influence,
-                      double time_s, Scratch& scratch, std::span<Contact> out, View view = View::planner) const;
+                      double time_s, Scratch& scratch, std::span<Contact> out, View view = View::planner,
+                      std::span<const std::uint8_t> seen = {}) const;
+
+  /// Marks the obstacles that are not known but come into sight of the arm as it stands: they are there, and its
+  /// clearance to them is at most their visible_within_m. Marks stay: what was seen is remembered.
+  /// @param seen one flag an obstacle, zero at first
+  /// @return the index of one that was newly seen, or −1 if there is none (any more). No allocation.
+  int see(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
+          std::span<std::uint8_t> seen) const;
 
   /// Smallest distance between any sphere's surface and any obstacle [m], or `limit` if all is farther. Zero or below
   /// is contact. No allocation.
   [[nodiscard]] double clearance(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-                                 double limit, View view = View::judge) const;
+                                 double limit, View view = View::judge, std::span<const std::uint8_t> seen = {}) const;
 
   /// Whether a sphere touches unknown space where the policy is `slow`.
   [[nodiscard]] bool in_slow_space(std::span<const Eigen::Vector3d> centers, std::span<const double> radii) const;
@@ -117,13 +127,13 @@ class Environment {
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
 
  private:
-  [[nodiscard]] bool shown(std::size_t obstacle, std::span<const Eigen::Vector3d> centers,
-                           std::span<const double> radii, double time_s, View view) const;
+  [[nodiscard]] bool shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const;
   [[nodiscard]] double clearance_to(const Obstacle& obstacle, std::span<const Eigen::Vector3d> centers,
                                     std::span<const double> radii, double time_s, double limit) const;
 
   geometry::SE3 map_pose_, map_pose_inverse_;
   BoxField map_, unknown_;  ///< in the map's frame [m]
+  FarTable far_from_map_, far_from_unknown_;
   std::vector<Obstacle> obstacles_;
   Summary summary_;
 };

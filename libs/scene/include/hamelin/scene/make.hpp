@@ -10,6 +10,7 @@
 #include "hamelin/core/json.hpp"
 #include "hamelin/scene/boxes.hpp"
 #include "hamelin/scene/obstacles.hpp"
+#include "hamelin/scene/scene.hpp"
 
 namespace hamelin::scene {
 
@@ -66,11 +67,13 @@ struct ProblemOptions {
   std::string tip;                       ///< may be empty
   double resolution_m = 0.02;
   Mark mark = Mark::touch;
-  std::filesystem::path output;  ///< the scene; the map stands beside it, with ending .bt
+  std::filesystem::path output;     ///< the scene; the map stands beside it, with ending .bt
+  GoalType goal = GoalType::joint;  ///< the problem's goal itself, or where the tip is then
 };
 
 /// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the
-/// planner sees the map, the primitives themselves are there for the judge. Joints go by order.
+/// planner sees the map, the primitives themselves are there for the judge. Joints go by order. Joint, velocity and
+/// torque limits and self-collision are modelled, and gravity.
 /// @throws Error io, parse or invalid
 MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options);
 

@@ -27,13 +27,17 @@ enum class GoalType : std::int32_t { joint, position, pose };
 
 struct Goal {
   GoalType type = GoalType::joint;
-  Eigen::VectorXd q;   ///< joint [rad or m]
-  geometry::SE3 pose;  ///< position, pose: of the tip in the world; a position's rotation means nothing
+  Eigen::VectorXd q;     ///< joint [rad or m]
+  Eigen::MatrixXd path;  ///< joint, if given as a path: way-points as columns, q the last; else empty
+  geometry::SE3 pose;    ///< position, pose: of the tip in the world; a position's rotation means nothing
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};              ///< see Quaternion
   double tolerance_m = 0.0;                                    ///< position 0.02, pose 0.01
   double tolerance_rad = 0.0;                                  ///< joint 0.05, pose 0.26
   double speed_max = std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
 };
+
+/// The goal's "type" in a scene file: "path" is a joint goal with way-points.
+[[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
 /// Viscous joint damping [Nms/rad or Ns/m].
 struct JointDamping {
@@ -65,6 +69,8 @@ struct Actuation {
   double delay_s = 0.0;
   double joint_noise_rad = 0.0;
   double planner_mass_scale = 1.0;
+  std::optional<double> torque_rate_max_Nm_s;  ///< sampled: of each joint's held torque [Nm/s or N/s]
+  double coulomb_friction_share = 0.0;         ///< of the effort limits; the planner knows nothing of it
 };
 
 /// A planner or integrator by name, with parameters that only it understands.

@@ -33,12 +33,12 @@ struct Pair {
 struct DrawnPairs {
   std::vector<Pair> pairs;
   std::size_t draws = 0;        ///< configurations drawn
-  std::size_t near_draws = 0;   ///< of these nearer than min_clearance_m to something
+  std::size_t near_draws = 0;   ///< of these nearer than min_clearance_m to something, or in self-contact
   std::size_t close_goals = 0;  ///< clear goals that lay within min_distance_rad of their start
 };
 
-/// Start and goal uniform in the joint limits, drawn anew until they have their clearance and their distance. The first
-/// k pairs do not depend on `count`.
+/// Start and goal uniform in the joint limits, drawn anew until they have their clearance and their distance, and are
+/// free of self-contact where the scene models it. The first k pairs do not depend on `count`.
 /// @throws Error invalid if a joint has no limits, or if max_draws do not suffice (saying how many were found, and why
 ///         the rest failed); usage for options that make no sense; all that load_model and Environment throw
 [[nodiscard]] DrawnPairs draw_pairs(const scene::Scene& scene, const PairOptions& options);

@@ -1,0 +1,14 @@
+#pragma once
+#include <CLI/CLI.hpp>
+
+/// The subcommands of `hamelin sweep`.
+namespace hamelin::app {
+
+void add_sweep_plan(CLI::App& sweep, int& exit_code);
+void add_sweep_run(CLI::App& sweep, int& exit_code);
+void add_sweep_merge(CLI::App& sweep, int& exit_code);
+void add_sweep_pairs(CLI::App& sweep, int& exit_code);
+/// Hidden: one judged run, a line of JSON; what `sweep run` starts.
+void add_sweep_one(CLI::App& sweep, int& exit_code);
+
+}  // namespace hamelin::app

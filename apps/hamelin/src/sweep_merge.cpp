@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/study/merge.hpp"
+#include "output.hpp"
+#include "sweep.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeOptions {
+  std::vector<fs::path> directories;
+  std::vector<std::string> by{"goal", "planner"};
+  std::optional<fs::path> output, page;
+  bool json = false;
+};
+
+int sweep_merge(const MergeOptions& options) {
+  std::vector<fs::path> inputs;
+  for (const auto& directory : options.directories) {
+    inputs.push_back(study::plan_file(directory));
+    inputs.push_back(study::records_file(directory));
+  }
+  std::optional<fs::path> output, page;
+  if (options.output) output = output_target(*options.output, inputs);
+  if (options.page) page = output_target(*options.page, inputs);
+  const study::Merged merged = study::merge(options.directories, options.by);
+  const Json summary = study::to_json(merged);
+  if (output) write_file_aside(*output, summary.dump(2) + "\n");
+  if (page) write_file_aside(*page, study::to_page(merged));
+  for (const auto& text : merged.notes) note(text);
+  if (options.json)
+    print_json(summary);
+  else
+    report(study::to_table(merged));
+  return 0;
+}
+
+}  // namespace
+
+void add_sweep_merge(CLI::App& sweep, int& exit_code) {
+  auto* command =
+      add_command(sweep, "merge", "Sum up the records of sweeps: success with 95 % intervals, contacts, times",
+                  "hamelin sweep merge tries\n"
+                  "hamelin sweep merge tries more --by family,goal,planner -o summary.json\n"
+                  "hamelin sweep merge tries --page tries.html --json");
+  const auto options = std::make_shared<MergeOptions>();
+  command->add_option("directories", options->directories, "plans with their records")->required()->type_name("DIR...");
+  command
+      ->add_option("--by", options->by, "labels to group by: family, problem, goal, map, planner, values, seed, gains")
+      ->type_name("LABEL,LABEL")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->default_str("goal,planner");
+  command->add_option("-o,--output", options->output, "write the summary as JSON")->type_name("SUMMARY.json");
+  command->add_option("--page", options->page, "write a page with table, gain map and all failed runs")
+      ->type_name("PAGE.html");
+  command->add_flag("--json", options->json, "print the summary as JSON");
+  command->callback([options, &exit_code] { exit_code = sweep_merge(*options); });
+}
+
+}  // namespace hamelin::app

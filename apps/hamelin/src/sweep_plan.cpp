@@ -1,0 +1,171 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "command_line.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/study/make_plan.hpp"
+#include "scene_flags.hpp"
+#include "sweep.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct PlanFlags {
+  study::PlanOptions plan;
+  std::vector<std::string> goals;
+  std::string mark = "touch", sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
+  std::vector<std::string> keep_out;
+  std::size_t primitives = 30;
+  std::uint64_t clutter_seed = 1;
+  std::vector<std::filesystem::path> plugin_path;
+  std::filesystem::path output;
+  bool json = false;
+};
+
+scene::GoalType goal_from(const std::string& name) {
+  for (const auto type : {scene::GoalType::joint, scene::GoalType::position})
+    if (name == scene::to_string(type)) return type;
+  return scene::GoalType::pose;
+}
+
+int sweep_plan(const PlanFlags& flags) {
+  study::PlanOptions options = flags.plan;
+  for (const auto& goal : flags.goals) options.goals.push_back(goal_from(goal));
+  options.problem.mark = scene::mark_from(flags.mark);
+  scene::Clutter& clutter = options.clutter.clutter;
+  clutter.count = flags.primitives;
+  clutter.seed = options.clutter.draw.seed = options.gains.seed = flags.clutter_seed;
+  const auto sizes = number_list("--sizes", flags.sizes, 2), b = number_list("--bounds", flags.bounds, 6);
+  clutter.size_min_m = sizes[0];
+  clutter.size_max_m = sizes[1];
+  clutter.bounds = {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+  for (const auto& text : flags.keep_out) {
+    const auto k = number_list("--keep-out", text, 4);
+    clutter.keep_out.push_back({{k[0], k[1], k[2]}, k[3]});
+  }
+  if (clutter.keep_out.empty()) clutter.keep_out.push_back({{0.0, 0.0, 0.2}, 0.35});
+  std::optional<Progress> progress(std::in_place, "scenes planned");
+  options.on_scene = [&progress](std::size_t done, std::size_t all) {
+    progress->show(static_cast<double>(done), static_cast<double>(all));
+  };
+  options.check = [&flags](const study::SweepRun& run) {
+    SceneFlags scene_flags;
+    scene_flags.planner = run.planner;
+    scene_flags.seed = run.seed;
+    scene_flags.set = run.set;
+    const scene::Scene scene = read_scene(flags.output / run.scene, scene_flags);
+    (void)simulation::full_config(scene, plugin_path(flags.plugin_path));
+  };
+  const study::SweepPlan plan = study::make_plan(flags.output, options);
+  progress.reset();
+  const auto feasible = static_cast<std::size_t>(
+      std::count_if(plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return scene.feasible; }));
+  if (flags.json)
+    print_json({{"file", study::plan_file(flags.output).string()},
+                {"scenes", plan.scenes.size()},
+                {"feasible", feasible},
+                {"runs", plan.runs.size()},
+                {"sha256", plan.sha256}});
+  else
+    report(fmt::format("{}: {} runs of {} scenes, {} of them feasible\n", study::plan_file(flags.output).string(),
+                       plan.runs.size(), plan.scenes.size(), feasible));
+  return 0;
+}
+
+void add_made_scenes(CLI::App& command, PlanFlags& flags) {
+  auto& plan = flags.plan;
+  command.add_option("--base", plan.base, "the scene whose arm clutter and gains are drawn for")
+      ->type_name("SCENE.json");
+  command.add_option("--clutter", plan.clutter.maps, "so many maps of random clutter")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 100'000L));
+  command.add_option("--pairs", plan.clutter.pairs, "start/goal pairs in each clutter")
+      ->type_name("K")
+      ->capture_default_str()
+      ->check(CLI::Range(1L, 100'000L));
+  command.add_option("--primitives", flags.primitives, "obstacles in each clutter")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1L, 10'000L));
+  command.add_option("--sizes", flags.sizes, "smallest and largest edge of clutter [m]")
+      ->type_name("A,B")
+      ->capture_default_str();
+  command.add_option("--bounds", flags.bounds, "where clutter goes [m]")
+      ->type_name("X,Y,Z,X,Y,Z")
+      ->capture_default_str();
+  command
+      .add_option("--keep-out", flags.keep_out,
+                  "no clutter reaches into this ball [m]; may be repeated (default 0,0,0.2,0.35)")
+      ->type_name("X,Y,Z,R")
+      ->allow_extra_args(false);
+  command.add_option("--gain-sets", plan.gains.sets, "so many random gain sets for example 5.2")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 1'000'000L));
+  command.add_option("--draw-seed", flags.clutter_seed, "of clutter (the first map's), pairs and gains")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(whole_number());
+}
+
+}  // namespace
+
+void add_sweep_plan(CLI::App& sweep, int& exit_code) {
+  auto* command =
+      add_command(sweep, "plan", "Plan runs: problems, scenes, clutter or gain sets, times planners, values and seeds",
+                  "hamelin sweep plan problems/*.json --robot arm.urdf --resolution 0.01 --goal pose -o tries\n"
+                  "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
+                  "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
+  const auto flags = std::make_shared<PlanFlags>();
+  auto& plan = flags->plan;
+  command->add_option("files", plan.files, "MotionBenchMaker problems and scenes, told apart by content")
+      ->type_name("FILE...");
+  command->add_option("-o,--output", flags->output, "the directory to write the plan and its scenes to")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option(
+          "--planner", plan.planners,
+          "a planner, with parameters as hybrid:escape=tree,margin_m=0.01; may be repeated (default the scene's)")
+      ->type_name("NAME:K=V,K=V")
+      ->allow_extra_args(false);
+  command->add_option("--set", plan.set, "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
+      ->type_name("/json/pointer=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("--vary", plan.vary, "a run for each of these values; repeated: for each combination")
+      ->type_name("/json/pointer=V,V")
+      ->allow_extra_args(false);
+  command->add_option("--seeds", plan.seeds, "a run for each of these seeds")
+      ->type_name("S,S")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->default_str("1")
+      ->check(whole_number());
+  command->add_option("--duration", plan.duration_s, "longest simulated time of a run [s] (default the scene's)")
+      ->type_name("T")
+      ->check(CLI::PositiveNumber);
+  one_of(command->add_option("--goal", flags->goals, "kinds of a problem's goal; may be repeated (default joint)"),
+         {"joint", "position", "pose"})
+      ->type_name("KIND")
+      ->allow_extra_args(false);
+  command->add_option("--robot", plan.problem.robot, "the problems' robot")->type_name("FILE");
+  command->add_option("--spheres", plan.problem.spheres, "its collision spheres")->type_name("FILE.json");
+  command->add_option("--tip", plan.problem.tip, "its tip")->type_name("LINK");
+  command->add_option("--resolution", plan.problem.resolution_m, "edge of a voxel in maps that are made [m]")
+      ->type_name("R")
+      ->capture_default_str();
+  one_of(command->add_option("--mark", flags->mark,
+                             "voxels that primitives touch, or whose centre they hold (default touch)"),
+         {"touch", "centre"});
+  add_made_scenes(*command, *flags);
+  command->add_option("--plugin-path", flags->plugin_path, "look for planners here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command->add_flag("--json", flags->json, "print what was planned as JSON");
+  command->callback([flags, &exit_code] { exit_code = sweep_plan(*flags); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "command_line.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/study/judge.hpp"
+#include "hamelin/study/sweep.hpp"
+#include "scene_flags.hpp"
+#include "sweep.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RunOptions {
+  fs::path directory;
+  study::SweepOptions sweep;
+  std::vector<fs::path> plugin_path;
+};
+
+struct OneOptions {
+  fs::path file;
+  SceneFlags flags;
+  std::vector<fs::path> plugin_path;
+};
+
+int sweep_run(const RunOptions& options) {
+  study::SweepOptions sweep = options.sweep;
+  // this very program, also if another was built in its place meanwhile
+  sweep.command = {"/proc/self/exe", "sweep", "one"};
+  for (const auto& directory : options.plugin_path) {
+    sweep.command.emplace_back("--plugin-path");
+    sweep.command.push_back(directory.string());
+  }
+  sweep.stop = &stop_on_signals();
+  study::SweepOutcome outcome;
+  {
+    const Phase phase("the sweep");
+    Progress progress("runs");
+    sweep.on_done = [&progress](std::size_t done, std::size_t all) {
+      progress.show(static_cast<double>(done), static_cast<double>(all));
+    };
+    outcome = study::run_sweep(options.directory, sweep);
+  }
+  if (outcome.dropped_cut_line)
+    note(
+        fmt::format("{}: the last line was cut; its run is repeated", study::records_file(options.directory).string()));
+  const std::size_t left = outcome.planned - outcome.recorded - outcome.run;
+  report(fmt::format("{}: {} runs recorded now, {} before, {} left{}\n", options.directory.string(), outcome.run,
+                     outcome.recorded, left,
+                     outcome.crashed > 0 ? fmt::format("; {} crashed", outcome.crashed) : std::string()));
+  return outcome.stopped ? log::exit_code(log::Outcome::interrupted) : 0;
+}
+
+int sweep_one(const OneOptions& options) {
+  const scene::Scene scene = read_scene(options.file, options.flags);
+  study::Judge judge(scene);
+  simulation::Watch watch;
+  watch.argv = command_line();
+  watch.stop = &stop_on_signals();
+  watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.node(time_s, q); };
+  const log::Result result = simulation::run(scene, plugin_path(options.plugin_path), watch);
+  const Json line{{"result", log::to_json(result)}, {"judge", study::to_json(judge.verdict())}};
+  fmt::print("{}\n", line.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return 0;
+}
+
+}  // namespace
+
+void add_sweep_run(CLI::App& sweep, int& exit_code) {
+  auto* command = add_command(sweep, "run",
+                              "Run what a plan holds and has no record yet, one process a run. Stopped or "
+                              "killed, it goes on where it was when called again",
+                              "hamelin sweep run tries\n"
+                              "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
+  const auto options = std::make_shared<RunOptions>();
+  options->sweep.jobs = std::max(1U, std::thread::hardware_concurrency());
+  command->add_option("directory", options->directory, "made by `hamelin sweep plan`")->required()->type_name("DIR");
+  command->add_option("--jobs", options->sweep.jobs, "processes at the same time (default one a core)")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 1024L));
+  command->add_option("--only", options->sweep.only, "only runs whose id holds this")->type_name("TEXT");
+  command->add_option("--limit", options->sweep.limit, "at most so many runs now")
+      ->type_name("N")
+      ->check(whole_number());
+  command->add_flag("--fresh", options->sweep.fresh, "drop the records that are there, and begin anew");
+  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command->callback([options, &exit_code] { exit_code = sweep_run(*options); });
+}
+
+void add_sweep_one(CLI::App& sweep, int& exit_code) {
+  auto* command = add_command(sweep, "one", "One run with a judge, as a line of JSON",
+                              "hamelin sweep one data/scenes/shelf.json\n"
+                              "hamelin sweep one data/scenes/shelf.json --planner apf --seed 2");
+  command->group("");
+  const auto options = std::make_shared<OneOptions>();
+  command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
+  command->add_option("--planner", options->flags.planner, "a plugin's name or path")->type_name("NAME|PATH");
+  command->add_option("--set", options->flags.set, "set one value of the scene; may be repeated")
+      ->type_name("/json/pointer=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("--seed", options->flags.seed, "of all random numbers")->type_name("S")->check(whole_number());
+  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command->callback([options, &exit_code] { exit_code = sweep_one(*options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,283 @@
+#include "hamelin/study/judge.hpp"
+
+#include <fmt/format.h>
+#include <octomap/OcTree.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <set>
+#include <sstream>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+namespace hamelin::study {
+
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Leaves this much beyond the nearest are kept with it: they serve until the ball has moved half as far.
+constexpr double nearby_m = 0.04;
+
+Isometry3d isometry(const geometry::SE3& g) {
+  Isometry3d made = Isometry3d::Identity();
+  made.linear() = g.R();
+  made.translation() = g.p();
+  return made;
+}
+
+// Positive outside, negative inside, of a body that is the product of intervals |x_i| <= h_i.
+template <typename Vector>
+double distance_from_block(const Vector& outside) {
+  return outside.cwiseMax(0.0).norm() + std::min(outside.maxCoeff(), 0.0);
+}
+
+double distance_from_box(const scene::Box& box, const Vector3d& p) {
+  return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).norm();
+}
+
+double distance_from_boxes(const std::vector<scene::Box>& boxes, const Vector3d& p) {
+  double nearest = infinity;
+  for (const auto& box : boxes)
+    nearest = std::min(nearest, (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).squaredNorm());
+  return std::sqrt(nearest);
+}
+
+Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
+  Vector3d center = obstacle.pose.p();
+  if (obstacle.motion)
+    center += obstacle.motion->amplitude_m * std::sin(2.0 * std::numbers::pi * time_s / obstacle.motion->period_s);
+  return center;
+}
+
+double radius_around(const scene::Obstacle& obstacle) {
+  switch (obstacle.shape) {
+    case scene::Shape::sphere:
+      return obstacle.radius_m;
+    case scene::Shape::box:
+      return 0.5 * obstacle.size_m.norm();
+    case scene::Shape::cylinder:
+      return std::hypot(obstacle.radius_m, 0.5 * obstacle.length_m);
+  }
+  return infinity;
+}
+
+}  // namespace
+
+JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
+  const model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres});
+  std::vector<std::string> parts;  // of each ball
+  std::map<std::string, int> counts;
+  const auto add = [&](const std::string& part, int link, const Vector3d& center, double radius) {
+    balls_.push_back({fmt::format("{}/{}", part, counts[part]++), link, center, radius});
+    parts.push_back(part);
+  };
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const auto& link = robot.links[i];
+    joints_.push_back({link.parent, link.joint.screw.head<3>(), link.joint.screw.tail<3>()});
+    for (const auto& sphere : link.spheres)
+      add(sphere.part.empty() ? link.name : sphere.part, static_cast<int>(i), isometry(link.com) * sphere.center_m,
+          sphere.radius_m);
+  }
+  if (!scene.model.self_collision) return;
+  for (const auto& sphere : robot.base_spheres) add(sphere.part, -1, sphere.center_m, sphere.radius_m);
+  std::set<std::pair<std::string, std::string>> disabled;
+  for (const auto& [a, b] : robot.self_collision_disabled) disabled.insert(std::minmax(a, b));
+  const auto parent = [&](int link) { return link < 0 ? -1 : robot.links[static_cast<std::size_t>(link)].parent; };
+  for (std::size_t a = 0; a < balls_.size(); ++a)
+    for (std::size_t b = a + 1; b < balls_.size(); ++b) {
+      const int i = balls_[a].link, j = balls_[b].link;
+      const bool neighbours = parent(i) == j || parent(j) == i;
+      if (i == j || (disabled.empty() && neighbours) || disabled.contains(std::minmax(parts[a], parts[b]))) continue;
+      self_pairs_.emplace_back(a, b);
+    }
+}
+
+void JudgedArm::place(const Eigen::VectorXd& q, std::vector<Vector3d>& centers) const {
+  std::vector<Isometry3d> moved(joints_.size());
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const Screw& joint = joints_[i];
+    const double angle = q[static_cast<Eigen::Index>(i)];
+    Isometry3d step = Isometry3d::Identity();
+    if (joint.axis.isZero()) {
+      step.translation() = angle * joint.moment;
+    } else {
+      // a point of the axis is ω × v; what of v lies along the axis is the screw's pitch
+      const Vector3d on_axis = joint.axis.cross(joint.moment);
+      step.linear() = Eigen::AngleAxisd(angle, joint.axis).toRotationMatrix();
+      step.translation() = on_axis - step.linear() * on_axis + angle * joint.axis.dot(joint.moment) * joint.axis;
+    }
+    const Isometry3d before = joint.parent < 0 ? base_ : moved[static_cast<std::size_t>(joint.parent)];
+    moved[i] = before * step;
+  }
+  centers.resize(balls_.size());
+  for (std::size_t k = 0; k < balls_.size(); ++k)
+    centers[k] = (balls_[k].link < 0 ? base_ : moved[static_cast<std::size_t>(balls_[k].link)]) * balls_[k].center;
+}
+
+double distance_from(const scene::Obstacle& obstacle, double time_s, const Vector3d& p) {
+  const Vector3d local = obstacle.pose.R().transpose() * (p - center_at(obstacle, time_s));
+  switch (obstacle.shape) {
+    case scene::Shape::sphere:
+      return local.norm() - obstacle.radius_m;
+    case scene::Shape::box:
+      return distance_from_block(Vector3d(local.cwiseAbs() - 0.5 * obstacle.size_m));
+    case scene::Shape::cylinder:
+      return distance_from_block(
+          Eigen::Vector2d(local.head<2>().norm() - obstacle.radius_m, std::abs(local.z()) - 0.5 * obstacle.length_m));
+  }
+  return infinity;
+}
+
+JudgedMap::JudgedMap(const scene::MapSpec& spec) : from_world_(isometry(spec.pose).inverse()) {
+  const std::string bytes = read_file(spec.file);
+  const auto header = scene::check_map_bytes(bytes, spec.file.string());
+  const double scale = spec.scale.value_or(1.0);
+  std::istringstream body(bytes.substr(header.data_offset));
+  octomap::OcTree tree(header.resolution);
+  tree.setOccupancyThres(spec.occupancy_threshold);
+  header.format == scene::MapFormat::bt ? tree.readBinaryData(body) : tree.readData(body);
+  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+    if (!tree.isNodeOccupied(*leaf)) continue;
+    const Vector3d center{leaf.getX(), leaf.getY(), leaf.getZ()};
+    const Vector3d half = Vector3d::Constant(0.5 * leaf.getSize());
+    leaves_.push_back({scale * (center - half), scale * (center + half)});
+  }
+}
+
+double JudgedMap::distance(const Vector3d& p) const {
+  return distance_from_boxes(leaves_, local(p));
+}
+
+std::vector<scene::Box> JudgedMap::near(const Vector3d& p, double distance) const {
+  const Vector3d at = local(p);
+  std::vector<scene::Box> found;
+  for (const auto& leaf : leaves_)
+    if (distance_from_box(leaf, at) <= distance) found.push_back(leaf);
+  return found;
+}
+
+Json to_json(const Verdict& v) {
+  const auto closest = [](const std::optional<Closest>& c) {
+    return c ? Json{{"clearance_m", c->clearance_m}, {"time_s", c->time_s}, {"sphere", c->ball}, {"other", c->other}}
+             : Json(nullptr);
+  };
+  return {{"contact", v.contact()},
+          {"obstacles", closest(v.obstacles)},
+          {"self", closest(v.self)},
+          {"configurations", v.configurations}};
+}
+
+Judge::Judge(const scene::Scene& scene)
+    : arm_(scene), obstacles_(scene.obstacles), best_(infinity), best_self_(infinity) {
+  for (const auto& obstacle : obstacles_) bounds_.push_back(radius_around(obstacle));
+  const bool exact = std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
+  if (scene.map && !exact) map_ = JudgedMap(*scene.map);
+  nearby_.resize(arm_.balls().size());
+}
+
+void Judge::node(double time_s, const Eigen::VectorXd& q) {
+  if (!q.allFinite()) return;  // the run ends as diverged
+  int parts = 1;
+  if (last_q_.size() > 0)
+    parts = std::max(1, static_cast<int>(std::ceil((q - last_q_).lpNorm<Eigen::Infinity>() / step_rad)));
+  for (int i = 1; i < parts; ++i) {
+    const double share = static_cast<double>(i) / parts;
+    look(last_time_s_ + share * (time_s - last_time_s_), last_q_ + share * (q - last_q_));
+  }
+  look(time_s, q);
+  last_time_s_ = time_s;
+  last_q_ = q;
+}
+
+void Judge::look(double time_s, const Eigen::VectorXd& q) {
+  ++verdict_.configurations;
+  arm_.place(q, centers_);
+  const auto& balls = arm_.balls();
+  const auto found = [&](double clearance, std::size_t ball, const std::string& what) {
+    if (!(clearance < best_)) return;
+    best_ = clearance;
+    verdict_.obstacles = {clearance, time_s, balls[ball].name, what};
+  };
+  for (std::size_t k = 0; k < balls.size(); ++k) {
+    if (balls[k].link < 0) continue;  // the base stands where it stands
+    for (std::size_t i = 0; i < obstacles_.size(); ++i) {
+      const auto& obstacle = obstacles_[i];
+      if (time_s < obstacle.appears_s) continue;
+      const double at_least = (centers_[k] - center_at(obstacle, time_s)).norm() - bounds_[i] - balls[k].radius;
+      if (at_least < best_) found(distance_from(obstacle, time_s, centers_[k]) - balls[k].radius, k, obstacle.name);
+    }
+    if (!map_.leaves().empty()) found(map_distance(k, best_) - balls[k].radius, k, "map");
+  }
+  for (const auto& [a, b] : arm_.self_pairs()) {
+    const double clearance = (centers_[a] - centers_[b]).norm() - balls[a].radius - balls[b].radius;
+    if (!(clearance < best_self_)) continue;
+    best_self_ = clearance;
+    verdict_.self = {clearance, time_s, balls[a].name, balls[b].name};
+  }
+}
+
+// Distances change by no more than the way moved: so what was found before tells when the ball cannot be nearer than
+// `enough`, and when the leaves gathered then still hold the nearest one.
+double Judge::map_distance(std::size_t ball, double enough) {
+  Nearby& nearby = nearby_[ball];
+  const Vector3d& p = centers_[ball];
+  const double moved = (p - nearby.at).norm();
+  if (nearby.known) {
+    if (nearby.distance - moved - arm_.balls()[ball].radius >= enough) return nearby.distance - moved;
+    if (2.0 * moved <= nearby_m) return distance_from_boxes(nearby.leaves, map_.local(p));
+  }
+  nearby.at = p;
+  nearby.distance = map_.distance(p);
+  nearby.leaves = map_.near(p, nearby.distance + nearby_m);
+  nearby.known = true;
+  return nearby.distance;
+}
+
+Feasibility feasibility(const scene::Scene& scene, const std::vector<Eigen::VectorXd>& goals_q) {
+  const JudgedArm arm(scene);
+  const JudgedMap map = scene.map ? JudgedMap(*scene.map) : JudgedMap();
+  std::vector<std::pair<std::string, Eigen::VectorXd>> places;
+  const auto dof = static_cast<Eigen::Index>(arm.dof());
+  places.emplace_back("start", scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(dof));
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    if (scene.goals[i].type == scene::GoalType::joint)
+      places.emplace_back(scene.goals.size() > 1 ? fmt::format("goal {}", i) : "goal", scene.goals[i].q);
+  for (const auto& q : goals_q) places.emplace_back("goal", q);
+  std::vector<Vector3d> centers;
+  for (const auto& [name, q] : places) {
+    if (q.size() != dof)
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: {}: {} numbers given, expected {}", scene.name, name, q.size(), arm.dof()));
+    arm.place(q, centers);
+    double nearest = infinity;
+    std::string what;
+    const auto& balls = arm.balls();
+    const auto see = [&](double clearance, const std::string& pair) {
+      if (clearance < nearest) what = pair;
+      nearest = std::min(nearest, clearance);
+    };
+    for (std::size_t k = 0; k < balls.size() && balls[k].link >= 0; ++k) {
+      see(map.distance(centers[k]) - balls[k].radius, balls[k].name + " in the map");
+      for (const auto& obstacle : scene.obstacles)
+        if (!obstacle.judge_only && obstacle.appears_s <= 0.0)
+          see(distance_from(obstacle, 0.0, centers[k]) - balls[k].radius,
+              fmt::format("{} in '{}'", balls[k].name, obstacle.name));
+    }
+    for (const auto& [a, b] : arm.self_pairs())
+      see((centers[a] - centers[b]).norm() - balls[a].radius - balls[b].radius,
+          fmt::format("{} in {}", balls[a].name, balls[b].name));
+    if (nearest <= 0.0) return {false, fmt::format("{}: {}, {:.4f} m deep", name, what, -nearest)};
+  }
+  return {};
+}
+
+}  // namespace hamelin::study

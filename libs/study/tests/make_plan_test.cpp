@@ -1,0 +1,308 @@
+#include "hamelin/study/make_plan.hpp"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/study/judge.hpp"
+
+using namespace hamelin;
+using namespace hamelin::study;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path source_dir = HAMELIN_SOURCE_DIR;
+
+/// A directory with two small problems for arm7: one that it can solve, one with a wall where the goal is.
+class Bench {
+ public:
+  Bench() {
+    std::string name = (fs::temp_directory_path() / "hamelin-plan-XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    root_ = name;
+    const Json home{0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785}, away{1.2, -0.4, 0.0, -2.0, 0.0, 1.571, 0.785};
+    const auto box = [](const Json& at) {
+      return Json{{"name", "wall"},
+                  {"type", "box"},
+                  {"position", at},
+                  {"quaternion_wxyz", {1, 0, 0, 0}},
+                  {"size", {0.1, 0.1, 0.1}}};
+    };
+    put("free.json", {{"name", "free"},
+                      {"family", "walls"},
+                      {"start", home},
+                      {"goal", away},
+                      {"obstacles", {box({0.9, -0.9, 0.1})}}});
+    put("blocked.json", {{"name", "blocked"},
+                         {"family", "walls"},
+                         {"start", home},
+                         {"goal", away},
+                         {"obstacles", {box({0.12, 0.31, 0.55}), box({0.2, 0.5, 0.5})}}});
+  }
+  ~Bench() {
+    std::error_code ignored;
+    fs::remove_all(root_, ignored);
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  void put(const std::string& file, const Json& document) const { std::ofstream(root_ / file) << document.dump(); }
+  [[nodiscard]] PlanOptions problems() const {
+    PlanOptions options;
+    options.files = {root_ / "free.json", root_ / "blocked.json"};
+    options.problem.robot = source_dir / "data/robots/arm7.urdf";
+    options.problem.spheres = source_dir / "data/robots/arm7.spheres.json";
+    options.problem.tip = "flange";
+    options.problem.resolution_m = 0.02;
+    return options;
+  }
+  [[nodiscard]] fs::path dir(const std::string& name) const { return root_ / name; }
+
+ private:
+  fs::path root_;
+};
+
+/// All files below a directory with their bytes.
+std::map<std::string, std::string> bytes_below(const fs::path& directory) {
+  std::map<std::string, std::string> all;
+  for (const auto& entry : fs::recursive_directory_iterator(directory))
+    if (entry.is_regular_file()) all[entry.path().lexically_relative(directory).string()] = read_file(entry.path());
+  return all;
+}
+
+std::string message_of(const fs::path& directory, const PlanOptions& options) {
+  try {
+    (void)make_plan(directory, options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a plan has each problem, goal, planner, combination of values and seed once", "[study][unit]") {
+  Bench bench;
+  PlanOptions options = bench.problems();
+  options.goals = {scene::GoalType::joint, scene::GoalType::pose};
+  options.planners = {"hybrid", "apf:k_p=3,law=wang2018"};
+  options.vary = {"/step_s=0.001,0.002", "/model/joint_damping=0,[1,1,1,1,1,1,1],2"};
+  options.set = {"/model/self_collision=false"};
+  options.seeds = {1, 2};
+  options.duration_s = 5.0;
+  std::vector<std::string> checked;
+  options.check = [&](const SweepRun& run) { checked.push_back(run.id); };
+  const SweepPlan plan = make_plan(bench.dir("a"), options);
+  CHECK(plan.scenes.size() == 4);
+  CHECK(plan.runs.size() == 2 * 2 * 2 * 2 * 3 * 2);
+  CHECK(checked.size() == 2 * 2 * 3);
+  std::set<std::string> ids;
+  std::map<std::string, std::size_t> by_label;
+  for (const auto& run : plan.runs) {
+    ids.insert(run.id);
+    for (const auto& [name, value] : run.labels) ++by_label[name + "=" + value];
+  }
+  CHECK(ids.size() == plan.runs.size());
+  CHECK(by_label["goal=pose"] == 48);
+  CHECK(by_label["planner=apf:k_p=3,law=wang2018"] == 48);
+  CHECK(by_label["seed=2"] == 48);
+  CHECK(by_label["family=walls"] == 96);
+  CHECK(by_label["values=/step_s=0.002 /model/joint_damping=[1,1,1,1,1,1,1]"] == 16);
+  const SweepRun& last = plan.runs.back();
+  CHECK(last.id == "blocked-pose/apf:k_p=3,law=wang2018//step_s=0.002 /model/joint_damping=2/s2");
+  CHECK(last.planner == "apf");
+  CHECK(last.set == std::vector<std::string>{"/planner/params/k_p=3", "/planner/params/law=wang2018",
+                                             "/model/self_collision=false", "/duration_s=5", "/step_s=0.002",
+                                             "/model/joint_damping=2"});
+  CHECK(to_json(read_plan(bench.dir("a"))) == to_json(plan));
+}
+
+TEST_CASE("the same options give the same bytes", "[study][unit]") {
+  Bench bench;
+  PlanOptions options = bench.problems();
+  options.base = source_dir / "data/scenes/clutter.json";
+  options.clutter.maps = 1;
+  options.clutter.clutter.count = 5;
+  options.clutter.clutter.size_min_m = 0.05;
+  options.clutter.clutter.size_max_m = 0.2;
+  options.clutter.clutter.bounds = {{-0.8, -0.8, 0.0}, {0.8, 0.8, 1.2}};
+  (void)make_plan(bench.dir("a"), options);
+  (void)make_plan(bench.dir("b"), options);
+  const auto a = bytes_below(bench.dir("a"));
+  CHECK(a.size() == 7);  // the plan, three scenes, three maps
+  CHECK(a == bytes_below(bench.dir("b")));
+}
+
+TEST_CASE("feasibility follows the map and is one for all goals of a problem; a pose goal is the tip's at the goal",
+          "[study][unit]") {
+  Bench bench;
+  PlanOptions options = bench.problems();
+  options.goals = {scene::GoalType::pose, scene::GoalType::joint, scene::GoalType::position};
+  const SweepPlan plan = make_plan(bench.dir("a"), options);
+  REQUIRE(plan.scenes.size() == 6);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(plan.scenes[i].feasible);
+    CHECK_FALSE(plan.scenes[3 + i].feasible);
+    CHECK_THAT(plan.scenes[3 + i].reason, Catch::StartsWith("goal: ") && Catch::Contains(" in the map, "));
+  }
+  const auto scene_at = [&](std::size_t i) { return scene::read_scene(bench.dir("a") / plan.scenes[i].file); };
+  const scene::Scene pose = scene_at(0), joint = scene_at(1);
+  CHECK(pose.map->file == joint.map->file);
+  CHECK(pose.obstacles.at(0).judge_only);
+  const model::Model model = simulation::load_model(joint);
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, joint.goals.at(0).q);
+  CHECK((dynamics::tip_pose(model, ws).matrix() - pose.goals.at(0).pose.matrix()).norm() < 1e-12);
+  CHECK(scene_at(2).goals.at(0).type == scene::GoalType::position);
+}
+
+TEST_CASE("clutter scenes have their pairs clear of map and primitives and apart", "[study][unit]") {
+  Bench bench;
+  PlanOptions options;
+  options.base = source_dir / "data/scenes/clutter.json";
+  options.clutter.maps = 2;
+  options.clutter.pairs = 3;
+  options.clutter.clutter.count = 12;
+  options.clutter.clutter.size_min_m = 0.05;
+  options.clutter.clutter.size_max_m = 0.2;
+  options.clutter.clutter.bounds = {{-0.8, -0.8, 0.0}, {0.8, 0.8, 1.2}};
+  options.clutter.clutter.keep_out = {{{0.0, 0.0, 0.2}, 0.35}};
+  options.clutter.clutter.seed = 7;
+  const SweepPlan plan = make_plan(bench.dir("a"), options);
+  REQUIRE(plan.scenes.size() == 6);
+  CHECK(plan.runs.size() == 6);
+  CHECK(plan.runs[0].id == "clutter_0007-001/hybrid/s1");
+  std::set<std::string> maps, starts;
+  for (const auto& found : plan.scenes) {
+    CHECK(found.feasible);
+    scene::Scene scene = scene::read_scene(bench.dir("a") / found.file);
+    maps.insert(scene.map->file.string());
+    REQUIRE(scene.obstacles.size() == 12);
+    CHECK(scene.obstacles[0].judge_only);
+    REQUIRE(scene.goals.size() == 1);
+    CHECK((scene.goals[0].q - scene.start_q).norm() >= 1.5);
+    CHECK(starts.insert(read_json(bench.dir("a") / found.file)["start"].dump()).second);
+    for (const auto& q : {scene.start_q, scene.goals[0].q}) {
+      Judge primitives(scene);
+      primitives.node(0.0, q);
+      CHECK(primitives.verdict().obstacles->clearance_m >= 0.02);
+      scene::Scene map_only = scene;
+      map_only.obstacles.clear();
+      Judge leaves(map_only);
+      leaves.node(0.0, q);
+      CHECK(leaves.verdict().obstacles->clearance_m >= 0.02);
+    }
+  }
+  CHECK(maps.size() == 2);
+}
+
+TEST_CASE("gain sets lie in the ranges of the set-up, and the first ones do not depend on their number",
+          "[study][unit]") {
+  const auto sets = draw_gains(2000, 1), few = draw_gains(3, 1);
+  std::size_t undamped = 0;
+  double low = 1e9, high = 0.0;
+  const auto between = [](double value, double from, double to) {
+    CHECK(std::log10(value) >= from);
+    CHECK(std::log10(value) <= to);
+  };
+  for (const auto& g : sets) {
+    between(g.k_p, -0.5, 1.5);
+    between(g.k_v / (2.0 * std::sqrt(g.k_p)), -0.6 - 1e-12, 0.6 + 1e-12);
+    between(g.eta, -2.0, 1.5);
+    between(g.k_obs, -1.0, 2.0);
+    if (g.joint_damping == 0.0)
+      ++undamped;
+    else
+      between(g.joint_damping, -1.5, 0.5);
+    low = std::min(low, g.k_p);
+    high = std::max(high, g.k_p);
+  }
+  CHECK(undamped > 900);
+  CHECK(undamped < 1100);
+  CHECK(low < 0.33);  // the ranges are used to their ends
+  CHECK(high > 31.0);
+  for (std::size_t i = 0; i < few.size(); ++i) CHECK(few[i].k_obs == sets[i].k_obs);
+}
+
+TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres and each planner's own names",
+          "[study][unit]") {
+  Bench bench;
+  PlanOptions options;
+  options.base = source_dir / "data/scenes/paper_52_apf.json";
+  options.gains.sets = 3;
+  const SweepPlan plan = make_plan(bench.dir("a"), options);
+  CHECK(plan.scenes.size() == 2);
+  CHECK(plan.runs.size() == 3 * 4);
+  std::map<std::string, std::size_t> planners;
+  for (const auto& run : plan.runs) {
+    ++planners[run.labels.at("planner")];
+    CHECK(run.gains.size() == 5);
+    const std::string last = run.set.back();
+    CHECK(last.starts_with(run.planner == "apf" ? "/planner/params/eta=" : "/planner/params/k_obs="));
+  }
+  CHECK(planners ==
+        std::map<std::string, std::size_t>{{"apf", 3}, {"apf without the obstacle", 3}, {"gyro", 3}, {"hybrid", 3}});
+  const scene::Scene scene = scene::read_scene(bench.dir("a") / plan.scenes[0].file);
+  CHECK(scene.integrator.name == "semi-implicit-euler");
+  CHECK(scene.step_s == 0.004);
+  CHECK(scene.duration_s == 40.0);
+  CHECK_FALSE(scene.gravity_m_s2.has_value());
+  CHECK(scene.obstacles.size() == 1);
+  CHECK(scene::read_scene(bench.dir("a") / plan.scenes[1].file).obstacles.empty());
+  // along each segment a sphere is never farther than 1 cm, and hardly wider than the segment
+  const model::Model model = simulation::load_model(scene);
+  for (const auto& link : model.robot().links)
+    for (int i = 0; i <= 1000; ++i) {
+      const double share = 0.001 * i;
+      const auto& segment = link.segments.at(0);
+      const Eigen::Vector3d p = segment.from_m + share * (segment.to_m - segment.from_m);
+      double nearest = 1.0;
+      for (const auto& sphere : link.spheres) nearest = std::min(nearest, (sphere.center_m - p).norm());
+      if (nearest > 0.01 + 1e-9) FAIL_CHECK(link.name << " at " << share);
+    }
+  CHECK(model.spheres().front().radius <= 1e-3);
+}
+
+TEST_CASE("options that make no plan are refused in one line", "[study][unit]") {
+  Bench bench;
+  CHECK_THAT(message_of(bench.dir("a"), {}), Catch::StartsWith("nothing to plan"));
+  PlanOptions options = bench.problems();
+  options.problem.robot.clear();
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("free.json: is a problem, it needs --robot"));
+  options = bench.problems();
+  options.planners = {":k=1"};
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--planner :k=1: no name"));
+  options.planners = {"apf:k"};
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--planner apf:k: 'k' is no parameter"));
+  options.planners = {"apf", "apf"};
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("is planned twice"));
+  options = bench.problems();
+  options.vary = {"step_s=1"};
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--vary step_s=1: expected /json/pointer="));
+  options = bench.problems();
+  options.files.push_back(options.files.front());
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("another file is named 'free-joint' too"));
+  options.files = {source_dir / "data/robots/planar3.json"};
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("planar3.json: is neither a scene nor a problem"));
+  options.files.clear();
+  options.clutter.maps = 1;
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("need --base"));
+  options.base = source_dir / "data/scenes/clutter.json";
+  options.clutter.maps = 0;
+  options.gains.sets = 1;
+  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("has no segments"));
+  CHECK_FALSE(fs::exists(plan_file(bench.dir("a"))));
+}

@@ -1,0 +1,85 @@
+// A planner that moves as it is told, books what it is told, and checks what the host shows and answers.
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "hamelin/planning/plugin.hpp"
+
+namespace {
+
+using namespace hamelin::planning;
+
+constexpr const char* schema = R"({
+  "type": "object",
+  "additionalProperties": false,
+  "properties": {
+    "torque": {"type": "array", "items": {"type": "number"}, "default": []},
+    "torque_until_s": {"type": "number", "default": 1e9},
+    "velocity": {"type": "array", "items": {"type": "number"}, "default": []},
+    "filter_work_J": {"type": "number", "default": 0},
+    "recovery_work_J": {"type": "number", "default": 0},
+    "books_at_tick": {"type": "integer", "minimum": 0, "default": 0},
+    "think_of": {"type": "array", "items": {"type": "number"}, "default": []},
+    "influence_m": {"type": "number", "default": 0.3}
+  }
+})";
+
+class Probe : public Planner {
+ public:
+  static double influence_m(const hamelin::Json& params) { return params.at("influence_m").get<double>(); }
+
+  Probe(const Host& host, const Setup& setup, const hamelin::Json& params)
+      : host_(host),
+        setup_(setup),
+        torque_(params.at("torque").get<std::vector<double>>()),
+        velocity_(params.at("velocity").get<std::vector<double>>()),
+        think_of_(params.at("think_of").get<std::vector<double>>()),
+        torque_until_s_(params.at("torque_until_s").get<double>()),
+        filter_(params.at("filter_work_J").get<double>()),
+        recovery_(params.at("recovery_work_J").get<double>()),
+        books_at_(params.at("books_at_tick").get<std::uint64_t>()),
+        contacts_(10000),
+        self_(100) {
+    std::string rates = "none";
+    if (const auto rate = setup.effort_rate_max()) rates = std::to_string((*rate)[0]);
+    host.info("sampled " + std::to_string(setup.sampled() ? 1 : 0) + ", delay " + std::to_string(setup.delay_s()) +
+              ", rate " + rates + ", path " + std::to_string(setup.path(setup.goal(0)).cols()));
+  }
+
+  void tick(const Tick& tick, Command& command) override {
+    const auto dof = static_cast<std::size_t>(setup_.dof());
+    if (!think_of_.empty()) {
+      const auto thought = host_.closest_points(think_of_, setup_.influence_m(), contacts_);
+      if (thought != thought_) host_.info("thought of " + std::to_string(thought) + " contacts");
+      thought_ = thought;
+    }
+    if (tick.contacts().size() != shown_) host_.info("shown " + std::to_string(tick.contacts().size()) + " contacts");
+    shown_ = tick.contacts().size();
+    const auto found = host_.closest_self({tick.q().data(), dof}, setup_.influence_m(), self_);
+    const auto shown = tick.self_contacts();
+    if (found != shown.size()) throw std::runtime_error("closest_self finds another number of contacts than the tick");
+    for (std::size_t i = 0; i < found; ++i)
+      if (std::memcmp(&self_[i], &shown[i], sizeof self_[i]) != 0)
+        throw std::runtime_error("closest_self differs from the tick");
+    if (torque_.size() == dof && tick.time_s() < torque_until_s_)
+      command.held_torque() = ConstVectorMap(torque_.data(), setup_.dof());
+    if (velocity_.size() == dof) command.node_velocity() = ConstVectorMap(velocity_.data(), setup_.dof());
+    if (tick.k() == books_at_) command.set_accounts(filter_, recovery_);
+  }
+
+ private:
+  Host host_;
+  Setup setup_;
+  std::vector<double> torque_, velocity_, think_of_;
+  double torque_until_s_, filter_, recovery_;
+  std::uint64_t books_at_;
+  std::vector<hamelin_contact> contacts_;
+  std::vector<hamelin_self_contact> self_;
+  std::size_t thought_ = 0, shown_ = 0;
+};
+
+}  // namespace
+
+HAMELIN_PLANNER_PLUGIN(Probe, "probe", "0.0.1", "moves as it is told and checks the host", schema);

@@ -1,0 +1,225 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "../scratch_scene.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/log/read_log.hpp"
+
+using namespace hamelin;
+using log::Outcome;
+using test::run_scene;
+using test::scene_52;
+using test::ScratchFolder;
+
+namespace {
+
+Json scene_of(const Json& params, const std::string& actuation = "ideal") {
+  Json scene = scene_52();
+  scene["goals"] = {{{"type", "joint"}, {"q", {9.0, 9.0, 9.0, 9.0}}}};
+  scene["planner"] = {{"name", "probe"}, {"params", params}};
+  scene["actuation"] = {{"type", actuation}};
+  scene["step_s"] = 0.001;
+  scene["duration_s"] = 0.1;
+  return scene;
+}
+
+model::Robot strong(double effort) {
+  model::Robot robot = test::planar4();
+  for (auto& link : robot.links) link.joint.effort_max = effort;
+  return robot;
+}
+
+struct Logged {
+  log::Result result;
+  std::vector<Json> ticks, events;
+};
+
+Logged logged_run(const ScratchFolder& folder, const Json& scene, const model::Robot& robot = test::planar4()) {
+  log::RunLog log(folder.path() / "run.jsonl");
+  simulation::Watch watch;
+  watch.log = &log;
+  Logged logged;
+  logged.result = run_scene(folder, scene, watch, robot);
+  (void)log::check_log(log.file());
+  for (auto& line : log::read_log(log.file()).lines) {
+    if (line["type"] == "tick") logged.ticks.push_back(line);
+    if (line["type"] == "event") logged.events.push_back(line);
+  }
+  return logged;
+}
+
+Eigen::VectorXd vector_of(const Json& numbers) {
+  Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
+  return x;
+}
+
+}  // namespace
+
+TEST_CASE("a planner is told how its answer is carried out, and of a goal's path", "[simulation][actuation]") {
+  const ScratchFolder folder;
+  Json scene = scene_of(Json::object(), "sampled");
+  scene["goals"] = {{{"type", "path"}, {"q", {{0.5, 0.0, 0.0, 0.0}, {0.2, 0.1, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}}}}};
+  scene["actuation"] = {
+      {"type", "sampled"}, {"control_period_s", 0.002}, {"delay_s", 0.004}, {"torque_rate_max_Nm_s", 750.0}};
+  const auto run = logged_run(folder, scene);
+  REQUIRE_FALSE(run.events.empty());
+  CHECK(run.events[0]["text"] == "probe: sampled 1, delay 0.004000, rate 750.000000, path 3");
+  // a path is reached at its end, where the arm is already
+  CHECK(run.result.outcome == Outcome::reached);
+  CHECK(run.result.goal->type == "path");
+  CHECK(*run.result.goal->error_rad == 0.0);
+
+  scene["goals"][0]["q"] = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/goals/0/q/0: 3 numbers given, expected 4"));
+}
+
+TEST_CASE("a held torque changes no faster than its rate limit, and that is counted", "[simulation][actuation]") {
+  const ScratchFolder folder;
+  Json scene = scene_of({{"torque", {10.0, -3.0, 0.0, 0.5}}}, "sampled");
+  scene["actuation"]["torque_rate_max_Nm_s"] = 1000.0;
+  const auto run = logged_run(folder, scene);
+  Eigen::VectorXd before = Eigen::VectorXd::Zero(4);
+  for (std::size_t k = 0; k + 1 < run.ticks.size(); ++k) {
+    const Eigen::VectorXd tau = vector_of(run.ticks[k]["tau"]);
+    CHECK((tau - before).lpNorm<Eigen::Infinity>() <= 1.0 + 1e-12);
+    CHECK(tau[3] == 0.5);  // what asks for less is not held back
+    CHECK(run.ticks[k]["saturated"] == (k < 9));
+    before = tau;
+  }
+  CHECK(before[0] == Approx(10.0));
+  CHECK(run.result.saturated_share == Approx(0.09));
+  scene["actuation"]["type"] = "ideal";
+  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/actuation/torque_rate_max_Nm_s: is not allowed"));
+}
+
+TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes energy out only",
+          "[simulation][actuation]") {
+  const ScratchFolder folder;
+  const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
+  CAPTURE(actuation);
+  Json scene = scene_of({{"torque", {4.0, -4.0, 4.0, -4.0}}}, actuation);
+  scene["actuation"]["coulomb_friction_share"] = 0.05;
+  scene["duration_s"] = 4.0;
+  const auto held = run_scene(folder, scene, {}, strong(100.0));
+  // 5 Nm tanh(v / 0.01) = 4 Nm
+  const double creep = 0.01 * std::atanh(0.8);
+  CHECK((held.v - creep * Eigen::Vector4d(1.0, -1.0, 1.0, -1.0)).lpNorm<Eigen::Infinity>() < 0.02 * creep);
+  CHECK(held.dissipated_J > 0.0);
+
+  // one that swings comes to rest
+  scene["planner"]["params"] = Json::object();
+  scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
+  scene["duration_s"] = 20.0;
+  const auto swung = run_scene(folder, scene, {}, strong(100.0));
+  CHECK(swung.v.lpNorm<Eigen::Infinity>() < 1e-3);
+  CHECK(swung.dissipated_J == Approx(swung.energy_initial_J).epsilon(1e-3));
+
+  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/actuation/coulomb_friction_share") &&
+                                                  Catch::Contains("joint 'j1' of 'planar4' has none"));
+}
+
+TEST_CASE("under sampled actuation a node velocity is made a torque by the planner's masses, not the true ones",
+          "[simulation][actuation]") {
+  const ScratchFolder folder;
+  for (const double scale : {0.9, 1.0, 1.1}) {
+    Json scene = scene_of({{"velocity", {0.02, -0.01, 0.03, 0.01}}}, "sampled");
+    scene["actuation"]["planner_mass_scale"] = scale;
+    scene["duration_s"] = 0.001;
+    const auto result = run_scene(folder, scene);
+    const Eigen::Vector4d expected = scale * Eigen::Vector4d(0.02, -0.01, 0.03, 0.01);
+    CAPTURE(scale, result.v.transpose());
+    CHECK((result.v - expected).norm() < 1e-3 * expected.norm());
+  }
+}
+
+TEST_CASE("torque limits hold for a node velocity too: its change is cut as a whole, and counted",
+          "[simulation][actuation]") {
+  const ScratchFolder folder;
+  const model::Robot robot = strong(10.0);
+  const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
+  dynamics::Workspace ws(model);
+  Json scene = scene_of({{"velocity", {1.0, 0.0, 0.0, 0.0}}, {"torque", {2.0, 0.0, 0.0, 0.0}}});
+  scene["model"] = {{"torque_limits", true}};
+  scene["duration_s"] = 0.01;
+  const auto run = logged_run(folder, scene, robot);
+  Eigen::VectorXd asked(4);
+  dynamics::momentum(model, ws, Eigen::VectorXd::Zero(4), Eigen::Vector4d(1000.0, 0.0, 0.0, 0.0), asked);
+  const Json& tick = run.ticks.at(0);
+  CHECK(tick["saturated"] == true);
+  const Eigen::VectorXd node = vector_of(tick["channels"]["node"]), tau = vector_of(tick["tau"]);
+  CHECK(tau.lpNorm<Eigen::Infinity>() == Approx(10.0).epsilon(1e-9));
+  CHECK((node - node[0] / asked[0] * asked).norm() < 1e-9 * node.norm());  // the direction is kept
+  CHECK(node[0] == Approx(8.0));                                           // the held torque comes first
+  CHECK(run.result.saturated_share == 1.0);
+  CHECK(run.result.node_work_J > 0.0);
+  CHECK(run.result.energy_error_max_J < 1e-6);
+
+  scene["model"]["torque_limits"] = false;
+  const auto free = logged_run(folder, scene, robot);
+  CHECK_FALSE(free.result.saturated_share.has_value());
+  CHECK_FALSE(free.ticks.at(0).contains("saturated"));
+  CHECK(vector_of(free.ticks.at(0)["channels"]["node"])[0] == Approx(asked[0]));
+}
+
+TEST_CASE("accounts that no filter may have are a defect under ideal actuation, and only reported elsewhere",
+          "[simulation][certificate]") {
+  const ScratchFolder folder;
+  const auto [key, value, text] =
+      GENERATE(table<std::string, double, std::string>({{"filter_work_J", 1e-3, "its filter added 0.001 J"},
+                                                        {"recovery_work_J", -1e-3, "its recovery took out 0.001 J"}}));
+  CAPTURE(key);
+  Json scene = scene_of({{"velocity", {0.1, 0.0, 0.0, 0.0}}, {key, value}, {"books_at_tick", 5}});
+  const auto broken = run_scene(folder, scene);
+  CHECK(broken.outcome == Outcome::defect);
+  CHECK(log::exit_code(broken.outcome) == 3);
+  CHECK(broken.steps == 5);
+  CHECK_THAT(broken.cause, Catch::Contains("planner 'probe' at step 5: " + text));
+
+  scene["planner"]["params"][key] = -value;  // what filters do
+  CHECK(run_scene(folder, scene).outcome == Outcome::timeout);
+  scene["planner"]["params"][key] = 1e-12 * value;  // rounding
+  CHECK(run_scene(folder, scene).outcome == Outcome::timeout);
+  scene["planner"]["params"][key] = value;
+  scene["integrator"] = {{"name", "rk4"}};
+  CHECK(run_scene(folder, scene).outcome == Outcome::timeout);
+  scene["integrator"] = {{"name", "hamel-variational"}};
+  scene["actuation"]["type"] = "sampled";
+  const auto sampled = run_scene(folder, scene);
+  CHECK(sampled.outcome == Outcome::timeout);
+  CHECK((key == "filter_work_J" ? sampled.filter_work_J : sampled.recovery_work_J) == value);
+}
+
+TEST_CASE("an energy account that does not close is a defect that names the step", "[simulation][certificate]") {
+  const ScratchFolder folder;
+  Json scene = scene_of(Json::object());
+  scene["start"] = {{"v", {6.0, -14.0, 10.0, -12.0}}};
+  scene["duration_s"] = 2.0;
+  const auto fine = run_scene(folder, scene);
+  CHECK(fine.outcome == Outcome::timeout);
+  scene["step_s"] = 0.05;  // 0.7 rad a step
+  const auto coarse = run_scene(folder, scene);
+  CAPTURE(coarse.cause);
+  CHECK(coarse.outcome == Outcome::defect);
+  CHECK_THAT(coarse.cause, Catch::Contains("step ") && Catch::Contains("the energy account is off by "));
+  scene["integrator"] = {{"name", "semi-implicit-euler"}};  // promises nothing
+  CHECK(run_scene(folder, scene).outcome != Outcome::defect);
+}
+
+TEST_CASE("the largest acceleration and jerk are those of the logged velocities", "[simulation][log]") {
+  const ScratchFolder folder;
+  Json scene = scene_of({{"torque", {3.0, -2.0, 1.0, 0.5}}, {"torque_until_s", 0.05}});
+  const auto run = logged_run(folder, scene);
+  Eigen::VectorXd a = Eigen::VectorXd::Zero(4), jerk = a, last;
+  for (std::size_t k = 1; k < run.ticks.size(); ++k) {
+    const Eigen::VectorXd now = (vector_of(run.ticks[k]["v"]) - vector_of(run.ticks[k - 1]["v"])) / 0.001;
+    a = a.cwiseMax(now.cwiseAbs());
+    if (last.size() > 0) jerk = jerk.cwiseMax((now - last).cwiseAbs() / 0.001);
+    last = now;
+  }
+  CHECK(a.minCoeff() > 0.01);
+  CHECK((run.result.a_abs_max - a).norm() < 1e-9 * a.norm());
+  CHECK((run.result.jerk_abs_max - jerk).norm() < 1e-9 * jerk.norm());
+  CHECK(jerk[0] > 100.0);  // where the torque ends
+}

@@ -1,0 +1,132 @@
+// Sweeps: planned, run one process a run, killed, taken up again, summed up.
+#include <signal.h>
+
+#include <chrono>
+#include <set>
+#include <thread>
+
+#include "../program.hpp"
+
+using namespace hamelin;
+using test::Bench;
+using test::lines_of;
+
+namespace {
+
+/// Plans runs of example 5.2 and of arm7 in its shelf.
+void plan(Bench& bench, const std::vector<std::string>& more = {}) {
+  std::vector<std::string> words{"sweep", "plan", "data/scenes/paper_52_gyro.json", "data/scenes/paper_52_apf.json",
+                                 "-o",    "tries"};
+  words.insert(words.end(), more.begin(), more.end());
+  const auto output = bench.run(words);
+  CAPTURE(output.err);
+  REQUIRE(output.exit_code == 0);
+}
+
+Json settled(const std::string& line) {
+  Json record = parse_json(line, "record");
+  record["result"].erase("timing");
+  record["result"].erase("provenance");
+  return record;
+}
+
+std::multiset<std::string> settled_records(Bench& bench, const std::string& file) {
+  std::multiset<std::string> all;
+  for (const auto& line : lines_of(bench.text(file))) all.insert(settled(line).dump());
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("a sweep is planned, run and summed up, and its files fit their schemas", "[end_to_end]") {
+  Bench bench;
+  plan(bench, {"--seeds", "1,2"});
+  const auto run = bench.run({"sweep", "run", "tries"});
+  CAPTURE(run.err);
+  CHECK(run.exit_code == 0);
+  CHECK(run.out == "tries: 4 runs recorded now, 0 before, 0 left\n");
+  const auto checked = bench.run({"validate", "tries/plan.json", "tries/records.jsonl"});
+  CAPTURE(checked.err);
+  CHECK(checked.exit_code == 0);
+  const Json summary = test::run_json(
+      bench, {"sweep", "merge", "tries", "--by", "problem", "-o", "summary.json", "--page", "page.html"});
+  CHECK(summary == bench.json("summary.json"));
+  REQUIRE(summary["groups"].size() == 2);
+  const Json &apf = summary["groups"][0], &gyro = summary["groups"][1];
+  CHECK(apf["labels"]["problem"] == "paper_52_apf");
+  CHECK(apf["outcomes"] == Json{{"stalled", 2}});
+  CHECK(gyro["reached"] == 2);
+  CHECK(gyro["contacts"] == 0);
+  CHECK(gyro["judged"] == 2);
+  CHECK(gyro["min_clearance_m"].get<double>() > 0.0);
+  CHECK_THAT(bench.text("page.html"), Catch::Contains("data/scenes/paper_52_apf.json --seed 2</code>"));
+  const auto table = bench.run({"sweep", "merge", "tries"});
+  CHECK(table.exit_code == 0);
+  CHECK_THAT(table.out, Catch::Contains("did not reach"));
+}
+
+TEST_CASE("a sweep that was killed goes on, and its records are those of one that was not", "[end_to_end]") {
+  Bench bench;
+  plan(bench, {"--seeds", "1,2,3"});
+  const pid_t child = bench.start({"sweep", "run", "tries", "--jobs", "1"});
+  const auto recorded = [&] {
+    return bench.has("tries/records.jsonl") ? lines_of(bench.text("tries/records.jsonl")).size() : 0;
+  };
+  for (int i = 0; i < 4000 && recorded() < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  ::kill(child, SIGKILL);
+  CHECK(bench.finish(child).exit_code == -SIGKILL);
+  const std::string text = bench.text("tries/records.jsonl");
+  REQUIRE(text.size() > 100);
+  bench.put("tries/records.jsonl", text.substr(0, text.size() - 50));
+  const std::size_t before = lines_of(text).size() - 1;
+  const auto again = bench.run({"sweep", "run", "tries"});
+  CHECK(again.exit_code == 0);
+  CHECK_THAT(again.err, Catch::Contains("tries/records.jsonl: the last line was cut; its run is repeated"));
+  CHECK(again.out ==
+        "tries: " + std::to_string(6 - before) + " runs recorded now, " + std::to_string(before) + " before, 0 left\n");
+  const auto resumed = settled_records(bench, "tries/records.jsonl");
+  CHECK(bench.run({"sweep", "run", "tries", "--fresh", "--jobs", "1"}).exit_code == 0);
+  CHECK(settled_records(bench, "tries/records.jsonl") == resumed);
+}
+
+TEST_CASE("Ctrl-C ends a sweep's children too, with exit code 130", "[end_to_end]") {
+  Bench bench;
+  // fixed to the spot the arm neither arrives nor stalls, so each run takes long
+  plan(bench,
+       {"--duration", "100000", "--set", "/stall=null", "--set", "/planner/params/k_p=1e-6", "--set", "/step_s=0.001"});
+  const pid_t child = bench.start({"sweep", "run", "tries", "--jobs", "2"});
+  for (int i = 0; i < 2000 && !bench.has("tries/records.jsonl"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  ::kill(child, SIGINT);
+  const auto output = bench.finish(child);
+  CHECK(output.exit_code == 130);
+  CHECK(output.out == "tries: 0 runs recorded now, 0 before, 2 left\n");
+  CHECK(bench.text("tries/records.jsonl").empty());
+}
+
+TEST_CASE("what a plan or a sweep cannot use is refused in one line", "[end_to_end]") {
+  Bench bench;
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& reason) {
+    const auto output = bench.run(words);
+    CAPTURE(words, output.err);
+    CHECK(output.exit_code == 2);
+    CHECK(lines_of(output.err).size() == 1);
+    CHECK_THAT(output.err, Catch::Contains(reason));
+  };
+  refused({"sweep", "plan", "-o", "x"}, "nothing to plan");
+  refused({"sweep", "plan", "data/scenes/shelf.json", "--planner", "hybrid:no_such=1", "-o", "x"}, "no_such");
+  refused({"sweep", "plan", "data/scenes/shelf.json", "--planner", "no_such", "-o", "x"}, "no_such");
+  CHECK_FALSE(bench.has("x/plan.json"));
+  refused({"sweep", "run", "nowhere"}, "nowhere: is no directory");
+  refused({"sweep", "merge", "nowhere"}, "nowhere: is no directory");
+  plan(bench);
+  refused({"sweep", "run", "tries", "--only", "no_such"}, "no run's id holds 'no_such'");
+  refused({"sweep", "merge", "tries", "-o", "tries/plan.json"}, "tries/plan.json: is an input");
+  refused({"sweep", "merge", "tries", "--page", "/no/such/page.html"}, "/no/such/page.html");
+  refused({"sweep", "merge", "tries", "--by", "colour"}, "--by colour: no run has that label");
+  REQUIRE(bench.run({"sweep", "run", "tries", "--limit", "1"}).exit_code == 0);
+  refused({"sweep", "plan", "data/scenes/paper_52_gyro.json", "-o", "tries"}, "holds records of another plan");
+  bench.put("tries/plan.json", "{\"schema\": \"hamelin.sweep/1\", \"scenes\": [], \"runs\": [");
+  refused({"sweep", "run", "tries"}, "tries/plan.json: line 1");
+}
