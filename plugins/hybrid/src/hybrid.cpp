@@ -29,6 +29,8 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
+constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
+constexpr double torque_share = 0.98;     // of the torque limits is planned with
 constexpr double steering_fade = 0.5;     // distance below which steering fades
 constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
 constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
@@ -102,8 +104,9 @@ class Hybrid final : public planning::Planner {
         search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
     }
     const int n = setup.dof();
-    for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_}) *x = VectorXd::Zero(n);
+    for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_}) *x = VectorXd::Zero(n);
     M_ = Minv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
+    terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // takes its memory now
   }
 
@@ -129,6 +132,7 @@ class Hybrid final : public planning::Planner {
       // steering turns faster than the law follows: near a target it would make the arm circle
       law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
     }
+    bound_steering(command);
 
     // the law's velocity one period on, of bounded acceleration
     const double dt = setup_.control_period_s();
@@ -207,6 +211,23 @@ class Hybrid final : public planning::Planner {
     return left;
   }
 
+  // Steering may take a small share of the torques only: the rest is for braking.
+  void bound_steering(planning::Command& command) {
+    steering_.setZero();
+    const auto effort = setup_.effort_max();
+    if (!effort || command.gyroscopic().empty()) return;
+    terms_.clear();
+    for (const auto& term : command.gyroscopic())
+      terms_.push_back({term.link, planning::vec3(term.point_link_m), planning::vec3(term.w_world)});
+    dynamics::gyroscopic_torque(model_, ws_, q_, v_, terms_, steering_);
+    double scale = 1.0;
+    for (int k = 0; k < setup_.dof(); ++k)
+      scale = std::min(scale, steering_share * (*effort)[k] / std::max(1e-12, std::abs(steering_[k])));
+    for (auto& term : command.gyroscopic())
+      for (auto& w : term.w_world) w *= scale;
+    steering_ *= scale;
+  }
+
   // The approach speed that leaves room to brake: γx near the margin, continued C¹ by √(2a(x − a/2γ²)).
   [[nodiscard]] double approach_limit(double x, double brake) const {
     if (x <= brake / (rate_ * rate_)) return rate_ * x;
@@ -258,8 +279,9 @@ class Hybrid final : public planning::Planner {
     filter_.set_box(lower_, upper_);
     if (const auto effort = setup_.effort_max()) {
       momentum_.noalias() = M_ * v_;
-      lower_ = momentum_ - dt * (*effort + bias_);
-      upper_ = momentum_ + dt * (*effort - bias_);
+      // the bias that is held is that of x, not of v; a little room covers the difference
+      lower_ = momentum_ - dt * (torque_share * *effort + bias_ + steering_);
+      upper_ = momentum_ + dt * (torque_share * *effort - bias_ - steering_);
       filter_.set_momentum_box(lower_, upper_);
     }
     scratch_ = x_;
@@ -368,7 +390,8 @@ class Hybrid final : public planning::Planner {
   int passes_, max_escapes_, search_steps_;
   bool remembers_ = false;
   Way path_;
-  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_;
+  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_;
+  std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, Minv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   const hamelin_goal* goal_ = nullptr;

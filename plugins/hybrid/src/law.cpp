@@ -23,7 +23,7 @@ constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the mi
 }  // namespace
 
 Law::Law(const planning::Setup& setup, const model::Model& model, const LawParams& params)
-    : params_(params), J_(6, model.dof()), null_(model.dof()), scratch_(model.dof()) {
+    : params_(params), J_(6, model.dof()), Jp_(3, model.dof()), JpW_(3, model.dof()), null_(model.dof()), scratch_(model.dof()) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
@@ -142,8 +142,10 @@ void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::s
     if (approach <= 0.0) continue;
     Vector3d side = ahead.cross(point.direction);
     side = side.norm() > 0.05 ? Vector3d(side.normalized()) : Vector3d(point.direction.unitOrthogonal());
-    scratch_.noalias() = W * point.row;
-    const double mobility = point.row.dot(scratch_);
+    dynamics::point_jacobian(model, ws, point.link, point.arm_point, Jp_);
+    JpW_.noalias() = Jp_ * W;
+    // The lightest direction: no other turns faster than the rate that is meant.
+    const double mobility = JpW_.cwiseProduct(Jp_).sum();
     if (mobility < 1e-9) continue;
     const double rate = strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
     // side × ahead points to the obstacle's far side: its part along the direction is the sine of the angle, so ≥ 0

@@ -44,7 +44,7 @@ class Law {
   /// weighted by `strength`.
   void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
   /// Gyroscopic terms w = m k (v̂ × n)^ for approached points, k = gain α (1/max(h, 1 cm) − 1/range), α = −v̂·n,
-  /// m = 1/(aᵀM⁻¹a): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
+  /// m = 1/tr(J M⁻¹ Jᵀ): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
   void steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
              const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command);
 
@@ -55,6 +55,7 @@ class Law {
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;
+  dynamics::Matrix3Xd Jp_, JpW_;
   Eigen::VectorXd null_, scratch_;
 };
 
