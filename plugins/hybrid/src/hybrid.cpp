@@ -29,6 +29,9 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
+// Of the braking that limits allow along one obstacle's row: how much is counted on, at least [m/s²], and how much a row
+// may demand at once.
+constexpr double brake_share = 0.5, least_brake = 0.3, row_share = 0.8;
 constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
 constexpr double torque_share = 0.98;     // of the torque limits is planned with
 constexpr double steering_fade = 0.5;     // distance below which steering fades
@@ -234,30 +237,8 @@ class Hybrid final : public planning::Planner {
     return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
   }
 
-  // The deceleration along a row that torques and joint accelerations can give.
-  [[nodiscard]] double braking(const VectorXd& row) {
-    scratch_.noalias() = Minv_ * row;
-    const double mobility = row.dot(scratch_);
-    double brake = brake_;
-    const auto effort = setup_.effort_max();
-    for (int k = 0; k < setup_.dof(); ++k) {
-      if (effort)
-        brake = std::min(brake, mobility * std::max(0.1 * (*effort)[k], (*effort)[k] - std::abs(bias_[k])) /
-                                    (std::abs(row[k]) + 1e-9));
-      brake = std::min(brake, acceleration_max_ * mobility / (std::abs(scratch_[k]) + 1e-9));
-    }
-    return std::max(brake, 0.1);
-  }
-
   void project(double dt, planning::Command& command) {
     filter_.begin(M_, Minv_);
-    for (const auto& point : obstacles_.points()) {
-      const double x = point.distance - point.margin;
-      const double b = point.obstacle_speed - (x > 0.0 ? approach_limit(x, braking(point.row)) : rate_ * x);
-      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
-                                                       : std::numeric_limits<double>::infinity();
-      (void)filter_.add_row(point.row, b, floor);
-    }
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
       double over = 1.0;
@@ -283,6 +264,16 @@ class Hybrid final : public planning::Planner {
       lower_ = momentum_ - dt * (torque_share * *effort + bias_ + steering_);
       upper_ = momentum_ + dt * (torque_share * *effort - bias_ - steering_);
       filter_.set_momentum_box(lower_, upper_);
+    }
+    for (const auto& point : obstacles_.points()) {
+      const double x = point.distance - point.margin;
+      // what boxes allow of braking along this row; some of it is left to the other rows
+      const double now = point.row.dot(v_), room = std::max(0.0, filter_.reach(point.row) - now);
+      const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
+      const double wanted = point.obstacle_speed - (x > 0.0 ? approach_limit(x, brake) : rate_ * x);
+      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
+                                                       : std::numeric_limits<double>::infinity();
+      (void)filter_.add_row(point.row, std::min(wanted, now + row_share * room), floor);
     }
     scratch_ = x_;
     const auto report = filter_.project(x_, passes_);

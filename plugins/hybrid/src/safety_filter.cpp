@@ -16,7 +16,7 @@ constexpr double settled = 1e-6;
 SafetyFilter::SafetyFilter(int dof, int max_rows)
     : a_(dof, max_rows), Wa_(dof, max_rows), rows_(static_cast<std::size_t>(max_rows)) {
   for (auto* x : {&lower_, &upper_, &momentum_lower_, &momentum_upper_, &box_lambda_low_, &box_lambda_high_,
-                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_})
+                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_, &Wa_reach_})
     *x = Eigen::VectorXd::Zero(dof);
 }
 
@@ -49,6 +49,20 @@ void SafetyFilter::set_momentum_box(const Eigen::VectorXd& lower, const Eigen::V
   momentum_lower_ = lower;
   momentum_upper_ = upper;
   has_momentum_box_ = true;
+}
+
+double SafetyFilter::reach(const Eigen::VectorXd& a) {
+  double most = 0.0;
+  for (Eigen::Index k = 0; k < a.size(); ++k)
+    if (a[k] != 0.0) most += a[k] > 0.0 ? a[k] * upper_[k] : a[k] * lower_[k];
+  if (!has_momentum_box_) return most;
+  // a · x = (M⁻¹ a) · M x
+  Wa_reach_.noalias() = *W_ * a;
+  double by_momentum = 0.0;
+  for (Eigen::Index k = 0; k < a.size(); ++k)
+    if (Wa_reach_[k] != 0.0)
+      by_momentum += Wa_reach_[k] > 0.0 ? Wa_reach_[k] * momentum_upper_[k] : Wa_reach_[k] * momentum_lower_[k];
+  return std::min(most, by_momentum);
 }
 
 SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {

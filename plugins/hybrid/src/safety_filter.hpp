@@ -25,6 +25,9 @@ class SafetyFilter {
   /// lower ≤ M x ≤ upper.
   void set_momentum_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
 
+  /// The largest a · x that the box, and the box on the momentum, allow: an upper bound of what both do.
+  [[nodiscard]] double reach(const Eigen::VectorXd& a);
+
   struct Report {
     int passes = 0;
     double energy_before_J = 0.0, energy_after_J = 0.0;  ///< ½ ũᵀMũ, ½ xᵀMx
@@ -52,7 +55,7 @@ class SafetyFilter {
   int count_ = 0;
   bool has_momentum_box_ = false;
   Eigen::VectorXd lower_, upper_, momentum_lower_, momentum_upper_;
-  Eigen::VectorXd box_lambda_low_, box_lambda_high_, momentum_lambda_low_, momentum_lambda_high_, Mx_;
+  Eigen::VectorXd box_lambda_low_, box_lambda_high_, momentum_lambda_low_, momentum_lambda_high_, Mx_, Wa_reach_;
 };
 
 }  // namespace hamelin::hybrid
