@@ -19,13 +19,12 @@ struct NearPoint {
   Eigen::VectorXd row;  ///< a = Jᵀ n: a · v is the rate of the distance but for the obstacle's own motion
 };
 
-/// The points that count at a configuration, bounded in number: of each link the nearest few with each obstacle, and
-/// the nearest pairs of the arm's own parts.
+/// The points that count at a configuration, bounded in number: the nearest pairs of the arm's own parts, and of each
+/// link the nearest points in each place and direction.
 class Obstacles {
  public:
-  static constexpr int per_link = 6;
   static constexpr int max_points = 64;
-  static constexpr double self_radius_m = 0.03;  ///< self contacts farther than this do not count
+  static constexpr double self_radius_m = 0.10;  ///< self contacts farther than this do not count
 
   Obstacles(const planning::Setup& setup, double radius);
   /// Selects from the contacts at a configuration and computes the rows; poses at q must stand in ws.
@@ -42,7 +41,7 @@ class Obstacles {
   double radius_, clearance_ = 0.0;
   std::vector<int> sphere_link_;
   std::vector<NearPoint> points_;
-  std::vector<std::size_t> chosen_;
+  std::vector<std::size_t> near_, chosen_;
   std::size_t count_ = 0;
   Eigen::VectorXd row_;
 };
