@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 namespace hamelin::hybrid {
 
@@ -105,7 +103,7 @@ bool Tree::advance(int units) {
         break;
     }
   }
-  if (phase_ == Phase::over && std::getenv("HDBG")) std::fprintf(stderr, "tree: roots %d sizes %d %d rounds %d way %d\n", roots_.count(), trees_[0].size(), trees_[1].size(), rounds_, static_cast<int>(way_.size()));
+
   return phase_ == Phase::over;
 }
 

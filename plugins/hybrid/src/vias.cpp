@@ -6,7 +6,7 @@ namespace hamelin::hybrid {
 
 namespace {
 
-constexpr int most_vias = 24, most_targets = 3, via_steps = 25, target_steps = 60;
+constexpr int most_vias = 64, most_targets = 3, most_legs = 4, via_steps = 25, target_steps = 60;
 constexpr double via_tolerance = 0.1, target_tolerance = 0.04;
 constexpr double global_share = 0.25;
 constexpr double worth = 0.05;  // nearer to the goal by this much, a way that does not arrive is taken
@@ -18,8 +18,8 @@ Vias::Vias(const planning::Setup& setup, Rollout& rollout, Roots& roots, const J
       rollout_(rollout),
       roots_(roots),
       rng_(setup.seed() ^ 0x76696173ULL),
-      trial_(setup.dof(), via_steps + target_steps + 4),
-      best_(setup.dof(), via_steps + target_steps + 4),
+      trial_(setup.dof(), most_legs * (via_steps + target_steps + 4)),
+      best_(setup.dof(), most_legs * (via_steps + target_steps + 4)),
       start_(setup.dof()),
       via_(setup.dof()),
       point_(setup.dof()),
@@ -31,7 +31,7 @@ void Vias::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* 
   path_ = path != nullptr;
   rollout_.take_goal(goal);
   best_.clear();
-  arrives_ = false;
+  arrives_ = nearer_ = false;
   tried_ = 0;
   ++stalls_;
   if (path_) {
@@ -45,15 +45,22 @@ void Vias::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* 
 
 void Vias::next_via() {
   if (tried_++ == most_vias) return over(false);
+  // half of the trials go on from the best end so far
+  if (nearer_ && best_.size() + via_steps + target_steps + 4 < best_.capacity() && rng_.uniform() < 0.5) {
+    trial_ = best_;
+  } else {
+    trial_.clear();
+    trial_.add(start_);
+  }
+  begin_ = trial_.size();
+  point_ = trial_.end();
   if (rng_.uniform() < global_share)
     box_.draw(rng_, via_);
   else
-    box_.draw_near(rng_, start_, rng_.uniform(0.2, std::min(2.5, 0.6 + 0.2 * stalls_)), via_);
-  trial_.clear();
-  trial_.add(start_);
+    box_.draw_near(rng_, point_, rng_.uniform(0.2, std::min(2.5, 0.6 + 0.2 * stalls_)), via_);
   target_ = 0;
   phase_ = Phase::to_via;
-  rollout_.begin(start_, via_, via_steps, via_tolerance);
+  rollout_.begin(point_, via_, via_steps, via_tolerance);
 }
 
 void Vias::head_for_target() {
@@ -98,7 +105,7 @@ void Vias::roll() {
   if (step == Step::moved) return trial_.add(rollout_.q());
   if (step == Step::touched) return next_via();
   if (phase_ == Phase::to_via) {
-    if (trial_.size() < 3) return next_via();
+    if (trial_.size() < begin_ + 2) return next_via();
     // the last resort, where nothing comes of any: the first that leads away from here
     if (best_.empty()) best_ = trial_;
     via_end_ = trial_.size();
@@ -106,8 +113,9 @@ void Vias::roll() {
   }
   const bool arrived = step == Step::arrived;
   if (arrived || rollout_.distance() < best_distance_) {
-    best_distance_ = std::min(best_distance_, rollout_.distance());
+    best_distance_ = std::min(best_distance_, rollout_.distance() - (arrived ? 0.0 : worth));
     best_ = trial_;
+    nearer_ = true;
     along_ = path_ ? roots_.along(target_) : 0.0;
     if (arrived) return over(true);
   }

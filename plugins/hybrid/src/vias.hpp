@@ -3,8 +3,9 @@
 
 namespace hamelin::hybrid {
 
-/// Rollouts through one random via each: towards the via, then towards the goal. The first that arrives wins; else the
-/// one that comes nearest to the goal, if that is nearer than here; else one towards a random via.
+/// Rollouts through random vias: towards the via, then towards the goal, from here or from the best end so far. The
+/// first that arrives wins; else the one that comes nearest to the goal, if that is nearer than here; else one towards
+/// a random via.
 class Vias final : public Search {
  public:
   Vias(const planning::Setup& setup, Rollout& rollout, Roots& roots, const JointBox& box);
@@ -32,10 +33,10 @@ class Vias final : public Search {
   Way trial_, best_;
   Eigen::VectorXd start_, via_, point_, to_;
   Phase phase_ = Phase::over;
-  Eigen::Index via_end_ = 0;
+  Eigen::Index begin_ = 0, via_end_ = 0;
   int tried_ = 0, target_ = 0, stalls_ = 0;
   double best_distance_ = 0.0, along_ = 0.0;
-  bool arrives_ = false;
+  bool arrives_ = false, nearer_ = false;
   long units_ = 0;
 };
 
