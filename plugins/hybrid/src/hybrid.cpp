@@ -29,9 +29,7 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
-// Of the braking that limits allow along one obstacle's row: how much is counted on, at least [m/s²], and how much a row
-// may demand at once.
-constexpr double brake_share = 0.5, least_brake = 0.3, row_share = 0.8;
+constexpr double least_brake = 0.3;       // braking along a row that is counted on in any case [m/s²]
 constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
 constexpr double torque_share = 0.98;     // of the torque limits is planned with
 constexpr double steering_fade = 0.5;     // distance below which steering fades
@@ -107,7 +105,8 @@ class Hybrid final : public planning::Planner {
         search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
     }
     const int n = setup.dof();
-    for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_}) *x = VectorXd::Zero(n);
+    for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_})
+      *x = VectorXd::Zero(n);
     M_ = Minv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
     terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // takes its memory now
@@ -267,13 +266,17 @@ class Hybrid final : public planning::Planner {
     }
     for (const auto& point : obstacles_.points()) {
       const double x = point.distance - point.margin;
-      // what boxes allow of braking along this row; some of it is left to the other rows
-      const double now = point.row.dot(v_), room = std::max(0.0, filter_.reach(point.row) - now);
-      const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
-      const double wanted = point.obstacle_speed - (x > 0.0 ? approach_limit(x, brake) : rate_ * x);
+      double wanted = point.obstacle_speed - (x > 0.0 ? approach_limit(x, brake_) : rate_ * x);
+      const double now = point.row.dot(v_);
+      // near its limit a row counts on, and asks for, no more braking than the boxes are sure to allow
+      if (now - least_brake * dt < point.obstacle_speed - (x > 0.0 ? approach_limit(x, least_brake) : rate_ * x)) {
+        const double room = filter_.room(point.row, v_), brake = std::clamp(room / dt, least_brake, brake_);
+        if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
+        wanted = std::min(wanted, now + room);
+      }
       const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
                                                        : std::numeric_limits<double>::infinity();
-      (void)filter_.add_row(point.row, std::min(wanted, now + row_share * room), floor);
+      (void)filter_.add_row(point.row, wanted, floor);
     }
     scratch_ = x_;
     const auto report = filter_.project(x_, passes_);

@@ -23,7 +23,12 @@ constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the mi
 }  // namespace
 
 Law::Law(const planning::Setup& setup, const model::Model& model, const LawParams& params)
-    : params_(params), J_(6, model.dof()), Jp_(3, model.dof()), JpW_(3, model.dof()), null_(model.dof()), scratch_(model.dof()) {
+    : params_(params),
+      J_(6, model.dof()),
+      Jp_(3, model.dof()),
+      JpW_(3, model.dof()),
+      null_(model.dof()),
+      scratch_(model.dof()) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }

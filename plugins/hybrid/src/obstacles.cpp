@@ -18,8 +18,8 @@ Obstacles::Obstacles(const planning::Setup& setup, double radius)
   near_.reserve(setup.spheres().size() * 8 + 64);
 }
 
-// Nearest first. A link of many spheres has many points that say the same: one that lies by a nearer one of its link and
-// looks the same way is left out, so that none is that looks another way.
+// Nearest first. A link of many spheres has many points that say the same: one that lies by a nearer one of its link
+// and looks the same way is left out, so that none is that looks another way.
 void Obstacles::select(std::span<const hamelin_contact> contacts) {
   const auto nearer = [&](std::size_t a, std::size_t b) {
     return contacts[a].distance_m != contacts[b].distance_m ? contacts[a].distance_m < contacts[b].distance_m : a < b;
