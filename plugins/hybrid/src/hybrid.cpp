@@ -4,15 +4,24 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <memory>
 #include <string>
 
-#include "escape.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "law.hpp"
+#include "margins.hpp"
+#include "memory.hpp"
 #include "obstacles.hpp"
 #include "params_schema.hpp"
+#include "rollout.hpp"
+#include "roots.hpp"
 #include "safety_filter.hpp"
+#include "stall.hpp"
+#include "surroundings.hpp"
+#include "tree.hpp"
+#include "vias.hpp"
+#include "way.hpp"
 
 namespace hamelin::hybrid {
 namespace {
@@ -20,13 +29,23 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
-constexpr double steering_fade = 0.5;     // joint distance below which steering towards a joint target fades
-constexpr double far_from_goal = 1.0, near_goal = 0.25;  // joint distances between which margins shrink
+constexpr double least_brake = 0.3;       // braking along a row that is counted on in any case [m/s²]
+constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
+constexpr double torque_share = 0.98;     // of the torque limits is planned with
+constexpr double steering_fade = 0.5;     // distance below which steering fades
+constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
+constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
 
+double or_else(const Json& value, double otherwise) {
+  return value.is_null() ? otherwise : value.get<double>();
+}
+
+// k_p and k_v of a law e'' = k_p e − k_v e' give the gain k_p/k_v of a velocity that is followed with k_v.
 LawParams law_params(const Json& params) {
-  return {params["cruise_speed"],      params["tip_speed_m_s"],       params["tip_turn_rad_s"],
-          params["repulsion_range_m"], params["repulsion_speed_m_s"], params["steering_gain"],
-          params["steering_range_m"]};
+  const double gain = params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / or_else(params["k_v"], 1.0);
+  return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
+          params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
+          params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
 }
 
 /// How far each joint can move the arm, relative to the one that can most: joints that move little need not be
@@ -57,26 +76,39 @@ class Hybrid final : public planning::Planner {
         ws_(model_),
         law_(setup, model_, law_params(params)),
         obstacles_(setup, params["contact_radius_m"]),
+        surroundings_(host, setup),
+        margins_(setup, margin_params(setup, params)),
+        box_(setup, lever_weights(model_)),
         filter_(setup.dof(), Obstacles::max_points),
-        stall_(params["stall_time_s"], 1.5),
-        escape_(setup, lever_weights(model_), params["max_escapes"]),
-        velocity_gain_(params["velocity_gain"]),
+        stall_(params["stall_time_s"]),
+        memory_(setup, box_, params["max_escapes"]),
+        velocity_gain_(or_else(params["k_v"], params["velocity_gain"])),
         drive_acceleration_(params["drive_acceleration"]),
         acceleration_max_(params["acceleration_max"]),
         brake_(params["brake_acceleration"]),
         rate_(params["approach_rate"]),
-        margin_(std::max(params["margin_m"].get<double>(), 0.5 * setup.map_resolution_m())),
-        goal_margin_(std::min(params["goal_margin_m"].get<double>(), margin_)),
+        joint_damping_(params["joint_damping"]),
+        contact_radius_(params["contact_radius_m"]),
         passes_(params["filter_passes"]),
         max_escapes_(params["max_escapes"]),
-        escapes_(params["escape"] == "memory"),
-        contact_radius_(params["contact_radius_m"]),
-        clearance_at_goal_(setup.spheres().size()),
-        contacts_at_(setup.spheres().size() * 4 + 16) {
+        search_steps_(params["search_steps"]),
+        path_(setup.dof(), path_room(setup)) {
+    const std::string escape = params["escape"];
+    remembers_ = escape == "memory";
+    if (escape == "rollouts" || escape == "tree") {
+      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params), margins_, surroundings_);
+      roots_ = std::make_unique<Roots>(setup_, model_, law_params(params), box_, surroundings_);
+      if (escape == "tree")
+        search_ = std::make_unique<Tree>(setup_, *rollout_, *roots_, box_, margins_, surroundings_,
+                                         params["search_budget"].get<int>());
+      else
+        search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
+    }
     const int n = setup.dof();
-    for (auto* x : {&q_, &v_, &u_, &x_, &bias_, &momentum_, &lower_, &upper_, &scratch_}) *x = VectorXd::Zero(n);
-    M_ = Minv_ = Eigen::MatrixXd::Identity(n, n);
-    identity_ = Eigen::MatrixXd::Identity(n, n);
+    for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_})
+      *x = VectorXd::Zero(n);
+    M_ = Minv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
+    terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // takes its memory now
   }
 
@@ -89,16 +121,20 @@ class Hybrid final : public planning::Planner {
     if (goal_ != &goal) take_goal(goal, tick.time_s());
     prepare(tick);
 
-    const Target target{&goal, escaping_ ? &escape_.via() : nullptr};
-    const double distance = law_.distance(model_, ws_, q_, target);
-    set_margins(law_.distance(model_, ws_, q_, {&goal, nullptr}));
-    law_.attract(model_, ws_, q_, target, u_);
-    if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
-    law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-    // steering turns faster than the law follows: near a joint target it would make the arm circle
-    const bool joint_target = target.via != nullptr || goal.type == HAMELIN_GOAL_JOINT;
-    law_.steer(model_, ws_, obstacles_.points(), Minv_, v_,
-               joint_target ? std::min(1.0, distance / steering_fade) : 1.0, command);
+    const Target target = choose_target();
+    margins_.set(obstacles_.points(), law_.away(model_, ws_, q_, goal));
+    double wanted = 0.0;
+    if (mode_ == Mode::think) {
+      u_.setZero();
+    } else {
+      wanted = law_.attract(model_, ws_, q_, target, u_);
+      if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
+      const double distance = law_.distance(model_, ws_, q_, target);
+      law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
+      // steering turns faster than the law follows: near a target it would make the arm circle
+      law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
+    }
+    bound_steering(command);
 
     // the law's velocity one period on, of bounded acceleration
     const double dt = setup_.control_period_s();
@@ -108,23 +144,44 @@ class Hybrid final : public planning::Planner {
     // what keeps that velocity through the step: gravity, and the Coriolis force at it
     dynamics::bias_torque(model_, ws_, q_, x_, bias_);
     command.held_torque() = bias_;
-    mind_stall(tick, target, distance, command);
+    if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
+    mind_stall(tick.time_s(), target, wanted, command);
   }
 
  private:
+  // What the arm goes for: the goal, an escape's way-point, or the way that a search found; or it stands while one is
+  // under way.
+  enum class Mode { goal, via, think, way };
+
+  static MarginParams margin_params(const planning::Setup& setup, const Json& params) {
+    MarginParams margins{};
+    margins.away_m = std::max(params["margin_m"].get<double>(), 0.5 * setup.map_resolution_m());
+    margins.goal_m = std::min(params["goal_margin_m"].get<double>(), margins.away_m);
+    margins.self_m = params["self_margin_m"];
+    return margins;
+  }
+
+  static Eigen::Index path_room(const planning::Setup& setup) {
+    std::size_t most = 0;
+    for (const auto& goal : setup.goals()) most = std::max(most, goal.path_points);
+    return static_cast<Eigen::Index>(most);
+  }
+
+  void enter(Mode mode, double time_s) {
+    mode_ = mode;
+    stall_.restart(time_s);
+  }
+
   void take_goal(const hamelin_goal& goal, double time_s) {
     goal_ = &goal;
-    escape_.restart();
-    escaping_ = false;
-    stall_.restart(time_s);
-    std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), contact_radius_);
-    if (goal.type != HAMELIN_GOAL_JOINT) return;
-    const std::size_t found =
-        host_.closest_points({goal.q, static_cast<std::size_t>(setup_.dof())}, contact_radius_, contacts_at_);
-    for (std::size_t i = 0; i < std::min(found, contacts_at_.size()); ++i) {
-      auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contacts_at_[i].sphere)];
-      clearance = std::min(clearance, contacts_at_[i].distance_m);
-    }
+    memory_.restart();
+    escapes_ = 0;
+    margins_.take_goal(surroundings_, goal, contact_radius_);
+    path_.clear();
+    const auto path = setup_.path(goal);
+    for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
+    path_at_ = 0.0;
+    enter(Mode::goal, time_s);
   }
 
   void prepare(const planning::Tick& tick) {
@@ -134,19 +191,43 @@ class Hybrid final : public planning::Planner {
     llt_.solveInPlace(Minv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
     dynamics::forward_kinematics(model_, ws_, q_);
-    obstacles_.update(model_, ws_, tick.contacts());
+    obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   }
 
-  // Away from the goal the whole margin; near it what the goal's own pose leaves, or the small one for a tip goal.
-  void set_margins(double goal_distance) {
-    const bool joint = goal_->type == HAMELIN_GOAL_JOINT;
-    const double w = joint ? std::clamp((goal_distance - near_goal) / (far_from_goal - near_goal), 0.0, 1.0)
-                           : std::clamp((0.5 * goal_distance - 0.02) / 0.10, 0.0, 1.0);
-    for (auto& point : obstacles_.points()) {
-      const double leaves = clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - goal_margin_;
-      const double there = joint ? std::min(margin_, std::max(0.001, leaves)) : goal_margin_;
-      point.margin = (1.0 - w) * there + w * margin_;
+  Target choose_target() {
+    if (mode_ == Mode::via) return {goal_, &memory_.via()};
+    if (mode_ == Mode::way) {
+      way_at_ = search_->way().carrot(way_at_, q_, way_ahead, via_);
+      return {goal_, &via_, way_at_ < search_->way().length()};
     }
+    if (path_.empty()) return {goal_};
+    path_at_ = path_.carrot(path_at_, q_, path_ahead, via_);
+    return {goal_, &via_, path_at_ < path_.length()};
+  }
+
+  // What is to shrink: the distance to the target, and what lies behind it.
+  [[nodiscard]] double remaining(const Target& target) {
+    double left = law_.distance(model_, ws_, q_, target);
+    if (mode_ == Mode::way) left += search_->way().length() - way_at_;
+    if (mode_ == Mode::goal && !path_.empty()) left += path_.length() - path_at_;
+    return left;
+  }
+
+  // Steering may take a small share of the torques only: the rest is for braking.
+  void bound_steering(planning::Command& command) {
+    steering_.setZero();
+    const auto effort = setup_.effort_max();
+    if (!effort || command.gyroscopic().empty()) return;
+    terms_.clear();
+    for (const auto& term : command.gyroscopic())
+      terms_.push_back({term.link, planning::vec3(term.point_link_m), planning::vec3(term.w_world)});
+    dynamics::gyroscopic_torque(model_, ws_, q_, v_, terms_, steering_);
+    double scale = 1.0;
+    for (int k = 0; k < setup_.dof(); ++k)
+      scale = std::min(scale, steering_share * (*effort)[k] / std::max(1e-12, std::abs(steering_[k])));
+    for (auto& term : command.gyroscopic())
+      for (auto& w : term.w_world) w *= scale;
+    steering_ *= scale;
   }
 
   // The approach speed that leaves room to brake: γx near the margin, continued C¹ by √(2a(x − a/2γ²)).
@@ -155,30 +236,8 @@ class Hybrid final : public planning::Planner {
     return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
   }
 
-  // The deceleration along a row that torques and joint accelerations can give.
-  [[nodiscard]] double braking(const VectorXd& row) {
-    scratch_.noalias() = Minv_ * row;
-    const double mobility = row.dot(scratch_);
-    double brake = brake_;
-    const auto effort = setup_.effort_max();
-    for (int k = 0; k < setup_.dof(); ++k) {
-      if (effort)
-        brake = std::min(brake, mobility * std::max(0.1 * (*effort)[k], (*effort)[k] - std::abs(bias_[k])) /
-                                    (std::abs(row[k]) + 1e-9));
-      brake = std::min(brake, acceleration_max_ * mobility / (std::abs(scratch_[k]) + 1e-9));
-    }
-    return std::max(brake, 0.1);
-  }
-
   void project(double dt, planning::Command& command) {
     filter_.begin(M_, Minv_);
-    for (const auto& point : obstacles_.points()) {
-      const double x = point.distance - point.margin;
-      const double b = point.obstacle_speed - (x > 0.0 ? approach_limit(x, braking(point.row)) : rate_ * x);
-      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
-                                                       : std::numeric_limits<double>::infinity();
-      (void)filter_.add_row(point.row, b, floor);
-    }
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
       double over = 1.0;
@@ -200,11 +259,28 @@ class Hybrid final : public planning::Planner {
     filter_.set_box(lower_, upper_);
     if (const auto effort = setup_.effort_max()) {
       momentum_.noalias() = M_ * v_;
-      lower_ = momentum_ - dt * (*effort + bias_);
-      upper_ = momentum_ + dt * (*effort - bias_);
+      // the bias that is held is that of x, not of v; a little room covers the difference
+      lower_ = momentum_ - dt * (torque_share * *effort + bias_ + steering_);
+      upper_ = momentum_ + dt * (torque_share * *effort - bias_ - steering_);
       filter_.set_momentum_box(lower_, upper_);
     }
+    for (const auto& point : obstacles_.points()) {
+      const double x = point.distance - point.margin;
+      double wanted = point.obstacle_speed - (x > 0.0 ? approach_limit(x, brake_) : rate_ * x);
+      const double now = point.row.dot(v_);
+      // near its limit a row counts on, and asks for, no more braking than the boxes are sure to allow
+      if (now - least_brake * dt < point.obstacle_speed - (x > 0.0 ? approach_limit(x, least_brake) : rate_ * x)) {
+        const double room = filter_.room(point.row, v_), brake = std::clamp(room / dt, least_brake, brake_);
+        if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
+        wanted = std::min(wanted, now + room);
+      }
+      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
+                                                       : std::numeric_limits<double>::infinity();
+      (void)filter_.add_row(point.row, wanted, floor);
+    }
+    scratch_ = x_;
     const auto report = filter_.project(x_, passes_);
+    held_ = (x_ - scratch_).norm() > 1e-3 * dt || obstacles_.clearance() < contact_radius_;
     command.set_accounts(report.energy_after_J - report.energy_before_J - report.recovery_J, report.recovery_J);
   }
 
@@ -217,33 +293,50 @@ class Hybrid final : public planning::Planner {
     return side * (x <= bend ? joint_limit_rate * x : std::sqrt(2.0 * brake * (x - 0.5 * bend)));
   }
 
-  void mind_stall(const planning::Tick& tick, const Target& target, double distance, planning::Command& command) {
-    const double now = tick.time_s();
-    const bool stalled = stall_.stalled(now, distance, v_.norm());
-    if (escaping_) {
-      const bool there = (escape_.via() - q_).lpNorm<Eigen::Infinity>() < 0.1;
-      if (!there && !stalled && now < escape_until_s_) return;
-      escaping_ = false;
-      stall_.restart(now);
+  void mind_stall(double now, const Target& target, double wanted, planning::Command& command) {
+    if (mode_ == Mode::think) return think(now, command);
+    const bool stalled = stall_.stalled(now, remaining(target), v_.norm(), wanted, held_);
+    if (mode_ == Mode::via) {
+      const bool there = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
+      if (there || stalled || now >= via_until_s_) enter(Mode::goal, now);
       return;
     }
-    if (!stalled) return;
-    if (!escapes_ || escape_.count() >= max_escapes_) {
-      command.give_up(cause());
-      return;
+    if (mode_ == Mode::way && way_at_ >= search_->way().length() &&
+        (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached) {
+      if (search_->arrives()) path_at_ = std::max(path_at_, search_->along());
+      return enter(Mode::goal, now);
     }
-    const double* goal = target.goal->type == HAMELIN_GOAL_JOINT ? target.goal->q : nullptr;
-    escape_.next(q_, goal, [&](const VectorXd& via) {
-      const std::size_t found =
-          host_.closest_points({via.data(), static_cast<std::size_t>(via.size())}, margin_, contacts_at_);
-      return found == 0;
-    });
+    if (stalled) escape(now, target, command);
+  }
+
+  void escape(double now, const Target& target, planning::Command& command) {
+    if ((!remembers_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
+    ++escapes_;
     std::array<char, 64> line{};
-    const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escape_.count());
+    const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
     host_.info({line.data(), static_cast<std::size_t>(size)});
-    escaping_ = true;
-    escape_until_s_ = now + 1.2 + 0.05 * escape_.count();
-    stall_.restart(now);
+    if (search_) {
+      search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_at_);
+      return enter(Mode::think, now);
+    }
+    const auto distance = [&](const VectorXd& via) {
+      if (target.via == nullptr) dynamics::forward_kinematics(model_, ws_, via);
+      return law_.distance(model_, ws_, via, target);
+    };
+    const auto clear = [&](const VectorXd& via) {
+      return surroundings_.clear(via, margins_.params().away_m, margins_.params().self_m);
+    };
+    memory_.next(q_, distance, clear);
+    via_until_s_ = now + 1.2 + 0.05 * escapes_;
+    enter(Mode::via, now);
+  }
+
+  // The arm stands while the search goes on.
+  void think(double now, planning::Command&) {
+    if (!search_->advance(search_steps_)) return;
+    if (search_->way().empty()) return enter(Mode::goal, now);
+    way_at_ = 0.0;
+    enter(Mode::way, now);
   }
 
   // What holds the arm: the filter's multipliers know.
@@ -257,7 +350,7 @@ class Hybrid final : public planning::Planner {
     if (worst >= 0) {
       const auto& point = points[static_cast<std::size_t>(worst)];
       const auto& name = links[static_cast<std::size_t>(point.link)].name;
-      if (clearance_at_goal_[static_cast<std::size_t>(point.sphere)] < margin_ && point.margin < margin_)
+      if (margins_.tight_at_goal(point) && point.margin < margins_.params().away_m)
         return "margin around the goal: link '" + name + "' is held off an obstacle that the goal is as near to";
       return "force balance: the pull to the goal is held by the obstacle next to link '" + name + "'";
     }
@@ -278,21 +371,28 @@ class Hybrid final : public planning::Planner {
   dynamics::Workspace ws_;
   Law law_;
   Obstacles obstacles_;
+  Surroundings surroundings_;
+  Margins margins_;
+  JointBox box_;
   SafetyFilter filter_;
   StallWatch stall_;
-  Escape escape_;
-  double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, margin_, goal_margin_;
-  int passes_, max_escapes_;
-  bool escapes_;
-  double contact_radius_;
-  std::vector<double> clearance_at_goal_;
-  std::vector<hamelin_contact> contacts_at_;
-  VectorXd q_, v_, u_, x_, bias_, momentum_, lower_, upper_, scratch_;
+  Memory memory_;
+  std::unique_ptr<Rollout> rollout_;
+  std::unique_ptr<Roots> roots_;
+  std::unique_ptr<Search> search_;
+  double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_, contact_radius_;
+  int passes_, max_escapes_, search_steps_;
+  bool remembers_ = false;
+  Way path_;
+  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_;
+  std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, Minv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   const hamelin_goal* goal_ = nullptr;
-  bool escaping_ = false;
-  double escape_until_s_ = 0.0;
+  Mode mode_ = Mode::goal;
+  bool held_ = false;  ///< the filter took something of the law's velocity
+  int escapes_ = 0;
+  double path_at_ = 0.0, way_at_ = 0.0, via_until_s_ = 0.0;
 };
 
 }  // namespace

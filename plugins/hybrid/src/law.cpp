@@ -14,15 +14,21 @@ using Eigen::Vector3d;
 // A rotation by one radian weighs as much as this length [m], so that one damped inverse serves both.
 constexpr double rotation_length = 0.25;
 // Damping of (J Jᵀ + λ²)⁻¹, relative to the trace: keeps joint speeds bounded near singular poses.
-constexpr double relative_damping = 0.004;
-constexpr double joint_gain = 4.0;     // [1/s] near a joint target
-constexpr double tip_gain = 3.0;       // [1/s] near a tip target
+constexpr double relative_damping = 0.004, projection_damping = 1e-7;
+constexpr double passing_far = 0.02;  // a via that is passed is given its full speed down to here
+// Distances to the goal between which margins shrink: joint space, tip [m].
+constexpr double joint_near = 0.25, joint_far = 1.0, tip_near_m = 0.02, tip_far_m = 0.12;
 constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the middle of the limits
 
 }  // namespace
 
 Law::Law(const planning::Setup& setup, const model::Model& model, const LawParams& params)
-    : params_(params), J_(6, model.dof()), null_(model.dof()), scratch_(model.dof()) {
+    : params_(params),
+      J_(6, model.dof()),
+      Jp_(3, model.dof()),
+      JpW_(3, model.dof()),
+      null_(model.dof()),
+      scratch_(model.dof()) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
@@ -47,16 +53,39 @@ double Law::distance(const model::Model& model, const dynamics::Workspace& ws, c
   return 2.0 * position.norm() + 0.5 * rotation.norm();
 }
 
-void Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                  const Target& target, Eigen::VectorXd& u) {
+bool Law::within(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                 const hamelin_goal& goal, double share) const {
+  if (goal.type == HAMELIN_GOAL_JOINT)
+    return (planning::ConstVectorMap(goal.q, q.size()) - q).lpNorm<Eigen::Infinity>() < share * goal.tolerance_rad;
+  Vector3d position, rotation;
+  task_error(model, ws, goal, position, rotation);
+  return position.norm() < share * goal.tolerance_m &&
+         (goal.type != HAMELIN_GOAL_POSE || rotation.norm() < share * goal.tolerance_rad);
+}
+
+double Law::away(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                 const hamelin_goal& goal) const {
+  if (goal.type == HAMELIN_GOAL_JOINT) {
+    const double off = (planning::ConstVectorMap(goal.q, q.size()) - q).norm();
+    return std::clamp((off - joint_near) / (joint_far - joint_near), 0.0, 1.0);
+  }
+  const double off = (planning::vec3(goal.position_world_m) - dynamics::tip_pose(model, ws).p()).norm();
+  return std::clamp((off - tip_near_m) / (tip_far_m - tip_near_m), 0.0, 1.0);
+}
+
+double Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                    const Target& target, Eigen::VectorXd& u) {
   if (target.via != nullptr || target.goal->type == HAMELIN_GOAL_JOINT) {
     if (target.via != nullptr)
       u = *target.via - q;
     else
       u = planning::ConstVectorMap(target.goal->q, q.size()) - q;
     const double far = u.norm();
-    if (far > 0.0) u *= std::min(joint_gain, params_.cruise_speed / far);
-    return;
+    if (target.passing)
+      u *= params_.cruise_speed / std::max(far, passing_far);
+    else if (far > 0.0)
+      u *= std::min(params_.joint_gain, params_.cruise_speed / far);
+    return u.norm();
   }
   Vector3d position, rotation;
   task_error(model, ws, *target.goal, position, rotation);
@@ -66,23 +95,30 @@ void Law::attract(const model::Model& model, const dynamics::Workspace& ws, cons
   if (turns) {
     J_.topRows<3>() *= rotation_length;
     const double angle = rotation.norm();
-    if (angle > 0.0) wanted.head<3>() = rotation_length * rotation * std::min(tip_gain, params_.tip_turn / angle);
+    if (angle > 0.0)
+      wanted.head<3>() = rotation_length * rotation * std::min(params_.tip_gain, params_.tip_turn / angle);
   } else {
     J_.topRows<3>().setZero();
   }
   const double far = position.norm();
-  if (far > 0.0) wanted.tail<3>() = position * std::min(tip_gain, params_.tip_speed / far);
+  if (far > 0.0) wanted.tail<3>() = position * std::min(params_.tip_gain, params_.tip_speed / far);
+  const double rate = 2.0 * wanted.tail<3>().norm() + 0.5 / rotation_length * wanted.head<3>().norm();
   Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
-  G.diagonal().array() += relative_damping * std::max(1e-6, G.trace());
+  const double scale = std::max(1e-6, G.trace());
+  G.diagonal().array() += relative_damping * scale;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
   u.noalias() = J_.transpose() * factor.solve(wanted).eval();
   const double fast = u.norm(), limit = 1.5 * params_.cruise_speed;
   if (fast > limit) u *= limit / fast;
-  if (middle_.size() == 0) return;
+  if (middle_.size() == 0) return rate;
   null_ = centring_gain * (middle_ - q);
+  // The centring must not push the tip off its goal, so this projection is all but undamped.
+  G.diagonal().array() -= (relative_damping - projection_damping) * scale;
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> projector(G);
   const Eigen::Matrix<double, 6, 1> disturbs = J_ * null_;
-  scratch_.noalias() = J_.transpose() * factor.solve(disturbs).eval();
+  scratch_.noalias() = J_.transpose() * projector.solve(disturbs).eval();
   u += null_ - scratch_;
+  return rate;
 }
 
 void Law::repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const {
@@ -111,8 +147,10 @@ void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::s
     if (approach <= 0.0) continue;
     Vector3d side = ahead.cross(point.direction);
     side = side.norm() > 0.05 ? Vector3d(side.normalized()) : Vector3d(point.direction.unitOrthogonal());
-    scratch_.noalias() = W * point.row;
-    const double mobility = point.row.dot(scratch_);
+    dynamics::point_jacobian(model, ws, point.link, point.arm_point, Jp_);
+    JpW_.noalias() = Jp_ * W;
+    // The lightest direction: no other turns faster than the rate that is meant.
+    const double mobility = JpW_.cwiseProduct(Jp_).sum();
     if (mobility < 1e-9) continue;
     const double rate = strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
     // side × ahead points to the obstacle's far side: its part along the direction is the sine of the angle, so ≥ 0

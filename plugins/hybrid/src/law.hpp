@@ -11,9 +11,11 @@ namespace hamelin::hybrid {
 struct Target {
   const hamelin_goal* goal = nullptr;
   const Eigen::VectorXd* via = nullptr;  ///< set: a joint vector to go to instead
+  bool passing = false;                  ///< the via is on the way: it is passed at full speed
 };
 
 struct LawParams {
+  double joint_gain, tip_gain;  ///< near a target of the joints, of the tip [1/s]
   double cruise_speed, tip_speed, tip_turn;
   double repulsion_range, repulsion_speed;
   double steering_gain, steering_range;
@@ -28,14 +30,21 @@ class Law {
   /// How far off the target is: joint distance, or 2 |position error| + ½ |rotation angle|.
   [[nodiscard]] double distance(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                                 const Target& target);
+  /// Whether q is at the goal, by this share of its tolerances. A joint goal: its largest |error|.
+  [[nodiscard]] bool within(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                            const hamelin_goal& goal, double share) const;
+  /// How far from the goal, as margins see it: 0 at it, 1 away from it.
+  [[nodiscard]] double away(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                            const hamelin_goal& goal) const;
   /// u = attraction to the target. Poses at q must stand in ws.
-  void attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Target& target,
-               Eigen::VectorXd& u);
+  /// @return how fast it means to shorten distance()
+  double attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                 const Target& target, Eigen::VectorXd& u);
   /// u += a (1 − h/range) speed / max(1, |a|²) per point within the range of its margin, h = distance − margin,
   /// weighted by `strength`.
   void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
   /// Gyroscopic terms w = m k (v̂ × n)^ for approached points, k = gain α (1/max(h, 1 cm) − 1/range), α = −v̂·n,
-  /// m = 1/(aᵀM⁻¹a): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
+  /// m = 1/tr(J M⁻¹ Jᵀ): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
   void steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
              const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command);
 
@@ -46,6 +55,7 @@ class Law {
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;
+  dynamics::Matrix3Xd Jp_, JpW_;
   Eigen::VectorXd null_, scratch_;
 };
 

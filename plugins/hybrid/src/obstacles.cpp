@@ -4,46 +4,80 @@
 
 namespace hamelin::hybrid {
 
-Obstacles::Obstacles(const planning::Setup& setup, double radius) : radius_(radius), points_(max_points) {
+namespace {
+
+constexpr double same_direction = 0.95, same_place_m = 0.04;
+
+}  // namespace
+
+Obstacles::Obstacles(const planning::Setup& setup, double radius)
+    : radius_(radius), points_(max_points), row_(setup.dof()) {
   for (const auto& sphere : setup.spheres()) sphere_link_.push_back(sphere.link);
   for (auto& point : points_) point.row = Eigen::VectorXd::Zero(setup.dof());
-  chosen_.reserve(max_points + per_link * 8);
+  chosen_.reserve(max_points);
+  near_.reserve(setup.spheres().size() * 8 + 64);
 }
 
-void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
-                       std::span<const hamelin_contact> contacts) {
-  // Spheres come in order, so a link's contacts stand together. Keep the nearest few of each link and obstacle.
+// Nearest first. A link of many spheres has many points that say the same: one that lies by a nearer one of its link
+// and looks the same way is left out, so that none is that looks another way.
+void Obstacles::select(std::span<const hamelin_contact> contacts) {
   const auto nearer = [&](std::size_t a, std::size_t b) {
     return contacts[a].distance_m != contacts[b].distance_m ? contacts[a].distance_m < contacts[b].distance_m : a < b;
   };
-  const auto link_of = [&](std::size_t i) { return sphere_link_[static_cast<std::size_t>(contacts[i].sphere)]; };
+  near_.clear();
+  for (std::size_t i = 0; i < contacts.size() && near_.size() < near_.capacity(); ++i) {
+    clearance_ = std::min(clearance_, contacts[i].distance_m);
+    if (contacts[i].distance_m <= radius_) near_.push_back(i);
+  }
+  std::sort(near_.begin(), near_.end(), nearer);
+  const auto link_of = [&](const hamelin_contact& c) { return sphere_link_[static_cast<std::size_t>(c.sphere)]; };
   chosen_.clear();
-  std::size_t link_begin = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    if (i > 0 && link_of(i) != link_of(i - 1)) link_begin = chosen_.size();
-    if (contacts[i].distance_m > radius_) continue;
-    std::size_t same = 0, farthest = chosen_.size();
-    for (std::size_t j = link_begin; j < chosen_.size(); ++j) {
-      if (contacts[chosen_[j]].obstacle != contacts[i].obstacle) continue;
-      ++same;
-      if (farthest == chosen_.size() || nearer(chosen_[farthest], chosen_[j])) farthest = j;
+  for (const std::size_t i : near_) {
+    const hamelin_contact& contact = contacts[i];
+    bool said = false;
+    for (std::size_t j = 0; j < chosen_.size() && !said; ++j) {
+      const hamelin_contact& other = contacts[chosen_[j]];
+      if (link_of(other) != link_of(contact) || other.obstacle != contact.obstacle) continue;
+      const auto n = planning::vec3(contact.direction_world), m = planning::vec3(other.direction_world);
+      const auto p = planning::vec3(contact.arm_point_world_m), r = planning::vec3(other.arm_point_world_m);
+      said = n.dot(m) > same_direction && (p - r).squaredNorm() < same_place_m * same_place_m;
     }
-    if (same < per_link && chosen_.size() < chosen_.capacity())
-      chosen_.push_back(i);
-    else if (farthest < chosen_.size() && nearer(i, chosen_[farthest]))
-      chosen_[farthest] = i;
+    if (!said) chosen_.push_back(i);
+    if (count_ + chosen_.size() == points_.size()) return;
   }
-  if (chosen_.size() > max_points) {
-    std::nth_element(chosen_.begin(), chosen_.begin() + max_points, chosen_.end(), nearer);
-    chosen_.resize(max_points);
-  }
-  std::sort(chosen_.begin(), chosen_.end(), nearer);
-  count_ = chosen_.size();
-  for (std::size_t i = 0; i < count_; ++i) {
-    const auto& contact = contacts[chosen_[i]];
-    NearPoint& point = points_[i];
+}
+
+void Obstacles::add_self(const model::Model& model, const dynamics::Workspace& ws,
+                         const hamelin_self_contact& contact) {
+  clearance_ = std::min(clearance_, contact.distance_m);
+  if (contact.distance_m > self_radius_m || count_ == points_.size()) return;
+  NearPoint& point = points_[count_++];
+  point.sphere = contact.sphere_a;
+  point.link = sphere_link_[static_cast<std::size_t>(contact.sphere_a)];
+  point.obstacle = NearPoint::self;
+  point.distance = contact.distance_m;
+  point.arm_point = planning::vec3(contact.point_a_world_m);
+  point.direction = planning::vec3(contact.direction_world);
+  point.obstacle_speed = 0.0;
+  dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction, point.row);
+  if (contact.sphere_b == HAMELIN_SPHERE_OF_BASE) return;
+  dynamics::point_jacobian_transpose(model, ws, sphere_link_[static_cast<std::size_t>(contact.sphere_b)],
+                                     planning::vec3(contact.point_b_world_m), point.direction, row_);
+  point.row -= row_;
+}
+
+void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
+                       std::span<const hamelin_contact> contacts, std::span<const hamelin_self_contact> self_contacts) {
+  clearance_ = radius_;
+  count_ = 0;
+  for (const auto& contact : self_contacts) add_self(model, ws, contact);
+  select(contacts);
+  for (const std::size_t i : chosen_) {
+    const auto& contact = contacts[i];
+    NearPoint& point = points_[count_++];
     point.sphere = contact.sphere;
     point.link = sphere_link_[static_cast<std::size_t>(contact.sphere)];
+    point.obstacle = contact.obstacle;
     point.distance = contact.distance_m;
     point.arm_point = planning::vec3(contact.arm_point_world_m);
     point.direction = planning::vec3(contact.direction_world);

@@ -16,7 +16,7 @@ constexpr double settled = 1e-6;
 SafetyFilter::SafetyFilter(int dof, int max_rows)
     : a_(dof, max_rows), Wa_(dof, max_rows), rows_(static_cast<std::size_t>(max_rows)) {
   for (auto* x : {&lower_, &upper_, &momentum_lower_, &momentum_upper_, &box_lambda_low_, &box_lambda_high_,
-                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_})
+                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_, &step_, &Mfrom_})
     *x = Eigen::VectorXd::Zero(dof);
 }
 
@@ -49,6 +49,33 @@ void SafetyFilter::set_momentum_box(const Eigen::VectorXd& lower, const Eigen::V
   momentum_lower_ = lower;
   momentum_upper_ = upper;
   has_momentum_box_ = true;
+}
+
+double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from) {
+  const auto n = a.size();
+  // The largest share of a step that keeps one number within its bounds; a number already outside may not go on.
+  const auto share = [](double x, double step, double low, double high) {
+    if (step > 0.0) return std::max(0.0, high - x) / step;
+    if (step < 0.0) return std::max(0.0, x - low) / -step;
+    return std::numeric_limits<double>::infinity();
+  };
+  if (has_momentum_box_) Mfrom_.noalias() = *M_ * from;
+
+  step_.noalias() = *W_ * a;
+  double along = std::numeric_limits<double>::infinity();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    along = std::min(along, share(from[k], step_[k], lower_[k], upper_[k]));
+    if (has_momentum_box_) along = std::min(along, share(Mfrom_[k], a[k], momentum_lower_[k], momentum_upper_[k]));
+  }
+  const double by_row = along * a.dot(step_);
+
+  for (Eigen::Index k = 0; k < n; ++k)
+    step_[k] = a[k] > 0.0 ? std::max(0.0, upper_[k] - from[k]) : a[k] < 0.0 ? std::min(0.0, lower_[k] - from[k]) : 0.0;
+  if (!step_.allFinite()) return by_row;
+  double to_corner = 1.0;
+  for (Eigen::Index k = 0; has_momentum_box_ && k < n; ++k)
+    to_corner = std::min(to_corner, share(Mfrom_[k], M_->col(k).dot(step_), momentum_lower_[k], momentum_upper_[k]));
+  return std::max(by_row, to_corner * a.dot(step_));
 }
 
 SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {

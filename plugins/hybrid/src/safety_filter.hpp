@@ -25,6 +25,10 @@ class SafetyFilter {
   /// lower ≤ M x ≤ upper.
   void set_momentum_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
 
+  /// How much a · x can surely be raised above a · from within the boxes: the better of a step along M⁻¹ a and one
+  /// towards the box's far corner. Never below zero.
+  [[nodiscard]] double room(const Eigen::VectorXd& a, const Eigen::VectorXd& from);
+
   struct Report {
     int passes = 0;
     double energy_before_J = 0.0, energy_after_J = 0.0;  ///< ½ ũᵀMũ, ½ xᵀMx
@@ -52,7 +56,7 @@ class SafetyFilter {
   int count_ = 0;
   bool has_momentum_box_ = false;
   Eigen::VectorXd lower_, upper_, momentum_lower_, momentum_upper_;
-  Eigen::VectorXd box_lambda_low_, box_lambda_high_, momentum_lambda_low_, momentum_lambda_high_, Mx_;
+  Eigen::VectorXd box_lambda_low_, box_lambda_high_, momentum_lambda_low_, momentum_lambda_high_, Mx_, step_, Mfrom_;
 };
 
 }  // namespace hamelin::hybrid

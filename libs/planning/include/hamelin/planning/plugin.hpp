@@ -131,6 +131,8 @@ class Command {
     VectorMap(term.point_link_m, 3) = point_link;
     VectorMap(term.w_world, 3) = w_world;
   }
+  /// The terms added so far.
+  [[nodiscard]] std::span<hamelin_gyroscopic_term> gyroscopic() { return {raw_->gyroscopic, raw_->gyroscopic_count}; }
   /// (d) Torque held over the step [Nm or N].
   [[nodiscard]] VectorMap held_torque() { return {raw_->held_torque, dof_}; }
   /// (e) The velocity right after this node; asking for it switches the channel on.

@@ -1,0 +1,133 @@
+#include "roots.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace hamelin::hybrid {
+
+namespace {
+
+// Tip goals: Newton-like steps along the law's own pull.
+constexpr int attempts = 60, iterations = 40;
+constexpr double step_s = 0.25;
+constexpr double share = 0.6;  // of the goal's tolerances
+// A root keeps this share of the margins that the goal itself may keep.
+constexpr double clear_m = 0.003, clear_self_m = 0.001;
+// Paths: looked at in such steps; roots so far behind the exit of what is blocked [rad or m].
+constexpr double path_step = 0.02;
+constexpr std::array<double, 3> behind = {0.1, 0.4, 0.9};
+
+}  // namespace
+
+JointBox::JointBox(const planning::Setup& setup, const Eigen::VectorXd& joint_weights)
+    : lower(setup.dof()), upper(setup.dof()), weights(joint_weights) {
+  const auto low = setup.q_lower(), high = setup.q_upper();
+  for (int i = 0; i < setup.dof(); ++i) {
+    lower[i] = low && std::isfinite((*low)[i]) ? (*low)[i] : -std::numbers::pi;
+    upper[i] = high && std::isfinite((*high)[i]) ? (*high)[i] : std::numbers::pi;
+  }
+}
+
+void JointBox::draw(Rng& rng, Eigen::VectorXd& q) const {
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = rng.uniform(lower[i], upper[i]);
+}
+
+void JointBox::draw_near(Rng& rng, const Eigen::VectorXd& center, double radius, Eigen::VectorXd& q) const {
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = rng.normal() * weights[i];
+  q *= radius / std::max(1e-9, q.norm());
+  q = (center + q).cwiseMax(lower).cwiseMin(upper);
+}
+
+Roots::Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law, const JointBox& box,
+             Surroundings& surroundings)
+    : model_(model),
+      box_(box),
+      surroundings_(surroundings),
+      ws_(model),
+      law_(setup, model, law),
+      start_(setup.dof()),
+      x_(setup.dof()),
+      u_(setup.dof()),
+      q_(setup.dof(), most) {
+  along_.reserve(most);
+}
+
+void Roots::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* path, double from) {
+  goal_ = &goal;
+  path_ = path;
+  start_ = q;
+  count_ = attempt_ = iteration_ = 0;
+  along_.clear();
+  met_block_ = done_ = false;
+  s_ = from;
+  x_ = q;
+  if (path_ == nullptr && goal.type == HAMELIN_GOAL_JOINT) {
+    add(planning::ConstVectorMap(goal.q, q.size()), 0.0);
+    done_ = true;
+  }
+}
+
+void Roots::add(const Eigen::VectorXd& q, double along) {
+  if (count_ == most) return;
+  q_.col(count_++) = q;
+  along_.push_back(along);
+}
+
+int Roots::advance(int units, Rng& rng) {
+  int used = 0;
+  for (; used < units && !done_; ++used) {
+    if (path_ != nullptr)
+      follow_path();
+    else
+      solve_tip(rng);
+  }
+  return used;
+}
+
+void Roots::solve_tip(Rng& rng) {
+  dynamics::forward_kinematics(model_, ws_, x_);
+  const bool there = law_.within(model_, ws_, x_, *goal_, share);
+  if (!there && iteration_++ < iterations) {
+    law_.attract(model_, ws_, x_, {goal_, nullptr}, u_);
+    x_ = (x_ + step_s * u_).cwiseMax(box_.lower).cwiseMin(box_.upper);
+    return;
+  }
+  if (there && surroundings_.clear(x_, clear_m, clear_self_m)) add(x_, 0.0);
+  iteration_ = 0;
+  if (++attempt_ == attempts || count_ == most) return finish();
+  box_.draw(rng, x_);
+}
+
+// The first stretch that is blocked from here on, its exit, and some places behind that.
+void Roots::follow_path() {
+  path_->at(s_, x_);
+  const bool last = s_ >= path_->length();
+  const bool clear = surroundings_.clear(x_, clear_m, clear_self_m);
+  if (!clear) {
+    met_block_ = true;
+  } else if (met_block_) {
+    if (count_ == 0) exit_ = s_;
+    const auto known = static_cast<std::size_t>(count_);
+    if (last || (known < behind.size() && s_ >= exit_ + behind[known])) add(x_, s_);
+  }
+  if (last) {
+    if (!met_block_) add(x_, s_);
+    done_ = true;
+    return;
+  }
+  // the end is a root of its own, so places behind the exit may not use up all room
+  if (count_ == static_cast<int>(behind.size())) s_ = path_->length();
+  s_ = std::min(s_ + path_step, path_->length());
+}
+
+void Roots::finish() {
+  // nearest first; there are few
+  for (int i = 1; i < count_; ++i)
+    for (int j = i; j > 0 && (q_.col(j) - start_).squaredNorm() < (q_.col(j - 1) - start_).squaredNorm(); --j)
+      q_.col(j).swap(q_.col(j - 1));
+  done_ = true;
+}
+
+}  // namespace hamelin::hybrid

@@ -1,0 +1,45 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "hamelin/planning/plugin.hpp"
+
+namespace hamelin::hybrid {
+
+/// Asks the host what is near at configurations the arm is not at. Allocates only when made.
+class Surroundings {
+ public:
+  Surroundings(const planning::Host& host, const planning::Setup& setup)
+      : host_(host),
+        self_collision_(setup.self_collision()),
+        contacts_(setup.spheres().size() * 4 + 16),
+        self_contacts_(self_collision_ ? setup.spheres().size() * 4 + 16 : 0) {}
+
+  /// Takes what is near q, up to `radius` from obstacles and `self_radius` within the arm [m].
+  void look(const Eigen::VectorXd& q, double radius, double self_radius) {
+    const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
+    count_ = std::min(host_.closest_points(at, radius, contacts_), contacts_.size());
+    self_count_ = 0;
+    if (self_collision_)
+      self_count_ = std::min(host_.closest_self(at, self_radius, self_contacts_), self_contacts_.size());
+  }
+  [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {contacts_.data(), count_}; }
+  [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
+    return {self_contacts_.data(), self_count_};
+  }
+  /// Whether nothing is nearer than this at q [m].
+  [[nodiscard]] bool clear(const Eigen::VectorXd& q, double margin, double self_margin) {
+    const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
+    if (host_.closest_points(at, margin, {}) > 0) return false;
+    return !self_collision_ || host_.closest_self(at, self_margin, {}) == 0;
+  }
+
+ private:
+  planning::Host host_;
+  bool self_collision_;
+  std::vector<hamelin_contact> contacts_;
+  std::vector<hamelin_self_contact> self_contacts_;
+  std::size_t count_ = 0, self_count_ = 0;
+};
+
+}  // namespace hamelin::hybrid
