@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 // The arm is looked at this far from itself, at most.
-constexpr double self_influence_max_m = 0.05;
+constexpr double self_influence_max_m = 0.10;
 // Obstacles are looked for this far where neither planner nor anything else says more.
 constexpr double default_influence_m = 0.2;
 // Friction is smooth below this speed [rad/s or m/s].
