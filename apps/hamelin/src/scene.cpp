@@ -1,12 +1,17 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/make.hpp"
+#include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "terminal.hpp"
 
@@ -63,6 +68,67 @@ Json map_info(const std::filesystem::path& file, std::optional<double> scale) {
           {"warnings", map.warnings}};
 }
 
+/// The arm where it stands at time zero: how near it is to what is there and to itself.
+class Surroundings {
+ public:
+  Surroundings(const scene::Scene& scene, const model::Model& model, const scene::Environment& environment)
+      : model_(model), environment_(environment), ws_(model), scratch_(environment, model.spheres().size()) {
+    if (scene.model.self_collision) self_.emplace(model);
+    centers_.resize(model.spheres().size());
+    for (const auto& sphere : model.spheres()) radii_.push_back(sphere.radius);
+  }
+
+  [[nodiscard]] const std::optional<scene::SelfField>& self() const { return self_; }
+
+  void stand_at(const Eigen::VectorXd& q) {
+    dynamics::forward_kinematics(model_, ws_, q);
+    dynamics::sphere_centers(model_, ws_, centers_);
+  }
+
+  [[nodiscard]] double clearance() const { return environment_.clearance(centers_, radii_, 0.0, shown_influence_m); }
+
+  /// Empty if no two parts can touch.
+  [[nodiscard]] std::optional<scene::SelfContact> nearest_of_itself() const {
+    std::array<scene::SelfContact, 1> nearest;
+    if (self_->closest(centers_, std::numeric_limits<double>::infinity(), nearest) == 0) return std::nullopt;
+    return nearest[0];
+  }
+
+  /// A line for the deepest contact with an obstacle, and one for the deepest with itself.
+  /// @param moving whether obstacles that move count
+  void note_contacts(const std::string& place, bool moving, Json& notes) {
+    std::vector<scene::Contact> contacts(model_.spheres().size() *
+                                         (scene::Environment::points_per_sphere + environment_.obstacles().size()));
+    contacts.resize(std::min(contacts.size(),
+                             environment_.closest(centers_, radii_, 0.0, 0.0, scratch_, contacts, scene::View::judge)));
+    const scene::Contact* deepest = nullptr;
+    for (const auto& contact : contacts) {
+      const bool moves = contact.obstacle >= 0 &&
+                         environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)].motion.has_value();
+      if ((moving || !moves) && (deepest == nullptr || contact.distance < deepest->distance)) deepest = &contact;
+    }
+    if (deepest != nullptr) {
+      const auto& sphere = model_.spheres()[static_cast<std::size_t>(deepest->sphere)];
+      notes.push_back(fmt::format("{}: sphere {} of link '{}' is {:.2g} mm inside {}", place, sphere.index_in_link,
+                                  model_.robot().links[static_cast<std::size_t>(sphere.link)].name,
+                                  -1e3 * deepest->distance, environment_.words(deepest->obstacle)));
+    }
+    if (!self_) return;
+    if (const auto nearest = nearest_of_itself(); nearest && nearest->distance <= 0.0)
+      notes.push_back(fmt::format("{}: the arm touches itself: {} are {:.2g} mm inside each other", place,
+                                  self_->words(nearest->pair), -1e3 * nearest->distance));
+  }
+
+ private:
+  const model::Model& model_;
+  const scene::Environment& environment_;
+  dynamics::Workspace ws_;
+  scene::Environment::Scratch scratch_;
+  std::optional<scene::SelfField> self_;
+  std::vector<Eigen::Vector3d> centers_;
+  std::vector<double> radii_;
+};
+
 Json scene_info(const std::filesystem::path& file) {
   const scene::Scene scene = scene::read_scene(file);
   const model::Model model = simulation::load_model(scene);
@@ -82,6 +148,7 @@ Json scene_info(const std::filesystem::path& file) {
             {"obstacles", summary.obstacles},
             {"map", nullptr},
             {"clearance_at_start_m", nullptr},
+            {"self_clearance_at_start_m", nullptr},
             {"warnings", summary.warnings}};
   if (summary.has_map)
     info["map"] = {{"file", summary.map_file},
@@ -91,18 +158,28 @@ Json scene_info(const std::filesystem::path& file) {
                    {"boxes", summary.boxes},
                    {"unknown", scene::to_string(summary.unknown)},
                    {"unknown_share", summary.unknown_share}};
-  if (environment.has_obstacles() && !model.spheres().empty()) {
-    dynamics::Workspace ws(model);
-    const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+  if (model.spheres().empty()) return info;
+  const auto sized = [&](const Eigen::VectorXd& q, const std::string& place) {
     if (q.size() != model.dof())
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /start/q: {} numbers given, expected {}", file.string(), q.size(), model.dof()));
-    dynamics::forward_kinematics(model, ws, q);
-    std::vector<Eigen::Vector3d> centers(model.spheres().size());
-    std::vector<double> radii;
-    for (const auto& sphere : model.spheres()) radii.push_back(sphere.radius);
-    dynamics::sphere_centers(model, ws, centers);
-    info["clearance_at_start_m"] = environment.clearance(centers, radii, 0.0, shown_influence_m);
+                  fmt::format("{}: {}: {} numbers given, expected {}", file.string(), place, q.size(), model.dof()));
+  };
+  Surroundings around(scene, model, environment);
+  const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+  sized(q, "/start/q");
+  around.stand_at(q);
+  if (environment.has_obstacles()) info["clearance_at_start_m"] = around.clearance();
+  if (around.self()) {
+    if (!around.self()->note().empty()) info["warnings"].push_back(around.self()->note());
+    if (const auto nearest = around.nearest_of_itself()) info["self_clearance_at_start_m"] = nearest->distance;
+  }
+  around.note_contacts("start", true, info["warnings"]);
+  for (std::size_t i = 0; i < scene.goals.size(); ++i) {
+    if (scene.goals[i].type != scene::GoalType::joint) continue;
+    sized(scene.goals[i].q, fmt::format("/goals/{}/q", i));
+    around.stand_at(scene.goals[i].q);
+    // where something that moves will be at arrival is not known
+    around.note_contacts(fmt::format("goal {}", i + 1), false, info["warnings"]);
   }
   return info;
 }
@@ -110,7 +187,7 @@ Json scene_info(const std::filesystem::path& file) {
 void show(const Json& info) {
   for (const auto& [key, value] : info.items()) {
     if (key == "warnings") continue;
-    fmt::print("{:<22} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    fmt::print("{:<26} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
   }
   for (const auto& warning : info["warnings"]) note(warning.get<std::string>());
 }

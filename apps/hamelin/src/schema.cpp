@@ -10,7 +10,8 @@ namespace hamelin::app {
 
 namespace {
 
-const std::vector<std::string> names = {"robot", "scene", "primitives", "integrator", "run", "result", "sweep", "record", "summary"};
+const std::vector<std::string> names = {"robot",  "scene", "primitives", "integrator", "run",
+                                        "result", "sweep", "record",     "summary"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

@@ -54,7 +54,8 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
   const auto options = std::make_shared<MergeOptions>();
   command->add_option("directories", options->directories, "plans with their records")->required()->type_name("DIR...");
   command
-      ->add_option("--by", options->by, "labels to group by: family, problem, goal, map, planner, values, seed, gains")
+      ->add_option("--by", options->by,
+                   "labels to group by: family, problem, goal, map, planner, values, seed, gains, sphere")
       ->type_name("LABEL,LABEL")
       ->delimiter(',')
       ->allow_extra_args(false)

@@ -129,7 +129,6 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       add_command(sweep, "plan", "Plan runs: problems, scenes, clutter or gain sets, times planners, values and seeds",
                   "hamelin sweep plan problems/*.json --robot arm.urdf --resolution 0.01 --goal pose -o tries\n"
                   "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
-                  "hamelin sweep plan problems/*.json --robot arm.urdf --sphere-on-path 0.06 -o spheres\n"
                   "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
   const auto flags = std::make_shared<PlanFlags>();
   auto& plan = flags->plan;

@@ -93,6 +93,12 @@ Environment::Scratch::Scratch(const Environment& environment, std::size_t sphere
   order_.reserve(room);
 }
 
+std::string Environment::words(int obstacle) const {
+  if (obstacle == Contact::map) return "the map";
+  if (obstacle == Contact::unknown) return "unknown space";
+  return fmt::format("obstacle '{}'", obstacles_[static_cast<std::size_t>(obstacle)].name);
+}
+
 bool Environment::has_obstacles() const noexcept {
   return !map_.empty() || !obstacles_.empty() || (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
 }

@@ -86,6 +86,12 @@ SelfField::SelfField(const model::Model& model) {
         left_out);
 }
 
+std::string SelfField::words(int pair) const {
+  const Pair& both = pairs_[static_cast<std::size_t>(pair)];
+  return fmt::format("'{}' and '{}'", parts_[static_cast<std::size_t>(both.part_a)].name,
+                     parts_[static_cast<std::size_t>(both.part_b)].name);
+}
+
 bool SelfField::nearer(const Pair& pair, std::span<const Vector3d> centers, Nearest& best) const {
   const Part &a = parts_[static_cast<std::size_t>(pair.part_a)], &b = parts_[static_cast<std::size_t>(pair.part_b)];
   const Vector3d &ball_a = center(a.center, centers), &ball_b = center(b.center, centers);

@@ -399,19 +399,9 @@ void ClosedLoop::finish(log::Outcome outcome, std::string cause) {
 
 std::string ClosedLoop::where_nearest() const {
   const auto& sphere = plant_.spheres()[static_cast<std::size_t>(nearest_sphere_)];
-  const std::string what =
-      nearest_obstacle_ == scene::Contact::map ? "the map"
-      : nearest_obstacle_ == scene::Contact::unknown
-          ? "unknown space"
-          : fmt::format("obstacle '{}'", environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name);
   return fmt::format("sphere {} of link '{}' is {:.2g} mm inside {}", sphere.index_in_link,
-                     plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_, what);
-}
-
-std::string ClosedLoop::parts_of(int pair) const {
-  const auto& both = self_->pairs()[static_cast<std::size_t>(pair)];
-  return fmt::format("'{}' and '{}'", self_->parts()[static_cast<std::size_t>(both.part_a)].name,
-                     self_->parts()[static_cast<std::size_t>(both.part_b)].name);
+                     plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_,
+                     environment_->words(nearest_obstacle_));
 }
 
 bool ClosedLoop::call_planner() {
@@ -664,7 +654,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
       if (verdict.contact && !touching)
         finish(log::Outcome::collision,
                fmt::format("contact {}between the nodes {} and {}",
-                           verdict.self_pair < 0 ? "" : fmt::format("of {} ", parts_of(verdict.self_pair)),
+                           verdict.self_pair < 0 ? "" : fmt::format("of {} ", self_->words(verdict.self_pair)),
                            state_.k - 1, state_.k));
       dynamics::forward_kinematics(plant_, ws_, state_.q);
     }
@@ -677,7 +667,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
       finish(state_.k == 0 ? log::Outcome::refused : log::Outcome::collision,
              fmt::format("{} at {} s",
                          itself ? fmt::format("the arm touches itself: {} are {:.2g} mm inside each other",
-                                              parts_of(nearest_pair_), -1e3 * self_clearance_now_)
+                                              self_->words(nearest_pair_), -1e3 * self_clearance_now_)
                                 : where_nearest(),
                          state_.time_s));
     } else if (!done_) {

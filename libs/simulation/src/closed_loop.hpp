@@ -73,7 +73,6 @@ class ClosedLoop final : private planning::HostServices {
   [[nodiscard]] bool at_rest_away_from_goal();
   void finish(log::Outcome outcome, std::string cause);
   [[nodiscard]] std::string where_nearest() const;
-  [[nodiscard]] std::string parts_of(int pair) const;
   [[nodiscard]] Json header() const;
   /// The torques of each channel at this node, for the log: tau_ and channel_torques_.
   void gather_torques();

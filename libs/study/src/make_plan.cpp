@@ -415,6 +415,8 @@ class Maker {
     const auto set = [&](const char* name, double value) {
       run.set.push_back(fmt::format("/planner/params/{}={}", name, value));
     };
+    // the rule is for planners without one, and hybrid stands still while it thinks
+    if (run.planner == "hybrid") run.set.emplace_back("/stall=null");
     set("k_p", g.k_p);
     set("k_v", g.k_v);
     set("joint_damping", g.joint_damping);

@@ -251,6 +251,7 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
   for (const auto& run : plan.runs) {
     ++planners[run.labels.at("planner")];
     CHECK(run.gains.size() == 5);
+    CHECK((run.set.front() == "/stall=null") == (run.planner == "hybrid"));
     const std::string last = run.set.back();
     CHECK(last.starts_with(run.planner == "apf"    ? "/planner/params/eta="
                            : run.planner == "gyro" ? "/planner/params/k_obs="

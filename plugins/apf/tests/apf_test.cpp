@@ -6,6 +6,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/bare_tick.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -18,55 +19,11 @@ test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4(
   return {plugin_file, std::move(params), robot, test::goal_52, test::ball_52};
 }
 
-const std::vector<test::Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
-
 /// A spatial arm of four joints among three balls, two of them near.
 test::ArmLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
   params["rho0_m"] = 5.0;
-  return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls, gravity};
+  return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, test::three_balls, gravity};
 }
-
-/// A joint path's goal, a pose, self contacts: what ArmLoop does not make. One tick of a planner among three balls.
-struct Bare : planning::HostServices {
-  void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
-
-  /// Held torque, then gradient.
-  Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
-                         const Eigen::MatrixXd& path = {}, bool self = false) {
-    params["rho0_m"] = 5.0;
-    test::ArmLoop near(plugin_file, Json{{"rho0_m", 5.0}}, test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls);
-    near.q << 0.3, -0.5, 0.8, 0.4;
-    near.v << 0.7, 0.2, -0.4, 0.5;
-    const auto& contacts = near.contacts();
-    const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
-    planning::SetupData setup(model);
-    setup.influence_m = 5.0;
-    setup.self_collision = self;
-    setup.add_goal(goal, q_goal, path);
-    const auto plugin = planning::Plugin::load(plugin_file);
-    auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
-    hamelin_self_contact touching{};
-    touching.sphere_a = 3;
-    touching.sphere_b = 0;
-    touching.distance_m = 1e-3;
-    touching.direction_world[0] = 1.0;
-    hamelin_tick tick{};
-    tick.struct_size = sizeof tick;
-    tick.q = near.q.data();
-    tick.v = near.v.data();
-    tick.contacts = contacts.data();
-    tick.contact_count = contacts.size();
-    tick.speed_scale = 1.0;
-    tick.self_contacts = &touching;
-    tick.self_contact_count = self ? 1 : 0;
-    planning::CommandBuffers buffers(4, contacts.size());
-    REQUIRE(planner.tick(tick, buffers));
-    Eigen::VectorXd all(8);
-    all << buffers.held_torque(), buffers.potential_gradient();
-    return all;
-  }
-};
 
 }  // namespace
 
@@ -102,7 +59,7 @@ TEST_CASE("the gradient of apf's potential is the difference quotient of its val
   test::ArmLoop loop(
       plugin_file,
       Json{{"mapping", "potential"}, {"law", law}, {"goal_exponent", exponent}, {"joint_damping", 0}, {"rho0_m", 5.0}},
-      test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls, Eigen::Vector3d::Zero(),
+      test::random_robot(11, 4), {0.3, 0.4, -0.2}, test::three_balls, Eigen::Vector3d::Zero(),
       joint_goal ? Eigen::VectorXd(Eigen::Vector4d(0.5, -0.2, 0.1, 1.0)) : Eigen::VectorXd());
   loop.q << 0.3, -0.5, 0.8, 0.4;
   REQUIRE(loop.tick());
@@ -283,7 +240,7 @@ TEST_CASE("apf goes to the end of a path, to a pose by its position, and past se
   const std::string mapping = GENERATE("operational", "potential"), law = GENERATE("khatib", "wang2018");
   const Json params{{"mapping", mapping}, {"law", law}};
   CAPTURE(params);
-  Bare bare;
+  test::BareTick bare(plugin_file);
   hamelin_goal joint{}, position{}, pose{};
   joint.type = HAMELIN_GOAL_JOINT;
   position.type = HAMELIN_GOAL_POSITION;

@@ -6,6 +6,7 @@
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/bare_tick.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -23,7 +24,6 @@ test::ArmLoop spatial(Json params, const std::vector<test::Ball>& balls) {
   params["gravity_compensation"] = false;
   return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, balls};
 }
-const std::vector<test::Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
 
 Eigen::Vector3d vec(const double (&x)[3]) {
   return {x[0], x[1], x[2]};
@@ -75,48 +75,6 @@ model::Robot point_mass() {
   return robot;
 }
 
-/// A joint path's goal, a pose, self contacts: what ArmLoop does not make. One tick of a planner among three balls.
-struct Bare : planning::HostServices {
-  void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
-
-  /// Held torque, then gradient.
-  Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
-                         const Eigen::MatrixXd& path = {}, bool self = false) {
-    params["rho0_m"] = 5.0;
-    test::ArmLoop near(plugin_file, Json{{"rho0_m", 5.0}}, test::random_robot(11, 4), {0.3, 0.4, -0.2}, three_balls);
-    near.q << 0.3, -0.5, 0.8, 0.4;
-    near.v << 0.7, 0.2, -0.4, 0.5;
-    const auto& contacts = near.contacts();
-    const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
-    planning::SetupData setup(model);
-    setup.influence_m = 5.0;
-    setup.self_collision = self;
-    setup.add_goal(goal, q_goal, path);
-    const auto plugin = planning::Plugin::load(plugin_file);
-    auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
-    hamelin_self_contact touching{};
-    touching.sphere_a = 3;
-    touching.sphere_b = 0;
-    touching.distance_m = 1e-3;
-    touching.direction_world[0] = 1.0;
-    hamelin_tick tick{};
-    tick.struct_size = sizeof tick;
-    tick.q = near.q.data();
-    tick.v = near.v.data();
-    tick.contacts = contacts.data();
-    tick.contact_count = contacts.size();
-    tick.speed_scale = 1.0;
-    tick.self_contacts = &touching;
-    tick.self_contact_count = self ? 1 : 0;
-    planning::CommandBuffers buffers(4, contacts.size());
-    REQUIRE(planner.tick(tick, buffers));
-    Eigen::VectorXd all(8);
-    all << buffers.held_torque(), buffers.potential_gradient();
-    return all;
-  }
-};
-
 /// data/scenes/paper_52_gyro.json as the program runs it.
 log::Result run_52(const std::vector<std::string>& settings) {
   const std::filesystem::path file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/paper_52_gyro.json";
@@ -152,8 +110,8 @@ TEST_CASE("the energy-neutral form does no work, the published one does", "[gyro
   CHECK(neutral.reached);
   CHECK(neutral.gyroscopic_work_J < 1e-12);
   // At one state: the published torque has power, the neutral one has none.
-  auto a = spatial(Json{{"variant", "published"}, {"k_p", 0}, {"k_v", 0}}, three_balls);
-  auto b = spatial(Json{{"variant", "energy-neutral"}, {"k_p", 0}, {"k_v", 0}}, three_balls);
+  auto a = spatial(Json{{"variant", "published"}, {"k_p", 0}, {"k_v", 0}}, test::three_balls);
+  auto b = spatial(Json{{"variant", "energy-neutral"}, {"k_p", 0}, {"k_v", 0}}, test::three_balls);
   for (auto* loop : {&a, &b}) {
     loop->q << 0.3, -0.5, 0.8, 0.4;
     loop->v << 0.7, 0.2, -0.4, 0.5;
@@ -292,7 +250,7 @@ TEST_CASE("a joint goal pulls every joint with k_p times its error", "[gyro]") {
 TEST_CASE("gyro does not allocate in a tick", "[gyro]") {
 #ifndef HAMELIN_SANITIZED
   const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
-  auto loop = spatial(Json{{"variant", variant}}, three_balls);
+  auto loop = spatial(Json{{"variant", variant}}, test::three_balls);
   loop.v << 0.7, 0.2, -0.4, 0.5;
   REQUIRE(loop.tick());
   CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
@@ -302,7 +260,7 @@ TEST_CASE("gyro does not allocate in a tick", "[gyro]") {
 TEST_CASE("steering that is energy-neutral does no work at 200 random states", "[gyro]") {
   const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
   CAPTURE(variant);
-  auto loop = spatial(Json{{"variant", variant}}, three_balls);
+  auto loop = spatial(Json{{"variant", variant}}, test::three_balls);
   Rng rng(7);
   int terms = 0;
   for (int k = 0; k < 200; ++k) {
@@ -457,7 +415,7 @@ TEST_CASE("gyro goes to the end of a path, to a pose by its position, and past s
   const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
   const Json params{{"variant", variant}, {"algorithm", "keep_attraction"}};
   CAPTURE(params);
-  Bare bare;
+  test::BareTick bare(plugin_file);
   hamelin_goal joint{}, position{}, pose{};
   joint.type = HAMELIN_GOAL_JOINT;
   position.type = HAMELIN_GOAL_POSITION;

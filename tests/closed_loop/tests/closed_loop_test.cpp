@@ -28,6 +28,11 @@ Json spring(double step_s, const std::string& actuation) {
   return scene;
 }
 
+Json moving(Json obstacle, double x, double y) {
+  obstacle["motion"] = {{"type", "sine"}, {"amplitude_m", {x, y, 0.0}}, {"period_s", 5.0}};
+  return obstacle;
+}
+
 // Kinetic energy and the spring's at the end of a run, from its state alone.
 double spring_energy(const log::Result& result) {
   const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
@@ -341,7 +346,8 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
   CAPTURE(planner);
   Json scene = scene_52();
-  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
+  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25), moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
+  scene["model"] = {{"self_collision", true}};
   scene["planner"]["name"] = planner;
   if (planner == "hybrid") scene["planner"].erase("params");
   const auto allocations = [&](double duration_s) {
@@ -362,7 +368,8 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   model::Robot robot = test::planar4();
   for (auto& link : robot.links) link.joint.effort_max = 5.0;
   Json scene = scene_52();
-  scene["obstacles"] = {ball("known", 2.4, 2.2, 0.25), ball("hidden", 2.4, -2.2, 0.25)};
+  scene["obstacles"] = {ball("known", 2.4, 2.2, 0.25), ball("hidden", 2.4, -2.2, 0.25),
+                        moving(ball("passer-by", 1.5, 0.8, 0.2), 0.5, 0.0)};
   scene["obstacles"][1]["known"] = false;
   scene["obstacles"][1]["visible_within_m"] = 0.5;
   scene["model"] = {{"self_collision", true}, {"torque_limits", true}};
@@ -370,7 +377,7 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   if (actuation == "sampled") scene["actuation"]["torque_rate_max_Nm_s"] = 100.0;
   scene["planner"] = {
       {"name", "probe"},
-      {"params", {{"velocity", {0.01, 0.0, 0.0, 0.02}}, {"think_of", {0.5, 0.5, 0.0, 0.0}}, {"influence_m", 1.0}}}};
+      {"params", {{"velocity", {0.01, 0.0, 0.0, 0.02}}, {"think_of", {0.5, 0.5, 0.0, 0.0}}, {"influence_m", 10.0}}}};
   const auto allocations = [&](double duration_s) {
     scene["duration_s"] = duration_s;
     return test::allocations_in([&] {
@@ -380,5 +387,31 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   };
   (void)allocations(0.2);
   CHECK(allocations(2.0) == allocations(1.0));
+}
+
+TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation]") {
+  // the first link cannot turn past either ball, so no search finds a way
+  const ScratchFolder folder;
+  Json scene = scene_52();
+  scene["goals"] = {{{"type", "joint"}, {"q", {std::acos(-1.0), 0.0, 0.0, 0.0}}}};
+  scene["obstacles"] = {ball("above", 0.0, 0.6, 0.1), ball("below", 0.0, -0.6, 0.1),
+                        moving(ball("near the base", -0.12, 0.0, 0.05), 0.0, 0.02)};
+  scene["model"] = {{"self_collision", true}};
+  const auto run = [&](const std::string& escape, double duration_s) {
+    scene["planner"] = {{"name", "hybrid"}, {"params", {{"escape", escape}}}};
+    scene["duration_s"] = duration_s;
+    return run_scene(folder, scene);
+  };
+  const auto held = run("none", 40.0);
+  REQUIRE(held.outcome == Outcome::stalled);
+  const auto allocations = [&](double duration_s) {
+    return test::allocations_in([&] {
+      const auto result = run("tree", duration_s);
+      CHECK(result.outcome == Outcome::timeout);
+    });
+  };
+  const double searching_from = 0.004 * std::ceil(held.time_s / 0.004);
+  (void)allocations(searching_from);
+  CHECK(allocations(searching_from + 4.0) == allocations(searching_from));
 }
 #endif

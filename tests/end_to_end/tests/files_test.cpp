@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "../program.hpp"
 #include "hamelin/test/scene_data.hpp"
 
@@ -27,6 +29,42 @@ TEST_CASE("the maps of data/ are what scene make builds of their primitives, byt
     REQUIRE(output.exit_code == 0);
     CHECK((bench.text(name + ".bt") == bench.text("data/maps/" + name + ".bt")));
   }
+}
+
+TEST_CASE("scene info tells how near the arm is to itself, and names contacts at the start and at joint goals",
+          "[end_to_end]") {
+  // planar4's links end in spheres of 2 cm; the square closes where its first link begins
+  Bench bench;
+  const double right = 0.5 * std::acos(-1.0);
+  Json scene = bench.json("data/scenes/paper_52_apf.json");
+  scene["robot"]["file"] = "data/robots/planar4.json";
+  scene["model"] = {{"self_collision", true}};
+  scene["goals"] = {{{"type", "joint"}, {"q", {0.0, right, right, right}}},
+                    {{"type", "position"}, {"position_m", {4.0, 0.0, 0.0}}},
+                    {{"type", "joint"}, {"q", {0.0, 0.0, 0.0, 0.0}}}};
+  Json ahead = {{"name", "ahead"}, {"type", "sphere"}, {"radius_m", 0.05}, {"position_m", {4.06, 0.0, 0.0}}};
+  Json mover = {{"name", "mover"}, {"type", "sphere"}, {"radius_m", 0.05}, {"position_m", {0.5, 1.0, 0.0}}};
+  mover["motion"] = {{"type", "sine"}, {"amplitude_m", {0.0, 0.0, 1.0}}, {"period_s", 2.0}};
+  scene["obstacles"] = {ahead, mover};
+  bench.put("scene.json", scene.dump());
+  const Json info = test::run_json(bench, {"scene", "info", "scene.json"});
+  CHECK(info["clearance_at_start_m"].get<double>() == Approx(-0.01));
+  CHECK(info["self_clearance_at_start_m"].get<double>() == Approx(0.96));
+  std::vector<std::string> notes = info["warnings"];
+  REQUIRE_FALSE(notes.empty());
+  CHECK_THAT(notes[0], Catch::Contains("link1-link2"));
+  notes.erase(notes.begin());
+  CHECK(notes ==
+        std::vector<std::string>{"start: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'",
+                                 "goal 1: the arm touches itself: 'link1' and 'link4' are 40 mm inside each other",
+                                 "goal 3: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'"});
+
+  scene["model"]["self_collision"] = false;
+  scene["obstacles"] = Json::array();
+  bench.put("scene.json", scene.dump());
+  const Json plain = test::run_json(bench, {"scene", "info", "scene.json"});
+  CHECK(plain["self_clearance_at_start_m"].is_null());
+  CHECK(plain["warnings"].empty());
 }
 
 TEST_CASE("schema print gives the schemas as shipped", "[end_to_end]") {

@@ -118,6 +118,9 @@ class Environment {
   /// Whether a sphere touches unknown space where the policy is `slow`.
   [[nodiscard]] bool in_slow_space(std::span<const Eigen::Vector3d> centers, std::span<const double> radii) const;
 
+  /// A Contact's obstacle in words: "the map", "unknown space" or "obstacle 'NAME'".
+  [[nodiscard]] std::string words(int obstacle) const;
+
   /// Whether there is anything at all to hit.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }

@@ -39,6 +39,8 @@ class SelfField {
 
   [[nodiscard]] const std::vector<Part>& parts() const noexcept { return parts_; }
   [[nodiscard]] const std::vector<Pair>& pairs() const noexcept { return pairs_; }
+  /// The names of a pair's parts: "'a' and 'b'".
+  [[nodiscard]] std::string words(int pair) const;
   /// One line if pairs of neighbours were left out for want of a list; else empty.
   [[nodiscard]] const std::string& note() const noexcept { return note_; }
 

@@ -194,4 +194,7 @@ class ArmLoop : public planning::HostServices {
 inline const std::vector<Ball> ball_52{{{2.4, 2.2, 0.0}, 0.25}};
 inline const Eigen::Vector3d goal_52{2.0, 3.0, 0.0};
 
+/// For a spatial arm of about a metre: two of these are near it.
+inline const std::vector<Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
+
 }  // namespace hamelin::test

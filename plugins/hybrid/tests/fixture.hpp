@@ -1,0 +1,233 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "../src/roots.hpp"
+#include "../src/tree.hpp"
+#include "../src/vias.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/test/arm_loop.hpp"
+
+/// An arm among balls, asked through the C border as a planner asks its host, but with distances by formula.
+namespace hamelin::test {
+
+/// Four links of 0.25 m along x that turn about z, five spheres on each.
+inline model::Robot short_planar4() {
+  constexpr double length = 0.25;
+  model::Robot robot;
+  robot.name = "short_planar4";
+  for (int i = 0; i < 4; ++i) {
+    model::Link link;
+    link.name = fmt::format("link{}", i + 1);
+    link.parent = i - 1;
+    link.joint.name = fmt::format("j{}", i + 1);
+    link.joint.screw << 0.0, 0.0, 1.0, 0.0, -length * i, 0.0;
+    link.com = geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{length * (i + 0.5), 0.0, 0.0}};
+    link.mass_kg = 1.0;
+    link.inertia_kg_m2 = 0.01 * Eigen::Matrix3d::Identity();
+    for (int k = 0; k < 5; ++k) link.spheres.push_back({Eigen::Vector3d{length * (0.2 * k - 0.4), 0.0, 0.0}, 0.025});
+    robot.links.push_back(link);
+  }
+  robot.tip = {"tip", 3, geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{4.0 * length, 0.0, 0.0}}};
+  return robot;
+}
+
+/// What a Scene is made of.
+struct Task {
+  std::vector<Ball> balls{};
+  hamelin_goal goal{};
+  Eigen::VectorXd q_goal{};
+  Eigen::MatrixXd path{};
+  model::Robot robot = short_planar4();
+  bool self_collision = false;
+  std::uint64_t seed = 1;
+  double joint_limit = 0.0;  ///< of every joint, both ways; none if zero
+};
+
+inline Task joint_task(const Eigen::VectorXd& q, std::vector<Ball> balls = {}) {
+  Task task;
+  task.balls = std::move(balls);
+  task.goal.type = HAMELIN_GOAL_JOINT;
+  task.goal.tolerance_rad = 0.02;
+  task.q_goal = q;
+  return task;
+}
+
+inline Task tip_task(const Eigen::Vector3d& p, std::vector<Ball> balls = {}) {
+  Task task;
+  task.balls = std::move(balls);
+  task.goal.type = HAMELIN_GOAL_POSITION;
+  std::copy_n(p.data(), 3, task.goal.position_world_m);
+  task.goal.tolerance_m = 0.01;
+  return task;
+}
+
+/// The default parameters of the planner.
+inline constexpr hybrid::LawParams law_params{4.0, 3.0, 2.0, 0.5, 1.5, 0.02, 0.15, 1.0, 0.08};
+inline constexpr hybrid::MarginParams margin_params{0.01, 0.003, 0.005};
+inline constexpr double contact_radius = 0.15;
+
+/// A planner's surroundings without the planner.
+class Scene {
+ public:
+  explicit Scene(const Task& task)
+      : model(task.robot, geometry::SE3{}, Eigen::Vector3d::Zero()),
+        balls_(task.balls),
+        ws_(model),
+        data_(fill(task, model)),
+        raw_setup_(data_.view()),
+        raw_host_{sizeof raw_host_, this, &log, &closest_points, &closest_self},
+        setup(raw_setup_),
+        surroundings(planning::Host(raw_host_), setup),
+        margins(setup, margin_params),
+        box(setup, Eigen::VectorXd::Ones(model.dof())),
+        rollout(setup, model, law_params, margins, surroundings),
+        roots(setup, model, law_params, box, surroundings) {
+    margins.take_goal(surroundings, goal(), contact_radius);
+    rollout.take_goal(goal());
+  }
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  [[nodiscard]] const hamelin_goal& goal() const { return setup.goals().front(); }
+  [[nodiscard]] hybrid::Tree tree(int budget) { return {setup, rollout, roots, box, margins, surroundings, budget}; }
+  [[nodiscard]] hybrid::Vias vias() { return {setup, rollout, roots, box}; }
+
+  /// World centre of a control sphere at q.
+  Eigen::Vector3d center(const Eigen::VectorXd& q, std::size_t sphere) {
+    dynamics::forward_kinematics(model, ws_, q);
+    return placed(sphere);
+  }
+  Eigen::Vector3d tip(const Eigen::VectorXd& q) {
+    dynamics::forward_kinematics(model, ws_, q);
+    return dynamics::tip_pose(model, ws_).p();
+  }
+  /// The smallest distance to a ball at q.
+  double clearance(const Eigen::VectorXd& q) {
+    dynamics::forward_kinematics(model, ws_, q);
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t s = 0; s < data_.spheres.size(); ++s)
+      for (const auto& ball : balls_)
+        least = std::min(least, (placed(s) - ball.center).norm() - data_.spheres[s].radius_m - ball.radius);
+    return least;
+  }
+  /// The smallest distance on straight lines between the points of a way, looked at every `step`.
+  double clearance(const hybrid::Way& way, double step) {
+    double least = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd q(model.dof());
+    for (double s = 0.0; s < way.length() + step; s += step) {
+      way.at(s, q);
+      least = std::min(least, clearance(q));
+    }
+    return least;
+  }
+  /// Configurations that the host was asked about.
+  [[nodiscard]] long asked() const { return asked_; }
+
+  const model::Model model;
+
+ private:
+  static planning::SetupData fill(const Task& task, const model::Model& model) {
+    planning::SetupData data(model);
+    data.seed = task.seed;
+    data.self_collision = task.self_collision;
+    data.control_period_s = 0.004;
+    data.influence_m = contact_radius;
+    if (task.joint_limit > 0.0) {
+      data.q_upper = Eigen::VectorXd::Constant(model.dof(), task.joint_limit);
+      data.q_lower = -data.q_upper;
+    }
+    data.add_goal(task.goal, task.q_goal, task.path);
+    return data;
+  }
+  [[nodiscard]] Eigen::Vector3d placed(std::size_t s) const {
+    const auto& sphere = data_.spheres[s];
+    return dynamics::point_position(model, ws_, sphere.link, planning::vec3(sphere.center_link_m));
+  }
+
+  static void log(void*, std::int32_t, const char*, std::size_t) {}
+  static std::size_t closest_points(void* context, const double* q, double influence, hamelin_contact* out,
+                                    std::size_t capacity) {
+    auto& self = *static_cast<Scene*>(context);
+    ++self.asked_;
+    dynamics::forward_kinematics(self.model, self.ws_, planning::ConstVectorMap(q, self.model.dof()));
+    std::size_t count = 0;
+    for (std::size_t s = 0; s < self.data_.spheres.size(); ++s) {
+      const Eigen::Vector3d at = self.placed(s);
+      const double radius = self.data_.spheres[s].radius_m;
+      for (std::size_t b = 0; b < self.balls_.size(); ++b) {
+        const auto& ball = self.balls_[b];
+        const Eigen::Vector3d away = at - ball.center, n = away.normalized();
+        const double distance = away.norm() - radius - ball.radius;
+        if (distance > influence || count++ >= capacity) continue;
+        hamelin_contact& contact = out[count - 1];
+        contact = {};
+        contact.sphere = static_cast<std::int32_t>(s);
+        contact.obstacle = static_cast<std::int32_t>(b);
+        contact.distance_m = distance;
+        planning::VectorMap(contact.arm_point_world_m, 3) = at - radius * n;
+        planning::VectorMap(contact.obstacle_point_world_m, 3) = ball.center + ball.radius * n;
+        planning::VectorMap(contact.direction_world, 3) = n;
+      }
+    }
+    return count;
+  }
+  // Of each two links that share no joint the nearest pair of spheres.
+  static std::size_t closest_self(void* context, const double* q, double influence, hamelin_self_contact* out,
+                                  std::size_t capacity) {
+    auto& self = *static_cast<Scene*>(context);
+    const auto& spheres = self.data_.spheres;
+    dynamics::forward_kinematics(self.model, self.ws_, planning::ConstVectorMap(q, self.model.dof()));
+    std::size_t count = 0;
+    for (int b = 0; b < self.model.dof(); ++b)
+      for (int a = b + 2; a < self.model.dof(); ++a) {
+        hamelin_self_contact nearest{};
+        nearest.distance_m = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < spheres.size(); ++i)
+          for (std::size_t j = 0; j < spheres.size(); ++j) {
+            if (spheres[i].link != a || spheres[j].link != b) continue;
+            const Eigen::Vector3d at = self.placed(i), from = self.placed(j), n = (at - from).normalized();
+            const double distance = (at - from).norm() - spheres[i].radius_m - spheres[j].radius_m;
+            if (distance >= nearest.distance_m) continue;
+            nearest.sphere_a = static_cast<std::int32_t>(i);
+            nearest.sphere_b = static_cast<std::int32_t>(j);
+            nearest.distance_m = distance;
+            planning::VectorMap(nearest.point_a_world_m, 3) = at - spheres[i].radius_m * n;
+            planning::VectorMap(nearest.point_b_world_m, 3) = from + spheres[j].radius_m * n;
+            planning::VectorMap(nearest.direction_world, 3) = n;
+          }
+        if (nearest.distance_m > influence || count++ >= capacity) continue;
+        out[count - 1] = nearest;
+      }
+    return count;
+  }
+
+  std::vector<Ball> balls_;
+  dynamics::Workspace ws_;
+  planning::SetupData data_;
+  hamelin_setup raw_setup_;
+  hamelin_host raw_host_;
+  long asked_ = 0;
+
+ public:
+  const planning::Setup setup;
+  hybrid::Surroundings surroundings;
+  hybrid::Margins margins;
+  hybrid::JointBox box;
+  hybrid::Rollout rollout;
+  hybrid::Roots roots;
+};
+
+/// A bar in front of the arm: it must fold to get from one side to the other.
+inline const std::vector<Ball> ball_between{{{0.75, 0.0, 0.0}, 0.1}};
+inline Eigen::VectorXd below_ball() {
+  return Eigen::Vector4d(-0.9, 0.0, 0.0, 0.0);
+}
+inline Eigen::VectorXd above_ball() {
+  return Eigen::Vector4d(0.9, 0.0, 0.0, 0.0);
+}
+
+}  // namespace hamelin::test

@@ -1,0 +1,132 @@
+#include "../src/margins.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "fixture.hpp"
+
+using namespace hamelin;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+using hybrid::Margins;
+using hybrid::NearPoint;
+
+namespace {
+
+NearPoint of_sphere(int sphere, double distance = 0.05) {
+  NearPoint point;
+  point.sphere = sphere;
+  point.distance = distance;
+  return point;
+}
+
+double margin(const Margins& margins, NearPoint point, double away) {
+  margins.set({&point, 1}, away);
+  return point.margin;
+}
+
+NearPoint within_arm() {
+  NearPoint point = of_sphere(0);
+  point.obstacle = NearPoint::self;
+  return point;
+}
+
+// Stretched along x, with a ball beside the last sphere that leaves it so much.
+test::Task beside_ball(double clearance) {
+  return test::joint_task(VectorXd::Zero(4), {{{0.975, 0.125 + clearance, 0.0}, 0.1}});
+}
+constexpr int last_sphere = 19;
+
+}  // namespace
+
+TEST_CASE("margins shrink from the whole one to the goal's as the goal comes near", "[hybrid][margins]") {
+  test::Scene scene(beside_ball(0.006));
+  const auto& margins = scene.margins;
+  CHECK(margin(margins, of_sphere(last_sphere), 1.0) == 0.01);
+  CHECK(margin(margins, of_sphere(last_sphere), 0.0) == Approx(0.003));  // 6 mm − 3 mm
+  double before = 0.0;
+  for (double away = 0.0; away <= 1.0; away += 0.125) {
+    const double here = margin(margins, of_sphere(last_sphere), away);
+    CHECK(here == Approx(0.003 + 0.007 * away));
+    CHECK(here > before);
+    before = here;
+  }
+}
+
+TEST_CASE("a sphere far from all at the goal keeps its whole margin there", "[hybrid][margins]") {
+  test::Scene scene(beside_ball(0.006));
+  CHECK(margin(scene.margins, of_sphere(0), 0.0) == 0.01);
+  CHECK_FALSE(scene.margins.tight_at_goal(of_sphere(0)));
+  CHECK(scene.margins.tight_at_goal(of_sphere(last_sphere)));
+}
+
+TEST_CASE("margins leave the pose of a joint goal admissible", "[hybrid][margins]") {
+  const double clearance = GENERATE(0.0011, 0.002, 0.0039, 0.004, 0.0041, 0.012, 0.013, 0.014, 0.1);
+  CAPTURE(clearance);
+  test::Scene scene(beside_ball(clearance));
+  dynamics::Workspace ws(scene.model);
+  hybrid::Obstacles obstacles(scene.setup, test::contact_radius);
+  const VectorXd goal = VectorXd::Zero(4);
+  dynamics::forward_kinematics(scene.model, ws, goal);
+  scene.surroundings.look(goal, test::contact_radius, 0.1);
+  obstacles.update(scene.model, ws, scene.surroundings.contacts(), {});
+  REQUIRE(obstacles.clearance() == Approx(clearance));
+  scene.margins.set(obstacles.points(), 0.0);
+  REQUIRE_FALSE(obstacles.points().empty());
+  for (const auto& point : obstacles.points()) {
+    CHECK(point.margin <= point.distance);
+    CHECK(point.margin >= 0.001);
+    CHECK(point.margin <= 0.01);
+  }
+  // as much as it can
+  CHECK(obstacles.points().front().margin == Approx(std::clamp(clearance - 0.003, 0.001, 0.01)));
+}
+
+TEST_CASE("a goal in contact leaves the smallest margin", "[hybrid][margins]") {
+  test::Scene scene(beside_ball(-0.02));
+  CHECK(margin(scene.margins, of_sphere(last_sphere), 0.0) == 0.001);
+}
+
+TEST_CASE("by a tip goal the margin is the smallest that is wanted, for all spheres", "[hybrid][margins]") {
+  test::Scene scene(test::tip_task({0.9, 0.0, 0.0}, {{{0.975, 0.2, 0.0}, 0.1}}));
+  for (const int sphere : {0, last_sphere}) {
+    CHECK(margin(scene.margins, of_sphere(sphere), 0.0) == 0.003);
+    CHECK(margin(scene.margins, of_sphere(sphere), 1.0) == 0.01);
+    CHECK_FALSE(scene.margins.tight_at_goal(of_sphere(sphere)));
+  }
+}
+
+TEST_CASE("the margin within the arm gives way to a goal that is folded closer", "[hybrid][margins]") {
+  // joint 2 and 3 turned so far that link 4 comes near link 1
+  auto task = test::joint_task(Vector4d(0.0, 2.0, 2.0, 0.0));
+  task.self_collision = true;
+  test::Scene scene(task);
+  scene.surroundings.look(task.q_goal, 0.01, 1.0);
+  double nearest = 1.0;
+  for (const auto& contact : scene.surroundings.self_contacts()) nearest = std::min(nearest, contact.distance_m);
+
+  SECTION("with room: the whole one") {
+    REQUIRE(nearest > 0.008);
+    CHECK(margin(scene.margins, within_arm(), 0.0) == 0.005);
+    CHECK_FALSE(scene.margins.tight_at_goal(within_arm()));
+  }
+  SECTION("without: what the goal leaves, but the whole one away from it") {
+    // the third joint folds the last two links back on the first; found by halving
+    double open = 2.0, closed = 3.0;
+    VectorXd q = task.q_goal;
+    for (int i = 0; i < 60; ++i) {
+      q[2] = 0.5 * (open + closed);
+      scene.surroundings.look(q, 0.01, 1.0);
+      nearest = 1.0;
+      for (const auto& contact : scene.surroundings.self_contacts()) nearest = std::min(nearest, contact.distance_m);
+      (nearest > 0.005 ? open : closed) = q[2];
+    }
+    REQUIRE(nearest == Approx(0.005));
+    auto tight = test::joint_task(q);
+    tight.self_collision = true;
+    test::Scene folded(tight);
+    CHECK(margin(folded.margins, within_arm(), 0.0) == Approx(0.002));
+    CHECK(margin(folded.margins, within_arm(), 1.0) == 0.005);
+    CHECK(folded.margins.tight_at_goal(within_arm()));
+  }
+}

@@ -1,0 +1,63 @@
+#pragma once
+#include <catch2/catch.hpp>
+#include <string>
+#include <utility>
+
+#include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/robots.hpp"
+
+namespace hamelin::test {
+
+/// What ArmLoop does not make: any goal, with a path or without, and self contacts. One tick of a planner that has a
+/// parameter rho0_m, for a moving spatial arm of four joints among three balls.
+class BareTick : public planning::HostServices {
+ public:
+  explicit BareTick(std::string plugin_file) : plugin_file_(std::move(plugin_file)) {}
+
+  void log(std::int32_t, std::string_view) override {}
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+
+  /// @param self whether the tick lists two parts that nearly touch
+  /// @return held torque, then the potential's gradient
+  Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
+                         const Eigen::MatrixXd& path = {}, bool self = false) {
+    const double influence = 5.0;
+    params["rho0_m"] = influence;
+    const model::Robot robot = random_robot(11, 4);
+    ArmLoop near(plugin_file_, Json{{"rho0_m", influence}}, robot, {0.3, 0.4, -0.2}, three_balls);
+    near.q << 0.3, -0.5, 0.8, 0.4;
+    near.v << 0.7, 0.2, -0.4, 0.5;
+    const auto& contacts = near.contacts();
+    const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
+    planning::SetupData setup(model);
+    setup.influence_m = influence;
+    setup.self_collision = self;
+    setup.add_goal(goal, q_goal, path);
+    const auto plugin = planning::Plugin::load(plugin_file_);
+    auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
+    hamelin_self_contact touching{};
+    touching.sphere_a = 3;
+    touching.sphere_b = 0;
+    touching.distance_m = 1e-3;
+    touching.direction_world[0] = 1.0;
+    hamelin_tick tick{};
+    tick.struct_size = sizeof tick;
+    tick.q = near.q.data();
+    tick.v = near.v.data();
+    tick.contacts = contacts.data();
+    tick.contact_count = contacts.size();
+    tick.speed_scale = 1.0;
+    tick.self_contacts = &touching;
+    tick.self_contact_count = self ? 1 : 0;
+    planning::CommandBuffers buffers(4, contacts.size());
+    REQUIRE(planner.tick(tick, buffers));
+    Eigen::VectorXd all(8);
+    all << buffers.held_torque(), buffers.potential_gradient();
+    return all;
+  }
+
+ private:
+  std::string plugin_file_;
+};
+
+}  // namespace hamelin::test
