@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "hamelin/dynamics/dynamics.hpp"
@@ -12,6 +13,7 @@
 #include "law.hpp"
 #include "margins.hpp"
 #include "memory.hpp"
+#include "observer.hpp"
 #include "obstacles.hpp"
 #include "params_schema.hpp"
 #include "rollout.hpp"
@@ -92,7 +94,13 @@ class Hybrid final : public planning::Planner {
         passes_(params["filter_passes"]),
         max_escapes_(params["max_escapes"]),
         search_steps_(params["search_steps"]),
+        horizon_s_(setup.control_period_s()),
         path_(setup.dof(), path_room(setup)) {
+    if (setup.sampled()) {
+      const double period = setup.control_period_s();
+      horizon_s_ = std::max(period, params["horizon_s"].get<double>());
+      observer_.emplace(setup.dof(), period, static_cast<int>(std::lround(setup.delay_s() / period)));
+    }
     const std::string escape = params["escape"];
     remembers_ = escape == "memory";
     if (escape == "rollouts" || escape == "tree") {
@@ -132,18 +140,18 @@ class Hybrid final : public planning::Planner {
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
       // steering turns faster than the law follows: near a target it would make the arm circle
-      law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
+      if (!observer_)
+        law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
     }
     bound_steering(command);
 
-    // the law's velocity one period on, of bounded acceleration
-    const double dt = setup_.control_period_s();
-    x_ = v_ + dt * (velocity_gain_ * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
-    project(dt, command);
-    command.node_velocity() = x_;
-    // what keeps that velocity through the step: gravity, and the Coriolis force at it
-    dynamics::bias_torque(model_, ws_, q_, x_, bias_);
-    command.held_torque() = bias_;
+    // the law's velocity one horizon on, of bounded acceleration
+    x_ = v_ + horizon_s_ * (velocity_gain_ * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
+    project(command);
+    if (observer_)
+      answer_by_torque(command);
+    else
+      answer_by_velocity(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     mind_stall(tick.time_s(), target, wanted, command);
   }
@@ -190,6 +198,7 @@ class Hybrid final : public planning::Planner {
     Minv_ = identity_;
     llt_.solveInPlace(Minv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
+    if (observer_) observer_->update(v_);
     dynamics::forward_kinematics(model_, ws_, q_);
     obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   }
@@ -211,6 +220,23 @@ class Hybrid final : public planning::Planner {
     if (mode_ == Mode::way) left += search_->way().length() - way_at_;
     if (mode_ == Mode::goal && !path_.empty()) left += path_.length() - path_at_;
     return left;
+  }
+
+  // The node's velocity, and the torque that keeps it through the step: gravity, and the Coriolis force at it.
+  void answer_by_velocity(planning::Command& command) {
+    command.node_velocity() = x_;
+    dynamics::bias_torque(model_, ws_, q_, x_, bias_);
+    command.held_torque() = bias_;
+  }
+
+  // The torque that brings the velocity about over the horizon, as far as the nominal model and its observer know.
+  void answer_by_torque(planning::Command& command) {
+    scratch_ = (x_ - v_) / horizon_s_ - observer_->disturbance();
+    torque_.noalias() = M_ * scratch_;
+    torque_ += bias_;
+    if (const auto effort = setup_.effort_max()) torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
+    observer_->issue(torque_, v_, Minv_, bias_);
+    command.held_torque() = torque_;
   }
 
   // Steering may take a small share of the torques only: the rest is for braking.
@@ -236,7 +262,8 @@ class Hybrid final : public planning::Planner {
     return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
   }
 
-  void project(double dt, planning::Command& command) {
+  void project(planning::Command& command) {
+    const double dt = horizon_s_;
     filter_.begin(M_, Minv_);
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
@@ -260,8 +287,18 @@ class Hybrid final : public planning::Planner {
     if (const auto effort = setup_.effort_max()) {
       momentum_.noalias() = M_ * v_;
       // the bias that is held is that of x, not of v; a little room covers the difference
-      lower_ = momentum_ - dt * (torque_share * *effort + bias_ + steering_);
-      upper_ = momentum_ + dt * (torque_share * *effort - bias_ - steering_);
+      lower_ = -torque_share * *effort;
+      upper_ = torque_share * *effort;
+      const auto rate = setup_.effort_rate_max();
+      if (rate && observer_ && observer_->ready()) {
+        scratch_ = setup_.control_period_s() * *rate;
+        lower_ = lower_.cwiseMax(observer_->last() - scratch_).cwiseMin(upper_);
+        upper_ = upper_.cwiseMin(observer_->last() + scratch_).cwiseMax(lower_);
+      }
+      scratch_ = bias_ + steering_;
+      if (observer_) scratch_.noalias() -= M_ * observer_->disturbance();
+      lower_ = momentum_ + dt * (lower_ - scratch_);
+      upper_ = momentum_ + dt * (upper_ - scratch_);
       filter_.set_momentum_box(lower_, upper_);
     }
     for (const auto& point : obstacles_.points()) {
@@ -281,7 +318,9 @@ class Hybrid final : public planning::Planner {
     scratch_ = x_;
     const auto report = filter_.project(x_, passes_);
     held_ = (x_ - scratch_).norm() > 1e-3 * dt || obstacles_.clearance() < contact_radius_;
-    command.set_accounts(report.energy_after_J - report.energy_before_J - report.recovery_J, report.recovery_J);
+    const double share = setup_.control_period_s() / dt;
+    command.set_accounts(share * (report.energy_after_J - report.energy_before_J - report.recovery_J),
+                         share * report.recovery_J);
   }
 
   // Towards a joint limit `room` away (signed as `side`): braked with half the acceleration that is allowed.
@@ -382,9 +421,11 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Search> search_;
   double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_, contact_radius_;
   int passes_, max_escapes_, search_steps_;
+  double horizon_s_;                  ///< x is the velocity this much later
+  std::optional<Observer> observer_;  ///< under sampled actuation
   bool remembers_ = false;
   Way path_;
-  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_;
+  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, Minv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
