@@ -333,6 +333,7 @@ class Hybrid final : public planning::Planner {
   }
 
   void mind_stall(double now, const Target& target, double wanted, planning::Command& command) {
+    if (remembers_ || search_) command.mind_own_stalls();
     if (mode_ == Mode::think) return think(now, command);
     const bool stalled = stall_.stalled(now, remaining(target), v_.norm(), wanted, held_);
     if (mode_ == Mode::via) {
