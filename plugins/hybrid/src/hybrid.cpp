@@ -31,6 +31,7 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
+constexpr double brake_share = 0.6;       // of the braking that the limits allow a row alone: others want some too
 constexpr double least_brake = 0.3;       // braking along a row that is counted on in any case [m/s²]
 constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
 constexpr double torque_share = 0.98;     // of the torque limits is planned with
@@ -307,7 +308,8 @@ class Hybrid final : public planning::Planner {
       const double now = point.row.dot(v_);
       // near its limit a row counts on, and asks for, no more braking than the boxes are sure to allow
       if (now - least_brake * dt < point.obstacle_speed - (x > 0.0 ? approach_limit(x, least_brake) : rate_ * x)) {
-        const double room = filter_.room(point.row, v_), brake = std::clamp(room / dt, least_brake, brake_);
+        const double room = filter_.room(point.row, v_);
+        const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
         if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
         wanted = std::min(wanted, now + room);
       }
