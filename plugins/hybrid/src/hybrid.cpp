@@ -37,6 +37,7 @@ constexpr double steering_share = 0.1;    // of the torque limits, at most, goes
 constexpr double torque_share = 0.98;     // of the torque limits is planned with
 constexpr double steering_fade = 0.5;     // distance below which steering fades
 constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
+constexpr double path_beyond = 1.0, path_regained = 2.0;  // of a path, at an escape by memory and after it
 constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
 
 double or_else(const Json& value, double otherwise) {
@@ -340,8 +341,10 @@ class Hybrid final : public planning::Planner {
     const bool stalled = stall_.stalled(now, remaining(target), v_.norm(), wanted, held_);
     if (mode_ == Mode::via) {
       const bool there = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
-      if (there || stalled || now >= via_until_s_) enter(Mode::goal, now);
-      return;
+      if (!there && !stalled && now < via_until_s_) return;
+      // the way-point may have led past what is blocked
+      if (!path_.empty()) path_at_ = path_.nearest(path_at_, path_regained, q_, scratch_);
+      return enter(Mode::goal, now);
     }
     if (mode_ == Mode::way && way_at_ >= search_->way().length() &&
         (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached) {
@@ -361,6 +364,8 @@ class Hybrid final : public planning::Planner {
       search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_at_);
       return enter(Mode::think, now);
     }
+    // on a path what lies behind the block counts
+    if (!path_.empty()) path_.at(path_at_ + path_beyond, via_);
     const auto distance = [&](const VectorXd& via) {
       if (target.via == nullptr) dynamics::forward_kinematics(model_, ws_, via);
       return law_.distance(model_, ws_, via, target);
