@@ -38,15 +38,16 @@ constexpr double torque_share = 0.98;     // of the torque limits is planned wit
 constexpr double steering_fade = 0.5;     // distance below which steering fades
 constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
 constexpr double path_beyond = 1.0, path_regained = 2.0;  // of a path, at an escape by memory and after it
-constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
+constexpr double via_reached = 0.1, way_reached = 0.08;   // largest |error| of a joint
 
 double or_else(const Json& value, double otherwise) {
   return value.is_null() ? otherwise : value.get<double>();
 }
 
 // k_p and k_v of a law e'' = k_p e − k_v e' give the gain k_p/k_v of a velocity that is followed with k_v.
-LawParams law_params(const Json& params) {
-  const double gain = params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / or_else(params["k_v"], 1.0);
+LawParams law_params(const Json& params, bool own_gains) {
+  const double gain =
+      !own_gains || params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / or_else(params["k_v"], 1.0);
   return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
           params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
           params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
@@ -78,7 +79,7 @@ class Hybrid final : public planning::Planner {
         setup_(setup),
         model_(setup.model()),
         ws_(model_),
-        law_(setup, model_, law_params(params)),
+        law_(setup, model_, law_params(params, true)),
         obstacles_(setup, params["contact_radius_m"]),
         surroundings_(host, setup),
         margins_(setup, margin_params(setup, params)),
@@ -87,6 +88,7 @@ class Hybrid final : public planning::Planner {
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         velocity_gain_(or_else(params["k_v"], params["velocity_gain"])),
+        follow_gain_(params["velocity_gain"]),
         drive_acceleration_(params["drive_acceleration"]),
         acceleration_max_(params["acceleration_max"]),
         brake_(params["brake_acceleration"]),
@@ -106,8 +108,8 @@ class Hybrid final : public planning::Planner {
     const std::string escape = params["escape"];
     remembers_ = escape == "memory";
     if (escape == "rollouts" || escape == "tree") {
-      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params), margins_, surroundings_);
-      roots_ = std::make_unique<Roots>(setup_, model_, law_params(params), box_, surroundings_);
+      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params, false), margins_, surroundings_);
+      roots_ = std::make_unique<Roots>(setup_, model_, law_params(params, false), box_, surroundings_);
       if (escape == "tree")
         search_ = std::make_unique<Tree>(setup_, *rollout_, *roots_, box_, margins_, surroundings_,
                                          params["search_budget"].get<int>());
@@ -148,7 +150,8 @@ class Hybrid final : public planning::Planner {
     bound_steering(command);
 
     // the law's velocity one horizon on, of bounded acceleration
-    x_ = v_ + horizon_s_ * (velocity_gain_ * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
+    const double gain = target.via != nullptr ? follow_gain_ : velocity_gain_;
+    x_ = v_ + horizon_s_ * (gain * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
     project(command);
     if (observer_)
       answer_by_torque(command);
@@ -346,10 +349,14 @@ class Hybrid final : public planning::Planner {
       if (!path_.empty()) path_at_ = path_.nearest(path_at_, path_regained, q_, scratch_);
       return enter(Mode::goal, now);
     }
-    if (mode_ == Mode::way && way_at_ >= search_->way().length() &&
-        (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached) {
-      if (search_->arrives()) path_at_ = std::max(path_at_, search_->along());
-      return enter(Mode::goal, now);
+    if (mode_ == Mode::way && way_at_ >= search_->way().length()) {
+      const bool there = (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached;
+      // the way to a tip goal ends at a pose that is as good as the goal: it is gone to the very end
+      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
+      if (there && (stalled || !stay)) {
+        if (search_->arrives()) path_at_ = std::max(path_at_, search_->along());
+        return enter(Mode::goal, now);
+      }
     }
     if (stalled) escape(now, target, command);
   }
@@ -427,7 +434,8 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
-  double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_, contact_radius_;
+  double velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_,
+      contact_radius_;
   int passes_, max_escapes_, search_steps_;
   double horizon_s_;                  ///< x is the velocity this much later
   std::optional<Observer> observer_;  ///< under sampled actuation
