@@ -54,7 +54,7 @@ bool finite(const double (&x)[3]) {
 // What is wrong with a planner's answer, or null.
 const char* defect(const CommandBuffers& out, std::size_t dof, std::size_t gyroscopic_capacity) {
   const hamelin_command& raw = out.raw();
-  if (raw.state != HAMELIN_PLANNER_RUNNING && raw.state != HAMELIN_PLANNER_GAVE_UP) return "unknown planner state";
+  if (raw.state < HAMELIN_PLANNER_RUNNING || raw.state > HAMELIN_PLANNER_OWN_STALL_RULE) return "unknown planner state";
   if (std::find(std::begin(raw.cause), std::end(raw.cause), '\0') == std::end(raw.cause))
     return "cause is not nul-terminated";
   if (!std::isfinite(raw.potential_J) || !finite(out.potential_gradient())) return "potential is not finite";

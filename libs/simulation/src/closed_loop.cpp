@@ -381,7 +381,7 @@ bool ClosedLoop::all_reached() {
 // The host's own stall rule: the tip at rest, away from a goal that has a place for it, or joints at rest away from
 // theirs.
 bool ClosedLoop::at_rest_away_from_goal() {
-  if (!scene_.stall) return false;
+  if (!scene_.stall || command_->raw().state == HAMELIN_PLANNER_OWN_STALL_RULE) return false;
   const auto& rule = *scene_.stall;
   const auto& goal = scene_.goals[goal_index_];
   bool away = true;

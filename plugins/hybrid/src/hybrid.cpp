@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "hamelin/dynamics/dynamics.hpp"
@@ -12,6 +13,7 @@
 #include "law.hpp"
 #include "margins.hpp"
 #include "memory.hpp"
+#include "observer.hpp"
 #include "obstacles.hpp"
 #include "params_schema.hpp"
 #include "rollout.hpp"
@@ -29,20 +31,23 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
+constexpr double brake_share = 0.6;       // of the braking that the limits allow a row alone: others want some too
 constexpr double least_brake = 0.3;       // braking along a row that is counted on in any case [m/s²]
 constexpr double steering_share = 0.1;    // of the torque limits, at most, goes into steering
 constexpr double torque_share = 0.98;     // of the torque limits is planned with
 constexpr double steering_fade = 0.5;     // distance below which steering fades
 constexpr double path_ahead = 0.25, way_ahead = 0.15;  // how far before the arm the carrot runs on a path, on a way out
-constexpr double via_reached = 0.1, way_reached = 0.08;  // largest |error| of a joint
+constexpr double path_beyond = 1.0, path_regained = 2.0;  // of a path, at an escape by memory and after it
+constexpr double via_reached = 0.1, way_reached = 0.08;   // largest |error| of a joint
 
 double or_else(const Json& value, double otherwise) {
   return value.is_null() ? otherwise : value.get<double>();
 }
 
 // k_p and k_v of a law e'' = k_p e − k_v e' give the gain k_p/k_v of a velocity that is followed with k_v.
-LawParams law_params(const Json& params) {
-  const double gain = params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / or_else(params["k_v"], 1.0);
+LawParams law_params(const Json& params, bool own_gains) {
+  const double gain =
+      !own_gains || params["k_p"].is_null() ? 0.0 : params["k_p"].get<double>() / or_else(params["k_v"], 1.0);
   return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
           params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
           params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
@@ -74,7 +79,7 @@ class Hybrid final : public planning::Planner {
         setup_(setup),
         model_(setup.model()),
         ws_(model_),
-        law_(setup, model_, law_params(params)),
+        law_(setup, model_, law_params(params, true)),
         obstacles_(setup, params["contact_radius_m"]),
         surroundings_(host, setup),
         margins_(setup, margin_params(setup, params)),
@@ -83,6 +88,7 @@ class Hybrid final : public planning::Planner {
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         velocity_gain_(or_else(params["k_v"], params["velocity_gain"])),
+        follow_gain_(params["velocity_gain"]),
         drive_acceleration_(params["drive_acceleration"]),
         acceleration_max_(params["acceleration_max"]),
         brake_(params["brake_acceleration"]),
@@ -92,12 +98,18 @@ class Hybrid final : public planning::Planner {
         passes_(params["filter_passes"]),
         max_escapes_(params["max_escapes"]),
         search_steps_(params["search_steps"]),
+        horizon_s_(setup.control_period_s()),
         path_(setup.dof(), path_room(setup)) {
+    if (setup.sampled()) {
+      const double period = setup.control_period_s();
+      horizon_s_ = std::max(period, params["horizon_s"].get<double>());
+      observer_.emplace(setup.dof(), period, static_cast<int>(std::lround(setup.delay_s() / period)));
+    }
     const std::string escape = params["escape"];
     remembers_ = escape == "memory";
     if (escape == "rollouts" || escape == "tree") {
-      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params), margins_, surroundings_);
-      roots_ = std::make_unique<Roots>(setup_, model_, law_params(params), box_, surroundings_);
+      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params, false), margins_, surroundings_);
+      roots_ = std::make_unique<Roots>(setup_, model_, law_params(params, false), box_, surroundings_);
       if (escape == "tree")
         search_ = std::make_unique<Tree>(setup_, *rollout_, *roots_, box_, margins_, surroundings_,
                                          params["search_budget"].get<int>());
@@ -132,18 +144,19 @@ class Hybrid final : public planning::Planner {
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
       // steering turns faster than the law follows: near a target it would make the arm circle
-      law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
+      if (!observer_)
+        law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
     }
     bound_steering(command);
 
-    // the law's velocity one period on, of bounded acceleration
-    const double dt = setup_.control_period_s();
-    x_ = v_ + dt * (velocity_gain_ * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
-    project(dt, command);
-    command.node_velocity() = x_;
-    // what keeps that velocity through the step: gravity, and the Coriolis force at it
-    dynamics::bias_torque(model_, ws_, q_, x_, bias_);
-    command.held_torque() = bias_;
+    // the law's velocity one horizon on, of bounded acceleration
+    const double gain = target.via != nullptr ? follow_gain_ : velocity_gain_;
+    x_ = v_ + horizon_s_ * (gain * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
+    project(command);
+    if (observer_)
+      answer_by_torque(command);
+    else
+      answer_by_velocity(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     mind_stall(tick.time_s(), target, wanted, command);
   }
@@ -190,6 +203,7 @@ class Hybrid final : public planning::Planner {
     Minv_ = identity_;
     llt_.solveInPlace(Minv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
+    if (observer_) observer_->update(v_);
     dynamics::forward_kinematics(model_, ws_, q_);
     obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   }
@@ -211,6 +225,23 @@ class Hybrid final : public planning::Planner {
     if (mode_ == Mode::way) left += search_->way().length() - way_at_;
     if (mode_ == Mode::goal && !path_.empty()) left += path_.length() - path_at_;
     return left;
+  }
+
+  // The node's velocity, and the torque that keeps it through the step: gravity, and the Coriolis force at it.
+  void answer_by_velocity(planning::Command& command) {
+    command.node_velocity() = x_;
+    dynamics::bias_torque(model_, ws_, q_, x_, bias_);
+    command.held_torque() = bias_;
+  }
+
+  // The torque that brings the velocity about over the horizon, as far as the nominal model and its observer know.
+  void answer_by_torque(planning::Command& command) {
+    scratch_ = (x_ - v_) / horizon_s_ - observer_->disturbance();
+    torque_.noalias() = M_ * scratch_;
+    torque_ += bias_;
+    if (const auto effort = setup_.effort_max()) torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
+    observer_->issue(torque_, v_, Minv_, bias_);
+    command.held_torque() = torque_;
   }
 
   // Steering may take a small share of the torques only: the rest is for braking.
@@ -236,7 +267,8 @@ class Hybrid final : public planning::Planner {
     return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
   }
 
-  void project(double dt, planning::Command& command) {
+  void project(planning::Command& command) {
+    const double dt = horizon_s_;
     filter_.begin(M_, Minv_);
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
@@ -260,8 +292,18 @@ class Hybrid final : public planning::Planner {
     if (const auto effort = setup_.effort_max()) {
       momentum_.noalias() = M_ * v_;
       // the bias that is held is that of x, not of v; a little room covers the difference
-      lower_ = momentum_ - dt * (torque_share * *effort + bias_ + steering_);
-      upper_ = momentum_ + dt * (torque_share * *effort - bias_ - steering_);
+      lower_ = -torque_share * *effort;
+      upper_ = torque_share * *effort;
+      const auto rate = setup_.effort_rate_max();
+      if (rate && observer_ && observer_->ready()) {
+        scratch_ = setup_.control_period_s() * *rate;
+        lower_ = lower_.cwiseMax(observer_->last() - scratch_).cwiseMin(upper_);
+        upper_ = upper_.cwiseMin(observer_->last() + scratch_).cwiseMax(lower_);
+      }
+      scratch_ = bias_ + steering_;
+      if (observer_) scratch_.noalias() -= M_ * observer_->disturbance();
+      lower_ = momentum_ + dt * (lower_ - scratch_);
+      upper_ = momentum_ + dt * (upper_ - scratch_);
       filter_.set_momentum_box(lower_, upper_);
     }
     for (const auto& point : obstacles_.points()) {
@@ -270,7 +312,8 @@ class Hybrid final : public planning::Planner {
       const double now = point.row.dot(v_);
       // near its limit a row counts on, and asks for, no more braking than the boxes are sure to allow
       if (now - least_brake * dt < point.obstacle_speed - (x > 0.0 ? approach_limit(x, least_brake) : rate_ * x)) {
-        const double room = filter_.room(point.row, v_), brake = std::clamp(room / dt, least_brake, brake_);
+        const double room = filter_.room(point.row, v_);
+        const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
         if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
         wanted = std::min(wanted, now + room);
       }
@@ -281,7 +324,9 @@ class Hybrid final : public planning::Planner {
     scratch_ = x_;
     const auto report = filter_.project(x_, passes_);
     held_ = (x_ - scratch_).norm() > 1e-3 * dt || obstacles_.clearance() < contact_radius_;
-    command.set_accounts(report.energy_after_J - report.energy_before_J - report.recovery_J, report.recovery_J);
+    const double share = setup_.control_period_s() / dt;
+    command.set_accounts(share * (report.energy_after_J - report.energy_before_J - report.recovery_J),
+                         share * report.recovery_J);
   }
 
   // Towards a joint limit `room` away (signed as `side`): braked with half the acceleration that is allowed.
@@ -294,17 +339,24 @@ class Hybrid final : public planning::Planner {
   }
 
   void mind_stall(double now, const Target& target, double wanted, planning::Command& command) {
+    if (remembers_ || search_) command.mind_own_stalls();
     if (mode_ == Mode::think) return think(now, command);
     const bool stalled = stall_.stalled(now, remaining(target), v_.norm(), wanted, held_);
     if (mode_ == Mode::via) {
       const bool there = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
-      if (there || stalled || now >= via_until_s_) enter(Mode::goal, now);
-      return;
-    }
-    if (mode_ == Mode::way && way_at_ >= search_->way().length() &&
-        (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached) {
-      if (search_->arrives()) path_at_ = std::max(path_at_, search_->along());
+      if (!there && !stalled && now < via_until_s_) return;
+      // the way-point may have led past what is blocked
+      if (!path_.empty()) path_at_ = path_.nearest(path_at_, path_regained, q_, scratch_);
       return enter(Mode::goal, now);
+    }
+    if (mode_ == Mode::way && way_at_ >= search_->way().length()) {
+      const bool there = (search_->way().end() - q_).lpNorm<Eigen::Infinity>() < way_reached;
+      // the way to a tip goal ends at a pose that is as good as the goal: it is gone to the very end
+      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
+      if (there && (stalled || !stay)) {
+        if (search_->arrives()) path_at_ = std::max(path_at_, search_->along());
+        return enter(Mode::goal, now);
+      }
     }
     if (stalled) escape(now, target, command);
   }
@@ -319,6 +371,8 @@ class Hybrid final : public planning::Planner {
       search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_at_);
       return enter(Mode::think, now);
     }
+    // on a path what lies behind the block counts
+    if (!path_.empty()) path_.at(path_at_ + path_beyond, via_);
     const auto distance = [&](const VectorXd& via) {
       if (target.via == nullptr) dynamics::forward_kinematics(model_, ws_, via);
       return law_.distance(model_, ws_, via, target);
@@ -380,11 +434,14 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
-  double velocity_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_, contact_radius_;
+  double velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, brake_, rate_, joint_damping_,
+      contact_radius_;
   int passes_, max_escapes_, search_steps_;
+  double horizon_s_;                  ///< x is the velocity this much later
+  std::optional<Observer> observer_;  ///< under sampled actuation
   bool remembers_ = false;
   Way path_;
-  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_;
+  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, Minv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;

@@ -104,18 +104,17 @@ void Roots::solve_tip(Rng& rng) {
 void Roots::follow_path() {
   path_->at(s_, x_);
   const bool last = s_ >= path_->length();
-  const bool clear = surroundings_.clear(x_, clear_m, clear_self_m);
-  if (!clear) {
+  if (last) {
+    add(x_, s_);  // the goal, whatever it leaves of clearance
+    done_ = true;
+    return;
+  }
+  if (!surroundings_.clear(x_, clear_m, clear_self_m)) {
     met_block_ = true;
   } else if (met_block_) {
     if (count_ == 0) exit_ = s_;
     const auto known = static_cast<std::size_t>(count_);
-    if (last || (known < behind.size() && s_ >= exit_ + behind[known])) add(x_, s_);
-  }
-  if (last) {
-    if (!met_block_) add(x_, s_);
-    done_ = true;
-    return;
+    if (known < behind.size() && s_ >= exit_ + behind[known]) add(x_, s_);
   }
   // the end is a root of its own, so places behind the exit may not use up all room
   if (count_ == static_cast<int>(behind.size())) s_ = path_->length();

@@ -10,6 +10,7 @@ namespace {
 constexpr int extend_steps = 40, connect_steps = 80, direct_tries = 4;
 constexpr double via_tolerance = 0.1, join_tolerance = 0.04;
 constexpr double global_share = 0.3;                            // of vias drawn from all of joint space
+constexpr double local_share = 0.5;                             // around a block on a path: of vias drawn nearby
 constexpr double near_radius = 0.3, far_radius = 2.5;           // of the others, around a node
 constexpr int cut_tries = 40;                                   // straight lines tried
 constexpr double cut_spacing = 0.03, cut_gain = 1.03;           // looked at so densely; worth it from here on
@@ -121,12 +122,13 @@ void Tree::start_extension() {
   phase_ = Phase::extend;
   side_ = rounds_++ % 2;
   const auto& tree = trees_[static_cast<std::size_t>(side_)];
-  if (!local_ && rng_.uniform() < global_share) {
+  const bool local = local_ && rng_.uniform() < local_share;
+  if (!local && rng_.uniform() < global_share) {
     box_.draw(rng_, via_);
   } else {
     point_ = tree.q.col(static_cast<Eigen::Index>(rng_.below(static_cast<std::uint64_t>(tree.size()))));
     const double radius =
-        local_ ? std::min(far_radius, rng_.uniform(0.2, 0.4 + 0.02 * rounds_)) : rng_.uniform(near_radius, far_radius);
+        local ? std::min(far_radius, rng_.uniform(0.2, 0.4 + 0.02 * rounds_)) : rng_.uniform(near_radius, far_radius);
     box_.draw_near(rng_, point_, radius, via_);
   }
   node_ = first_node_ = nearest(side_, via_);

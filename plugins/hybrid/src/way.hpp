@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 namespace hamelin::hybrid {
@@ -54,6 +55,16 @@ class Way {
       at(s, out);
     }
     return s;
+  }
+  /// The length between s and s + range whose point is nearest to q.
+  [[nodiscard]] double nearest(double s, double range, const Eigen::VectorXd& q, Eigen::VectorXd& scratch) const {
+    constexpr double step = 0.02;
+    double best = s, least = std::numeric_limits<double>::infinity();
+    for (double at_s = s; at_s <= std::min(s + range, length()); at_s += step) {
+      at(at_s, scratch);
+      if (const double far = (scratch - q).squaredNorm(); far < least) least = far, best = at_s;
+    }
+    return best;
   }
   /// Replaces what lies between the lengths a < b by a straight line.
   void cut(double a, double b, Eigen::VectorXd& from, Eigen::VectorXd& to) {

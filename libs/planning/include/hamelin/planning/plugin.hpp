@@ -145,6 +145,8 @@ class Command {
     raw_->filter_work_J = filter_work_J;
     raw_->recovery_work_J = recovery_work_J;
   }
+  /// Says that the planner notices by itself when it stalls: the scene's rule does not apply.
+  void mind_own_stalls() { raw_->state = HAMELIN_PLANNER_OWN_STALL_RULE; }
   /// Ends the run: the planner knows no way on. The cause is one line; what does not fit is cut off.
   void give_up(std::string_view cause) {
     raw_->state = HAMELIN_PLANNER_GAVE_UP;

@@ -110,7 +110,8 @@ typedef struct hamelin_tick {
   size_t self_contact_count;
 } hamelin_tick;
 
-enum { HAMELIN_PLANNER_RUNNING = 0, HAMELIN_PLANNER_GAVE_UP = 1 };
+/* OWN_STALL_RULE: running, and the planner notices by itself when it stalls: the scene's rule does not apply. */
+enum { HAMELIN_PLANNER_RUNNING = 0, HAMELIN_PLANNER_GAVE_UP = 1, HAMELIN_PLANNER_OWN_STALL_RULE = 2 };
 
 /*
  * One tick's answer, in channels. The host owns the memory and clears it before each call; what is left alone acts not.
