@@ -129,6 +129,16 @@ TEST_CASE("the carrot runs ahead on the way and never back", "[hybrid][way]") {
   }
 }
 
+TEST_CASE("the nearest place of a way is looked for ahead only, and so far only", "[hybrid][way]") {
+  const Way way = hook();
+  VectorXd q(2), scratch(2);
+  q << 1.2, 1.0;
+  CHECK(way.nearest(0.0, 6.0, q, scratch) == Approx(2.0).margin(0.011));
+  CHECK(way.nearest(2.5, 6.0, q, scratch) == Approx(2.5));
+  CHECK(way.nearest(0.0, 1.5, q, scratch) == Approx(1.5).margin(0.021));
+  CHECK(way.nearest(5.9, 6.0, q, scratch) == Approx(5.9));
+}
+
 TEST_CASE("a cut replaces what lies between by a line", "[hybrid][way]") {
   VectorXd from(2), to(2);
   SECTION("over a corner: one point goes, two come") {
