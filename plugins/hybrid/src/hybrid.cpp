@@ -30,6 +30,7 @@ namespace {
 
 using Eigen::VectorXd;
 
+constexpr double voxel_at_goal = 0.4;     // of a voxel is kept near a tip goal
 constexpr double joint_limit_rate = 8.0;  // towards a joint limit no faster than this times what is left [1/s]
 constexpr double brake_share = 0.6;       // of the braking that the limits allow a row alone: others want some too
 constexpr double least_brake = 0.3;       // braking along a row that is counted on in any case [m/s²]
@@ -168,8 +169,11 @@ class Hybrid final : public planning::Planner {
 
   static MarginParams margin_params(const planning::Setup& setup, const Json& params) {
     MarginParams margins{};
-    margins.away_m = std::max(params["margin_m"].get<double>(), 0.5 * setup.map_resolution_m());
-    margins.goal_m = std::min(params["goal_margin_m"].get<double>(), margins.away_m);
+    // a map may lack what fills less than half of a voxel
+    const double voxel = setup.map_resolution_m();
+    margins.away_m = std::max(params["margin_m"].get<double>(), voxel);
+    margins.goal_m = std::min(std::max(params["goal_margin_m"].get<double>(), voxel_at_goal * voxel), margins.away_m);
+    margins.slack_m = std::min(params["goal_margin_m"].get<double>(), margins.away_m);
     margins.self_m = params["self_margin_m"];
     return margins;
   }
@@ -317,8 +321,7 @@ class Hybrid final : public planning::Planner {
         if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
         wanted = std::min(wanted, now + room);
       }
-      const double floor = point.obstacle_speed == 0.0 ? -rate_ * std::max(1e-9, point.distance - 0.5 * point.margin)
-                                                       : std::numeric_limits<double>::infinity();
+      const double floor = point.obstacle_speed - rate_ * std::max(1e-9, point.distance - 0.5 * point.margin);
       (void)filter_.add_row(point.row, wanted, floor);
     }
     scratch_ = x_;

@@ -18,7 +18,7 @@ constexpr double relative_damping = 0.004, projection_damping = 1e-7;
 constexpr double passing_far = 0.02;  // a via that is passed is given its full speed down to here
 // Distances to the goal between which margins shrink: joint space, tip [m].
 constexpr double joint_near = 0.25, joint_far = 1.0, tip_near_m = 0.02, tip_far_m = 0.12;
-constexpr double via_gain = 4.0;  // [1/s] near a via
+constexpr double via_gain = 4.0;       // [1/s] near a via
 constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the middle of the limits
 
 }  // namespace

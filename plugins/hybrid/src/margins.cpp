@@ -18,19 +18,19 @@ void Margins::take_goal(Surroundings& surroundings, const hamelin_goal& goal, do
   std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), radius);
   self_at_goal_ = params_.self_m;
   if (!joint_goal_) return;
-  surroundings.look(planning::ConstVectorMap(goal.q, dof_), radius, 2.0 * params_.self_m + params_.goal_m);
+  surroundings.look(planning::ConstVectorMap(goal.q, dof_), radius, 2.0 * params_.self_m + params_.slack_m);
   for (const auto& contact : surroundings.contacts()) {
     auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contact.sphere)];
     clearance = std::min(clearance, contact.distance_m);
   }
   for (const auto& contact : surroundings.self_contacts())
-    self_at_goal_ = std::min(self_at_goal_, std::max(smallest_margin_m, contact.distance_m - params_.goal_m));
+    self_at_goal_ = std::min(self_at_goal_, std::max(smallest_margin_m, contact.distance_m - params_.slack_m));
 }
 
 double Margins::at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_;
   if (!joint_goal_) return params_.goal_m;
-  const double leaves = clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - params_.goal_m;
+  const double leaves = clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - params_.slack_m;
   return std::min(params_.away_m, std::max(smallest_margin_m, leaves));
 }
 

@@ -7,14 +7,15 @@
 namespace hamelin::hybrid {
 
 struct MarginParams {
-  double away_m;  ///< from obstacles, away from the goal
-  double goal_m;  ///< near a goal of the tip; and how much less than its own clearance a joint goal leaves
-  double self_m;  ///< within the arm
+  double away_m;   ///< from obstacles, away from the goal
+  double goal_m;   ///< near a goal of the tip
+  double slack_m;  ///< how much less than its own clearance a joint goal leaves
+  double self_m;   ///< within the arm
 };
 
 /// Margins that shrink near the goal. A joint goal often stands nearer to something than one wants to be elsewhere: by
-/// its side each sphere's margin is what the goal's own pose leaves of clearance, less `goal_m`, but at least 1 mm. For
-/// a tip goal it is `goal_m`.
+/// its side each sphere's margin is what the goal's own pose leaves of clearance, less `slack_m`, but at least 1 mm.
+/// For a tip goal it is `goal_m`.
 class Margins {
  public:
   Margins(const planning::Setup& setup, const MarginParams& params);

@@ -15,7 +15,7 @@ Obstacles::Obstacles(const planning::Setup& setup, double radius)
   for (const auto& sphere : setup.spheres()) sphere_link_.push_back(sphere.link);
   for (auto& point : points_) point.row = Eigen::VectorXd::Zero(setup.dof());
   chosen_.reserve(max_points);
-  near_.reserve(setup.spheres().size() * 8 + 64);
+  near_.reserve(setup.spheres().size() * 32 + 64);
 }
 
 // Nearest first. A link of many spheres has many points that say the same: one that lies by a nearer one of its link
@@ -25,14 +25,15 @@ void Obstacles::select(std::span<const hamelin_contact> contacts) {
     return contacts[a].distance_m != contacts[b].distance_m ? contacts[a].distance_m < contacts[b].distance_m : a < b;
   };
   near_.clear();
-  for (std::size_t i = 0; i < contacts.size() && near_.size() < near_.capacity(); ++i) {
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
     clearance_ = std::min(clearance_, contacts[i].distance_m);
-    if (contacts[i].distance_m <= radius_) near_.push_back(i);
+    if (contacts[i].distance_m <= radius_ && near_.size() < near_.capacity()) near_.push_back(i);
   }
   std::sort(near_.begin(), near_.end(), nearer);
   const auto link_of = [&](const hamelin_contact& c) { return sphere_link_[static_cast<std::size_t>(c.sphere)]; };
   chosen_.clear();
   for (const std::size_t i : near_) {
+    if (count_ + chosen_.size() == points_.size()) return;
     const hamelin_contact& contact = contacts[i];
     bool said = false;
     for (std::size_t j = 0; j < chosen_.size() && !said; ++j) {
@@ -43,7 +44,6 @@ void Obstacles::select(std::span<const hamelin_contact> contacts) {
       said = n.dot(m) > same_direction && (p - r).squaredNorm() < same_place_m * same_place_m;
     }
     if (!said) chosen_.push_back(i);
-    if (count_ + chosen_.size() == points_.size()) return;
   }
 }
 

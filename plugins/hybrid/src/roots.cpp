@@ -111,8 +111,8 @@ void Roots::follow_path() {
   }
   if (!surroundings_.clear(x_, clear_m, clear_self_m)) {
     met_block_ = true;
-  } else if (met_block_) {
     if (count_ == 0) exit_ = s_;
+  } else if (met_block_) {
     const auto known = static_cast<std::size_t>(count_);
     if (known < behind.size() && s_ >= exit_ + behind[known]) add(x_, s_);
   }

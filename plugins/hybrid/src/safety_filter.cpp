@@ -67,7 +67,7 @@ double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from)
     along = std::min(along, share(from[k], step_[k], lower_[k], upper_[k]));
     if (has_momentum_box_) along = std::min(along, share(Mfrom_[k], a[k], momentum_lower_[k], momentum_upper_[k]));
   }
-  const double by_row = along * a.dot(step_);
+  const double size = a.dot(step_), by_row = size > 0.0 ? along * size : 0.0;
 
   for (Eigen::Index k = 0; k < n; ++k)
     step_[k] = a[k] > 0.0 ? std::max(0.0, upper_[k] - from[k]) : a[k] < 0.0 ? std::min(0.0, lower_[k] - from[k]) : 0.0;
