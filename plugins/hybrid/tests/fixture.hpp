@@ -67,7 +67,7 @@ inline Task tip_task(const Eigen::Vector3d& p, std::vector<Ball> balls = {}) {
 
 /// The default parameters of the planner.
 inline constexpr hybrid::LawParams law_params{4.0, 3.0, 2.0, 0.5, 1.5, 0.02, 0.15, 1.0, 0.08};
-inline constexpr hybrid::MarginParams margin_params{0.01, 0.003, 0.005};
+inline constexpr hybrid::MarginParams margin_params{0.01, 0.003, 0.003, 0.005};
 inline constexpr double contact_radius = 0.15;
 
 /// A planner's surroundings without the planner.
