@@ -415,20 +415,5 @@ TEST_CASE("gyro goes to the end of a path, to a pose by its position, and past s
   const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
   const Json params{{"variant", variant}, {"algorithm", "keep_attraction"}};
   CAPTURE(params);
-  test::BareTick bare(plugin_file);
-  hamelin_goal joint{}, position{}, pose{};
-  joint.type = HAMELIN_GOAL_JOINT;
-  position.type = HAMELIN_GOAL_POSITION;
-  pose.type = HAMELIN_GOAL_POSE;
-  for (auto* goal : {&position, &pose}) Eigen::Map<Eigen::Vector3d>(goal->position_world_m) << 0.3, 0.4, -0.2;
-  pose.quaternion_wxyz[1] = 1.0;
-  const Eigen::Vector4d end(0.5, -0.2, 0.1, 1.0);
-  Eigen::MatrixXd path(4, 3);
-  path << Eigen::Vector4d::Constant(2.0), Eigen::Vector4d::Constant(-1.0), end;
-  const Eigen::VectorXd to_end = bare.answer(params, joint, end), there = bare.answer(params, position);
-  CHECK(to_end.norm() > 1.0);
-  CHECK((to_end - there).norm() > 1.0);
-  CHECK(bare.answer(params, joint, end, path) == to_end);
-  CHECK(bare.answer(params, pose) == there);
-  CHECK(bare.answer(params, position, {}, {}, true) == there);
+  test::check_goes_by_goals_alone(plugin_file, params);
 }

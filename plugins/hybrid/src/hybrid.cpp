@@ -265,7 +265,7 @@ class Hybrid final : public planning::Planner {
     steering_ *= scale;
   }
 
-  // The approach speed that leaves room to brake: γx near the margin, continued C¹ by √(2a(x − a/2γ²)).
+  // The approach speed that leaves room to brake: γx near the margin and inside it, continued C¹ by √(2a(x − a/2γ²)).
   [[nodiscard]] double approach_limit(double x, double brake) const {
     if (x <= brake / (rate_ * rate_)) return rate_ * x;
     return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
@@ -312,14 +312,13 @@ class Hybrid final : public planning::Planner {
     }
     for (const auto& point : obstacles_.points()) {
       const double x = point.distance - point.margin;
-      double wanted = point.obstacle_speed - (x > 0.0 ? approach_limit(x, brake_) : rate_ * x);
+      double wanted = point.obstacle_speed - approach_limit(x, brake_);
       const double now = point.row.dot(v_);
       // near its limit a row counts on, and asks for, no more braking than the boxes are sure to allow
-      if (now - least_brake * dt < point.obstacle_speed - (x > 0.0 ? approach_limit(x, least_brake) : rate_ * x)) {
+      if (now - least_brake * dt < point.obstacle_speed - approach_limit(x, least_brake)) {
         const double room = filter_.room(point.row, v_);
         const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
-        if (x > 0.0) wanted = point.obstacle_speed - approach_limit(x, brake);
-        wanted = std::min(wanted, now + room);
+        wanted = std::min(point.obstacle_speed - approach_limit(x, brake), now + room);
       }
       const double floor = point.obstacle_speed - rate_ * std::max(1e-9, point.distance - 0.5 * point.margin);
       (void)filter_.add_row(point.row, wanted, floor);
@@ -343,7 +342,7 @@ class Hybrid final : public planning::Planner {
 
   void mind_stall(double now, const Target& target, double wanted, planning::Command& command) {
     if (remembers_ || search_) command.mind_own_stalls();
-    if (mode_ == Mode::think) return think(now, command);
+    if (mode_ == Mode::think) return think(now);
     const bool stalled = stall_.stalled(now, remaining(target), v_.norm(), wanted, held_);
     if (mode_ == Mode::via) {
       const bool there = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
@@ -389,7 +388,7 @@ class Hybrid final : public planning::Planner {
   }
 
   // The arm stands while the search goes on.
-  void think(double now, planning::Command&) {
+  void think(double now) {
     if (!search_->advance(search_steps_)) return;
     if (search_->way().empty()) return enter(Mode::goal, now);
     way_at_ = 0.0;
