@@ -19,10 +19,11 @@ void Explicit::accelerate(const Channels& channels, const VectorXd& q, const Vec
 StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   accelerate(channels, state.q, state.v, report);
+  report.converged = acceleration_.allFinite();
+  if (!report.converged) return report;
   state.v += h * acceleration_;
   book_work(report, state.v, h);
   state.q += h * state.v;
-  report.converged = state.q.allFinite() && state.v.allFinite();
   return report;
 }
 
@@ -46,9 +47,10 @@ StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
     q_sum_ += b[i] * h * v_;
     v_sum_ += b[i] * h * acceleration_;
   }
+  report.converged = q_sum_.allFinite() && v_sum_.allFinite();
+  if (!report.converged) return report;
   state.q = q_sum_;
   state.v = v_sum_;
-  report.converged = state.q.allFinite() && state.v.allFinite();
   return report;
 }
 

@@ -121,6 +121,7 @@ SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, c
     out.sin_alpha = std::sin(alpha);
     out.offset = angle_about(z, x_parent, x);
     out.p0 = small(parent.R().transpose() * (frame.p() - parent.p()));
+    out.armature = link.joint.armature;
     out.mass = link.mass_kg;
     out.moment = small(link.mass_kg * (frame.inverse() * link.com.p()));
     out.inertia = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
@@ -166,6 +167,7 @@ PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, con
     out.offset = angle_about(normal, parent.R().col(0), frame.R().col(0));
     out.p0x = p0.x();
     out.p0y = p0.y();
+    out.armature = link.joint.armature;
     out.mass = link.mass_kg;
     out.moment_x = link.mass_kg * c.x();
     out.moment_y = link.mass_kg * c.y();

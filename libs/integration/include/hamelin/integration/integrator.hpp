@@ -19,6 +19,8 @@ using model::Model;
 /// potential (a) and the node impulse (e) act between steps: Integrator::kick and Integrator::set_velocity.
 struct Channels {
   VectorXd damping;                        ///< (b) torque −damping_i v_i; empty or dof [Nm s/rad]
+  VectorXd coulomb;                        ///< dry friction −coulomb_i tanh(v_i / coulomb_speed); empty or dof [Nm]
+  double coulomb_speed = 0.01;             ///< below it dry friction turns viscous [rad/s or m/s]
   std::vector<GyroscopicTerm> gyroscopic;  ///< (c)
   VectorXd held_torque;                    ///< (d) empty or dof [Nm]
 };
@@ -29,11 +31,12 @@ struct State {
   double time_s = 0.0;
   long k = 0;
   VectorXd q, v, p;
-  VectorXd memory;               ///< hamel: body twists of the last step, dof × (6 or 3)
+  VectorXd memory;               ///< the scheme's own; hamel: body twists of the last step, dof × (6 or 3)
   VectorXd force_previous;       ///< hamel: generalised force of the last step
   double step_previous = 0.0;    ///< hamel: 0 right after a (consistent) start
   std::vector<VectorXd> deltas;  ///< last displacements, newest first, for the guess
   int delta_count = 0;           ///< how many of them are valid
+  double step_next = 0.0;        ///< what step control would take next [s]; 0 before the first step
 };
 
 /// What one step did.
@@ -43,9 +46,11 @@ struct StepReport {
   int factorizations = 0;  ///< linear solves that made new factors
   int evaluations = 0;     ///< sweeps over the chain: residuals, or forward dynamics for explicit schemes
   int halvings = 0;        ///< how often the step was halved to find a root
+  int rejected = 0;        ///< steps that step control took back
+  double step_s = 0.0;     ///< how far the state went
   double residual = 0.0;   ///< the figure the criterion looks at, of the accepted step
   double gyroscopic_work_J = 0.0;
-  double dissipated_J = 0.0;  ///< by channel (b), positive
+  double dissipated_J = 0.0;  ///< by channel (b) and dry friction, positive
   double held_work_J = 0.0;   ///< by channel (d)
 };
 
@@ -55,7 +60,7 @@ struct Energy {
 };
 
 enum class Start : std::int32_t { consistent, published };
-enum class Solver : std::int32_t { newton, feedback };
+enum class Solver : std::int32_t { newton, feedback, riqn };
 
 /// Settings of all integrators; each takes what concerns it and refuses what it cannot do.
 struct Options {
@@ -67,6 +72,11 @@ struct Options {
   double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
   int max_updates = 100;             ///< feedback; newton gives up where it does not contract
   int max_halvings = 8;              ///< a step is cut into at most 2^max_halvings pieces
+  int order = 0;                     ///< composition, gauss: 0 takes the scheme's default
+  double rtol = 0.0, atol = 0.0;     ///< either above 0 switches step control on; the first step is the one asked for
+  double newmark_beta = 0.25, newmark_gamma = 0.5;
+
+  [[nodiscard]] bool step_control() const noexcept { return rtol > 0.0 || atol > 0.0; }
 };
 
 /// Options from a scene's or command line's parameters {"alpha":…, "start":…, "solver":…, "tolerance":…,
@@ -95,8 +105,15 @@ class Integrator {
   virtual void kick(State& state, const VectorXd& dp) = 0;
   /// Node velocity: p = M(θ^k) v.
   virtual void set_velocity(State& state, const VectorXd& v) = 0;
-  /// One step of h > 0. If it reports converged = false no root was found, and the state is as it was.
+  /// Exactly h > 0 ahead: one step, or under step control as many as it takes. If it reports converged = false no root
+  /// was found, and the state is as it was.
   [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
+  /// One step of at most `limit`: all of it for fixed steps, what step control chooses else (StepReport::step_s).
+  [[nodiscard]] StepReport advance(State& state, const Channels& channels, double limit);
+  /// Whether the scheme chooses its steps itself (Options::rtol, atol).
+  [[nodiscard]] bool adaptive() const noexcept { return options_.step_control(); }
+  /// "structure": fixed steps of a structure-preserving scheme, iterated to rounding; else "accurate".
+  [[nodiscard]] virtual std::string mode() const { return "accurate"; }
   /// Energy at the node, as the scheme defines it (SPEC §3).
   [[nodiscard]] virtual Energy energy(const State& state);
 
@@ -105,8 +122,11 @@ class Integrator {
 
   /// Fills q, v and whatever the scheme keeps; sizes are set.
   virtual void begin(State& state, const VectorXd& v0) = 0;
-  /// One undivided step; on failure the state may be left half-way.
+  /// One undivided step. Where it does not converge the state is left as it was.
   virtual StepReport attempt(State& state, const Channels& channels, double h) = 0;
+  /// One step under step control, of at most `limit`, chosen by State::step_next; rejected ones are counted. Where it
+  /// fails the state is left as it was. Schemes without step control never get here: make_integrator refuses.
+  virtual StepReport controlled(State& state, const Channels& channels, double limit);
 
   /// Generalised force of the channels at (q, v): total, with its parts kept for the work done.
   void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
@@ -123,7 +143,7 @@ class Integrator {
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level
-  VectorXd held_, damped_, gyroscopic_;
+  VectorXd held_, damped_, dry_, gyroscopic_;
 };
 
 /// Names that make_integrator knows.

@@ -16,6 +16,7 @@ struct SpatialLink {
   double cos_alpha, sin_alpha;
   double offset;                   ///< [rad]
   geometry::Vec3<double> p0;       ///< [m]
+  double armature;                 ///< rotor inertia seen at the joint [kg m² or kg]
   double mass;                     ///< [kg]
   geometry::Vec3<double> moment;   ///< mass × COM, own frame [kg m]
   geometry::Sym3<double> inertia;  ///< about the frame's origin [kg m²]
@@ -29,6 +30,7 @@ struct PlanarLink {
   double direction;           ///< +1 or −1: the joint's axis along the plane's normal or against it
   double offset;              ///< [rad]
   double p0x, p0y;            ///< [m]
+  double armature;            ///< rotor inertia seen at the joint [kg m² or kg]
   double mass;                ///< [kg]
   double moment_x, moment_y;  ///< mass × COM [kg m]
   double inertia;             ///< about the frame's origin [kg m²]

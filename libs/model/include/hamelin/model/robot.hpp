@@ -22,6 +22,8 @@ struct Joint {
   std::optional<double> velocity_max;  ///< [rad/s or m/s]
   std::optional<double> effort_max;    ///< [Nm or N]
   double damping = 0.0;                ///< viscous, as the robot file gives it; used only where a scene says so
+  double friction = 0.0;               ///< dry friction [Nm or N], likewise
+  double armature = 0.0;               ///< rotor inertia seen at the joint [kg m² or kg]; part of the dynamics
 };
 
 /// Collision sphere. Coordinates in the link's COM frame.

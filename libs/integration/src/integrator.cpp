@@ -6,7 +6,7 @@ namespace hamelin::integration {
 
 Integrator::Integrator(std::string name, const Model& model, const Options& options)
     : model_(model), options_(options), ws_(model), force_(model.dof()), name_(std::move(name)) {
-  held_ = damped_ = gyroscopic_ = VectorXd::Zero(model.dof());
+  held_ = damped_ = dry_ = gyroscopic_ = VectorXd::Zero(model.dof());
 }
 
 State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
@@ -21,44 +21,81 @@ State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   return state;
 }
 
+namespace {
+
+// What two parts of a step did, the second after the first.
+StepReport together(const StepReport& a, const StepReport& b) {
+  StepReport sum = a;
+  sum.converged = a.converged && b.converged;
+  sum.updates += b.updates;
+  sum.factorizations += b.factorizations;
+  sum.evaluations += b.evaluations;
+  sum.halvings += b.halvings;
+  sum.rejected += b.rejected;
+  sum.step_s += b.step_s;
+  sum.residual = std::max(a.residual, b.residual);
+  sum.gyroscopic_work_J += b.gyroscopic_work_J;
+  sum.dissipated_J += b.dissipated_J;
+  sum.held_work_J += b.held_work_J;
+  return sum;
+}
+
+}  // namespace
+
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   const long k = state.k;
   const double time = state.time_s;
-  const StepReport report = divide(state, channels, h, 0);
-  if (!report.converged) {
-    state = saved_[0];
-    return report;
+  StepReport report;
+  if (adaptive()) {
+    saved_[0] = state;
+    for (double left = h; left > 0.0 && report.converged;) {
+      const StepReport part = advance(state, channels, left);
+      // the last part ends at h itself, not a rounding error before it
+      left = part.step_s == left ? 0.0 : left - part.step_s;
+      report = together(report, part);
+    }
+    if (!report.converged) state = saved_[0];
+    report.step_s = h;
+  } else {
+    report = advance(state, channels, h);
   }
+  if (!report.converged) return report;
   state.k = k + 1;
   state.time_s = time + h;
   return report;
 }
 
+StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
+  if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
+  StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
+  if (!report.converged) return report;
+  ++state.k;
+  state.time_s += report.step_s;
+  return report;
+}
+
+StepReport Integrator::controlled(State&, const Channels&, double) {
+  StepReport report;
+  report.converged = false;
+  return report;
+}
+
 // Halves the step where no root is found; the channels stay as they are, so the planner is not asked again.
 StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
+  StepReport report = attempt(state, channels, h);
+  report.step_s = h;
+  if (report.converged || depth == options_.max_halvings) return report;
   State& before = saved_[static_cast<std::size_t>(depth)];
   before = state;
-  StepReport report = attempt(state, channels, h);
-  if (report.converged || depth == options_.max_halvings) return report;
-  state = before;
-  StepReport total = report;
+  StepReport total = report;  // what the failed attempt cost; it moved nothing
   total.converged = true;
-  total.residual = 0.0;
+  total.residual = total.step_s = 0.0;
   total.gyroscopic_work_J = total.dissipated_J = total.held_work_J = 0.0;
   ++total.halvings;
-  for (int half = 0; half < 2 && total.converged; ++half) {
-    const StepReport part = divide(state, channels, 0.5 * h, depth + 1);
-    total.converged = part.converged;
-    total.updates += part.updates;
-    total.factorizations += part.factorizations;
-    total.evaluations += part.evaluations;
-    total.halvings += part.halvings;
-    total.residual = std::max(total.residual, part.residual);
-    total.gyroscopic_work_J += part.gyroscopic_work_J;
-    total.dissipated_J += part.dissipated_J;
-    total.held_work_J += part.held_work_J;
-  }
+  for (int half = 0; half < 2 && total.converged; ++half)
+    total = together(total, divide(state, channels, 0.5 * h, depth + 1));
+  if (!total.converged) state = before;
   return total;
 }
 
@@ -71,16 +108,20 @@ void Integrator::evaluate_forces(const Channels& channels, const VectorXd& q, co
     damped_ = channels.damping.cwiseProduct(v);
   else
     damped_.setZero();
+  if (channels.coulomb.size() > 0)
+    dry_ = channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
+  else
+    dry_.setZero();
   if (!channels.gyroscopic.empty())
     dynamics::gyroscopic_torque(model_, ws_, q, v, channels.gyroscopic, gyroscopic_);
   else
     gyroscopic_.setZero();
-  force_ = held_ - damped_ + gyroscopic_;
+  force_ = held_ - damped_ - dry_ + gyroscopic_;
 }
 
 void Integrator::book_work(StepReport& report, const VectorXd& displacement, double weight) const {
   report.held_work_J += weight * held_.dot(displacement);
-  report.dissipated_J += weight * damped_.dot(displacement);
+  report.dissipated_J += weight * (damped_.dot(displacement) + dry_.dot(displacement));
   report.gyroscopic_work_J += weight * gyroscopic_.dot(displacement);
 }
 
