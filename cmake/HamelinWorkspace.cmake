@@ -71,6 +71,31 @@ function(hamelin_library)
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
+# hamelin_isa_sources(TARGET SOURCE...): compiles each source once for every instruction set of core/isa.hpp. What such a
+# source may use is said in dynamics/kernel/lanes.hpp; a test looks at the objects. Products may be contracted: results
+# are promised to the bit on one set only.
+function(hamelin_isa_sources target)
+  set(names baseline)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    list(APPEND names v3 v4)
+  endif()
+  set(flags_baseline "")
+  set(flags_v3 -mavx2 -mfma)
+  set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)
+  # A source's own options come last. Optimised in every build, so that nothing stays out of line.
+  set_source_files_properties(${ARGN} PROPERTIES
+    COMPILE_OPTIONS "-O3;-ffp-contract=fast;-fno-math-errno;-fno-trapping-math")
+  foreach(name IN LISTS names)
+    add_library(${target}_${name} OBJECT ${ARGN})
+    target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>)
+    target_include_directories(${target}_${name} PRIVATE include)
+    target_compile_definitions(${target}_${name} PRIVATE HAMELIN_ISA_NAMESPACE=isa_${name})
+    target_compile_options(${target}_${name} PRIVATE ${flags_${name}})
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${target}_${name}>)
+    set_property(GLOBAL APPEND PROPERTY HAMELIN_ISA_OBJECTS $<TARGET_OBJECTS:${target}_${name}>)
+  endforeach()
+endfunction()
+
 # hamelin_tests(NAME scene LINKS hamelin::scene [TIMEOUT s]): tests/*_test.cpp of the calling folder as one program.
 # Tests that need ../shared or data/ find the checkout by HAMELIN_SOURCE_DIR and skip what is absent, saying so.
 function(hamelin_tests)

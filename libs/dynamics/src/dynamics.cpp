@@ -1,79 +1,104 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
+#include "kernels.hpp"
+
 namespace hamelin::dynamics {
 
 namespace {
 
-std::variant<kernel::Scratch<kernel::Spatial<double>>, kernel::Scratch<kernel::Planar<double>>> scratch_for(
-    const Model& model) {
-  const auto n = static_cast<std::size_t>(model.dof());
-  if (model.planar()) return kernel::Scratch<kernel::Planar<double>>(n);
-  return kernel::Scratch<kernel::Spatial<double>>(n);
+std::size_t sweep_bytes(const Model& model, const KernelSet& set) {
+  return with_group(model, set,
+                    [&](const auto& kernel, const auto& chain) { return kernel.bytes(chain.links.size()); });
+}
+
+std::size_t batch_bytes(const Model& model, const KernelSet& set) {
+  return with_group(model, set,
+                    [&](const auto& kernel, const auto& chain) { return kernel.batch_bytes(chain.links.size()); });
 }
 
 }  // namespace
 
 Workspace::Workspace(const Model& model)
-    : links(scratch_for(model)),
+    : kernels(&dynamics::kernels()),
+      sweep(sweep_bytes(model, *kernels)),
       frames(static_cast<std::size_t>(model.dof())),
       motions(static_cast<std::size_t>(model.dof())),
       forces(static_cast<std::size_t>(model.dof())),
       column_in(model.dof()),
       column_out(model.dof()) {}
 
+BatchWorkspace::BatchWorkspace(const Model& model)
+    : kernels(&dynamics::kernels()), sweep(batch_bytes(model, *kernels)) {}
+
 void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a,
                       VectorXd& tau) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::inverse_dynamics<Space>(chain, k, q.data(), v.data(), a.data(), tau.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), a.data(), tau.data());
   });
 }
 
 void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau,
                       VectorXd& a) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::forward_dynamics<Space>(chain, k, q.data(), v.data(), tau.data(), a.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.forward_dynamics(chain, ws.sweep.get(), q.data(), v.data(), tau.data(), a.data());
   });
 }
 
 void bias_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& tau) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::inverse_dynamics<Space>(chain, k, q.data(), v.data(), nullptr, tau.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), nullptr, tau.data());
   });
 }
 
 void gravity_torque(const Model& model, Workspace& ws, const VectorXd& q, VectorXd& tau) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::inverse_dynamics<Space>(chain, k, q.data(), nullptr, nullptr, tau.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.gravity_torque(chain, ws.sweep.get(), q.data(), tau.data());
   });
 }
 
 void solve_mass(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& y, VectorXd& x) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::solve_mass<Space>(chain, k, q.data(), y.data(), x.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.solve_mass(chain, ws.sweep.get(), q.data(), y.data(), x.data());
   });
 }
 
 void momentum(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& p) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::momentum<Space>(chain, k, q.data(), v.data(), p.data());
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.momentum(chain, ws.sweep.get(), q.data(), v.data(), p.data());
   });
 }
 
 void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::MatrixXd& M) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    kernel::mass_matrix<Space>(chain, k, q.data(), M.data(), static_cast<std::size_t>(M.outerStride()));
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.mass_matrix(chain, ws.sweep.get(), q.data(), M.data(), static_cast<std::size_t>(M.outerStride()));
   });
 }
 
 double kinetic_energy(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v) {
-  return with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    return kernel::kinetic_energy<Space>(chain, k, q.data(), v.data());
+  return with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    return kernel.kinetic_energy(chain, ws.sweep.get(), q.data(), v.data());
   });
 }
 
 double potential_energy(const Model& model, Workspace& ws, const VectorXd& q) {
-  return with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    return kernel::potential_energy<Space>(chain, k, q.data()) + chain.potential_constant;
+  return with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    return kernel.potential_energy(chain, ws.sweep.get(), q.data()) + chain.potential_constant;
+  });
+}
+
+void inverse_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& a,
+                      StatesXd& tau) {
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    const auto states = static_cast<std::size_t>(q.cols());
+    kernel.inverse_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), a.data(), tau.data());
+  });
+}
+
+void forward_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& tau,
+                      StatesXd& a) {
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    const auto states = static_cast<std::size_t>(q.cols());
+    kernel.forward_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), tau.data(), a.data());
   });
 }
 

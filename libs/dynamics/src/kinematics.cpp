@@ -2,6 +2,9 @@
 #include <cmath>
 
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/kernel/planar.hpp"
+#include "hamelin/dynamics/kernel/spatial.hpp"
+#include "kernels.hpp"
 
 namespace hamelin::dynamics {
 
@@ -55,14 +58,18 @@ Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const V
 }  // namespace
 
 void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q) {
-  with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) {
-    for (std::size_t i = 0; i < k.size(); ++i) {
+  const auto place = [&]<class Space>(Space, const auto& chain) {
+    for (std::size_t i = 0; i < chain.links.size(); ++i) {
       const auto& l = chain.links[i];
       const auto x = Space::place(l, q[static_cast<Eigen::Index>(i)]);
-      ws.frames[i] = l.parent < 0 ? child_frame(l, x, chain.root.R(), chain.root.p())
+      ws.frames[i] = l.parent < 0 ? child_frame(l, x, model.root().R(), model.root().p())
                                   : child_frame(l, x, frame(ws, l.parent).R, frame(ws, l.parent).p);
     }
-  });
+  };
+  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain()))
+    place(kernel::Planar<double>{}, *planar);
+  else
+    place(kernel::Spatial<double>{}, std::get<model::SpatialChain>(model.chain()));
 }
 
 Vector3d point_position(const Model& model, const Workspace& ws, int link, const Vector3d& point_link) {
@@ -149,21 +156,19 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, con
 }
 
 Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J, double damping) {
-  return with_group(model, ws, [&]<class Space>(Space, const auto& chain, auto& k) -> Matrix3d {
-    kernel::place<Space>(chain, k, q.data());
-    kernel::factor<Space>(chain, k);
-    Matrix3d inverse;
+  Matrix3d inverse;
+  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+    kernel.factor(chain, ws.sweep.get(), q.data());
     for (int c = 0; c < 3; ++c) {
       ws.column_in = J.row(c).transpose();
-      for (auto& link : k) link.force = Space::zero_force();
-      kernel::solve_factored<Space>(chain, k, ws.column_in.data(), ws.column_out.data());
+      kernel.solve_factored(chain, ws.sweep.get(), ws.column_in.data(), ws.column_out.data());
       inverse.col(c).noalias() = J * ws.column_out;
     }
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(0.5 * (inverse + inverse.transpose()));
-    const Vector3d& d = eigen.eigenvalues();
-    const Vector3d damped = d.array() / (d.array().square() + damping * damping);
-    return eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose();
   });
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(0.5 * (inverse + inverse.transpose()));
+  const Vector3d& d = eigen.eigenvalues();
+  const Vector3d damped = d.array() / (d.array().square() + damping * damping);
+  return eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
 }  // namespace hamelin::dynamics

@@ -1,6 +1,8 @@
 #pragma once
 #include <variant>
 
+#include "hamelin/dynamics/kernel/planar.hpp"
+#include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {

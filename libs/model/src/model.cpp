@@ -103,8 +103,8 @@ std::vector<SE3> spatial_frames(const Robot& robot) {
 SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base,
                            const Vector3d& gravity) {
   SpatialChain chain;
-  chain.root = base * frames[0];
-  chain.gravity = small(chain.root.R().transpose() * gravity);
+  const SE3 root = base * frames[0];
+  chain.gravity = small(root.R().transpose() * gravity);
   chain.potential_constant = 0.0;
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link& link = robot.links[i];
@@ -125,7 +125,7 @@ SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, c
     out.mass = link.mass_kg;
     out.moment = small(link.mass_kg * (frame.inverse() * link.com.p()));
     out.inertia = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
-    chain.potential_constant -= link.mass_kg * gravity.dot(chain.root.p());
+    chain.potential_constant -= link.mass_kg * gravity.dot(root.p());
     chain.links.push_back(out);
   }
   return chain;
@@ -148,8 +148,8 @@ std::vector<SE3> planar_frames(const Robot& robot, const Vector3d& normal) {
 
 PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base, const Vector3d& gravity) {
   PlanarChain chain;
-  chain.root = base * frames[0];
-  const Vector3d g = chain.root.R().transpose() * gravity;
+  const SE3 root = base * frames[0];
+  const Vector3d g = root.R().transpose() * gravity;
   chain.gravity_x = g.x();
   chain.gravity_y = g.y();
   chain.potential_constant = 0.0;
@@ -172,7 +172,7 @@ PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, con
     out.moment_x = link.mass_kg * c.x();
     out.moment_y = link.mass_kg * c.y();
     out.inertia = inertia_in(frame, link)(2, 2);
-    chain.potential_constant -= link.mass_kg * (gravity.dot(chain.root.p()) + g.z() * c.z());
+    chain.potential_constant -= link.mass_kg * (gravity.dot(root.p()) + g.z() * c.z());
     chain.links.push_back(out);
   }
   return chain;
@@ -212,6 +212,7 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     frames = spatial_frames(robot_);
     chain_ = spatial_chain(robot_, frames, base_, gravity_);
   }
+  root_ = base_ * frames[0];
   for (std::size_t i = 0; i < robot_.links.size(); ++i) {
     const Link& link = robot_.links[i];
     com_in_frame_.push_back(frames[i + 1].inverse() * link.com);

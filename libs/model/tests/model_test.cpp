@@ -68,7 +68,7 @@ TEST_CASE("axes parallel to a hair still give exact frames", "[model][hard]") {
     REQUIRE_FALSE(model.planar());
     const auto& chain = std::get<model::SpatialChain>(model.chain());
     // rebuild the COM frames at q = 0 from the chain's own constants
-    SE3 g = chain.root;
+    SE3 g = model.root();
     for (int i = 0; i < 4; ++i) {
       const auto& l = chain.links[static_cast<std::size_t>(i)];
       Eigen::Matrix3d R;

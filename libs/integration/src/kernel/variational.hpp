@@ -2,6 +2,8 @@
 #include <cmath>
 #include <vector>
 
+#include "hamelin/dynamics/kernel/planar.hpp"
+#include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
 
 /// The two sweeps of hamel-variational and their exact linearisation (SPEC §3), over the group and the scalar.

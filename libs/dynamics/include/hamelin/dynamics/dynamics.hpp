@@ -14,6 +14,8 @@ using Eigen::VectorXd;
 using model::Model;
 using Matrix3Xd = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 using Matrix6Xd = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+/// Joint vectors of many states, dof × states: the states' numbers for one joint stand side by side.
+using StatesXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// τ = M(q) a + C(q, v) v + ∂U(q): recursive Newton–Euler.
 void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a,
@@ -36,6 +38,13 @@ void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::Ma
 [[nodiscard]] double kinetic_energy(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v);
 /// U(q) = −Σ m_i g·p_i [J].
 [[nodiscard]] double potential_energy(const Model& model, Workspace& ws, const VectorXd& q);
+
+/// The same for all columns at once, as many states to a SIMD register as it has lanes. All matrices are dof × states;
+/// results are those of the single calls but for rounding.
+void inverse_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& a,
+                      StatesXd& tau);
+void forward_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& tau,
+                      StatesXd& a);
 
 /// World poses of all links at q, kept in ws until the next call. The functions below read them.
 void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);

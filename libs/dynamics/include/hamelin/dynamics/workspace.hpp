@@ -1,16 +1,33 @@
 #pragma once
 #include <Eigen/Core>
-#include <variant>
+#include <cstddef>
+#include <memory>
+#include <new>
 #include <vector>
 
-#include "hamelin/dynamics/kernel/planar.hpp"
-#include "hamelin/dynamics/kernel/spatial.hpp"
-#include "hamelin/dynamics/kernel/sweeps.hpp"
 #include "hamelin/model/model.hpp"
 
 namespace hamelin::dynamics {
 
-/// All scratch of the algorithms for one model and one thread. Made once; nothing allocates afterwards.
+struct KernelSet;
+
+/// Memory for the kernels' scratch, aligned for any SIMD register.
+class Memory {
+ public:
+  static constexpr std::align_val_t alignment{64};
+
+  explicit Memory(std::size_t bytes) : bytes_(static_cast<std::byte*>(::operator new(bytes, alignment))) {}
+  [[nodiscard]] void* get() noexcept { return bytes_.get(); }
+
+ private:
+  struct Free {
+    void operator()(std::byte* p) const noexcept { ::operator delete(p, alignment); }
+  };
+  std::unique_ptr<std::byte, Free> bytes_;
+};
+
+/// All scratch of the algorithms for one model and one thread, and which instruction set they run on: core's
+/// selected_isa() when it was made. Made once; nothing allocates afterwards.
 class Workspace {
  public:
   explicit Workspace(const model::Model& model);
@@ -22,7 +39,8 @@ class Workspace {
     Eigen::Vector3d axis;  ///< the joint's axis (revolute) or direction (prismatic), unit, world
   };
 
-  std::variant<kernel::Scratch<kernel::Spatial<double>>, kernel::Scratch<kernel::Planar<double>>> links;
+  const KernelSet* kernels;
+  Memory sweep;  ///< scratch of the kernels
   std::vector<Frame> frames;
   /// Angular velocity and velocity of a frame's origin, or moment about it and force; world axes.
   struct Pair {
@@ -32,12 +50,13 @@ class Workspace {
   Eigen::VectorXd column_in, column_out;  ///< joint vectors of operational_inertia
 };
 
-/// Calls f(Space{}, chain, scratch) with the group of this model: one branch a call, none inside.
-template <class F>
-decltype(auto) with_group(const model::Model& model, Workspace& ws, F&& f) {
-  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain()))
-    return f(kernel::Planar<double>{}, *planar, std::get<1>(ws.links));
-  return f(kernel::Spatial<double>{}, std::get<0>(model.chain()), std::get<0>(ws.links));
-}
+/// Scratch for many states at once (inverse_dynamics_batch, forward_dynamics_batch); of one thread.
+class BatchWorkspace {
+ public:
+  explicit BatchWorkspace(const model::Model& model);
+
+  const KernelSet* kernels;
+  Memory sweep;
+};
 
 }  // namespace hamelin::dynamics

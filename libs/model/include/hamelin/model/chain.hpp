@@ -1,7 +1,6 @@
 #pragma once
 #include <vector>
 
-#include "hamelin/geometry/se3.hpp"
 #include "hamelin/geometry/small.hpp"
 
 namespace hamelin::model {
@@ -36,17 +35,15 @@ struct PlanarLink {
   double inertia;             ///< about the frame's origin [kg m²]
 };
 
-/// A chain in one of the two groups. `root` is the world pose of the constant frame that parents −1 means; for planar
-/// chains its z is the plane's normal. Gravity is given in root axes [m/s²].
+/// A chain in one of the two groups. Gravity is given in the axes of the root, the constant frame that parents −1 means
+/// (Model::root) [m/s²].
 struct SpatialChain {
   std::vector<SpatialLink> links;
-  geometry::SE3 root;
   geometry::Vec3<double> gravity;
   double potential_constant;  ///< what U = −Σ m g·p counts besides the sweep's root-frame part [J]
 };
 struct PlanarChain {
   std::vector<PlanarLink> links;
-  geometry::SE3 root;
   double gravity_x, gravity_y;
   double potential_constant;  ///< as above, out-of-plane offsets included [J]
 };

@@ -27,6 +27,9 @@ class Model {
   [[nodiscard]] bool planar() const noexcept { return std::holds_alternative<PlanarChain>(chain_); }
   [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept { return chain_; }
 
+  /// World pose of the chain's root frame; of a planar chain its z is the plane's normal.
+  [[nodiscard]] const geometry::SE3& root() const noexcept { return root_; }
+
   /// Pose of link i's COM frame in its joint-aligned frame (constant).
   [[nodiscard]] const geometry::SE3& com_in_frame(int link) const {
     return com_in_frame_[static_cast<std::size_t>(link)];
@@ -51,6 +54,7 @@ class Model {
   Robot robot_;
   geometry::SE3 base_;
   Eigen::Vector3d gravity_;
+  geometry::SE3 root_;
   std::variant<SpatialChain, PlanarChain> chain_;
   std::vector<geometry::SE3> com_in_frame_;
   geometry::SE3 tip_in_frame_;

@@ -1,9 +1,11 @@
 #pragma once
 #include <cmath>
 
+#include "hamelin/dynamics/kernel/lanes.hpp"
 #include "hamelin/model/chain.hpp"
 
 namespace hamelin::dynamics::kernel {
+inline namespace HAMELIN_ISA_NAMESPACE {
 
 /// SE(2) as the sweeps see it; the names and meanings are those of kernel/spatial.hpp. Twists [w; vx; vy], wrenches
 /// [t; fx; fy].
@@ -31,39 +33,45 @@ struct Planar {
     S ww, wx, wy, xw, xx, xy, yw, yx, yy;
   };
   struct Flow {
-    S w, dw, ax, ay;
+    S w, dw, ax, ay, ww;  ///< ww = w²
   };
   struct Moment {
     S m, x, y;
   };
 
-  static Motion sum(const Motion& a, const Motion& b) noexcept { return {a.w + b.w, a.x + b.x, a.y + b.y}; }
-  static Force sum(const Force& a, const Force& b) noexcept { return {a.t + b.t, a.x + b.x, a.y + b.y}; }
-  static Motion scaled(const Motion& a, S k) noexcept { return {a.w * k, a.x * k, a.y * k}; }
-  static Force scaled(const Force& a, S k) noexcept { return {a.t * k, a.x * k, a.y * k}; }
+  HAMELIN_INLINE static Motion sum(const Motion& a, const Motion& b) noexcept {
+    return {a.w + b.w, a.x + b.x, a.y + b.y};
+  }
+  HAMELIN_INLINE static Force sum(const Force& a, const Force& b) noexcept { return {a.t + b.t, a.x + b.x, a.y + b.y}; }
+  HAMELIN_INLINE static Motion scaled(const Motion& a, S k) noexcept { return {a.w * k, a.x * k, a.y * k}; }
+  HAMELIN_INLINE static Force scaled(const Force& a, S k) noexcept { return {a.t * k, a.x * k, a.y * k}; }
 
-  static Motion zero_motion() noexcept { return {S(0), S(0), S(0)}; }
-  static Force zero_force() noexcept { return {S(0), S(0), S(0)}; }
-  static Flow root_flow(const Chain& chain) noexcept { return {S(0), S(0), S(-chain.gravity_x), S(-chain.gravity_y)}; }
-
-  static Placement place(const Link& l, S q) noexcept {
-    if (l.prismatic) {
-      const S s = S(std::sin(l.offset)), c = S(std::cos(l.offset));
-      return {s, c, l.p0x + q * c, l.p0y + q * s};
-    }
-    const S angle = l.direction * q + l.offset;
-    return {std::sin(angle), std::cos(angle), S(l.p0x), S(l.p0y)};
+  HAMELIN_INLINE static Motion zero_motion() noexcept { return {S(0), S(0), S(0)}; }
+  HAMELIN_INLINE static Force zero_force() noexcept { return {S(0), S(0), S(0)}; }
+  HAMELIN_INLINE static Flow root_flow(const Chain& chain) noexcept {
+    return {S(0), S(0), S(-chain.gravity_x), S(-chain.gravity_y), S(0)};
   }
 
-  static Motion to_child(const Link&, const Placement& x, const Motion& m) noexcept {
+  HAMELIN_INLINE static S angle(const Link& l, S q) noexcept {
+    return l.prismatic ? S(l.offset) : q * l.direction + l.offset;
+  }
+  HAMELIN_INLINE static Placement place(const Link& l, S q, S sine, S cosine) noexcept {
+    if (l.prismatic) return {sine, cosine, q * cosine + l.p0x, q * sine + l.p0y};
+    return {sine, cosine, S(l.p0x), S(l.p0y)};
+  }
+  HAMELIN_INLINE static Placement place(const Link& l, double q) noexcept {
+    return place(l, q, std::sin(angle(l, q)), std::cos(angle(l, q)));
+  }
+
+  HAMELIN_INLINE static Motion to_child(const Link&, const Placement& x, const Motion& m) noexcept {
     const S vx = m.x - m.w * x.py, vy = m.y + m.w * x.px;
     return {m.w, x.c * vx + x.s * vy, x.c * vy - x.s * vx};
   }
-  static Force to_parent(const Link&, const Placement& x, const Force& f) noexcept {
+  HAMELIN_INLINE static Force to_parent(const Link&, const Placement& x, const Force& f) noexcept {
     const S fx = x.c * f.x - x.s * f.y, fy = x.s * f.x + x.c * f.y;
     return {f.t + x.px * fy - x.py * fx, fx, fy};
   }
-  static Inertia to_parent(const Link&, const Placement& x, const Inertia& P) noexcept {
+  HAMELIN_INLINE static Inertia to_parent(const Link&, const Placement& x, const Inertia& P) noexcept {
     const S d = P.xx - P.yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2) * P.xy * cs;
     const S xx = P.xx - k, xy = d * cs + P.xy * (S(1) - S(2) * ss), yy = P.yy + k;
     const S hx = x.c * P.wx - x.s * P.wy, hy = x.s * P.wx + x.c * P.wy;
@@ -71,7 +79,18 @@ struct Planar {
     const S wx = hx + x.px * xy - x.py * xx, wy = hy + x.px * yy - x.py * xy;
     return {P.ww + x.px * (hy + wy) - x.py * (hx + wx), wx, wy, xx, xy, yy};
   }
-  static Operator to_parent(const Link&, const Placement& x, const Operator& P) noexcept {
+  /// Behind a revolute joint without rotor inertia the row and column of w are gone.
+  HAMELIN_INLINE static Inertia carried(const Link& l, const Placement& x, const Inertia& P, const Force& u,
+                                        S inv_d) noexcept {
+    Inertia rest = P;
+    subtract_outer(rest, u, inv_d);
+    if (l.prismatic || l.armature != 0.0) return to_parent(l, x, rest);
+    const S d = rest.xx - rest.yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2) * rest.xy * cs;
+    const S xx = rest.xx - k, xy = d * cs + rest.xy * (S(1) - S(2) * ss), yy = rest.yy + k;
+    const S wx = x.px * xy - x.py * xx, wy = x.px * yy - x.py * xy;
+    return {x.px * wy - x.py * wx, wx, wy, xx, xy, yy};
+  }
+  HAMELIN_INLINE static Operator to_parent(const Link&, const Placement& x, const Operator& P) noexcept {
     const auto turn = [&](S a, S b, S& u, S& v) {
       u = x.c * a - x.s * b;
       v = x.s * a + x.c * b;
@@ -97,90 +116,122 @@ struct Planar {
             Q.yx,
             Q.yy};
   }
-  static Moment to_parent(const Link&, const Placement& x, const Moment& k) noexcept {
+  HAMELIN_INLINE static Moment to_parent(const Link&, const Placement& x, const Moment& k) noexcept {
     return {k.m, x.c * k.x - x.s * k.y + x.px * k.m, x.s * k.x + x.c * k.y + x.py * k.m};
   }
 
-  static Motion axis(const Link& l) noexcept {
+  HAMELIN_INLINE static Motion axis(const Link& l) noexcept {
     return l.prismatic ? Motion{S(0), S(1), S(0)} : Motion{S(l.direction), S(0), S(0)};
   }
-  static S along_axis(const Link& l, const Force& f) noexcept { return l.prismatic ? f.x : l.direction * f.t; }
-  static void add_along_axis(const Link& l, Motion& m, S k) noexcept {
+  HAMELIN_INLINE static S along_axis(const Link& l, const Force& f) noexcept {
+    return l.prismatic ? f.x : l.direction * f.t;
+  }
+  HAMELIN_INLINE static void add_along_axis(const Link& l, Motion& m, S k) noexcept {
     if (l.prismatic)
       m.x += k;
     else
       m.w += l.direction * k;
   }
-  static Force column(const Link& l, const Inertia& P) noexcept {
+  HAMELIN_INLINE static Force column(const Link& l, const Inertia& P) noexcept {
     if (l.prismatic) return {P.wx, P.xx, P.xy};
     return {l.direction * P.ww, l.direction * P.wx, l.direction * P.wy};
   }
 
-  static Inertia rigid(const Link& l) noexcept {
+  HAMELIN_INLINE static Inertia rigid(const Link& l) noexcept {
     return {S(l.inertia), S(-l.moment_y), S(l.moment_x), S(l.mass), S(0), S(l.mass)};
   }
-  static Operator general(const Inertia& P) noexcept { return {P.ww, P.wx, P.wy, P.wx, P.xx, P.xy, P.wy, P.xy, P.yy}; }
-  static Moment moment(const Link& l) noexcept { return {S(l.mass), S(l.moment_x), S(l.moment_y)}; }
-  static Force momentum(const Link& l, const Motion& m) noexcept { return times(rigid(l), m); }
+  HAMELIN_INLINE static Inertia no_inertia() noexcept { return {S(0), S(0), S(0), S(0), S(0), S(0)}; }
+  HAMELIN_INLINE static void add_rigid(const Link& l, Inertia& P) noexcept {
+    P.ww += S(l.inertia);
+    P.wx -= S(l.moment_y);
+    P.wy += S(l.moment_x);
+    P.xx += S(l.mass);
+    P.yy += S(l.mass);
+  }
+  HAMELIN_INLINE static Operator general(const Inertia& P) noexcept {
+    return {P.ww, P.wx, P.wy, P.wx, P.xx, P.xy, P.wy, P.xy, P.yy};
+  }
+  HAMELIN_INLINE static Moment moment(const Link& l) noexcept { return {S(l.mass), S(l.moment_x), S(l.moment_y)}; }
+  HAMELIN_INLINE static Force momentum(const Link& l, const Motion& m) noexcept { return times(rigid(l), m); }
 
-  static Force times(const Inertia& P, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force times(const Inertia& P, const Motion& m) noexcept {
     return {P.ww * m.w + P.wx * m.x + P.wy * m.y, P.wx * m.w + P.xx * m.x + P.xy * m.y,
             P.wy * m.w + P.xy * m.x + P.yy * m.y};
   }
-  static Force times(const Operator& P, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force times(const Operator& P, const Motion& m) noexcept {
     return {P.ww * m.w + P.wx * m.x + P.wy * m.y, P.xw * m.w + P.xx * m.x + P.xy * m.y,
             P.yw * m.w + P.yx * m.x + P.yy * m.y};
   }
-  static Force transposed_times(const Operator& P, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force transposed_times(const Operator& P, const Motion& m) noexcept {
     return {P.ww * m.w + P.xw * m.x + P.yw * m.y, P.wx * m.w + P.xx * m.x + P.yx * m.y,
             P.wy * m.w + P.xy * m.x + P.yy * m.y};
   }
-  static void subtract_outer(Inertia& P, const Force& u, S k) noexcept {
+  HAMELIN_INLINE static void subtract_outer(Inertia& P, const Force& u, S k) noexcept {
     const Force a = scaled(u, k);
     P = {P.ww - a.t * u.t, P.wx - a.t * u.x, P.wy - a.t * u.y, P.xx - a.x * u.x, P.xy - a.x * u.y, P.yy - a.y * u.y};
   }
-  static void subtract_outer(Operator& P, const Force& u, const Force& w) noexcept {
+  HAMELIN_INLINE static void subtract_outer(Operator& P, const Force& u, const Force& w) noexcept {
     P = {P.ww - u.t * w.t, P.wx - u.t * w.x, P.wy - u.t * w.y, P.xw - u.x * w.t, P.xx - u.x * w.x,
          P.xy - u.x * w.y, P.yw - u.y * w.t, P.yx - u.y * w.x, P.yy - u.y * w.y};
   }
-  static void add(Inertia& P, const Inertia& Q) noexcept {
+  HAMELIN_INLINE static void add(Inertia& P, const Inertia& Q) noexcept {
     P = {P.ww + Q.ww, P.wx + Q.wx, P.wy + Q.wy, P.xx + Q.xx, P.xy + Q.xy, P.yy + Q.yy};
   }
-  static void add(Operator& P, const Operator& Q) noexcept {
+  HAMELIN_INLINE static void add(Operator& P, const Operator& Q) noexcept {
     P = {P.ww + Q.ww, P.wx + Q.wx, P.wy + Q.wy, P.xw + Q.xw, P.xx + Q.xx,
          P.xy + Q.xy, P.yw + Q.yw, P.yx + Q.yx, P.yy + Q.yy};
   }
-  static void add(Moment& k, const Moment& j) noexcept { k = {k.m + j.m, k.x + j.x, k.y + j.y}; }
+  HAMELIN_INLINE static void add(Moment& k, const Moment& j) noexcept { k = {k.m + j.m, k.x + j.x, k.y + j.y}; }
 
-  static Motion ad(const Motion& a, const Motion& b) noexcept {
+  HAMELIN_INLINE static Motion ad(const Motion& a, const Motion& b) noexcept {
     return {S(0), a.y * b.w - a.w * b.y, a.w * b.x - a.x * b.w};
   }
-  static Force ad_T(const Motion& a, const Force& f) noexcept {
+  HAMELIN_INLINE static Force ad_T(const Motion& a, const Force& f) noexcept {
     return {a.y * f.x - a.x * f.y, a.w * f.y, -(a.w * f.x)};
   }
-  static S pair(const Motion& m, const Force& f) noexcept { return m.w * f.t + m.x * f.x + m.y * f.y; }
+  HAMELIN_INLINE static S pair(const Motion& m, const Force& f) noexcept { return m.w * f.t + m.x * f.x + m.y * f.y; }
 
-  static Flow advance(const Link& l, const Placement& x, const Flow& parent, S v, S a) noexcept {
-    const S ww = parent.w * parent.w;
-    const S ax = parent.ax - parent.dw * x.py - ww * x.px, ay = parent.ay + parent.dw * x.px - ww * x.py;
-    Flow out{parent.w, parent.dw, x.c * ax + x.s * ay, x.c * ay - x.s * ax};
+  HAMELIN_INLINE static S turning(const Link& l, const Motion& X, const Force& lambda) noexcept {
+    if (l.prismatic) return lambda.y * X.w;  // [X, e_x] = (0; 0, w)
+    return (lambda.x * X.y - lambda.y * X.x) * l.direction;
+  }
+
+  HAMELIN_INLINE static Flow advance(const Link& l, const Placement& x, const Flow& parent, S v, S a) noexcept {
+    const S ax = parent.ax - parent.dw * x.py - parent.ww * x.px, ay = parent.ay + parent.dw * x.px - parent.ww * x.py;
+    Flow out{parent.w, parent.dw, x.c * ax + x.s * ay, x.c * ay - x.s * ax, parent.ww};
     if (l.prismatic) {
       out.ax += a;
       out.ay += S(2) * parent.w * v;
     } else {
-      out.w += l.direction * v;
-      out.dw += l.direction * a;
+      out.w += v * l.direction;
+      out.dw += a * l.direction;
+      out.ww = out.w * out.w;
     }
     return out;
   }
-  static Force inertial_force(const Link& l, const Flow& k) noexcept {
-    const S ww = k.w * k.w;
-    return {l.inertia * k.dw + l.moment_x * k.ay - l.moment_y * k.ax,
-            l.mass * k.ax - k.dw * l.moment_y - ww * l.moment_x, l.mass * k.ay + k.dw * l.moment_x - ww * l.moment_y};
+  HAMELIN_INLINE static Force inertial_force(const Link& l, const Flow& k) noexcept {
+    return {k.dw * l.inertia + k.ay * l.moment_x - k.ax * l.moment_y,
+            k.ax * l.mass - k.dw * l.moment_y - k.ww * l.moment_x,
+            k.ay * l.mass + k.dw * l.moment_x - k.ww * l.moment_y};
   }
-  static S potential(const Chain& chain, const Moment& k) noexcept {
-    return -(chain.gravity_x * k.x + chain.gravity_y * k.y);
+  HAMELIN_INLINE static S potential(const Chain& chain, const Moment& k) noexcept {
+    return -(k.x * chain.gravity_x + k.y * chain.gravity_y);
+  }
+
+  struct Direction {
+    S x, y;
+  };
+  HAMELIN_INLINE static Direction to_child(const Link&, const Placement& x, const Direction& d) noexcept {
+    return {x.c * d.x + x.s * d.y, x.c * d.y - x.s * d.x};
+  }
+  HAMELIN_INLINE static Direction gravity(const Chain& chain) noexcept {
+    return {S(chain.gravity_x), S(chain.gravity_y)};
+  }
+  HAMELIN_INLINE static Moment no_moment() noexcept { return {S(0), S(0), S(0)}; }
+  HAMELIN_INLINE static S falling(const Link& l, const Direction& g, const Moment& k) noexcept {
+    return l.prismatic ? k.m * g.x : (k.x * g.y - k.y * g.x) * l.direction;
   }
 };
 
+}  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics::kernel

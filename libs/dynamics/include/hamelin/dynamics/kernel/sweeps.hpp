@@ -1,200 +1,316 @@
 #pragma once
 #include <cstddef>
-#include <vector>
 
-/// The recursive algorithms, written once over the group (kernel/spatial.hpp, kernel/planar.hpp) and the scalar.
-/// Links come parents first; outward sweeps read the parent's entry, inward sweeps add to it.
+#include "hamelin/dynamics/kernel/lanes.hpp"
+
+/// The recursive algorithms, written once over the group (kernel/spatial.hpp, kernel/planar.hpp) and the scalar. Links
+/// come root first and each is the parent of the next, so what a sweep hands on stays in registers.
 namespace hamelin::dynamics::kernel {
+inline namespace HAMELIN_ISA_NAMESPACE {
 
 /// Scratch of one link. Which members hold what is said at each sweep.
 template <class Space>
 struct LinkScratch {
-  typename Space::Placement x{};
-  typename Space::Flow flow{};
-  typename Space::Motion motion{};
-  typename Space::Force force{}, column{};
-  typename Space::Inertia inertia{};
-  typename Space::Moment moment{};
-  typename Space::Scalar inv_d{}, u{};
+  typename Space::Placement x;
+  typename Space::Motion motion;
+  typename Space::Force force, column;
+  typename Space::Direction down;
+  typename Space::Scalar inv_d, u;
 };
 
+/// Room for a chain, laid out in memory that the caller owns: nothing here allocates.
 template <class Space>
-using Scratch = std::vector<LinkScratch<Space>>;
+struct Scratch {
+  using S = typename Space::Scalar;
+
+  LinkScratch<Space>* links;
+  S *angle, *sine, *cosine;  ///< room for a multiple of native_lanes
+
+  static constexpr std::size_t alignment = 64;
+  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept { return (n + 7) & ~std::size_t{7}; }
+  HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
+    return 3 * padded(n) * sizeof(S) + n * sizeof(LinkScratch<Space>);
+  }
+  HAMELIN_INLINE static Scratch at(void* memory, std::size_t n) noexcept {
+    S* const numbers = static_cast<S*>(memory);
+    for (std::size_t i = n; i < padded(n); ++i) numbers[i] = S(0.0);
+    return {reinterpret_cast<LinkScratch<Space>*>(numbers + 3 * padded(n)), numbers, numbers + padded(n),
+            numbers + 2 * padded(n)};
+  }
+  HAMELIN_INLINE LinkScratch<Space>& operator[](std::size_t i) const noexcept { return links[i]; }
+};
+
+/// A chain's links as the sweeps read them.
+template <class Space>
+HAMELIN_INLINE const typename Space::Link* links_of(const typename Space::Chain& chain) noexcept {
+  return chain.links.data();
+}
+template <class Space>
+HAMELIN_INLINE std::size_t count(const typename Space::Chain& chain) noexcept {
+  return chain.links.size();
+}
 
 /// Places all frames at q.
 template <class Space>
-void place(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q) noexcept {
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].x = Space::place(chain.links[i], q[i]);
+HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Space>& k,
+                          const typename Space::Scalar* q) noexcept {
+  const std::size_t n = count<Space>(chain);
+  const auto* const links = links_of<Space>(chain);
+  for (std::size_t i = 0; i < n; ++i) k.angle[i] = Space::angle(links[i], q[i]);
+  sincos(n, k.angle, k.sine, k.cosine);
+  for (std::size_t i = 0; i < n; ++i) k[i].x = Space::place(links[i], q[i], k.sine[i], k.cosine[i]);
 }
 
 /// Newton–Euler outwards (5): force[i] = the wrench link i needs for itself. v, a may be null (zero).
 template <class Space>
-void inertial_forces(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* v,
-                     const typename Space::Scalar* a) noexcept {
+HAMELIN_INLINE void inertial_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
+                                    const typename Space::Scalar* v, const typename Space::Scalar* a) noexcept {
   using S = typename Space::Scalar;
-  const auto root = Space::root_flow(chain);
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    const auto& l = chain.links[i];
-    const auto& parent = l.parent < 0 ? root : k[static_cast<std::size_t>(l.parent)].flow;
-    k[i].flow = Space::advance(l, k[i].x, parent, v == nullptr ? S(0) : v[i], a == nullptr ? S(0) : a[i]);
-    k[i].force = Space::inertial_force(l, k[i].flow);
+  const auto* const links = links_of<Space>(chain);
+  auto flow = Space::root_flow(chain);
+  for (std::size_t i = 0; i < count<Space>(chain); ++i) {
+    flow = Space::advance(links[i], k[i].x, flow, v == nullptr ? S(0.0) : v[i], a == nullptr ? S(0.0) : a[i]);
+    k[i].force = Space::inertial_force(links[i], flow);
   }
 }
 
-/// (8) inwards: sums force[] from the tips and reads tau[i] = A_i · f_i, (6).
+/// (8) inwards: sums force[] from the tip, reads tau[i] = A_i · f_i (6), and adds what rotors take, armature · a.
 template <class Space>
-void gather_forces(const typename Space::Chain& chain, Scratch<Space>& k, typename Space::Scalar* tau) noexcept {
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    tau[i] = Space::along_axis(l, k[i].force);
-    if (l.parent < 0) continue;
-    auto& outer = k[static_cast<std::size_t>(l.parent)].force;
-    outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
+HAMELIN_INLINE void gather_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
+                                  const typename Space::Scalar* a, typename Space::Scalar* tau) noexcept {
+  const auto* const links = links_of<Space>(chain);
+  auto carried = Space::zero_force();
+  for (std::size_t i = count<Space>(chain); i-- > 0;) {
+    const auto& l = links[i];
+    const auto f = Space::sum(k[i].force, carried);
+    tau[i] = Space::along_axis(l, f);
+    if (a != nullptr) tau[i] += a[i] * l.armature;
+    if (i > 0) carried = Space::to_parent(l, k[i].x, f);
   }
 }
 
 template <class Space>
-void inverse_dynamics(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q,
+void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
                       const typename Space::Scalar* v, const typename Space::Scalar* a,
                       typename Space::Scalar* tau) noexcept {
   place(chain, k, q);
   inertial_forces(chain, k, v, a);
-  gather_forces(chain, k, tau);
+  gather_forces(chain, k, a, tau);
 }
 
-/// Articulated inertias inwards: inertia[i], column[i] = P A, inv_d[i] = 1/(A·PA). Placements must stand.
+/// One link of the articulated-body recursion: P comes in as what the links outboard hand over and leaves as what this
+/// one hands to its parent. column[i] = P A, inv_d[i] = 1/(A·P A + armature).
 template <class Space>
-void factor(const typename Space::Chain& chain, Scratch<Space>& k) noexcept {
+HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
+                               typename Space::Inertia& P) noexcept {
   using S = typename Space::Scalar;
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].inertia = Space::rigid(chain.links[i]);
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    k[i].column = Space::column(l, k[i].inertia);
-    k[i].inv_d = S(1) / Space::along_axis(l, k[i].column);
-    if (l.parent < 0) continue;
-    auto rest = k[i].inertia;
-    Space::subtract_outer(rest, k[i].column, k[i].inv_d);
-    Space::add(k[static_cast<std::size_t>(l.parent)].inertia, Space::to_parent(l, k[i].x, rest));
-  }
+  Space::add_rigid(l, P);
+  link.column = Space::column(l, P);
+  link.inv_d = S(1.0) / (Space::along_axis(l, link.column) + l.armature);
+  if (!root) P = Space::carried(l, link.x, P, link.column, link.inv_d);
 }
 
-/// x = M⁻¹(y − gathered force[]), after factor. force[] is consumed; set it to zero for a plain solve.
+/// One link of the solve: bias comes in as what outboard links hand over. u[i] = (y − A·bias)/d.
 template <class Space>
-void solve_factored(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* y,
-                    typename Space::Scalar* x) noexcept {
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    k[i].u = (y[i] - Space::along_axis(l, k[i].force)) * k[i].inv_d;
-    if (l.parent < 0) continue;
-    const auto carried = Space::sum(k[i].force, Space::scaled(k[i].column, k[i].u));
-    auto& outer = k[static_cast<std::size_t>(l.parent)].force;
-    outer = Space::sum(outer, Space::to_parent(l, k[i].x, carried));
-  }
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    const auto& l = chain.links[i];
-    auto m =
-        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
-    x[i] = k[i].u - k[i].inv_d * Space::pair(m, k[i].column);
+HAMELIN_INLINE void eliminate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
+                              typename Space::Scalar y, typename Space::Force& bias) noexcept {
+  link.u = (y - Space::along_axis(l, bias)) * link.inv_d;
+  if (!root) bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, link.u)));
+}
+
+/// Outwards after the elimination: x[i], and the twists that the x are rates of, on their way: visit(i, X_i) sees
+/// X_i = Ad(g⁻¹) ξ_{i−1} before the joint's own rate is added.
+template <class Space, class Visit>
+HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch<Space>& k, typename Space::Scalar* x,
+                               Visit&& visit) noexcept {
+  const auto* const links = links_of<Space>(chain);
+  auto twist = Space::zero_motion();
+  for (std::size_t i = 0; i < count<Space>(chain); ++i) {
+    const auto& l = links[i];
+    const auto& link = k[i];
+    auto m = i == 0 ? twist : Space::to_child(l, link.x, twist);
+    x[i] = link.u - link.inv_d * Space::pair(m, link.column);
+    visit(i, m);
     Space::add_along_axis(l, m, x[i]);
-    k[i].motion = m;
+    twist = m;
   }
 }
 
+/// Articulated inertias inwards, kept for solve_factored. Placements must stand.
 template <class Space>
-void forward_dynamics(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q,
+HAMELIN_INLINE void factor(const typename Space::Chain& chain, const Scratch<Space>& k) noexcept {
+  auto P = Space::no_inertia();
+  for (std::size_t i = count<Space>(chain); i-- > 0;) articulate<Space>(links_of<Space>(chain)[i], k[i], i == 0, P);
+}
+
+/// x = M⁻¹ y after factor. x may be y.
+template <class Space>
+HAMELIN_INLINE void solve_factored(const typename Space::Chain& chain, const Scratch<Space>& k,
+                                   const typename Space::Scalar* y, typename Space::Scalar* x) noexcept {
+  auto bias = Space::zero_force();
+  for (std::size_t i = count<Space>(chain); i-- > 0;)
+    eliminate<Space>(links_of<Space>(chain)[i], k[i], i == 0, y[i], bias);
+  substitute<Space>(chain, k, x, [](std::size_t, const auto&) {});
+}
+
+/// a = M⁻¹(τ − C v − ∂U): Newton–Euler bias outwards, articulated bodies inwards, accelerations outwards.
+template <class Space>
+void forward_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
                       const typename Space::Scalar* v, const typename Space::Scalar* tau,
                       typename Space::Scalar* a) noexcept {
   place(chain, k, q);
   inertial_forces(chain, k, v, static_cast<const typename Space::Scalar*>(nullptr));
-  factor(chain, k);
-  solve_factored(chain, k, tau, a);
+  auto P = Space::no_inertia();
+  auto bias = Space::zero_force();
+  for (std::size_t i = count<Space>(chain); i-- > 0;) {
+    const auto& l = links_of<Space>(chain)[i];
+    articulate<Space>(l, k[i], i == 0, P);
+    bias = Space::sum(bias, k[i].force);
+    eliminate<Space>(l, k[i], i == 0, tau[i], bias);
+  }
+  substitute<Space>(chain, k, a, [](std::size_t, const auto&) {});
 }
 
 template <class Space>
-void solve_mass(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q,
+void solve_mass(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
                 const typename Space::Scalar* y, typename Space::Scalar* x) noexcept {
   place(chain, k, q);
-  factor(chain, k);
-  for (auto& link : k) link.force = Space::zero_force();
-  solve_factored(chain, k, y, x);
+  auto P = Space::no_inertia();
+  auto bias = Space::zero_force();
+  for (std::size_t i = count<Space>(chain); i-- > 0;) {
+    const auto& l = links_of<Space>(chain)[i];
+    articulate<Space>(l, k[i], i == 0, P);
+    eliminate<Space>(l, k[i], i == 0, y[i], bias);
+  }
+  substitute<Space>(chain, k, x, [](std::size_t, const auto&) {});
+}
+
+/// Hamilton's equations for the momenta p = M v: v = M⁻¹ p by articulated bodies, then
+///   ṗ_i = λ_i · ad(X_i) A_i − ∂U_i  with  λ_i = I_i ξ_i + Adᵀ λ_{i+1}  (SPEC §3; the kinetic part is −∂(½ pᵀM⁻¹p)).
+/// No Newton–Euler bias is needed, so it costs less than forward dynamics. Leaves the twists ξ_i in motion[].
+template <class Space>
+HAMELIN_INLINE void hamilton(const typename Space::Chain& chain, const Scratch<Space>& k,
+                             const typename Space::Scalar* q, const typename Space::Scalar* p,
+                             typename Space::Scalar* v, typename Space::Scalar* p_rate) noexcept {
+  place(chain, k, q);
+  const auto* const links = links_of<Space>(chain);
+  const std::size_t n = count<Space>(chain);
+  auto P = Space::no_inertia();
+  auto bias = Space::zero_force();
+  for (std::size_t i = n; i-- > 0;) {
+    articulate<Space>(links[i], k[i], i == 0, P);
+    eliminate<Space>(links[i], k[i], i == 0, p[i], bias);
+  }
+  auto down = Space::gravity(chain);
+  substitute<Space>(chain, k, v, [&](std::size_t i, const auto& X) {
+    down = Space::to_child(links[i], k[i].x, down);
+    k[i].down = down;
+    k[i].motion = X;
+  });
+  auto lambda = Space::zero_force();
+  auto moment = Space::no_moment();
+  for (std::size_t i = n; i-- > 0;) {
+    const auto& l = links[i];
+    const auto X = k[i].motion;
+    Space::add_along_axis(l, k[i].motion, v[i]);
+    lambda = Space::sum(lambda, Space::momentum(l, k[i].motion));
+    Space::add(moment, Space::moment(l));
+    p_rate[i] = Space::turning(l, X, lambda) + Space::falling(l, k[i].down, moment);
+    if (i == 0) break;
+    lambda = Space::to_parent(l, k[i].x, lambda);
+    moment = Space::to_parent(l, k[i].x, moment);
+  }
+}
+
+/// ∂U(q).
+template <class Space>
+void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
+                    typename Space::Scalar* tau) noexcept {
+  place(chain, k, q);
+  const auto* const links = links_of<Space>(chain);
+  const std::size_t n = count<Space>(chain);
+  auto down = Space::gravity(chain);
+  for (std::size_t i = 0; i < n; ++i) k[i].down = down = Space::to_child(links[i], k[i].x, down);
+  auto moment = Space::no_moment();
+  for (std::size_t i = n; i-- > 0;) {
+    Space::add(moment, Space::moment(links[i]));
+    tau[i] = -Space::falling(links[i], k[i].down, moment);
+    if (i > 0) moment = Space::to_parent(links[i], k[i].x, moment);
+  }
 }
 
 /// Body twists (5) at placements that stand: motion[i].
 template <class Space>
-void twists(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* v) noexcept {
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    const auto& l = chain.links[i];
-    auto m =
-        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, k[i].x, k[static_cast<std::size_t>(l.parent)].motion);
-    Space::add_along_axis(l, m, v[i]);
+HAMELIN_INLINE void twists(const typename Space::Chain& chain, const Scratch<Space>& k,
+                           const typename Space::Scalar* v) noexcept {
+  const auto* const links = links_of<Space>(chain);
+  auto m = Space::zero_motion();
+  for (std::size_t i = 0; i < count<Space>(chain); ++i) {
+    if (i > 0) m = Space::to_child(links[i], k[i].x, m);
+    Space::add_along_axis(links[i], m, v[i]);
     k[i].motion = m;
   }
 }
 
-/// p = M v; leaves the momentum of each link's outboard part in force[].
+/// p = M v.
 template <class Space>
-void momentum(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q,
+void momentum(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
               const typename Space::Scalar* v, typename Space::Scalar* p) noexcept {
   place(chain, k, q);
   twists(chain, k, v);
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].force = Space::momentum(chain.links[i], k[i].motion);
-  gather_forces(chain, k, p);
+  for (std::size_t i = 0; i < count<Space>(chain); ++i)
+    k[i].force = Space::momentum(links_of<Space>(chain)[i], k[i].motion);
+  gather_forces(chain, k, v, p);
 }
 
 template <class Space>
-typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, Scratch<Space>& k,
+typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, const Scratch<Space>& k,
                                       const typename Space::Scalar* q, const typename Space::Scalar* v) noexcept {
   using S = typename Space::Scalar;
   place(chain, k, q);
   twists(chain, k, v);
-  S twice = S(0);
-  for (std::size_t i = 0; i < k.size(); ++i)
-    twice += Space::pair(k[i].motion, Space::momentum(chain.links[i], k[i].motion));
+  S twice = S(0.0);
+  for (std::size_t i = 0; i < count<Space>(chain); ++i) {
+    const auto& l = links_of<Space>(chain)[i];
+    twice += Space::pair(k[i].motion, Space::momentum(l, k[i].motion)) + v[i] * v[i] * l.armature;
+  }
   return S(0.5) * twice;
 }
 
 /// −Σ m g·(position − root): mass moments gathered inwards.
 template <class Space>
-typename Space::Scalar potential_energy(const typename Space::Chain& chain, Scratch<Space>& k,
+typename Space::Scalar potential_energy(const typename Space::Chain& chain, const Scratch<Space>& k,
                                         const typename Space::Scalar* q) noexcept {
-  using S = typename Space::Scalar;
   place(chain, k, q);
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].moment = Space::moment(chain.links[i]);
-  S energy = S(0);
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    const auto carried = Space::to_parent(l, k[i].x, k[i].moment);
-    if (l.parent < 0)
-      energy += Space::potential(chain, carried);
-    else
-      Space::add(k[static_cast<std::size_t>(l.parent)].moment, carried);
+  auto moment = Space::no_moment();
+  for (std::size_t i = count<Space>(chain); i-- > 0;) {
+    const auto& l = links_of<Space>(chain)[i];
+    Space::add(moment, Space::moment(l));
+    moment = Space::to_parent(l, k[i].x, moment);
   }
-  return energy;
+  return Space::potential(chain, moment);
 }
 
 /// Composite inertias inwards, then one column of M a link; `M` is column-major with leading dimension `ld`.
 template <class Space>
-void mass_matrix(const typename Space::Chain& chain, Scratch<Space>& k, const typename Space::Scalar* q,
+void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
                  typename Space::Scalar* M, std::size_t ld) noexcept {
-  using S = typename Space::Scalar;
   place(chain, k, q);
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].inertia = Space::rigid(chain.links[i]);
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    for (std::size_t j = 0; j < k.size(); ++j) M[i * ld + j] = S(0);
-    if (l.parent >= 0)
-      Space::add(k[static_cast<std::size_t>(l.parent)].inertia, Space::to_parent(l, k[i].x, k[i].inertia));
-  }
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    auto f = Space::column(chain.links[i], k[i].inertia);
-    for (std::size_t j = i;;) {
-      const auto& l = chain.links[j];
-      M[i * ld + j] = M[j * ld + i] = Space::along_axis(l, f);
-      if (l.parent < 0) break;
-      f = Space::to_parent(l, k[j].x, f);
-      j = static_cast<std::size_t>(l.parent);
+  const auto* const links = links_of<Space>(chain);
+  const std::size_t n = count<Space>(chain);
+  auto composite = Space::no_inertia();
+  for (std::size_t i = n; i-- > 0;) {
+    Space::add_rigid(links[i], composite);
+    auto f = Space::column(links[i], composite);
+    for (std::size_t j = i;; --j) {
+      M[i * ld + j] = M[j * ld + i] = Space::along_axis(links[j], f);
+      if (j == 0) break;
+      f = Space::to_parent(links[j], k[j].x, f);
     }
+    M[i * ld + i] += links[i].armature;
+    if (i > 0) composite = Space::to_parent(links[i], k[i].x, composite);
   }
 }
 
+}  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics::kernel

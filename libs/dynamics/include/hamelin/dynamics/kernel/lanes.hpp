@@ -1,0 +1,160 @@
+#pragma once
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "hamelin/geometry/small.hpp"
+
+/// Everything in kernel/ is compiled once for each instruction set (core/isa.hpp) and linked into one program. So that
+/// no copy meant for one of them serves another, it lives in an inline namespace named after the set, and what is used
+/// from outside (std, geometry) must be inlined. Sources that are compiled more than once get the name from CMake.
+#ifndef HAMELIN_ISA_NAMESPACE
+#define HAMELIN_ISA_NAMESPACE isa_baseline
+#endif
+
+namespace hamelin::dynamics::kernel {
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+/// How many doubles a register holds.
+#if defined(__AVX512F__)
+inline constexpr int native_lanes = 8;
+#elif defined(__AVX2__)
+inline constexpr int native_lanes = 4;
+#else
+inline constexpr int native_lanes = 2;
+#endif
+
+template <int W>
+struct NativeVector;
+template <>
+struct NativeVector<2> {
+  typedef double Real __attribute__((vector_size(16)));
+  typedef std::int64_t Bits __attribute__((vector_size(16)));
+};
+template <>
+struct NativeVector<4> {
+  typedef double Real __attribute__((vector_size(32)));
+  typedef std::int64_t Bits __attribute__((vector_size(32)));
+};
+template <>
+struct NativeVector<8> {
+  typedef double Real __attribute__((vector_size(64)));
+  typedef std::int64_t Bits __attribute__((vector_size(64)));
+};
+
+/// W independent numbers in one register: a scalar to the sweeps, which then treat W states at once. W must not exceed
+/// native_lanes: a wider vector is lowered through memory.
+template <int W>
+struct Lanes {
+  using Real = typename NativeVector<W>::Real;
+  using Bits = typename NativeVector<W>::Bits;
+
+  Real v;
+
+  HAMELIN_INLINE Lanes() = default;
+  HAMELIN_INLINE Lanes(Real x) noexcept : v(x) {}
+  /// The same number in all lanes.
+  HAMELIN_INLINE Lanes(double x) noexcept {
+    if constexpr (W == 2)
+      v = Real{x, x};
+    else if constexpr (W == 4)
+      v = Real{x, x, x, x};
+    else
+      v = Real{x, x, x, x, x, x, x, x};
+  }
+
+  HAMELIN_INLINE static Lanes load(const double* x) noexcept {
+    Lanes out;
+    __builtin_memcpy(&out.v, x, sizeof(Real));
+    return out;
+  }
+  HAMELIN_INLINE void store(double* x) const noexcept { __builtin_memcpy(x, &v, sizeof(Real)); }
+  HAMELIN_INLINE double operator[](int lane) const noexcept { return v[lane]; }
+
+  HAMELIN_INLINE Lanes& operator+=(Lanes b) noexcept { return *this = {v + b.v}; }
+  HAMELIN_INLINE Lanes& operator-=(Lanes b) noexcept { return *this = {v - b.v}; }
+  HAMELIN_INLINE Lanes& operator*=(Lanes b) noexcept { return *this = {v * b.v}; }
+  HAMELIN_INLINE friend Lanes operator+(Lanes a, Lanes b) noexcept { return {a.v + b.v}; }
+  HAMELIN_INLINE friend Lanes operator-(Lanes a, Lanes b) noexcept { return {a.v - b.v}; }
+  HAMELIN_INLINE friend Lanes operator*(Lanes a, Lanes b) noexcept { return {a.v * b.v}; }
+  HAMELIN_INLINE friend Lanes operator/(Lanes a, Lanes b) noexcept { return {a.v / b.v}; }
+  HAMELIN_INLINE friend Lanes operator-(Lanes a) noexcept { return {-a.v}; }
+};
+
+template <int W>
+HAMELIN_INLINE Lanes<W> abs(Lanes<W> a) noexcept {
+  return {a.v < 0.0 ? -a.v : a.v};
+}
+/// Lane by lane; a lane of a that is no number yields it, so that it is seen.
+template <int W>
+HAMELIN_INLINE Lanes<W> max(Lanes<W> a, Lanes<W> b) noexcept {
+  return {a.v <= b.v ? b.v : a.v};
+}
+template <int W>
+HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
+  double most = a[0];
+  for (int i = 1; i < W; ++i) most = most <= a[i] ? a[i] : most;
+  return most;
+}
+
+/// Beyond this [rad] the reduction below loses digits, and the C library takes over.
+inline constexpr double largest_reduced_angle = 1e6;
+
+/// Sine and cosine of all lanes to about one unit in the last place, without a branch for |x| ≤ 1e6: reduction to
+/// [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of fdlibm's kernels.
+template <int W>
+HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
+  using Real = typename Lanes<W>::Real;
+  using Bits = typename Lanes<W>::Bits;
+  const Real x = angle.v;
+  if (__builtin_expect(!(largest(abs(angle)) <= largest_reduced_angle), 0)) {
+    for (int i = 0; i < W; ++i) {
+      sine.v[i] = __builtin_sin(x[i]);
+      cosine.v[i] = __builtin_cos(x[i]);
+    }
+    return;
+  }
+  // adding 1.5·2^52 rounds to an integer and leaves it in the low bits
+  constexpr double to_integer = 6755399441055744.0;
+  const Real shifted = x * 0.63661977236758134308 + to_integer;
+  const Bits quadrant = reinterpret_cast<Bits>(shifted);
+  const Real turns = shifted - to_integer;
+  Real y = x - turns * 1.57079632673412561417e+00;
+  y = y - turns * 6.07710050630396597660e-11;
+  y = y - turns * 2.02226624879595063154e-21;
+  const Real z = y * y;
+  const Real s = y + y * z * (-1.66666666666666324348e-01 +
+                              z * (8.33333333332248946124e-03 +
+                                   z * (-1.98412698298579493134e-04 +
+                                        z * (2.75573137070700676789e-06 +
+                                             z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const Real c =
+      1.0 - (0.5 * z - z * z * (4.16666666666666019037e-02 +
+                                z * (-1.38888888888741095749e-03 +
+                                     z * (2.48015872894767294178e-05 +
+                                          z * (-2.75573143513906633035e-07 +
+                                               z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+  // odd quadrants exchange the two, and their signs turn with the quadrant
+  const Bits odd = (quadrant & 1) != 0;
+  const Real a = odd ? c : s, b = odd ? s : c;
+  sine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(a) ^ ((quadrant & 2) << 62));
+  cosine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(b) ^ (((quadrant + 1) & 2) << 62));
+}
+
+/// The same for arrays whose room is a multiple of `native_lanes`.
+HAMELIN_INLINE void sincos(std::size_t n, const double* angle, double* sine, double* cosine) noexcept {
+  using Pack = Lanes<native_lanes>;
+  for (std::size_t i = 0; i < n; i += static_cast<std::size_t>(native_lanes)) {
+    Pack s, c;
+    sincos(Pack::load(angle + i), s, c);
+    s.store(sine + i);
+    c.store(cosine + i);
+  }
+}
+template <int W>
+HAMELIN_INLINE void sincos(std::size_t n, const Lanes<W>* angle, Lanes<W>* sine, Lanes<W>* cosine) noexcept {
+  for (std::size_t i = 0; i < n; ++i) sincos(angle[i], sine[i], cosine[i]);
+}
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::dynamics::kernel

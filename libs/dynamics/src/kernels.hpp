@@ -1,0 +1,55 @@
+#pragma once
+#include <cstddef>
+
+#include <variant>
+
+#include "hamelin/core/isa.hpp"
+#include "hamelin/model/model.hpp"
+
+namespace hamelin::dynamics {
+
+/// The sweeps of kernel/sweeps.hpp for one group, compiled for one instruction set. `memory` is what `bytes` asks for,
+/// aligned to 64; joint vectors have one number a link. Batches have native_lanes states a packet: joint by joint, the
+/// numbers of all states side by side, `stride` apart from joint to joint.
+template <class Chain>
+struct Kernels {
+  std::size_t (*bytes)(std::size_t links) noexcept;
+  void (*inverse_dynamics)(const Chain&, void* memory, const double* q, const double* v, const double* a,
+                           double* tau) noexcept;
+  void (*forward_dynamics)(const Chain&, void* memory, const double* q, const double* v, const double* tau,
+                           double* a) noexcept;
+  void (*gravity_torque)(const Chain&, void* memory, const double* q, double* tau) noexcept;
+  void (*solve_mass)(const Chain&, void* memory, const double* q, const double* y, double* x) noexcept;
+  /// Leaves factors in memory for solve_factored.
+  void (*factor)(const Chain&, void* memory, const double* q) noexcept;
+  void (*solve_factored)(const Chain&, void* memory, const double* y, double* x) noexcept;
+  void (*momentum)(const Chain&, void* memory, const double* q, const double* v, double* p) noexcept;
+  double (*kinetic_energy)(const Chain&, void* memory, const double* q, const double* v) noexcept;
+  double (*potential_energy)(const Chain&, void* memory, const double* q) noexcept;
+  void (*mass_matrix)(const Chain&, void* memory, const double* q, double* M, std::size_t ld) noexcept;
+
+  std::size_t lanes;
+  std::size_t (*batch_bytes)(std::size_t links) noexcept;
+  void (*inverse_dynamics_batch)(const Chain&, void* memory, std::size_t states, std::size_t stride, const double* q,
+                                 const double* v, const double* a, double* tau) noexcept;
+  void (*forward_dynamics_batch)(const Chain&, void* memory, std::size_t states, std::size_t stride, const double* q,
+                                 const double* v, const double* tau, double* a) noexcept;
+};
+
+/// Both groups for one instruction set.
+struct KernelSet {
+  Kernels<model::SpatialChain> spatial;
+  Kernels<model::PlanarChain> planar;
+};
+
+/// The set that core's selected_isa() names.
+[[nodiscard]] const KernelSet& kernels();
+
+/// f(kernels, chain) for the group of this model: one branch a call, none inside.
+template <class F>
+decltype(auto) with_group(const model::Model& model, const KernelSet& set, F&& f) {
+  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) return f(set.planar, *planar);
+  return f(set.spatial, std::get<model::SpatialChain>(model.chain()));
+}
+
+}  // namespace hamelin::dynamics
