@@ -228,6 +228,14 @@ struct Planar {
     return {S(chain.gravity_x), S(chain.gravity_y)};
   }
   HAMELIN_INLINE static Moment no_moment() noexcept { return {S(0), S(0), S(0)}; }
+  /// Only the part along the plane's normal turns anything within it.
+  HAMELIN_INLINE static S spin_axis(const geometry::Vec3<double>& w) noexcept { return S(w.z); }
+  HAMELIN_INLINE static S to_child_axis(const Link&, const Placement&, S w) noexcept { return w; }
+  HAMELIN_INLINE static Force spin_force(S w, const geometry::Vec3<double>& p, const Motion& m) noexcept {
+    const S fx = -w * (m.y + m.w * p.x), fy = w * (m.x - m.w * p.y);
+    return {fy * p.x - fx * p.y, fx, fy};
+  }
+
   HAMELIN_INLINE static S falling(const Link& l, const Direction& g, const Moment& k) noexcept {
     return l.prismatic ? k.m * g.x : (k.x * g.y - k.y * g.x) * l.direction;
   }

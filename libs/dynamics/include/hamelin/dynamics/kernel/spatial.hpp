@@ -292,6 +292,17 @@ struct Spatial {
   using Direction = Vec3<S>;
   HAMELIN_INLINE static Direction gravity(const Chain& chain) noexcept { return vec(chain.gravity); }
   HAMELIN_INLINE static Moment no_moment() noexcept { return {S(0), vec({0, 0, 0})}; }
+
+  /// A gyroscopic coefficient w on its way out, and the wrench (p × f, f) of f = w × (velocity of point p).
+  HAMELIN_INLINE static Vec3<S> spin_axis(const Vec3<double>& w) noexcept { return vec(w); }
+  HAMELIN_INLINE static Vec3<S> to_child_axis(const Link& l, const Placement& x, const Vec3<S>& w) noexcept {
+    return to_child(l, x, w);
+  }
+  HAMELIN_INLINE static Force spin_force(const Vec3<S>& w, const Vec3<double>& point, const Motion& m) noexcept {
+    const Vec3<S> p = vec(point), f = cross(w, m.v + cross(m.w, p));
+    return {cross(p, f), f};
+  }
+
   /// −∂U of the joint, with gravity g in the link's frame and the outboard moment k.
   HAMELIN_INLINE static S falling(const Link& l, const Direction& g, const Moment& k) noexcept {
     return l.prismatic ? k.m * g.z : k.h.x * g.y - k.h.y * g.x;

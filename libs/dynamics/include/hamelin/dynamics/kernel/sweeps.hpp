@@ -222,6 +222,29 @@ HAMELIN_INLINE void hamilton(const typename Space::Chain& chain, const Scratch<S
   }
 }
 
+/// A gyroscopic term as the sweeps read it: the point in the link's joint-aligned frame, w in the root's axes.
+struct Spin {
+  std::size_t link;
+  geometry::Vec3<double> point, w;
+};
+
+/// Joint torques Σ J_pᵀ (w × J_p v) of gyroscopic terms, at placements and twists (motion[]) that stand.
+template <class Space>
+HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const Scratch<Space>& k, const Spin* spins,
+                                      std::size_t count_spins, typename Space::Scalar* tau) noexcept {
+  const auto* const links = links_of<Space>(chain);
+  const std::size_t n = count<Space>(chain);
+  for (std::size_t i = 0; i < n; ++i) k[i].force = Space::zero_force();
+  for (std::size_t s = 0; s < count_spins; ++s) {
+    const Spin& spin = spins[s];
+    auto w = Space::spin_axis(spin.w);
+    for (std::size_t i = 0; i <= spin.link; ++i) w = Space::to_child_axis(links[i], k[i].x, w);
+    auto& total = k[spin.link].force;
+    total = Space::sum(total, Space::spin_force(w, spin.point, k[spin.link].motion));
+  }
+  gather_forces(chain, k, static_cast<const typename Space::Scalar*>(nullptr), tau);
+}
+
 /// ∂U(q).
 template <class Space>
 void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,

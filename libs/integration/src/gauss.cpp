@@ -1,0 +1,227 @@
+#include "gauss.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "hamelin/core/isa.hpp"
+#include "spins.hpp"
+
+namespace hamelin::integration {
+
+namespace kernel {
+
+namespace isa_baseline {
+extern const GaussSet gauss_set;
+}
+#if defined(__x86_64__)
+namespace isa_v3 {
+extern const GaussSet gauss_set;
+}
+namespace isa_v4 {
+extern const GaussSet gauss_set;
+}
+#endif
+
+namespace {
+
+const GaussSet& gauss_kernels() {
+  switch (selected_isa()) {
+#if defined(__x86_64__)
+    case Isa::v4:
+      return isa_v4::gauss_set;
+    case Isa::v3:
+      return isa_v3::gauss_set;
+#endif
+    default:
+      return isa_baseline::gauss_set;
+  }
+}
+
+// Nodes are the roots of the Legendre polynomial P_s on [0, 1], by Newton; a_ij = ∫₀^{c_i} ℓ_j, which Gauss quadrature
+// of the same nodes does exactly. In long double, so that the rounded numbers are right.
+GaussTableau tableau(std::size_t s) {
+  using Real = long double;
+  GaussTableau t{};
+  t.stages = s;
+  Real x[most_stages], w[most_stages];
+  for (std::size_t i = 0; i < s; ++i) {
+    Real z = std::cos(std::numbers::pi_v<Real> * (static_cast<Real>(i) + 0.75L) / (static_cast<Real>(s) + 0.5L));
+    Real slope = 1.0L;
+    for (int newton = 0; newton < 50; ++newton) {
+      Real before = 1.0L, value = z;
+      for (std::size_t j = 2; j <= s; ++j) {
+        const auto k = static_cast<Real>(j);
+        const Real next = ((2.0L * k - 1.0L) * z * value - (k - 1.0L) * before) / k;
+        before = value;
+        value = next;
+      }
+      slope = static_cast<Real>(s) * (z * value - before) / (z * z - 1.0L);
+      z -= value / slope;
+    }
+    x[s - 1 - i] = 0.5L * (1.0L + z);
+    w[s - 1 - i] = 1.0L / ((1.0L - z * z) * slope * slope);
+  }
+  const auto basis = [&](std::size_t j, Real at) {
+    Real value = 1.0L;
+    for (std::size_t m = 0; m < s; ++m)
+      if (m != j) value *= (at - x[m]) / (x[j] - x[m]);
+    return value;
+  };
+  for (std::size_t j = 0; j < s; ++j) {
+    t.c[j] = static_cast<double>(x[j]);
+    t.b[j] = static_cast<double>(w[j]);
+    for (std::size_t i = 0; i < s; ++i) {
+      Real a = 0.0L;
+      for (std::size_t m = 0; m < s; ++m) a += w[m] * x[i] * basis(j, x[i] * x[m]);
+      t.a[i][j] = static_cast<double>(a);
+    }
+  }
+  return t;
+}
+
+}  // namespace
+
+}  // namespace kernel
+
+namespace {
+
+constexpr int default_order = 8;
+constexpr int max_sweeps = 60;
+constexpr int max_rejections = 60;
+// How far a step may follow the last one.
+constexpr double most = 1.5, least = 0.5;
+// Of the step error that is allowed, what the iteration may leave.
+constexpr double iteration_share = 0.01;
+
+template <class F>
+decltype(auto) with_kernel(const Model& model, const kernel::GaussSet& set, F&& f) {
+  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) return f(set.planar, *planar);
+  return f(set.spatial, std::get<model::SpatialChain>(model.chain()));
+}
+
+const double* data_or_null(const VectorXd& x) {
+  return x.size() > 0 ? x.data() : nullptr;
+}
+
+}  // namespace
+
+GaussLegendre::GaussLegendre(const Model& model, const Options& options)
+    : Integrator("gauss", model, options),
+      tableau_(kernel::tableau(static_cast<std::size_t>((options.order == 0 ? default_order : options.order) / 2))),
+      kernels_(&kernel::gauss_kernels()),
+      memory_(with_kernel(model, *kernels_, [&](const auto& entry, const auto& chain) {
+        return entry.bytes(chain.links.size(), tableau_.stages);
+      })) {
+  q_next_ = p_next_ = VectorXd::Zero(model.dof());
+  slopes_ = VectorXd::Zero(2 * model.dof() * static_cast<Eigen::Index>(tableau_.stages));
+}
+
+std::string GaussLegendre::criterion() const {
+  if (adaptive()) return fmt::format("error <= {} + {} |q|, max", options_.atol, options_.rtol);
+  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+}
+
+std::string GaussLegendre::mode() const {
+  return !adaptive() && options_.tolerance <= 1e-12 ? "structure" : "accurate";
+}
+
+void GaussLegendre::begin(State& state, const VectorXd& v0) {
+  state.memory = slopes_;
+  state.step_previous = 0.0;
+  set_velocity(state, v0);
+}
+
+void GaussLegendre::velocity(const State& state, VectorXd& v) {
+  dynamics::solve_mass(model_, ws_, state.q, state.p, v);
+}
+
+void GaussLegendre::set_velocity(State& state, const VectorXd& v) {
+  dynamics::momentum(model_, ws_, state.q, v, state.p);
+  state.v = v;
+}
+
+kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& channels, double h, double tolerance,
+                                          StepReport& report) {
+  slopes_ = state.memory;
+  to_spins(model_, channels.gyroscopic, spins_);
+  const auto outcome =
+      with_kernel(model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
+        const kernel::GaussCall<Chain> call{chain,
+                                            tableau_,
+                                            h,
+                                            state.q.data(),
+                                            state.p.data(),
+                                            q_next_.data(),
+                                            p_next_.data(),
+                                            slopes_.data(),
+                                            state.step_previous,
+                                            data_or_null(channels.damping),
+                                            data_or_null(channels.coulomb),
+                                            data_or_null(channels.held_torque),
+                                            channels.coulomb_speed,
+                                            spins_.data(),
+                                            spins_.size(),
+                                            tolerance,
+                                            max_sweeps};
+        return entry.step(call, memory_.get());
+      });
+  report.updates += outcome.sweeps;
+  report.evaluations += outcome.sweeps * static_cast<int>(tableau_.stages);
+  return outcome;
+}
+
+void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, double h, StepReport& report) {
+  state.q = q_next_;
+  state.p = p_next_;
+  state.memory = slopes_;
+  state.step_previous = h;
+  report.held_work_J = outcome.held_work;
+  report.dissipated_J = outcome.dissipated;
+  report.gyroscopic_work_J = outcome.gyroscopic_work;
+}
+
+StepReport GaussLegendre::attempt(State& state, const Channels& channels, double h) {
+  StepReport report;
+  const auto outcome = solve(state, channels, h, options_.tolerance, report);
+  report.residual = outcome.residual;
+  report.converged = outcome.converged;
+  if (report.converged) accept(state, outcome, h, report);
+  return report;
+}
+
+// The guess is the last step's polynomial of degree s, so what the first sweep changes, e, is its error O(h^{s+1}),
+// while the step's own is O(h^{2s+1}): relative to the displacement scale 1 it is taken for e^{(2s+1)/(s+1)}. It costs
+// nothing, and it sees a motion that quickens one step late at most.
+StepReport GaussLegendre::controlled(State& state, const Channels& channels, double limit) {
+  StepReport report;
+  report.converged = false;
+  const double s = static_cast<double>(tableau_.stages);
+  const double allowed = options_.atol + options_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
+  const double target = std::pow(allowed, (s + 1.0) / (2.0 * s + 1.0));
+  const double wish = state.step_next > 0.0 ? state.step_next : limit;
+  double h = std::min(wish, limit);
+  while (report.rejected <= max_rejections) {
+    const auto outcome = solve(state, channels, h, std::max(iteration_share * allowed, 1e-15), report);
+    const double wanted = outcome.starter_error > 0.0 ? std::pow(target / outcome.starter_error, 1.0 / (s + 1.0)) : 1.0;
+    if (!outcome.converged || wanted < least) {
+      ++report.rejected;
+      h *= outcome.converged ? std::clamp(wanted, 0.1, least) : least;
+      continue;
+    }
+    double next = h * std::min(wanted, most);
+    // A step that the limit cut short says nothing against the wish there was.
+    if (report.rejected == 0 && h < wish) next = std::max(next, wish);
+    accept(state, outcome, h, report);
+    state.step_next = next;
+    report.step_s = h;
+    report.residual = outcome.residual;
+    report.converged = true;
+    break;
+  }
+  return report;
+}
+
+}  // namespace hamelin::integration

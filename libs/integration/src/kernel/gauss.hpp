@@ -1,0 +1,264 @@
+#pragma once
+#include <cstddef>
+#include <variant>
+
+#include "hamelin/dynamics/kernel/sweeps.hpp"
+#include "hamelin/model/chain.hpp"
+
+namespace hamelin::integration::kernel {
+
+inline constexpr std::size_t most_stages = 8;
+
+/// Gauss–Legendre collocation with s stages on [0, 1].
+struct GaussTableau {
+  std::size_t stages;
+  double c[most_stages], b[most_stages], a[most_stages][most_stages];
+};
+
+/// One step y = (q, p) → y + h Σ b_j K_j with K_i = f(y + h Σ a_ij K_j), by fixed-point sweeps over all stages.
+template <class Chain>
+struct GaussCall {
+  const Chain& chain;
+  const GaussTableau& tableau;
+  double h;
+  const double *q, *p;
+  double *q_next, *p_next;  ///< written where it converges
+  /// Slopes K, 2n × stages (all of q̇, then all of ṗ; the stages of one number side by side). In: those of the step
+  /// before, of length `h_before` (0: none), from which the guess is extrapolated. Out, where it converges: this
+  /// step's.
+  double* slopes;
+  double h_before;
+  // Forces besides gravity; null or none: not computed.
+  const double *damping, *coulomb, *held;
+  double coulomb_speed;
+  const dynamics::kernel::Spin* spins;
+  std::size_t spin_count;
+  double tolerance;  ///< on the displacement's error that is left [rad or m]
+  int max_sweeps;
+};
+
+struct GaussOutcome {
+  bool converged;
+  int sweeps;            ///< each as many stage evaluations as there are stages
+  double residual;       ///< what the last sweep still changed, times its contraction [rad or m]
+  double starter_error;  ///< what the first sweep changed [rad or m]; 0 without a guess
+  double held_work, dissipated, gyroscopic_work;  ///< h Σ b_i F_i·v_i [J]
+};
+
+/// The entry points for one instruction set.
+template <class Chain>
+struct GaussEntry {
+  std::size_t (*bytes)(std::size_t links, std::size_t stages) noexcept;
+  GaussOutcome (*step)(const GaussCall<Chain>& call, void* memory) noexcept;
+};
+struct GaussSet {
+  GaussEntry<model::SpatialChain> spatial;
+  GaussEntry<model::PlanarChain> planar;
+};
+
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+/// The stages of a step are independent within a sweep, so they go into the lanes of a register: `W` at a time, in as
+/// many groups as it takes, each group using what those before it have found. Lanes without a stage repeat the first.
+template <template <class> class Group, int W>
+class Gauss {
+  using Pack = dynamics::kernel::Lanes<W>;
+  using Space = Group<Pack>;
+  using Chain = typename Space::Chain;
+  using Scratch = dynamics::kernel::Scratch<Space>;
+  static constexpr auto lanes = static_cast<std::size_t>(W);
+  static constexpr std::size_t most_groups = (most_stages + lanes - 1) / lanes;
+
+ public:
+  static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
+    return (2 * n * groups(stages) + 5 * n) * sizeof(Pack) + Scratch::alignment + Scratch::bytes(n);
+  }
+
+  static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept { return Gauss(call, memory).solve(); }
+
+ private:
+  Gauss(const GaussCall<Chain>& call, void* memory) noexcept
+      : call_(call),
+        n_(dynamics::kernel::count<Space>(call.chain)),
+        s_(call.tableau.stages),
+        groups_(groups(s_)),
+        slopes_(static_cast<Pack*>(memory)),
+        y_(slopes_ + 2 * n_ * groups_),
+        rate_(y_ + 2 * n_),
+        force_(rate_ + 2 * n_),
+        scratch_(Scratch::at(aligned(force_ + n_), n_)) {}
+
+  static std::size_t groups(std::size_t stages) noexcept { return (stages + lanes - 1) / lanes; }
+  static void* aligned(Pack* p) noexcept {
+    auto address = reinterpret_cast<std::size_t>(p);
+    address = (address + Scratch::alignment - 1) / Scratch::alignment * Scratch::alignment;
+    return reinterpret_cast<void*>(address);
+  }
+  /// Which stage lane `lane` of group `g` holds.
+  std::size_t stage(std::size_t g, std::size_t lane) const noexcept {
+    const std::size_t i = g * lanes + lane;
+    return i < s_ ? i : 0;
+  }
+  /// Slope of number r at stage j.
+  HAMELIN_INLINE double slope(std::size_t r, std::size_t j) const noexcept {
+    return slopes_[r * groups_ + j / lanes].v[j % lanes];
+  }
+
+  GaussOutcome solve() noexcept {
+    GaussOutcome out{};
+    const double h = call_.h;
+    Pack weights[most_groups][most_stages];
+    for (std::size_t g = 0; g < groups_; ++g)
+      for (std::size_t j = 0; j < s_; ++j)
+        for (std::size_t lane = 0; lane < lanes; ++lane) weights[g][j].v[lane] = h * call_.tableau.a[stage(g, lane)][j];
+    const bool guessed = call_.h_before > 0.0;
+    if (guessed)
+      extrapolate();
+    else
+      repeat_first();
+    double before = 0.0;
+    for (int sweep = 0;; ++sweep) {
+      Pack change(0.0);
+      for (std::size_t g = 0; g < groups_; ++g) {
+        for (std::size_t r = 0; r < 2 * n_; ++r) {
+          Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
+          for (std::size_t j = 0; j < s_; ++j) sum += weights[g][j] * slope(r, j);
+          y_[r] = sum;
+        }
+        rates();
+        for (std::size_t r = 0; r < n_; ++r) {
+          Pack& v = slopes_[r * groups_ + g];
+          Pack& p_rate = slopes_[(n_ + r) * groups_ + g];
+          change = max(change, abs(rate_[r] - v));
+          // a change of momentum as the displacement it makes
+          change = max(change, abs(rate_[n_ + r] - p_rate) * scratch_[r].inv_d * h);
+          v = rate_[r];
+          p_rate = rate_[n_ + r];
+        }
+      }
+      const double now = h * largest(change);
+      ++out.sweeps;
+      if (sweep == 0 && guessed) out.starter_error = now;
+      // a repeated first slope says nothing of the contraction, an extrapolated one is trusted with a tenth
+      const double contraction = sweep > 0 ? now / before : guessed ? 0.1 : 1.0;
+      out.residual = now * (contraction < 1.0 ? contraction : 1.0);
+      if (out.residual <= call_.tolerance || (sweep > 1 && now <= rounding())) break;
+      const bool hopeless = !(now < 1e3) || (sweep > 2 && contraction > 1.0 && now > 1e3 * rounding());
+      if (hopeless || sweep + 1 == call_.max_sweeps) return out;
+      before = now;
+    }
+    out.converged = true;
+    finish(out);
+    return out;
+  }
+
+  /// What rounding alone may change in a sweep.
+  double rounding() const noexcept {
+    double most = 1.0;
+    for (std::size_t r = 0; r < n_; ++r) {
+      const double q = call_.q[r] < 0.0 ? -call_.q[r] : call_.q[r];
+      most = q > most ? q : most;
+    }
+    return 4e-16 * most;
+  }
+
+  /// The polynomial through the slopes of the step before, read at this step's stages.
+  void extrapolate() noexcept {
+    const double ratio = call_.h / call_.h_before;
+    const auto& c = call_.tableau.c;
+    Pack weights[most_groups][most_stages];
+    for (std::size_t g = 0; g < groups_; ++g)
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        const double t = 1.0 + ratio * c[stage(g, lane)];
+        for (std::size_t j = 0; j < s_; ++j) {
+          double w = 1.0;
+          for (std::size_t m = 0; m < s_; ++m)
+            if (m != j) w *= (t - c[m]) / (c[j] - c[m]);
+          weights[g][j].v[lane] = w;
+        }
+      }
+    for (std::size_t r = 0; r < 2 * n_; ++r) {
+      const double* const old = call_.slopes + r * s_;
+      for (std::size_t g = 0; g < groups_; ++g) {
+        Pack sum(0.0);
+        for (std::size_t j = 0; j < s_; ++j) sum += weights[g][j] * old[j];
+        slopes_[r * groups_ + g] = sum;
+      }
+    }
+  }
+
+  void repeat_first() noexcept {
+    for (std::size_t r = 0; r < n_; ++r) {
+      y_[r] = Pack(call_.q[r]);
+      y_[n_ + r] = Pack(call_.p[r]);
+    }
+    rates();
+    for (std::size_t r = 0; r < 2 * n_; ++r)
+      for (std::size_t g = 0; g < groups_; ++g) slopes_[r * groups_ + g] = rate_[r];
+  }
+
+  /// rate_ = f(y_): Hamilton's equations and the forces at the stages' own velocities.
+  HAMELIN_INLINE void rates() noexcept {
+    dynamics::kernel::hamilton<Space>(call_.chain, scratch_, y_, y_ + n_, rate_, rate_ + n_);
+    if (call_.held != nullptr)
+      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += Pack(call_.held[r]);
+    if (call_.damping != nullptr)
+      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] -= rate_[r] * call_.damping[r];
+    if (call_.coulomb != nullptr)
+      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] -= dry(r, rate_[r]);
+    if (call_.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, call_.spins, call_.spin_count, force_);
+      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += force_[r];
+    }
+  }
+  Pack dry(std::size_t r, Pack v) const noexcept {
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      v.v[lane] = call_.coulomb[r] * __builtin_tanh(v.v[lane] / call_.coulomb_speed);
+    return v;
+  }
+
+  void finish(GaussOutcome& out) noexcept {
+    const double h = call_.h;
+    const auto& b = call_.tableau.b;
+    for (std::size_t r = 0; r < n_; ++r) {
+      double dq = 0.0, dp = 0.0;
+      for (std::size_t j = 0; j < s_; ++j) {
+        const double v = slope(r, j), p_rate = slope(n_ + r, j), weight = h * b[j];
+        dq += weight * v;
+        dp += weight * p_rate;
+        call_.slopes[r * s_ + j] = v;
+        call_.slopes[(n_ + r) * s_ + j] = p_rate;
+        if (call_.held != nullptr) out.held_work += weight * call_.held[r] * v;
+        if (call_.damping != nullptr) out.dissipated += weight * call_.damping[r] * v * v;
+        if (call_.coulomb != nullptr)
+          out.dissipated += weight * call_.coulomb[r] * __builtin_tanh(v / call_.coulomb_speed) * v;
+      }
+      call_.q_next[r] = call_.q[r] + dq;
+      call_.p_next[r] = call_.p[r] + dp;
+    }
+    if (call_.spin_count == 0) return;
+    for (std::size_t g = 0; g < groups_; ++g) {
+      // the terms' own power, at the stages as they came out
+      for (std::size_t r = 0; r < 2 * n_; ++r) {
+        Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
+        for (std::size_t j = 0; j < s_; ++j)
+          for (std::size_t lane = 0; lane < lanes; ++lane)
+            sum.v[lane] += h * call_.tableau.a[stage(g, lane)][j] * slope(r, j);
+        y_[r] = sum;
+      }
+      rates();
+      for (std::size_t r = 0; r < n_; ++r)
+        for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane)
+          out.gyroscopic_work += h * b[g * lanes + lane] * force_[r].v[lane] * rate_[r].v[lane];
+    }
+  }
+
+  const GaussCall<Chain>& call_;
+  std::size_t n_, s_, groups_;
+  Pack* slopes_;  ///< 2n × groups
+  Pack *y_, *rate_, *force_;
+  Scratch scratch_;
+};
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::integration::kernel

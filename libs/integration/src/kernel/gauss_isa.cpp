@@ -1,0 +1,33 @@
+// Compiled once for each instruction set; see dynamics/kernel/lanes.hpp on what may be used here.
+#include "gauss.hpp"
+#include "hamelin/dynamics/kernel/planar.hpp"
+#include "hamelin/dynamics/kernel/spatial.hpp"
+
+namespace hamelin::integration::kernel {
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+namespace {
+
+// As narrow as the stages allow: half-empty wide registers cost more than full narrow ones.
+template <template <class> class Group>
+struct Entry {
+  using Chain = typename Group<double>::Chain;
+  static constexpr int narrow = dynamics::kernel::native_lanes < 4 ? dynamics::kernel::native_lanes : 4;
+  static constexpr int wide = dynamics::kernel::native_lanes;
+
+  static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
+    return stages <= 4 ? Gauss<Group, narrow>::bytes(n, stages) : Gauss<Group, wide>::bytes(n, stages);
+  }
+  static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
+    return call.tableau.stages <= 4 ? Gauss<Group, narrow>::step(call, memory) : Gauss<Group, wide>::step(call, memory);
+  }
+  static constexpr GaussEntry<Chain> entry{bytes, step};
+};
+
+}  // namespace
+
+extern const GaussSet gauss_set;
+constexpr GaussSet gauss_set{Entry<dynamics::kernel::Spatial>::entry, Entry<dynamics::kernel::Planar>::entry};
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::integration::kernel

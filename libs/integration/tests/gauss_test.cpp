@@ -1,0 +1,162 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "hamelin/core/isa.hpp"
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/test/chains.hpp"
+#include "hamelin/test/robots.hpp"
+
+using namespace hamelin;
+using namespace hamelin::integration;
+
+namespace {
+
+State run(const Model& model, const Options& options, const VectorXd& q0, const VectorXd& v0, double h, int steps,
+          const Channels& channels = {}) {
+  const auto integrator = make_integrator("gauss", model, options);
+  State state = integrator->start(q0, v0);
+  for (int k = 0; k < steps; ++k) REQUIRE(integrator->step(state, channels, h).converged);
+  return state;
+}
+
+Options of_order(int order) {
+  Options options;
+  options.order = order;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gauss][order]") {
+  const bool planar = GENERATE(false, true);
+  const Model model(planar ? test::planar3() : test::spatial_chain(3));
+  const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
+  const auto rk4 = make_integrator("rk4", model);
+  State truth = rk4->start(q0, v0);
+  for (int k = 0; k < 20000; ++k) REQUIRE(rk4->step(truth, {}, 0.4 / 20000).converged);
+  for (const int order : {4, 6, 8}) {
+    CAPTURE(planar, order);
+    const int steps = order == 4 ? 16 : order == 6 ? 8 : 6;
+    const auto error = [&](int n) { return (run(model, of_order(order), q0, v0, 0.4 / n, n).q - truth.q).norm(); };
+    CHECK(std::log2(error(steps) / error(2 * steps)) == Approx(order).margin(0.6));
+  }
+  for (const int order : {10, 12, 14, 16})  // beneath what rk4 can tell
+    CHECK((run(model, of_order(order), q0, v0, 0.05, 8).q - truth.q).norm() < 1e-7);
+}
+
+TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",
+          "[integration][gauss]") {
+  const Model model(test::random_robot(21, 5, 3));
+  Rng rng(21);
+  const VectorXd q0 = test::random_joints(rng, 5), v0 = test::random_joints(rng, 5);
+  for (const int order : {4, 8, 16}) {
+    const auto integrator = make_integrator("gauss", model, of_order(order));
+    State state = integrator->start(q0, v0);
+    const VectorXd p0 = state.p;
+    for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(state, {}, 0.02).converged);
+    VectorXd back;
+    back.resize(5);
+    integrator->velocity(state, back);
+    State home = integrator->start(state.q, -back);
+    for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(home, {}, 0.02).converged);
+    CHECK((home.q - q0).norm() < 1e-10);
+    CHECK((home.p + p0).norm() < 1e-9 * (1.0 + p0.norm()));
+  }
+}
+
+TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss][step-control]") {
+  const Model model(test::spatial_chain(7));
+  const VectorXd q0 = VectorXd::Constant(7, 0.3);
+  const auto truth = run(model, of_order(16), q0, VectorXd::Zero(7), 1e-3, 500);
+  for (const int order : {8, 12, 16}) {
+    double before = 1.0;
+    for (const double rtol : {1e-4, 1e-6, 1e-8}) {
+      CAPTURE(order, rtol);
+      Options options = of_order(order);
+      options.rtol = options.atol = rtol;
+      const auto integrator = make_integrator("gauss", model, options);
+      State state = integrator->start(q0, VectorXd::Zero(7));
+      state.step_next = 1e-3;
+      int steps = 0;
+      while (state.time_s < 0.5) {
+        const auto report = integrator->advance(state, {}, 0.5 - state.time_s);
+        REQUIRE(report.converged);
+        REQUIRE(report.step_s > 0.0);
+        ++steps;
+      }
+      const double error = (state.q - truth.q).lpNorm<Eigen::Infinity>();
+      CHECK(error < 100.0 * rtol);
+      CHECK(error < before);
+      CHECK(steps < 500);
+      before = error;
+    }
+  }
+}
+
+TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all channels, and books their work",
+          "[integration][gauss][channels]") {
+  const bool planar = GENERATE(false, true);
+  const Model model(test::random_robot(7, 4, 3, planar));
+  Rng rng(7);
+  const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4);
+  Channels channels;
+  channels.damping = VectorXd::Constant(4, 0.3);
+  channels.coulomb = VectorXd::Constant(4, 0.2);
+  channels.coulomb_speed = 0.5;
+  channels.held_torque = test::random_joints(rng, 4, 2.0);
+  const Eigen::Vector3d normal = model.robot().links[0].joint.screw.head<3>();
+  channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal + test::random_vector(rng, 1.0)},
+                         {3, test::random_vector(rng, 0.2), -1.0 * normal}};
+  const auto rk4 = make_integrator("rk4", model);
+  State truth = rk4->start(q0, v0);
+  for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(truth, channels, 0.5 / 8000).converged);
+  const auto gauss = make_integrator("gauss", model, of_order(8));
+  State state = gauss->start(q0, v0);
+  const double start = gauss->energy(state).total();
+  double booked = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    const auto report = gauss->step(state, channels, 0.005);
+    REQUIRE(report.converged);
+    CHECK(std::abs(report.gyroscopic_work_J) < 1e-14);
+    CHECK(report.dissipated_J > 0.0);
+    booked += report.held_work_J - report.dissipated_J;
+  }
+  CHECK((state.q - truth.q).lpNorm<Eigen::Infinity>() < 1e-9);
+  CHECK(std::abs(gauss->energy(state).total() - start - booked) < 1e-8);
+}
+
+TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to rounding", "[integration][gauss]") {
+  const Model model(test::planar3());
+  const auto gauss = make_integrator("gauss", model, of_order(8));
+  State state = gauss->start(VectorXd::Zero(3), VectorXd::Zero(3));
+  const double start = gauss->energy(state).total();
+  double early = 0.0, late = 0.0;
+  for (int k = 0; k < 20000; ++k) {
+    REQUIRE(gauss->step(state, {}, 0.02).converged);
+    if (k % 10 != 0) continue;
+    const double error = std::abs(gauss->energy(state).total() - start);
+    (k < 10000 ? early : late) = std::max(k < 10000 ? early : late, error);
+  }
+  CHECK(late < 1e-9);
+  CHECK(late < 2.0 * early + 1e-12);
+}
+
+TEST_CASE("all instruction sets come to the same motion but for rounding", "[integration][gauss][isa]") {
+  const Model model(test::random_robot(22, 6, 4));
+  Rng rng(22);
+  const VectorXd q0 = test::random_joints(rng, 6), v0 = test::random_joints(rng, 6);
+  const std::string best(instruction_set());
+  for (const int order : {4, 6, 8, 10, 16}) {
+    const VectorXd q = run(model, of_order(order), q0, v0, 0.005, 50).q;
+    for (const char* isa : {"x86-64", "v3", "v4"}) {
+      CAPTURE(order, isa);
+      try {
+        force_instruction_set(isa);
+      } catch (const std::exception&) {
+        continue;  // not on this machine
+      }
+      CHECK((run(model, of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
+    }
+    force_instruction_set(best);
+  }
+}
