@@ -28,20 +28,23 @@ Options of_order(int order) {
 }  // namespace
 
 TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gauss][order]") {
-  const bool planar = GENERATE(false, true);
-  const Model model(planar ? test::planar3() : test::spatial_chain(3));
+  // Slow enough for the asymptotic range: a chain in a slow swing, errors well above rounding.
+  const Model model(test::random_robot(20, 3, GENERATE(0, 2)));
   const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
+  const VectorXd truth = run(model, of_order(16), q0, v0, 1e-3, 400).q;
   const auto rk4 = make_integrator("rk4", model);
-  State truth = rk4->start(q0, v0);
-  for (int k = 0; k < 20000; ++k) REQUIRE(rk4->step(truth, {}, 0.4 / 20000).converged);
-  for (const int order : {4, 6, 8}) {
-    CAPTURE(planar, order);
-    const int steps = order == 4 ? 16 : order == 6 ? 8 : 6;
-    const auto error = [&](int n) { return (run(model, of_order(order), q0, v0, 0.4 / n, n).q - truth.q).norm(); };
-    CHECK(std::log2(error(steps) / error(2 * steps)) == Approx(order).margin(0.6));
+  State peer = rk4->start(q0, v0);
+  for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
+  REQUIRE((truth - peer.q).norm() < 1e-10);
+  for (const int order : {4, 6, 8, 10, 12}) {
+    const auto error = [&](int n) { return (run(model, of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
+    int steps = 2;
+    while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
+    CAPTURE(order, steps, error(steps), error(2 * steps));
+    const double observed = std::log2(error(steps) / error(2 * steps));
+    CHECK(observed > order - 0.7);
+    CHECK(error(2 * steps) < 1e-5 * std::pow(2.0, 0.7 - order) + 1e-12);
   }
-  for (const int order : {10, 12, 14, 16})  // beneath what rk4 can tell
-    CHECK((run(model, of_order(order), q0, v0, 0.05, 8).q - truth.q).norm() < 1e-7);
 }
 
 TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",
@@ -138,7 +141,7 @@ TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to roun
     (k < 10000 ? early : late) = std::max(k < 10000 ? early : late, error);
   }
   CHECK(late < 1e-9);
-  CHECK(late < 2.0 * early + 1e-12);
+  CHECK(late < 1.5 * early + 1e-10);
 }
 
 TEST_CASE("all instruction sets come to the same motion but for rounding", "[integration][gauss][isa]") {

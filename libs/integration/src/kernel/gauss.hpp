@@ -9,10 +9,11 @@ namespace hamelin::integration::kernel {
 
 inline constexpr std::size_t most_stages = 8;
 
-/// Gauss–Legendre collocation with s stages on [0, 1].
+/// Gauss–Legendre collocation with s stages on [0, 1]: nodes c, weights b, a_ij by columns, and the barycentric weights
+/// 1/Π_{m≠j}(c_j − c_m). Rows beyond s repeat the first, for lanes without a stage.
 struct GaussTableau {
   std::size_t stages;
-  double c[most_stages], b[most_stages], a[most_stages][most_stages];
+  double c[most_stages], b[most_stages], a_column[most_stages][most_stages], barycentric[most_stages];
 };
 
 /// One step y = (q, p) → y + h Σ b_j K_j with K_i = f(y + h Σ a_ij K_j), by fixed-point sweeps over all stages.
@@ -94,11 +95,6 @@ class Gauss {
     address = (address + Scratch::alignment - 1) / Scratch::alignment * Scratch::alignment;
     return reinterpret_cast<void*>(address);
   }
-  /// Which stage lane `lane` of group `g` holds.
-  std::size_t stage(std::size_t g, std::size_t lane) const noexcept {
-    const std::size_t i = g * lanes + lane;
-    return i < s_ ? i : 0;
-  }
   /// Slope of number r at stage j.
   HAMELIN_INLINE double slope(std::size_t r, std::size_t j) const noexcept {
     return slopes_[r * groups_ + j / lanes].v[j % lanes];
@@ -164,19 +160,15 @@ class Gauss {
 
   /// The polynomial through the slopes of the step before, read at this step's stages.
   void extrapolate() noexcept {
-    const double ratio = call_.h / call_.h_before;
-    const auto& c = call_.tableau.c;
+    const Pack ratio(call_.h / call_.h_before);
+    const auto& t = call_.tableau;
     Pack weights[most_groups][most_stages];
-    for (std::size_t g = 0; g < groups_; ++g)
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        const double t = 1.0 + ratio * c[stage(g, lane)];
-        for (std::size_t j = 0; j < s_; ++j) {
-          double w = 1.0;
-          for (std::size_t m = 0; m < s_; ++m)
-            if (m != j) w *= (t - c[m]) / (c[j] - c[m]);
-          weights[g][j].v[lane] = w;
-        }
-      }
+    for (std::size_t g = 0; g < groups_; ++g) {
+      const Pack at = Pack(1.0) + ratio * Pack::load(t.c + g * lanes);  // beyond all nodes
+      Pack product(1.0);
+      for (std::size_t j = 0; j < s_; ++j) product *= at - t.c[j];
+      for (std::size_t j = 0; j < s_; ++j) weights[g][j] = product * t.barycentric[j] / (at - t.c[j]);
+    }
     for (std::size_t r = 0; r < 2 * n_; ++r) {
       const double* const old = call_.slopes + r * s_;
       for (std::size_t g = 0; g < groups_; ++g) {
@@ -242,8 +234,7 @@ class Gauss {
       for (std::size_t r = 0; r < 2 * n_; ++r) {
         Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
         for (std::size_t j = 0; j < s_; ++j)
-          for (std::size_t lane = 0; lane < lanes; ++lane)
-            sum.v[lane] += h * call_.tableau.a[stage(g, lane)][j] * slope(r, j);
+          sum += Pack::load(call_.tableau.a_column[j] + g * lanes) * (h * slope(r, j));
         y_[r] = sum;
       }
       rates();
