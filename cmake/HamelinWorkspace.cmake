@@ -82,9 +82,10 @@ function(hamelin_isa_sources target)
   set(flags_baseline "")
   set(flags_v3 -mavx2 -mfma)
   set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)
-  # A source's own options come last. Optimised in every build, so that nothing stays out of line.
-  set_source_files_properties(${ARGN} PROPERTIES
-    COMPILE_OPTIONS "-O3;-ffp-contract=fast;-fno-math-errno;-fno-trapping-math")
+  # A source's own options come last. Optimised in every build, so that nothing stays out of line. GCC would copy value
+  # types of many lanes through memory, and make vectors of single numbers at a loss.
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS
+    "-O3;-ffp-contract=fast;-fno-math-errno;-fno-trapping-math;-fno-tree-slp-vectorize;$<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>")
   foreach(name IN LISTS names)
     add_library(${target}_${name} OBJECT ${ARGN})
     target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>)

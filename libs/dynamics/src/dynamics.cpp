@@ -1,5 +1,6 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
+#include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernels.hpp"
 
 namespace hamelin::dynamics {
@@ -7,13 +8,13 @@ namespace hamelin::dynamics {
 namespace {
 
 std::size_t sweep_bytes(const Model& model, const KernelSet& set) {
-  return with_group(model, set,
-                    [&](const auto& kernel, const auto& chain) { return kernel.bytes(chain.links.size()); });
+  return kernel::with_group(model, set,
+                            [&](const auto& sweeps, const auto& chain) { return sweeps.bytes(chain.links.size()); });
 }
 
 std::size_t batch_bytes(const Model& model, const KernelSet& set) {
-  return with_group(model, set,
-                    [&](const auto& kernel, const auto& chain) { return kernel.batch_bytes(chain.links.size()); });
+  return kernel::with_group(
+      model, set, [&](const auto& sweeps, const auto& chain) { return sweeps.batch_bytes(chain.links.size()); });
 }
 
 }  // namespace
@@ -32,73 +33,73 @@ BatchWorkspace::BatchWorkspace(const Model& model)
 
 void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a,
                       VectorXd& tau) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), a.data(), tau.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), a.data(), tau.data());
   });
 }
 
 void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau,
                       VectorXd& a) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.forward_dynamics(chain, ws.sweep.get(), q.data(), v.data(), tau.data(), a.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.forward_dynamics(chain, ws.sweep.get(), q.data(), v.data(), tau.data(), a.data());
   });
 }
 
 void bias_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& tau) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), nullptr, tau.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), nullptr, tau.data());
   });
 }
 
 void gravity_torque(const Model& model, Workspace& ws, const VectorXd& q, VectorXd& tau) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.gravity_torque(chain, ws.sweep.get(), q.data(), tau.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.gravity_torque(chain, ws.sweep.get(), q.data(), tau.data());
   });
 }
 
 void solve_mass(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& y, VectorXd& x) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.solve_mass(chain, ws.sweep.get(), q.data(), y.data(), x.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.solve_mass(chain, ws.sweep.get(), q.data(), y.data(), x.data());
   });
 }
 
 void momentum(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& p) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.momentum(chain, ws.sweep.get(), q.data(), v.data(), p.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.momentum(chain, ws.sweep.get(), q.data(), v.data(), p.data());
   });
 }
 
 void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::MatrixXd& M) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.mass_matrix(chain, ws.sweep.get(), q.data(), M.data(), static_cast<std::size_t>(M.outerStride()));
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.mass_matrix(chain, ws.sweep.get(), q.data(), M.data(), static_cast<std::size_t>(M.outerStride()));
   });
 }
 
 double kinetic_energy(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v) {
-  return with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    return kernel.kinetic_energy(chain, ws.sweep.get(), q.data(), v.data());
+  return kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    return sweeps.kinetic_energy(chain, ws.sweep.get(), q.data(), v.data());
   });
 }
 
 double potential_energy(const Model& model, Workspace& ws, const VectorXd& q) {
-  return with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    return kernel.potential_energy(chain, ws.sweep.get(), q.data()) + chain.potential_constant;
+  return kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    return sweeps.potential_energy(chain, ws.sweep.get(), q.data()) + chain.potential_constant;
   });
 }
 
 void inverse_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& a,
                       StatesXd& tau) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     const auto states = static_cast<std::size_t>(q.cols());
-    kernel.inverse_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), a.data(), tau.data());
+    sweeps.inverse_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), a.data(), tau.data());
   });
 }
 
 void forward_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& tau,
                       StatesXd& a) {
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     const auto states = static_cast<std::size_t>(q.cols());
-    kernel.forward_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), tau.data(), a.data());
+    sweeps.forward_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), tau.data(), a.data());
   });
 }
 

@@ -1,10 +1,8 @@
 #pragma once
 #include <cstddef>
 
-#include <variant>
-
 #include "hamelin/core/isa.hpp"
-#include "hamelin/model/model.hpp"
+#include "hamelin/dynamics/kernel/groups.hpp"
 
 namespace hamelin::dynamics {
 
@@ -36,20 +34,10 @@ struct Kernels {
                                  const double* v, const double* tau, double* a) noexcept;
 };
 
-/// Both groups for one instruction set.
-struct KernelSet {
-  Kernels<model::SpatialChain> spatial;
-  Kernels<model::PlanarChain> planar;
-};
+/// All kinds of chains for one instruction set.
+struct KernelSet : kernel::Groups<Kernels> {};
 
 /// The set that core's selected_isa() names.
 [[nodiscard]] const KernelSet& kernels();
-
-/// f(kernels, chain) for the group of this model: one branch a call, none inside.
-template <class F>
-decltype(auto) with_group(const model::Model& model, const KernelSet& set, F&& f) {
-  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) return f(set.planar, *planar);
-  return f(set.spatial, std::get<model::SpatialChain>(model.chain()));
-}
 
 }  // namespace hamelin::dynamics

@@ -76,8 +76,7 @@ struct Entry {
           if (count == lanes) {
             vectors[j * n + i] = Pack::load(row);
           } else {  // the last packet's idle lanes repeat its first state
-            for (std::size_t lane = 0; lane < lanes; ++lane)
-              vectors[j * n + i].v[lane] = row[lane < count ? lane : 0];
+            for (std::size_t lane = 0; lane < lanes; ++lane) vectors[j * n + i].v[lane] = row[lane < count ? lane : 0];
           }
         }
       }
@@ -100,17 +99,28 @@ struct Entry {
     batch(c, m, states, stride, q, v, tau, a, kernel::forward_dynamics<Packed>);
   }
 
-  static constexpr Kernels<Chain> table{Scratch::bytes,   inverse_dynamics, forward_dynamics,
-                                        gravity_torque,   solve_mass,       factor,
-                                        solve_factored,   momentum,         kinetic_energy,
-                                        potential_energy, mass_matrix,      static_cast<std::size_t>(kernel::native_lanes),
-                                        batch_bytes,      inverse_dynamics_batch, forward_dynamics_batch};
+  static constexpr Kernels<Chain> table{Scratch::bytes,
+                                        inverse_dynamics,
+                                        forward_dynamics,
+                                        gravity_torque,
+                                        solve_mass,
+                                        factor,
+                                        solve_factored,
+                                        momentum,
+                                        kinetic_energy,
+                                        potential_energy,
+                                        mass_matrix,
+                                        static_cast<std::size_t>(kernel::native_lanes),
+                                        batch_bytes,
+                                        inverse_dynamics_batch,
+                                        forward_dynamics_batch};
 };
 
 }  // namespace
 
 extern const KernelSet set;
-constexpr KernelSet set{Entry<kernel::Spatial>::table, Entry<kernel::Planar>::table};
+constexpr KernelSet set{{Entry<kernel::SpatialPlain>::table, Entry<kernel::SpatialMixed>::table,
+                         Entry<kernel::PlanarPlain>::table, Entry<kernel::PlanarMixed>::table}};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "kernels.hpp"
@@ -157,11 +158,11 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, con
 
 Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J, double damping) {
   Matrix3d inverse;
-  with_group(model, *ws.kernels, [&](const auto& kernel, const auto& chain) {
-    kernel.factor(chain, ws.sweep.get(), q.data());
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.factor(chain, ws.sweep.get(), q.data());
     for (int c = 0; c < 3; ++c) {
       ws.column_in = J.row(c).transpose();
-      kernel.solve_factored(chain, ws.sweep.get(), ws.column_in.data(), ws.column_out.data());
+      sweeps.solve_factored(chain, ws.sweep.get(), ws.column_in.data(), ws.column_out.data());
       inverse.col(c).noalias() = J * ws.column_out;
     }
   });

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "hamelin/core/isa.hpp"
+#include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "spins.hpp"
 
 namespace hamelin::integration {
@@ -102,12 +103,6 @@ constexpr double most = 1.5, least = 0.5;
 // one, the step may use. Both found by work and error on falling arms.
 constexpr double iteration_share = 1e-3, estimate_share = 3.0;
 
-template <class F>
-decltype(auto) with_kernel(const Model& model, const kernel::GaussSet& set, F&& f) {
-  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) return f(set.planar, *planar);
-  return f(set.spatial, std::get<model::SpatialChain>(model.chain()));
-}
-
 const double* data_or_null(const VectorXd& x) {
   return x.size() > 0 ? x.data() : nullptr;
 }
@@ -118,7 +113,7 @@ GaussLegendre::GaussLegendre(const Model& model, const Options& options)
     : Integrator("gauss", model, options),
       tableau_(kernel::tableau(static_cast<std::size_t>((options.order == 0 ? default_order : options.order) / 2))),
       kernels_(&kernel::gauss_kernels()),
-      memory_(with_kernel(model, *kernels_, [&](const auto& entry, const auto& chain) {
+      memory_(dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
         return entry.bytes(chain.links.size(), tableau_.stages);
       })) {
   q_next_ = p_next_ = VectorXd::Zero(model.dof());
@@ -153,8 +148,8 @@ kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& ch
                                           StepReport& report) {
   slopes_ = state.memory;
   to_spins(model_, channels.gyroscopic, spins_);
-  const auto outcome =
-      with_kernel(model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
+  const auto outcome = dynamics::kernel::with_group(
+      model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
         const kernel::GaussCall<Chain> call{chain,
                                             tableau_,
                                             h,

@@ -213,6 +213,9 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     chain_ = spatial_chain(robot_, frames, base_, gravity_);
   }
   root_ = base_ * frames[0];
+  mixed_ = std::any_of(robot_.links.begin(), robot_.links.end(), [](const Link& link) {
+    return link.joint.type == JointType::prismatic || link.joint.armature != 0.0;
+  });
   for (std::size_t i = 0; i < robot_.links.size(); ++i) {
     const Link& link = robot_.links[i];
     com_in_frame_.push_back(frames[i + 1].inverse() * link.com);

@@ -1,9 +1,8 @@
 #pragma once
 #include <cstddef>
-#include <variant>
 
+#include "hamelin/dynamics/kernel/groups.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
-#include "hamelin/model/chain.hpp"
 
 namespace hamelin::integration::kernel {
 
@@ -52,10 +51,7 @@ struct GaussEntry {
   std::size_t (*bytes)(std::size_t links, std::size_t stages) noexcept;
   GaussOutcome (*step)(const GaussCall<Chain>& call, void* memory) noexcept;
 };
-struct GaussSet {
-  GaussEntry<model::SpatialChain> spatial;
-  GaussEntry<model::PlanarChain> planar;
-};
+using GaussSet = dynamics::kernel::Groups<GaussEntry>;
 
 inline namespace HAMELIN_ISA_NAMESPACE {
 

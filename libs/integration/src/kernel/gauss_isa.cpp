@@ -27,7 +27,8 @@ struct Entry {
 }  // namespace
 
 extern const GaussSet gauss_set;
-constexpr GaussSet gauss_set{Entry<dynamics::kernel::Spatial>::entry, Entry<dynamics::kernel::Planar>::entry};
+constexpr GaussSet gauss_set{Entry<dynamics::kernel::SpatialPlain>::entry, Entry<dynamics::kernel::SpatialMixed>::entry,
+                             Entry<dynamics::kernel::PlanarPlain>::entry, Entry<dynamics::kernel::PlanarMixed>::entry};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::integration::kernel

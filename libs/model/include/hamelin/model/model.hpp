@@ -25,6 +25,8 @@ class Model {
   [[nodiscard]] const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
   /// Whether all joints keep one plane, so that the SE(2) path is taken.
   [[nodiscard]] bool planar() const noexcept { return std::holds_alternative<PlanarChain>(chain_); }
+  /// Whether any joint slides or turns a rotor: then the sweeps ask each joint, else none.
+  [[nodiscard]] bool mixed() const noexcept { return mixed_; }
   [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept { return chain_; }
 
   /// World pose of the chain's root frame; of a planar chain its z is the plane's normal.
@@ -54,6 +56,7 @@ class Model {
   Robot robot_;
   geometry::SE3 base_;
   Eigen::Vector3d gravity_;
+  bool mixed_ = false;
   geometry::SE3 root_;
   std::variant<SpatialChain, PlanarChain> chain_;
   std::vector<geometry::SE3> com_in_frame_;

@@ -123,17 +123,19 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
   y = y - turns * 6.07710050630396597660e-11;
   y = y - turns * 2.02226624879595063154e-21;
   const Real z = y * y;
-  const Real s = y + y * z * (-1.66666666666666324348e-01 +
-                              z * (8.33333333332248946124e-03 +
-                                   z * (-1.98412698298579493134e-04 +
-                                        z * (2.75573137070700676789e-06 +
-                                             z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const Real s = y + y * z *
+                         (-1.66666666666666324348e-01 +
+                          z * (8.33333333332248946124e-03 +
+                               z * (-1.98412698298579493134e-04 +
+                                    z * (2.75573137070700676789e-06 +
+                                         z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
   const Real c =
-      1.0 - (0.5 * z - z * z * (4.16666666666666019037e-02 +
-                                z * (-1.38888888888741095749e-03 +
-                                     z * (2.48015872894767294178e-05 +
-                                          z * (-2.75573143513906633035e-07 +
-                                               z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+      1.0 - (0.5 * z - z * z *
+                           (4.16666666666666019037e-02 +
+                            z * (-1.38888888888741095749e-03 +
+                                 z * (2.48015872894767294178e-05 +
+                                      z * (-2.75573143513906633035e-07 +
+                                           z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
   // odd quadrants exchange the two, and their signs turn with the quadrant
   const Bits odd = (quadrant & 1) != 0;
   const Real a = odd ? c : s, b = odd ? s : c;
@@ -141,10 +143,12 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
   cosine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(b) ^ (((quadrant + 1) & 2) << 62));
 }
 
-/// The same for arrays whose room is a multiple of `native_lanes`.
+/// The same for arrays whose room is a multiple of 8. Not wider than 4: one wide load of numbers just stored one by one
+/// waits for all of them.
 HAMELIN_INLINE void sincos(std::size_t n, const double* angle, double* sine, double* cosine) noexcept {
-  using Pack = Lanes<native_lanes>;
-  for (std::size_t i = 0; i < n; i += static_cast<std::size_t>(native_lanes)) {
+  constexpr int width = native_lanes < 4 ? native_lanes : 4;
+  using Pack = Lanes<width>;
+  for (std::size_t i = 0; i < n; i += static_cast<std::size_t>(width)) {
     Pack s, c;
     sincos(Pack::load(angle + i), s, c);
     s.store(sine + i);

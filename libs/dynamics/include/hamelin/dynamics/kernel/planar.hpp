@@ -9,9 +9,10 @@ inline namespace HAMELIN_ISA_NAMESPACE {
 
 /// SE(2) as the sweeps see it; the names and meanings are those of kernel/spatial.hpp. Twists [w; vx; vy], wrenches
 /// [t; fx; fy].
-template <class S>
+template <class S, bool Mixed = true>
 struct Planar {
   using Scalar = S;
+  static constexpr bool mixed = Mixed;
   using Link = model::PlanarLink;
   using Chain = model::PlanarChain;
 
@@ -39,6 +40,8 @@ struct Planar {
     S m, x, y;
   };
 
+  HAMELIN_INLINE static bool slides(const Link& l) noexcept { return Mixed && l.prismatic; }
+
   HAMELIN_INLINE static Motion sum(const Motion& a, const Motion& b) noexcept {
     return {a.w + b.w, a.x + b.x, a.y + b.y};
   }
@@ -53,14 +56,19 @@ struct Planar {
   }
 
   HAMELIN_INLINE static S angle(const Link& l, S q) noexcept {
-    return l.prismatic ? S(l.offset) : q * l.direction + l.offset;
+    return slides(l) ? S(l.offset) : q * l.direction + l.offset;
   }
-  HAMELIN_INLINE static Placement place(const Link& l, S q, S sine, S cosine) noexcept {
-    if (l.prismatic) return {sine, cosine, q * cosine + l.p0x, q * sine + l.p0y};
-    return {sine, cosine, S(l.p0x), S(l.p0y)};
+  HAMELIN_INLINE static void place(const Link& l, S q, S sine, S cosine, Placement& x) noexcept {
+    x = {sine, cosine, S(l.p0x), S(l.p0y)};
+    if (slides(l)) {
+      x.px += q * cosine;
+      x.py += q * sine;
+    }
   }
   HAMELIN_INLINE static Placement place(const Link& l, double q) noexcept {
-    return place(l, q, std::sin(angle(l, q)), std::cos(angle(l, q)));
+    Placement x;
+    place(l, q, std::sin(angle(l, q)), std::cos(angle(l, q)), x);
+    return x;
   }
 
   HAMELIN_INLINE static Motion to_child(const Link&, const Placement& x, const Motion& m) noexcept {
@@ -80,15 +88,21 @@ struct Planar {
     return {P.ww + x.px * (hy + wy) - x.py * (hx + wx), wx, wy, xx, xy, yy};
   }
   /// Behind a revolute joint without rotor inertia the row and column of w are gone.
-  HAMELIN_INLINE static Inertia carried(const Link& l, const Placement& x, const Inertia& P, const Force& u,
-                                        S inv_d) noexcept {
-    Inertia rest = P;
-    subtract_outer(rest, u, inv_d);
-    if (l.prismatic || l.armature != 0.0) return to_parent(l, x, rest);
-    const S d = rest.xx - rest.yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2) * rest.xy * cs;
-    const S xx = rest.xx - k, xy = d * cs + rest.xy * (S(1) - S(2) * ss), yy = rest.yy + k;
-    const S wx = x.px * xy - x.py * xx, wy = x.px * yy - x.py * xy;
-    return {x.px * wy - x.py * wx, wx, wy, xx, xy, yy};
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force& u, S inv_d) noexcept {
+    if (Mixed && (l.prismatic || l.armature != 0.0)) {
+      subtract_outer(P, u, inv_d);
+      P = to_parent(l, x, P);
+      return;
+    }
+    const S kx = u.x * inv_d, ky = u.y * inv_d;
+    const S rxx = P.xx - kx * u.x, rxy = P.xy - kx * u.y, ryy = P.yy - ky * u.y;
+    const S d = rxx - ryy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2.0) * rxy * cs;
+    P.xx = rxx - k;
+    P.xy = d * cs + rxy * (S(1.0) - S(2.0) * ss);
+    P.yy = ryy + k;
+    P.wx = x.px * P.xy - x.py * P.xx;
+    P.wy = x.px * P.yy - x.py * P.xy;
+    P.ww = x.px * P.wy - x.py * P.wx;
   }
   HAMELIN_INLINE static Operator to_parent(const Link&, const Placement& x, const Operator& P) noexcept {
     const auto turn = [&](S a, S b, S& u, S& v) {
@@ -121,19 +135,19 @@ struct Planar {
   }
 
   HAMELIN_INLINE static Motion axis(const Link& l) noexcept {
-    return l.prismatic ? Motion{S(0), S(1), S(0)} : Motion{S(l.direction), S(0), S(0)};
+    return slides(l) ? Motion{S(0), S(1), S(0)} : Motion{S(l.direction), S(0), S(0)};
   }
   HAMELIN_INLINE static S along_axis(const Link& l, const Force& f) noexcept {
-    return l.prismatic ? f.x : l.direction * f.t;
+    return slides(l) ? f.x : l.direction * f.t;
   }
   HAMELIN_INLINE static void add_along_axis(const Link& l, Motion& m, S k) noexcept {
-    if (l.prismatic)
+    if (slides(l))
       m.x += k;
     else
       m.w += l.direction * k;
   }
   HAMELIN_INLINE static Force column(const Link& l, const Inertia& P) noexcept {
-    if (l.prismatic) return {P.wx, P.xx, P.xy};
+    if (slides(l)) return {P.wx, P.xx, P.xy};
     return {l.direction * P.ww, l.direction * P.wx, l.direction * P.wy};
   }
 
@@ -192,14 +206,14 @@ struct Planar {
   HAMELIN_INLINE static S pair(const Motion& m, const Force& f) noexcept { return m.w * f.t + m.x * f.x + m.y * f.y; }
 
   HAMELIN_INLINE static S turning(const Link& l, const Motion& X, const Force& lambda) noexcept {
-    if (l.prismatic) return lambda.y * X.w;  // [X, e_x] = (0; 0, w)
+    if (slides(l)) return lambda.y * X.w;  // [X, e_x] = (0; 0, w)
     return (lambda.x * X.y - lambda.y * X.x) * l.direction;
   }
 
   HAMELIN_INLINE static Flow advance(const Link& l, const Placement& x, const Flow& parent, S v, S a) noexcept {
     const S ax = parent.ax - parent.dw * x.py - parent.ww * x.px, ay = parent.ay + parent.dw * x.px - parent.ww * x.py;
     Flow out{parent.w, parent.dw, x.c * ax + x.s * ay, x.c * ay - x.s * ax, parent.ww};
-    if (l.prismatic) {
+    if (slides(l)) {
       out.ax += a;
       out.ay += S(2) * parent.w * v;
     } else {
@@ -237,9 +251,15 @@ struct Planar {
   }
 
   HAMELIN_INLINE static S falling(const Link& l, const Direction& g, const Moment& k) noexcept {
-    return l.prismatic ? k.m * g.x : (k.x * g.y - k.y * g.x) * l.direction;
+    return slides(l) ? k.m * g.x : (k.x * g.y - k.y * g.x) * l.direction;
   }
 };
+
+/// With and without prismatic joints and rotor inertias.
+template <class S>
+using PlanarMixed = Planar<S, true>;
+template <class S>
+using PlanarPlain = Planar<S, false>;
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics::kernel

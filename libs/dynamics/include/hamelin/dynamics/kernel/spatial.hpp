@@ -14,10 +14,11 @@ using geometry::Vec3;
 
 /// SE(3) as the sweeps see it: twists [w; v], wrenches [t; f], articulated inertias, and how they pass between a link's
 /// joint-aligned frame and its parent's. kernel/planar.hpp has the same names for SE(2). S is the scalar, double or
-/// Lanes.
-template <class S>
+/// Lanes. `Mixed` chains may have prismatic joints and rotor inertias; without, nothing asks for them.
+template <class S, bool Mixed = true>
 struct Spatial {
   using Scalar = S;
+  static constexpr bool mixed = Mixed;
   using Link = model::SpatialLink;
   using Chain = model::SpatialChain;
 
@@ -53,6 +54,15 @@ struct Spatial {
     Vec3<S> h;
   };
 
+  HAMELIN_INLINE static bool slides(const Link& l) noexcept { return Mixed && l.prismatic; }
+  /// The parent's origin to the child's, in the parent's axes.
+  HAMELIN_INLINE static Vec3<S> offset(const Link& l, const Placement& x) noexcept {
+    if constexpr (Mixed)
+      return x.p;
+    else
+      return vec(l.p0);
+  }
+
   HAMELIN_INLINE static Vec3<S> vec(const Vec3<double>& a) noexcept { return {S(a.x), S(a.y), S(a.z)}; }
 
   HAMELIN_INLINE static Motion sum(const Motion& a, const Motion& b) noexcept { return {a.w + b.w, a.v + b.v}; }
@@ -68,17 +78,22 @@ struct Spatial {
   }
 
   /// The angle whose sine and cosine place() wants.
-  HAMELIN_INLINE static S angle(const Link& l, S q) noexcept { return l.prismatic ? S(l.offset) : q + l.offset; }
-  HAMELIN_INLINE static Placement place(const Link& l, S q, S sine, S cosine) noexcept {
-    Placement x{sine, cosine, vec(l.p0)};
-    if (l.prismatic) {
-      x.p.y -= q * l.sin_alpha;
-      x.p.z += q * l.cos_alpha;
+  HAMELIN_INLINE static S angle(const Link& l, S q) noexcept { return slides(l) ? S(l.offset) : q + l.offset; }
+  HAMELIN_INLINE static void place(const Link& l, S q, S sine, S cosine, Placement& x) noexcept {
+    x.s = sine;
+    x.c = cosine;
+    if constexpr (Mixed) {
+      x.p = vec(l.p0);
+      if (l.prismatic) {
+        x.p.y -= q * l.sin_alpha;
+        x.p.z += q * l.cos_alpha;
+      }
     }
-    return x;
   }
   HAMELIN_INLINE static Placement place(const Link& l, double q) noexcept {
-    return place(l, q, std::sin(angle(l, q)), std::cos(angle(l, q)));
+    Placement x;
+    place(l, q, std::sin(angle(l, q)), std::cos(angle(l, q)), x);
+    return x;
   }
 
   HAMELIN_INLINE static Vec3<S> to_child(const Link& l, const Placement& x, const Vec3<S>& a) noexcept {
@@ -91,12 +106,12 @@ struct Spatial {
   }
   /// Ad(g⁻¹) of a twist, g the child's pose in the parent.
   HAMELIN_INLINE static Motion to_child(const Link& l, const Placement& x, const Motion& m) noexcept {
-    return {to_child(l, x, m.w), to_child(l, x, m.v + cross(m.w, x.p))};
+    return {to_child(l, x, m.w), to_child(l, x, m.v + cross(m.w, offset(l, x)))};
   }
   /// Adᵀ(g⁻¹) of a wrench.
   HAMELIN_INLINE static Force to_parent(const Link& l, const Placement& x, const Force& f) noexcept {
     const Vec3<S> force = to_parent(l, x, f.f);
-    return {to_parent(l, x, f.t) + cross(x.p, force), force};
+    return {to_parent(l, x, f.t) + cross(offset(l, x), force), force};
   }
   /// R a Rᵀ with R = Rx(α) Rz(angle).
   HAMELIN_INLINE static Mat3<S> rotated(const Link& l, const Placement& x, const Mat3<S>& a) noexcept {
@@ -115,67 +130,73 @@ struct Spatial {
     return {b.xx,     ca * b.xy - sa * b.xz, sa * b.xy + ca * b.xz, b.yy - kx, dx * cas + b.yz * (S(1) - S(2) * sas),
             b.zz + kx};
   }
-  /// The inertia about an origin displaced by −p.
-  HAMELIN_INLINE static Inertia shifted(const Vec3<S>& p, const Inertia& P) noexcept {
-    Inertia out = P;
-    out.H = P.H + hat_times(p, full(P.M));
-    const Mat3<S> right = times_hat(P.H, p), left = hat_times(p, transpose(out.H));
-    out.A.xx += left.x.x - right.x.x;
-    out.A.xy += left.x.y - right.x.y;
-    out.A.xz += left.x.z - right.x.z;
-    out.A.yy += left.y.y - right.y.y;
-    out.A.yz += left.y.z - right.y.z;
-    out.A.zz += left.z.z - right.z.z;
-    return out;
+  /// P about an origin displaced by −p.
+  HAMELIN_INLINE static void shift(const Vec3<S>& p, Inertia& P) noexcept {
+    const Mat3<S> right = times_hat(P.H, p);
+    P.H = P.H + hat_times(p, full(P.M));
+    const Mat3<S> left = hat_times(p, transpose(P.H));
+    P.A.xx += left.x.x - right.x.x;
+    P.A.xy += left.x.y - right.x.y;
+    P.A.xz += left.x.z - right.x.z;
+    P.A.yy += left.y.y - right.y.y;
+    P.A.yz += left.y.z - right.y.z;
+    P.A.zz += left.z.z - right.z.z;
   }
   /// Adᵀ(g⁻¹) P Ad(g⁻¹).
   HAMELIN_INLINE static Inertia to_parent(const Link& l, const Placement& x, const Inertia& P) noexcept {
-    return shifted(x.p, {rotated(l, x, P.A), rotated(l, x, P.M), rotated(l, x, P.H)});
+    Inertia out{rotated(l, x, P.A), rotated(l, x, P.M), rotated(l, x, P.H)};
+    shift(offset(l, x), out);
+    return out;
   }
-  /// Adᵀ(g⁻¹) (P − u uᵀ/d) Ad(g⁻¹) with u = P A: what an articulated body is to its parent. Behind a revolute joint
+  /// P ← Adᵀ(g⁻¹) (P − u uᵀ/d) Ad(g⁻¹) with u = P A: what an articulated body is to its parent. Behind a revolute joint
   /// without rotor inertia all moments about z are gone: A loses its third row and column, H its third row.
-  HAMELIN_INLINE static Inertia carried(const Link& l, const Placement& x, const Inertia& P, const Force& u,
-                                        S inv_d) noexcept {
-    if (l.prismatic || l.armature != 0.0) {
-      Inertia rest = P;
-      subtract_outer(rest, u, inv_d);
-      return to_parent(l, x, rest);
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force& u, S inv_d) noexcept {
+    if (Mixed && (l.prismatic || l.armature != 0.0)) {
+      subtract_outer(P, u, inv_d);
+      P.A = rotated(l, x, P.A);
+      P.M = rotated(l, x, P.M);
+      P.H = rotated(l, x, P.H);
+    } else {
+      const S ca = S(l.cos_alpha), sa = S(l.sin_alpha);
+      const S kx = u.t.x * inv_d, ky = u.t.y * inv_d;
+      const S xx = P.A.xx - kx * u.t.x, xy = P.A.xy - kx * u.t.y, yy = P.A.yy - ky * u.t.y;
+      const S d = xx - yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2.0) * xy * cs;
+      const S turned = d * cs + xy * (S(1.0) - S(2.0) * ss), rest = yy + k;
+      P.A = {xx - k, turned * ca, turned * sa, rest * (ca * ca), rest * (ca * sa), rest * (sa * sa)};
+      P.M = rotated(l, x, minus_outer(P.M, u.f, inv_d));
+      const Vec3<S> hx = P.H.x - u.f * kx, hy = P.H.y - u.f * ky;
+      P.H.x = to_parent(l, x, hx * x.c - hy * x.s);
+      const Vec3<S> row = to_parent(l, x, hx * x.s + hy * x.c);
+      P.H.y = row * ca;
+      P.H.z = row * sa;
     }
-    const S ca = S(l.cos_alpha), sa = S(l.sin_alpha);
-    const S kx = u.t.x * inv_d, ky = u.t.y * inv_d;
-    const S xx = P.A.xx - kx * u.t.x, xy = P.A.xy - kx * u.t.y, yy = P.A.yy - ky * u.t.y;
-    const S d = xx - yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2) * xy * cs;
-    const S turned = d * cs + xy * (S(1) - S(2) * ss), rest = yy + k;
-    const Vec3<S> hx = P.H.x - u.f * kx, hy = P.H.y - u.f * ky;
-    const Vec3<S> row_x = to_parent(l, x, hx * x.c - hy * x.s), row_y = to_parent(l, x, hx * x.s + hy * x.c);
-    return shifted(x.p, {{xx - k, turned * ca, turned * sa, rest * (ca * ca), rest * (ca * sa), rest * (sa * sa)},
-                         rotated(l, x, minus_outer(P.M, u.f, inv_d)),
-                         {row_x, row_y * ca, row_y * sa}});
+    shift(offset(l, x), P);
   }
   HAMELIN_INLINE static Operator to_parent(const Link& l, const Placement& x, const Operator& P) noexcept {
     const Mat3<S> A = rotated(l, x, P.A), B = rotated(l, x, P.B), C = rotated(l, x, P.C), D = rotated(l, x, P.D);
-    const Mat3<S> shifted = C - times_hat(D, x.p);
-    return {A - times_hat(B, x.p) + hat_times(x.p, shifted), B + hat_times(x.p, D), shifted, D};
+    const Vec3<S> p = offset(l, x);
+    const Mat3<S> shifted = C - times_hat(D, p);
+    return {A - times_hat(B, p) + hat_times(p, shifted), B + hat_times(p, D), shifted, D};
   }
   HAMELIN_INLINE static Moment to_parent(const Link& l, const Placement& x, const Moment& k) noexcept {
-    return {k.m, to_parent(l, x, k.h) + x.p * k.m};
+    return {k.m, to_parent(l, x, k.h) + offset(l, x) * k.m};
   }
 
   /// The joint's screw A in the link's frame.
   HAMELIN_INLINE static Motion axis(const Link& l) noexcept {
     Motion m = zero_motion();
-    (l.prismatic ? m.v.z : m.w.z) = S(1);
+    (slides(l) ? m.v.z : m.w.z) = S(1);
     return m;
   }
   /// A · f: what the joint feels of a wrench.
-  HAMELIN_INLINE static S along_axis(const Link& l, const Force& f) noexcept { return l.prismatic ? f.f.z : f.t.z; }
+  HAMELIN_INLINE static S along_axis(const Link& l, const Force& f) noexcept { return slides(l) ? f.f.z : f.t.z; }
   /// m + A k.
   HAMELIN_INLINE static void add_along_axis(const Link& l, Motion& m, S k) noexcept {
-    (l.prismatic ? m.v.z : m.w.z) += k;
+    (slides(l) ? m.v.z : m.w.z) += k;
   }
   /// P A.
   HAMELIN_INLINE static Force column(const Link& l, const Inertia& P) noexcept {
-    if (l.prismatic) return {{P.H.x.z, P.H.y.z, P.H.z.z}, {P.M.xz, P.M.yz, P.M.zz}};
+    if (slides(l)) return {{P.H.x.z, P.H.y.z, P.H.z.z}, {P.M.xz, P.M.yz, P.M.zz}};
     return {{P.A.xz, P.A.yz, P.A.zz}, P.H.z};
   }
 
@@ -254,14 +275,15 @@ struct Spatial {
 
   /// λ · ad(X) A for a twist X: the turning of the joint's axis against a momentum. X needs no part along A.
   HAMELIN_INLINE static S turning(const Link& l, const Motion& X, const Force& lambda) noexcept {
-    if (l.prismatic) return lambda.f.x * X.w.y - lambda.f.y * X.w.x;
+    if (slides(l)) return lambda.f.x * X.w.y - lambda.f.y * X.w.x;
     return lambda.t.x * X.w.y - lambda.t.y * X.w.x + lambda.f.x * X.v.y - lambda.f.y * X.v.x;
   }
 
   /// Newton–Euler outwards: the parent's flow carried to the child, joint rate and acceleration added.
   HAMELIN_INLINE static Flow advance(const Link& l, const Placement& x, const Flow& parent, S v, S a) noexcept {
-    Flow out{to_child(l, x, parent.w), to_child(l, x, parent.dw), to_child(l, x, parent.a + parent.turn * x.p), {}};
-    if (l.prismatic) {
+    Flow out{
+        to_child(l, x, parent.w), to_child(l, x, parent.dw), to_child(l, x, parent.a + parent.turn * offset(l, x)), {}};
+    if (slides(l)) {
       out.a.x += S(2) * out.w.y * v;
       out.a.y -= S(2) * out.w.x * v;
       out.a.z += a;
@@ -305,9 +327,15 @@ struct Spatial {
 
   /// −∂U of the joint, with gravity g in the link's frame and the outboard moment k.
   HAMELIN_INLINE static S falling(const Link& l, const Direction& g, const Moment& k) noexcept {
-    return l.prismatic ? k.m * g.z : k.h.x * g.y - k.h.y * g.x;
+    return slides(l) ? k.m * g.z : k.h.x * g.y - k.h.y * g.x;
   }
 };
+
+/// With and without prismatic joints and rotor inertias.
+template <class S>
+using SpatialMixed = Spatial<S, true>;
+template <class S>
+using SpatialPlain = Spatial<S, false>;
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics::kernel

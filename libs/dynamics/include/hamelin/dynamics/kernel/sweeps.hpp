@@ -58,7 +58,7 @@ HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Spac
   const auto* const links = links_of<Space>(chain);
   for (std::size_t i = 0; i < n; ++i) k.angle[i] = Space::angle(links[i], q[i]);
   sincos(n, k.angle, k.sine, k.cosine);
-  for (std::size_t i = 0; i < n; ++i) k[i].x = Space::place(links[i], q[i], k.sine[i], k.cosine[i]);
+  for (std::size_t i = 0; i < n; ++i) Space::place(links[i], q[i], k.sine[i], k.cosine[i], k[i].x);
 }
 
 /// Newton–Euler outwards (5): force[i] = the wrench link i needs for itself. v, a may be null (zero).
@@ -84,7 +84,8 @@ HAMELIN_INLINE void gather_forces(const typename Space::Chain& chain, const Scra
     const auto& l = links[i];
     const auto f = Space::sum(k[i].force, carried);
     tau[i] = Space::along_axis(l, f);
-    if (a != nullptr) tau[i] += a[i] * l.armature;
+    if constexpr (Space::mixed)
+      if (a != nullptr) tau[i] += a[i] * l.armature;
     if (i > 0) carried = Space::to_parent(l, k[i].x, f);
   }
 }
@@ -106,8 +107,10 @@ HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>
   using S = typename Space::Scalar;
   Space::add_rigid(l, P);
   link.column = Space::column(l, P);
-  link.inv_d = S(1.0) / (Space::along_axis(l, link.column) + l.armature);
-  if (!root) P = Space::carried(l, link.x, P, link.column, link.inv_d);
+  S d = Space::along_axis(l, link.column);
+  if constexpr (Space::mixed) d += l.armature;
+  link.inv_d = S(1.0) / d;
+  if (!root) Space::carry(l, link.x, P, link.column, link.inv_d);
 }
 
 /// One link of the solve: bias comes in as what outboard links hand over. u[i] = (y − A·bias)/d.
@@ -295,7 +298,8 @@ typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, const 
   S twice = S(0.0);
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
     const auto& l = links_of<Space>(chain)[i];
-    twice += Space::pair(k[i].motion, Space::momentum(l, k[i].motion)) + v[i] * v[i] * l.armature;
+    twice += Space::pair(k[i].motion, Space::momentum(l, k[i].motion));
+    if constexpr (Space::mixed) twice += v[i] * v[i] * l.armature;
   }
   return S(0.5) * twice;
 }
@@ -330,7 +334,7 @@ void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k, co
       if (j == 0) break;
       f = Space::to_parent(links[j], k[j].x, f);
     }
-    M[i * ld + i] += links[i].armature;
+    if constexpr (Space::mixed) M[i * ld + i] += links[i].armature;
     if (i > 0) composite = Space::to_parent(links[i], k[i].x, composite);
   }
 }
