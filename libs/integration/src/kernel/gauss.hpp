@@ -101,8 +101,7 @@ class Gauss {
     const double h = call_.h;
     Pack weights[most_groups][most_stages];
     for (std::size_t g = 0; g < groups_; ++g)
-      for (std::size_t j = 0; j < s_; ++j)
-        for (std::size_t lane = 0; lane < lanes; ++lane) weights[g][j].v[lane] = h * call_.tableau.a[stage(g, lane)][j];
+      for (std::size_t j = 0; j < s_; ++j) weights[g][j] = Pack::load(call_.tableau.a_column[j] + g * lanes) * h;
     const bool guessed = call_.h_before > 0.0;
     if (guessed)
       extrapolate();
