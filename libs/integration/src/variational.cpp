@@ -2,34 +2,81 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+
+#include "guess.hpp"
+#include "hamelin/core/isa.hpp"
+#include "hamelin/dynamics/kernel/dispatch.hpp"
+#include "spins.hpp"
 
 namespace hamelin::integration {
 
+namespace kernel {
+
+namespace isa_baseline {
+extern const VariationalSet variational_set;
+}
+#if defined(__x86_64__)
+namespace isa_v3 {
+extern const VariationalSet variational_set;
+}
+namespace isa_v4 {
+extern const VariationalSet variational_set;
+}
+#endif
+
 namespace {
 
-// Near a root Newton contracts quadratically, and the guess is near. A first correction beyond this [rad or m], or one
-// that is not well below the one before, is on its way to some other root of the step: better to halve the step.
-constexpr double largest_correction = 1.0;
-constexpr double contraction = 0.5;
-constexpr int max_newton_updates = 30;  // at the worst contraction, from the largest correction to 1e-9
+const VariationalSet& variational_kernels() {
+  switch (selected_isa()) {
+#if defined(__x86_64__)
+    case Isa::v4:
+      return isa_v4::variational_set;
+    case Isa::v3:
+      return isa_v3::variational_set;
+#endif
+    default:
+      return isa_baseline::variational_set;
+  }
+}
 
 }  // namespace
 
-Variational::Variational(const Model& model, const Options& options) : Integrator("hamel-variational", model, options) {
-  const auto n = static_cast<std::size_t>(model.dof());
-  if (model.planar())
-    links_ = kernel::VariationalScratch<dynamics::kernel::Planar<double>>(n);
-  else
-    links_ = kernel::VariationalScratch<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_})
-    *x = VectorXd::Zero(model.dof());
+}  // namespace kernel
+
+namespace {
+
+// From this tolerance up the square of the first correction may vouch for it: below, energy would drift (measured).
+constexpr double loosest_confirmed = 1e-10;
+
+const double* data_or_null(const VectorXd& x) {
+  return x.size() > 0 ? x.data() : nullptr;
+}
+
+}  // namespace
+
+Variational::Variational(const Model& model, const Options& options)
+    : Integrator("hamel-variational", model, options),
+      kernels_(&kernel::variational_kernels()),
+      memory_(dynamics::kernel::with_group(
+          model, *kernels_, [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
+  for (auto* x : {&delta_, &p_, &p_next_, &correction_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
+  gradient_at_ = VectorXd::Constant(model.dof(), std::nan(""));
+}
+
+bool Variational::trusts_quadratic() const noexcept {
+  return options_.solver == Solver::newton && options_.tolerance >= loosest_confirmed;
 }
 
 std::string Variational::criterion() const {
-  return options_.solver == Solver::newton ? fmt::format("|error of delta|_inf <= {}", options_.tolerance)
-                                           : fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
+  if (options_.solver == Solver::feedback) return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
+  if (trusts_quadratic())
+    return fmt::format("|error of delta|_inf <= {}, or 10 |first correction|^2 <= it, unconfirmed", options_.tolerance);
+  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+}
+
+std::string Variational::mode() const {
+  return options_.solver == Solver::newton && options_.tolerance <= 1e-12 ? "structure" : "accurate";
 }
 
 void Variational::begin(State& state, const VectorXd& v0) {
@@ -50,126 +97,80 @@ void Variational::set_velocity(State& state, const VectorXd& v) {
   state.delta_count = -1;  // the guess is h v
 }
 
-void Variational::guess(const State& state, double h) {
-  if (options_.solver == Solver::feedback) {
-    delta_.setZero();  // the paper's guess θ^k
-    return;
+// The end of one step is the start of the next.
+const VectorXd& Variational::gradient(const VectorXd& q) {
+  if (q != gradient_at_) {
+    dynamics::gravity_torque(model_, ws_, q, gradient_);
+    gradient_at_ = q;
   }
-  const auto& d = state.deltas;
-  switch (state.delta_count) {
-    case -1:
-      delta_ = h * state.v;
-      break;
-    case 0:
-      delta_.setZero();
-      break;
-    case 1:
-      delta_ = d[0];
-      break;
-    case 2:
-      delta_ = 2.0 * d[0] - d[1];
-      break;
-    case 3:
-      delta_ = 3.0 * (d[0] - d[1]) + d[2];
-      break;
-    default:
-      delta_ = 4.0 * (d[0] + d[2]) - 6.0 * d[1] - d[3];
-      break;
-  }
-  if (state.delta_count > 0 && state.step_previous != h) delta_ = d[0] * (h / state.step_previous);
+  return gradient_;
 }
 
-void Variational::evaluate(const State& state, const Channels& channels, double h) {
-  mid_ = state.q + 0.5 * delta_;
-  rate_ = delta_ / h;
-  if (model_.planar())
-    kernel::momenta(std::get<1>(model_.chain()), std::get<1>(links_), mid_.data(), rate_.data(), h, minus_.data(),
-                    plus_.data());
-  else
-    kernel::momenta(std::get<0>(model_.chain()), std::get<0>(links_), mid_.data(), rate_.data(), h, minus_.data(),
-                    plus_.data());
-  evaluate_forces(channels, mid_, rate_);
-  residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
+template <class F>
+kernel::VariationalOutcome Variational::with_call(const State& state, const Channels& channels, double h, F&& f) {
+  return dynamics::kernel::with_group(model_, *kernels_,
+                                      [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
+                                        const kernel::VariationalCall<Chain> call{chain,
+                                                                                  h,
+                                                                                  state.q.data(),
+                                                                                  p_.data(),
+                                                                                  delta_.data(),
+                                                                                  p_next_.data(),
+                                                                                  data_or_null(channels.damping),
+                                                                                  data_or_null(channels.coulomb),
+                                                                                  data_or_null(channels.held_torque),
+                                                                                  channels.coulomb_speed,
+                                                                                  spins_.data(),
+                                                                                  spins_.size(),
+                                                                                  options_.tolerance,
+                                                                                  trusts_quadratic()};
+                                        return f(entry, call);
+                                      });
 }
 
-bool Variational::factor(const Channels& channels, double h) {
-  const double* damping = channels.damping.size() > 0 ? channels.damping.data() : nullptr;
-  if (model_.planar()) return kernel::factor(std::get<1>(model_.chain()), std::get<1>(links_), h, damping);
-  return kernel::factor(std::get<0>(model_.chain()), std::get<0>(links_), h, damping);
+kernel::VariationalOutcome Variational::solve_newton(const State& state, const Channels& channels, double h) {
+  extrapolate(state, h, delta_);
+  return with_call(state, channels, h,
+                   [&](const auto& entry, const auto& call) { return entry.step(call, memory_.get()); });
 }
 
-void Variational::correct() {
-  if (model_.planar())
-    kernel::correct(std::get<1>(model_.chain()), std::get<1>(links_), residual_.data(), correction_.data());
-  else
-    kernel::correct(std::get<0>(model_.chain()), std::get<0>(links_), residual_.data(), correction_.data());
-}
-
-// The last sweep is needed for p⁺ anyway, and the kept factors turn its residual into the error of Δ: no factorisation
-// is spent on confirming.
-bool Variational::solve_newton(const State& state, const Channels& channels, double h, StepReport& report) {
-  double allowed = largest_correction;
+kernel::VariationalOutcome Variational::solve_feedback(const State& state, const Channels& channels, double h) {
+  delta_.setZero();  // the paper's guess θ^k
+  int updates = 0;
   for (;;) {
-    evaluate(state, channels, h);
-    ++report.evaluations;
-    if (!residual_.allFinite()) return false;
-    if (report.factorizations > 0) {
-      correct();
-      report.residual = correction_.lpNorm<Eigen::Infinity>();
-      if (report.residual <= options_.tolerance) {
-        // The correction is at hand, so Δ takes it; taking R out of p⁺ = p⁻ + h λ·b moves p⁺ along but for its slow
-        // part.
-        delta_ += correction_;
-        plus_ -= residual_;
-        return true;
-      }
-    }
-    if (report.updates == max_newton_updates || !factor(channels, h)) return false;
-    ++report.factorizations;
-    correct();
-    const double size = correction_.lpNorm<Eigen::Infinity>();
-    if (!(size <= allowed)) return false;
-    // rounding of long chains ends the contraction, not the iteration
-    allowed = std::max(contraction * size, 1e3 * options_.tolerance);
-    delta_ += correction_;
-    ++report.updates;
-  }
-}
-
-bool Variational::solve_feedback(const State& state, const Channels& channels, double h, StepReport& report) {
-  for (;;) {
-    evaluate(state, channels, h);
-    ++report.evaluations;
-    report.residual = residual_.norm() / h;  // ‖τ_e‖
-    if (!std::isfinite(report.residual)) return false;
-    if (report.residual < options_.feedback_tolerance) return true;
-    if (report.updates == options_.max_updates) return false;
+    auto out = with_call(state, channels, h, [&](const auto& entry, const auto& call) {
+      return entry.evaluate(call, memory_.get(), residual_.data());
+    });
+    out.updates = out.factorizations = updates;
+    out.evaluations = updates + 1;
+    out.residual = residual_.norm() / std::abs(h);  // ‖τ_e‖
+    out.converged = out.residual < options_.feedback_tolerance;
+    if (out.converged || !std::isfinite(out.residual) || updates == options_.max_updates) return out;
     residual_ *= -h;  // h² M⁻¹ τ_e with τ_e = R/h, (16)
     dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);
     delta_ += correction_;
-    ++report.updates;
-    ++report.factorizations;
+    ++updates;
   }
 }
 
 StepReport Variational::attempt(State& state, const Channels& channels, double h) {
+  p_ = state.p - 0.5 * h * gradient(state.q);
+  to_spins(model_, channels.gyroscopic, spins_);
+  const auto out =
+      options_.solver == Solver::newton ? solve_newton(state, channels, h) : solve_feedback(state, channels, h);
   StepReport report;
-  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
-  guess(state, h);
-  report.converged = options_.solver == Solver::newton ? solve_newton(state, channels, h, report)
-                                                       : solve_feedback(state, channels, h, report);
+  report.converged = out.converged;
+  report.updates = out.updates;
+  report.factorizations = out.factorizations;
+  report.evaluations = out.evaluations;
+  report.residual = out.residual;
+  report.held_work_J = out.held_work;
+  report.dissipated_J = out.dissipated;
+  report.gyroscopic_work_J = out.gyroscopic_work;
   if (!report.converged) return report;
-  book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
-  // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F
   state.q += delta_;
-  state.p = plus_ + 0.5 * h * force_;
-  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
-  state.p -= 0.5 * h * gradient_;
-  const bool same_step = state.step_previous == h && state.delta_count > 0;
-  std::rotate(state.deltas.begin(), state.deltas.end() - 1, state.deltas.end());
-  state.deltas[0] = delta_;
-  state.delta_count = same_step ? std::min(state.delta_count + 1, 4) : 1;
-  state.step_previous = h;
+  state.p = p_next_ - 0.5 * h * gradient(state.q);
+  remember(state, h, delta_);
   return report;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
-#include <memory>
-#include <variant>
+#include <vector>
 
 #include "hamelin/integration/integrator.hpp"
 #include "kernel/variational.hpp"
@@ -8,12 +7,13 @@
 namespace hamelin::integration {
 
 /// hamel-variational: the exact variation of L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] (SPEC §3), solved for Δ by
-/// the exact O(n) Newton step or by the paper's feedback (16).
+/// the exact O(n) Newton step (kernel/variational.hpp) or by the paper's feedback (16).
 class Variational final : public Integrator {
  public:
   Variational(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 2; }
+  [[nodiscard]] std::string mode() const override;
   void velocity(const State& state, VectorXd& v) override;
   void kick(State& state, const VectorXd& dp) override;
   void set_velocity(State& state, const VectorXd& v) override;
@@ -21,19 +21,20 @@ class Variational final : public Integrator {
  private:
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  void guess(const State& state, double h);
-  /// Residual of the left equation at delta_; leaves plus_ and force_.
-  void evaluate(const State& state, const Channels& channels, double h);
-  bool factor(const Channels& channels, double h);
-  /// correction_ = what the kept factors make of residual_.
-  void correct();
-  bool solve_newton(const State& state, const Channels& channels, double h, StepReport& report);
-  bool solve_feedback(const State& state, const Channels& channels, double h, StepReport& report);
+  /// ∂U(q), kept from the last call where that was for the same q.
+  const VectorXd& gradient(const VectorXd& q);
+  /// f(entry, call) for the kernel of this model.
+  template <class F>
+  kernel::VariationalOutcome with_call(const State& state, const Channels& channels, double h, F&& f);
+  kernel::VariationalOutcome solve_newton(const State& state, const Channels& channels, double h);
+  kernel::VariationalOutcome solve_feedback(const State& state, const Channels& channels, double h);
+  [[nodiscard]] bool trusts_quadratic() const noexcept;
 
-  std::variant<kernel::VariationalScratch<dynamics::kernel::Spatial<double>>,
-               kernel::VariationalScratch<dynamics::kernel::Planar<double>>>
-      links_;
-  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_;
+  const kernel::VariationalSet* kernels_;
+  dynamics::Memory memory_;
+  std::vector<dynamics::kernel::Spin> spins_;
+  VectorXd delta_, p_, p_next_, correction_, residual_;
+  VectorXd gradient_, gradient_at_;
 };
 
 }  // namespace hamelin::integration

@@ -1,117 +1,369 @@
 #pragma once
-#include <cmath>
-#include <vector>
+#include <cstddef>
 
-#include "hamelin/dynamics/kernel/planar.hpp"
-#include "hamelin/dynamics/kernel/spatial.hpp"
+#include "hamelin/dynamics/kernel/groups.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
 
-/// The two sweeps of hamel-variational and their exact linearisation (SPEC §3), over the group and the scalar.
 namespace hamelin::integration::kernel {
 
-template <class Space>
-struct VariationalLink {
-  typename Space::Placement x{};
-  typename Space::Motion carried{};  ///< X_i = Ad(g⁻¹) ξ_{i−1}
-  typename Space::Motion b{};        ///< b_i = ad(X_i) A_i
-  typename Space::Motion twist{};    ///< ξ_i
-  typename Space::Motion step{};     ///< δξ_i
-  typename Space::Force lambda{};    ///< λ_i
-
-  // Factors of the linearisation, kept while momenta() moves on.
-  typename Space::Placement x_kept{};
-  typename Space::Motion a{}, B{};  ///< a_i, B_i
-  typename Space::Force w{}, u{};   ///< w_i, u_i
-  typename Space::Operator P{};     ///< δλ_i = P_i δξ_i + s_i
-  typename Space::Scalar inv_d{};
-
-  typename Space::Force s{};  ///< s_i of the current right-hand side
-  typename Space::Scalar r{};
+/// One step of hamel-variational: Δ from p_k⁻(Δ) + (h/2)(∂V − F) = p_k, and p_{k+1}⁺ (SPEC §3).
+template <class Chain>
+struct VariationalCall {
+  const Chain& chain;
+  double h;         ///< may be negative (compositions)
+  const double* q;  ///< θ^k
+  const double* p;  ///< p_k − (h/2) ∂V(θ^k)
+  double* delta;    ///< in: the guess; out: Δ
+  double* p_next;   ///< out: p_{k+1}⁺ + (h/2) F
+  // Forces at θ_mid with velocity Δ/h; null or none: not computed.
+  const double *damping, *coulomb, *held;
+  double coulomb_speed;
+  const dynamics::kernel::Spin* spins;
+  std::size_t spin_count;
+  double tolerance;  ///< ‖error of Δ‖∞ [rad or m]
+  /// Whether a first correction whose square promises the tolerance needs no confirming (tolerances from 1e-10 up).
+  bool trust_quadratic;
 };
 
-template <class Space>
-using VariationalScratch = std::vector<VariationalLink<Space>>;
+struct VariationalOutcome {
+  bool converged;
+  int updates, factorizations, evaluations;
+  double residual;                                ///< the last correction, or what its square promises [rad or m]
+  double held_work, dissipated, gyroscopic_work;  ///< F·Δ [J]
+};
 
-/// Both sweeps at θ_mid with velocity Δ/h: minus[i] = p_k⁻ and plus[i] = p_{k+1}⁺ without forces and potentials.
-template <class Space>
-void momenta(const typename Space::Chain& chain, VariationalScratch<Space>& k, const double* mid, const double* rate,
-             double h, double* minus, double* plus) noexcept {
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    const auto& l = chain.links[i];
-    auto& link = k[i];
-    link.x = Space::place(l, mid[i]);
-    link.carried =
-        l.parent < 0 ? Space::zero_motion() : Space::to_child(l, link.x, k[static_cast<std::size_t>(l.parent)].twist);
-    link.b = Space::ad(link.carried, Space::axis(l));
-    link.twist = link.carried;
-    Space::add_along_axis(l, link.twist, rate[i]);
-    link.lambda = Space::momentum(l, link.twist);
-  }
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    const auto& link = k[i];
-    const double along = Space::along_axis(l, link.lambda), turned = 0.5 * h * Space::pair(link.b, link.lambda);
-    minus[i] = along - turned;
-    plus[i] = along + turned;
-    if (l.parent < 0) continue;
-    auto& outer = k[static_cast<std::size_t>(l.parent)].lambda;
-    outer = Space::sum(outer, Space::to_parent(l, link.x, link.lambda));
-  }
-}
+template <class Chain>
+struct VariationalEntry {
+  std::size_t (*bytes)(std::size_t links) noexcept;
+  /// Newton, as Variational::solve().
+  VariationalOutcome (*step)(const VariationalCall<Chain>& call, void* memory) noexcept;
+  /// What a step of just this Δ would be, and the residual R of its equation.
+  VariationalOutcome (*evaluate)(const VariationalCall<Chain>& call, void* memory, double* residual) noexcept;
+};
+using VariationalSet = dynamics::kernel::Groups<VariationalEntry>;
 
-/// Factors the linearisation at the point of the last momenta(): eliminates from the tip with δλ_i = P_i δξ_i + s_i.
-/// `damping` (null = none) adds D_i/2 to the pivots. False where a pivot vanishes.
-template <class Space>
-bool factor(const typename Space::Chain& chain, VariationalScratch<Space>& k, double h,
-            const double* damping) noexcept {
-  const double half = 0.5 * h;
-  for (std::size_t i = 0; i < k.size(); ++i) k[i].P = Space::general(Space::rigid(chain.links[i]));
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    auto& link = k[i];
-    const auto A = Space::axis(l);
-    link.x_kept = link.x;
-    link.a = Space::sum(A, Space::scaled(link.b, -half));
-    link.B = Space::sum(Space::scaled(A, 1.0 / h), Space::scaled(link.b, 0.5));
-    const auto z = Space::ad_T(A, link.lambda);
-    const auto PB = Space::times(link.P, link.B);
-    link.w = Space::sum(Space::transposed_times(link.P, link.a), Space::scaled(z, half));
-    link.u = Space::sum(PB, Space::scaled(z, -0.5));
-    double d = Space::pair(link.a, PB) + 0.5 * half * Space::pair(link.b, z);
-    if (damping != nullptr) d += 0.5 * damping[i];
-    // A pivot is an inertia over h; one that is lost in the rounding of its terms has no meaning.
-    if (!(std::abs(d) > 1e-14 * std::abs(Space::along_axis(l, PB)))) return false;
-    link.inv_d = 1.0 / d;
-    if (l.parent < 0) continue;
-    auto rest = link.P;
-    Space::subtract_outer(rest, link.u, Space::scaled(link.w, link.inv_d));
-    Space::add(k[static_cast<std::size_t>(l.parent)].P, Space::to_parent(l, link.x, rest));
-  }
-  return true;
-}
+// Near a root Newton contracts quadratically, and the guess is near. A first correction beyond this [rad or m], or one
+// that is not well below the one before, is on its way to some other root of the step: better to halve the step.
+inline constexpr double largest_correction = 0.3;
+inline constexpr double contraction_asked = 0.5;
+inline constexpr int max_newton_updates = 30;  // at the worst contraction, from the largest correction to 1e-9
+// A correction of size e leaves an error of about 0.3 e² (measured on falling chains); this is on the safe side.
+inline constexpr double quadratic_constant = 10.0;
 
-/// δΔ of the factored linearisation for a residual: s inwards, then outwards.
-template <class Space>
-void correct(const typename Space::Chain& chain, VariationalScratch<Space>& k, const double* residual,
-             double* delta) noexcept {
-  for (auto& link : k) link.s = Space::zero_force();
-  for (std::size_t i = k.size(); i-- > 0;) {
-    const auto& l = chain.links[i];
-    auto& link = k[i];
-    link.r = (-residual[i] - Space::pair(link.a, link.s)) * link.inv_d;
-    if (l.parent < 0) continue;
-    auto& outer = k[static_cast<std::size_t>(l.parent)].s;
-    const auto carried = Space::sum(link.s, Space::scaled(link.u, link.r));
-    outer = Space::sum(outer, Space::to_parent(l, link.x_kept, carried));
-  }
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    const auto& l = chain.links[i];
-    auto& link = k[i];
-    const auto y = l.parent < 0 ? Space::zero_motion()
-                                : Space::to_child(l, link.x_kept, k[static_cast<std::size_t>(l.parent)].step);
-    delta[i] = link.r - Space::pair(y, link.w) * link.inv_d;
-    link.step = Space::sum(y, Space::scaled(link.B, delta[i]));
-  }
-}
+inline namespace HAMELIN_ISA_NAMESPACE {
 
+/// The sweeps and their exact linearisation, written once over the group. All that the linearisation needs is scaled so
+/// that h drops out: with σ = δΔ/h, b = (h/2) ad(X)A and z = (h/2) adᵀ(A)λ,
+///   a = A − b,  B = A + b,  u = P B − z,  w = Pᵀa + z,  d = a·P B + z·b + armature + (h/2) D,
+///   P_{i−1} = I_{i−1} + Adᵀ(P − u wᵀ/d)Ad,  ρ = (−R − a·s)/d,  s_{i−1} = Adᵀ(s + u ρ),
+///   σ = ρ − w·y/d,  y_i = Ad δξ_{i−1},  δξ = y + B σ.
+/// Gyroscopic terms hang their wrenches on A, not on a: a second pair δμ = Q δξ + t runs along with them.
+template <class Space>
+class Variational {
+  using Chain = typename Space::Chain;
+  using Link = typename Space::Link;
+  using Motion = typename Space::Motion;
+  using Force = typename Space::Force;
+  using Scratch = dynamics::kernel::Scratch<Space>;
+
+  struct Factors {
+    Motion b;  ///< (h/2) ad(X) A
+    Force z, w, u;
+    Force spin_u;  ///< Q B − (h/2) adᵀ(A) μ
+    double inv_d, rho;
+  };
+
+ public:
+  static std::size_t bytes(std::size_t n) noexcept {
+    return Scratch::bytes(n) + n * sizeof(Factors) + 6 * n * sizeof(double);
+  }
+  static VariationalOutcome step(const VariationalCall<Chain>& call, void* memory) noexcept {
+    Variational v(call, memory);
+    v.solve();
+    return v.out_;
+  }
+
+  static VariationalOutcome evaluate(const VariationalCall<Chain>& call, void* memory, double* residual) noexcept {
+    Variational v(call, memory);
+    v.evaluate();
+    for (std::size_t i = 0; i < v.n_; ++i) {
+      residual[i] = v.residual_[i];
+      v.residual_[i] = 0.0;
+    }
+    v.finish();
+    return v.out_;
+  }
+
+  Variational(const VariationalCall<Chain>& call, void* memory) noexcept
+      : call_(call),
+        n_(dynamics::kernel::count<Space>(call.chain)),
+        links_(dynamics::kernel::links_of<Space>(call.chain)),
+        half_(0.5 * call.h),
+        k_(Scratch::at(memory, n_)),
+        f_(reinterpret_cast<Factors*>(static_cast<char*>(memory) + Scratch::bytes(n_))),
+        mid_(reinterpret_cast<double*>(f_ + n_)),
+        rate_(mid_ + n_),
+        plus_(rate_ + n_),
+        residual_(plus_ + n_),
+        force_(residual_ + n_),
+        sigma_(force_ + n_) {}
+
+  /// R and p⁺ at the present Δ.
+  void evaluate() noexcept { sweep<false>(); }
+
+  /// The same, and the factors of the linearisation there. False where a pivot vanishes.
+  bool evaluate_and_factor() noexcept { return call_.spin_count > 0 ? eliminate<true>() : eliminate<false>(); }
+
+  /// δΔ for the residual that the factors were made with, added to Δ; returns its largest size.
+  double correct() noexcept { return substitute(); }
+
+  /// R and p⁺ at the present Δ, and δΔ for this R by the factors there are, added to Δ; returns its largest size. The
+  /// frames are those of now: another change of the order of δΔ to an approximate Jacobian.
+  double evaluate_and_correct() noexcept {
+    sweep<true>();
+    return substitute();
+  }
+
+  const double* residual() const noexcept { return residual_; }
+
+ private:
+  /// Places the chain at θ_mid, moves it at Δ/h: motion[i] = ξ_i, b_i, and the forces there.
+  HAMELIN_INLINE void move() noexcept {
+    const double inv_h = 1.0 / call_.h;
+    for (std::size_t i = 0; i < n_; ++i) {
+      mid_[i] = call_.q[i] + 0.5 * call_.delta[i];
+      rate_[i] = call_.delta[i] * inv_h;
+    }
+    dynamics::kernel::place<Space>(call_.chain, k_, mid_);
+    auto twist = Space::zero_motion();
+    for (std::size_t i = 0; i < n_; ++i) {
+      const auto X = i == 0 ? twist : Space::to_child(links_[i], k_[i].x, twist);
+      f_[i].b = Space::scaled(Space::bracket(links_[i], X), half_);
+      twist = X;
+      Space::add_along_axis(links_[i], twist, rate_[i]);
+      k_[i].motion = twist;
+    }
+    for (std::size_t i = 0; i < n_; ++i) force_[i] = call_.held != nullptr ? call_.held[i] : 0.0;
+    if (call_.damping != nullptr)
+      for (std::size_t i = 0; i < n_; ++i) force_[i] -= call_.damping[i] * rate_[i];
+    if (call_.coulomb != nullptr)
+      for (std::size_t i = 0; i < n_; ++i)
+        force_[i] -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
+    if (call_.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, call_.spins, call_.spin_count, sigma_);
+      for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
+    }
+  }
+
+  template <bool Correct>
+  HAMELIN_INLINE void sweep() noexcept {
+    ++out_.evaluations;
+    move();
+    auto lambda = Space::zero_force(), s = Space::zero_force(), t = Space::zero_force();
+    for (std::size_t i = n_; i-- > 0;) {
+      const Link& l = links_[i];
+      const auto& x = k_[i].x;
+      lambda = Space::sum(lambda, Space::momentum(l, k_[i].motion));
+      read(i, lambda);
+      if (i > 0) lambda = Space::to_parent(l, x, lambda);
+      if constexpr (Correct) {
+        auto& f = f_[i];
+        double right = -residual_[i] - along_a(i, s);
+        if (call_.spin_count > 0) right += half_ * Space::along_axis(l, t);
+        f.rho = right * f.inv_d;
+        if (i == 0) break;
+        s = Space::to_parent(l, x, Space::sum(s, Space::scaled(f.u, f.rho)));
+        if (call_.spin_count > 0) t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
+      }
+    }
+  }
+
+  /// p⁻, p⁺ and R of a joint from its λ.
+  HAMELIN_INLINE void read(std::size_t i, const Force& lambda) noexcept {
+    double along = Space::along_axis(links_[i], lambda);
+    if constexpr (Space::mixed) along += links_[i].armature * rate_[i];
+    const double turned = Space::pair(f_[i].b, lambda);
+    residual_[i] = along - turned - half_ * force_[i] - call_.p[i];
+    plus_[i] = along + turned;
+  }
+
+  HAMELIN_INLINE double along_a(std::size_t i, const Force& s) const noexcept {
+    return Space::along_axis(links_[i], s) - Space::pair(f_[i].b, s);
+  }
+
+  template <bool Spins>
+  bool eliminate() noexcept {
+    ++out_.evaluations;
+    ++out_.factorizations;
+    move();
+    auto P = Space::no_operator(), Q = Space::no_operator();
+    auto lambda = Space::zero_force(), mu = Space::zero_force(), s = Space::zero_force(), t = Space::zero_force();
+    for (std::size_t i = n_; i-- > 0;) {
+      const Link& l = links_[i];
+      auto& f = f_[i];
+      const auto& x = k_[i].x;
+      lambda = Space::sum(lambda, Space::momentum(l, k_[i].motion));
+      read(i, lambda);
+      Space::add_rigid(l, P);
+      const Force z = f.z = Space::scaled(Space::turned_axis(l, lambda), half_);
+      const Force PB = Space::sum(Space::column(l, P), Space::times_bracket(P, f.b));
+      f.u = Space::sum(PB, Space::scaled(z, -1.0));
+      f.w = Space::sum(Space::sum(Space::row(l, P), Space::scaled(Space::transposed_times_bracket(P, f.b), -1.0)), z);
+      const double along = Space::along_axis(l, PB);
+      double d = along - Space::pair(f.b, PB) + Space::pair(f.b, z);
+      if constexpr (Space::mixed) d += l.armature;
+      if (call_.damping != nullptr) d += half_ * call_.damping[i];
+      if (call_.coulomb != nullptr) {
+        const double slope = __builtin_tanh(rate_[i] / call_.coulomb_speed);
+        d += half_ * call_.coulomb[i] / call_.coulomb_speed * (1.0 - slope * slope);
+      }
+      double right = -residual_[i] - along_a(i, s);
+      if constexpr (Spins) {
+        for (std::size_t j = 0; j < call_.spin_count; ++j)
+          if (call_.spins[j].link == i) hang(call_.spins[j], Q, mu);
+        const Force QB = Space::sum(Space::column(l, Q), Space::times_bracket(Q, f.b));
+        f.spin_u = Space::sum(QB, Space::scaled(Space::turned_axis(l, mu), -half_));
+        f.w = Space::sum(f.w, Space::scaled(Space::row(l, Q), -half_));
+        d -= half_ * Space::along_axis(l, QB);
+        right += half_ * Space::along_axis(l, t);
+      }
+      // A pivot is an inertia; one that is lost in the rounding of its terms has no meaning.
+      if (!(__builtin_fabs(d) > 1e-14 * __builtin_fabs(along))) return false;
+      f.inv_d = 1.0 / d;
+      f.rho = right * f.inv_d;
+      if (i == 0) break;
+      const Force share = Space::scaled(f.w, f.inv_d);
+      Space::subtract_outer(P, f.u, share);
+      Space::carry(l, x, P);
+      s = Space::to_parent(l, x, Space::sum(s, Space::scaled(f.u, f.rho)));
+      lambda = Space::to_parent(l, x, lambda);
+      if constexpr (Spins) {
+        Space::subtract_outer(Q, f.spin_u, share);
+        Space::carry(l, x, Q);
+        t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
+        mu = Space::to_parent(l, x, mu);
+      }
+    }
+    return true;
+  }
+
+  /// A term's wrench and its dependence on the link's twist. That its w stays put while the link turns is left out: it
+  /// is of higher order in h.
+  void hang(const dynamics::kernel::Spin& spin, typename Space::Operator& Q, Force& mu) const noexcept {
+    auto w = Space::spin_axis(spin.w);
+    for (std::size_t j = 0; j <= spin.link; ++j) w = Space::to_child_axis(links_[j], k_[j].x, w);
+    Space::add(Q, Space::spin_operator(w, spin.point));
+    mu = Space::sum(mu, Space::spin_force(w, spin.point, k_[spin.link].motion));
+  }
+
+  HAMELIN_INLINE double substitute() noexcept {
+    auto step = Space::zero_motion();
+    double most = 0.0;
+    for (std::size_t i = 0; i < n_; ++i) {
+      const Link& l = links_[i];
+      const auto& f = f_[i];
+      auto y = i == 0 ? step : Space::to_child(l, k_[i].x, step);
+      sigma_[i] = f.rho - f.inv_d * Space::pair(y, f.w);
+      const double correction = sigma_[i] * call_.h;
+      call_.delta[i] += correction;
+      const double size = __builtin_fabs(correction);
+      most = most >= size ? most : size;  // what is no number stays
+      step = Space::sum(y, Space::scaled(f.b, sigma_[i]));
+      Space::add_along_axis(l, step, sigma_[i]);
+    }
+    ++out_.updates;
+    return most;
+  }
+
+  /// p_{k+1} after a correction that no sweep confirms: p⁻ is then p + (h/2) F, and what b·λ gains is taken to first
+  /// order, δ(b·λ) = b·δλ − z·δX with δX = y + b σ, δλ handed on less z σ. Gyroscopic terms are not followed.
+  HAMELIN_INLINE void follow() noexcept {
+    const double inv_h = 1.0 / call_.h;
+    auto step = Space::zero_motion();
+    for (std::size_t i = 0; i < n_; ++i) {
+      const Link& l = links_[i];
+      const auto y = i == 0 ? step : Space::to_child(l, k_[i].x, step);
+      step = Space::sum(y, Space::scaled(f_[i].b, sigma_[i]));
+      const double turned = 0.5 * (plus_[i] - residual_[i] - half_ * force_[i] - call_.p[i]);
+      plus_[i] = turned - Space::pair(step, f_[i].z);
+      Space::add_along_axis(l, step, sigma_[i]);
+      k_[i].force = Space::momentum(l, step);
+      rate_[i] = call_.delta[i] * inv_h;
+      force_[i] = call_.held != nullptr ? call_.held[i] : 0.0;
+      if (call_.damping != nullptr) force_[i] -= call_.damping[i] * rate_[i];
+      if (call_.coulomb != nullptr) force_[i] -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
+    }
+    auto lambda = Space::zero_force();
+    for (std::size_t i = n_; i-- > 0;) {
+      lambda = Space::sum(lambda, k_[i].force);
+      plus_[i] = call_.p[i] + 2.0 * (plus_[i] + Space::pair(f_[i].b, lambda)) + half_ * force_[i];
+      residual_[i] = 0.0;
+      if (i > 0) lambda = Space::to_parent(links_[i], k_[i].x, Space::sum(lambda, Space::scaled(f_[i].z, -sigma_[i])));
+    }
+  }
+
+  HAMELIN_INLINE void solve() noexcept {
+    double allowed = largest_correction;
+    for (;;) {
+      if (!evaluate_and_factor()) return;
+      const double first = correct();
+      out_.residual = first;
+      if (!(first <= allowed)) return;
+      if (call_.trust_quadratic && call_.spin_count == 0 && quadratic_constant * first * first <= call_.tolerance) {
+        out_.residual = quadratic_constant * first * first;
+        follow();
+        finish();
+        return;
+      }
+      // confirmed by the sweep that p⁺ needs anyway: the kept factors turn its residual into the error of Δ
+      double size = first;
+      for (bool again = true; again;) {
+        const double error = evaluate_and_correct();
+        out_.residual = error;
+        if (error <= call_.tolerance) {
+          finish();
+          return;
+        }
+        const double rate = error / size;
+        // on by the same factors where two sweeps will do, for they cost no more than new ones
+        again = rate < 0.1 && error * rate * rate <= 0.1 * call_.tolerance;
+        if (!(error <= contraction_asked * size) && error > 1e3 * call_.tolerance) return;
+        size = error;
+      }
+      if (out_.updates >= max_newton_updates) return;
+      // rounding of long chains ends the contraction, not the iteration
+      allowed = contraction_asked * size;
+      if (allowed < 1e3 * call_.tolerance) allowed = 1e3 * call_.tolerance;
+    }
+  }
+
+  /// Δ has taken the last correction, since it was at hand; taking R out of p⁺ = p⁻ + 2 b·λ moves p⁺ along but for its
+  /// slow part.
+  HAMELIN_INLINE void finish() noexcept {
+    out_.converged = true;
+    for (std::size_t i = 0; i < n_; ++i) call_.p_next[i] = plus_[i] - residual_[i] + half_ * force_[i];
+    if (call_.held != nullptr)
+      for (std::size_t i = 0; i < n_; ++i) out_.held_work += call_.held[i] * rate_[i] * call_.h;
+    if (call_.damping != nullptr)
+      for (std::size_t i = 0; i < n_; ++i) out_.dissipated += call_.damping[i] * rate_[i] * rate_[i] * call_.h;
+    if (call_.coulomb != nullptr)
+      for (std::size_t i = 0; i < n_; ++i)
+        out_.dissipated += call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed) * rate_[i] * call_.h;
+    if (call_.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, call_.spins, call_.spin_count, sigma_);
+      for (std::size_t i = 0; i < n_; ++i) out_.gyroscopic_work += sigma_[i] * rate_[i] * call_.h;
+    }
+  }
+
+  const VariationalCall<Chain>& call_;
+  VariationalOutcome out_{};
+  std::size_t n_;
+  const Link* links_;
+  double half_;
+  Scratch k_;
+  Factors* f_;
+  double *mid_, *rate_, *plus_, *residual_, *force_, *sigma_;
+};
+
+}  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::integration::kernel

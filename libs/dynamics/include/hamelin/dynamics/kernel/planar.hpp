@@ -104,32 +104,6 @@ struct Planar {
     P.wy = x.px * P.yy - x.py * P.xy;
     P.ww = x.px * P.wy - x.py * P.wx;
   }
-  HAMELIN_INLINE static Operator to_parent(const Link&, const Placement& x, const Operator& P) noexcept {
-    const auto turn = [&](S a, S b, S& u, S& v) {
-      u = x.c * a - x.s * b;
-      v = x.s * a + x.c * b;
-    };
-    Operator Q = P;
-    turn(P.wx, P.wy, Q.wx, Q.wy);
-    turn(P.xw, P.yw, Q.xw, Q.yw);
-    S ax, ay, bx, by;  // R D, column by column, then Rᵀ from the right
-    turn(P.xx, P.yx, ax, ay);
-    turn(P.xy, P.yy, bx, by);
-    turn(ax, bx, Q.xx, Q.xy);
-    turn(ay, by, Q.yx, Q.yy);
-    // motion: v += w (−py, px);  force: t += p × f
-    const S cx = Q.xw - Q.xx * x.py + Q.xy * x.px, cy = Q.yw - Q.yx * x.py + Q.yy * x.px;
-    const S cw = Q.ww - Q.wx * x.py + Q.wy * x.px;
-    return {cw + x.px * cy - x.py * cx,
-            Q.wx + x.px * Q.yx - x.py * Q.xx,
-            Q.wy + x.px * Q.yy - x.py * Q.xy,
-            cx,
-            Q.xx,
-            Q.xy,
-            cy,
-            Q.yx,
-            Q.yy};
-  }
   HAMELIN_INLINE static Moment to_parent(const Link&, const Placement& x, const Moment& k) noexcept {
     return {k.m, x.c * k.x - x.s * k.y + x.px * k.m, x.s * k.x + x.c * k.y + x.py * k.m};
   }
@@ -161,9 +135,6 @@ struct Planar {
     P.wy += S(l.moment_x);
     P.xx += S(l.mass);
     P.yy += S(l.mass);
-  }
-  HAMELIN_INLINE static Operator general(const Inertia& P) noexcept {
-    return {P.ww, P.wx, P.wy, P.wx, P.xx, P.xy, P.wy, P.xy, P.yy};
   }
   HAMELIN_INLINE static Moment moment(const Link& l) noexcept { return {S(l.mass), S(l.moment_x), S(l.moment_y)}; }
   HAMELIN_INLINE static Force momentum(const Link& l, const Motion& m) noexcept { return times(rigid(l), m); }
@@ -204,6 +175,72 @@ struct Planar {
     return {a.y * f.x - a.x * f.y, a.w * f.y, -(a.w * f.x)};
   }
   HAMELIN_INLINE static S pair(const Motion& m, const Force& f) noexcept { return m.w * f.t + m.x * f.x + m.y * f.y; }
+
+  HAMELIN_INLINE static Motion bracket(const Link& l, const Motion& X) noexcept {
+    if (slides(l)) return {S(0.0), S(0.0), X.w};
+    return {S(0.0), X.y * l.direction, -X.x * l.direction};
+  }
+  HAMELIN_INLINE static Force turned_axis(const Link& l, const Force& f) noexcept {
+    if (slides(l)) return {-f.y, S(0.0), S(0.0)};
+    return {S(0.0), f.y * l.direction, -f.x * l.direction};
+  }
+  HAMELIN_INLINE static Force times_bracket(const Operator& P, const Motion& b) noexcept {
+    return {P.wx * b.x + P.wy * b.y, P.xx * b.x + P.xy * b.y, P.yx * b.x + P.yy * b.y};
+  }
+  HAMELIN_INLINE static Force transposed_times_bracket(const Operator& P, const Motion& b) noexcept {
+    return {P.xw * b.x + P.yw * b.y, P.xx * b.x + P.yx * b.y, P.xy * b.x + P.yy * b.y};
+  }
+  HAMELIN_INLINE static Force column(const Link& l, const Operator& P) noexcept {
+    if (slides(l)) return {P.wx, P.xx, P.yx};
+    return {P.ww * l.direction, P.xw * l.direction, P.yw * l.direction};
+  }
+  HAMELIN_INLINE static Force row(const Link& l, const Operator& P) noexcept {
+    if (slides(l)) return {P.xw, P.xx, P.xy};
+    return {P.ww * l.direction, P.wx * l.direction, P.wy * l.direction};
+  }
+  HAMELIN_INLINE static Operator no_operator() noexcept {
+    const S o = S(0.0);
+    return {o, o, o, o, o, o, o, o, o};
+  }
+  HAMELIN_INLINE static void add_rigid(const Link& l, Operator& P) noexcept {
+    P.ww += S(l.inertia);
+    P.wx -= S(l.moment_y);
+    P.wy += S(l.moment_x);
+    P.xw -= S(l.moment_y);
+    P.yw += S(l.moment_x);
+    P.xx += S(l.mass);
+    P.yy += S(l.mass);
+  }
+  HAMELIN_INLINE static void carry(const Link&, const Placement& x, Operator& P) noexcept {
+    const auto turn = [&](S a, S b, S& u, S& v) {
+      u = x.c * a - x.s * b;
+      v = x.s * a + x.c * b;
+    };
+    Operator Q = P;
+    turn(P.wx, P.wy, Q.wx, Q.wy);
+    turn(P.xw, P.yw, Q.xw, Q.yw);
+    S ax, ay, bx, by;  // R D, column by column, then Rᵀ from the right
+    turn(P.xx, P.yx, ax, ay);
+    turn(P.xy, P.yy, bx, by);
+    turn(ax, bx, Q.xx, Q.xy);
+    turn(ay, by, Q.yx, Q.yy);
+    // motion: v += w (−py, px);  force: t += p × f
+    const S cx = Q.xw - Q.xx * x.py + Q.xy * x.px, cy = Q.yw - Q.yx * x.py + Q.yy * x.px;
+    const S cw = Q.ww - Q.wx * x.py + Q.wy * x.px;
+    P = {cw + x.px * cy - x.py * cx,
+         Q.wx + x.px * Q.yx - x.py * Q.xx,
+         Q.wy + x.px * Q.yy - x.py * Q.xy,
+         cx,
+         Q.xx,
+         Q.xy,
+         cy,
+         Q.yx,
+         Q.yy};
+  }
+  HAMELIN_INLINE static Operator spin_operator(S w, const geometry::Vec3<double>& p) noexcept {
+    const S o = S(0.0), xw = -w * p.x, yw = -w * p.y;
+    return {yw * p.x - xw * p.y, w * p.x, w * p.y, xw, o, -w, yw, w, o};
+  }
 
   HAMELIN_INLINE static S turning(const Link& l, const Motion& X, const Force& lambda) noexcept {
     if (slides(l)) return lambda.y * X.w;  // [X, e_x] = (0; 0, w)

@@ -172,12 +172,6 @@ struct Spatial {
     }
     shift(offset(l, x), P);
   }
-  HAMELIN_INLINE static Operator to_parent(const Link& l, const Placement& x, const Operator& P) noexcept {
-    const Mat3<S> A = rotated(l, x, P.A), B = rotated(l, x, P.B), C = rotated(l, x, P.C), D = rotated(l, x, P.D);
-    const Vec3<S> p = offset(l, x);
-    const Mat3<S> shifted = C - times_hat(D, p);
-    return {A - times_hat(B, p) + hat_times(p, shifted), B + hat_times(p, D), shifted, D};
-  }
   HAMELIN_INLINE static Moment to_parent(const Link& l, const Placement& x, const Moment& k) noexcept {
     return {k.m, to_parent(l, x, k.h) + offset(l, x) * k.m};
   }
@@ -226,9 +220,6 @@ struct Spatial {
     P.H.z.x -= S(l.moment.y);
     P.H.z.y += S(l.moment.x);
   }
-  HAMELIN_INLINE static Operator general(const Inertia& P) noexcept {
-    return {full(P.A), P.H, transpose(P.H), full(P.M)};
-  }
   HAMELIN_INLINE static Moment moment(const Link& l) noexcept { return {S(l.mass), vec(l.moment)}; }
   HAMELIN_INLINE static Force momentum(const Link& l, const Motion& m) noexcept {
     const Vec3<S> h = vec(l.moment);
@@ -272,6 +263,84 @@ struct Spatial {
     return {cross(f.t, x.w) + cross(f.f, x.v), cross(f.f, x.w)};
   }
   HAMELIN_INLINE static S pair(const Motion& m, const Force& f) noexcept { return dot(m.w, f.t) + dot(m.v, f.f); }
+
+  /// ad(X) A, its part along the axis left out: it is zero.
+  HAMELIN_INLINE static Motion bracket(const Link& l, const Motion& X) noexcept {
+    const S o = S(0.0);
+    if (slides(l)) return {{o, o, o}, {X.w.y, -X.w.x, o}};
+    return {{X.w.y, -X.w.x, o}, {X.v.y, -X.v.x, o}};
+  }
+  /// adᵀ(A) f.
+  HAMELIN_INLINE static Force turned_axis(const Link& l, const Force& f) noexcept {
+    const S o = S(0.0);
+    if (slides(l)) return {{f.f.y, -f.f.x, o}, {o, o, o}};
+    return {{f.t.y, -f.t.x, o}, {f.f.y, -f.f.x, o}};
+  }
+  /// P b and Pᵀ b for a bracket, which has nothing along z.
+  HAMELIN_INLINE static Force times_bracket(const Operator& P, const Motion& b) noexcept {
+    const auto part = [](const Vec3<S>& row, const Vec3<S>& x) { return row.x * x.x + row.y * x.y; };
+    return {
+        {part(P.A.x, b.w) + part(P.B.x, b.v), part(P.A.y, b.w) + part(P.B.y, b.v), part(P.A.z, b.w) + part(P.B.z, b.v)},
+        {part(P.C.x, b.w) + part(P.D.x, b.v), part(P.C.y, b.w) + part(P.D.y, b.v),
+         part(P.C.z, b.w) + part(P.D.z, b.v)}};
+  }
+  HAMELIN_INLINE static Force transposed_times_bracket(const Operator& P, const Motion& b) noexcept {
+    return {P.A.x * b.w.x + P.A.y * b.w.y + P.C.x * b.v.x + P.C.y * b.v.y,
+            P.B.x * b.w.x + P.B.y * b.w.y + P.D.x * b.v.x + P.D.y * b.v.y};
+  }
+  /// P A and Pᵀ A.
+  HAMELIN_INLINE static Force column(const Link& l, const Operator& P) noexcept {
+    if (slides(l)) return {{P.B.x.z, P.B.y.z, P.B.z.z}, {P.D.x.z, P.D.y.z, P.D.z.z}};
+    return {{P.A.x.z, P.A.y.z, P.A.z.z}, {P.C.x.z, P.C.y.z, P.C.z.z}};
+  }
+  HAMELIN_INLINE static Force row(const Link& l, const Operator& P) noexcept {
+    if (slides(l)) return {P.C.z, P.D.z};
+    return {P.A.z, P.B.z};
+  }
+  HAMELIN_INLINE static Operator no_operator() noexcept {
+    const Vec3<S> z{S(0.0), S(0.0), S(0.0)};
+    const Mat3<S> none{z, z, z};
+    return {none, none, none, none};
+  }
+  HAMELIN_INLINE static void add_rigid(const Link& l, Operator& P) noexcept {
+    P.A = P.A + full(inertia(l));
+    P.D.x.x += S(l.mass);
+    P.D.y.y += S(l.mass);
+    P.D.z.z += S(l.mass);
+    P.B.x.y -= S(l.moment.z);
+    P.B.x.z += S(l.moment.y);
+    P.B.y.x += S(l.moment.z);
+    P.B.y.z -= S(l.moment.x);
+    P.B.z.x -= S(l.moment.y);
+    P.B.z.y += S(l.moment.x);
+    P.C.x.y += S(l.moment.z);
+    P.C.x.z -= S(l.moment.y);
+    P.C.y.x -= S(l.moment.z);
+    P.C.y.z += S(l.moment.x);
+    P.C.z.x += S(l.moment.y);
+    P.C.z.y -= S(l.moment.x);
+  }
+  /// P ← Adᵀ(g⁻¹) P Ad(g⁻¹).
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Operator& P) noexcept {
+    const Vec3<S> p = offset(l, x);
+    P.A = rotated(l, x, P.A);
+    P.B = rotated(l, x, P.B);
+    P.C = rotated(l, x, P.C);
+    P.D = rotated(l, x, P.D);
+    P.A = P.A - times_hat(P.B, p);
+    P.B = P.B + hat_times(p, P.D);
+    P.C = P.C - times_hat(P.D, p);
+    P.A = P.A + hat_times(p, P.C);
+  }
+  /// G with spin_force(w, point, m) = G m.
+  HAMELIN_INLINE static Operator spin_operator(const Vec3<S>& w, const Vec3<double>& point) noexcept {
+    const S o = S(0.0);
+    const Vec3<S> p = vec(point);
+    const Mat3<S> D{{o, -w.z, w.y}, {w.z, o, -w.x}, {-w.y, w.x, o}};
+    const Mat3<S> none{{o, o, o}, {o, o, o}, {o, o, o}};
+    const Mat3<S> C = none - times_hat(D, p);
+    return {hat_times(p, C), hat_times(p, D), C, D};
+  }
 
   /// λ · ad(X) A for a twist X: the turning of the joint's axis against a momentum. X needs no part along A.
   HAMELIN_INLINE static S turning(const Link& l, const Motion& X, const Force& lambda) noexcept {
