@@ -41,7 +41,7 @@ void Hamel::set_velocity(State& state, const VectorXd& v) {
   // ξ^{−1+α} from the velocity by (5)
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
-    state.memory.resize(static_cast<Eigen::Index>(width * k.size()));
+    state.memory.resize(static_cast<Eigen::Index>((width + 1) * k.size()));
     for (std::size_t i = 0; i < k.size(); ++i) {
       const auto& l = chain.links[i];
       const auto x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
@@ -51,13 +51,14 @@ void Hamel::set_velocity(State& state, const VectorXd& v) {
       std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
     }
   });
+  state.memory.tail(v.size()) = v;  // joint rates of ξ', for the rotors
 }
 
 void Hamel::kick(State& state, const VectorXd& dp) {
   state.p += dp;
 }
 
-void Hamel::load(const State& state) {
+void Hamel::load(const State& state, double h_before) {
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
     for (std::size_t i = 0; i < k.size(); ++i) {
@@ -66,19 +67,19 @@ void Hamel::load(const State& state) {
       std::memcpy(&twist, state.memory.data() + width * i, sizeof(twist));
       k[i].x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
       const auto mu = Space::momentum(l, twist);
-      k[i].before =
-          Space::scaled(Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * state.step_previous)), -1.0);
+      k[i].before = Space::scaled(Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * h_before)), -1.0);
     }
   });
 }
 
 void Hamel::momentum_before(const State& state, VectorXd& p) {
-  load(state);
+  load(state, state.step_previous);
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    const double* const rate_before = state.memory.data() + state.memory.size() - model_.dof();
     for (std::size_t i = 0; i < k.size(); ++i) k[i].force = Space::scaled(k[i].before, -1.0);
     for (std::size_t i = k.size(); i-- > 0;) {
       const auto& l = chain.links[i];
-      p[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force);
+      p[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force) + rate_before[i] * l.armature;
       if (l.parent < 0) continue;
       auto& outer = k[static_cast<std::size_t>(l.parent)].force;
       outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
@@ -109,7 +110,8 @@ Energy Hamel::energy(const State& state) {
   return energy;
 }
 
-void Hamel::evaluate(const State& state, const Channels& channels, double h, double h_potential, double h_force) {
+void Hamel::evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force) {
+  const double* const rate_before = state.memory.data() + state.memory.size() - model_.dof();
   rate_ = delta_ / h;
   mid_ = state.q + 0.5 * delta_;
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
@@ -126,32 +128,29 @@ void Hamel::evaluate(const State& state, const Channels& channels, double h, dou
     }
     for (std::size_t i = k.size(); i-- > 0;) {
       const auto& l = chain.links[i];
-      residual_[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force);
+      const auto j = static_cast<Eigen::Index>(i);
+      residual_[j] = Space::along_axis(l, k[i].force) + (rate_[j] - rate_before[i]) * l.armature;
       if (l.parent < 0) continue;
       auto& outer = k[static_cast<std::size_t>(l.parent)].force;
       outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
     }
   });
   evaluate_forces(channels, mid_, rate_);
-  residual_ += h_potential * gradient_ - h_force * force_ - 0.5 * state.step_previous * state.force_previous - state.p;
+  residual_ += 0.5 * (h + h_before) * gradient_ - h_force * force_ - 0.5 * h_before * state.force_previous - state.p;
 }
 
 StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   report.converged = false;
-  load(state);
-  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
   // The published start counts the whole node at k = 0, as if a step like this one had ended there.
   const bool whole_node = state.k == 0 && state.step_previous == 0.0 && options_.start == Start::published;
-  if (whole_node) {
-    state.step_previous = h;
-    load(state);
-  }
-  const double h_potential = 0.5 * (h + state.step_previous);
+  const double h_before = whole_node ? h : state.step_previous;
   const double h_force = whole_node ? h : 0.5 * h;
+  load(state, h_before);
+  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
   delta_.setZero();  // the paper's guess θ^k
   for (;;) {
-    evaluate(state, channels, h, h_potential, h_force);
+    evaluate(state, channels, h, h_before, h_force);
     ++report.evaluations;
     report.residual = residual_.norm() / h;  // ‖τ_e‖
     if (!std::isfinite(report.residual)) return report;
@@ -170,6 +169,7 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
     for (std::size_t i = 0; i < k.size(); ++i)
       std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
   });
+  state.memory.tail(rate_.size()) = rate_;
   state.q += delta_;
   state.deltas[0] = delta_;
   state.delta_count = 1;

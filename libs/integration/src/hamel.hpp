@@ -28,7 +28,7 @@ class Hamel final : public Integrator {
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// τ_e of the node equation at delta_, times h.
-  void evaluate(const State& state, const Channels& channels, double h, double h_potential, double h_force);
+  void evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force);
 
   template <class Space>
   struct Link {
@@ -43,8 +43,8 @@ class Hamel final : public Integrator {
   decltype(auto) with_links(F&& f);
   /// Node momentum as the step before left it, A_i · Σ (I ξ' + α h' adᵀ(ξ') I ξ') − ½h' ∂U + ½h' F'.
   void momentum_before(const State& state, VectorXd& p);
-  /// Reads ξ' from the state and places the chain at θ^k.
-  void load(const State& state);
+  /// Reads ξ' from the state, h' given, and places the chain at θ^k.
+  void load(const State& state, double h_before);
 
   bool midpoint_;
   double alpha_;

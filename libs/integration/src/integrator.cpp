@@ -100,29 +100,32 @@ StepReport Integrator::divide(State& state, const Channels& channels, double h, 
 }
 
 void Integrator::evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-  if (channels.held_torque.size() > 0)
+  acts_ = {channels.held_torque.size() > 0, channels.damping.size() > 0, channels.coulomb.size() > 0,
+           !channels.gyroscopic.empty()};
+  force_.setZero();
+  if (acts_.held) {
     held_ = channels.held_torque;
-  else
-    held_.setZero();
-  if (channels.damping.size() > 0)
+    force_ += held_;
+  }
+  if (acts_.damped) {
     damped_ = channels.damping.cwiseProduct(v);
-  else
-    damped_.setZero();
-  if (channels.coulomb.size() > 0)
+    force_ -= damped_;
+  }
+  if (acts_.dry) {
     dry_ = channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
-  else
-    dry_.setZero();
-  if (!channels.gyroscopic.empty())
+    force_ -= dry_;
+  }
+  if (acts_.gyroscopic) {
     dynamics::gyroscopic_torque(model_, ws_, q, v, channels.gyroscopic, gyroscopic_);
-  else
-    gyroscopic_.setZero();
-  force_ = held_ - damped_ - dry_ + gyroscopic_;
+    force_ += gyroscopic_;
+  }
 }
 
 void Integrator::book_work(StepReport& report, const VectorXd& displacement, double weight) const {
-  report.held_work_J += weight * held_.dot(displacement);
-  report.dissipated_J += weight * (damped_.dot(displacement) + dry_.dot(displacement));
-  report.gyroscopic_work_J += weight * gyroscopic_.dot(displacement);
+  if (acts_.held) report.held_work_J += weight * held_.dot(displacement);
+  if (acts_.damped) report.dissipated_J += weight * damped_.dot(displacement);
+  if (acts_.dry) report.dissipated_J += weight * dry_.dot(displacement);
+  if (acts_.gyroscopic) report.gyroscopic_work_J += weight * gyroscopic_.dot(displacement);
 }
 
 Energy Integrator::energy(const State& state) {

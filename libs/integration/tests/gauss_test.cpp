@@ -36,15 +36,16 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
   State peer = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
   REQUIRE((truth - peer.q).norm() < 1e-10);
-  for (const int order : {4, 6, 8, 10, 12}) {
+  for (const int order : {4, 6, 8}) {
     const auto error = [&](int n) { return (run(model, of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
     int steps = 2;
     while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
     CAPTURE(order, steps, error(steps), error(2 * steps));
     const double observed = std::log2(error(steps) / error(2 * steps));
     CHECK(observed > order - 0.7);
-    CHECK(error(2 * steps) < 1e-5 * std::pow(2.0, 0.7 - order) + 1e-12);
   }
+  for (const int order : {10, 12, 14, 16})  // beneath what doubles can tell apart
+    CHECK((run(model, of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
 }
 
 TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",

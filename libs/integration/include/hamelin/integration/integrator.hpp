@@ -36,7 +36,7 @@ struct State {
   double step_previous = 0.0;    ///< hamel: 0 right after a (consistent) start
   std::vector<VectorXd> deltas;  ///< last displacements, newest first, for the guess
   int delta_count = 0;           ///< how many of them are valid
-  double step_next = 0.0;        ///< what step control would take next [s]; 0 before the first step
+  double step_next = 0.0;        ///< what step control takes next [s]: set it for a first step; 0 goes as far as asked
 };
 
 /// What one step did.
@@ -74,13 +74,12 @@ struct Options {
   int max_halvings = 8;              ///< a step is cut into at most 2^max_halvings pieces
   int order = 0;                     ///< composition, gauss: 0 takes the scheme's default
   double rtol = 0.0, atol = 0.0;     ///< either above 0 switches step control on; the first step is the one asked for
-  double newmark_beta = 0.25, newmark_gamma = 0.5;
+  double newmark_beta = 0.25, newmark_gamma = 0.5;  ///< newmark
 
   [[nodiscard]] bool step_control() const noexcept { return rtol > 0.0 || atol > 0.0; }
 };
 
-/// Options from a scene's or command line's parameters {"alpha":…, "start":…, "solver":…, "tolerance":…,
-/// "max_halvings":…}.
+/// Options from a scene's or command line's parameters, docs/schema/integrator.schema.json.
 /// @throws Error invalid naming `where` and the key
 [[nodiscard]] Options options_from_json(const Json& params, const std::string& where);
 
@@ -143,13 +142,29 @@ class Integrator {
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level
+  struct {
+    bool held = false, damped = false, dry = false, gyroscopic = false;
+  } acts_;  ///< what the forces last evaluated are made of
   VectorXd held_, damped_, dry_, gyroscopic_;
 };
+
+/// What a scheme takes of Options.
+struct Scheme {
+  std::string name;
+  std::vector<Solver> solvers;  ///< root-finding, the default first; none where nothing is to be solved
+  std::vector<int> orders;      ///< to choose from; none where there is but one
+  bool step_control = false;    ///< whether it takes rtol and atol
+  bool iterates = false;        ///< whether it takes a tolerance of its iterations
+};
+
+/// Null for an unknown name.
+[[nodiscard]] const Scheme* find_scheme(const std::string& name);
 
 /// Names that make_integrator knows.
 [[nodiscard]] const std::vector<std::string>& integrator_names();
 
-/// @throws Error usage for an unknown name (with the nearest), or a solver the scheme has not
+/// rtol without atol sets atol to the same number [rad or m, and per second]; atol without rtol stays absolute.
+/// @throws Error usage for an unknown name (with the nearest), or a solver, order or step control the scheme has not
 [[nodiscard]] std::unique_ptr<Integrator> make_integrator(const std::string& name, const Model& model,
                                                           const Options& options = {});
 

@@ -1,0 +1,37 @@
+#pragma once
+#include <span>
+
+#include "variational.hpp"
+
+namespace hamelin::integration {
+
+/// Weights γ_i of a symmetric composition of sub-steps γ_i h: Σ γ_i = 1, γ_i = γ_{s+1−i}; order 4, 6 or 8.
+[[nodiscard]] std::span<const double> composition_weights(int order);
+
+/// Symmetric compositions of the variational step: Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h}. As φ is symmetric and symplectic,
+/// so is Φ. Some γ_i are negative: such a sub-step goes back in time, its damping feeds energy in and is booked so.
+class Composition final : public Integrator {
+ public:
+  Composition(const Model& model, const Options& options);
+  [[nodiscard]] std::string criterion() const override { return step_.criterion(); }
+  [[nodiscard]] int order() const override { return order_; }
+  [[nodiscard]] std::string mode() const override { return step_.mode(); }
+  void velocity(const State& state, VectorXd& v) override { step_.velocity(state, v); }
+  void kick(State& state, const VectorXd& dp) override { step_.kick(state, dp); }
+  void set_velocity(State& state, const VectorXd& v) override { step_.set_velocity(state, v); }
+
+ private:
+  void begin(State& state, const VectorXd& v0) override;
+  StepReport attempt(State& state, const Channels& channels, double h) override;
+  /// Lends the history of a sub-step to inner_, or takes it back.
+  void swap_history(std::size_t slot);
+
+  int order_;
+  std::span<const double> weights_;
+  Variational step_;
+  State inner_;                    ///< what the sub-steps move
+  std::vector<VectorXd> history_;  ///< State::deltas of all sub-steps, as a step changes it
+  VectorXd last_;                  ///< displacement of the sub-step before
+};
+
+}  // namespace hamelin::integration

@@ -1,0 +1,37 @@
+#pragma once
+#include <array>
+
+#include "explicit.hpp"
+
+namespace hamelin::integration {
+
+/// DOP853 of Hairer, Nørsett and Wanner (Solving Ordinary Differential Equations I, 2nd ed., code dop853.f): twelve
+/// stages, order 8, error estimate of orders 5 and 3 combined as published. With rtol or atol the step is chosen by
+/// their controller, else fixed. The thirteenth evaluation of the published code is the first of the next step and is
+/// made there, so nothing goes from step to step but State::step_next.
+class Dop853 final : public Explicit {
+ public:
+  Dop853(const Model& model, const Options& options);
+  [[nodiscard]] std::string criterion() const override;
+  [[nodiscard]] int order() const override { return 8; }
+
+ private:
+  StepReport attempt(State& state, const Channels& channels, double h) override;
+  StepReport controlled(State& state, const Channels& channels, double limit) override;
+
+  /// The derivative at the node. It does not depend on h, so it outlives a rejected step.
+  void first_stage(const State& state, const Channels& channels, StepReport& report);
+  /// All other stages, then q_new_, v_new_ at the end of the step.
+  void stages(const State& state, const Channels& channels, double h, StepReport& report);
+  template <std::size_t s>
+  void stage(const State& state, const Channels& channels, double h, StepReport& report);
+  /// Over q and v together; at most 1 where the tolerances are met.
+  [[nodiscard]] double error_norm(const State& state, double h) const;
+
+  static constexpr std::size_t count = 12;
+  std::array<VectorXd, count> v_, a_;  ///< derivatives of q and v at the stages
+  StepReport first_;                   ///< power of the channels at the node
+  VectorXd q_, q_new_, v_new_;
+};
+
+}  // namespace hamelin::integration

@@ -1,0 +1,139 @@
+#include "lie_exact.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "guess.hpp"
+
+namespace hamelin::integration {
+
+namespace {
+
+constexpr double largest_correction = 1.0;  // [rad or m]: beyond it another root of the step is nearer
+constexpr double contraction = 0.5;
+constexpr int max_newton_updates = 30;
+
+}  // namespace
+
+LieExact::LieExact(const Model& model, const Options& options) : Integrator("lie-exact", model, options) {
+  const auto n = static_cast<std::size_t>(model.dof());
+  if (model.planar())
+    links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
+  else
+    links_ = kernel::LieScratch<dynamics::kernel::Spatial<double>>(n);
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_})
+    *x = VectorXd::Zero(model.dof());
+}
+
+template <class F>
+decltype(auto) LieExact::with_links(F&& f) {
+  if (model_.planar()) return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
+  return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
+}
+
+std::string LieExact::criterion() const {
+  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+}
+
+void LieExact::velocity(const State& state, VectorXd& v) {
+  dynamics::solve_mass(model_, ws_, state.q, state.p, v);
+}
+
+void LieExact::set_velocity(State& state, const VectorXd& v) {
+  dynamics::momentum(model_, ws_, state.q, v, state.p);
+  state.v = v;
+  state.delta_count = -1;  // the guess is h v
+}
+
+bool LieExact::evaluate(const State& state, const Channels& channels, double h) {
+  const bool found = with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    return kernel::lie_left<Space>(chain, k, delta_.data(), h, minus_.data());
+  });
+  if (!found) return false;
+  mid_ = state.q + 0.5 * delta_;
+  rate_ = delta_ / h;
+  evaluate_forces(channels, mid_, rate_);
+  residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
+  return residual_.allFinite();
+}
+
+bool LieExact::factor(const State& state, const Channels& channels, double h) {
+  if (options_.solver == Solver::riqn) return true;
+  return with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i) {
+      const auto j = static_cast<Eigen::Index>(i);
+      k[i].after = Space::place(chain.links[i], state.q[j] + delta_[j]);
+    }
+    return kernel::lie_factor<Space>(chain, k, h, channels.damping.size() > 0 ? channels.damping.data() : nullptr);
+  });
+}
+
+void LieExact::correct(const State& state, double h) {
+  if (options_.solver == Solver::riqn) {
+    correction_ = -h * residual_;
+    dynamics::solve_mass(model_, ws_, state.q, correction_, correction_);
+    return;
+  }
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    kernel::lie_correct<Space>(chain, k, residual_.data(), correction_.data());
+  });
+}
+
+// The residual of the sweep that p⁺ needs is turned into the error of Δ by the kept factors. Theirs takes the iterate
+// it stands at when the iterations are used up; here that step has failed.
+bool LieExact::solve(const State& state, const Channels& channels, double h, StepReport& report) {
+  const bool riqn = options_.solver == Solver::riqn;
+  double allowed = largest_correction;
+  for (;;) {
+    if (!evaluate(state, channels, h)) return false;
+    ++report.evaluations;
+    if (riqn || report.factorizations > 0) {
+      correct(state, h);
+      report.residual = correction_.lpNorm<Eigen::Infinity>();
+      report.factorizations += riqn ? 1 : 0;
+      if (report.residual <= options_.tolerance) {
+        delta_ += correction_;
+        return true;
+      }
+    }
+    if (report.updates == (riqn ? options_.max_updates : max_newton_updates)) return false;
+    if (!riqn) {
+      if (!factor(state, channels, h)) return false;
+      ++report.factorizations;
+      correct(state, h);
+    }
+    const double size = correction_.lpNorm<Eigen::Infinity>();
+    if (!(size <= allowed)) return false;
+    allowed = riqn ? largest_correction : std::max(contraction * size, 1e3 * options_.tolerance);
+    delta_ += correction_;
+    ++report.updates;
+  }
+}
+
+StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
+  StepReport report;
+  dynamics::gravity_torque(model_, ws_, state.q, gradient_);
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i)
+      k[i].before = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
+  });
+  extrapolate(state, h, delta_);
+  report.converged = solve(state, channels, h, report);
+  if (!report.converged) return report;
+  book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
+  state.q += delta_;
+  with_links([&]<class Space>(Space, const auto& chain, auto& k) {
+    for (std::size_t i = 0; i < k.size(); ++i)
+      k[i].after = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
+    kernel::lie_right<Space>(chain, k, delta_.data(), h, plus_.data());
+  });
+  // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F; the last correction took R out of p⁻, and p⁺ moves along
+  dynamics::gravity_torque(model_, ws_, state.q, mid_);
+  state.p = plus_ - residual_ + 0.5 * h * (force_ - mid_);
+  remember(state, h, delta_);
+  return report;
+}
+
+}  // namespace hamelin::integration

@@ -1,0 +1,81 @@
+#include "newmark.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace hamelin::integration {
+
+Newmark::Newmark(const Model& model, const Options& options) : Explicit("newmark", model, options) {
+  for (auto* x : {&a_, &a_new_, &q_, &v_, &node_force_, &moved_}) *x = VectorXd::Zero(model.dof());
+}
+
+std::string Newmark::criterion() const {
+  return fmt::format("h^2 |change of the acceleration|_inf <= {}", options_.tolerance);
+}
+
+// State::memory holds the node's acceleration and the one before; delta_count says whether they stand.
+void Newmark::begin(State& state, const VectorXd& v0) {
+  state.memory = VectorXd::Zero(2 * model_.dof());
+  set_velocity(state, v0);
+}
+
+void Newmark::kick(State& state, const VectorXd& dp) {
+  Explicit::kick(state, dp);
+  state.delta_count = 0;
+}
+
+void Newmark::set_velocity(State& state, const VectorXd& v) {
+  state.v = v;
+  state.delta_count = 0;
+}
+
+void Newmark::place(const State& state, double h) {
+  const double beta = options_.newmark_beta, gamma = options_.newmark_gamma;
+  q_ = state.q + h * state.v + (h * h) * ((0.5 - beta) * a_ + beta * a_new_);
+  v_ = state.v + h * ((1.0 - gamma) * a_ + gamma * a_new_);
+}
+
+StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
+  const Eigen::Index n = model_.dof();
+  StepReport report;
+  report.converged = false;
+  evaluate_forces(channels, state.q, state.v);
+  node_force_ = force_;
+  // the acceleration carried over belongs to the forces it was made with
+  const bool stands = state.delta_count > 0 && state.force_previous == node_force_;
+  if (stands) {
+    a_ = state.memory.head(n);
+  } else {
+    accelerate(channels, state.q, state.v, report);
+    a_ = acceleration_;
+  }
+  a_new_ = a_;
+  if (stands && state.step_previous == h) a_new_ += a_ - state.memory.tail(n);
+  do {
+    if (report.updates == options_.max_updates) return report;
+    place(state, h);
+    accelerate(channels, q_, v_, report);
+    report.residual = h * h * (acceleration_ - a_new_).lpNorm<Eigen::Infinity>();
+    if (!std::isfinite(report.residual)) return report;
+    a_new_ = acceleration_;
+    ++report.updates;
+  } while (report.residual > options_.tolerance);
+  report.converged = true;
+  place(state, h);
+  state.memory.head(n) = a_new_;
+  state.memory.tail(n) = a_;
+  state.force_previous = force_;
+  // work by the mean of both nodes' forces: those of the new node stand, the old one's are made again
+  moved_ = q_ - state.q;
+  book_work(report, moved_, 0.5);
+  evaluate_forces(channels, state.q, state.v);
+  book_work(report, moved_, 0.5);
+  state.q = q_;
+  state.v = v_;
+  state.delta_count = 1;
+  state.step_previous = h;
+  return report;
+}
+
+}  // namespace hamelin::integration
