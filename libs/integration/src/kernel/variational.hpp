@@ -163,7 +163,7 @@ class Variational {
     for (std::size_t i = n_; i-- > 0;) {
       const Link& l = links_[i];
       const auto& x = k_[i].x;
-      lambda = Space::sum(lambda, Space::momentum(l, k_[i].motion));
+      lambda = Space::sum(lambda, Space::momentum(l, k_[i].x, k_[i].motion));
       read(i, lambda);
       if (i > 0) lambda = Space::to_parent(l, x, lambda);
       if constexpr (Correct) {
@@ -202,9 +202,9 @@ class Variational {
       const Link& l = links_[i];
       auto& f = f_[i];
       const auto& x = k_[i].x;
-      lambda = Space::sum(lambda, Space::momentum(l, k_[i].motion));
+      lambda = Space::sum(lambda, Space::momentum(l, k_[i].x, k_[i].motion));
       read(i, lambda);
-      Space::add_rigid(l, P);
+      Space::add_rigid(l, x, P);
       const Force z = f.z = Space::scaled(Space::turned_axis(l, lambda), half_);
       const Force PB = Space::sum(Space::column(l, P), Space::times_bracket(P, f.b));
       f.u = Space::sum(PB, Space::scaled(z, -1.0));
@@ -252,8 +252,8 @@ class Variational {
   void hang(const dynamics::kernel::Spin& spin, typename Space::Operator& Q, Force& mu) const noexcept {
     auto w = Space::spin_axis(spin.w);
     for (std::size_t j = 0; j <= spin.link; ++j) w = Space::to_child_axis(links_[j], k_[j].x, w);
-    Space::add(Q, Space::spin_operator(w, spin.point));
-    mu = Space::sum(mu, Space::spin_force(w, spin.point, k_[spin.link].motion));
+    Space::add(Q, Space::spin_operator(w, k_[spin.link].x, spin.point));
+    mu = Space::sum(mu, Space::spin_force(w, k_[spin.link].x, spin.point, k_[spin.link].motion));
   }
 
   HAMELIN_INLINE double substitute() noexcept {
@@ -287,7 +287,7 @@ class Variational {
       const double turned = 0.5 * (plus_[i] - residual_[i] - half_ * force_[i] - call_.p[i]);
       plus_[i] = turned - Space::pair(step, f_[i].z);
       Space::add_along_axis(l, step, sigma_[i]);
-      k_[i].force = Space::momentum(l, step);
+      k_[i].force = Space::momentum(l, k_[i].x, step);
       rate_[i] = call_.delta[i] * inv_h;
       force_[i] = call_.held != nullptr ? call_.held[i] : 0.0;
       if (call_.damping != nullptr) force_[i] -= call_.damping[i] * rate_[i];

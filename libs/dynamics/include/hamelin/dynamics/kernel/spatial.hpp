@@ -19,6 +19,7 @@ template <class S, bool Mixed = true>
 struct Spatial {
   using Scalar = S;
   static constexpr bool mixed = Mixed;
+  static constexpr bool root_axes = false;  ///< each link's frame turns with it
   using Link = model::SpatialLink;
   using Chain = model::SpatialChain;
 
@@ -194,6 +195,9 @@ struct Spatial {
     return {{P.A.xz, P.A.yz, P.A.zz}, P.H.z};
   }
 
+  /// A · P A.
+  HAMELIN_INLINE static S pivot(const Link& l, const Inertia& P) noexcept { return slides(l) ? P.M.zz : P.A.zz; }
+
   HAMELIN_INLINE static Sym3<S> inertia(const Link& l) noexcept {
     return {S(l.inertia.xx), S(l.inertia.xy), S(l.inertia.xz), S(l.inertia.yy), S(l.inertia.yz), S(l.inertia.zz)};
   }
@@ -208,7 +212,7 @@ struct Spatial {
     return {{o, o, o, o, o, o}, {o, o, o, o, o, o}, {z, z, z}};
   }
   /// P + rigid(l), what is zero left out.
-  HAMELIN_INLINE static void add_rigid(const Link& l, Inertia& P) noexcept {
+  HAMELIN_INLINE static void add_rigid(const Link& l, const Placement&, Inertia& P) noexcept {
     P.A = P.A + inertia(l);
     P.M.xx += S(l.mass);
     P.M.yy += S(l.mass);
@@ -220,7 +224,10 @@ struct Spatial {
     P.H.z.x -= S(l.moment.y);
     P.H.z.y += S(l.moment.x);
   }
-  HAMELIN_INLINE static Moment moment(const Link& l) noexcept { return {S(l.mass), vec(l.moment)}; }
+  HAMELIN_INLINE static Moment moment(const Link& l, const Placement&) noexcept { return {S(l.mass), vec(l.moment)}; }
+  HAMELIN_INLINE static Force momentum(const Link& l, const Placement&, const Motion& m) noexcept {
+    return momentum(l, m);
+  }
   HAMELIN_INLINE static Force momentum(const Link& l, const Motion& m) noexcept {
     const Vec3<S> h = vec(l.moment);
     return {inertia(l) * m.w + cross(h, m.v), m.v * S(l.mass) - cross(h, m.w)};
@@ -302,7 +309,7 @@ struct Spatial {
     const Mat3<S> none{z, z, z};
     return {none, none, none, none};
   }
-  HAMELIN_INLINE static void add_rigid(const Link& l, Operator& P) noexcept {
+  HAMELIN_INLINE static void add_rigid(const Link& l, const Placement&, Operator& P) noexcept {
     P.A = P.A + full(inertia(l));
     P.D.x.x += S(l.mass);
     P.D.y.y += S(l.mass);
@@ -333,7 +340,7 @@ struct Spatial {
     P.A = P.A + hat_times(p, P.C);
   }
   /// G with spin_force(w, point, m) = G m.
-  HAMELIN_INLINE static Operator spin_operator(const Vec3<S>& w, const Vec3<double>& point) noexcept {
+  HAMELIN_INLINE static Operator spin_operator(const Vec3<S>& w, const Placement&, const Vec3<double>& point) noexcept {
     const S o = S(0.0);
     const Vec3<S> p = vec(point);
     const Mat3<S> D{{o, -w.z, w.y}, {w.z, o, -w.x}, {-w.y, w.x, o}};
@@ -369,7 +376,7 @@ struct Spatial {
     return out;
   }
   /// The wrench about the frame's origin that moves the rigid link so (gravity enters through the root's acceleration).
-  HAMELIN_INLINE static Force inertial_force(const Link& l, const Flow& k) noexcept {
+  HAMELIN_INLINE static Force inertial_force(const Link& l, const Placement&, const Flow& k) noexcept {
     const Vec3<S> h = vec(l.moment);
     const Sym3<S> I = inertia(l);
     return {I * k.dw + cross(k.w, I * k.w) + cross(h, k.a), k.a * S(l.mass) + k.turn * h};
@@ -389,7 +396,8 @@ struct Spatial {
   HAMELIN_INLINE static Vec3<S> to_child_axis(const Link& l, const Placement& x, const Vec3<S>& w) noexcept {
     return to_child(l, x, w);
   }
-  HAMELIN_INLINE static Force spin_force(const Vec3<S>& w, const Vec3<double>& point, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force spin_force(const Vec3<S>& w, const Placement&, const Vec3<double>& point,
+                                         const Motion& m) noexcept {
     const Vec3<S> p = vec(point), f = cross(w, m.v + cross(m.w, p));
     return {cross(p, f), f};
   }

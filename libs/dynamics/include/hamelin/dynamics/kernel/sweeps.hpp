@@ -54,11 +54,20 @@ HAMELIN_INLINE std::size_t count(const typename Space::Chain& chain) noexcept {
 template <class Space>
 HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Space>& k,
                           const typename Space::Scalar* q) noexcept {
+  using S = typename Space::Scalar;
   const std::size_t n = count<Space>(chain);
   const auto* const links = links_of<Space>(chain);
   for (std::size_t i = 0; i < n; ++i) k.angle[i] = Space::angle(links[i], q[i]);
+  if constexpr (Space::root_axes)
+    for (std::size_t i = 1; i < n; ++i) k.angle[i] += k.angle[i - 1];
   sincos(n, k.angle, k.sine, k.cosine);
-  for (std::size_t i = 0; i < n; ++i) Space::place(links[i], q[i], k.sine[i], k.cosine[i], k[i].x);
+  for (std::size_t i = 0; i < n; ++i) {
+    if constexpr (Space::root_axes)
+      Space::place(links[i], i > 0 ? k.sine[i - 1] : S(0.0), i > 0 ? k.cosine[i - 1] : S(1.0), k.sine[i], k.cosine[i],
+                   k[i].x);
+    else
+      Space::place(links[i], q[i], k.sine[i], k.cosine[i], k[i].x);
+  }
 }
 
 /// Newton–Euler outwards (5): force[i] = the wrench link i needs for itself. v, a may be null (zero).
@@ -70,7 +79,7 @@ HAMELIN_INLINE void inertial_forces(const typename Space::Chain& chain, const Sc
   auto flow = Space::root_flow(chain);
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
     flow = Space::advance(links[i], k[i].x, flow, v == nullptr ? S(0.0) : v[i], a == nullptr ? S(0.0) : a[i]);
-    k[i].force = Space::inertial_force(links[i], flow);
+    k[i].force = Space::inertial_force(links[i], k[i].x, flow);
   }
 }
 
@@ -105,9 +114,9 @@ template <class Space>
 HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                                typename Space::Inertia& P) noexcept {
   using S = typename Space::Scalar;
-  Space::add_rigid(l, P);
+  Space::add_rigid(l, link.x, P);
   link.column = Space::column(l, P);
-  S d = Space::along_axis(l, link.column);
+  S d = Space::pivot(l, P);
   if constexpr (Space::mixed) d += l.armature;
   link.inv_d = S(1.0) / d;
   if (!root) Space::carry(l, link.x, P, link.column, link.inv_d);
@@ -216,8 +225,8 @@ HAMELIN_INLINE void hamilton(const typename Space::Chain& chain, const Scratch<S
     const auto& l = links[i];
     const auto X = k[i].motion;
     Space::add_along_axis(l, k[i].motion, v[i]);
-    lambda = Space::sum(lambda, Space::momentum(l, k[i].motion));
-    Space::add(moment, Space::moment(l));
+    lambda = Space::sum(lambda, Space::momentum(l, k[i].x, k[i].motion));
+    Space::add(moment, Space::moment(l, k[i].x));
     p_rate[i] = Space::turning(l, X, lambda) + Space::falling(l, k[i].down, moment);
     if (i == 0) break;
     lambda = Space::to_parent(l, k[i].x, lambda);
@@ -243,7 +252,7 @@ HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const 
     auto w = Space::spin_axis(spin.w);
     for (std::size_t i = 0; i <= spin.link; ++i) w = Space::to_child_axis(links[i], k[i].x, w);
     auto& total = k[spin.link].force;
-    total = Space::sum(total, Space::spin_force(w, spin.point, k[spin.link].motion));
+    total = Space::sum(total, Space::spin_force(w, k[spin.link].x, spin.point, k[spin.link].motion));
   }
   gather_forces(chain, k, static_cast<const typename Space::Scalar*>(nullptr), tau);
 }
@@ -259,7 +268,7 @@ void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k,
   for (std::size_t i = 0; i < n; ++i) k[i].down = down = Space::to_child(links[i], k[i].x, down);
   auto moment = Space::no_moment();
   for (std::size_t i = n; i-- > 0;) {
-    Space::add(moment, Space::moment(links[i]));
+    Space::add(moment, Space::moment(links[i], k[i].x));
     tau[i] = -Space::falling(links[i], k[i].down, moment);
     if (i > 0) moment = Space::to_parent(links[i], k[i].x, moment);
   }
@@ -285,7 +294,7 @@ void momentum(const typename Space::Chain& chain, const Scratch<Space>& k, const
   place(chain, k, q);
   twists(chain, k, v);
   for (std::size_t i = 0; i < count<Space>(chain); ++i)
-    k[i].force = Space::momentum(links_of<Space>(chain)[i], k[i].motion);
+    k[i].force = Space::momentum(links_of<Space>(chain)[i], k[i].x, k[i].motion);
   gather_forces(chain, k, v, p);
 }
 
@@ -298,7 +307,7 @@ typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, const 
   S twice = S(0.0);
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
     const auto& l = links_of<Space>(chain)[i];
-    twice += Space::pair(k[i].motion, Space::momentum(l, k[i].motion));
+    twice += Space::pair(k[i].motion, Space::momentum(l, k[i].x, k[i].motion));
     if constexpr (Space::mixed) twice += v[i] * v[i] * l.armature;
   }
   return S(0.5) * twice;
@@ -312,7 +321,7 @@ typename Space::Scalar potential_energy(const typename Space::Chain& chain, cons
   auto moment = Space::no_moment();
   for (std::size_t i = count<Space>(chain); i-- > 0;) {
     const auto& l = links_of<Space>(chain)[i];
-    Space::add(moment, Space::moment(l));
+    Space::add(moment, Space::moment(l, k[i].x));
     moment = Space::to_parent(l, k[i].x, moment);
   }
   return Space::potential(chain, moment);
@@ -327,7 +336,7 @@ void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k, co
   const std::size_t n = count<Space>(chain);
   auto composite = Space::no_inertia();
   for (std::size_t i = n; i-- > 0;) {
-    Space::add_rigid(links[i], composite);
+    Space::add_rigid(links[i], k[i].x, composite);
     auto f = Space::column(links[i], composite);
     for (std::size_t j = i;; --j) {
       M[i * ld + j] = M[j * ld + i] = Space::along_axis(links[j], f);
