@@ -71,6 +71,12 @@ function(hamelin_library)
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
+# How kernels are compiled, on top of all else (a source's own options come last). Optimised in every build, so that
+# nothing stays out of line. GCC would copy value types of many lanes through memory, and make vectors of single numbers
+# at a loss.
+set(HAMELIN_KERNEL_OPTIONS -O3 -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
+  $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
+
 # hamelin_isa_sources(TARGET SOURCE...): compiles each source once for every instruction set of core/isa.hpp. What such a
 # source may use is said in dynamics/kernel/lanes.hpp; a test looks at the objects. Products may be contracted: results
 # are promised to the bit on one set only.
@@ -82,10 +88,7 @@ function(hamelin_isa_sources target)
   set(flags_baseline "")
   set(flags_v3 -mavx2 -mfma)
   set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)
-  # A source's own options come last. Optimised in every build, so that nothing stays out of line. GCC would copy value
-  # types of many lanes through memory, and make vectors of single numbers at a loss.
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS
-    "-O3;-ffp-contract=fast;-fno-math-errno;-fno-trapping-math;-fno-tree-slp-vectorize;$<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>")
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "${HAMELIN_KERNEL_OPTIONS}")
   foreach(name IN LISTS names)
     add_library(${target}_${name} OBJECT ${ARGN})
     target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>)

@@ -7,7 +7,7 @@
 namespace hamelin::app {
 
 /// What a file is, by its content.
-enum class Kind { map, urdf, robot, scene, result, primitives, spheres, log, sweep, records, summary };
+enum class Kind { map, urdf, robot, scene, result, primitives, spheres, log, sweep, records, summary, accuracy };
 
 [[nodiscard]] std::string_view to_string(Kind kind) noexcept;
 

@@ -10,7 +10,8 @@ namespace hamelin::app {
 
 struct IntegratorFlags {
   std::optional<std::string> integrator, start, solver;
-  std::optional<double> alpha, tolerance;
+  std::optional<double> alpha, tolerance, rtol, atol;
+  std::optional<int> order;
 };
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags);

@@ -24,7 +24,7 @@ struct Purpose {
 
 const std::vector<Purpose>& commands() {
   static const std::vector<Purpose> all{
-      {"Run things", {add_run, add_integrate, add_replay, add_sweep}},
+      {"Run things", {add_run, add_integrate, add_accuracy, add_replay, add_sweep}},
       {"Look at things", {add_report, add_robot, add_scene, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},
       {"Help", {add_help, add_completion}},

@@ -6,9 +6,11 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "document.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/core/json.hpp"
+#include "hamelin/study/accuracy.hpp"
 #include "output.hpp"
 #include "terminal.hpp"
 
@@ -45,8 +47,32 @@ Json json_of(const report::RunSummary& run) {
           {"ticks", run.ticks}, {"frames", run.frames},    {"notes", run.notes}};
 }
 
+// Measurements of `hamelin accuracy` make a page of another kind, which needs no script.
+int make_accuracy_page(const ReportOptions& options, const fs::path& target) {
+  std::vector<study::Accuracy> all;
+  for (const auto& file : options.logs) {
+    if (kind_of(file) != Kind::accuracy)
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{}: is no measurement of accuracy, expected either those alone or logs alone", file.string()));
+    all.push_back(study::accuracy_from_json(read_json(file), file.string()));
+  }
+  const std::string page = study::to_page(all);
+  write_file_aside(target, page);
+  if (options.json)
+    print_json({{"page", options.output.string()}, {"bytes", page.size()}, {"measurements", all.size()}});
+  else
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(page.size())));
+  return 0;
+}
+
+bool measurement(const fs::path& file) {
+  return file.extension() == ".json" && kind_of(file) == Kind::accuracy;
+}
+
 int make_report(const ReportOptions& options) {
   const fs::path target = output_target(options.output, options.logs);
+  if (measurement(options.logs.front())) return make_accuracy_page(options, target);
   const fs::path template_file = page_template();
   report::Data data;
   {
@@ -78,11 +104,16 @@ int make_report(const ReportOptions& options) {
 
 void add_report(CLI::App& app, int& exit_code) {
   auto* command =
-      add_command(app, "report", "Make one HTML page of logs: the arm replayed in its map, plots; opens offline",
+      add_command(app, "report",
+                  "Make one HTML page of logs: the arm replayed in its map, plots; opens offline. Measurements of "
+                  "`hamelin accuracy` make a page of speed against error",
                   "hamelin report shelf.jsonl -o shelf.html\n"
-                  "hamelin report apf.jsonl gyro.jsonl hybrid.jsonl -o compared.html");
+                  "hamelin report apf.jsonl gyro.jsonl hybrid.jsonl -o compared.html\n"
+                  "hamelin report accuracy.json -o accuracy.html");
   const auto options = std::make_shared<ReportOptions>();
-  command->add_option("logs", options->logs, "logs, plain or zstd; several are shown side by side")
+  command
+      ->add_option("logs", options->logs,
+                   "logs, plain or zstd, several are shown side by side; or files of `hamelin accuracy`")
       ->required()
       ->type_name("LOG...");
   command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("PAGE.html");

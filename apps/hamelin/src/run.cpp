@@ -34,6 +34,10 @@ void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
     unused.push_back("effort limits");
   if (!scene.model.joint_damping.from_robot && any([](const model::Link& l) { return l.joint.damping != 0.0; }))
     unused.push_back("damping");
+  if (!scene.model.friction.from_robot && any([](const model::Link& l) { return l.joint.friction != 0.0; }))
+    unused.push_back("friction");
+  if (!scene.model.armature.from_robot && any([](const model::Link& l) { return l.joint.armature != 0.0; }))
+    unused.push_back("armature");
   if (!unused.empty())
     note(fmt::format("{}: not modelled by the scene: {}", scene.robot.file.string(), fmt::join(unused, ", ")));
 }

@@ -11,7 +11,7 @@ namespace hamelin::app {
 namespace {
 
 const std::vector<std::string> names = {"robot",  "scene", "primitives", "integrator", "run",
-                                        "result", "sweep", "record",     "summary"};
+                                        "result", "sweep", "record",     "summary",    "accuracy"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

@@ -12,6 +12,7 @@
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "hamelin/study/accuracy.hpp"
 #include "hamelin/study/sweep.hpp"
 #include "terminal.hpp"
 
@@ -86,6 +87,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::summary:
       check_shipped_schema(read_json(file), "summary", file.string());
       return "sweep summary";
+    case Kind::accuracy:
+      return fmt::format("measurement of accuracy, {} rows",
+                         study::accuracy_from_json(read_json(file), file.string()).rows.size());
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,

@@ -24,6 +24,8 @@ class GaussLegendre final : public Integrator {
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   StepReport controlled(State& state, const Channels& channels, double limit) override;
+  /// Fixed steps iterated to rounding.
+  [[nodiscard]] bool structure() const noexcept { return !adaptive() && options_.tolerance <= 1e-12; }
   /// One solve from the state into q_next_, p_next_, slopes_; the state stays.
   kernel::GaussOutcome solve(const State& state, const Channels& channels, double h, double tolerance,
                              StepReport& report);

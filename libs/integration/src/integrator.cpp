@@ -5,7 +5,7 @@
 namespace hamelin::integration {
 
 Integrator::Integrator(std::string name, const Model& model, const Options& options)
-    : model_(model), options_(options), ws_(model), force_(model.dof()), name_(std::move(name)) {
+    : model_(model), options_(options), ws_(model), force_(VectorXd::Zero(model.dof())), name_(std::move(name)) {
   held_ = damped_ = dry_ = gyroscopic_ = VectorXd::Zero(model.dof());
 }
 
@@ -99,8 +99,8 @@ StepReport Integrator::divide(State& state, const Channels& channels, double h, 
   return total;
 }
 
-void Integrator::evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-  acts_ = {channels.held_torque.size() > 0, channels.damping.size() > 0, channels.coulomb.size() > 0,
+void Integrator::sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
+  acts_ = {!channels.none(), channels.held_torque.size() > 0, channels.damping.size() > 0, channels.coulomb.size() > 0,
            !channels.gyroscopic.empty()};
   force_.setZero();
   if (acts_.held) {
@@ -121,7 +121,7 @@ void Integrator::evaluate_forces(const Channels& channels, const VectorXd& q, co
   }
 }
 
-void Integrator::book_work(StepReport& report, const VectorXd& displacement, double weight) const {
+void Integrator::sum_work(StepReport& report, const VectorXd& displacement, double weight) const {
   if (acts_.held) report.held_work_J += weight * held_.dot(displacement);
   if (acts_.damped) report.dissipated_J += weight * damped_.dot(displacement);
   if (acts_.dry) report.dissipated_J += weight * dry_.dot(displacement);
@@ -129,7 +129,7 @@ void Integrator::book_work(StepReport& report, const VectorXd& displacement, dou
 }
 
 Energy Integrator::energy(const State& state) {
-  VectorXd& v = force_;  // scratch: no forces are pending between steps
+  VectorXd& v = held_;  // scratch: no forces are pending between steps
   velocity(state, v);
   return {dynamics::kinetic_energy(model_, ws_, state.q, v), dynamics::potential_energy(model_, ws_, state.q)};
 }

@@ -38,6 +38,7 @@ Json solver(const SolverSummary& s) {
           {"factorizations_mean", mean(s.factorizations)},
           {"evaluations", s.evaluations},
           {"halvings", s.halvings},
+          {"rejected", s.rejected},
           {"residual_max", s.residual_max},
           {"criterion", s.criterion},
           {"tolerance", s.tolerance}};

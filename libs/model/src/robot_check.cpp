@@ -70,6 +70,10 @@ void check_joint(const Joint& joint, const std::string& where) {
     fail(where, fmt::format("effort limit {}, expected a positive number", *joint.effort_max));
   if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
     fail(where, fmt::format("damping {}, expected a number of at least 0", joint.damping));
+  if (!(joint.friction >= 0.0 && std::isfinite(joint.friction)))
+    fail(where, fmt::format("friction {}, expected a number of at least 0", joint.friction));
+  if (!(joint.armature >= 0.0 && joint.armature <= inertia_max_kg_m2))
+    fail(where, fmt::format("armature {}, expected 0 to {}", joint.armature, inertia_max_kg_m2));
 }
 
 void check_body(const Link& link, const std::string& where) {
@@ -114,9 +118,10 @@ void check_joint_inertia(const Robot& robot, const std::string& where) {
   for (std::size_t i = n; i-- > 0;) {
     composite += bodies[i];
     articulated += bodies[i];
-    const double locked = screws[i].dot(composite * screws[i]);
+    const double rotor = robot.links[i].joint.armature;
+    const double locked = screws[i].dot(composite * screws[i]) + rotor;
     const geometry::Vector6d push = articulated * screws[i];
-    const double free = screws[i].dot(push);
+    const double free = screws[i].dot(push) + rotor;
     if (!(locked > 0.0) || !(free > inertia_share_min * locked))
       fail(where,
            fmt::format("link '{}': nothing it moves has inertia about joint '{}', expected a positive mass or inertia",

@@ -71,6 +71,8 @@ Joint joint_of(const Json& json) {
   joint.velocity_max = optional_of(json["velocity_max"]);
   joint.effort_max = optional_of(json["effort_max"]);
   joint.damping = json["damping"].get<double>();
+  joint.friction = json.value("friction", 0.0);
+  joint.armature = json.value("armature", 0.0);
   return joint;
 }
 
@@ -82,6 +84,8 @@ Json json_of(const Joint& joint) {
   json["velocity_max"] = json_of(joint.velocity_max);
   json["effort_max"] = json_of(joint.effort_max);
   json["damping"] = joint.damping;
+  if (joint.friction != 0.0) json["friction"] = joint.friction;
+  if (joint.armature != 0.0) json["armature"] = joint.armature;
   return json;
 }
 

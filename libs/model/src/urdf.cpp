@@ -553,8 +553,7 @@ class Reader {
   void set_limits(Joint& out, const urdf::Joint& joint) {
     if (joint.dynamics) {
       out.damping = joint.dynamics->damping;
-      if (joint.dynamics->friction != 0.0)
-        note("joint '{}': friction {} ignored", joint.name, joint.dynamics->friction);
+      out.friction = joint.dynamics->friction;
     }
     if (!joint.limits) return;
     const urdf::JointLimits& limits = *joint.limits;

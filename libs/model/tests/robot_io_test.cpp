@@ -97,7 +97,7 @@ const std::string arm = R"(<?xml version="1.0"?>
   <link name="tool"/>
   <joint name="shoulder" type="revolute">
     <parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="2" effort="50" velocity="3"/><dynamics damping="0.5"/>
+    <limit lower="-1" upper="2" effort="50" velocity="3"/><dynamics damping="0.5" friction="0.1"/>
   </joint>
   <joint name="slide" type="prismatic">
     <parent link="upper"/><child link="lower"/><origin xyz="0 0 0.4"/><axis xyz="0 0 1"/>
@@ -139,6 +139,8 @@ void check_same(const Robot& a, const Robot& b) {
     CHECK(x.joint.velocity_max == y.joint.velocity_max);
     CHECK(x.joint.effort_max == y.joint.effort_max);
     CHECK(x.joint.damping == y.joint.damping);
+    CHECK(x.joint.friction == y.joint.friction);
+    CHECK(x.joint.armature == y.joint.armature);
     CHECK(x.com == y.com);
     CHECK(x.mass_kg == y.mass_kg);
     CHECK(x.inertia_kg_m2 == y.inertia_kg_m2);
@@ -170,6 +172,9 @@ TEST_CASE("a URDF's joints, limits, spheres and tip come out in the base frame a
   CHECK(robot.links[0].joint.effort_max == 50.0);
   CHECK(robot.links[0].joint.velocity_max == 3.0);
   CHECK(robot.links[0].joint.damping == 0.5);
+  CHECK(robot.links[0].joint.friction == 0.1);
+  CHECK(robot.links[1].joint.friction == 0.0);
+  CHECK(robot.links[0].joint.armature == 0.0);  // URDF has none
   CHECK((robot.links[1].com.p() - Vector3d(0, 0, 0.8)).norm() < 1e-15);
   REQUIRE(robot.links[1].spheres.size() == 1);
   CHECK(robot.links[1].spheres[0].center_m.norm() < 1e-15);  // at the COM
@@ -271,17 +276,15 @@ TEST_CASE("what a URDF offers and is not used is noted", "[model][robot]") {
     CHECK(noted(robot, "no collision spheres"));
     CHECK(noted(robot, "1 <collision><box>"));
   }
-  SECTION("visuals, transmissions, friction") {
+  SECTION("visuals, transmissions") {
     std::string text =
         replaced(arm, "<link name=\"tool\"/>",
                  "<link name=\"tool\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link>");
     text = replaced(text, "</robot>", "<transmission name=\"t\"/><gazebo/></robot>");
-    text = replaced(text, "damping=\"0.5\"", "damping=\"0.5\" friction=\"0.1\"");
     const Robot robot = read_text("arm.urdf", text);
     CHECK(noted(robot, "1 <visual>"));
     CHECK(noted(robot, "1 <transmission>"));
     CHECK(noted(robot, "1 <gazebo>"));
-    CHECK(noted(robot, "friction 0.1 ignored"));
   }
   SECTION("zero effort and velocity") {
     const Robot robot =
@@ -406,6 +409,7 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[model]
       {"no effort", replaced(arm, "effort=\"50\" ", ""), "line 14: joint 'shoulder': <limit> has no effort"},
       {"negative effort", replaced(arm, "effort=\"50\"", "effort=\"-50\""), "effort limit -50"},
       {"negative damping", replaced(arm, "damping=\"0.5\"", "damping=\"-0.5\""), "damping -0.5"},
+      {"negative friction", replaced(arm, "friction=\"0.1\"", "friction=\"-1\""), "friction -1"},
       {"floating", replaced(arm, "type=\"prismatic\"", "type=\"floating\""), "joint 'slide': its type is floating"},
       {"planar", replaced(arm, "type=\"prismatic\"", "type=\"planar\""), "joint 'slide': its type is planar"},
       {"unknown type", replaced(arm, "type=\"prismatic\"", "type=\"helical\""),
@@ -490,6 +494,8 @@ TEST_CASE("a robot survives its JSON form bit for bit", "[model][robot]") {
     Eigen::Vector4d q(rng.normal(), rng.normal(), rng.normal(), rng.normal());
     q.normalize();
     json["links"][0]["com"]["quaternion_wxyz"] = {q[0], q[1], q[2], q[3]};
+    json["links"][0]["joint"]["friction"] = rng.uniform(0.0, 1.0);
+    json["links"][0]["joint"]["armature"] = rng.uniform(0.0, 1.0);
     json["links"][1]["joint"]["screw"] = {0.6 * (1.0 + 1e-9), 0, 0.8, 0, 0, 0};
     robots.push_back(robot_from_json(json, "tilted"));
   }

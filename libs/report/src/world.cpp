@@ -57,7 +57,7 @@ Json robot_json(const model::Model& model) {
   }
   for (const Vector3d& point : skeleton(robot)) points.push_back(array(point));
   Json normal = nullptr;
-  if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain())) normal = array(planar->root.R().col(2));
+  if (model.planar()) normal = array(model.root().R().col(2));
   return {{"name", robot.name},   {"base", pose_json(model.base())}, {"joints", std::move(joints)},
           {"skeleton", points},   {"tip_link", robot.tip.link},      {"spheres", std::move(spheres)},
           {"segments", segments}, {"planar_normal", normal}};

@@ -114,8 +114,8 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
     // A point on its joint's axis is one point of both links that the joint holds together.
     for (std::size_t k = 1; k < links.size(); ++k)
       REQUIRE((place(k, skeleton[k]) - place(k - 1, skeleton[k])).norm() < 1e-12);
-    if (const auto* chain = std::get_if<model::PlanarChain>(&model.chain()))
-      CHECK((vector_of(robot["planar_normal"]) - chain->root.R().col(2)).norm() < 1e-12);
+    if (model.planar())
+      CHECK((vector_of(robot["planar_normal"]) - model.root().R().col(2)).norm() < 1e-12);
     else
       CHECK(robot["planar_normal"].is_null());
   }

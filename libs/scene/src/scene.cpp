@@ -170,14 +170,23 @@ Goal read_goal(const Reader& in) {
   return goal;
 }
 
+JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers otherwise) {
+  const Json* given = in.find(key);
+  if (given == nullptr) return otherwise;
+  JointNumbers numbers;
+  if (given->is_string()) numbers.from_robot = true;
+  if (given->is_number()) numbers.values = {given->get<double>()};
+  if (given->is_array()) numbers.values = given->get<std::vector<double>>();
+  if (numbers.values == std::vector<double>{0.0}) numbers.values.clear();
+  return numbers;
+}
+
 ModelFlags read_model(const Reader& in) {
   ModelFlags model;
-  if (const Json* damping = in.find("joint_damping"); damping != nullptr) {
-    if (damping->is_string()) model.joint_damping.from_robot = true;
-    if (damping->is_number()) model.joint_damping.values = {damping->get<double>()};
-    if (damping->is_array()) model.joint_damping.values = damping->get<std::vector<double>>();
-    if (model.joint_damping.values == std::vector<double>{0.0}) model.joint_damping.values.clear();
-  }
+  model.joint_damping = read_joint_numbers(in, "joint_damping", model.joint_damping);
+  model.friction = read_joint_numbers(in, "friction", model.friction);
+  model.friction_speed = in.get("friction_speed", model.friction_speed);
+  model.armature = read_joint_numbers(in, "armature", model.armature);
   model.joint_limits = in.get("joint_limits", false);
   model.velocity_limits = in.get("velocity_limits", false);
   model.torque_limits = in.get("torque_limits", false);
@@ -374,11 +383,15 @@ Json resolved_json(const Scene& scene) {
   out["obstacles"] = Json::array();
   for (const Obstacle& obstacle : scene.obstacles) out["obstacles"].push_back(to_json(obstacle));
   const ModelFlags& model = scene.model;
-  Json damping = 0.0;
-  if (model.joint_damping.from_robot) damping = "robot";
-  if (model.joint_damping.values.size() == 1) damping = model.joint_damping.values.front();
-  if (model.joint_damping.values.size() > 1) damping = model.joint_damping.values;
-  out["model"] = {{"joint_damping", damping},
+  const auto joint_numbers = [](const JointNumbers& numbers) -> Json {
+    if (numbers.from_robot) return "robot";
+    if (numbers.values.empty()) return 0.0;
+    return numbers.values.size() == 1 ? Json(numbers.values.front()) : Json(numbers.values);
+  };
+  out["model"] = {{"joint_damping", joint_numbers(model.joint_damping)},
+                  {"friction", joint_numbers(model.friction)},
+                  {"friction_speed", model.friction_speed},
+                  {"armature", joint_numbers(model.armature)},
                   {"joint_limits", model.joint_limits},
                   {"velocity_limits", model.velocity_limits},
                   {"torque_limits", model.torque_limits},

@@ -317,3 +317,26 @@ TEST_CASE("friction and a torque's rate are read, and read back", "[scene][unit]
   document["actuation"] = {{"torque_rate_max_Nm_s", 1000.0}};
   CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("torque_rate_max_Nm_s"));
 }
+
+TEST_CASE("dry friction and rotor inertia are read, and read back", "[scene][unit]") {
+  Json document = small_document();
+  CHECK(scene_from_json(document, ".", "x.json").model.friction.values.empty());
+  CHECK(scene_from_json(document, ".", "x.json").model.armature.from_robot);  // part of the robot
+  CHECK(resolved_json(scene_from_json(document, ".", "x.json"))["model"]["armature"] == "robot");
+  document["model"] = {{"friction", {0.5, 0.25}}, {"friction_speed", 0.02}, {"armature", 0.1}};
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  CHECK(scene.model.friction.values == std::vector<double>{0.5, 0.25});
+  CHECK(scene.model.friction_speed == 0.02);
+  CHECK_FALSE(scene.model.armature.from_robot);
+  CHECK(scene.model.armature.values == std::vector<double>{0.1});
+  const Json resolved = resolved_json(scene);
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+  document["model"] = {{"friction", "robot"}, {"armature", 0}};
+  CHECK(scene_from_json(document, ".", "x.json").model.friction.from_robot);
+  CHECK_FALSE(scene_from_json(document, ".", "x.json").model.armature.from_robot);
+  for (const auto& [key, bad] : std::vector<std::pair<std::string, Json>>{
+           {"friction", -1.0}, {"friction", "file"}, {"friction_speed", 0.0}, {"armature", {0.1, -0.1}}}) {
+    document["model"] = {{key, bad}};
+    CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("/model/" + key));
+  }
+}

@@ -22,8 +22,6 @@ using Eigen::VectorXd;
 constexpr double self_influence_max_m = 0.10;
 // Obstacles are looked for this far where neither planner nor anything else says more.
 constexpr double default_influence_m = 0.2;
-// Friction is smooth below this speed [rad/s or m/s].
-constexpr double friction_speed = 0.01;
 // Figures that must be zero are so up to this share of the kinetic energy and 1 J: far above rounding, far below what
 // matters.
 constexpr double rounding_share = 1e-9;
@@ -45,6 +43,7 @@ model::Model scaled_masses(const model::Model& plant, double scale) {
   for (auto& link : robot.links) {
     link.mass_kg *= scale;
     link.inertia_kg_m2 *= scale;
+    link.joint.armature *= scale;
   }
   return model::Model(std::move(robot), plant.base(), plant.gravity());
 }
@@ -134,13 +133,17 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         if (scene.model.torque_limits)
           limits_ = limits_of(plant_.robot(), &model::Joint::effort_max, std::numeric_limits<double>::infinity());
         plant_damping_ = plant_damping(scene, plant_.robot());
-        if (scene.actuation.coulomb_friction_share > 0.0)
-          friction_ =
+        channels_.coulomb = plant_friction(scene, plant_.robot());
+        channels_.coulomb_speed = scene.model.friction_speed;
+        if (scene.actuation.coulomb_friction_share > 0.0) {
+          if (channels_.coulomb.size() == 0) channels_.coulomb = VectorXd::Zero(n);
+          channels_.coulomb +=
               scene.actuation.coulomb_friction_share * limits_of(plant_.robot(), &model::Joint::effort_max, 0.0);
+        }
         proves_energy_ =
             scene.actuation.type == scene::ActuationType::ideal && integrator_->name() == "hamel-variational";
         channels_.held_torque = VectorXd::Zero(n);
-        channels_.damping = VectorXd::Zero(n);
+        channels_.damping = plant_damping_.size() > 0 ? plant_damping_ : VectorXd::Zero(n);
         channels_.gyroscopic.reserve(shown_.size());
         if (scene.actuation.type == scene::ActuationType::sampled) {
           control_steps_ = std::max(
@@ -474,15 +477,6 @@ double ClosedLoop::room_for_node_velocity() {
   return scale;
 }
 
-void ClosedLoop::resist(const VectorXd& v) {
-  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
-  // As a coefficient of viscous damping, kept over the step: it takes energy out whatever the step and the inertia are.
-  for (Eigen::Index i = 0; i < friction_.size(); ++i) {
-    const double speed = std::max(std::abs(v[i]), 1e-9);
-    channels_.damping[i] += friction_[i] * std::tanh(speed / friction_speed) / speed;
-  }
-}
-
 void ClosedLoop::check_accounts() {
   if (!proves_energy_) return;
   const auto& answer = command_->raw();
@@ -558,7 +552,7 @@ void ClosedLoop::actuate() {
     ledger_.filter += command_->raw().filter_work_J;
     ledger_.recovery += command_->raw().recovery_work_J;
   }
-  resist(node_velocity_);
+  if (plant_damping_.size() > 0) channels_.damping += plant_damping_;
   if (potential) {
     impulse_ = -0.5 * scene_.step_s * gradient_;
     integrator_->kick(state_, impulse_);
@@ -581,8 +575,6 @@ void ClosedLoop::settle() {
 // What a sampled controller can do: one torque, made of all channels at the tick, held over the control period.
 void ClosedLoop::actuate_sampled() {
   book_node(0.0);
-  channels_.damping.setZero();
-  resist(v_);
   if (state_.k % control_steps_ != 0) return;
   const double period = static_cast<double>(control_steps_) * scene_.step_s;
   VectorXd& torque = delayed_[static_cast<std::size_t>((state_.k / control_steps_) % (delay_periods_ + 1))];

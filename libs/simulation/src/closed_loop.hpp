@@ -62,8 +62,6 @@ class ClosedLoop final : private planning::HostServices {
   void limit_torques();
   /// How much of the node's change of velocity the torque limits leave, 0 to 1.
   [[nodiscard]] double room_for_node_velocity();
-  /// Puts the plant's own damping and friction at velocity v into the damping channel, on top of the planner's.
-  void resist(const Eigen::VectorXd& v);
   /// Ends the run as a defect if the planner's accounts say what no filter may do.
   void check_accounts();
   /// The same for the energy account, and for the work of the last step's gyroscopic terms.
@@ -112,7 +110,7 @@ class ClosedLoop final : private planning::HostServices {
   integration::State state_;
   integration::Channels channels_;
   integration::StepReport report_;
-  Eigen::VectorXd v_, q_before_, v_before_, gradient_, gradient_before_, impulse_, limits_, plant_damping_, friction_;
+  Eigen::VectorXd v_, q_before_, v_before_, gradient_, gradient_before_, impulse_, limits_, plant_damping_;
   Eigen::VectorXd node_velocity_, turning_;  ///< what the node's velocity really becomes; gyroscopic torque at the node
   std::vector<Eigen::VectorXd> delayed_;
   Eigen::VectorXd torque_before_;  ///< of the last tick, where its rate is limited

@@ -31,28 +31,43 @@ void add_payload(model::Robot& robot, const scene::Payload& payload) {
   }
 }
 
+// One number a joint, as the scene gives them; empty for none.
+Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& given, const char* key,
+                              const model::Robot& robot, double model::Joint::*member) {
+  const int n = robot.dof();
+  if (given.from_robot) {
+    Eigen::VectorXd values(n);
+    for (int i = 0; i < n; ++i) values[i] = robot.links[static_cast<std::size_t>(i)].joint.*member;
+    return values.isZero(0.0) ? Eigen::VectorXd() : values;
+  }
+  if (given.values.empty()) return {};
+  if (given.values.size() == 1) return Eigen::VectorXd::Constant(n, given.values[0]);
+  if (given.values.size() != static_cast<std::size_t>(n))
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/{}: {} numbers given, expected 1 or {}", scene.name, key,
+                                                given.values.size(), n));
+  return Eigen::Map<const Eigen::VectorXd>(given.values.data(), n);
+}
+
 }  // namespace
 
 model::Model load_model(const scene::Scene& scene) {
   model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres});
   if (scene.model.payload) add_payload(robot, *scene.model.payload);
+  if (!scene.model.armature.from_robot) {
+    const Eigen::VectorXd armature =
+        joint_numbers(scene, scene.model.armature, "armature", robot, &model::Joint::armature);
+    for (int i = 0; i < robot.dof(); ++i)
+      robot.links[static_cast<std::size_t>(i)].joint.armature = armature.size() > 0 ? armature[i] : 0.0;
+  }
   return model::Model(std::move(robot), scene.base, scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
 }
 
 Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& robot) {
-  const auto& damping = scene.model.joint_damping;
-  const int n = robot.dof();
-  if (damping.from_robot) {
-    Eigen::VectorXd values(n);
-    for (int i = 0; i < n; ++i) values[i] = robot.links[static_cast<std::size_t>(i)].joint.damping;
-    return values;
-  }
-  if (damping.values.empty()) return {};
-  if (damping.values.size() == 1) return Eigen::VectorXd::Constant(n, damping.values[0]);
-  if (damping.values.size() != static_cast<std::size_t>(n))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /model/joint_damping: {} numbers given, expected 1 or {}",
-                                                scene.name, damping.values.size(), n));
-  return Eigen::Map<const Eigen::VectorXd>(damping.values.data(), n);
+  return joint_numbers(scene, scene.model.joint_damping, "joint_damping", robot, &model::Joint::damping);
+}
+
+Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot) {
+  return joint_numbers(scene, scene.model.friction, "friction", robot, &model::Joint::friction);
 }
 
 std::vector<log::Input> inputs_of(const scene::Scene& scene) {

@@ -13,6 +13,10 @@ namespace hamelin::simulation {
 /// @throws Error invalid if there is another number of them than of joints
 [[nodiscard]] Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& robot);
 
+/// Dry friction of each joint [Nm or N], as the scene's model asks for it; empty for none.
+/// @throws Error invalid if there is another number of them than of joints
+[[nodiscard]] Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot);
+
 /// The files of scene, robot and spheres.
 [[nodiscard]] std::vector<log::Input> inputs_of(const scene::Scene& scene);
 

@@ -24,8 +24,9 @@ Recorder::Recorder(log::Result& result, const Watch& watch, const integration::I
     : result_(result), watch_(watch) {
   result_.integrator = integrator.name();
   result_.solver.criterion = integrator.criterion();
-  result_.solver.tolerance =
-      integrator.criterion().starts_with("|tau_e") ? options.feedback_tolerance : options.tolerance;
+  result_.solver.tolerance = integrator.adaptive()                          ? std::max(options.rtol, options.atol)
+                             : integrator.criterion().starts_with("|tau_e") ? options.feedback_tolerance
+                                                                            : options.tolerance;
   tick_us_.reserve(static_cast<std::size_t>(steps_expected) + 1);
 }
 
@@ -80,6 +81,7 @@ void Recorder::step(const integration::StepReport& report) {
   sums.factorizations += report.factorizations;
   sums.evaluations += report.evaluations;
   sums.halvings += report.halvings;
+  sums.rejected += report.rejected;
   sums.updates_max = std::max(sums.updates_max, report.updates);
   sums.residual_max = std::max(sums.residual_max, report.residual);
   since_.updates = std::max(since_.updates, report.updates);

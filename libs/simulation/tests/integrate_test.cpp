@@ -52,6 +52,34 @@ TEST_CASE("a duration that is no whole number of steps, and vectors of the wrong
   CHECK(simulation::integrate(arm, rest(3, 0.1, 0.3), {}).steps == 3);  // 0.3/0.1 is not 3 in doubles
 }
 
+TEST_CASE("under step control the last step ends at the duration, whatever it is", "[simulation][step-control]") {
+  const model::Model arm(test::planar3());
+  auto motion = rest(3, 0.01, 10.0 + 1.0 / 3.0);
+  motion.integrator = "dop853";
+  motion.options.rtol = motion.options.atol = 1e-9;
+  const auto result = simulation::integrate(arm, motion, {});
+  CHECK(result.outcome == log::Outcome::completed);
+  CHECK(result.time_s == motion.duration_s);
+  CHECK(result.steps == result.solver.steps);
+  CHECK(result.steps < 100);
+  CHECK(result.solver.evaluations == 12 * result.steps + 11 * result.solver.rejected);
+  CHECK(result.energy_error_max_J < 1e-7);
+  motion.step_s = 5.0;  // far too long for a first step: taken back
+  CHECK(simulation::integrate(arm, motion, {}).solver.rejected > 0);
+}
+
+TEST_CASE("an explicit scheme that leaves the finite numbers ends as diverged, naming the step",
+          "[simulation][outcome]") {
+  const model::Model arm(test::spatial_chain(7));
+  auto motion = rest(7, 0.5, 500.0);
+  motion.q0.setConstant(0.3);
+  motion.v0.setConstant(1e3);
+  motion.integrator = "rk4";
+  const auto result = simulation::integrate(arm, motion, {});
+  CHECK(result.outcome == log::Outcome::diverged);
+  CHECK_THAT(result.cause, Catch::Contains("left the finite numbers"));
+}
+
 TEST_CASE("free motion can be stopped from outside", "[simulation][outcome]") {
   const model::Model arm(test::planar3());
   std::atomic<bool> stop = false;

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <set>
 
 #include "hamelin/study/merge.hpp"
+#include "html.hpp"
 
 namespace hamelin::study {
 
@@ -13,58 +13,17 @@ namespace {
 
 // Colours after Okabe and Ito, told apart by the colour-blind too; shapes differ as well.
 constexpr std::string_view style = R"css(
-:root { color-scheme: light dark; --ink: #1a1d21; --soft: #5c6570; --line: #d5dae0; --ground: #fff; --panel: #f6f7f9;
-  --reached: #00845f; --contact: #c8480a; --stalled: #c98600; --timeout: #3b8fd0; --other: #8a8a8a; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e6e9ed; --soft: #9aa4b0; --line: #363c45; --ground: #14171b;
-  --panel: #1c2026; --reached: #2fc79a; --contact: #ff7a45; --stalled: #f0b429; --timeout: #6cb8f2; --other: #8f979f; } }
-body { margin: 0 auto; max-width: 100rem; padding: 1.5rem 2rem 4rem; background: var(--ground); color: var(--ink);
-  font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-h1 { font-size: 1.6rem; margin: 0 0 .2rem; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .5rem; }
-p, .soft { color: var(--soft); max-width: 65rem; } p { margin: .3rem 0 .8rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
-td svg { vertical-align: middle; }
-th, td { padding: .32rem .5rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
-th { font-weight: 600; color: var(--soft); font-size: .82rem; vertical-align: bottom; }
-th.text, td.text { text-align: left; } td.cause { white-space: normal; min-width: 16rem; text-align: left; }
+:root { --reached: #00845f; --contact: #c8480a; --stalled: #c98600; --timeout: #3b8fd0; --other: #8a8a8a; }
+@media (prefers-color-scheme: dark) { :root { --reached: #2fc79a; --contact: #ff7a45; --stalled: #f0b429;
+  --timeout: #6cb8f2; --other: #8f979f; } }
+td.cause { white-space: normal; min-width: 16rem; text-align: left; }
 tr.bad td.contacts { color: var(--contact); font-weight: 700; }
-code { font: 12px/1.45 ui-monospace, "DejaVu Sans Mono", Menlo, monospace; }
 td code { display: block; max-width: 46rem; white-space: pre-wrap; overflow-wrap: anywhere; text-align: left; }
-.panels { display: flex; flex-wrap: wrap; gap: 1.2rem; }
-figure { margin: 0; background: var(--panel); border: 1px solid var(--line); border-radius: 8px; padding: .8rem 1rem; }
-figcaption { font-weight: 600; } figcaption span { font-weight: 400; color: var(--soft); }
-svg text { fill: var(--soft); font-size: 12px; } .axis { stroke: var(--line); stroke-width: 1; fill: none; }
-.legend { display: flex; flex-wrap: wrap; gap: .3rem 1.4rem; margin: .4rem 0 .9rem; } .legend svg { vertical-align: -2px; }
 .reached { fill: var(--reached); } .contact { stroke: var(--contact); stroke-width: 2; fill: none; }
 .stalled { stroke: var(--stalled); stroke-width: 1.7; fill: none; } .timeout { fill: var(--timeout); }
 .other { fill: var(--other); } .bar { fill: var(--reached); opacity: .8; } .track { fill: var(--line); opacity: .6; }
 .whisker { stroke: var(--ink); stroke-width: 1.4; fill: none; }
-details { margin-top: 1rem; } summary { cursor: pointer; font-weight: 600; }
 )css";
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  return out;
-}
 
 std::string shown(const std::optional<double>& value, double scale, int digits) {
   return value ? fmt::format("{:.{}f}", scale * *value, digits) : "–";
@@ -84,14 +43,6 @@ std::string bar(double share, const Interval& interval) {
       "<rect class=\"bar\" y=\"3\" width=\"{4:.1f}\" height=\"10\" rx=\"2\"/>"
       "<path class=\"whisker\" d=\"M{5:.1f} 8H{6:.1f}M{5:.1f} 4v8M{6:.1f} 4v8\"/></svg>",
       width, 100.0 * share, 100.0 * interval.low, 100.0 * interval.high, at, low + 0.7, high - 0.7);
-}
-
-std::string head_cell(std::string_view text, bool words = false) {
-  return fmt::format("<th{}>{}</th>", words ? " class=\"text\"" : "", text);
-}
-
-std::string cell(std::string_view text, std::string_view kind = "") {
-  return kind.empty() ? fmt::format("<td>{}</td>", text) : fmt::format("<td class=\"{}\">{}</td>", kind, text);
 }
 
 std::string success_table(const Merged& merged) {
@@ -176,26 +127,6 @@ std::string mark(Spot spot, double x, double y) {
   }
   return fmt::format("<circle class=\"other\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\"/>", x, y);
 }
-
-/// A logarithmic axis over whole decades and halves of them.
-struct LogAxis {
-  double low, high, from, to;  ///< decades, and where they are in the picture
-
-  LogAxis(const std::vector<double>& values, double at_low, double at_high)
-      : low(0), high(1), from(at_low), to(at_high) {
-    const auto [least, most] = std::minmax_element(values.begin(), values.end());
-    low = std::floor(2.0 * std::log10(*least)) / 2.0;
-    high = std::max(low + 0.5, std::ceil(2.0 * std::log10(*most)) / 2.0);
-  }
-  [[nodiscard]] double operator()(double value) const {
-    return from + (std::log10(value) - low) / (high - low) * (to - from);
-  }
-  [[nodiscard]] std::vector<double> ticks() const {
-    std::vector<double> all;
-    for (double decade = std::ceil(low); decade <= high; decade += 1.0) all.push_back(std::pow(10.0, decade));
-    return all;
-  }
-};
 
 std::string gain_panel(const std::string& planner, const std::vector<const MergedRun*>& runs) {
   constexpr double left = 58.0, right = 404.0, top = 12.0, bottom = 296.0;
@@ -331,15 +262,11 @@ std::string to_page(const Merged& merged) {
     directories.insert(r.directory.string());
     recorded += r.record.is_null() ? 0U : 1U;
   }
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\">\n<title>hamelin "
-      "sweep</title>\n<style>{}</style>\n</head>\n<body>\n"
-      "<h1>hamelin sweep</h1>\n<p>{} of {} planned runs in {}</p>\n",
-      style, recorded, merged.runs.size(), escaped(fmt::format("{}", fmt::join(directories, ", "))));
+  std::string html = fmt::format("<h1>hamelin sweep</h1>\n<p>{} of {} planned runs in {}</p>\n", recorded,
+                                 merged.runs.size(), escaped(fmt::format("{}", fmt::join(directories, ", "))));
   for (const auto& note : merged.notes) html += fmt::format("<p>Note: {}.</p>\n", escaped(note));
   html += success_table(merged) + gain_map(merged) + causes_table(merged) + failures(merged);
-  return html + "</body>\n</html>\n";
+  return html_page("hamelin sweep", style, html);
 }
 
 }  // namespace hamelin::study

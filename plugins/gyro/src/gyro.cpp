@@ -37,8 +37,7 @@ class Gyro : public Planner {
         tau_(setup.dof()) {
     if (rho_min_ > rho0_)
       throw hamelin::Error(hamelin::ErrorCode::invalid, "/distance_min_m: above rho0_m, expected at most rho0_m");
-    if (const auto* plane = std::get_if<hamelin::model::PlanarChain>(&arm_.model().chain()))
-      plane_normal_ = plane->root.R().col(2);
+    if (arm_.model().planar()) plane_normal_ = arm_.model().root().R().col(2);
   }
 
   void tick(const Tick& tick, Command& command) override {

@@ -120,6 +120,27 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes en
                                                   Catch::Contains("joint 'j1' of 'planar4' has none"));
 }
 
+TEST_CASE("the model's dry friction is the same to the arm as one that actuation names, and both add up",
+          "[simulation][actuation]") {
+  const ScratchFolder folder;
+  Json scene = scene_of({{"torque", {9.0, -4.0, 12.0, 1.0}}}, "ideal");
+  scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
+  scene["duration_s"] = 0.5;
+  const auto final_q = [&](const Json& model, double share) {
+    scene["model"] = model;
+    scene["actuation"]["coulomb_friction_share"] = share;
+    model::Robot robot = strong(100.0);
+    for (auto& link : robot.links) link.joint.friction = 5.0;
+    return run_scene(folder, scene, {}, robot).q;
+  };
+  const Eigen::VectorXd named = final_q({{"friction", 5.0}}, 0.0);
+  CHECK(named == final_q(nullptr, 0.05));
+  CHECK(named == final_q({{"friction", "robot"}}, 0.0));
+  CHECK(named == final_q({{"friction", {2.5, 2.5, 2.5, 2.5}}}, 0.025));
+  CHECK((named - final_q(nullptr, 0.0)).norm() > 1e-3);
+  CHECK((named - final_q({{"friction", 5.0}, {"friction_speed", 0.5}}, 0.0)).norm() > 1e-5);
+}
+
 TEST_CASE("under sampled actuation a node velocity is made a torque by the planner's masses, not the true ones",
           "[simulation][actuation]") {
   const ScratchFolder folder;

@@ -178,6 +178,7 @@ TEST_CASE("a slip in a command, an option or a value is answered with the neares
 TEST_CASE("with --json standard output is one JSON document", "[manners]") {
   const std::string shelf = "data/scenes/shelf.json";
   const std::vector<Words> all{free_fall,
+                               {"accuracy", "data/robots/planar3.json", "--integrators", "rk4", "--steps", "0.1"},
                                {"robot", "info", "data/robots/arm7.urdf"},
                                {"robot", "make-chain", "--links", "2", "-o", "chain.json"},
                                {"scene", "info", shelf},

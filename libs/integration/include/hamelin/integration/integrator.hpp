@@ -23,6 +23,10 @@ struct Channels {
   double coulomb_speed = 0.01;             ///< below it dry friction turns viscous [rad/s or m/s]
   std::vector<GyroscopicTerm> gyroscopic;  ///< (c)
   VectorXd held_torque;                    ///< (d) empty or dof [Nm]
+
+  [[nodiscard]] bool none() const noexcept {
+    return damping.size() == 0 && coulomb.size() == 0 && gyroscopic.empty() && held_torque.size() == 0;
+  }
 };
 
 /// What an integrator remembers between steps: a plain value, to be copied, kept and restored. Schemes with a momentum
@@ -128,9 +132,13 @@ class Integrator {
   virtual StepReport controlled(State& state, const Channels& channels, double limit);
 
   /// Generalised force of the channels at (q, v): total, with its parts kept for the work done.
-  void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
+  void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
+    if (acts_.any || !channels.none()) sum_forces(channels, q, v);  // else it is zero already
+  }
   /// Adds the work of the forces last evaluated over the displacement to the report.
-  void book_work(StepReport& report, const VectorXd& displacement, double weight) const;
+  void book_work(StepReport& report, const VectorXd& displacement, double weight) const {
+    if (acts_.any) sum_work(report, displacement, weight);
+  }
 
   const Model& model_;
   Options options_;
@@ -138,12 +146,14 @@ class Integrator {
   VectorXd force_;  ///< sum of the channels, as evaluate_forces left it
 
  private:
+  void sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
+  void sum_work(StepReport& report, const VectorXd& displacement, double weight) const;
   StepReport divide(State& state, const Channels& channels, double h, int depth);
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level
   struct {
-    bool held = false, damped = false, dry = false, gyroscopic = false;
+    bool any = false, held = false, damped = false, dry = false, gyroscopic = false;
   } acts_;  ///< what the forces last evaluated are made of
   VectorXd held_, damped_, dry_, gyroscopic_;
 };

@@ -28,7 +28,7 @@ enum class Outcome : std::int32_t {
 /// Statistics over all steps, filled by StepReports.
 struct SolverSummary {
   long steps = 0;
-  long updates = 0, factorizations = 0, evaluations = 0, halvings = 0;
+  long updates = 0, factorizations = 0, evaluations = 0, halvings = 0, rejected = 0;
   int updates_max = 0;
   double residual_max = 0.0;
   std::string criterion;

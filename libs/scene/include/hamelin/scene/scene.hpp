@@ -40,10 +40,10 @@ struct Goal {
 /// The goal's "type" in a scene file: "path" is a joint goal with way-points.
 [[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
-/// Viscous joint damping [Nms/rad or Ns/m].
-struct JointDamping {
+/// A number for each joint.
+struct JointNumbers {
   bool from_robot = false;     ///< what the robot file gives
-  std::vector<double> values;  ///< else one number for all joints, one per joint, or none
+  std::vector<double> values;  ///< else one number for all joints, one per joint, or none: zero
 };
 
 /// A body fixed to the tip.
@@ -53,9 +53,17 @@ struct Payload {
   Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the centre of mass, tip frame's axes
 };
 
+/// Below this speed dry friction turns viscous, if a scene says nothing else [rad/s or m/s].
+inline constexpr double default_friction_speed = 0.01;
+
 /// What of the robot is modelled; by default nothing that could be left out.
 struct ModelFlags {
-  JointDamping joint_damping;
+  JointNumbers joint_damping;                      ///< viscous [Nms/rad or Ns/m]
+  JointNumbers friction;                           ///< dry: torque −c tanh(v / friction_speed) [Nm or N]
+  double friction_speed = default_friction_speed;  ///< [rad/s or m/s]
+  /// Rotor inertia seen at the joint [kg m² or kg]. The robot's own by default, as masses are: no part of its motion
+  /// would be right without.
+  JointNumbers armature{true, {}};
   bool joint_limits = false, velocity_limits = false, torque_limits = false, self_collision = false;
   std::optional<Payload> payload;
 };

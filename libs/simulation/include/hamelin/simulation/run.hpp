@@ -36,6 +36,8 @@ struct FreeMotion {
   std::string integrator = "hamel-variational";
   integration::Options options;
   Eigen::VectorXd damping;         ///< empty: none
+  Eigen::VectorXd coulomb;         ///< dry friction, see integration::Channels; empty: none
+  double coulomb_speed = scene::default_friction_speed;
   Json config = Json::object();    ///< for the log's header: a scene's form, see free_motion()
   std::vector<log::Input> inputs;  ///< files it was read from
 };
@@ -46,7 +48,9 @@ struct FreeMotion {
 [[nodiscard]] FreeMotion free_motion(const scene::Scene& scene, const model::Model& model);
 
 /// Integrates free motion. The result's outcome is completed, diverged or interrupted.
-/// @throws Error usage if the duration is no whole number of steps (to 1e-9 steps), or sizes do not match
+/// Under step control (options.rtol, atol) step_s is the first step, the last one ends at the duration, and the result
+/// counts the accepted steps.
+/// @throws Error usage if the duration is no whole number of fixed steps (to 1e-9 steps), or sizes do not match
 [[nodiscard]] log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch);
 
 /// Runs a scene in closed loop with its planner: every tick kinematics, closest points, planner, one integrator step,

@@ -1,0 +1,117 @@
+#include "hamelin/study/accuracy.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "free_motion.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "output.hpp"
+#include "scene_flags.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct AccuracyFlags {
+  MotionFlags motion;
+  std::string integrators;
+  std::optional<std::string> steps, rtols, tolerances;
+  std::optional<double> atol, duration_s;
+  long every = 0;
+  bool no_reference = false, json = false, markdown = false;
+  std::optional<std::filesystem::path> output, page;
+};
+
+int accuracy(const AccuracyFlags& flags) {
+  scene::Scene scene = read_motion(flags.motion);
+  const model::Model model = simulation::load_model(scene);
+  set_start(flags.motion, model.dof(), scene);
+  scene.integrator = {};  // those of the command line are measured instead
+  const auto motion = simulation::free_motion(scene, model);
+
+  study::AccuracyOptions options;
+  options.name = motion.name;
+  options.q0 = motion.q0;
+  options.v0 = motion.v0;
+  options.channels.damping = motion.damping;
+  options.channels.coulomb = motion.coulomb;
+  options.channels.coulomb_speed = motion.coulomb_speed;
+  options.duration_s = flags.duration_s.value_or(motion.duration_s);
+  options.schemes = study::accuracy_schemes(flags.integrators);
+  if (flags.steps) options.steps_s = number_list("--steps", *flags.steps);
+  if (flags.rtols) options.rtols = number_list("--rtol", *flags.rtols);
+  if (flags.tolerances) options.tolerances = number_list("--tolerance", *flags.tolerances);
+  options.atol = flags.atol;
+  options.every = flags.every;
+  options.reference = !flags.no_reference;
+  std::optional<std::filesystem::path> output, page;
+  if (flags.output) output = output_target(*flags.output, files_of(scene));
+  if (flags.page) page = output_target(*flags.page, files_of(scene));
+
+  const auto progress = std::make_shared<Progress>("rows measured");
+  options.progress = [progress](std::size_t done, std::size_t all) {
+    progress->show(static_cast<double>(done), static_cast<double>(all));
+  };
+  const study::Accuracy found = study::measure_accuracy(model, options);
+  const Json document = study::to_json(found);
+  if (output) write_file_aside(*output, document.dump(2) + "\n");
+  if (page) write_file_aside(*page, study::to_page({found}));
+  for (const auto& text : found.notes) note(text);
+  if (flags.json)
+    print_json(document);
+  else
+    report(flags.markdown ? study::to_markdown(found) : study::to_table(found));
+  return 0;
+}
+
+}  // namespace
+
+void add_accuracy(CLI::App& app, int& exit_code) {
+  auto* command = add_command(
+      app, "accuracy",
+      "Measure integrators: speed against error. Each lets the robot move freely with each of the steps (fixed) and "
+      "relative tolerances (step control) it takes; errors are those at the end, against a reference made by two "
+      "schemes whose difference is its own error",
+      "hamelin accuracy data/robots/planar3.json --integrators gauss:8,rk4 --steps 0.05,0.02 --duration 1\n"
+      "hamelin accuracy arm.urdf --integrators gauss,dop853 --rtol 1e-4,1e-8 --duration 1 --page p.html\n"
+      "hamelin accuracy scene.json --integrators rk4 --steps 1e-3 --duration 100 --no-reference --json");
+  const auto flags = std::make_shared<AccuracyFlags>();
+  add_motion_flags(*command, flags->motion);
+  command
+      ->add_option("--integrators", flags->integrators,
+                   fmt::format("a list as gauss:8,rk4, an order behind the colon; known are {}",
+                               fmt::join(integration::integrator_names(), ", ")))
+      ->required()
+      ->type_name("a,b,..");
+  command->add_option("--steps", flags->steps, "fixed steps [s], each a whole number of times in the duration")
+      ->type_name("H,H,..");
+  command->add_option("--rtol", flags->rtols, "relative tolerances, for integrators with step control")
+      ->type_name("E,E,..");
+  command->add_option("--atol", flags->atol, "absolute tolerance of step control (default equal to --rtol)")
+      ->type_name("E");
+  command
+      ->add_option("--tolerance", flags->tolerances,
+                   "of root-finding with fixed steps, see `hamelin integrate` (default the integrator's own)")
+      ->type_name("E,E,..");
+  command->add_option("--duration", flags->duration_s, "[s] (default the scene's, else 10)")->type_name("T");
+  command
+      ->add_option("--every", flags->every,
+                   "look at the energy after every K fixed steps (default: so that it is at most 131072 times)")
+      ->type_name("K")
+      ->check(CLI::Range(1L, 1000000000L));
+  command->add_flag("--no-reference", flags->no_reference, "energy and time alone, for long motions");
+  command->add_flag("--json", flags->json, "print JSON (hamelin.accuracy/1)");
+  command->add_flag("--markdown", flags->markdown, "print tables in Markdown")->excludes("--json");
+  command->add_option("-o,--output", flags->output, "write the JSON")->type_name("ACCURACY.json");
+  command->add_option("--page", flags->page, "write a page with plots and tables; `hamelin report` joins several")
+      ->type_name("PAGE.html");
+  command->callback([flags, &exit_code] { exit_code = accuracy(*flags); });
+}
+
+}  // namespace hamelin::app

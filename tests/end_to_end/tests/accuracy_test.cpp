@@ -1,0 +1,74 @@
+#include <algorithm>
+
+#include "../program.hpp"
+
+using namespace hamelin;
+using test::Bench;
+
+namespace {
+
+const std::vector<std::string> measure = {"accuracy",      "data/robots/planar3.json",
+                                          "--integrators", "hamel-variational,rk4,dop853",
+                                          "--steps",       "0.1,0.05",
+                                          "--rtol",        "1e-6",
+                                          "--duration",    "1"};
+
+std::vector<std::string> with(std::vector<std::string> command, const std::vector<std::string>& more) {
+  command.insert(command.end(), more.begin(), more.end());
+  return command;
+}
+
+}  // namespace
+
+TEST_CASE("accuracy prints, writes and draws the same rows, and report joins several", "[end_to_end]") {
+  Bench bench;
+  const Json printed = test::run_json(bench, with(measure, {"-o", "a.json", "--page", "a.html"}));
+  CHECK(printed == bench.json("a.json"));
+  REQUIRE(printed["rows"].size() == 7);
+  for (const auto& row : printed["rows"]) {
+    CHECK(row["outcome"] == "completed");
+    CHECK(row["error_q"] < 0.1);
+  }
+  CHECK(bench.run({"validate", "a.json"}).out == "a.json: ok (measurement of accuracy, 7 rows)\n");
+  const auto page = bench.run({"report", "a.json", "a.json", "-o", "both.html"});
+  CAPTURE(page.err);
+  CHECK(page.exit_code == 0);
+  CHECK(bench.run({"report", "a.json", "data/scenes/shelf.json", "-o", "no.html"}).exit_code == 2);
+  const auto table = bench.run(measure);
+  CHECK(table.out.find("dop853, controlled") != std::string::npos);
+  CHECK(bench.run(with(measure, {"--markdown"})).out.find("| hamel-variational") != std::string::npos);
+  CHECK(bench.run(with(measure, {"--markdown", "--json"})).exit_code == 2);
+}
+
+TEST_CASE("accuracy takes start, damping and duration of a scene, and says what it leaves out", "[end_to_end]") {
+  Bench bench;
+  const auto output = bench.run(
+      {"accuracy", "data/scenes/shelf.json", "--integrators", "rk4", "--steps", "0.01", "--duration", "0.1", "--json"});
+  CHECK(output.exit_code == 0);
+  CHECK(output.err.find("free motion, ignored: planner 'hybrid', the map") != std::string::npos);
+}
+
+TEST_CASE("accuracy refuses in one line what it cannot measure", "[end_to_end]") {
+  Bench bench;
+  const std::vector<std::string> bare{"accuracy", "data/robots/planar3.json"};
+  const std::vector<std::pair<std::vector<std::string>, std::string>> slips{
+      {{"--integrators", "rk5", "--steps", "0.1"}, "did you mean 'rk4'?"},
+      {{"--integrators", "rk4"}, "neither --steps nor --rtol"},
+      {{"--integrators", "", "--steps", "0.1"}, "--integrators"},
+      {{"--integrators", "rk4", "--steps", ""}, "--steps: '' is no number"},
+      {{"--integrators", "rk4", "--steps", "0.3", "--duration", "1"}, "no whole number of steps of 0.3 s"},
+      {{"--integrators", "rk4", "--rtol", "1e-6"}, "has no step control"},
+      {{"--integrators", "rk4:8", "--steps", "0.1"}, "'rk4' has one order"},
+      {{"--integrators", "rk4", "--steps", "0.1", "--q0", "1,2"}, "--q0: 2 numbers given, expected 3"},
+      {{"--integrators", "rk4", "--steps", "0.1", "--page", "absent/a.html"}, "absent"},
+      {{"--steps", "0.1"}, "--integrators"}};
+  for (const auto& [arguments, wanted] : slips) {
+    CAPTURE(arguments);
+    const auto output = bench.run(with(bare, arguments));
+    CAPTURE(output.err);
+    CHECK(output.exit_code == 2);
+    CHECK(output.out.empty());
+    CHECK(std::count(output.err.begin(), output.err.end(), '\n') == 1);
+    CHECK(output.err.find(wanted) != std::string::npos);
+  }
+}

@@ -1,0 +1,151 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/model/robot_io.hpp"
+
+/// Motions that integrators find hard (SPEC §7), set up once for the tests and for the table of their figures.
+namespace hamelin::hard_cases {
+
+using Eigen::VectorXd;
+
+/// What came of a motion.
+struct Outcome {
+  bool completed = true;  ///< else a step found no root and the motion ended there, as it should
+  long steps = 0;
+  double energy_error_J = 0.0;   ///< largest |E − E₀|
+  double energy_scale_J = 0.0;   ///< largest kinetic energy
+  double late_over_early = 0.0;  ///< largest error of the second half over that of the first: 1 where nothing drifts
+  double updates_mean = 0.0, factorizations_mean = 0.0;
+  int updates_max = 0;
+  long halvings = 0;
+  double deepest = 0.0;  ///< how far a barrier was entered [rad]
+  VectorXd q;            ///< at the end
+};
+
+/// A potential of the joints that acts as half-kicks at both nodes of a step, as a planner's does.
+struct Barrier {
+  std::function<double(const VectorXd& q, VectorXd& gradient)> potential;
+  std::function<double(const VectorXd& q)> depth;
+};
+
+struct Motion {
+  std::string name;
+  model::Model model;
+  VectorXd q0, v0;
+  double step_s = 1e-3;
+  long steps = 1000;
+  long look_every = 1;  ///< energy is looked at every so many steps
+  Barrier barrier{};
+};
+
+inline Outcome run(const Motion& motion, const std::string& scheme) {
+  const auto integrator = integration::make_integrator(scheme, motion.model);
+  auto state = integrator->start(motion.q0, motion.v0);
+  const int n = motion.model.dof();
+  VectorXd gradient = VectorXd::Zero(n), kick(n);
+  Outcome out;
+  double value = motion.barrier.potential ? motion.barrier.potential(state.q, gradient) : 0.0;
+  const double first = integrator->energy(state).total() + value;
+  double early = 0.0, late = 0.0, updates = 0.0, factorizations = 0.0;
+  for (long k = 0; k < motion.steps; ++k) {
+    const auto half_kick = [&] {
+      kick = -0.5 * motion.step_s * gradient;
+      integrator->kick(state, kick);
+    };
+    if (motion.barrier.potential && !gradient.isZero(0.0)) half_kick();
+    const auto report = integrator->step(state, {}, motion.step_s);
+    updates += report.updates;
+    factorizations += report.factorizations;
+    out.updates_max = std::max(out.updates_max, report.updates);
+    out.halvings += report.halvings;
+    if (!report.converged) {
+      out.completed = false;
+      break;
+    }
+    ++out.steps;
+    if (motion.barrier.potential) {
+      value = motion.barrier.potential(state.q, gradient);
+      if (!gradient.isZero(0.0)) half_kick();
+      out.deepest = std::max(out.deepest, motion.barrier.depth(state.q));
+    }
+    if (out.steps % motion.look_every != 0) continue;
+    const auto energy = integrator->energy(state);
+    const double error = std::abs(energy.total() + value - first);
+    out.energy_scale_J = std::max(out.energy_scale_J, energy.kinetic_J);
+    auto& half = 2 * out.steps <= motion.steps ? early : late;
+    half = std::isfinite(error) ? std::max(half, error) : INFINITY;
+  }
+  const auto counted = static_cast<double>(std::max(1L, out.steps));
+  out.updates_mean = updates / counted;
+  out.factorizations_mean = factorizations / counted;
+  out.energy_error_J = std::max(early, late);
+  out.late_over_early = early > 0.0 ? late / early : 0.0;
+  out.q = state.q;
+  return out;
+}
+
+inline model::Robot chain(int links, const std::string& axes = "x,z,x") {
+  return model::make_chain({links, axes, 0.2, 1.0, 0.03});
+}
+
+/// A stretched arm let go: all axes of bending meet it straight, and it falls out of that.
+inline Motion stretched(int links, double step_s, long steps) {
+  return {"stretched", model::Model(chain(links)), VectorXd::Zero(links), VectorXd::Zero(links), step_s, steps};
+}
+
+/// No gravity: every joint turns past π, again and again.
+inline Motion turning(double step_s, long steps) {
+  return {"turning",
+          model::Model(chain(3, "x,y,z"), geometry::SE3{}, Eigen::Vector3d::Zero()),
+          VectorXd::Constant(3, 3.0),  // π is near
+          (VectorXd(3) << 6.0, -4.0, 5.0).finished(),
+          step_s,
+          steps};
+}
+
+/// A 7-link arm, one link of which weighs a million times the others.
+inline Motion mass_ratio(std::size_t heavy_link, double step_s, long steps) {
+  model::Robot robot = chain(7);
+  robot.links[heavy_link].mass_kg *= 1e6;
+  robot.links[heavy_link].inertia_kg_m2 *= 1e6;
+  const VectorXd q0 = (VectorXd(7) << 0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6).finished();
+  return {"mass ratio", model::Model(robot), q0, VectorXd::Zero(7), step_s, steps};
+}
+
+/// Example 5.1's arm falls on a spring that begins at q₁ = −0.5 rad: ½ stiffness (q₁ + 0.5)².
+inline Motion falling_on_barrier(double stiffness, double step_s, long steps) {
+  const auto depth = [](const VectorXd& q) { return std::max(0.0, -0.5 - q[0]); };
+  Motion motion{"barrier",
+                model::Model(model::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+                VectorXd::Zero(3),
+                VectorXd::Zero(3),
+                step_s,
+                steps};
+  motion.barrier.depth = depth;
+  motion.barrier.potential = [depth, stiffness](const VectorXd& q, VectorXd& gradient) {
+    const double d = depth(q);
+    gradient.setZero();
+    gradient[0] = -stiffness * d;
+    return 0.5 * stiffness * d * d;
+  };
+  return motion;
+}
+
+/// Example 5.1 of the paper, 10⁶ steps of 10 ms.
+inline Motion million_steps() {
+  Motion motion{"10^6 steps",
+                model::Model(model::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+                VectorXd::Zero(3),
+                VectorXd::Zero(3),
+                0.01,
+                1000000};
+  motion.look_every = 7;  // no divisor of any period in sight
+  return motion;
+}
+
+}  // namespace hamelin::hard_cases
