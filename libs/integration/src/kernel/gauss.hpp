@@ -133,8 +133,10 @@ class Gauss {
       // a repeated first slope says nothing of the contraction, an extrapolated one is trusted with a tenth
       const double contraction = sweep > 0 ? now / before : guessed ? 0.1 : 1.0;
       out.residual = now * (contraction < 1.0 ? contraction : 1.0);
-      if (out.residual <= call_.tolerance || (sweep > 1 && now <= rounding())) break;
-      const bool hopeless = !(now < 1e3) || (sweep > 2 && contraction > 1.0 && now > 1e3 * rounding());
+      // where sweeps only stir what rounding leaves, there is no more to gain
+      const bool stirring = sweep > 1 && contraction > 0.3 && now <= 1e4 * rounding();
+      if (out.residual <= call_.tolerance || stirring || (sweep > 1 && now <= rounding())) break;
+      const bool hopeless = !(now < 1e3) || (sweep > 2 && contraction > 1.0);
       if (hopeless || sweep + 1 == call_.max_sweeps) return out;
       before = now;
     }

@@ -14,7 +14,7 @@ using Vec3 = geometry::Vec3<double>;
 using Mat3 = geometry::Mat3<double>;
 using Screw = dynamics::kernel::Spatial<double>::Motion;
 using Wrench = dynamics::kernel::Spatial<double>::Force;
-using Blocks = dynamics::kernel::Spatial<double>::Operator;
+using Blocks = dynamics::kernel::Spatial<double>::Blocks;
 
 [[nodiscard]] inline Mat3 product(const Mat3& a, const Mat3& b) noexcept {
   const auto row = [&](const Vec3& r) { return b.x * r.x + b.y * r.y + b.z * r.z; };
@@ -159,13 +159,13 @@ struct InSpace<dynamics::kernel::Spatial<double>> {
   static Space::Motion down(const Screw& m) noexcept { return m; }
   static Wrench up(const Space::Force& f) noexcept { return f; }
   static Space::Force down(const Wrench& f, const Space::Force*) noexcept { return f; }
-  static Space::Operator stiffness(const InverseExp& d, const Space::Link& l, const Wrench& mu, double h) noexcept {
+  static Space::Blocks stiffness(const InverseExp& d, const Space::Link& l, const Wrench& mu, double h) noexcept {
     const auto I = Space::rigid(l);
     return d.stiffness(geometry::full(I.A), I.H, geometry::full(I.M), mu, h);
   }
   /// Adᵀ(left⁻¹) P Ad(right⁻¹).
-  static Space::Operator to_parent(const Space::Link& l, const Space::Placement& left, const Space::Placement& right,
-                                   const Space::Operator& P) noexcept {
+  static Space::Blocks to_parent(const Space::Link& l, const Space::Placement& left, const Space::Placement& right,
+                                 const Space::Blocks& P) noexcept {
     const auto rotated = [&](const Mat3& a) {
       const Mat3 rows{Space::to_parent(l, right, a.x), Space::to_parent(l, right, a.y),
                       Space::to_parent(l, right, a.z)};
@@ -187,15 +187,15 @@ struct InSpace<dynamics::kernel::Planar<double>> {
   static Space::Motion down(const Screw& m) noexcept { return {m.w.z, m.v.x, m.v.y}; }
   static Wrench up(const Space::Force& f) noexcept { return {{0.0, 0.0, f.t}, {f.x, f.y, 0.0}}; }
   static Space::Force down(const Wrench& f, const Space::Force*) noexcept { return {f.t.z, f.f.x, f.f.y}; }
-  static Space::Operator stiffness(const InverseExp& d, const Space::Link& l, const Wrench& mu, double h) noexcept {
+  static Space::Blocks stiffness(const InverseExp& d, const Space::Link& l, const Wrench& mu, double h) noexcept {
     const Mat3 A{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, l.inertia}};
     const Mat3 H{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {-l.moment_y, l.moment_x, 0.0}};
     const Mat3 M{{l.mass, 0.0, 0.0}, {0.0, l.mass, 0.0}, {0.0, 0.0, l.mass}};
     const Blocks k = d.stiffness(A, H, M, mu, h);
     return {k.A.z.z, k.B.z.x, k.B.z.y, k.C.x.z, k.D.x.x, k.D.x.y, k.C.y.z, k.D.y.x, k.D.y.y};
   }
-  static Space::Operator to_parent(const Space::Link& l, const Space::Placement& left, const Space::Placement& right,
-                                   const Space::Operator& P) noexcept {
+  static Space::Blocks to_parent(const Space::Link& l, const Space::Placement& left, const Space::Placement& right,
+                                 const Space::Blocks& P) noexcept {
     // the operator's columns as wrenches by `left`, then its rows, which are wrenches too, by `right`
     const auto t = Space::to_parent(l, left, Space::Force{P.ww, P.xw, P.yw});
     const auto x = Space::to_parent(l, left, Space::Force{P.wx, P.xx, P.yx});
@@ -216,7 +216,7 @@ struct LieLink {
   typename Space::Force lambda{};
 
   typename Space::Placement after_kept{};
-  typename Space::Operator P{};  ///< δλ = P η + s, η the link's δ at θ^{k+1}
+  typename Space::Blocks P{};  ///< δλ = P η + s, η the link's δ at θ^{k+1}
   typename Space::Force u{}, w{};
   double inv_d{};
 

@@ -206,9 +206,9 @@ class Variational {
       read(i, lambda);
       Space::add_rigid(l, x, P);
       const Force z = f.z = Space::scaled(Space::turned_axis(l, lambda), half_);
-      const Force PB = Space::sum(Space::column(l, P), Space::times_bracket(P, f.b));
+      const Force PB = Space::times_axis_and(l, P, f.b);
       f.u = Space::sum(PB, Space::scaled(z, -1.0));
-      f.w = Space::sum(Space::sum(Space::row(l, P), Space::scaled(Space::transposed_times_bracket(P, f.b), -1.0)), z);
+      f.w = Space::sum(Space::transposed_times_axis_less(l, P, f.b), z);
       const double along = Space::along_axis(l, PB);
       double d = along - Space::pair(f.b, PB) + Space::pair(f.b, z);
       if constexpr (Space::mixed) d += l.armature;
@@ -221,7 +221,7 @@ class Variational {
       if constexpr (Spins) {
         for (std::size_t j = 0; j < call_.spin_count; ++j)
           if (call_.spins[j].link == i) hang(call_.spins[j], Q, mu);
-        const Force QB = Space::sum(Space::column(l, Q), Space::times_bracket(Q, f.b));
+        const Force QB = Space::times_axis_and(l, Q, f.b);
         f.spin_u = Space::sum(QB, Space::scaled(Space::turned_axis(l, mu), -half_));
         f.w = Space::sum(f.w, Space::scaled(Space::row(l, Q), -half_));
         d -= half_ * Space::along_axis(l, QB);

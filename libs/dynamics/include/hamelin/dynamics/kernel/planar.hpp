@@ -34,6 +34,7 @@ struct Planar {
   struct Operator {
     S ww, wx, wy, xw, xx, xy, yw, yx, yy;
   };
+  using Blocks = Operator;
   struct Flow {
     S w, dw, ax, ay, ww;  ///< ww = w²
   };
@@ -192,15 +193,16 @@ struct Planar {
     if (slides(l)) return {-f.y, S(0.0), S(0.0)};
     return {S(0.0), f.y * l.direction, -f.x * l.direction};
   }
-  HAMELIN_INLINE static Force times_bracket(const Operator& P, const Motion& b) noexcept {
-    return {P.wx * b.x + P.wy * b.y, P.xx * b.x + P.xy * b.y, P.yx * b.x + P.yy * b.y};
+  HAMELIN_INLINE static Force times_axis_and(const Link& l, const Operator& P, const Motion& b) noexcept {
+    const Force turned{P.wx * b.x + P.wy * b.y, P.xx * b.x + P.xy * b.y, P.yx * b.x + P.yy * b.y};
+    if (slides(l)) return sum({P.wx, P.xx, P.yx}, turned);
+    return sum({P.ww * l.direction, P.xw * l.direction, P.yw * l.direction}, turned);
   }
-  HAMELIN_INLINE static Force transposed_times_bracket(const Operator& P, const Motion& b) noexcept {
-    return {P.xw * b.x + P.yw * b.y, P.xx * b.x + P.yx * b.y, P.xy * b.x + P.yy * b.y};
-  }
-  HAMELIN_INLINE static Force column(const Link& l, const Operator& P) noexcept {
-    if (slides(l)) return {P.wx, P.xx, P.yx};
-    return {P.ww * l.direction, P.xw * l.direction, P.yw * l.direction};
+  HAMELIN_INLINE static Force transposed_times_axis_less(const Link& l, const Operator& P, const Motion& b) noexcept {
+    const Force turned{P.xw * b.x + P.yw * b.y, P.xx * b.x + P.yx * b.y, P.xy * b.x + P.yy * b.y};
+    const Force row =
+        slides(l) ? Force{P.xw, P.xx, P.xy} : Force{P.ww * l.direction, P.wx * l.direction, P.wy * l.direction};
+    return {row.t - turned.t, row.x - turned.x, row.y - turned.y};
   }
   HAMELIN_INLINE static Force row(const Link& l, const Operator& P) noexcept {
     if (slides(l)) return {P.xw, P.xx, P.xy};

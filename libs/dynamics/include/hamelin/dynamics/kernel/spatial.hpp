@@ -1,5 +1,6 @@
 #pragma once
 #include <cmath>
+#include <type_traits>
 
 #include "hamelin/dynamics/kernel/lanes.hpp"
 #include "hamelin/geometry/small.hpp"
@@ -40,9 +41,15 @@ struct Spatial {
     Mat3<S> H;
   };
   /// The same without symmetry:  t = A w + B v,  f = C w + D v.
-  struct Operator {
+  struct Blocks {
     Mat3<S> A, B, C, D;
   };
+  /// The same, its four blocks side by side in a register: lanes A, B, C, D, entry by entry. They turn alike.
+  struct PackedBlocks {
+    Mat3<Lanes<4>> m;
+  };
+  static constexpr bool packs = std::is_same_v<S, double> && native_lanes >= 4;
+  using Operator = std::conditional_t<packs, PackedBlocks, Blocks>;
   /// What Newton–Euler carries outwards: angular velocity, angular acceleration, acceleration of the frame's origin,
   /// and Ω = hat(dw) + hat(w)², which gives the acceleration of a point r as a + Ω r.
   struct Flow {
@@ -115,10 +122,15 @@ struct Spatial {
     return {to_parent(l, x, f.t) + cross(offset(l, x), force), force};
   }
   /// R a Rᵀ with R = Rx(α) Rz(angle).
-  HAMELIN_INLINE static Mat3<S> rotated(const Link& l, const Placement& x, const Mat3<S>& a) noexcept {
-    const Mat3<S> rows{to_parent(l, x, a.x), to_parent(l, x, a.y), to_parent(l, x, a.z)};
-    const Mat3<S> cols = transpose(rows);
-    return transpose(Mat3<S>{to_parent(l, x, cols.x), to_parent(l, x, cols.y), to_parent(l, x, cols.z)});
+  template <class T>
+  HAMELIN_INLINE static Mat3<T> rotated(const Link& l, const Placement& x, const Mat3<T>& a) noexcept {
+    const T s(x.s), c(x.c), sa(l.sin_alpha), ca(l.cos_alpha);
+    const auto turn = [&](const Vec3<T>& v) -> Vec3<T> {
+      const T y = v.x * s + v.y * c;
+      return {v.x * c - v.y * s, y * ca - v.z * sa, y * sa + v.z * ca};
+    };
+    const Mat3<T> columns = transpose(Mat3<T>{turn(a.x), turn(a.y), turn(a.z)});
+    return transpose(Mat3<T>{turn(columns.x), turn(columns.y), turn(columns.z)});
   }
   HAMELIN_INLINE static Sym3<S> rotated(const Link& l, const Placement& x, const Sym3<S>& a) noexcept {
     // about z by the joint's angle, then about x by α; written with differences so that rounding stays small
@@ -236,10 +248,10 @@ struct Spatial {
   HAMELIN_INLINE static Force times(const Inertia& P, const Motion& m) noexcept {
     return {P.A * m.w + P.H * m.v, geometry::transposed_times(P.H, m.w) + P.M * m.v};
   }
-  HAMELIN_INLINE static Force times(const Operator& P, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force times(const Blocks& P, const Motion& m) noexcept {
     return {P.A * m.w + P.B * m.v, P.C * m.w + P.D * m.v};
   }
-  HAMELIN_INLINE static Force transposed_times(const Operator& P, const Motion& m) noexcept {
+  HAMELIN_INLINE static Force transposed_times(const Blocks& P, const Motion& m) noexcept {
     return {geometry::transposed_times(P.A, m.w) + geometry::transposed_times(P.C, m.v),
             geometry::transposed_times(P.B, m.w) + geometry::transposed_times(P.D, m.v)};
   }
@@ -251,13 +263,25 @@ struct Spatial {
     P.H = minus_outer(P.H, ku.t, u.f);
   }
   /// P − u wᵀ.
-  HAMELIN_INLINE static void subtract_outer(Operator& P, const Force& u, const Force& w) noexcept {
+  HAMELIN_INLINE static void subtract_outer(Blocks& P, const Force& u, const Force& w) noexcept {
     P = {minus_outer(P.A, u.t, w.t), minus_outer(P.B, u.t, w.f), minus_outer(P.C, u.f, w.t),
          minus_outer(P.D, u.f, w.f)};
   }
+  HAMELIN_INLINE static void subtract_outer(PackedBlocks& P, const Force& u, const Force& w) noexcept {
+    P.m = minus_outer(P.m, {pairwise(u.t.x, u.f.x), pairwise(u.t.y, u.f.y), pairwise(u.t.z, u.f.z)},
+                      {alternate(w.t.x, w.f.x), alternate(w.t.y, w.f.y), alternate(w.t.z, w.f.z)});
+  }
   HAMELIN_INLINE static void add(Inertia& P, const Inertia& Q) noexcept { P = {P.A + Q.A, P.M + Q.M, P.H + Q.H}; }
-  HAMELIN_INLINE static void add(Operator& P, const Operator& Q) noexcept {
+  HAMELIN_INLINE static void add(Blocks& P, const Blocks& Q) noexcept {
     P = {P.A + Q.A, P.B + Q.B, P.C + Q.C, P.D + Q.D};
+  }
+  HAMELIN_INLINE static void add(PackedBlocks& P, const Blocks& Q) noexcept {
+    const auto row = [](const Vec3<S>& a, const Vec3<S>& b, const Vec3<S>& c, const Vec3<S>& d) -> Vec3<Lanes<4>> {
+      using Real = typename Lanes<4>::Real;
+      return {Real{a.x, b.x, c.x, d.x}, Real{a.y, b.y, c.y, d.y}, Real{a.z, b.z, c.z, d.z}};
+    };
+    P.m = P.m + Mat3<Lanes<4>>{row(Q.A.x, Q.B.x, Q.C.x, Q.D.x), row(Q.A.y, Q.B.y, Q.C.y, Q.D.y),
+                               row(Q.A.z, Q.B.z, Q.C.z, Q.D.z)};
   }
   HAMELIN_INLINE static void add(Moment& k, const Moment& j) noexcept { k = {k.m + j.m, k.h + j.h}; }
 
@@ -283,33 +307,61 @@ struct Spatial {
     if (slides(l)) return {{f.f.y, -f.f.x, o}, {o, o, o}};
     return {{f.t.y, -f.t.x, o}, {f.f.y, -f.f.x, o}};
   }
-  /// P b and Pᵀ b for a bracket, which has nothing along z.
-  HAMELIN_INLINE static Force times_bracket(const Operator& P, const Motion& b) noexcept {
+  /// P (A + b) and Pᵀ (A − b) for a bracket, which has nothing along z.
+  HAMELIN_INLINE static Force times_axis_and(const Link& l, const Blocks& P, const Motion& b) noexcept {
     const auto part = [](const Vec3<S>& row, const Vec3<S>& x) { return row.x * x.x + row.y * x.y; };
-    return {
+    const Force turned{
         {part(P.A.x, b.w) + part(P.B.x, b.v), part(P.A.y, b.w) + part(P.B.y, b.v), part(P.A.z, b.w) + part(P.B.z, b.v)},
         {part(P.C.x, b.w) + part(P.D.x, b.v), part(P.C.y, b.w) + part(P.D.y, b.v),
          part(P.C.z, b.w) + part(P.D.z, b.v)}};
+    if (slides(l)) return sum({{P.B.x.z, P.B.y.z, P.B.z.z}, {P.D.x.z, P.D.y.z, P.D.z.z}}, turned);
+    return sum({{P.A.x.z, P.A.y.z, P.A.z.z}, {P.C.x.z, P.C.y.z, P.C.z.z}}, turned);
   }
-  HAMELIN_INLINE static Force transposed_times_bracket(const Operator& P, const Motion& b) noexcept {
-    return {P.A.x * b.w.x + P.A.y * b.w.y + P.C.x * b.v.x + P.C.y * b.v.y,
-            P.B.x * b.w.x + P.B.y * b.w.y + P.D.x * b.v.x + P.D.y * b.v.y};
+  HAMELIN_INLINE static Force transposed_times_axis_less(const Link& l, const Blocks& P, const Motion& b) noexcept {
+    const Force turned{P.A.x * b.w.x + P.A.y * b.w.y + P.C.x * b.v.x + P.C.y * b.v.y,
+                       P.B.x * b.w.x + P.B.y * b.w.y + P.D.x * b.v.x + P.D.y * b.v.y};
+    const Force row = slides(l) ? Force{P.C.z, P.D.z} : Force{P.A.z, P.B.z};
+    return {row.t - turned.t, row.f - turned.f};
   }
-  /// P A and Pᵀ A.
-  HAMELIN_INLINE static Force column(const Link& l, const Operator& P) noexcept {
-    if (slides(l)) return {{P.B.x.z, P.B.y.z, P.B.z.z}, {P.D.x.z, P.D.y.z, P.D.z.z}};
-    return {{P.A.x.z, P.A.y.z, P.A.z.z}, {P.C.x.z, P.C.y.z, P.C.z.z}};
+  HAMELIN_INLINE static Force times_axis_and(const Link& l, const PackedBlocks& P, const Motion& b) noexcept {
+    const S one(1.0), o(0.0);
+    const Vec3<Lanes<4>> x{alternate(b.w.x, b.v.x), alternate(b.w.y, b.v.y),
+                           slides(l) ? alternate(o, one) : alternate(one, o)};
+    const Lanes<4> a = dot(P.m.x, x), c = dot(P.m.y, x), d = dot(P.m.z, x);
+    return {{a[0] + a[1], c[0] + c[1], d[0] + d[1]}, {a[2] + a[3], c[2] + c[3], d[2] + d[3]}};
   }
-  HAMELIN_INLINE static Force row(const Link& l, const Operator& P) noexcept {
-    if (slides(l)) return {P.C.z, P.D.z};
-    return {P.A.z, P.B.z};
+  HAMELIN_INLINE static Force transposed_times_axis_less(const Link& l, const PackedBlocks& P,
+                                                         const Motion& b) noexcept {
+    const S one(1.0), o(0.0);
+    const Vec3<Lanes<4>> sum = P.m.x * pairwise(-b.w.x, -b.v.x) + P.m.y * pairwise(-b.w.y, -b.v.y) +
+                               P.m.z * (slides(l) ? pairwise(o, one) : pairwise(one, o));
+    return {{sum.x[0] + sum.x[2], sum.y[0] + sum.y[2], sum.z[0] + sum.z[2]},
+            {sum.x[1] + sum.x[3], sum.y[1] + sum.y[3], sum.z[1] + sum.z[3]}};
   }
+  /// Pᵀ A.
+  HAMELIN_INLINE static Force row(const Link& l, const Blocks& P) noexcept {
+    return slides(l) ? Force{P.C.z, P.D.z} : Force{P.A.z, P.B.z};
+  }
+  HAMELIN_INLINE static Force row(const Link& l, const PackedBlocks& P) noexcept {
+    const Vec3<Lanes<4>>& z = P.m.z;
+    if (slides(l)) return {{z.x[2], z.y[2], z.z[2]}, {z.x[3], z.y[3], z.z[3]}};
+    return {{z.x[0], z.y[0], z.z[0]}, {z.x[1], z.y[1], z.z[1]}};
+  }
+  /// (a, b, a, b) and (a, a, b, b).
+  HAMELIN_INLINE static Lanes<4> alternate(double a, double b) noexcept { return typename Lanes<4>::Real{a, b, a, b}; }
+  HAMELIN_INLINE static Lanes<4> pairwise(double a, double b) noexcept { return typename Lanes<4>::Real{a, a, b, b}; }
+
   HAMELIN_INLINE static Operator no_operator() noexcept {
-    const Vec3<S> z{S(0.0), S(0.0), S(0.0)};
-    const Mat3<S> none{z, z, z};
-    return {none, none, none, none};
+    if constexpr (packs) {
+      const Vec3<Lanes<4>> z{Lanes<4>(0.0), Lanes<4>(0.0), Lanes<4>(0.0)};
+      return {{z, z, z}};
+    } else {
+      const Vec3<S> z{S(0.0), S(0.0), S(0.0)};
+      const Mat3<S> none{z, z, z};
+      return {none, none, none, none};
+    }
   }
-  HAMELIN_INLINE static void add_rigid(const Link& l, const Placement&, Operator& P) noexcept {
+  HAMELIN_INLINE static void add_rigid(const Link& l, const Placement&, Blocks& P) noexcept {
     P.A = P.A + full(inertia(l));
     P.D.x.x += S(l.mass);
     P.D.y.y += S(l.mass);
@@ -327,8 +379,22 @@ struct Spatial {
     P.C.z.x += S(l.moment.y);
     P.C.z.y -= S(l.moment.x);
   }
+  HAMELIN_INLINE static void add_rigid(const Link& l, const Placement&, PackedBlocks& P) noexcept {
+    using Real = typename Lanes<4>::Real;
+    const auto& I = l.inertia;
+    const auto& h = l.moment;
+    P.m.x.x += Real{I.xx, 0.0, 0.0, l.mass};
+    P.m.x.y += Real{I.xy, -h.z, h.z, 0.0};
+    P.m.x.z += Real{I.xz, h.y, -h.y, 0.0};
+    P.m.y.x += Real{I.xy, h.z, -h.z, 0.0};
+    P.m.y.y += Real{I.yy, 0.0, 0.0, l.mass};
+    P.m.y.z += Real{I.yz, -h.x, h.x, 0.0};
+    P.m.z.x += Real{I.xz, -h.y, h.y, 0.0};
+    P.m.z.y += Real{I.yz, h.x, -h.x, 0.0};
+    P.m.z.z += Real{I.zz, 0.0, 0.0, l.mass};
+  }
   /// P ← Adᵀ(g⁻¹) P Ad(g⁻¹).
-  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Operator& P) noexcept {
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Blocks& P) noexcept {
     const Vec3<S> p = offset(l, x);
     P.A = rotated(l, x, P.A);
     P.B = rotated(l, x, P.B);
@@ -339,8 +405,22 @@ struct Spatial {
     P.C = P.C - times_hat(P.D, p);
     P.A = P.A + hat_times(p, P.C);
   }
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, PackedBlocks& P) noexcept {
+    const Vec3<S> p = offset(l, x);
+    const S o(0.0);
+    P.m = rotated(l, x, P.m);
+    // A −= B p̂, C −= D p̂; then A += p̂ C, B += p̂ D
+    P.m = P.m - times_hat(shuffled<1, 1, 3, 3>(P.m), {alternate(p.x, o), alternate(p.y, o), alternate(p.z, o)});
+    P.m = P.m + hat_times({pairwise(p.x, o), pairwise(p.y, o), pairwise(p.z, o)}, shuffled<2, 3, 2, 3>(P.m));
+  }
+  template <int i, int j, int k, int n>
+  HAMELIN_INLINE static Mat3<Lanes<4>> shuffled(const Mat3<Lanes<4>>& a) noexcept {
+    const auto one = [](Lanes<4> v) -> Lanes<4> { return __builtin_shufflevector(v.v, v.v, i, j, k, n); };
+    const auto row = [&](const Vec3<Lanes<4>>& v) -> Vec3<Lanes<4>> { return {one(v.x), one(v.y), one(v.z)}; };
+    return {row(a.x), row(a.y), row(a.z)};
+  }
   /// G with spin_force(w, point, m) = G m.
-  HAMELIN_INLINE static Operator spin_operator(const Vec3<S>& w, const Placement&, const Vec3<double>& point) noexcept {
+  HAMELIN_INLINE static Blocks spin_operator(const Vec3<S>& w, const Placement&, const Vec3<double>& point) noexcept {
     const S o = S(0.0);
     const Vec3<S> p = vec(point);
     const Mat3<S> D{{o, -w.z, w.y}, {w.z, o, -w.x}, {-w.y, w.x, o}};
