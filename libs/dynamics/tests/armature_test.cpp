@@ -52,7 +52,9 @@ TEST_CASE("rotor inertia is the mass matrix plus a diagonal, in every algorithm"
   dynamics::momentum(model, ws, q, v, x);
   close(x, dense * v);
   CHECK(dynamics::kinetic_energy(model, ws, q, v) == Approx(0.5 * v.dot(dense * v)).epsilon(1e-12));
-  CHECK(dynamics::potential_energy(model, ws, q) == dynamics::potential_energy(bare, bare_ws, q));
+  // chains without rotors run code of their own
+  CHECK(dynamics::potential_energy(model, ws, q) ==
+        Approx(dynamics::potential_energy(bare, bare_ws, q)).epsilon(1e-13));
 }
 
 TEST_CASE("a massless link is fine where its rotor has inertia", "[dynamics][armature]") {

@@ -136,6 +136,7 @@ void GaussLegendre::begin(State& state, const VectorXd& v0) {
   state.memory = slopes_;
   state.step_previous = 0.0;
   set_velocity(state, v0);
+  if (adaptive()) ahead_ = state;
 }
 
 void GaussLegendre::velocity(const State& state, VectorXd& v) {
@@ -199,18 +200,31 @@ StepReport GaussLegendre::attempt(State& state, const Channels& channels, double
 
 // The guess is the last step's polynomial of degree s, so what the first sweep changes, e, is its error O(h^{s+1}),
 // while the step's own is O(h^{2s+1}): relative to the displacement scale 1 it is taken for e^{(2s+1)/(s+1)}. It costs
-// nothing, and it sees a motion that quickens one step late at most.
+// nothing, and it sees a motion that quickens one step late at most. The first step has no guess; it is judged by a
+// second one like it, which is then dropped.
 StepReport GaussLegendre::controlled(State& state, const Channels& channels, double limit) {
   StepReport report;
   report.converged = false;
   const double s = static_cast<double>(tableau_.stages);
   const double allowed = options_.atol + options_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
+  const double tolerance = std::max(iteration_share * allowed, 1e-15);
   const double target = std::pow(estimate_share * allowed, (s + 1.0) / (2.0 * s + 1.0));
+  const auto wanted_after = [&](const kernel::GaussOutcome& outcome) {
+    return outcome.starter_error > 0.0 ? std::pow(target / outcome.starter_error, 1.0 / (s + 1.0)) : most;
+  };
+  const bool first = state.step_previous == 0.0;
   const double wish = state.step_next > 0.0 ? state.step_next : limit;
-  double h = std::min(wish, limit);
-  while (report.rejected <= max_rejections) {
-    const auto outcome = solve(state, channels, h, std::max(iteration_share * allowed, 1e-15), report);
-    const double wanted = outcome.starter_error > 0.0 ? std::pow(target / outcome.starter_error, 1.0 / (s + 1.0)) : 1.0;
+  for (double h = std::min(wish, limit); report.rejected <= max_rejections;) {
+    auto outcome = solve(state, channels, h, tolerance, report);
+    double wanted = wanted_after(outcome);
+    if (first && outcome.converged) {
+      ahead_ = state;
+      StepReport booked;
+      accept(ahead_, outcome, h, booked);
+      const auto judge = solve(ahead_, channels, h, tolerance, report);
+      wanted = wanted_after(judge);
+      outcome.converged = judge.converged;
+    }
     if (!outcome.converged || wanted < least) {
       ++report.rejected;
       h *= outcome.converged ? std::clamp(wanted, 0.1, least) : least;
@@ -219,6 +233,11 @@ StepReport GaussLegendre::controlled(State& state, const Channels& channels, dou
     double next = h * std::min(wanted, most);
     // A step that the limit cut short says nothing against the wish there was.
     if (report.rejected == 0 && h < wish) next = std::max(next, wish);
+    if (first) {
+      q_next_ = ahead_.q;
+      p_next_ = ahead_.p;
+      slopes_ = ahead_.memory;
+    }
     accept(state, outcome, h, report);
     state.step_next = next;
     report.step_s = h;

@@ -36,6 +36,7 @@ class GaussLegendre final : public Integrator {
   dynamics::Memory memory_;
   std::vector<dynamics::kernel::Spin> spins_;
   VectorXd q_next_, p_next_, slopes_;
+  State ahead_;  ///< the first step's end, until a second has judged it
 };
 
 }  // namespace hamelin::integration

@@ -17,7 +17,7 @@ State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   state.force_previous = VectorXd::Zero(model_.dof());
   state.deltas.assign(4, VectorXd::Zero(model_.dof()));
   begin(state, v0);
-  saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
+  if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   return state;
 }
 
