@@ -89,22 +89,9 @@ struct Planar {
     const S wx = hx + x.px * xy - x.py * xx, wy = hy + x.px * yy - x.py * xy;
     return {P.ww + x.px * (hy + wy) - x.py * (hx + wx), wx, wy, xx, xy, yy};
   }
-  /// Behind a revolute joint without rotor inertia the row and column of w are gone.
-  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force& u, S inv_d) noexcept {
-    if (Mixed && (l.prismatic || l.armature != 0.0)) {
-      subtract_outer(P, u, inv_d);
-      P = to_parent(l, x, P);
-      return;
-    }
-    const S kx = u.x * inv_d, ky = u.y * inv_d;
-    const S rxx = P.xx - kx * u.x, rxy = P.xy - kx * u.y, ryy = P.yy - ky * u.y;
-    const S d = rxx - ryy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2.0) * rxy * cs;
-    P.xx = rxx - k;
-    P.xy = d * cs + rxy * (S(1.0) - S(2.0) * ss);
-    P.yy = ryy + k;
-    P.wx = x.px * P.xy - x.py * P.xx;
-    P.wy = x.px * P.yy - x.py * P.xy;
-    P.ww = x.px * P.wy - x.py * P.wx;
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force&, S inv_d) noexcept {
+    subtract_outer(P, column(l, P), inv_d);
+    P = to_parent(l, x, P);
   }
   HAMELIN_INLINE static Moment to_parent(const Link&, const Placement& x, const Moment& k) noexcept {
     return {k.m, x.c * k.x - x.s * k.y + x.px * k.m, x.s * k.x + x.c * k.y + x.py * k.m};
@@ -347,14 +334,18 @@ struct PlanarParallel : Planar<S, false> {
     const S wx = P.wx + x.px * P.xy - x.py * P.xx, wy = P.wy + x.px * P.yy - x.py * P.xy;
     return {P.ww + x.px * (P.wy + wy) - x.py * (P.wx + wx), wx, wy, P.xx, P.xy, P.yy};
   }
+  /// Behind the joint the row and column of w are gone, and those of the parent are made of the rest. What its pivot
+  /// needs, nᵀ(M − h hᵀ/d)n with n = (−p_y, p_x), is written so that only one product waits for 1/d.
   HAMELIN_INLINE static void carry(const Link&, const Placement& x, Inertia& P, const Force&, S inv_d) noexcept {
-    const S kx = P.wx * inv_d, ky = P.wy * inv_d;  // u but for the joint's direction, which cancels
+    const S nh = x.px * P.wy - x.py * P.wx;
+    const S nMn = x.px * (x.px * P.yy - x.py * P.xy) - x.py * (x.px * P.xy - x.py * P.xx);
+    P.ww = nMn - (nh * nh) * inv_d;
+    const S kx = P.wx * inv_d, ky = P.wy * inv_d;
     P.xx -= kx * P.wx;
     P.xy -= kx * P.wy;
     P.yy -= ky * P.wy;
     P.wx = x.px * P.xy - x.py * P.xx;
     P.wy = x.px * P.yy - x.py * P.xy;
-    P.ww = x.px * P.wy - x.py * P.wx;
   }
   HAMELIN_INLINE static void carry(const Link&, const Placement& x, Operator& P) noexcept {
     // motion: v += w (−py, px);  force: t += p × f

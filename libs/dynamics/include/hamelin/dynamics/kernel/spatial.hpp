@@ -161,9 +161,11 @@ struct Spatial {
     shift(offset(l, x), out);
     return out;
   }
-  /// P ← Adᵀ(g⁻¹) (P − u uᵀ/d) Ad(g⁻¹) with u = P A: what an articulated body is to its parent. Behind a revolute joint
-  /// without rotor inertia all moments about z are gone: A loses its third row and column, H its third row.
-  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force& u, S inv_d) noexcept {
+  /// P ← Adᵀ(g⁻¹) (P − u uᵀ/d) Ad(g⁻¹) with u = P A, k = u/d: what an articulated body is to its parent. Behind a
+  /// revolute joint without rotor inertia all moments about z are gone: A loses its third row and column, H its third
+  /// row.
+  HAMELIN_INLINE static void carry(const Link& l, const Placement& x, Inertia& P, const Force& k, S inv_d) noexcept {
+    const Force u = column(l, P);
     if (Mixed && (l.prismatic || l.armature != 0.0)) {
       subtract_outer(P, u, inv_d);
       P.A = rotated(l, x, P.A);
@@ -171,13 +173,15 @@ struct Spatial {
       P.H = rotated(l, x, P.H);
     } else {
       const S ca = S(l.cos_alpha), sa = S(l.sin_alpha);
-      const S kx = u.t.x * inv_d, ky = u.t.y * inv_d;
-      const S xx = P.A.xx - kx * u.t.x, xy = P.A.xy - kx * u.t.y, yy = P.A.yy - ky * u.t.y;
-      const S d = xx - yy, cs = x.c * x.s, ss = x.s * x.s, k = d * ss + S(2.0) * xy * cs;
-      const S turned = d * cs + xy * (S(1.0) - S(2.0) * ss), rest = yy + k;
-      P.A = {xx - k, turned * ca, turned * sa, rest * (ca * ca), rest * (ca * sa), rest * (sa * sa)};
-      P.M = rotated(l, x, minus_outer(P.M, u.f, inv_d));
-      const Vec3<S> hx = P.H.x - u.f * kx, hy = P.H.y - u.f * ky;
+      const S xx = P.A.xx - k.t.x * u.t.x, xy = P.A.xy - k.t.x * u.t.y, yy = P.A.yy - k.t.y * u.t.y;
+      const S d = xx - yy, cs = x.c * x.s, ss = x.s * x.s, turn = d * ss + S(2.0) * xy * cs;
+      const S turned = d * cs + xy * (S(1.0) - S(2.0) * ss), rest = yy + turn;
+      P.A = {xx - turn, turned * ca, turned * sa, rest * (ca * ca), rest * (ca * sa), rest * (sa * sa)};
+      const Vec3<S> f = u.f, kf = k.f;
+      P.M = rotated(l, x,
+                    Sym3<S>{P.M.xx - kf.x * f.x, P.M.xy - kf.x * f.y, P.M.xz - kf.x * f.z, P.M.yy - kf.y * f.y,
+                            P.M.yz - kf.y * f.z, P.M.zz - kf.z * f.z});
+      const Vec3<S> hx = P.H.x - f * k.t.x, hy = P.H.y - f * k.t.y;
       P.H.x = to_parent(l, x, hx * x.c - hy * x.s);
       const Vec3<S> row = to_parent(l, x, hx * x.s + hy * x.c);
       P.H.y = row * ca;

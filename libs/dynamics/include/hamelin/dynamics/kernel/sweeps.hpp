@@ -109,16 +109,16 @@ void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& 
 }
 
 /// One link of the articulated-body recursion: P comes in as what the links outboard hand over and leaves as what this
-/// one hands to its parent. column[i] = P A, inv_d[i] = 1/(A·P A + armature).
+/// one hands to its parent. inv_d[i] = 1/d with d = A·P A + armature, column[i] = P A/d.
 template <class Space>
 HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                                typename Space::Inertia& P) noexcept {
   using S = typename Space::Scalar;
   Space::add_rigid(l, link.x, P);
-  link.column = Space::column(l, P);
   S d = Space::pivot(l, P);
   if constexpr (Space::mixed) d += l.armature;
   link.inv_d = S(1.0) / d;
+  link.column = Space::scaled(Space::column(l, P), link.inv_d);
   if (!root) Space::carry(l, link.x, P, link.column, link.inv_d);
 }
 
@@ -126,8 +126,9 @@ HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>
 template <class Space>
 HAMELIN_INLINE void eliminate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                               typename Space::Scalar y, typename Space::Force& bias) noexcept {
-  link.u = (y - Space::along_axis(l, bias)) * link.inv_d;
-  if (!root) bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, link.u)));
+  const auto left = y - Space::along_axis(l, bias);
+  link.u = left * link.inv_d;
+  if (!root) bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, left)));
 }
 
 /// Outwards after the elimination: x[i], and the twists that the x are rates of, on their way: visit(i, X_i) sees
@@ -141,7 +142,7 @@ HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch
     const auto& l = links[i];
     const auto& link = k[i];
     auto m = i == 0 ? twist : Space::to_child(l, link.x, twist);
-    x[i] = link.u - link.inv_d * Space::pair(m, link.column);
+    x[i] = link.u - Space::pair(m, link.column);
     visit(i, m);
     Space::add_along_axis(l, m, x[i]);
     twist = m;
