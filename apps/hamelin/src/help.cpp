@@ -27,7 +27,7 @@ const std::vector<HelpSection>& about_the_program() {
         {"130", "interrupted; what was recorded so far is written"}}},
       {"Environment",
        {{"HAMELIN_PLUGIN_PATH", "directories to look for planners in, separated by colons"},
-        {"HAMELIN_ISA", "x86-64, v3 or v4: refuse to run unless this is the build's instruction set"},
+        {"HAMELIN_ISA", "x86-64, v3 (AVX2) or v4 (AVX-512): the instruction set to compute with (default the best)"},
         {"NO_COLOR, TERM=dumb", "no colour, as --no-color; a dumb terminal gets no counting line either"}}}};
   return sections;
 }

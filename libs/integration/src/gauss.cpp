@@ -99,7 +99,7 @@ constexpr int max_sweeps = 60;
 constexpr int max_rejections = 60;
 // What an iteration stopped at 1e-12 leaves has a sign, and energy drifts with it (1e-10 J in 10⁵ steps of planar3); a
 // sweep more for structure's sake.
-constexpr double to_rounding = 1e-3;
+constexpr double to_rounding = 1e-2;
 // How far a step may follow the last one.
 constexpr double most = 1.5, least = 0.5;
 // Of the step error that is allowed, what the iteration may leave; and how much of the estimate, which is a cautious
