@@ -1,30 +1,13 @@
 #include "kernels.hpp"
 
+#include "hamelin/dynamics/kernel/dispatch.hpp"
+
 namespace hamelin::dynamics {
 
-namespace isa_baseline {
-extern const KernelSet set;
-}
-#if defined(__x86_64__)
-namespace isa_v3 {
-extern const KernelSet set;
-}
-namespace isa_v4 {
-extern const KernelSet set;
-}
-#endif
+HAMELIN_SELECT_KERNELS(KernelSet, set)
 
 const KernelSet& kernels() {
-  switch (selected_isa()) {
-#if defined(__x86_64__)
-    case Isa::v4:
-      return isa_v4::set;
-    case Isa::v3:
-      return isa_v3::set;
-#endif
-    default:
-      return isa_baseline::set;
-  }
+  return selected_set();
 }
 
 }  // namespace hamelin::dynamics

@@ -72,15 +72,7 @@ StepReport Composition::attempt(State& state, const Channels& channels, double h
       inner_.deltas[0] = last_;
       inner_.step_previous = weights_[i - 1] * h;
     }
-    const StepReport part = step_.advance(inner_, channels, weights_[i] * h);
-    report.converged = part.converged;
-    report.updates += part.updates;
-    report.factorizations += part.factorizations;
-    report.evaluations += part.evaluations;
-    report.residual = std::max(report.residual, part.residual);
-    report.gyroscopic_work_J += part.gyroscopic_work_J;
-    report.dissipated_J += part.dissipated_J;
-    report.held_work_J += part.held_work_J;
+    report = together(report, step_.advance(inner_, channels, weights_[i] * h));
     last_ = inner_.deltas[0];
     swap_history(i);
   }

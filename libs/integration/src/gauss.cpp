@@ -6,40 +6,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "hamelin/core/isa.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
-#include "spins.hpp"
+#include "kernel_arguments.hpp"
 
 namespace hamelin::integration {
 
 namespace kernel {
 
-namespace isa_baseline {
-extern const GaussSet gauss_set;
-}
-#if defined(__x86_64__)
-namespace isa_v3 {
-extern const GaussSet gauss_set;
-}
-namespace isa_v4 {
-extern const GaussSet gauss_set;
-}
-#endif
+HAMELIN_SELECT_KERNELS(GaussSet, gauss_set)
 
 namespace {
-
-const GaussSet& gauss_kernels() {
-  switch (selected_isa()) {
-#if defined(__x86_64__)
-    case Isa::v4:
-      return isa_v4::gauss_set;
-    case Isa::v3:
-      return isa_v3::gauss_set;
-#endif
-    default:
-      return isa_baseline::gauss_set;
-  }
-}
 
 // Nodes are the roots of the Legendre polynomial P_s on [0, 1], by Newton; a_ij = ∫₀^{c_i} ℓ_j, which Gauss quadrature
 // of the same nodes does exactly. In long double, so that the rounded numbers are right.
@@ -106,19 +82,16 @@ constexpr double most = 1.5, least = 0.5;
 // one, the step may use. Both found by work and error on falling arms.
 constexpr double iteration_share = 1e-3, estimate_share = 3.0;
 
-const double* data_or_null(const VectorXd& x) {
-  return x.size() > 0 ? x.data() : nullptr;
-}
-
 }  // namespace
 
 GaussLegendre::GaussLegendre(const Model& model, const Options& options)
     : Integrator("gauss", model, options),
       tableau_(kernel::tableau(static_cast<std::size_t>((options.order == 0 ? default_order : options.order) / 2))),
-      kernels_(&kernel::gauss_kernels()),
+      kernels_(&kernel::selected_gauss_set()),
       memory_(dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
         return entry.bytes(chain.links.size(), tableau_.stages);
       })) {
+  spins_.reserve(most_spins);
   q_next_ = p_next_ = VectorXd::Zero(model.dof());
   slopes_ = VectorXd::Zero(2 * model.dof() * static_cast<Eigen::Index>(tableau_.stages));
 }

@@ -21,9 +21,6 @@ State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   return state;
 }
 
-namespace {
-
-// What two parts of a step did, the second after the first.
 StepReport together(const StepReport& a, const StepReport& b) {
   StepReport sum = a;
   sum.converged = a.converged && b.converged;
@@ -39,8 +36,6 @@ StepReport together(const StepReport& a, const StepReport& b) {
   sum.held_work_J += b.held_work_J;
   return sum;
 }
-
-}  // namespace
 
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);

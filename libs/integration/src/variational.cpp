@@ -5,42 +5,14 @@
 #include <cmath>
 
 #include "guess.hpp"
-#include "hamelin/core/isa.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
-#include "spins.hpp"
+#include "kernel_arguments.hpp"
 
 namespace hamelin::integration {
 
 namespace kernel {
 
-namespace isa_baseline {
-extern const VariationalSet variational_set;
-}
-#if defined(__x86_64__)
-namespace isa_v3 {
-extern const VariationalSet variational_set;
-}
-namespace isa_v4 {
-extern const VariationalSet variational_set;
-}
-#endif
-
-namespace {
-
-const VariationalSet& variational_kernels() {
-  switch (selected_isa()) {
-#if defined(__x86_64__)
-    case Isa::v4:
-      return isa_v4::variational_set;
-    case Isa::v3:
-      return isa_v3::variational_set;
-#endif
-    default:
-      return isa_baseline::variational_set;
-  }
-}
-
-}  // namespace
+HAMELIN_SELECT_KERNELS(VariationalSet, variational_set)
 
 }  // namespace kernel
 
@@ -49,18 +21,15 @@ namespace {
 // From this tolerance up the square of the first correction may vouch for it: below, energy would drift (measured).
 constexpr double loosest_confirmed = 1e-10;
 
-const double* data_or_null(const VectorXd& x) {
-  return x.size() > 0 ? x.data() : nullptr;
-}
-
 }  // namespace
 
 Variational::Variational(const Model& model, const Options& options)
     : Integrator("hamel-variational", model, options),
-      kernels_(&kernel::variational_kernels()),
+      kernels_(&kernel::selected_variational_set()),
       memory_(dynamics::kernel::with_group(
           model, *kernels_, [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
   for (auto* x : {&delta_, &p_, &p_next_, &correction_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
+  spins_.reserve(most_spins);
   gradient_at_ = VectorXd::Constant(model.dof(), std::nan(""));
 }
 

@@ -58,6 +58,9 @@ struct StepReport {
   double held_work_J = 0.0;   ///< by channel (d)
 };
 
+/// What two parts of a step did, the second after the first.
+[[nodiscard]] StepReport together(const StepReport& a, const StepReport& b);
+
 struct Energy {
   double kinetic_J = 0.0, potential_J = 0.0;
   [[nodiscard]] double total() const noexcept { return kinetic_J + potential_J; }

@@ -7,6 +7,14 @@
 
 namespace hamelin::integration {
 
+/// A channel as the kernels take it: null where there is none.
+inline const double* data_or_null(const Eigen::VectorXd& x) noexcept {
+  return x.size() > 0 ? x.data() : nullptr;
+}
+
+/// Room for as many terms is made beforehand, so that steps do not allocate; more are taken too.
+inline constexpr std::size_t most_spins = 256;
+
 /// Gyroscopic terms in the frames of the sweeps: points in joint-aligned frames, w in the root's axes.
 inline void to_spins(const model::Model& model, std::span<const dynamics::GyroscopicTerm> terms,
                      std::vector<dynamics::kernel::Spin>& spins) {
