@@ -388,6 +388,11 @@ struct PlanarParallel : Planar<S, false> {
             k.ay * l.mass + k.dw * x.hx - k.ww * x.hy};
   }
 
+  /// u − m·f, what comes last in a sweep outwards last.
+  HAMELIN_INLINE static S less_pair(S u, const Motion& m, const Force& f) noexcept {
+    return ((u - m.x * f.x) - m.y * f.y) - m.w * f.t;
+  }
+
   HAMELIN_INLINE static S to_child_axis(const Link&, const Placement&, S w) noexcept { return w; }
   HAMELIN_INLINE static Force spin_force(S w, const Placement& x, const geometry::Vec3<double>& point,
                                          const Motion& m) noexcept {

@@ -109,7 +109,8 @@ void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& 
 }
 
 /// One link of the articulated-body recursion: P comes in as what the links outboard hand over and leaves as what this
-/// one hands to its parent. inv_d[i] = 1/d with d = A·P A + armature, column[i] = P A/d.
+/// one hands to its parent. inv_d[i] = 1/d with d = A·P A + armature, column[i] = P A/d: in the link's frame, or in
+/// parallel frames about the parent's origin, where it is needed without waiting for anything to be shifted.
 template <class Space>
 HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                                typename Space::Inertia& P) noexcept {
@@ -119,7 +120,9 @@ HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>
   if constexpr (Space::mixed) d += l.armature;
   link.inv_d = S(1.0) / d;
   link.column = Space::scaled(Space::column(l, P), link.inv_d);
-  if (!root) Space::carry(l, link.x, P, link.column, link.inv_d);
+  if (root) return;
+  Space::carry(l, link.x, P, link.column, link.inv_d);
+  if constexpr (Space::root_axes) link.column = Space::to_parent(l, link.x, link.column);
 }
 
 /// One link of the solve: bias comes in as what outboard links hand over. u[i] = (y − A·bias)/d.
@@ -128,7 +131,11 @@ HAMELIN_INLINE void eliminate(const typename Space::Link& l, LinkScratch<Space>&
                               typename Space::Scalar y, typename Space::Force& bias) noexcept {
   const auto left = y - Space::along_axis(l, bias);
   link.u = left * link.inv_d;
-  if (!root) bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, left)));
+  if (root) return;
+  if constexpr (Space::root_axes)
+    bias = Space::sum(Space::to_parent(l, link.x, bias), Space::scaled(link.column, left));
+  else
+    bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, left)));
 }
 
 /// Outwards after the elimination: x[i], and the twists that the x are rates of, on their way: visit(i, X_i) sees
@@ -142,7 +149,10 @@ HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch
     const auto& l = links[i];
     const auto& link = k[i];
     auto m = i == 0 ? twist : Space::to_child(l, link.x, twist);
-    x[i] = link.u - Space::pair(m, link.column);
+    if constexpr (Space::root_axes)
+      x[i] = Space::less_pair(link.u, twist, link.column);
+    else
+      x[i] = link.u - Space::pair(m, link.column);
     visit(i, m);
     Space::add_along_axis(l, m, x[i]);
     twist = m;
