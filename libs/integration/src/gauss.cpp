@@ -77,7 +77,7 @@ constexpr int max_rejections = 60;
 // sweep more for structure's sake.
 constexpr double to_rounding = 1e-2;
 // How far a step may follow the last one.
-constexpr double most = 1.5, least = 0.5;
+constexpr double most = 4.0, least = 0.5;
 // Of the step error that is allowed, what the iteration may leave; and how much of the estimate, which is a cautious
 // one, the step may use. Both found by work and error on falling arms.
 constexpr double iteration_share = 1e-3, estimate_share = 3.0;

@@ -130,13 +130,14 @@ class Gauss {
       const double now = h * largest(change);
       ++out.sweeps;
       if (sweep == 0 && guessed) out.starter_error = now;
-      // a repeated first slope says nothing of the contraction, an extrapolated one is trusted with a tenth
-      const double contraction = sweep > 0 ? now / before : guessed ? 0.1 : 1.0;
+      // An extrapolated guess is trusted to contract by a tenth at first. After a repeated first slope each sweep mends
+      // one more order in h, at a pace that says nothing of the next.
+      const double contraction = !guessed ? 1.0 : sweep > 0 ? now / before : 0.1;
       out.residual = now * (contraction < 1.0 ? contraction : 1.0);
       // where sweeps only stir what rounding leaves, there is no more to gain
-      const bool stirring = sweep > 1 && contraction > 0.3 && now <= 1e4 * rounding();
+      const bool stirring = sweep > 1 && now > 0.3 * before && now <= 1e4 * rounding();
       if (out.residual <= call_.tolerance || stirring || (sweep > 1 && now <= rounding())) break;
-      const bool hopeless = !(now < 1e3) || (sweep > 2 && contraction > 1.0);
+      const bool hopeless = !(now < 1e3) || (sweep > 2 && now > before);
       if (hopeless || sweep + 1 == call_.max_sweeps) return out;
       before = now;
     }

@@ -21,7 +21,7 @@ decltype(auto) with_group(const model::Model& model, const Groups<Entry>& groups
 /// source under hamelin_isa_sources defines. To be written in the namespace around theirs.
 #if defined(__x86_64__)
 #define HAMELIN_SELECT_KERNELS(Set, name)                                                      \
-  namespace isa_baseline {                                                                     \
+  inline namespace isa_baseline {                                                              \
   extern const Set name;                                                                       \
   }                                                                                            \
   namespace isa_v3 {                                                                           \
@@ -36,7 +36,7 @@ decltype(auto) with_group(const model::Model& model, const Groups<Entry>& groups
   }
 #else
 #define HAMELIN_SELECT_KERNELS(Set, name) \
-  namespace isa_baseline {                \
+  inline namespace isa_baseline {         \
   extern const Set name;                  \
   }                                       \
   static const Set& selected_##name() {   \
