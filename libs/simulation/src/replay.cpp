@@ -4,12 +4,12 @@
 
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <cstdint>
+#include <cstdlib>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/isa.hpp"
 #include "hamelin/core/file.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/planning/plugin_host.hpp"

@@ -35,8 +35,8 @@ struct FreeMotion {
   double step_s = 1e-3, duration_s = 10.0;
   std::string integrator = "hamel-variational";
   integration::Options options;
-  Eigen::VectorXd damping;         ///< empty: none
-  Eigen::VectorXd coulomb;         ///< dry friction, see integration::Channels; empty: none
+  Eigen::VectorXd damping;  ///< empty: none
+  Eigen::VectorXd coulomb;  ///< dry friction, see integration::Channels; empty: none
   double coulomb_speed = scene::default_friction_speed;
   Json config = Json::object();    ///< for the log's header: a scene's form, see free_motion()
   std::vector<log::Input> inputs;  ///< files it was read from
