@@ -164,9 +164,6 @@ struct Planar {
   }
   HAMELIN_INLINE static void add(Moment& k, const Moment& j) noexcept { k = {k.m + j.m, k.x + j.x, k.y + j.y}; }
 
-  HAMELIN_INLINE static Motion ad(const Motion& a, const Motion& b) noexcept {
-    return {S(0), a.y * b.w - a.w * b.y, a.w * b.x - a.x * b.w};
-  }
   HAMELIN_INLINE static Force ad_T(const Motion& a, const Force& f) noexcept {
     return {a.y * f.x - a.x * f.y, a.w * f.y, -(a.w * f.x)};
   }

@@ -289,10 +289,6 @@ struct Spatial {
   }
   HAMELIN_INLINE static void add(Moment& k, const Moment& j) noexcept { k = {k.m + j.m, k.h + j.h}; }
 
-  /// ad(x) y, the bracket [x, y].
-  HAMELIN_INLINE static Motion ad(const Motion& x, const Motion& y) noexcept {
-    return {cross(x.w, y.w), cross(x.v, y.w) + cross(x.w, y.v)};
-  }
   /// adᵀ(x) f.
   HAMELIN_INLINE static Force ad_T(const Motion& x, const Force& f) noexcept {
     return {cross(f.t, x.w) + cross(f.f, x.v), cross(f.f, x.w)};
