@@ -39,7 +39,7 @@ std::span<const double> composition_weights(int order) {
 }
 
 Composition::Composition(const Model& model, const Options& options)
-    : Integrator("composition", model, options),
+    : Momentum("composition", model, options),
       order_(options.order == 0 ? 4 : options.order),
       weights_(composition_weights(order_)),
       step_(model, undivided(options)),

@@ -1,6 +1,7 @@
 #pragma once
 #include <span>
 
+#include "momentum.hpp"
 #include "variational.hpp"
 
 namespace hamelin::integration {
@@ -10,15 +11,12 @@ namespace hamelin::integration {
 
 /// Symmetric compositions of the variational step: Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h}. As φ is symmetric and symplectic,
 /// so is Φ. Some γ_i are negative: such a sub-step goes back in time, its damping feeds energy in and is booked so.
-class Composition final : public Integrator {
+class Composition final : public Momentum {
  public:
   Composition(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override { return step_.criterion(); }
   [[nodiscard]] int order() const override { return order_; }
   [[nodiscard]] std::string mode() const override { return step_.mode(); }
-  void velocity(const State& state, VectorXd& v) override { step_.velocity(state, v); }
-  void kick(State& state, const VectorXd& dp) override { step_.kick(state, dp); }
-  void set_velocity(State& state, const VectorXd& v) override { step_.set_velocity(state, v); }
 
  private:
   void begin(State& state, const VectorXd& v0) override;

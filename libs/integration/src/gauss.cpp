@@ -85,7 +85,7 @@ constexpr double iteration_share = 1e-3, estimate_share = 3.0;
 }  // namespace
 
 GaussLegendre::GaussLegendre(const Model& model, const Options& options)
-    : Integrator("gauss", model, options),
+    : Momentum("gauss", model, options),
       tableau_(kernel::tableau(static_cast<std::size_t>((options.order == 0 ? default_order : options.order) / 2))),
       kernels_(&kernel::selected_gauss_set()),
       memory_(dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
@@ -110,15 +110,6 @@ void GaussLegendre::begin(State& state, const VectorXd& v0) {
   state.step_previous = 0.0;
   set_velocity(state, v0);
   if (adaptive()) ahead_ = state;
-}
-
-void GaussLegendre::velocity(const State& state, VectorXd& v) {
-  dynamics::solve_mass(model_, ws_, state.q, state.p, v);
-}
-
-void GaussLegendre::set_velocity(State& state, const VectorXd& v) {
-  dynamics::momentum(model_, ws_, state.q, v, state.p);
-  state.v = v;
 }
 
 kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& channels, double h, double tolerance,

@@ -1,8 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "hamelin/integration/integrator.hpp"
 #include "kernel/gauss.hpp"
+#include "momentum.hpp"
 
 namespace hamelin::integration {
 
@@ -10,15 +10,12 @@ namespace hamelin::integration {
 /// degree, symplectic and symmetric. A stage is v = M⁻¹p, ṗ_i = λ_i·ad(X_i)A_i − ∂_iU + F_i (SPEC §3); all stages of a
 /// sweep go through SIMD lanes together (kernel/gauss.hpp). Fixed steps iterated to rounding keep the structure; with
 /// rtol or atol the step follows an error estimate made of what the first sweep changed.
-class GaussLegendre final : public Integrator {
+class GaussLegendre final : public Momentum {
  public:
   GaussLegendre(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return static_cast<int>(2 * tableau_.stages); }
   [[nodiscard]] std::string mode() const override;
-  void velocity(const State& state, VectorXd& v) override;
-  void kick(State& state, const VectorXd& dp) override { state.p += dp; }
-  void set_velocity(State& state, const VectorXd& v) override;
 
  private:
   void begin(State& state, const VectorXd& v0) override;

@@ -17,7 +17,7 @@ constexpr int max_newton_updates = 30;
 
 }  // namespace
 
-LieExact::LieExact(const Model& model, const Options& options) : Integrator("lie-exact", model, options) {
+LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
@@ -35,16 +35,6 @@ decltype(auto) LieExact::with_links(F&& f) {
 
 std::string LieExact::criterion() const {
   return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
-}
-
-void LieExact::velocity(const State& state, VectorXd& v) {
-  dynamics::solve_mass(model_, ws_, state.q, state.p, v);
-}
-
-void LieExact::set_velocity(State& state, const VectorXd& v) {
-  dynamics::momentum(model_, ws_, state.q, v, state.p);
-  state.v = v;
-  state.delta_count = -1;  // the guess is h v
 }
 
 bool LieExact::evaluate(const State& state, const Channels& channels, double h) {

@@ -1,26 +1,22 @@
 #pragma once
 #include <variant>
 
-#include "hamelin/integration/integrator.hpp"
 #include "kernel/lie_exact.hpp"
+#include "momentum.hpp"
 
 namespace hamelin::integration {
 
 /// After Lee, Liu, Park, Srinivasa, A Linear-Time Variational Integrator for Multibody Systems (2016): the discrete
 /// Lagrangian takes each link's body twist from the logarithm of its displacement in the step, and the trapezoidal
 /// potential. Solved for Δ by an exact O(n) Newton step, or by their RIQN, Δ ← Δ − h M(θ^k)⁻¹R.
-class LieExact final : public Integrator {
+class LieExact final : public Momentum {
  public:
   LieExact(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 2; }
   [[nodiscard]] std::string mode() const override { return options_.tolerance <= 1e-12 ? "structure" : "accurate"; }
-  void velocity(const State& state, VectorXd& v) override;
-  void kick(State& state, const VectorXd& dp) override { state.p += dp; }
-  void set_velocity(State& state, const VectorXd& v) override;
 
  private:
-  void begin(State& state, const VectorXd& v0) override { set_velocity(state, v0); }
   StepReport attempt(State& state, const Channels& channels, double h) override;
   bool evaluate(const State& state, const Channels& channels, double h);
   /// False where no new factors could be made.

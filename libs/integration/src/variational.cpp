@@ -24,7 +24,7 @@ constexpr double loosest_confirmed = 1e-10;
 }  // namespace
 
 Variational::Variational(const Model& model, const Options& options)
-    : Integrator("hamel-variational", model, options),
+    : Momentum("hamel-variational", model, options),
       kernels_(&kernel::selected_variational_set()),
       memory_(dynamics::kernel::with_group(
           model, *kernels_, [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
@@ -46,24 +46,6 @@ std::string Variational::criterion() const {
 
 std::string Variational::mode() const {
   return options_.solver == Solver::newton && options_.tolerance <= 1e-12 ? "structure" : "accurate";
-}
-
-void Variational::begin(State& state, const VectorXd& v0) {
-  set_velocity(state, v0);
-}
-
-void Variational::velocity(const State& state, VectorXd& v) {
-  dynamics::solve_mass(model_, ws_, state.q, state.p, v);
-}
-
-void Variational::kick(State& state, const VectorXd& dp) {
-  state.p += dp;
-}
-
-void Variational::set_velocity(State& state, const VectorXd& v) {
-  dynamics::momentum(model_, ws_, state.q, v, state.p);
-  state.v = v;
-  state.delta_count = -1;  // the guess is h v
 }
 
 // The end of one step is the start of the next.

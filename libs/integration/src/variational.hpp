@@ -1,25 +1,21 @@
 #pragma once
 #include <vector>
 
-#include "hamelin/integration/integrator.hpp"
 #include "kernel/variational.hpp"
+#include "momentum.hpp"
 
 namespace hamelin::integration {
 
 /// hamel-variational: the exact variation of L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] (SPEC §3), solved for Δ by
 /// the exact O(n) Newton step (kernel/variational.hpp) or by the paper's feedback (16).
-class Variational final : public Integrator {
+class Variational final : public Momentum {
  public:
   Variational(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 2; }
   [[nodiscard]] std::string mode() const override;
-  void velocity(const State& state, VectorXd& v) override;
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override;
 
  private:
-  void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// ∂U(q), kept from the last call where that was for the same q.
   const VectorXd& gradient(const VectorXd& q);

@@ -143,16 +143,19 @@ class Variational {
       Space::add_along_axis(links_[i], twist, rate_[i]);
       k_[i].motion = twist;
     }
-    for (std::size_t i = 0; i < n_; ++i) force_[i] = call_.held != nullptr ? call_.held[i] : 0.0;
-    if (call_.damping != nullptr)
-      for (std::size_t i = 0; i < n_; ++i) force_[i] -= call_.damping[i] * rate_[i];
-    if (call_.coulomb != nullptr)
-      for (std::size_t i = 0; i < n_; ++i)
-        force_[i] -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
+    for (std::size_t i = 0; i < n_; ++i) force_[i] = joint_force(i);
     if (call_.spin_count > 0) {
       dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, call_.spins, call_.spin_count, sigma_);
       for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
     }
+  }
+
+  /// Held torque, damping and dry friction of a joint at its rate.
+  HAMELIN_INLINE double joint_force(std::size_t i) const noexcept {
+    double force = call_.held != nullptr ? call_.held[i] : 0.0;
+    if (call_.damping != nullptr) force -= call_.damping[i] * rate_[i];
+    if (call_.coulomb != nullptr) force -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
+    return force;
   }
 
   template <bool Correct>
@@ -163,7 +166,7 @@ class Variational {
     for (std::size_t i = n_; i-- > 0;) {
       const Link& l = links_[i];
       const auto& x = k_[i].x;
-      lambda = Space::sum(lambda, Space::momentum(l, k_[i].x, k_[i].motion));
+      lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));
       read(i, lambda);
       if (i > 0) lambda = Space::to_parent(l, x, lambda);
       if constexpr (Correct) {
@@ -202,7 +205,7 @@ class Variational {
       const Link& l = links_[i];
       auto& f = f_[i];
       const auto& x = k_[i].x;
-      lambda = Space::sum(lambda, Space::momentum(l, k_[i].x, k_[i].motion));
+      lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));
       read(i, lambda);
       Space::add_rigid(l, x, P);
       const Force z = f.z = Space::scaled(Space::turned_axis(l, lambda), half_);
@@ -289,9 +292,7 @@ class Variational {
       Space::add_along_axis(l, step, sigma_[i]);
       k_[i].force = Space::momentum(l, k_[i].x, step);
       rate_[i] = call_.delta[i] * inv_h;
-      force_[i] = call_.held != nullptr ? call_.held[i] : 0.0;
-      if (call_.damping != nullptr) force_[i] -= call_.damping[i] * rate_[i];
-      if (call_.coulomb != nullptr) force_[i] -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
+      force_[i] = joint_force(i);
     }
     auto lambda = Space::zero_force();
     for (std::size_t i = n_; i-- > 0;) {
