@@ -65,7 +65,7 @@ int run(int argc, char** argv) {
     poses[i].clearance = environment.clearance(poses[i].centers, radii, 0.0, 1.0, View::planner);
   }
   fmt::print("{}: {} spheres, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n", argv[1],
-             radii.size(), environment.map_field().boxes().size(), influence, build_ms, self.pairs().size());
+             radii.size(), environment.map_field().boxes().boxes().size(), influence, build_ms, self.pairs().size());
   fmt::print("{:<22} {:>8} {:>15} {:>17} {:>22} {:>21}\n", "clearance to obstacles", "poses", "contacts a pose",
              "obstacles us/pose", "obstacles ns/sphere", "itself us/pose");
   Environment::Scratch scratch(environment, radii.size());

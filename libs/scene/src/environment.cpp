@@ -6,39 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "hamelin/core/error.hpp"
 
 namespace hamelin::scene {
-
-namespace {
-
-constexpr double cone_cosine = 0.86602540378443865;  // 30°
-constexpr double far_table_edge_m = 0.05;
-// Tables are exact up to influence + this: no sphere of an arm is much larger.
-constexpr double far_table_radius_m = 0.2;
-
-BoxField field_of(const std::vector<Cell>& cells, double resolution, const Eigen::Vector3d& origin) {
-  std::vector<Box> boxes;
-  for (const VoxelBox& box : merge(cells)) boxes.push_back(to_metres(box, resolution));
-  return BoxField(std::move(boxes), origin);
-}
-
-}  // namespace
-
-std::string_view to_string(UnknownPolicy policy) noexcept {
-  switch (policy) {
-    case UnknownPolicy::free:
-      return "free";
-    case UnknownPolicy::slow:
-      return "slow";
-    case UnknownPolicy::block:
-      return "block";
-  }
-  return "unknown";
-}
 
 Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
                          double reach, double influence)
@@ -46,44 +18,14 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   for (const Obstacle& obstacle : obstacles_) check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
   summary_.obstacles = obstacles_.size();
   if (!map) return;
-  if (!(reach >= 0.0 && influence >= 0.0 && std::isfinite(reach) && std::isfinite(influence)))
-    throw Error(ErrorCode::usage, fmt::format("{}: reach {} m and influence {} m, expected finite numbers from 0 up",
-                                              map->file.string(), reach, influence));
-  MapData data = read_map(map->file, {map->scale, map->occupancy_threshold});
+  const MapRegion region = read_region(*map, base, reach, influence);
+  static_cast<MapSummary&>(summary_) = region.summary;
   map_pose_ = map->pose;
   map_pose_inverse_ = map->pose.inverse();
-  const Eigen::Vector3d center = map_pose_inverse_ * base.p();
-  const Ball region{center, reach + influence}, reachable{center, reach};
-
-  const std::vector<Cell> occupied = crop(data.occupied, data.resolution, region);
-  map_ = field_of(occupied, data.resolution, center);
-  const double exact_up_to = influence + far_table_radius_m;
-  far_from_map_ = FarTable(map_, reachable, far_table_edge_m, exact_up_to);
-
-  summary_.has_map = true;
-  summary_.map_file = data.file;
-  summary_.map_sha256 = data.sha256;
-  summary_.resolution_m = data.resolution;
-  summary_.nodes = data.node_count;
-  summary_.leaves = data.occupied.size();
-  summary_.leaves_cropped = occupied.size();
-  summary_.boxes = map_.boxes().size();
-  summary_.unknown = map->unknown;
-  summary_.warnings = std::move(data.warnings);
-  const double ball_volume = 4.0 / 3.0 * std::numbers::pi * reach * reach * reach;
-  if (ball_volume > 0.0)
-    summary_.unknown_share =
-        std::clamp(volume_inside(data.unknown, data.resolution, reachable) / ball_volume, 0.0, 1.0);
-  if (map->unknown != UnknownPolicy::free) {
-    std::vector<Cell> unknown = crop(data.unknown, data.resolution, region);
-    if (map->keep_out_radius_m > 0.0) unknown = cut_out(unknown, data.resolution, {center, map->keep_out_radius_m});
-    unknown_ = field_of(unknown, data.resolution, center);
-    far_from_unknown_ = FarTable(unknown_, reachable, far_table_edge_m, exact_up_to);
-    summary_.unknown_boxes = unknown_.boxes().size();
-  }
-  if (!data.occupied.empty() && occupied.empty())
-    summary_.warnings.push_back(fmt::format(
-        "no occupied leaf within {:.3g} m of the base: are base, map pose and scale right?", region.radius));
+  map_ = MapField(region.occupied, region.resolution_m, region.reachable, influence);
+  unknown_ = MapField(region.unknown, region.resolution_m, region.reachable, influence);
+  summary_.boxes = map_.boxes().boxes().size();
+  summary_.unknown_boxes = unknown_.boxes().boxes().size();
 }
 
 Environment::Scratch::Scratch(const Environment& environment, std::size_t spheres)
@@ -147,20 +89,16 @@ std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::
     found.push_back({static_cast<int>(sphere), obstacle, center_distance - radii[sphere],
                      centers[sphere] - radii[sphere] * direction, point, direction, velocity});
   };
-  const auto add_boxes = [&](const BoxField& field, const FarTable& far, BoxField::Scratch& room, int id,
-                             std::size_t sphere) {
+  const auto add_boxes = [&](const MapField& field, MapField::Scratch& room, int id, std::size_t sphere) {
     if (field.empty()) return;
-    const Eigen::Vector3d local = map_pose_inverse_ * centers[sphere];
-    if (far.beyond(local, influence + radii[sphere])) return;
-    const std::size_t count = field.several(local, influence + radii[sphere], cone_cosine, room, hits);
+    const std::size_t count = field.several(map_pose_inverse_ * centers[sphere], influence + radii[sphere], room, hits);
     for (std::size_t i = 0; i < count; ++i)
       add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction,
           Eigen::Vector3d::Zero());
   };
   for (std::size_t sphere = 0; view != View::hidden && sphere < centers.size(); ++sphere) {
-    add_boxes(map_, far_from_map_, scratch.map_, Contact::map, sphere);
-    if (summary_.unknown == UnknownPolicy::block)
-      add_boxes(unknown_, far_from_unknown_, scratch.unknown_, Contact::unknown, sphere);
+    add_boxes(map_, scratch.map_, Contact::map, sphere);
+    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, sphere);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     if (!shown(k, time_s, view, seen)) continue;
@@ -197,20 +135,20 @@ double Environment::clearance(std::span<const Eigen::Vector3d> centers, std::spa
                               double limit, View view, std::span<const std::uint8_t> seen) const {
   double smallest = limit;
   BoxHit hit;
-  const auto consider = [&](const BoxField& field, const FarTable& far) {
+  const auto consider = [&](const MapField& field) {
     if (field.empty() || view == View::hidden) return;
     std::int32_t hint = -1;
     for (std::size_t i = 0; i < centers.size(); ++i) {
       // Beyond contact the search must not end at a sphere's radius: a deeper one may follow.
       const Eigen::Vector3d local = map_pose_inverse_ * centers[i];
       const double near = std::max(0.0, smallest + radii[i]);
-      if (far.beyond(local, near) || !field.nearest(local, near, hit, hint)) continue;
+      if (!field.nearest(local, near, hit, hint)) continue;
       hint = hit.box;
       smallest = std::min(smallest, hit.distance - radii[i]);
     }
   };
-  consider(map_, far_from_map_);
-  if (summary_.unknown == UnknownPolicy::block) consider(unknown_, far_from_unknown_);
+  consider(map_);
+  if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
     if (shown(k, time_s, view, seen)) smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
   return smallest;

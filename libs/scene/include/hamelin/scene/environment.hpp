@@ -10,27 +10,11 @@
 #include <vector>
 
 #include "hamelin/geometry/se3.hpp"
-#include "hamelin/scene/distance.hpp"
-#include "hamelin/scene/map_file.hpp"
+#include "hamelin/scene/map_field.hpp"
+#include "hamelin/scene/map_region.hpp"
 #include "hamelin/scene/obstacles.hpp"
 
 namespace hamelin::scene {
-
-/// What unknown space means: as if free; free, but to be crossed slowly; an obstacle.
-enum class UnknownPolicy : std::int32_t { free, slow, block };
-
-[[nodiscard]] std::string_view to_string(UnknownPolicy policy) noexcept;
-
-/// A map as a scene names it.
-struct MapSpec {
-  std::filesystem::path file;
-  geometry::SE3 pose;                              ///< of the map's frame in the world
-  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
-  std::optional<double> scale;                     ///< metres per unit of the file
-  double occupancy_threshold = 0.5;
-  UnknownPolicy unknown = UnknownPolicy::free;
-  double keep_out_radius_m = 0.0;  ///< unknown voxels touched by this ball around the base count as free
-};
 
 /// A near obstacle point of one sphere of the arm; world frame. The fields are those of hamelin_contact.
 struct Contact {
@@ -53,23 +37,13 @@ enum class View : std::int32_t { planner, hidden, judge };
 /// Scratch of its own.
 class Environment {
  public:
-  /// Nearest points of the map (and of blocking unknown space) per sphere; directions within 30° of a nearer one's are
-  /// the same obstacle.
-  static constexpr std::size_t points_per_sphere = 3;
+  /// Nearest points of the map (and of blocking unknown space) per sphere.
+  static constexpr std::size_t points_per_sphere = MapField::points_max;
 
-  struct Summary {
-    bool has_map = false;
-    std::string map_file, map_sha256;
-    double resolution_m = 0.0;
-    std::size_t nodes = 0;
-    std::size_t leaves = 0;          ///< occupied leaves in the file
-    std::size_t leaves_cropped = 0;  ///< of these within reach + influence
-    std::size_t boxes = 0;           ///< after merging
-    std::size_t unknown_boxes = 0;   ///< zero where unknown space is free
-    double unknown_share = 0.0;      ///< of the ball of radius reach around the base
-    UnknownPolicy unknown = UnknownPolicy::free;
+  struct Summary : MapSummary {
+    std::size_t boxes = 0;          ///< after merging
+    std::size_t unknown_boxes = 0;  ///< zero where unknown space is free
     std::size_t obstacles = 0;
-    std::vector<std::string> warnings;
   };
 
   /// Nothing to hit.
@@ -88,7 +62,7 @@ class Environment {
 
    private:
     friend class Environment;
-    BoxField::Scratch map_, unknown_;
+    MapField::Scratch map_, unknown_;
     std::vector<Contact> found_;
     std::vector<std::size_t> order_;
   };
@@ -124,7 +98,7 @@ class Environment {
   /// Whether there is anything at all to hit.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
-  [[nodiscard]] const BoxField& map_field() const noexcept { return map_; }
+  [[nodiscard]] const MapField& map_field() const noexcept { return map_; }
   /// Pose of the map's frame, in which map_field() is, in the world.
   [[nodiscard]] const geometry::SE3& map_pose() const noexcept { return map_pose_; }
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
@@ -135,8 +109,7 @@ class Environment {
                                     std::span<const double> radii, double time_s, double limit) const;
 
   geometry::SE3 map_pose_, map_pose_inverse_;
-  BoxField map_, unknown_;  ///< in the map's frame [m]
-  FarTable far_from_map_, far_from_unknown_;
+  MapField map_, unknown_;  ///< in the map's frame [m]
   std::vector<Obstacle> obstacles_;
   Summary summary_;
 };
