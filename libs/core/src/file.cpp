@@ -19,6 +19,9 @@ std::string read_file(const std::filesystem::path& file) {
   std::error_code ec;
   if (std::filesystem::is_directory(file, ec))
     throw Error(ErrorCode::io, fmt::format("{}: is a directory, want a file", file.string()));
+  // A scene may name /dev/zero as its map, which has no end.
+  if (std::filesystem::is_character_file(file, ec) || std::filesystem::is_block_file(file, ec))
+    throw Error(ErrorCode::io, fmt::format("{}: is a device, want a file", file.string()));
   std::ifstream in(file, std::ios::binary);
   if (!in) throw Error(ErrorCode::io, fmt::format("{}: cannot be opened: {}", file.string(), std::strerror(errno)));
   std::ostringstream text;

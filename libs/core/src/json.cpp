@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
-#include <set>
+#include <utility>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
@@ -23,32 +23,84 @@ std::string position_of(std::string_view text, std::size_t byte) {
   return fmt::format("line {}, column {}", line, std::max<std::size_t>(column, 1));
 }
 
+// dump(), copying and schemas recurse into a document.
+constexpr std::size_t nesting_max = 100;
+
+// Builds a document as it is read. nlohmann's own builder keeps the last of two equal keys without a word (a typo in a
+// scene must not vanish like that) and takes a time that grows with the square of a list or of an object.
+class Builder final : public nlohmann::json_sax<Json> {
+ public:
+  Builder(std::string_view text, const std::string& where) : text_(text), where_(where) {}
+  Json take() { return std::move(document_); }
+
+  bool null() override { return put(nullptr); }
+  bool boolean(bool value) override { return put(value); }
+  bool number_integer(Json::number_integer_t value) override { return put(value); }
+  bool number_unsigned(Json::number_unsigned_t value) override { return put(value); }
+  bool number_float(Json::number_float_t value, const std::string&) override { return put(value); }
+  bool string(std::string& value) override { return put(std::move(value)); }
+  bool binary(Json::binary_t&) override { return false; }
+  bool start_array(std::size_t) override { return open(Json::array()); }
+  bool end_array() override { return close(); }
+  bool start_object(std::size_t) override { return open(Json::object()); }
+  bool key(std::string& value) override {
+    members().emplace_back(std::move(value), nullptr);
+    return true;
+  }
+  bool end_object() override {
+    std::vector<const std::string*> keys;
+    for (const auto& member : members()) keys.push_back(&member.first);
+    std::sort(keys.begin(), keys.end(), [](const auto* a, const auto* b) { return *a < *b; });
+    const auto doubled =
+        std::adjacent_find(keys.begin(), keys.end(), [](const auto* a, const auto* b) { return *a == *b; });
+    if (doubled != keys.end())
+      throw Error(ErrorCode::parse, fmt::format("{}: key '{}' is given twice", where_, **doubled));
+    return close();
+  }
+  bool parse_error(std::size_t byte, const std::string&, const Json::exception& e) override {
+    std::string_view reason = e.what();  // opens with the exception's name in brackets
+    constexpr int number_out_of_range = 406;
+    if (e.id == number_out_of_range)
+      throw Error(ErrorCode::parse, fmt::format("{}: not JSON: {}", where_, reason.substr(reason.find("] ") + 2)));
+    if (const auto at = reason.find("syntax error"); at != std::string_view::npos) reason.remove_prefix(at);
+    throw Error(ErrorCode::parse, fmt::format("{}: {}: not JSON: {}", where_, position_of(text_, byte), reason));
+  }
+
+ private:
+  // The object being read, as the list of members that it is.
+  Json::object_t::Container& members() { return open_.back()->get_ref<Json::object_t&>(); }
+  Json& place(Json&& value) {
+    if (open_.empty()) return document_ = std::move(value);
+    if (open_.back()->is_object()) return members().back().second = std::move(value);
+    return open_.back()->get_ref<Json::array_t&>().emplace_back(std::move(value));
+  }
+  bool put(Json&& value) {
+    place(std::move(value));
+    return true;
+  }
+  bool open(Json&& value) {
+    if (open_.size() == nesting_max)
+      throw Error(ErrorCode::parse, fmt::format("{}: lists and objects nest deeper than {}", where_, nesting_max));
+    open_.push_back(&place(std::move(value)));
+    return true;
+  }
+  bool close() {
+    open_.pop_back();
+    return true;
+  }
+
+  std::string_view text_;
+  const std::string& where_;
+  Json document_;
+  std::vector<Json*> open_;  // what is not closed yet; a parent does not grow while its child is open
+};
+
 }  // namespace
 
 Json parse_json(std::string_view text, const std::string& where) {
-  // nlohmann keeps the last of two equal keys without a word; a typo in a scene must not vanish like that.
-  std::vector<std::set<std::string>> keys;
-  std::string doubled;
-  const auto watch = [&](int, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second && doubled.empty())
-      doubled = value.get<std::string>();
-    return true;
-  };
-  try {
-    Json document = Json::parse(text, watch);
-    if (!doubled.empty()) throw Error(ErrorCode::parse, fmt::format("{}: key '{}' is given twice", where, doubled));
-    return document;
-  } catch (const nlohmann::json::parse_error& e) {
-    std::string reason = e.what();
-    if (const auto colon = reason.rfind("syntax error"); colon != std::string::npos) reason = reason.substr(colon);
-    std::replace(reason.begin(), reason.end(), '\n', ' ');
-    throw Error(ErrorCode::parse, fmt::format("{}: {}: not JSON: {}", where, position_of(text, e.byte), reason));
-  } catch (const nlohmann::json::out_of_range& e) {
-    const std::string_view reason = e.what();  // opens with the exception's name in brackets
-    throw Error(ErrorCode::parse, fmt::format("{}: not JSON: {}", where, reason.substr(reason.find("] ") + 2)));
-  }
+  Builder builder(text, where);
+  (void)Json::sax_parse(text, &builder);
+  return builder.take();
 }
 
 Json read_json(const std::filesystem::path& file) {
@@ -80,9 +132,12 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
+  constexpr std::size_t longest = 100;  // no one mistypes a longer one, and the time grows with the square
+  if (name.size() > longest) return {};
   std::string best;
   std::size_t fewest = 1 + std::max<std::size_t>(1, name.size() / 3);
   for (const auto& candidate : candidates) {
+    if (candidate.size() > longest) continue;
     const std::size_t edits = edits_between(name, candidate);
     // Names that share less than half of their letters are not alike, however short they are.
     if (edits >= fewest || 2 * edits >= std::max(name.size(), candidate.size())) continue;

@@ -1,5 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <mutex>
+
 #define VALIJSON_USE_EXCEPTIONS 1  // else it aborts on a bad schema
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -102,23 +107,63 @@ std::string violation(const nlohmann::json& schema, const nlohmann::json& docume
   return fmt::format("{}: {}", at, error.description);
 }
 
+// A copy with the first items only of each list.
+nlohmann::json beginning(const nlohmann::json& document, std::size_t items) {
+  if (!document.is_structured()) return document;
+  nlohmann::json out = document.is_array() ? nlohmann::json::array() : nlohmann::json::object();
+  if (document.is_array())
+    for (std::size_t i = 0; i < std::min(items, document.size()); ++i) out.push_back(beginning(document[i], items));
+  else
+    for (const auto& [key, value] : document.items()) out[key] = beginning(value, items);
+  return out;
+}
+
+std::size_t longest_list(const nlohmann::json& document) {
+  std::size_t longest = document.is_array() ? document.size() : 0;
+  if (document.is_structured())
+    for (const auto& part : document) longest = std::max(longest, longest_list(part));
+  return longest;
+}
+
+bool valid(const valijson::Schema& schema, const nlohmann::json& document, valijson::ValidationResults* results) {
+  valijson::Validator validator(valijson::Validator::kStrongTypes);
+  return validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), results);
+}
+
 }  // namespace
 
-void check_schema(const Json& document, const Json& schema, const std::string& where) {
-  const nlohmann::json plain_schema = nlohmann::json::parse(schema.dump());
-  const nlohmann::json plain = nlohmann::json::parse(document.dump());
-  valijson::Schema compiled;
+struct Schema::Compiled {
+  nlohmann::json text;
+  valijson::Schema schema;
+};
+
+Schema::Schema(const Json& schema, const std::string& where) {
+  const auto made = std::make_shared<Compiled>();
+  made->text = nlohmann::json::parse(schema.dump());
   valijson::SchemaParser parser(valijson::SchemaParser::kDraft7);
-  const valijson::adapters::NlohmannJsonAdapter schema_adapter(plain_schema);
   try {
-    parser.populateSchema(schema_adapter, compiled);
+    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(made->text), made->schema);
   } catch (const std::exception& e) {
     throw Error(ErrorCode::invalid, fmt::format("{}: its JSON Schema cannot be used: {}", where, e.what()));
   }
-  valijson::Validator validator(valijson::Validator::kStrongTypes);
+  compiled_ = made;
+}
+
+void Schema::check(const Json& document, const std::string& where) const {
+  const nlohmann::json plain = nlohmann::json::parse(document.dump());
+  if (valid(compiled_->schema, plain, nullptr)) return;
+  // Asked for its reasons valijson gathers all there are, each many times the size of what it is about. Of long lists
+  // the beginning that holds the first fault will do.
+  nlohmann::json part = plain;
+  const std::size_t longest = longest_list(plain);
+  for (std::size_t items = 1000; items < longest; items += items / 4) {
+    nlohmann::json begun = beginning(plain, items);
+    if (valid(compiled_->schema, begun, nullptr)) continue;
+    part = std::move(begun);
+    break;
+  }
   valijson::ValidationResults results;
-  const valijson::adapters::NlohmannJsonAdapter document_adapter(plain);
-  if (validator.validate(compiled, document_adapter, &results)) return;
+  (void)valid(compiled_->schema, part, &results);
   // The deepest place says most; the first of those, as written.
   valijson::ValidationResults::Error error, deepest;
   bool first = true;
@@ -126,7 +171,11 @@ void check_schema(const Json& document, const Json& schema, const std::string& w
     if (first || error.context.size() > deepest.context.size()) deepest = error;
     first = false;
   }
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, violation(plain_schema, plain, deepest)));
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, violation(compiled_->text, part, deepest)));
+}
+
+void check_schema(const Json& document, const Json& schema, const std::string& where) {
+  Schema(schema, where).check(document, where);
 }
 
 std::string_view schema_text(std::string_view name) {
@@ -134,9 +183,19 @@ std::string_view schema_text(std::string_view name) {
 }
 
 void check_shipped_schema(const Json& document, std::string_view schema_name, const std::string& where) {
-  const auto text = schema_text(schema_name);
-  if (text.empty()) throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", schema_name));
-  check_schema(document, Json::parse(text), where);
+  static std::mutex one_at_a_time;
+  static std::map<std::string, Schema, std::less<>> ready;
+  const auto schema = [&] {
+    const std::lock_guard lock(one_at_a_time);
+    auto at = ready.find(schema_name);
+    if (at == ready.end()) {
+      const auto text = schema_text(schema_name);
+      if (text.empty()) throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", schema_name));
+      at = ready.emplace(schema_name, Schema(Json::parse(text), where)).first;
+    }
+    return at->second;
+  }();
+  schema.check(document, where);
 }
 
 Json with_defaults(Json document, const Json& schema) {

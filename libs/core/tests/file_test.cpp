@@ -44,6 +44,10 @@ TEST_CASE("bytes come back as they were written, and nothing else is left in the
   CHECK(folder.files() == 2);
 }
 
+TEST_CASE("a device is refused: it may have no end", "[core][unit]") {
+  CHECK_THROWS_WITH(read_file("/dev/zero"), "/dev/zero: is a device, want a file");
+}
+
 TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit]") {
   const Folder folder;
   SECTION("where a folder stands in the way") {

@@ -1,6 +1,7 @@
 #include "hamelin/core/json.hpp"
 
 #include <catch2/catch.hpp>
+#include <iterator>
 
 #include "hamelin/core/error.hpp"
 
@@ -44,6 +45,39 @@ TEST_CASE("a key given twice is refused at any depth, equal keys of different ob
   CHECK_NOTHROW(parse_json(R"([{"a": {"a": 1}}, {"a": 2}])", "a.json"));
 }
 
+TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[core][unit]") {
+  const auto nested = [](std::size_t depth, std::size_t closed) {
+    return std::string(depth, '[') + std::string(closed, ']');
+  };
+  CHECK_NOTHROW(parse_json(nested(100, 100), "a.json"));
+  CHECK_THAT(refusal(ErrorCode::parse, [&] { (void)parse_json(nested(101, 101), "a.json"); }),
+             Catch::StartsWith("a.json: lists and objects nest deeper than 100"));
+  CHECK_THAT(refusal(ErrorCode::parse, [&] { (void)parse_json(nested(1000000, 0), "a.json"); }),
+             Catch::Contains("nest deeper"));
+}
+
+// With time that grows as the square of these, this test would not end.
+TEST_CASE("long lists of objects and objects of many keys are read", "[core][unit]") {
+  constexpr std::size_t count = 200000;
+  std::string list = "[{}", object = "{\"k\": 0";
+  for (std::size_t i = 1; i < count; ++i) {
+    list += ",{}";
+    object += ",\"k" + std::to_string(i) + "\":" + std::to_string(i);
+  }
+  CHECK(parse_json(list + "]", "a.json").size() == count);
+  const Json read = parse_json(object + "}", "a.json");
+  REQUIRE(read.size() == count);
+  CHECK(std::prev(read.end()).key() == "k199999");
+  CHECK_THAT(refusal(ErrorCode::parse, [&] { (void)parse_json(object + ",\"k7\":0}", "a.json"); }),
+             Catch::Contains("key 'k7' is given twice"));
+}
+
+TEST_CASE("numbers, words, texts and empty parts are read as they stand", "[core][unit]") {
+  const char* text = R"({"a":[1,-2,18446744073709551615,0.5,true,false,null,"x",[],{}],"b":{"c":{}}})";
+  CHECK(parse_json(text, "a.json").dump() == text);
+  CHECK(parse_json("7", "a.json") == 7);
+}
+
 TEST_CASE("keys keep the order in which they were written", "[core][unit]") {
   CHECK(parse_json(R"({"z": 1, "a": 2, "m": 3})", "").dump() == R"({"z":1,"a":2,"m":3})");
 }
@@ -72,4 +106,5 @@ TEST_CASE("no name is near that shares less than half of its letters", "[core][u
   CHECK(nearest_name("q0", {"v0"}).empty());
   CHECK(nearest_name("a", {"ab"}).empty());
   CHECK(nearest_name("rn", {"run"}) == "run");
+  CHECK(nearest_name(std::string(100000, 'x'), {"x", std::string(100000, 'x')}).empty());  // no one mistypes that
 }

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 
 #include "hamelin/core/error.hpp"
@@ -80,6 +82,28 @@ TEST_CASE("an unknown key is named with its hint where the schema speaks by refe
   })");
   CHECK(refusal(R"({"links": [{"mass_kg": 1}, {"mas_kg": 1}]})", referring) ==
         "a.json: /links/1: unknown key 'mas_kg', expected 'mass_kg'?");
+}
+
+TEST_CASE("the first fault of a long list is named, wherever it stands", "[core][unit]") {
+  const Json numbers = Json::parse(R"({"type": "array", "items": {"type": "number"}, "maxItems": 100000})");
+  for (const std::size_t at : {0U, 999U, 1000U, 4321U, 99999U}) {
+    CAPTURE(at);
+    Json list = std::vector<double>(100000, 0.5);
+    list[at] = "x";
+    list.back() = "y";
+    const std::string value = at == 99999 ? "y" : "x";
+    CHECK(refusal(list.dump(), numbers) ==
+          fmt::format("a.json: /{}: \"{}\" is not allowed, expected type number", at, value));
+  }
+  CHECK_THAT(refusal(Json(std::vector<double>(100001, 0.5)).dump(), numbers), Catch::Contains("items at most 100000"));
+}
+
+TEST_CASE("a schema made ready once checks many documents", "[core][unit]") {
+  const Schema ready(schema, "schema.json");
+  const Schema copy = ready;
+  CHECK_NOTHROW(ready.check(Json::parse(R"({"name": "a", "arm": {"file": "f"}})"), "a.json"));
+  CHECK_THROWS_WITH(copy.check(Json::parse(R"({"name": "a"})"), "b.json"), "b.json: /: key 'arm' is missing");
+  CHECK_THROWS_WITH(Schema(Json::parse(R"({"type": 12})"), "s.json"), Catch::StartsWith("s.json: its JSON Schema"));
 }
 
 TEST_CASE("a long value is cut and one with line breaks stays on one line", "[core][unit]") {

@@ -5,6 +5,7 @@
 #include <zstd_errors.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <map>
@@ -16,8 +17,12 @@ namespace hamelin::log {
 namespace {
 
 constexpr std::size_t chunk = std::size_t{1} << 16;
-// Ours hold 256 lines; a file compressed by hand is one frame. What is larger is no log but a trap.
-constexpr std::size_t largest_frame = std::size_t{1} << 30;
+// A frame of ours holds 256 lines and is kept back until its end vouches for it. A file compressed by hand may be one
+// frame of any size: beyond this it is handed on as it comes.
+constexpr std::size_t kept_back = std::size_t{8} << 20;
+// Logs of an arm at rest pack to a fiftieth. What unpacks to more than these times its size is no log but a trap.
+constexpr std::size_t unpacked_per_byte = 200, line_per_byte = 4;
+constexpr std::size_t line_always = std::size_t{1} << 20;
 
 std::string place(const std::filesystem::path& file, std::size_t line) {
   return fmt::format("{}: line {}", file.string(), line);
@@ -36,46 +41,25 @@ Json line_schema(const std::string& type) {
   return schema;
 }
 
-Json array_of(const Json& schema) {
-  Json outer = {{"type", "array"}, {"items", schema}};
-  if (schema.contains("definitions")) outer["definitions"] = schema["definitions"];
-  return outer;
+constexpr std::array<const char*, 4> line_types{"header", "tick", "event", "result"};
+
+const Schema& schema_of(const std::string& type) {
+  static const std::map<std::string, Schema> all = [] {
+    std::map<std::string, Schema> made;
+    for (const char* name : line_types) made.emplace(name, Schema(line_schema(name), name));
+    return made;
+  }();
+  return all.at(type);
 }
 
 // The line's type, if it is one of ours. @throws Error invalid
 std::string type_of(const Json& line, const std::string& where) {
   const Json type = line.value("type", Json(nullptr));
-  for (const char* known : {"header", "tick", "event", "result"})
+  for (const char* known : line_types)
     if (type == known) return known;
   throw Error(ErrorCode::invalid,
               fmt::format("{}: type {}, expected header, tick, event or result", where, type.dump()));
 }
-
-// Lines of one type with where they stood, checked many at a time: that is fast, and only where something is wrong one
-// by one names the line.
-class Batch {
- public:
-  explicit Batch(const std::string& type) : schema_(line_schema(type)), many_(array_of(schema_)) {}
-  void add(Json line, std::string where) {
-    lines_.push_back(std::move(line));
-    places_.push_back(std::move(where));
-    if (lines_.size() == 1000) check();
-  }
-  void check() {
-    try {
-      check_schema(lines_, many_, "log");
-    } catch (const Error&) {
-      for (std::size_t i = 0; i < lines_.size(); ++i) check_schema(lines_[i], schema_, places_[i]);
-      throw;
-    }
-    lines_ = Json::array();
-    places_.clear();
-  }
-
- private:
-  Json schema_, many_, lines_ = Json::array();
-  std::vector<std::string> places_;
-};
 
 }  // namespace
 
@@ -84,7 +68,7 @@ struct LogReader::Decompressor {
   std::string input, frame;
   std::size_t at = 0;                  ///< read up to here in `input`
   std::size_t offset = 0, number = 1;  ///< where the frame begins in the file, and its number
-  std::size_t taken = 0;               ///< bytes of the file taken in so far
+  std::size_t taken = 0, given = 0;    ///< bytes of the file taken in so far, and of text given out
 
   Decompressor() {
     if (context == nullptr) throw std::bad_alloc();
@@ -98,6 +82,8 @@ LogReader::LogReader(const std::filesystem::path& file) : file_(file) {
   std::error_code ec;
   if (std::filesystem::is_directory(file, ec))
     throw Error(ErrorCode::io, fmt::format("{}: cannot be read: Is a directory", file.string()));
+  if (std::filesystem::is_character_file(file, ec) || std::filesystem::is_block_file(file, ec))
+    throw Error(ErrorCode::io, fmt::format("{}: is a device, expected a file", file.string()));  // it may have no end
   errno = 0;
   in_.open(file, std::ios::binary);
   if (!in_)
@@ -154,10 +140,14 @@ bool LogReader::read_more() {
     d.taken += in.pos - d.at;
     d.at = in.pos;
     d.frame.resize(out.pos);
-    if (d.frame.size() > largest_frame) throw damaged("holds more than 1 GiB, expected a log of hamelin");
-    if (left == 0) {
+    d.given += out.pos - before;
+    if (d.given > kept_back + unpacked_per_byte * d.taken)
+      throw damaged(
+          fmt::format("unpacks to more than {} times its size, expected a log of hamelin", unpacked_per_byte));
+    if (left == 0 || d.frame.size() > kept_back) {
       text_ += d.frame;
       d.frame.clear();
+      if (left != 0) return true;
       d.offset = d.taken;
       ++d.number;
       return true;
@@ -166,19 +156,27 @@ bool LogReader::read_more() {
 }
 
 bool LogReader::next_text(std::string_view& line) {
+  const auto check_size = [this](std::size_t bytes) {
+    const std::size_t most = decompressor_ ? line_always + line_per_byte * decompressor_->taken : bytes;
+    if (bytes > most)
+      throw Error(ErrorCode::parse,
+                  fmt::format("{}: has more than {} bytes, expected a log of hamelin", place(file_, lines_ + 1), most));
+  };
   std::size_t end = text_.find('\n', at_);
   while (end == std::string::npos) {
     text_.erase(0, at_);
     at_ = 0;
     const std::size_t searched = text_.size();
+    check_size(searched);
     if (!read_more()) {
       cut_ = cut_ || !text_.empty();
       return false;
     }
     end = text_.find('\n', searched);
   }
-  ++lines_;
   line = std::string_view(text_).substr(at_, end - at_);
+  check_size(line.size());
+  ++lines_;
   at_ = end + 1;
   return true;
 }
@@ -200,13 +198,12 @@ LogLines read_log(const std::filesystem::path& file) {
 }
 
 void check_line(const Json& line, const std::string& where) {
-  check_schema(line, line_schema(type_of(line, where)), where);
+  schema_of(type_of(line, where)).check(line, where);
 }
 
 LogSummary check_log(const std::filesystem::path& file) {
   LogReader reader(file);
   LogSummary summary;
-  std::map<std::string, Batch> batches;
   double k_before = -1.0;
   for (Json line; reader.next(line);) {
     const std::string where = reader.where();
@@ -219,18 +216,17 @@ LogSummary check_log(const std::filesystem::path& file) {
     summary.ticks += type == "tick" ? 1 : 0;
     summary.events += type == "event" ? 1 : 0;
     summary.has_result = type == "result";
-    if (type == "tick" && line.contains("k") && line["k"].is_number()) {
+    schema_of(type).check(line, where);
+    if (type == "tick") {
       const double k = line["k"].get<double>();
       if (k <= k_before)
         throw Error(ErrorCode::invalid, fmt::format("{}: /k: {} after {}, expected rising steps", where, k, k_before));
       k_before = k;
     }
-    batches.try_emplace(type, type).first->second.add(std::move(line), where);
   }
   summary.cut = reader.cut();
   if (reader.lines() == 0)
     throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a header", file.string()));
-  for (auto& [type, batch] : batches) batch.check();
   return summary;
 }
 

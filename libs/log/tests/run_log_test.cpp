@@ -244,6 +244,21 @@ TEST_CASE("a damaged frame is named, and a file compressed by hand is read", "[l
   CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl.zst: frame ") && Contains("is damaged"));
 }
 
+TEST_CASE("a small file that unpacks to no end is refused", "[log][zstd]") {
+  const auto file = fresh_directory("bomb") / "run.jsonl.zst";
+  const auto record = [&](std::size_t lines, std::size_t bytes) {
+    log::RunLog log(file);
+    log.write("header", header);
+    for (std::size_t i = 0; i < lines; ++i) log.write("event", {{"time_s", 0.0}, {"text", std::string(bytes, 'x')}});
+  };
+  record(1, 4U << 20);
+  CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl.zst: line 2: has more than "));
+  record(40, 900U << 10);
+  REQUIRE(fs::file_size(file) < 100000);
+  CHECK_THROWS_WITH(log::read_log(file), Contains("unpacks to more than 200 times its size"));
+  CHECK_THROWS_WITH(log::LogReader("/dev/zero"), "/dev/zero: is a device, expected a file");
+}
+
 TEST_CASE("the size foretold is right to a factor of two", "[log][unit]") {
   const auto directory = fresh_directory("size");
   for (const int dof : {3, 7, 20})

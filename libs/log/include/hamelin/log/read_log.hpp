@@ -24,7 +24,7 @@ class LogReader {
   /// The next whole line.
   /// @return false at the end
   /// @throws Error parse: "file: line N: …" for a whole line that is not a JSON object, "file: frame N at byte B: …"
-  /// for a frame that is damaged
+  /// for a frame that is damaged, or that unpacks to more than 200 times its size as no log does
   bool next(Json& line);
   /// The same as text, not looked at; valid up to the next call.
   bool next_text(std::string_view& line);

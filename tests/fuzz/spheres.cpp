@@ -1,0 +1,26 @@
+#include "hamelin/model/robot_io.hpp"
+#include "robot_detail.hpp"
+#include "targets.hpp"
+
+namespace hamelin::fuzz {
+
+namespace {
+
+constexpr const char* arm = R"(<robot name="arm"><link name="base"/><link name="a">
+<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint></robot>)";
+
+}  // namespace
+
+void spheres(std::string_view bytes) {
+  const MemoryFile file(bytes);
+  std::size_t count = 0;
+  if (!accepts(file.path(), [&] { count = model::check_spheres(file.path()); })) return;
+  // The links may not be this arm's: then that is said.
+  (void)accepts("", [&] {
+    const model::Robot robot = model::detail::read_urdf(arm, "arm.urdf", {std::nullopt, file.path()});
+    promise(robot.links[0].spheres.size() + robot.base_spheres.size() == count, "all spheres are on the robot");
+  });
+}
+
+}  // namespace hamelin::fuzz

@@ -1,0 +1,16 @@
+#include "robot_detail.hpp"
+#include "round_trip.hpp"
+#include "targets.hpp"
+
+namespace hamelin::fuzz {
+
+void urdf(std::string_view bytes) {
+  const std::string file = "arm.urdf";
+  model::Robot robot;
+  if (accepts(file, [&] { robot = model::detail::read_urdf(std::string(bytes), file, {}); }))
+    promise_round_trip(robot);
+  else
+    promise(robot.links.empty(), "a refused robot leaves nothing");
+}
+
+}  // namespace hamelin::fuzz
