@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "command_line.hpp"
@@ -11,6 +12,7 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/self_collision.hpp"
+#include "robot_commands.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -20,12 +22,23 @@ namespace {
 struct InfoOptions {
   std::filesystem::path file;
   std::optional<std::string> tip;
-  std::optional<std::filesystem::path> spheres;
+  std::optional<std::filesystem::path> spheres, srdf;
   bool json = false;
 };
 
 Json optional(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
+}
+
+std::size_t capsules_of(const model::Link& link) {
+  return static_cast<std::size_t>(std::count_if(link.segments.begin(), link.segments.end(),
+                                                [](const model::Segment& segment) { return segment.is_capsule(); }));
+}
+
+std::size_t count_shapes(const model::Model& model, bool capsules) {
+  return static_cast<std::size_t>(
+      std::count_if(model.shapes().begin(), model.shapes().end(),
+                    [capsules](const model::Model::Shape& shape) { return shape.is_capsule == capsules; }));
 }
 
 Json describe(const model::Model& model, const std::filesystem::path& file) {
@@ -44,7 +57,8 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
                      {"damping", link.joint.damping},
                      {"mass_kg", link.mass_kg},
                      {"spheres", link.spheres.size()},
-                     {"segments", link.segments.size()}});
+                     {"capsules", capsules_of(link)},
+                     {"lines", link.segments.size() - capsules_of(link)}});
   }
   const scene::SelfField self(model);
   Json notes = robot.notes;
@@ -57,8 +71,10 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
           {"tip_link", robot.links[static_cast<std::size_t>(robot.tip.link)].name},
           {"mass_kg", mass},
           {"reach_m", model.reach()},
-          {"spheres", model.spheres().size()},
+          {"spheres", count_shapes(model, false)},
+          {"capsules", count_shapes(model, true)},
           {"base_spheres", robot.base_spheres.size()},
+          {"base_capsules", robot.base_segments.size()},
           {"self_collision_disabled", robot.self_collision_disabled.size()},
           {"self_collision_parts", self.parts().size()},
           {"self_collision_pairs", self.pairs().size()},
@@ -78,23 +94,25 @@ void print_table(const Json& robot) {
              robot["reach_m"].get<double>());
   constexpr const char* row = "{:<20} {:<20} {:<9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8}\n";
   fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass", "spheres",
-             "segments");
+             "capsules");
   for (const auto& link : robot["links"])
     fmt::print(row, link["joint"].get<std::string>(), link["name"].get<std::string>(), link["type"].get<std::string>(),
                cell(link["lower"]), cell(link["upper"]), cell(link["velocity_max"]), cell(link["effort_max"]),
                cell(link["damping"]), cell(link["mass_kg"]), link["spheres"].get<std::size_t>(),
-               link["segments"].get<std::size_t>());
+               link["capsules"].get<std::size_t>());
   fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
-  if (robot["spheres"] == 0)
-    fmt::print("no collision spheres: obstacles need some, as <collision><sphere> or by --spheres\n");
-  fmt::print("base: {} spheres; self-collision: {} parts, {} pairs that may not touch, {} listed as disabled\n",
-             robot["base_spheres"].get<std::size_t>(), robot["self_collision_parts"].get<std::size_t>(),
-             robot["self_collision_pairs"].get<std::size_t>(), robot["self_collision_disabled"].get<std::size_t>());
+  if (robot["spheres"] == 0 && robot["capsules"] == 0)
+    fmt::print("no collision spheres or capsules: obstacles need some, as <collision><sphere> or by --spheres\n");
+  fmt::print(
+      "base: {} spheres, {} capsules; self-collision: {} parts, {} pairs that may not touch, {} listed as disabled\n",
+      robot["base_spheres"].get<std::size_t>(), robot["base_capsules"].get<std::size_t>(),
+      robot["self_collision_parts"].get<std::size_t>(), robot["self_collision_pairs"].get<std::size_t>(),
+      robot["self_collision_disabled"].get<std::size_t>());
   for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
 }
 
 void info(const InfoOptions& options) {
-  const model::Model model(model::read_robot(options.file, {options.tip, options.spheres}));
+  const model::Model model(model::read_robot(options.file, {options.tip, options.spheres, options.srdf}));
   const Json robot = describe(model, options.file);
   if (options.json)
     print_json(robot);
@@ -121,7 +139,8 @@ void make_chain(const ChainFlags& flags) {
 
 void add_robot(CLI::App& app, int& exit_code) {
   auto* robot = add_command(app, "robot", "Look at robots and make them",
-                            "hamelin robot info data/robots/arm7.urdf\n"
+                            "hamelin robot fit arm.urdf -o arm.spheres.json\n"
+                            "hamelin robot check arm.urdf --spheres arm.spheres.json\n"
                             "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json");
   robot->require_subcommand(1);
 
@@ -135,11 +154,16 @@ void add_robot(CLI::App& app, int& exit_code) {
       ->type_name("LINK");
   info_command->add_option("--spheres", info_options->spheres, "sidecar file with collision spheres")
       ->type_name("FILE");
+  info_command->add_option("--srdf", info_options->srdf, "SRDF whose disabled pairs are not checked")
+      ->type_name("FILE.srdf");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options, &exit_code] {
     info(*info_options);
     exit_code = 0;
   });
+
+  add_robot_fit(*robot, exit_code);
+  add_robot_check(*robot, exit_code);
 
   auto* chain_command =
       add_command(*robot, "make-chain", "Write a chain of equal links along +y",

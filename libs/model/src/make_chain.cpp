@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <string_view>
 
 #include "hamelin/core/error.hpp"
@@ -48,8 +46,6 @@ Robot make_chain(const ChainOptions& options) {
   require_positive("radius", r, 1e3);
   const std::vector<Vector3d> axes = parse_axes(options.axes);
 
-  // Spheres that touch, but never more than a few a link.
-  const int spheres = static_cast<int>(std::clamp(std::ceil(L / (2.0 * r)), 1.0, 8.0));
   Robot robot;
   robot.name = fmt::format("chain{}", options.links);
   for (int i = 0; i < options.links; ++i) {
@@ -63,7 +59,6 @@ Robot make_chain(const ChainOptions& options) {
     link.mass_kg = m;
     const double across = m * (L * L / 12.0 + r * r / 4.0);
     link.inertia_kg_m2 = Vector3d(across, m * r * r / 2.0, across).asDiagonal();
-    for (int k = 0; k < spheres; ++k) link.spheres.push_back({Vector3d(0.0, L * ((k + 0.5) / spheres - 0.5), 0.0), r});
     link.segments.push_back({Vector3d(0.0, -0.5 * L, 0.0), Vector3d(0.0, 0.5 * L, 0.0), r});
     robot.links.push_back(std::move(link));
     if (i > 0) robot.self_collision_disabled.emplace_back(fmt::format("link{}", i), fmt::format("link{}", i + 1));

@@ -1,5 +1,7 @@
 #include "hamelin/model/model.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -219,12 +221,25 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
   for (std::size_t i = 0; i < robot_.links.size(); ++i) {
     const Link& link = robot_.links[i];
     com_in_frame_.push_back(frames[i + 1].inverse() * link.com);
+    const SE3& com = com_in_frame_.back();
     for (std::size_t s = 0; s < link.spheres.size(); ++s)
-      spheres_.push_back({static_cast<int>(i), static_cast<int>(s), com_in_frame_.back() * link.spheres[s].center_m,
-                          link.spheres[s].radius_m});
+      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), false, com * link.spheres[s].center_m,
+                         Vector3d::Zero(), link.spheres[s].radius_m});
+    for (std::size_t s = 0; s < link.segments.size(); ++s) {
+      const Segment& segment = link.segments[s];
+      if (!segment.is_capsule()) continue;
+      has_capsules_ = true;
+      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), true, com * (0.5 * (segment.from_m + segment.to_m)),
+                         com.R() * (0.5 * (segment.to_m - segment.from_m)), segment.radius_m});
+    }
   }
   tip_in_frame_ = frames[static_cast<std::size_t>(robot_.tip.link) + 1].inverse() * robot_.tip.pose;
   reach_ = reach_of(robot_, frames);
+}
+
+std::string Model::words(const Shape& shape) const {
+  return fmt::format("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere", shape.index_in_link,
+                     robot_.links[static_cast<std::size_t>(shape.link)].name);
 }
 
 }  // namespace hamelin::model

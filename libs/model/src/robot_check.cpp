@@ -134,23 +134,33 @@ void check_joint_inertia(const Robot& robot, const std::string& where) {
 void check_parts(const Robot& robot, const std::string& where) {
   std::map<std::string, int> body_of;
   for (int i = 0; i < robot.dof(); ++i) body_of.emplace(robot.links[static_cast<std::size_t>(i)].name, i);
-  const auto place = [&](const Sphere& sphere, int body, const std::string& owner) {
-    if (std::any_of(sphere.part.begin(), sphere.part.end(), [](unsigned char c) { return c < ' '; }))
-      fail(where, owner + ": a sphere's part has a name with control characters");
-    if (body_of.emplace(sphere.part, body).first->second != body)
-      fail(where, fmt::format("{}: part '{}' is on another link as well, expected it on one", owner, sphere.part));
+  const auto place = [&](const std::string& part, int body, const std::string& owner) {
+    if (std::any_of(part.begin(), part.end(), [](unsigned char c) { return c < ' '; }))
+      fail(where, owner + ": a shape's part has a name with control characters");
+    if (body_of.emplace(part, body).first->second != body)
+      fail(where, fmt::format("{}: part '{}' is on another link as well, expected it on one", owner, part));
   };
   for (int i = 0; i < robot.dof(); ++i) {
     const Link& link = robot.links[static_cast<std::size_t>(i)];
     for (const Sphere& sphere : link.spheres)
-      if (!sphere.part.empty()) place(sphere, i, fmt::format("link '{}'", link.name));
+      if (!sphere.part.empty()) place(sphere.part, i, fmt::format("link '{}'", link.name));
+    for (const Segment& segment : link.segments)
+      if (!segment.part.empty()) place(segment.part, i, fmt::format("link '{}'", link.name));
   }
   for (const Sphere& sphere : robot.base_spheres) {
     if (sphere.part.empty()) fail(where, "base_spheres: a sphere names no part, expected the link that bears it");
     check_length(sphere.center_m, where + ": base_spheres", "a sphere's centre");
     if (!(sphere.radius_m > 0.0 && sphere.radius_m <= length_max_m))
       fail(where, fmt::format("base_spheres: a radius is {} m, expected a positive number", sphere.radius_m));
-    place(sphere, -1, "base_spheres");
+    place(sphere.part, -1, "base_spheres");
+  }
+  for (const Segment& segment : robot.base_segments) {
+    if (segment.part.empty()) fail(where, "base_segments: a capsule names no part, expected the link that bears it");
+    check_length(segment.from_m, where + ": base_segments", "a capsule's start");
+    check_length(segment.to_m, where + ": base_segments", "a capsule's end");
+    if (!(segment.radius_m > 0.0 && segment.radius_m <= length_max_m))
+      fail(where, fmt::format("base_segments: a radius is {} m, expected a positive number", segment.radius_m));
+    place(segment.part, -1, "base_segments");
   }
   std::vector<std::string> names;
   for (const auto& [name, body] : body_of) names.push_back(name);

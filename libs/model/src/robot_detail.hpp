@@ -6,24 +6,35 @@
 
 #include "hamelin/model/robot.hpp"
 #include "hamelin/model/robot_io.hpp"
+#include "hamelin/model/srdf.hpp"
 
 /// What the readers share.
 namespace hamelin::model::detail {
 
-/// Spheres by link, and pairs of links that never count as colliding.
+/// Spheres and capsules by link, and pairs of links that never count as colliding.
 struct SphereFile {
   std::map<std::string, std::vector<Sphere>> links;
+  std::map<std::string, std::vector<Segment>> capsules;
   std::vector<std::pair<std::string, std::string>> self_collision_disabled;
 };
 
 /// @throws Error io, parse or invalid
 [[nodiscard]] SphereFile read_spheres(const std::filesystem::path& file);
 
+/// Adds an SRDF's pairs to those that are there, each once.
+/// @return what to note: how many, of which file, how many were there before
+[[nodiscard]] std::string join_pairs(std::vector<std::pair<std::string, std::string>>& disabled,
+                                     const std::vector<DisabledPair>& more, const std::filesystem::path& file);
+
+/// Refuses what TinyXML cannot take: no text at all, bytes that are none, nesting that would exhaust the stack.
+/// @throws Error parse
+void check_xml(const std::string& text, const std::string& where);
+
 /// @param where the file's name, for messages
 [[nodiscard]] Robot read_urdf(const std::string& text, const std::string& where, const RobotOptions& options);
 
 /// Brings each rotation to one that a quaternion of doubles gives exactly (a change of some 1e-16), so that a robot
-/// survives its JSON form bit for bit.
+/// survives its JSON form bit for bit; where none is found nearby, to rounding.
 void round_to_quaternions(Robot& robot);
 
 /// "a, b, c"

@@ -99,6 +99,16 @@ Json json_of(const Sphere& sphere) {
   return json;
 }
 
+Segment segment_of(const Json& json) {
+  return {vector_of(json["from_m"]), vector_of(json["to_m"]), json["radius_m"].get<double>(), json.value("part", "")};
+}
+
+Json json_of(const Segment& segment) {
+  Json json{{"from_m", json_of(segment.from_m)}, {"to_m", json_of(segment.to_m)}, {"radius_m", segment.radius_m}};
+  if (!segment.part.empty()) json["part"] = segment.part;
+  return json;
+}
+
 Json json_of(const Link& link) {
   const Matrix3d& I = link.inertia_kg_m2;
   Json json{{"name", link.name}, {"parent", link.parent}, {"joint", json_of(link.joint)}};
@@ -108,9 +118,7 @@ Json json_of(const Link& link) {
   json["spheres"] = Json::array();
   for (const auto& sphere : link.spheres) json["spheres"].push_back(json_of(sphere));
   json["segments"] = Json::array();
-  for (const auto& segment : link.segments)
-    json["segments"].push_back(
-        {{"from_m", json_of(segment.from_m)}, {"to_m", json_of(segment.to_m)}, {"radius_m", segment.radius_m}});
+  for (const auto& segment : link.segments) json["segments"].push_back(json_of(segment));
   return json;
 }
 
@@ -143,9 +151,13 @@ void take_spheres(Robot& robot, const std::filesystem::path& file) {
   std::vector<std::string> names;
   for (auto& link : robot.links) {
     link.spheres.clear();
+    auto& segments = link.segments;
+    segments.erase(std::remove_if(segments.begin(), segments.end(), [](const Segment& s) { return s.is_capsule(); }),
+                   segments.end());
     names.push_back(link.name);
   }
   robot.base_spheres.clear();
+  robot.base_segments.clear();
   // A sidecar of a JSON robot speaks of links; pairs of the parts that went with the spheres mean nothing any more.
   const auto gone = [&](const auto& pair) {
     return std::find(names.begin(), names.end(), pair.first) == names.end() ||
@@ -160,8 +172,38 @@ void take_spheres(Robot& robot, const std::filesystem::path& file) {
                 fmt::format("{}: the robot has no link '{}'{}", file.string(), name, detail::suggestion(name, names)));
   };
   for (const auto& [name, spheres] : given.links) link_named(name).spheres = spheres;
+  for (const auto& [name, capsules] : given.capsules) {
+    auto& segments = link_named(name).segments;
+    segments.insert(segments.end(), capsules.begin(), capsules.end());
+  }
   for (const auto& [a, b] : given.self_collision_disabled)
     robot.self_collision_disabled.emplace_back(link_named(a).name, link_named(b).name);
+}
+
+// Pairs of parts that this robot has; a JSON robot has not all links of the URDF that the SRDF speaks of.
+void take_srdf(Robot& robot, const std::filesystem::path& file) {
+  std::vector<std::string> parts;
+  const auto add = [&](const auto& shapes) {
+    for (const auto& shape : shapes) parts.push_back(shape.part);
+  };
+  for (const Link& link : robot.links) {
+    parts.push_back(link.name);
+    add(link.spheres);
+    add(link.segments);
+  }
+  add(robot.base_spheres);
+  add(robot.base_segments);
+  const auto known = [&](const std::string& name) {
+    return std::find(parts.begin(), parts.end(), name) != parts.end();
+  };
+  std::vector<DisabledPair> pairs = read_srdf(file);
+  const std::size_t all = pairs.size();
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                             [&](const DisabledPair& pair) { return !known(pair.link_a) || !known(pair.link_b); }),
+              pairs.end());
+  std::string said = detail::join_pairs(robot.self_collision_disabled, pairs, file.filename());
+  if (pairs.size() < all) said += fmt::format("; {} more are of links that this robot has not", all - pairs.size());
+  robot.notes.push_back(said);
 }
 
 }  // namespace
@@ -193,8 +235,10 @@ std::string detail::normalise_screw(Joint& joint, const std::string& where) {
 }
 
 std::size_t check_spheres(const std::filesystem::path& file) {
+  const detail::SphereFile given = detail::read_spheres(file);
   std::size_t count = 0;
-  for (const auto& [name, spheres] : detail::read_spheres(file).links) count += spheres.size();
+  for (const auto& [name, spheres] : given.links) count += spheres.size();
+  for (const auto& [name, capsules] : given.capsules) count += capsules.size();
   return count;
 }
 
@@ -208,6 +252,17 @@ detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
     if (!value.is_number()) fail(fmt::format("{}: expected a number", place));
     return value.get<double>();
   };
+  const auto is_point = [](const Json& shape, const char* key) {
+    return shape.contains(key) && shape[key].is_array() && shape[key].size() == 3;
+  };
+  const auto point = [&](const Json& value, const std::string& place) {
+    return Vector3d(number(value[0], place), number(value[1], place), number(value[2], place));
+  };
+  const auto radius = [&](const Json& value, const std::string& place) {
+    const double r = number(value, place + "/radius");
+    if (!(r > 0.0)) fail(fmt::format("{}/radius: {} m, expected a positive number", place, r));
+    return r;
+  };
   if (!document.is_object() || !document.contains("links") || !document["links"].is_object())
     fail("expected an object whose \"links\" maps link names to lists of spheres");
   SphereFile out;
@@ -217,15 +272,25 @@ detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
     for (std::size_t i = 0; i < list.size(); ++i) {
       const std::string place = fmt::format("/links/{}/{}", name, i);
       const Json& sphere = list[i];
-      if (!sphere.is_object() || sphere.size() != 2 || !sphere.contains("center") || !sphere.contains("radius") ||
-          !sphere["center"].is_array() || sphere["center"].size() != 3)
+      if (!sphere.is_object() || sphere.size() != 2 || !is_point(sphere, "center") || !sphere.contains("radius"))
         fail(fmt::format("{}: expected {{\"center\": [x, y, z], \"radius\": r}}", place));
-      Sphere s;
-      for (int k = 0; k < 3; ++k)
-        s.center_m[k] = number(sphere["center"][static_cast<std::size_t>(k)], place + "/center");
-      s.radius_m = number(sphere["radius"], place + "/radius");
-      if (!(s.radius_m > 0.0)) fail(fmt::format("{}/radius: {} m, expected a positive number", place, s.radius_m));
-      spheres.push_back(s);
+      spheres.push_back({point(sphere["center"], place + "/center"), radius(sphere["radius"], place)});
+    }
+  }
+  if (document.contains("capsules")) {
+    if (!document["capsules"].is_object()) fail("/capsules: expected an object that maps link names to capsules");
+    for (const auto& [name, list] : document["capsules"].items()) {
+      auto& capsules = out.capsules[name];
+      if (!list.is_array()) fail(fmt::format("/capsules/{}: expected a list of capsules", name));
+      for (std::size_t i = 0; i < list.size(); ++i) {
+        const std::string place = fmt::format("/capsules/{}/{}", name, i);
+        const Json& capsule = list[i];
+        if (!capsule.is_object() || capsule.size() != 3 || !is_point(capsule, "from") || !is_point(capsule, "to") ||
+            !capsule.contains("radius"))
+          fail(fmt::format("{}: expected {{\"from\": [x, y, z], \"to\": [x, y, z], \"radius\": r}}", place));
+        capsules.push_back({point(capsule["from"], place + "/from"), point(capsule["to"], place + "/to"),
+                            radius(capsule["radius"], place)});
+      }
     }
   }
   if (document.contains("self_collision_disabled")) {
@@ -262,9 +327,10 @@ Robot robot_from_json(const Json& document, const std::string& where) {
       link.spheres.push_back(sphere_of(sphere));
       if (link.spheres.back().part == link.name) link.spheres.back().part.clear();
     }
-    for (const auto& segment : list_of(json, "segments"))
-      link.segments.push_back(
-          {vector_of(segment["from_m"]), vector_of(segment["to_m"]), segment["radius_m"].get<double>()});
+    for (const auto& segment : list_of(json, "segments")) {
+      link.segments.push_back(segment_of(segment));
+      if (link.segments.back().part == link.name) link.segments.back().part.clear();
+    }
     names.push_back(link.name);
     robot.links.push_back(std::move(link));
   }
@@ -275,6 +341,7 @@ Robot robot_from_json(const Json& document, const std::string& where) {
                                                 tip["link"].get<std::string>(), detail::join(names)));
   robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()), pose_of(tip, where + ": /tip")};
   for (const auto& sphere : list_of(document, "base_spheres")) robot.base_spheres.push_back(sphere_of(sphere));
+  for (const auto& segment : list_of(document, "base_segments")) robot.base_segments.push_back(segment_of(segment));
   for (const auto& pair : list_of(document, "self_collision_disabled"))
     robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
   detail::round_to_quaternions(robot);
@@ -293,6 +360,10 @@ Json robot_to_json(const Robot& robot) {
   if (!robot.base_spheres.empty()) {
     json["base_spheres"] = Json::array();
     for (const auto& sphere : robot.base_spheres) json["base_spheres"].push_back(json_of(sphere));
+  }
+  if (!robot.base_segments.empty()) {
+    json["base_segments"] = Json::array();
+    for (const auto& segment : robot.base_segments) json["base_segments"].push_back(json_of(segment));
   }
   json["self_collision_disabled"] = Json::array();
   for (const auto& [a, b] : robot.self_collision_disabled)
@@ -315,6 +386,10 @@ Robot read_robot(const std::filesystem::path& file, const RobotOptions& options)
   if (options.spheres) {
     take_spheres(robot, *options.spheres);
     check(robot, options.spheres->string());
+  }
+  if (options.srdf) {
+    take_srdf(robot, *options.srdf);
+    check(robot, options.srdf->string());
   }
   return robot;
 }

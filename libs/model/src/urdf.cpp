@@ -15,6 +15,9 @@
 #include <string_view>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/model/srdf.hpp"
+#include "hamelin/model/urdf_geometry.hpp"
 #include "robot_detail.hpp"
 
 namespace hamelin::model {
@@ -27,8 +30,9 @@ using geometry::SE3;
 
 // ---- the text: what urdfdom passes over or says without a place ----
 
-// TinyXML and urdfdom recurse into the tree of elements.
-constexpr int nesting_max = 100;
+// TinyXML and urdfdom recurse into the tree of elements, urdfdom into the tree of links too.
+constexpr int nesting_max = 100, attributes_max = 100;
+constexpr std::size_t size_max = std::size_t{4} << 20;
 
 // One line, whatever the file's names and values hold.
 [[noreturn]] void fail(ErrorCode code, const std::string& where, std::string what) {
@@ -41,16 +45,39 @@ std::string at_line(const std::string& where, int line) {
   return line > 0 ? fmt::format("{}: line {}", where, line) : where;
 }
 
+// Where TinyXML would see other elements than we do, or take a time that grows with the square of the file: one rule
+// for both, that only markup passes which has one meaning.
 void check_text(std::string_view text, const std::string& where) {
+  if (text.size() > size_max)
+    fail(ErrorCode::parse, where,
+         fmt::format("the file has {} bytes, expected a URDF of at most {}", text.size(), size_max));
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos)
     fail(ErrorCode::parse, where, "the file is empty, expected a <robot>");
   if (text.find('\0') != std::string_view::npos)
     fail(ErrorCode::parse, where, "the file is not text, expected URDF (XML)");
+  if (const auto good = utf8_prefix(text); good != text.size())
+    fail(ErrorCode::parse, where, fmt::format("byte {} is not UTF-8, expected URDF (XML) in UTF-8", good));
   int depth = 0;
   std::size_t at = 0;
+  const auto refuse = [&](const std::string& what) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    fail(ErrorCode::parse, at_line(where, static_cast<int>(line)), what);
+  };
   const auto skip_past = [&](std::string_view end) {
     const auto found = text.find(end, at);
     at = found == std::string_view::npos ? text.size() : found + end.size();
+  };
+  // Past the tag's '>', which may stand in an attribute's value as well.
+  const auto skip_tag = [&] {
+    int attributes = 0;
+    for (++at; at < text.size() && text[at] != '>'; ++at) {
+      const char c = text[at];
+      if (c == '<') refuse("not XML: '<' inside a tag");
+      if (c == '=' && ++attributes > attributes_max)
+        refuse(fmt::format("a tag has more than {} attributes", attributes_max));
+      if (c == '"' || c == '\'') at = std::min(text.find(c, at + 1), text.size() - 1);
+    }
+    at = std::min(at + 1, text.size());
   };
   while ((at = text.find('<', at)) != std::string_view::npos) {
     const std::string_view tag = text.substr(at, 9);
@@ -58,18 +85,21 @@ void check_text(std::string_view text, const std::string& where) {
       skip_past("-->");
     } else if (tag == "<![CDATA[") {
       skip_past("]]>");
-    } else if (tag.substr(0, 2) == "<?" || tag.substr(0, 2) == "<!") {
+    } else if (tag.substr(0, 2) == "<!") {
       skip_past(">");
+    } else if (tag.substr(0, 2) == "<?") {
+      const std::size_t begin = at;
+      skip_past(">");
+      const std::string_view declaration = text.substr(begin, at - begin);
+      for (const char quote : {'"', '\''})
+        if (std::count(declaration.begin(), declaration.end(), quote) % 2 != 0)
+          refuse("not XML: a quote in <? ?> is not closed");
     } else {
       const bool closing = tag.substr(0, 2) == "</";
-      skip_past(">");
+      skip_tag();
       const bool empty = at >= 2 && text[at - 2] == '/';
-      if (closing) --depth;
-      if (!closing && !empty && ++depth > nesting_max) {
-        const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
-        fail(ErrorCode::parse, at_line(where, static_cast<int>(line)),
-             fmt::format("elements nest deeper than {}", nesting_max));
-      }
+      if (closing) depth = std::max(0, depth - 1);
+      if (!closing && !empty && ++depth > nesting_max) refuse(fmt::format("elements nest deeper than {}", nesting_max));
     }
   }
 }
@@ -204,11 +234,12 @@ void outline_joint(const TiXmlElement& element, const std::string& where, Outlin
     if (element.FirstChildElement(tag) != nullptr) ++outline.skipped[fmt::format("<{}>", tag)];
 }
 
-// Every link is some joint's child at most once, and all names exist.
+// Every link is some joint's child at most once, all names exist, and no links carry each other in a circle (urdfdom
+// never gives those back).
 void check_edges(const TiXmlElement& robot, const std::string& where, const Outline& outline) {
   std::vector<std::string> names;
   for (const auto& [name, line] : outline.link_lines) names.push_back(name);
-  std::map<std::string, std::string> carrier;
+  std::map<std::string, std::string> carrier, parent_of;
   for (const TiXmlElement* e = robot.FirstChildElement("joint"); e != nullptr; e = e->NextSiblingElement("joint")) {
     const std::string joint = e->Attribute("name"), place = at_line(where, e->Row());
     for (const char* end : {"parent", "child"}) {
@@ -225,8 +256,19 @@ void check_edges(const TiXmlElement& robot, const std::string& where, const Outl
           fail(ErrorCode::invalid, place,
                fmt::format("link '{}' is the child of two joints, '{}' and '{}', expected one", link, before->second,
                            joint));
+        parent_of.emplace(link, e->FirstChildElement("parent")->Attribute("link"));
       }
     }
+  }
+  std::set<std::string> rooted;
+  for (const auto& [name, line] : outline.link_lines) {
+    std::set<std::string> way;
+    for (auto at = parent_of.find(name); at != parent_of.end() && rooted.count(at->first) == 0;
+         at = parent_of.find(at->second))
+      if (!way.insert(at->first).second)
+        fail(ErrorCode::invalid, at_line(where, line),
+             fmt::format("link '{}': it hangs in a cycle of joints, expected a tree from one root", name));
+    rooted.merge(way);
   }
 }
 
@@ -351,7 +393,7 @@ class Reader {
     collect_bodies();
     take_spheres();
     for (std::size_t i = 0; i < bodies_.size(); ++i) robot_.links.push_back(moving_link(i));
-    keep_base_spheres();
+    keep_base_shapes();
     robot_.tip = {tip_->name, static_cast<int>(bodies_.size()) - 1, poses_.at(tip_->name)};
     disable_pairs();
     note_the_rest();
@@ -385,10 +427,6 @@ class Reader {
         order_.push_back(child);
       }
     }
-    for (const auto& [name, link] : model_.links_)
-      if (poses_.count(name) == 0)
-        fail_at_link(name,
-                     fmt::format("it hangs in a cycle of joints, expected a tree from '{}'", order_.front()->name));
   }
 
   void find_path() {
@@ -482,20 +520,39 @@ class Reader {
         note("the file's own {} collision spheres are replaced by those of {}", own,
              options_.spheres->filename().string());
       for (const auto& [name, list] : spheres_.links) require_link(name);
+      for (const auto& [name, list] : spheres_.capsules) require_link(name);
       for (const auto& [a, b] : spheres_.self_collision_disabled) {
         require_link(a);
         require_link(b);
       }
     }
-    std::size_t moving = 0, still = 0;
-    for (const auto& [name, list] : spheres_.links) (body_of_.at(name) < 0 ? still : moving) += list.size();
-    if (still > 0) note("{} collision spheres on the base do not move: only the arm itself can touch them", still);
-    if (moving == 0) note("no collision spheres: the arm meets nothing");
+    take_srdf();
+    std::size_t moving = 0;
+    const auto count = [&](const auto& by_link, const char* what) {
+      std::size_t still = 0;
+      for (const auto& [name, list] : by_link) (body_of_.at(name) < 0 ? still : moving) += list.size();
+      if (still > 0) note("{} collision {} on the base do not move: only the arm itself can touch them", still, what);
+    };
+    count(spheres_.links, "spheres");
+    count(spheres_.capsules, "capsules");
+    if (moving == 0) note("no collision spheres or capsules: the arm meets nothing");
+  }
+
+  void take_srdf() {
+    if (!options_.srdf) return;
+    const std::string said = detail::join_pairs(spheres_.self_collision_disabled,
+                                                read_srdf(*options_.srdf, link_names()), options_.srdf->filename());
+    robot_.notes.push_back(said);
+  }
+
+  [[nodiscard]] std::vector<std::string> link_names() const {
+    std::vector<std::string> names;
+    for (const urdf::Link* link : order_) names.push_back(link->name);
+    return names;
   }
 
   void require_link(const std::string& name) const {
-    std::vector<std::string> names;
-    for (const urdf::Link* link : order_) names.push_back(link->name);
+    const std::vector<std::string> names = link_names();
     if (std::find(names.begin(), names.end(), name) == names.end())
       fail(ErrorCode::invalid, options_.spheres->string(),
            fmt::format("the robot has no link '{}'{}", name, detail::suggestion(name, names)));
@@ -607,23 +664,37 @@ class Reader {
         for (const Sphere& sphere : list->second)
           out.spheres.push_back({to_com * (poses_.at(member->name) * sphere.center_m), sphere.radius_m,
                                  member == body.own ? "" : member->name});
+    for (const urdf::Link* member : body.members)
+      if (const auto list = spheres_.capsules.find(member->name); list != spheres_.capsules.end())
+        for (const Segment& capsule : list->second) {
+          const SE3 to_link = to_com * poses_.at(member->name);
+          out.segments.push_back({to_link * capsule.from_m, to_link * capsule.to_m, capsule.radius_m,
+                                  member == body.own ? "" : member->name});
+        }
     return out;
   }
 
-  void keep_base_spheres() {
-    for (const urdf::Link* link : order_)
-      if (const auto list = spheres_.links.find(link->name);
-          list != spheres_.links.end() && body_of_.at(link->name) < 0)
+  void keep_base_shapes() {
+    for (const urdf::Link* link : order_) {
+      if (body_of_.at(link->name) >= 0) continue;
+      const SE3& pose = poses_.at(link->name);
+      if (const auto list = spheres_.links.find(link->name); list != spheres_.links.end())
         for (const Sphere& sphere : list->second)
-          robot_.base_spheres.push_back({poses_.at(link->name) * sphere.center_m, sphere.radius_m, link->name});
+          robot_.base_spheres.push_back({pose * sphere.center_m, sphere.radius_m, link->name});
+      if (const auto list = spheres_.capsules.find(link->name); list != spheres_.capsules.end())
+        for (const Segment& capsule : list->second)
+          robot_.base_segments.push_back({pose * capsule.from_m, pose * capsule.to_m, capsule.radius_m, link->name});
+    }
   }
 
-  // Pairs keep the names of the file; a pair with a link that bears no sphere and does not move by itself means
-  // nothing.
+  // Pairs keep the names of the file; a pair with a link that bears no shape and does not move by itself means nothing.
   void disable_pairs() {
+    const auto bears = [](const auto& by_link, const std::string& name) {
+      const auto list = by_link.find(name);
+      return list != by_link.end() && !list->second.empty();
+    };
     const auto counts = [&](const std::string& name) {
-      const auto list = spheres_.links.find(name);
-      return (list != spheres_.links.end() && !list->second.empty()) ||
+      return bears(spheres_.links, name) || bears(spheres_.capsules, name) ||
              std::any_of(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.own->name == name; });
     };
     for (const auto& [a, b] : spheres_.self_collision_disabled)
@@ -632,8 +703,14 @@ class Reader {
 
   void note_the_rest() {
     std::vector<std::string> skipped;
-    for (const auto& [what, count] : outline_.skipped) skipped.push_back(fmt::format("{} {}", count, what));
-    if (!skipped.empty()) note("skipped: {}", detail::join(skipped));
+    bool shapes = false;
+    for (const auto& [what, count] : outline_.skipped) {
+      skipped.push_back(fmt::format("{} {}", count, what));
+      shapes = shapes || what.rfind("<collision>", 0) == 0;
+    }
+    if (!skipped.empty())
+      note("skipped: {}{}", detail::join(skipped),
+           shapes && !options_.spheres ? "; `hamelin robot fit` makes spheres or capsules of collision shapes" : "");
   }
 
   const urdf::ModelInterface& model_;
@@ -650,13 +727,102 @@ class Reader {
   detail::SphereFile spheres_;
 };
 
+// ---- shapes, for what fits spheres to them ----
+
+std::vector<LinkShape> shapes_of(const TiXmlElement& link, const char* tag, const std::string& where,
+                                 const std::string& owner) {
+  std::vector<LinkShape> shapes;
+  for (const TiXmlElement* e = link.FirstChildElement(tag); e != nullptr; e = e->NextSiblingElement(tag)) {
+    check_numbers(*e, where, owner);
+    const TiXmlElement* geometry = e->FirstChildElement("geometry");
+    const TiXmlElement* shape = geometry == nullptr ? nullptr : geometry->FirstChildElement();
+    LinkShape out;
+    out.line = shape == nullptr ? e->Row() : shape->Row();
+    shapes.push_back(out);
+  }
+  return shapes;
+}
+
+void take_shape(LinkShape& out, const urdf::Geometry& geometry, const urdf::Pose& pose, const std::string& place) {
+  const auto positive = [&](const char* what, double value) {
+    if (!(value > 0.0))
+      fail(ErrorCode::invalid, place, fmt::format("a {} of {} m, expected a positive number", what, value));
+    return value;
+  };
+  out.pose = pose_of(pose);
+  switch (geometry.type) {
+    case urdf::Geometry::SPHERE:
+      out.kind = LinkShape::Kind::sphere;
+      out.radius_m = positive("radius", static_cast<const urdf::Sphere&>(geometry).radius);
+      break;
+    case urdf::Geometry::BOX: {
+      const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
+      out.kind = LinkShape::Kind::box;
+      out.size_m = {positive("size", size.x), positive("size", size.y), positive("size", size.z)};
+      break;
+    }
+    case urdf::Geometry::CYLINDER: {
+      const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
+      out.kind = LinkShape::Kind::cylinder;
+      out.radius_m = positive("radius", cylinder.radius);
+      out.length_m = positive("length", cylinder.length);
+      break;
+    }
+    case urdf::Geometry::MESH: {
+      const auto& mesh = static_cast<const urdf::Mesh&>(geometry);
+      out.kind = LinkShape::Kind::mesh;
+      out.mesh = mesh.filename;
+      out.scale = {mesh.scale.x, mesh.scale.y, mesh.scale.z};
+      if (out.mesh.empty()) fail(ErrorCode::invalid, place, "a <mesh> names no file");
+      if (!((out.scale.array() != 0.0).all()))
+        fail(ErrorCode::invalid, place, "a mesh is scaled by 0, expected factors other than 0");
+      break;
+    }
+  }
+}
+
 }  // namespace
+
+void detail::check_xml(const std::string& text, const std::string& where) {
+  check_text(text, where);
+}
 
 Robot detail::read_urdf(const std::string& text, const std::string& where, const RobotOptions& options) {
   check_text(text, where);
   const Outline outline = read_outline(text, where);
   const urdf::ModelInterfaceSharedPtr model = parse(text, where, outline);
   return Reader(*model, where, outline, options).read();
+}
+
+std::vector<LinkGeometry> read_urdf_geometry(const std::filesystem::path& file) {
+  const std::string text = read_file(file), where = file.string();
+  if (file.extension() != ".urdf")
+    fail(ErrorCode::usage, where, fmt::format("unknown kind of file '{}', expected .urdf", file.extension().string()));
+  check_text(text, where);
+  const Outline outline = read_outline(text, where);
+  const urdf::ModelInterfaceSharedPtr model = parse(text, where, outline);
+  TiXmlDocument document;
+  document.Parse(text.c_str());
+  std::vector<LinkGeometry> links;
+  for (const TiXmlElement* e = document.RootElement()->FirstChildElement("link"); e != nullptr;
+       e = e->NextSiblingElement("link")) {
+    const urdf::Link& link = *model->getLink(e->Attribute("name"));
+    const std::string owner = fmt::format("link '{}'", link.name);
+    LinkGeometry out{link.name, e->Row(), shapes_of(*e, "collision", where, owner),
+                     shapes_of(*e, "visual", where, owner)};
+    const auto take = [&](std::vector<LinkShape>& shapes, const auto& given) {
+      // urdfdom keeps the order of the file, and refuses what it cannot read
+      shapes.resize(std::min(shapes.size(), given.size()));
+      for (std::size_t i = 0; i < shapes.size(); ++i)
+        if (given[i] && given[i]->geometry)
+          take_shape(shapes[i], *given[i]->geometry, given[i]->origin,
+                     fmt::format("{}: {}", at_line(where, shapes[i].line), owner));
+    };
+    take(out.collision, link.collision_array);
+    take(out.visual, link.visual_array);
+    links.push_back(std::move(out));
+  }
+  return links;
 }
 
 }  // namespace hamelin::model

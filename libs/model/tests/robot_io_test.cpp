@@ -122,6 +122,16 @@ void check_same(const Robot& a, const Robot& b) {
       CHECK(x[i].part == y[i].part);
     }
   };
+  const auto check_segments = [](const std::vector<Segment>& x, const std::vector<Segment>& y) {
+    REQUIRE(x.size() == y.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      CHECK(x[i].from_m == y[i].from_m);
+      CHECK(x[i].to_m == y[i].to_m);
+      CHECK(x[i].radius_m == y[i].radius_m);
+      CHECK(x[i].part == y[i].part);
+    }
+  };
+  check_segments(a.base_segments, b.base_segments);
   check_spheres(a.base_spheres, b.base_spheres);
   for (std::size_t i = 0; i < a.links.size(); ++i) check_spheres(a.links[i].spheres, b.links[i].spheres);
   CHECK(a.tip.name == b.tip.name);
@@ -149,12 +159,7 @@ void check_same(const Robot& a, const Robot& b) {
       CHECK(x.spheres[k].center_m == y.spheres[k].center_m);
       CHECK(x.spheres[k].radius_m == y.spheres[k].radius_m);
     }
-    REQUIRE(x.segments.size() == y.segments.size());
-    for (std::size_t k = 0; k < x.segments.size(); ++k) {
-      CHECK(x.segments[k].from_m == y.segments[k].from_m);
-      CHECK(x.segments[k].to_m == y.segments[k].to_m);
-      CHECK(x.segments[k].radius_m == y.segments[k].radius_m);
-    }
+    check_segments(x.segments, y.segments);
   }
 }
 
@@ -363,6 +368,41 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[model]
              return open;
            }(),
        "nest deeper than 100"},
+      {"deep behind quotes",
+       "<robot name=\"r\">" +
+           [] {
+             std::string open;
+             for (int i = 0; i < 100000; ++i) open += "<a b='/>'>";
+             return open;
+           }(),
+       "nest deeper than 100"},
+      {"deep behind ends of nothing",
+       [] {
+         std::string text;
+         for (int i = 0; i < 1000; ++i) text += "</a>";
+         for (int i = 0; i < 1000; ++i) text += "<a>";
+         return text;
+       }(),
+       "nest deeper than 100"},
+      {"deep behind a quoted end of the declaration",
+       "<?xml version=\"><!--\"?>" +
+           [] {
+             std::string open;
+             for (int i = 0; i < 100000; ++i) open += "<a>";
+             return open;
+           }(),
+       "a quote in <? ?> is not closed"},
+      {"a tag in a tag", "<robot name=\"r\"><link <a/></robot>", "line 1: not XML: '<' inside a tag"},
+      {"one letter", "<", "expected <robot> as the root, found no element"},
+      {"Latin-1", replaced(arm, "name=\"tool\"", "name=\"to\xf6l\""), "is not UTF-8"},
+      {"many attributes",
+       [] {
+         std::string tag = "<robot";
+         for (int i = 0; i < 100000; ++i) tag += " a" + std::to_string(i) + "=\"1\"";
+         return tag + "/>";
+       }(),
+       "a tag has more than 100 attributes"},
+      {"large", arm + std::string(4U << 20, ' '), "expected a URDF of at most 4194304"},
       {"link twice", replaced(arm, "<link name=\"tool\"/>", "<link name=\"tool\"/><link name=\"base\"/>"),
        "link 'base' is given twice, first in line 3"},
       {"joint twice", replaced(arm, "<joint name=\"slide\"", "<joint name=\"shoulder\""),
@@ -552,6 +592,67 @@ TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
              Catch::Contains("pairs of link names"));
 }
 
+TEST_CASE("a sidecar's capsules come to their links as its spheres do, and replace the file's own", "[model][robot]") {
+  const Scratch sidecar("shapes.json",
+                        R"({"links": {"upper": [{"center": [0, 0, 0.2], "radius": 0.1}]},
+    "capsules": {"lower": [{"from": [0, 0, 0], "to": [0, 0, 0.2], "radius": 0.1}],
+                 "tool": [{"from": [0.1, 0, 0], "to": [0.3, 0, 0], "radius": 0.05}],
+                 "base": [{"from": [0, 0, -0.2], "to": [0, 0, 0.1], "radius": 0.2}]},
+    "self_collision_disabled": [["upper", "lower"], ["base", "tool"]]})");
+  RobotOptions options;
+  options.spheres = sidecar.file();
+  const Robot robot = read_text("arm.urdf", arm, options);
+  CHECK(noted(robot, "1 collision capsules on the base do not move"));
+  CHECK_FALSE(noted(robot, "meets nothing"));
+  const Link& lower = robot.links[1];
+  REQUIRE(lower.segments.size() == 2);
+  CHECK((lower.com * lower.segments[0].from_m - Vector3d(0, 0, 0.7)).norm() < 1e-15);
+  CHECK((lower.com * lower.segments[0].to_m - Vector3d(0, 0, 0.9)).norm() < 1e-15);
+  CHECK(lower.segments[0].radius_m == 0.1);
+  CHECK(lower.segments[0].part.empty());
+  CHECK((lower.com * lower.segments[1].to_m - Vector3d(0.3 * std::cos(1.0), 0.3 * std::sin(1.0), 0.95)).norm() < 1e-15);
+  CHECK(lower.segments[1].part == "tool");
+  REQUIRE(robot.base_segments.size() == 1);
+  CHECK(robot.base_segments[0].part == "base");
+  CHECK(robot.base_segments[0].from_m == Vector3d(0, 0, -0.2));
+  CHECK(robot.self_collision_disabled.size() == 2);  // capsules bear parts as spheres do
+  check_same(robot, robot_from_json(parse_json(robot_to_json(robot).dump(), "again"), "again"));
+  CHECK(check_spheres(sidecar.file()) == 4);
+
+  // of a JSON robot it replaces spheres and capsules, and leaves lines alone
+  Robot with_line = robot;
+  with_line.links[1].segments.push_back({Vector3d::Zero(), Vector3d::UnitX(), 0.0});
+  const Scratch file("robot.json", robot_to_json(with_line).dump());
+  const Scratch other("other.json",
+                      R"({"links": {}, "capsules": {"upper": [{"from": [0, 0, 0], "to": [0, 0, 1], "radius": 0.3}]}})");
+  options.spheres = other.file();
+  const Robot replaced = read_robot(file.file(), options);
+  CHECK(replaced.base_segments.empty());
+  CHECK(replaced.links[0].spheres.empty());
+  REQUIRE(replaced.links[0].segments.size() == 1);
+  CHECK(replaced.links[0].segments[0].radius_m == 0.3);
+  REQUIRE(replaced.links[1].segments.size() == 1);
+  CHECK_FALSE(replaced.links[1].segments[0].is_capsule());
+
+  const auto refused = [&](const std::string& text) {
+    const Scratch bad("bad.json", text);
+    RobotOptions with_bad;
+    with_bad.spheres = bad.file();
+    try {
+      (void)read_text("arm.urdf", arm, with_bad);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  CHECK_THAT(refused(R"({"links": {}, "capsules": []})"), Catch::Contains("/capsules: expected an object"));
+  CHECK_THAT(refused(R"({"links": {}, "capsules": {"lover": []}})"), Catch::Contains("did you mean 'lower'?"));
+  CHECK_THAT(refused(R"({"links": {}, "capsules": {"lower": [{"from": [0, 0, 0], "radius": 1}]}})"),
+             Catch::Contains("/capsules/lower/0"));
+  CHECK_THAT(refused(R"({"links": {}, "capsules": {"lower": [{"from": [0, 0, 0], "to": [0, 0, 1], "radius": 0}]}})"),
+             Catch::Contains("/capsules/lower/0/radius"));
+}
+
 TEST_CASE("parts of a JSON robot are checked, and a sidecar replaces them with their pairs", "[model][robot]") {
   const Scratch spheres("spheres.json", R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}],
     "tool": [{"center": [0.1, 0, 0], "radius": 0.2}], "base": [{"center": [0, 0, 0], "radius": 0.2}]},
@@ -598,8 +699,12 @@ TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[model]
     CHECK(link.inertia_kg_m2(0, 0) == Approx(0.04 / 12 + 0.0009 / 4));
     CHECK(link.inertia_kg_m2(1, 1) == Approx(0.00045));
     CHECK(link.inertia_kg_m2(2, 2) == link.inertia_kg_m2(0, 0));
-    CHECK(link.segments.size() == 1);
-    CHECK_FALSE(link.spheres.empty());
+    CHECK(link.spheres.empty());
+    REQUIRE(link.segments.size() == 1);
+    CHECK(link.segments[0].is_capsule());
+    CHECK((link.com * link.segments[0].from_m - origin).norm() < 1e-15);
+    CHECK((link.com * link.segments[0].to_m - origin).norm() == Approx(0.2));
+    CHECK(link.segments[0].radius_m == 0.03);
   }
   CHECK((robot.tip.pose.p() - Vector3d(0, 0.8, 0)).norm() < 1e-15);
   CHECK_NOTHROW(make_chain({200, "x,y,z", 0.04, 0.1, 0.01}));

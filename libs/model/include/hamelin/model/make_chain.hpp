@@ -15,7 +15,7 @@ struct ChainOptions {
 };
 
 /// Link i (from 0) turns about axes[i mod count] through (0, i·length, 0) and ends at (0, (i + 1)·length, 0), its COM
-/// in the middle: I_xx = I_zz = m(L²/12 + r²/4), I_yy = m r²/2. One capsule and a row of spheres of that radius a link;
+/// in the middle: I_xx = I_zz = m(L²/12 + r²/4), I_yy = m r²/2. It collides by one capsule of that radius a link;
 /// the tip is the last link's end. No limits.
 /// @throws Error usage naming the option
 [[nodiscard]] Robot make_chain(const ChainOptions& options);

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -39,16 +40,23 @@ class Model {
   /// Pose of the tip in its link's joint-aligned frame (constant).
   [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept { return tip_in_frame_; }
 
-  struct PlacedSphere {
+  /// A collision shape of a link: all points within `radius` of the axis from centre − half_axis to centre + half_axis.
+  struct Shape {
     int link;
-    int index_in_link;
-    Eigen::Vector3d center;  ///< in the link's joint-aligned frame [m]
-    double radius;           ///< [m]
+    int index_in_link;          ///< into Link::spheres, or Link::segments if it is a capsule
+    bool is_capsule;            ///< a sphere's axis is a point
+    Eigen::Vector3d center;     ///< in the link's joint-aligned frame [m]
+    Eigen::Vector3d half_axis;  ///< likewise; zero for a sphere
+    double radius;              ///< [m]
   };
-  /// The collision spheres of all links, link by link.
-  [[nodiscard]] const std::vector<PlacedSphere>& spheres() const noexcept { return spheres_; }
+  /// The collision shapes of all links, link by link: its spheres, then its capsules.
+  [[nodiscard]] const std::vector<Shape>& shapes() const noexcept { return shapes_; }
+  /// Whether any shape is a capsule.
+  [[nodiscard]] bool has_capsules() const noexcept { return has_capsules_; }
+  /// A shape in words: "sphere 2 of link 'forearm'".
+  [[nodiscard]] std::string words(const Shape& shape) const;
 
-  /// An upper bound of the distance from the base to any point of any sphere or the tip, over all q; infinite never:
+  /// An upper bound of the distance from the base to any point of any shape or the tip, over all q; infinite never:
   /// prismatic joints count their limits, unlimited ones 1 m. [m]
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
@@ -61,7 +69,8 @@ class Model {
   std::variant<SpatialChain, PlanarChain> chain_;
   std::vector<geometry::SE3> com_in_frame_;
   geometry::SE3 tip_in_frame_;
-  std::vector<PlacedSphere> spheres_;
+  std::vector<Shape> shapes_;
+  bool has_capsules_ = false;
   double reach_ = 0.0;
 };
 

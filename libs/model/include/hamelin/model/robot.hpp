@@ -33,10 +33,14 @@ struct Sphere {
   std::string part{};  ///< what was lumped into the link and bears the sphere; empty: the link itself
 };
 
-/// Collision capsule (a segment if the radius is zero). Coordinates in the link's COM frame.
+/// Collision capsule: a sphere swept along a segment. With a radius of zero a line, for drawings and gain sets, that
+/// collides with nothing. Coordinates in the link's COM frame.
 struct Segment {
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
+  std::string part{};  ///< as a sphere's
+
+  [[nodiscard]] bool is_capsule() const noexcept { return radius_m > 0.0; }
 };
 
 /// One moving body with the joint that carries it.
@@ -65,6 +69,7 @@ struct Robot {
   std::vector<Link> links;
   Tip tip;
   std::vector<Sphere> base_spheres;  ///< of what does not move: base frame, each with its part; for self-collision only
+  std::vector<Segment> base_segments;  ///< likewise, capsules only
   /// Pairs of parts that never count as colliding: links, or what was lumped into one or into the base.
   std::vector<std::pair<std::string, std::string>> self_collision_disabled;
   std::vector<std::string> notes;

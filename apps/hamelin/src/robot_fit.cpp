@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "command_line.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/file.hpp"
+#include "hamelin/fit/robot_fit.hpp"
+#include "hamelin/model/srdf.hpp"
+#include "hamelin/model/urdf_geometry.hpp"
+#include "output.hpp"
+#include "robot_commands.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct Flags {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> output, srdf, compare;
+  fit::FitOptions fit;
+  std::vector<std::string> packages;
+  bool json = false;
+};
+
+void check_flags(Flags& flags) {
+  const auto positive = [](const char* option, double value, bool zero) {
+    if (!(value > 0.0 || (zero && value == 0.0)) || value > 10.0)
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: {} m, expected a length {}and at most 10", option, value, zero ? "" : "above 0 "));
+  };
+  positive("--excess", flags.fit.cover.excess_m, false);
+  positive("--padding", flags.fit.padding_m, true);
+  positive("--tolerance", flags.fit.tolerance_m, false);
+  for (const std::string& package : flags.packages) {
+    const auto at = package.find('=');
+    if (at == std::string::npos || at == 0 || at + 1 == package.size())
+      throw Error(ErrorCode::usage, fmt::format("--package: '{}', expected NAME=DIR", package));
+    flags.fit.meshes.packages.emplace_back(package.substr(0, at), package.substr(at + 1));
+  }
+  if (!flags.output && !flags.compare)
+    throw Error(ErrorCode::usage, "robot fit: no output, expected -o OUT.spheres.json (or --compare FILE)");
+}
+
+std::string millimetres(double metres) {
+  return std::isfinite(metres) ? fmt::format("{:.3g}", 1e3 * metres) : "all";
+}
+
+void print_table(const fit::RobotFit& fit, const std::string& title) {
+  constexpr const char* row = "{:<24} {:>9} {:>7} {:>8} {:>10} {:>10} {:>10} {:>7}\n";
+  std::string text = fmt::format("{}\n", title);
+  const auto rounded = [](double value) { return fmt::format("{:.1f}", 1e3 * value); };
+  text += fmt::format(row, "link", "triangles", "spheres", "capsules", "gap mm", "excess mm", "mean mm", "volume");
+  std::size_t balls = 0, triangles = 0;
+  for (const auto& link : fit.links) {
+    const auto n = static_cast<std::size_t>(
+        std::count_if(link.shapes.begin(), link.shapes.end(), [](const fit::Shape& s) { return s.ball(); }));
+    balls += n;
+    triangles += link.triangles;
+    text += fmt::format(row, link.name, link.triangles, n, link.shapes.size() - n, millimetres(link.gap.bound_m),
+                        rounded(link.excess.max_m), rounded(link.excess.mean_m),
+                        fmt::format("{:.2f}", link.excess.volume_m3 / link.volume_m3));
+  }
+  text +=
+      fmt::format(row, "in all", triangles, balls, fit.shapes() - balls, millimetres(fit.gap_bound_m()),
+                  rounded(fit.excess_max_m()), rounded(fit.excess_mean_m()), fmt::format("{:.2f}", fit.volume_ratio()));
+  text += "gap: no point of the geometry sticks out farther, proven; excess: how far the shapes stick out;\n";
+  text += "volume: of the shapes to that of the geometry\n";
+  for (const auto& note : fit.notes) text += fmt::format("note: {}\n", note);
+  report(text);
+}
+
+void run(Flags& flags) {
+  check_flags(flags);
+  std::filesystem::path target;
+  if (flags.output) {
+    std::vector<std::filesystem::path> inputs = {flags.file};
+    if (flags.srdf) inputs.push_back(*flags.srdf);
+    if (flags.compare) inputs.push_back(*flags.compare);
+    target = output_target(*flags.output, inputs);
+  }
+  std::vector<std::pair<std::string, std::string>> disabled;
+  if (flags.srdf) {
+    std::vector<std::string> links;
+    for (const auto& link : model::read_urdf_geometry(flags.file)) links.push_back(link.name);
+    for (const auto& pair : model::read_srdf(*flags.srdf, links)) disabled.emplace_back(pair.link_a, pair.link_b);
+  }
+  Json out{{"robot", flags.file.string()}};
+  if (flags.compare) {
+    const Phase phase("measuring the shapes given");
+    const fit::RobotFit given = fit::measure_sidecar(flags.file, *flags.compare, flags.fit);
+    if (flags.json)
+      out["compare"] = fit::figures_json(given);
+    else
+      print_table(given, fmt::format("{}: {} shapes as given", flags.compare->string(), given.shapes()));
+  }
+  if (flags.output) {
+    const Phase phase("fitting");
+    const fit::RobotFit fitted = fit::fit_robot(flags.file, flags.fit);
+    const std::string note = fmt::format(
+        "{} that cover the collision geometry of {} [m, link frames]: coverage gap {:.3g} mm, excess up to {:.1f} mm",
+        flags.fit.cover.capsules ? "Capsules" : "Spheres", flags.file.filename().string(), 1e3 * fitted.gap_bound_m(),
+        1e3 * fitted.excess_max_m());
+    write_file_aside(target, fit::sidecar_json(fitted, note, disabled).dump(1) + "\n");
+    if (flags.json) {
+      out["file"] = flags.output->string();
+      out["fit"] = fit::figures_json(fitted);
+    } else {
+      print_table(fitted, fmt::format("{}: {} shapes fitted", flags.output->string(), fitted.shapes()));
+    }
+  }
+  if (flags.json) print_json(out);
+}
+
+}  // namespace
+
+void add_robot_fit(CLI::App& robot, int& exit_code) {
+  auto* command = add_command(
+      robot, "fit", "Make collision spheres or capsules that cover a URDF's collision geometry, and measure them",
+      "hamelin robot fit arm.urdf --package arm_description=~/arm --total 50 -o arm.spheres.json\n"
+      "hamelin robot fit arm.urdf --capsules --excess 0.03 --srdf arm.srdf -o arm.capsules.json\n"
+      "hamelin robot fit arm.urdf --meshes meshes --compare by_hand.spheres.json --json");
+  const auto flags = std::make_shared<Flags>();
+  auto& fit = flags->fit;
+  command->add_option("file", flags->file, "a robot, .urdf")->required()->type_name("FILE.urdf");
+  command
+      ->add_option("-o,--output", flags->output, "sidecar to write, as --spheres and a scene's robot.spheres take it")
+      ->type_name("FILE.json");
+  command->add_option("--excess", fit.cover.excess_m, "how far a shape may stick out of the geometry [m]")
+      ->type_name("M")
+      ->capture_default_str();
+  command->add_option("--total", fit.total, "at most so many shapes in all: --excess becomes the least that does")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000));
+  command
+      ->add_option("--spheres-per-link", fit.cover.count_max,
+                   "at most so many shapes a link, even if they stick out farther")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_flag("--capsules", fit.cover.capsules, "capsules instead of spheres");
+  command->add_option("--padding", fit.padding_m, "added to each radius [m]")->type_name("M")->capture_default_str();
+  command->add_option("--package", flags->packages, "folder of a ROS package that meshes name; repeatable")
+      ->type_name("NAME=DIR")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--meshes", fit.meshes.folders,
+                   "folder with meshes: their paths, and ever shorter ends of them, are tried there; repeatable")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command->add_flag("--visual", fit.visual, "take <visual> where a link has no <collision>");
+  command->add_option("--srdf", flags->srdf, "copy its <disable_collisions> into the sidecar")->type_name("FILE.srdf");
+  command
+      ->add_option("--compare", flags->compare,
+                   "measure this sidecar against the geometry too; then -o may be left out")
+      ->type_name("FILE.json");
+  command->add_option("--tolerance", fit.tolerance_m, "to which a gap is bounded [m]")
+      ->type_name("M")
+      ->capture_default_str();
+  command->add_flag("--json", flags->json, "print the figures as JSON");
+  command->callback([flags, &exit_code] {
+    run(*flags);
+    exit_code = 0;
+  });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,47 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "hamelin/geometry/se3.hpp"
+
+namespace hamelin::fit {
+
+/// Triangles of a surface [m]; they need not be closed, oriented or free of overlaps.
+struct Mesh {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<std::int32_t, 3>> triangles;
+
+  [[nodiscard]] Eigen::Vector3d corner(std::size_t triangle, std::size_t k) const {
+    return vertices[static_cast<std::size_t>(triangles[triangle][k])];
+  }
+};
+
+/// The most triangles that a file may hold.
+inline constexpr std::size_t triangles_max = 5'000'000;
+
+/// How far a mesh of a curved surface may stand off it [m]. It never lies inside: what covers the mesh covers the
+/// solid.
+inline constexpr double facet_error_m = 5e-5;
+
+/// Reads STL, OBJ, COLLADA and what else assimp takes. Of a COLLADA file the unit counts and the up-axis does not.
+/// @param scale factors of the file's coordinates
+/// @throws Error io, parse or invalid: "file: what is wrong"
+[[nodiscard]] Mesh load_mesh(const std::filesystem::path& file, const Eigen::Vector3d& scale);
+
+/// A box about the origin. @param size full extents [m]
+[[nodiscard]] Mesh box_mesh(const Eigen::Vector3d& size);
+
+/// The prism around a cylinder about the origin, along z [m].
+[[nodiscard]] Mesh cylinder_mesh(double radius, double length);
+
+/// A polyhedron around a ball [m].
+[[nodiscard]] Mesh ball_mesh(const Eigen::Vector3d& center, double radius);
+
+/// Adds `other`, moved by `pose`.
+void append(Mesh& mesh, const Mesh& other, const geometry::SE3& pose = {});
+
+}  // namespace hamelin::fit

@@ -1,0 +1,249 @@
+#include "hamelin/fit/self_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "hamelin/core/rng.hpp"
+#include "hamelin/fit/shape.hpp"
+
+namespace hamelin::fit {
+
+namespace {
+
+using Eigen::Vector3d;
+using geometry::SE3;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+struct Part {
+  std::string name;
+  int body = -1;              // −1: base
+  std::vector<Shape> shapes;  // in the body's COM frame, of the base in the base frame
+};
+
+std::vector<Part> parts_of(const model::Robot& robot) {
+  std::vector<Part> parts;
+  const auto add = [&](const std::string& name, int body, const Shape& shape) {
+    for (Part& part : parts)
+      if (part.name == name) {
+        part.shapes.push_back(shape);
+        return;
+      }
+    parts.push_back({name, body, {shape}});
+  };
+  const auto add_all = [&](const auto& spheres, const auto& segments, const std::string& own, int body) {
+    for (const model::Sphere& s : spheres)
+      add(s.part.empty() ? own : s.part, body, {s.center_m, s.center_m, s.radius_m});
+    for (const model::Segment& s : segments)
+      if (s.radius_m > 0.0) add(s.part.empty() ? own : s.part, body, {s.from_m, s.to_m, s.radius_m});
+  };
+  for (std::size_t i = 0; i < robot.links.size(); ++i)
+    add_all(robot.links[i].spheres, robot.links[i].segments, robot.links[i].name, static_cast<int>(i));
+  add_all(robot.base_spheres, robot.base_segments, "base", -1);
+  return parts;
+}
+
+// Distance of two segments (Ericson 2005, 5.1.9).
+double segments_apart(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2, const Vector3d& q2) {
+  const Vector3d d1 = q1 - p1, d2 = q2 - p2, r = p1 - p2;
+  const double a = d1.squaredNorm(), e = d2.squaredNorm(), f = d2.dot(r);
+  if (a <= 0.0) return segment_distance(p2, q2, p1);
+  if (e <= 0.0) return segment_distance(p1, q1, p2);
+  const double c = d1.dot(r), b = d1.dot(d2), denominator = a * e - b * b;
+  double s = denominator > 1e-12 * a * e ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
+  double t = (b * s + f) / e;
+  if (t < 0.0) {
+    t = 0.0;
+    s = std::clamp(-c / a, 0.0, 1.0);
+  } else if (t > 1.0) {
+    t = 1.0;
+    s = std::clamp((b - c) / a, 0.0, 1.0);
+  }
+  return (p1 + s * d1 - p2 - t * d2).norm();
+}
+
+double apart(const std::vector<Shape>& a, const std::vector<Shape>& b) {
+  double least = infinity;
+  for (const Shape& x : a)
+    for (const Shape& y : b) {
+      const double axes = x.ball() && y.ball() ? (x.from - y.from).norm() : segments_apart(x.from, x.to, y.from, y.to);
+      least = std::min(least, axes - x.radius_m - y.radius_m);
+    }
+  return least;
+}
+
+// The parts' shapes in the base frame.
+void place(const model::Robot& robot, const std::vector<double>& q, const std::vector<Part>& parts,
+           std::vector<std::vector<Shape>>& placed) {
+  std::vector<SE3> poses;
+  SE3 moved;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    moved = moved * SE3::exp(robot.links[i].joint.screw * q[i]);
+    poses.push_back(moved * robot.links[i].com);
+  }
+  placed.resize(parts.size());
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const SE3 pose = parts[k].body < 0 ? SE3() : poses[static_cast<std::size_t>(parts[k].body)];
+    placed[k].clear();
+    for (const Shape& shape : parts[k].shapes) {
+      const Vector3d from = pose * shape.from;
+      placed[k].push_back({from, shape.ball() ? from : pose * shape.to, shape.radius_m});
+    }
+  }
+}
+
+std::pair<double, double> range_of(const model::Joint& joint) {
+  const double open = joint.type == model::JointType::revolute ? std::numbers::pi : 1.0;
+  return {joint.lower.value_or(-open), joint.upper.value_or(open)};
+}
+
+std::vector<std::string> odd_limits_of(const model::Robot& robot) {
+  std::vector<std::string> odd;
+  for (const model::Link& link : robot.links) {
+    const model::Joint& joint = link.joint;
+    const bool turns = joint.type == model::JointType::revolute;
+    const char* unit = turns ? "rad" : "m";
+    const auto say = [&](const std::string& what) { odd.push_back(fmt::format("joint '{}': {}", joint.name, what)); };
+    if (joint.lower && joint.upper) {
+      const double low = *joint.lower, high = *joint.upper;
+      if (low > 0.0 || high < 0.0) say(fmt::format("0 is outside its limits [{:.4g}, {:.4g}] {}", low, high, unit));
+      if (turns && high - low > 4.0 * std::numbers::pi + 1e-6)
+        say(fmt::format("its limits [{:.4g}, {:.4g}] rad span more than two turns; degrees?", low, high));
+      if (!turns && high - low > 10.0)
+        say(fmt::format("its limits [{:.4g}, {:.4g}] m span more than 10 m; millimetres?", low, high));
+      if (high - low < (turns ? 0.01 : 0.001))
+        say(fmt::format("its limits [{:.4g}, {:.4g}] {} leave it next to no room", low, high, unit));
+    } else if (!turns) {
+      say("it slides without limits");
+    }
+    if (joint.velocity_max && *joint.velocity_max > (turns ? 50.0 : 20.0))
+      say(fmt::format("its speed limit is {:.4g} {}/s", *joint.velocity_max, unit));
+    if (!joint.velocity_max) say("it has no speed limit");
+    if (!joint.effort_max) say(fmt::format("it has no {} limit", turns ? "torque" : "force"));
+  }
+  return odd;
+}
+
+}  // namespace
+
+std::vector<PartPair> SelfCheck::faults() const {
+  std::vector<PartPair> out;
+  for (const PartPair& pair : pairs)
+    if (pair.checked && pair.touches_at_rest()) out.push_back(pair);
+  return out;
+}
+
+std::vector<model::DisabledPair> SelfCheck::disabled(bool never) const {
+  std::vector<model::DisabledPair> out;
+  for (const PartPair& pair : pairs) {
+    const bool touches = pair.touches_at_rest() || pair.contacts > 0;
+    const bool listed = !pair.checked && !pair.neighbours;
+    std::string reason;
+    if (pair.neighbours && (touches || !pair.checked)) {
+      reason = "Adjacent";
+    } else if (listed) {
+      reason = pair.reason;
+    } else if (samples > 0 && pair.contacts == samples) {
+      reason = "Always";
+    } else if (pair.touches_at_rest()) {
+      reason = "Default";
+    } else if (never && samples > 0 && !touches) {
+      reason = "Never";
+    }
+    if (!reason.empty()) out.push_back({pair.part_a, pair.part_b, reason, 0});
+  }
+  return out;
+}
+
+SelfCheck check_self(const model::Robot& robot, const std::vector<model::DisabledPair>& listed,
+                     const SelfCheckOptions& options) {
+  SelfCheck out;
+  const std::vector<Part> parts = parts_of(robot);
+  const auto same = [](const std::string& a, const std::string& b, const PartPair& pair) {
+    return (a == pair.part_a && b == pair.part_b) || (a == pair.part_b && b == pair.part_a);
+  };
+  std::vector<std::pair<std::size_t, std::size_t>> indices;
+  for (std::size_t a = 0; a < parts.size(); ++a)
+    for (std::size_t b = a + 1; b < parts.size(); ++b) {
+      if (parts[a].body == parts[b].body) continue;
+      PartPair pair;
+      pair.part_a = parts[a].name;
+      pair.part_b = parts[b].name;
+      pair.neighbours = std::abs(parts[a].body - parts[b].body) == 1;
+      pair.checked = true;
+      for (const auto& [x, y] : robot.self_collision_disabled)
+        if (same(x, y, pair)) {
+          pair.checked = false;
+          pair.reason = "listed";
+        }
+      if (robot.self_collision_disabled.empty() && pair.neighbours) {
+        pair.checked = false;
+        pair.reason = "neighbours, and nothing is listed";
+      }
+      for (const model::DisabledPair& why : listed)
+        if (!pair.checked && same(why.link_a, why.link_b, pair) && !why.reason.empty()) pair.reason = why.reason;
+      out.pairs.push_back(std::move(pair));
+      indices.emplace_back(a, b);
+    }
+
+  std::vector<double> q;
+  for (const model::Link& link : robot.links) {
+    const auto [low, high] = range_of(link.joint);
+    q.push_back(low <= 0.0 && high >= 0.0 ? 0.0 : 0.5 * (low + high));
+  }
+  out.rest_q = q;
+  out.samples = options.samples;
+  std::vector<std::vector<Shape>> placed;
+  place(robot, q, parts, placed);
+  for (std::size_t k = 0; k < indices.size(); ++k)
+    out.pairs[k].rest_m = out.pairs[k].least_m = apart(placed[indices[k].first], placed[indices[k].second]);
+  Rng rng(options.seed);
+  for (int sample = 0; sample < options.samples; ++sample) {
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      const auto [low, high] = range_of(robot.links[i].joint);
+      q[i] = rng.uniform(low, high);
+    }
+    place(robot, q, parts, placed);
+    for (std::size_t k = 0; k < indices.size(); ++k) {
+      const double distance = apart(placed[indices[k].first], placed[indices[k].second]);
+      out.pairs[k].least_m = std::min(out.pairs[k].least_m, distance);
+      if (distance <= 0.0) ++out.pairs[k].contacts;
+    }
+  }
+
+  for (std::size_t i = 0; i < robot.links.size(); ++i)
+    if (std::none_of(parts.begin(), parts.end(), [&](const Part& p) { return p.body == static_cast<int>(i); }))
+      out.shapeless.push_back(robot.links[i].name);
+  out.odd_limits = odd_limits_of(robot);
+  return out;
+}
+
+std::string srdf_text(const std::string& robot, const std::vector<model::DisabledPair>& pairs) {
+  const auto quoted = [](const std::string& text) {
+    std::string out;
+    for (const char c : text) {
+      if (c == '&') {
+        out += "&amp;";
+      } else if (c == '<') {
+        out += "&lt;";
+      } else if (c == '"') {
+        out += "&quot;";
+      } else {
+        out += c;
+      }
+    }
+    return out;
+  };
+  std::string text = fmt::format("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", quoted(robot));
+  for (const model::DisabledPair& pair : pairs)
+    text += fmt::format("  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{}\"/>\n", quoted(pair.link_a),
+                        quoted(pair.link_b), quoted(pair.reason));
+  return text + "</robot>\n";
+}
+
+}  // namespace hamelin::fit

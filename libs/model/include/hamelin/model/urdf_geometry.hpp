@@ -1,0 +1,35 @@
+#pragma once
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hamelin/geometry/se3.hpp"
+
+namespace hamelin::model {
+
+/// One <collision> or <visual> of a URDF link: a shape and where it stands in the link's frame.
+struct LinkShape {
+  enum class Kind { sphere, box, cylinder, mesh };
+  Kind kind = Kind::sphere;
+  geometry::SE3 pose;                                ///< of the shape, in the link's frame
+  double radius_m = 0.0;                             ///< sphere, cylinder
+  double length_m = 0.0;                             ///< cylinder: along its z, centred
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  ///< box: full extents, centred
+  std::string mesh;                                  ///< the file as the URDF names it: package://, file:// or a path
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();   ///< mesh: factors of its coordinates
+  int line = 0;                                      ///< of the URDF where the shape stands
+};
+
+/// A link with the shapes the file gives it.
+struct LinkGeometry {
+  std::string name;
+  int line = 0;
+  std::vector<LinkShape> collision, visual;
+};
+
+/// The shapes of all links of a .urdf, in the file's order. Sizes are positive and finite.
+/// @throws Error io, parse or invalid: "file: line N: link 'x': what is wrong, what was expected"
+[[nodiscard]] std::vector<LinkGeometry> read_urdf_geometry(const std::filesystem::path& file);
+
+}  // namespace hamelin::model

@@ -1,0 +1,192 @@
+#include <algorithm>
+#include <cmath>
+
+#include "../program.hpp"
+#include "hamelin/test/scene_data.hpp"
+
+using namespace hamelin;
+using test::Bench;
+namespace fs = std::filesystem;
+
+namespace {
+
+// An arm of primitives: a drum that turns, a rod on it, a box at its end.
+constexpr const char* arm = R"(<robot name="drum">
+ <link name="base"><collision><geometry><box size="0.2 0.2 0.05"/></geometry></collision></link>
+ <link name="drum"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+  <collision><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.06" length="0.2"/></geometry></collision></link>
+ <link name="rod"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+  <collision><origin xyz="0 0 0.25"/><geometry><cylinder radius="0.04" length="0.5"/></geometry></collision></link>
+ <link name="box"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+  <collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.15"/></geometry></collision></link>
+ <joint name="j1" type="revolute"><parent link="base"/><child link="drum"/><axis xyz="0 0 1"/>
+  <limit lower="-3" upper="3" effort="50" velocity="2"/></joint>
+ <joint name="j2" type="revolute"><origin xyz="0 0 0.25"/><parent link="drum"/><child link="rod"/><axis xyz="1 0 0"/>
+  <limit lower="-2" upper="2" effort="50" velocity="2"/></joint>
+ <joint name="j3" type="revolute"><origin xyz="0 0 0.5"/><parent link="rod"/><child link="box"/><axis xyz="1 0 0"/>
+  <limit lower="0.5" upper="2.5" effort="50" velocity="2"/></joint>
+</robot>)";
+
+bool one_line_error(const test::Output& output) {
+  return output.exit_code == 2 && output.out.empty() && test::lines_of(output.err).size() == 1;
+}
+
+}  // namespace
+
+TEST_CASE("robot fit covers primitives, and its sidecar is read by robot info and validate", "[end_to_end]") {
+  Bench bench;
+  bench.put("arm.urdf", arm);
+  const Json made = test::run_json(bench, {"robot", "fit", "arm.urdf", "-o", "arm.spheres.json"});
+  CHECK(made["fit"]["gap_bound_m"] == 0.0);
+  CHECK(made["fit"]["excess_max_m"].get<double>() < 0.027);
+  CHECK(made["fit"]["links"].size() == 4);
+  const auto shapes = made["fit"]["shapes"].get<std::size_t>();
+  const Json info = test::run_json(bench, {"robot", "info", "arm.urdf", "--spheres", "arm.spheres.json"});
+  CHECK(info["spheres"].get<std::size_t>() + info["base_spheres"].get<std::size_t>() == shapes);
+  CHECK(bench.run({"validate", "arm.spheres.json"}).exit_code == 0);
+  // the same bytes again
+  const std::string first = bench.text("arm.spheres.json");
+  REQUIRE(bench.run({"robot", "fit", "arm.urdf", "-o", "again.json"}).exit_code == 0);
+  CHECK((bench.text("again.json") == first));
+  // without spheres the reader says where they come from
+  CHECK_THAT(bench.run({"robot", "info", "arm.urdf"}).out, Catch::Contains("`hamelin robot fit`"));
+}
+
+TEST_CASE("robot fit makes fewer capsules, measures what is given and prints a table", "[end_to_end]") {
+  Bench bench;
+  bench.put("arm.urdf", arm);
+  const Json capsules = test::run_json(bench, {"robot", "fit", "arm.urdf", "--capsules", "-o", "c.json"});
+  const Json spheres = test::run_json(bench, {"robot", "fit", "arm.urdf", "-o", "s.json"});
+  CHECK(capsules["fit"]["gap_bound_m"] == 0.0);
+  CHECK(capsules["fit"]["shapes"].get<int>() < spheres["fit"]["shapes"].get<int>());
+  CHECK(bench.json("c.json").contains("capsules"));
+  const Json compared = test::run_json(bench, {"robot", "fit", "arm.urdf", "--compare", "c.json"});
+  CHECK(compared["compare"]["gap_bound_m"] == 0.0);
+  CHECK(compared["compare"]["excess_max_m"] == capsules["fit"]["excess_max_m"]);
+  bench.put("bad.json", R"({"links": {"rod": [{"center": [0, 0, 0.25], "radius": 0.1}]}})");
+  const auto table = bench.run({"robot", "fit", "arm.urdf", "--compare", "bad.json"});
+  CHECK(table.exit_code == 0);
+  CHECK_THAT(table.out, Catch::Contains("rod") && Catch::Contains("link 'box' has geometry but no shapes"));
+}
+
+TEST_CASE("robot fit refuses in one line and leaves nothing behind", "[end_to_end]") {
+  Bench bench;
+  bench.put("arm.urdf", arm);
+  const auto before = bench.files();
+  const std::vector<std::vector<std::string>> commands = {
+      {"robot", "fit", "absent.urdf", "-o", "s.json"},
+      {"robot", "fit", "arm.urdf"},
+      {"robot", "fit", "arm.urdf", "-o", "arm.urdf"},
+      {"robot", "fit", "arm.urdf", "-o", "s.json", "--excess", "0"},
+      {"robot", "fit", "arm.urdf", "-o", "s.json", "--excess", "nan"},
+      {"robot", "fit", "arm.urdf", "-o", "s.json", "--total", "1"},
+      {"robot", "fit", "arm.urdf", "-o", "s.json", "--package", "nothing"},
+      {"robot", "fit", "arm.urdf", "-o", "s.json", "--srdf", "absent.srdf"},
+      {"robot", "fit", "data/robots/planar3.json", "-o", "s.json"}};
+  for (const auto& command : commands) {
+    const auto output = bench.run(command);
+    CAPTURE(command, output.err, output.out);
+    CHECK(one_line_error(output));
+  }
+  CHECK(bench.files() == before);
+  bench.put("mesh.urdf",
+            "<robot name=\"m\"><link name=\"a\"><collision><geometry>\n<mesh filename=\"package://p/m.stl\"/>"
+            "</geometry></collision></link></robot>");
+  const auto output = bench.run({"robot", "fit", "mesh.urdf", "-o", "s.json"});
+  CHECK(one_line_error(output));
+  CHECK_THAT(output.err, Catch::Contains("mesh.urdf: line 2: link 'a'") && Catch::Contains("package://p/m.stl") &&
+                             Catch::Contains("p/m.stl,"));
+}
+
+TEST_CASE("robot check finds overlaps at rest, and the list it writes makes it clean", "[end_to_end]") {
+  Bench bench;
+  bench.put("arm.urdf", arm);
+  REQUIRE(bench.run({"robot", "fit", "arm.urdf", "-o", "s.json"}).exit_code == 0);
+  // an empty-handed list switches the rule for neighbours off
+  bench.put("one.srdf",
+            "<robot name=\"drum\"><disable_collisions link1=\"base\" link2=\"box\" reason=\"Never\"/></robot>");
+  const Json strict = test::run_json(
+      bench, {"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf", "one.srdf", "--samples", "500"}, 1);
+  CHECK(strict["overlaps_at_rest"].size() >= 2);
+  CHECK(strict["rest_q"][2].get<double>() == Approx(1.5));
+  for (const Json& pair : strict["pairs"]) {
+    const bool named = pair["parts"] == Json::array({"box", "base"}) || pair["parts"] == Json::array({"base", "box"});
+    CHECK(pair["checked"].get<bool>() != named);
+    if (named) CHECK(pair["reason"] == "Never");
+  }
+  CHECK(std::any_of(strict["odd_limits"].begin(), strict["odd_limits"].end(), [](const Json& line) {
+    return line.get<std::string>().find("'j3': 0 is outside its limits") != std::string::npos;
+  }));
+  for (const char* file : {"list.srdf", "list.json"}) {
+    CAPTURE(file);
+    CHECK(bench
+              .run({"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf", "one.srdf", "--samples", "500",
+                    "--write", file})
+              .exit_code == 1);
+  }
+  const Json by_srdf =
+      test::run_json(bench, {"robot", "check", "arm.urdf", "--spheres", "s.json", "--srdf", "list.srdf"});
+  const Json by_sidecar = test::run_json(bench, {"robot", "check", "arm.urdf", "--spheres", "list.json"});
+  CHECK(by_srdf["overlaps_at_rest"].empty());
+  CHECK(by_sidecar["overlaps_at_rest"].empty());
+  // what is checked is what the simulation checks
+  const Json info = test::run_json(bench, {"robot", "info", "arm.urdf", "--spheres", "list.json"});
+  const auto checked = std::count_if(by_sidecar["pairs"].begin(), by_sidecar["pairs"].end(),
+                                     [](const Json& pair) { return pair["checked"].get<bool>(); });
+  CHECK(info["self_collision_pairs"].get<std::ptrdiff_t>() == checked);
+  CHECK(checked > 0);
+}
+
+TEST_CASE("robot check is clean for the robots of data/, and the same seed gives the same text", "[end_to_end]") {
+  Bench bench;
+  const std::vector<std::string> command = {
+      "robot", "check", "data/robots/arm7.urdf", "--spheres", "data/robots/arm7.spheres.json", "--samples", "300"};
+  const auto first = bench.run(command);
+  CAPTURE(first.err, first.out);
+  CHECK(first.exit_code == 0);
+  CHECK(bench.run(command).out == first.out);
+  CHECK_THAT(first.out, Catch::Contains("neighbours, and nothing is listed") && Catch::Contains("clean"));
+  CHECK(bench.run({"robot", "check", "data/robots/planar3.json", "--samples", "10"}).exit_code == 0);
+}
+
+TEST_CASE("a scene's robot.srdf reaches the run: its hash is logged and the log replays", "[end_to_end]") {
+  Bench bench;
+  bench.put("arm.urdf", arm);
+  bench.put("arm.srdf",
+            "<robot name=\"drum\"><disable_collisions link1=\"base\" link2=\"drum\" reason=\"Adjacent\"/>"
+            "<disable_collisions link1=\"drum\" link2=\"rod\" reason=\"Adjacent\"/>"
+            "<disable_collisions link1=\"rod\" link2=\"box\" reason=\"Adjacent\"/></robot>");
+  REQUIRE(bench.run({"robot", "fit", "arm.urdf", "-o", "s.json"}).exit_code == 0);
+  const Json scene = {{"schema", "hamelin.scene/1"},
+                      {"robot", {{"file", "arm.urdf"}, {"spheres", "s.json"}, {"srdf", "arm.srdf"}}},
+                      {"start", {{"q", {0.0, 0.3, 1.0}}}},
+                      {"goals", {{{"type", "joint"}, {"q", {0.2, 0.4, 1.1}}}}},
+                      {"model", {{"self_collision", true}}}};
+  bench.put("scene.json", scene.dump());
+  const auto run = bench.run({"run", "scene.json", "--planner", "apf", "--duration", "0.05", "--log", "log.jsonl"});
+  CAPTURE(run.err, run.out);
+  CHECK(run.exit_code <= 1);
+  const Json header = parse_json(test::lines_of(bench.text("log.jsonl")).front(), "header");
+  CHECK(header["config"]["robot"]["srdf"].get<std::string>().find("arm.srdf") != std::string::npos);
+  CHECK(header["provenance"].dump().find("\"srdf\"") != std::string::npos);
+  CHECK(bench.run({"replay", "log.jsonl", "--verify"}).exit_code == 0);
+  bench.put("scene.json", [&] {
+    Json wrong = scene;
+    wrong["robot"]["srdf"] = "absent.srdf";
+    return wrong.dump();
+  }());
+  const auto absent = bench.run({"run", "scene.json", "--planner", "apf"});
+  CHECK(one_line_error(absent));
+  CHECK_THAT(absent.err, Catch::Contains("absent.srdf"));
+}
+
+TEST_CASE("the public Panda's SRDF and spheres are read together", "[end_to_end]") {
+  const auto robots = test::shared_data("robots");
+  if (!robots) return;
+  Bench bench;
+  const auto path = [&](const char* name) { return (fs::canonical(*robots) / name).string(); };
+  const Json info = test::run_json(bench, {"robot", "info", path("panda.urdf"), "--tip", "panda_grasptarget",
+                                           "--spheres", path("panda_spheres.json"), "--srdf", path("panda.srdf")});
+  CHECK(std::any_of(info["notes"].begin(), info["notes"].end(),
+                    [](const Json& note) { return note.get<std::string>().find("panda.srdf:") == 0; }));
+}
