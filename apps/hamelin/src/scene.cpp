@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "scene_map.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -24,7 +26,7 @@ constexpr double shown_influence_m = 0.2;
 
 struct InfoOptions {
   std::filesystem::path file;
-  std::optional<double> scale;
+  MapInfoOptions map;
   bool json = false;
 };
 
@@ -40,79 +42,49 @@ struct MakeOptions {
   bool json = false;
 };
 
-Json corner(const std::array<double, 3>& x) {
-  return {x[0], x[1], x[2]};
-}
-
-// Where a map's occupied cells lie, in its own frame [m].
-Json map_info(const std::filesystem::path& file, std::optional<double> scale) {
-  const auto map = scene::read_map(file, {scale, 0.5});
-  std::array<double, 3> low{}, high{};
-  bool first = true;
-  for (const auto& cell : map.occupied)
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double lo = cell.lo[i] * map.resolution, hi = lo + cell.size * map.resolution;
-      low[i] = first ? lo : std::min(low[i], lo);
-      high[i] = first ? hi : std::max(high[i], hi);
-      if (i == 2) first = false;
-    }
-  return {{"file", file.string()},
-          {"kind", "map"},
-          {"resolution_m", map.resolution},
-          {"nodes", map.node_count},
-          {"occupied_leaves", map.occupied.size()},
-          {"free_leaves", map.free_leaves},
-          {"occupied_low_m", map.occupied.empty() ? Json(nullptr) : corner(low)},
-          {"occupied_high_m", map.occupied.empty() ? Json(nullptr) : corner(high)},
-          {"sha256", map.sha256},
-          {"warnings", map.warnings}};
-}
-
 /// The arm where it stands at time zero: how near it is to what is there and to itself.
 class Surroundings {
  public:
   Surroundings(const scene::Scene& scene, const model::Model& model, const scene::Environment& environment)
-      : model_(model), environment_(environment), ws_(model), scratch_(environment, model.spheres().size()) {
+      : model_(model),
+        environment_(environment),
+        ws_(model),
+        scratch_(environment, model.shapes().size()),
+        arm_(model) {
     if (scene.model.self_collision) self_.emplace(model);
-    centers_.resize(model.spheres().size());
-    for (const auto& sphere : model.spheres()) radii_.push_back(sphere.radius);
   }
 
   [[nodiscard]] const std::optional<scene::SelfField>& self() const { return self_; }
 
   void stand_at(const Eigen::VectorXd& q) {
     dynamics::forward_kinematics(model_, ws_, q);
-    dynamics::sphere_centers(model_, ws_, centers_);
+    arm_.place(model_, ws_);
   }
 
-  [[nodiscard]] double clearance() const { return environment_.clearance(centers_, radii_, 0.0, shown_influence_m); }
+  [[nodiscard]] double clearance() const { return environment_.clearance(arm_.view(), 0.0, shown_influence_m); }
 
   /// Empty if no two parts can touch.
   [[nodiscard]] std::optional<scene::SelfContact> nearest_of_itself() const {
     std::array<scene::SelfContact, 1> nearest;
-    if (self_->closest(centers_, std::numeric_limits<double>::infinity(), nearest) == 0) return std::nullopt;
+    if (self_->closest(arm_.view(), std::numeric_limits<double>::infinity(), nearest) == 0) return std::nullopt;
     return nearest[0];
   }
 
   /// A line for the deepest contact with an obstacle, and one for the deepest with itself.
   /// @param moving whether obstacles that move count
   void note_contacts(const std::string& place, bool moving, Json& notes) {
-    std::vector<scene::Contact> contacts(model_.spheres().size() *
-                                         (scene::Environment::points_per_sphere + environment_.obstacles().size()));
-    contacts.resize(std::min(contacts.size(),
-                             environment_.closest(centers_, radii_, 0.0, 0.0, scratch_, contacts, scene::View::judge)));
+    std::vector<scene::Contact> contacts(environment_.contacts_max(model_.shapes().size()));
+    contacts.resize(
+        std::min(contacts.size(), environment_.closest(arm_.view(), 0.0, 0.0, scratch_, contacts, scene::View::judge)));
     const scene::Contact* deepest = nullptr;
     for (const auto& contact : contacts) {
       const bool moves = contact.obstacle >= 0 &&
                          environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)].motion.has_value();
       if ((moving || !moves) && (deepest == nullptr || contact.distance < deepest->distance)) deepest = &contact;
     }
-    if (deepest != nullptr) {
-      const auto& sphere = model_.spheres()[static_cast<std::size_t>(deepest->sphere)];
-      notes.push_back(fmt::format("{}: sphere {} of link '{}' is {:.2g} mm inside {}", place, sphere.index_in_link,
-                                  model_.robot().links[static_cast<std::size_t>(sphere.link)].name,
-                                  -1e3 * deepest->distance, environment_.words(deepest->obstacle)));
-    }
+    if (deepest != nullptr)
+      notes.push_back(fmt::format("{}: {}; the way out is {}", place, environment_.words(*deepest, model_),
+                                  scene::way_out(*deepest)));
     if (!self_) return;
     if (const auto nearest = nearest_of_itself(); nearest && nearest->distance <= 0.0)
       notes.push_back(fmt::format("{}: the arm touches itself: {} are {:.2g} mm inside each other", place,
@@ -125,14 +97,15 @@ class Surroundings {
   dynamics::Workspace ws_;
   scene::Environment::Scratch scratch_;
   std::optional<scene::SelfField> self_;
-  std::vector<Eigen::Vector3d> centers_;
-  std::vector<double> radii_;
+  scene::PlacedShapes arm_;
 };
 
 Json scene_info(const std::filesystem::path& file) {
   const scene::Scene scene = scene::read_scene(file);
   const model::Model model = simulation::load_model(scene);
-  const auto environment = scene::make_environment(scene, model.reach(), shown_influence_m);
+  const auto begin = std::chrono::steady_clock::now();
+  const auto environment = scene::make_environment(scene, model, shown_influence_m);
+  const double build_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   const auto& summary = environment.summary();
   Json goals = Json::array();
   for (const auto& goal : scene.goals) goals.push_back(scene::type_name(goal));
@@ -140,7 +113,7 @@ Json scene_info(const std::filesystem::path& file) {
             {"kind", "scene"},
             {"robot", model.robot().name},
             {"dof", model.dof()},
-            {"spheres", model.spheres().size()},
+            {"spheres", model.shapes().size()},
             {"reach_m", model.reach()},
             {"goals", goals},
             {"planner", scene.planner ? Json(scene.planner->name) : Json(nullptr)},
@@ -149,16 +122,32 @@ Json scene_info(const std::filesystem::path& file) {
             {"map", nullptr},
             {"clearance_at_start_m", nullptr},
             {"self_clearance_at_start_m", nullptr},
+            {"timing", {{"build_ms", build_ms}}},
             {"warnings", summary.warnings}};
-  if (summary.has_map)
+  if (summary.has_map) {
     info["map"] = {{"file", summary.map_file},
+                   {"sha256", summary.map_sha256},
                    {"resolution_m", summary.resolution_m},
+                   {"nodes", summary.nodes},
                    {"occupied_leaves", summary.leaves},
-                   {"within_reach", summary.leaves_cropped},
-                   {"boxes", summary.boxes},
+                   {"free_leaves", summary.free_leaves},
                    {"unknown", scene::to_string(summary.unknown)},
-                   {"unknown_share", summary.unknown_share}};
-  if (model.spheres().empty()) return info;
+                   {"self_filter", nullptr}};
+    info["map"]["within_reach"] = {{"reach_m", model.reach()},
+                                   {"occupied_share", summary.within_reach.occupied},
+                                   {"free_share", summary.within_reach.free},
+                                   {"unknown_share", summary.within_reach.unknown},
+                                   {"occupied_leaves", summary.leaves_cropped},
+                                   {"boxes", summary.boxes},
+                                   {"unknown_boxes", summary.unknown_boxes},
+                                   {"structure_bytes", environment.map_field().bytes()}};
+    if (summary.self_filter_padding_m)
+      info["map"]["self_filter"] = {{"padding_m", *summary.self_filter_padding_m},
+                                    {"occupied_voxels", summary.self_filter_voxels},
+                                    {"occupied_leaves", summary.self_filter_leaves},
+                                    {"unknown_voxels", summary.self_filter_unknown_voxels}};
+  }
+  if (model.shapes().empty()) return info;
   const auto sized = [&](const Eigen::VectorXd& q, const std::string& place) {
     if (q.size() != model.dof())
       throw Error(ErrorCode::invalid,
@@ -184,28 +173,61 @@ Json scene_info(const std::filesystem::path& file) {
   return info;
 }
 
-void show(const Json& info) {
-  for (const auto& [key, value] : info.items()) {
-    if (key == "warnings") continue;
-    fmt::print("{:<26} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+std::string scene_text(const Json& info) {
+  const auto words = [](const Json& value) { return value.is_null() ? "none" : value.get<std::string>(); };
+  std::string out =
+      fmt::format("{}: scene of '{}', {} joints, {} collision shapes, reach {:.4g} m\n", words(info["file"]),
+                  words(info["robot"]), info["dof"].dump(), info["spheres"].dump(), info["reach_m"].get<double>());
+  std::string goals;
+  for (const auto& goal : info["goals"]) goals += (goals.empty() ? "" : ", ") + words(goal);
+  out += info_line("goals", goals.empty() ? "none" : goals);
+  out += info_line("planner", fmt::format("{}; integrator {}", words(info["planner"]), words(info["integrator"])));
+  out += info_line("obstacles", fmt::format("{} besides the map", info["obstacles"].dump()));
+  if (const Json& map = info["map"]; !map.is_null()) {
+    const Json& near = map["within_reach"];
+    out += info_line("map", fmt::format("{}, voxels of {:.4g} m, {} occupied leaves, {} free", words(map["file"]),
+                                        map["resolution_m"].get<double>(), map["occupied_leaves"].dump(),
+                                        map["free_leaves"].dump()));
+    out += info_line("within reach",
+                     fmt::format("{} occupied, {} free, {} unknown: taken for {}", percent(near["occupied_share"]),
+                                 percent(near["free_share"]), percent(near["unknown_share"]),
+                                 map["unknown"] == "block" ? "an obstacle" : words(map["unknown"])));
+    if (const Json& filter = map["self_filter"]; !filter.is_null())
+      out += info_line("self-filter",
+                       fmt::format("{} occupied voxels of {} leaves and {} unknown ones taken out, {:.3g} m around the "
+                                   "robot at its start",
+                                   filter["occupied_voxels"].dump(), filter["occupied_leaves"].dump(),
+                                   filter["unknown_voxels"].dump(), filter["padding_m"].get<double>()));
+    out += info_line("structure",
+                     fmt::format("{} boxes of {} leaves, {}; read and built in {:.3g} ms", near["boxes"].dump(),
+                                 near["occupied_leaves"].dump(), bytes_text(near["structure_bytes"].get<std::size_t>()),
+                                 info["timing"]["build_ms"].get<double>()));
   }
-  for (const auto& warning : info["warnings"]) note(warning.get<std::string>());
+  const auto clearance = [&](const char* label, const Json& distance) {
+    if (!distance.is_null()) out += info_line(label, fmt::format("{:.4g} m at the start", distance.get<double>()));
+  };
+  clearance("clearance", info["clearance_at_start_m"]);
+  clearance("to itself", info["self_clearance_at_start_m"]);
+  return out;
 }
 
 void info(const InfoOptions& options) {
   const Kind kind = kind_of(options.file);
-  Json document;
-  if (kind == Kind::map)
-    document = map_info(options.file, options.scale);
-  else if (kind == Kind::scene)
-    document = scene_info(options.file);
-  else
+  if (kind != Kind::map && kind != Kind::scene)
     throw Error(ErrorCode::usage,
                 fmt::format("{}: is a {}, expected a map or a scene", options.file.string(), to_string(kind)));
-  if (options.json)
+  const MapInfoOptions& of_map = options.map;
+  if (kind == Kind::scene && (of_map.scale || of_map.threshold || of_map.reach || !of_map.base.empty()))
+    throw Error(ErrorCode::usage,
+                "scene info: --scale, --threshold, --base and --reach are for a map, a scene has its "
+                "own");
+  const Json document = kind == Kind::map ? map_info(options.file, of_map) : scene_info(options.file);
+  if (options.json) {
     print_json(document);
-  else
-    show(document);
+    return;
+  }
+  fmt::print("{}", kind == Kind::map ? map_text(document) : scene_text(document));
+  for (const auto& warning : document["warnings"]) note(warning.get<std::string>());
 }
 
 scene::Clutter clutter_of(const MakeOptions& options) {
@@ -279,19 +301,34 @@ void make(const MakeOptions& options) {
 void add_scene(CLI::App& app, int&) {
   auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them",
                             "hamelin scene info data/maps/shelf.bt\n"
+                            "hamelin scene crop --scene data/scenes/shelf.json -o near.bt\n"
                             "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
   scene->require_subcommand(1);
 
   auto* info_command = add_command(*scene, "info", "What a map or a scene holds",
                                    "hamelin scene info data/scenes/shelf.json\n"
+                                   "hamelin scene info data/maps/clutter.bt --base 0,0,0.3 --reach 0.9\n"
                                    "hamelin scene info data/maps/clutter.bt --json");
   const auto info_options = std::make_shared<InfoOptions>();
   info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")
       ->required()
       ->type_name("MAP_OR_SCENE");
-  info_command->add_option("--scale", info_options->scale, "metres per unit of the map")->type_name("S");
+  MapInfoOptions& of_map = info_options->map;
+  info_command->add_option("--scale", of_map.scale, "metres per unit of a map")->type_name("S");
+  info_command
+      ->add_option("--threshold", of_map.threshold,
+                   "leaves of a .ot are occupied from this probability on (default 0.5)")
+      ->type_name("P");
+  info_command
+      ->add_option("--base", of_map.base,
+                   "where an arm would stand in the map's frame [m] (default amid what is occupied)")
+      ->type_name("X,Y,Z");
+  info_command->add_option("--reach", of_map.reach, "how far it would reach [m] (default all that is occupied)")
+      ->type_name("R");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options] { info(*info_options); });
+
+  add_scene_crop(*scene);
 
   auto* make_command =
       add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",

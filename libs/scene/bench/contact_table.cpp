@@ -21,7 +21,7 @@ using namespace hamelin::scene;
 using Clock = std::chrono::steady_clock;
 
 struct Pose {
-  std::vector<Eigen::Vector3d> centers;
+  PlacedShapes arm;
   double clearance = 0.0;
 };
 
@@ -46,12 +46,11 @@ int run(int argc, char** argv) {
   const double influence = std::stod(argv[2]), spread = argc > 3 ? std::stod(argv[3]) : 0.6;
   const model::Model model(model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres}), scene.base);
   auto start = Clock::now();
-  const Environment environment = make_environment(scene, model.reach(), influence);
+  const Environment environment = make_environment(scene, model, influence);
   const double build_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   const SelfField self(model);
   dynamics::Workspace ws(model);
-  std::vector<double> radii;
-  for (const auto& sphere : model.spheres()) radii.push_back(sphere.radius);
+  const std::size_t shapes = model.shapes().size();
 
   std::vector<Pose> poses(2000);
   Rng rng(1);
@@ -60,16 +59,16 @@ int run(int argc, char** argv) {
     if (q.size() != model.dof()) q.setZero(model.dof());
     for (double& angle : q) angle += rng.uniform(-spread, spread);
     dynamics::forward_kinematics(model, ws, q);
-    poses[i].centers.resize(radii.size());
-    dynamics::sphere_centers(model, ws, poses[i].centers);
-    poses[i].clearance = environment.clearance(poses[i].centers, radii, 0.0, 1.0, View::planner);
+    poses[i].arm = PlacedShapes(model);
+    poses[i].arm.place(model, ws);
+    poses[i].clearance = environment.clearance(poses[i].arm.view(), 0.0, 1.0, View::planner);
   }
-  fmt::print("{}: {} spheres, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n", argv[1],
-             radii.size(), environment.map_field().boxes().boxes().size(), influence, build_ms, self.pairs().size());
+  fmt::print("{}: {} shapes, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n", argv[1],
+             shapes, environment.map_field().boxes().boxes().size(), influence, build_ms, self.pairs().size());
   fmt::print("{:<22} {:>8} {:>15} {:>17} {:>22} {:>21}\n", "clearance to obstacles", "poses", "contacts a pose",
-             "obstacles us/pose", "obstacles ns/sphere", "itself us/pose");
-  Environment::Scratch scratch(environment, radii.size());
-  std::vector<Contact> out(radii.size() * 16);
+             "obstacles us/pose", "obstacles ns/shape", "itself us/pose");
+  Environment::Scratch scratch(environment, shapes);
+  std::vector<Contact> out(environment.contacts_max(shapes));
   std::vector<SelfContact> pairs(self.pairs().size());
   const double edges[] = {-1e9, 0.0, 0.25 * influence, influence, 1e9};
   const char* names[] = {"in contact", "within influence / 4", "within influence", "beyond"};
@@ -79,14 +78,13 @@ int run(int argc, char** argv) {
     for (const Pose& pose : poses)
       if (pose.clearance > edges[row] && pose.clearance <= edges[row + 1]) chosen.push_back(&pose);
     if (chosen.empty()) continue;
-    for (const Pose* pose : chosen) contacts += environment.closest(pose->centers, radii, influence, 0.0, scratch, out);
-    const double us = cost_us(chosen, [&](const Pose& pose) {
-      (void)environment.closest(pose.centers, radii, influence, 0.0, scratch, out);
-    });
-    const double self_us = cost_us(chosen, [&](const Pose& pose) { (void)self.closest(pose.centers, 0.05, pairs); });
+    for (const Pose* pose : chosen) contacts += environment.closest(pose->arm.view(), influence, 0.0, scratch, out);
+    const double us = cost_us(
+        chosen, [&](const Pose& pose) { (void)environment.closest(pose.arm.view(), influence, 0.0, scratch, out); });
+    const double self_us = cost_us(chosen, [&](const Pose& pose) { (void)self.closest(pose.arm.view(), 0.05, pairs); });
     fmt::print("{:<22} {:>8} {:>15.1f} {:>17.2f} {:>22.0f} {:>21.2f}\n", names[row], chosen.size(),
                static_cast<double>(contacts) / static_cast<double>(chosen.size()), us,
-               1e3 * us / static_cast<double>(radii.size()), self_us);
+               1e3 * us / static_cast<double>(shapes), self_us);
   }
   return 0;
 }

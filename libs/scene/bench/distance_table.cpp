@@ -1,6 +1,6 @@
-// Prints, for one map and one crop, the cost of a distance query and the largest error against brute force over all
-// leaf boxes: ours cold, warm and several, beside FCL's octree and dynamicEDT3D where they are installed. Same points,
-// same run.
+// Prints, for one map and one crop, what building the structure, asking it and changing it costs, beside FCL's octree
+// and dynamicEDT3D where they are installed, and the largest errors against brute force: over all leaf boxes outside,
+// over the voxels around inside. Same points, same run. `--points 100000 --capsules 10000` is the long comparison.
 #include <fmt/format.h>
 #include <octomap/OcTree.h>
 
@@ -22,7 +22,8 @@
 #endif
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/scene/distance.hpp"
+#include "hamelin/core/isa.hpp"
+#include "hamelin/scene/map_field.hpp"
 #include "hamelin/scene/map_file.hpp"
 #include "hamelin/test/scene_queries.hpp"
 
@@ -33,107 +34,326 @@ using namespace hamelin::scene;
 using Eigen::Vector3d;
 using Clock = std::chrono::steady_clock;
 
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int passes = 15;
+
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-struct Row {
-  std::string method;
-  double build_ms = 0.0;
-  double query_ns = 0.0;
-  double over_mm = 0.0, under_mm = 0.0;  // largest errors to the unsafe and to the safe side
-};
-
-// The best of several passes over all points; the answers of the last.
-template <typename Query>
-Row measure(const std::string& method, double build_s, const std::vector<Vector3d>& points,
-            const std::vector<double>& truth, int passes, const Query& query) {
-  Row row{method, 1e3 * build_s, std::numeric_limits<double>::infinity(), 0.0, 0.0};
-  std::vector<double> answers(points.size());
-  for (int pass = 0; pass < passes; ++pass) {
+// The best of several runs [ms].
+template <class F>
+double least_ms(const F& f) {
+  double best = infinity;
+  for (int pass = 0; pass < 5; ++pass) {
     const auto start = Clock::now();
-    for (std::size_t i = 0; i < points.size(); ++i) answers[i] = query(points[i]);
-    row.query_ns = std::min(row.query_ns, 1e9 * seconds_since(start) / static_cast<double>(points.size()));
+    f();
+    best = std::min(best, 1e3 * seconds_since(start));
   }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    row.over_mm = std::max(row.over_mm, 1e3 * (std::max(answers[i], 0.0) - truth[i]));
-    row.under_mm = std::max(row.under_mm, 1e3 * (truth[i] - std::max(answers[i], 0.0)));
-  }
-  return row;
+  return best;
 }
 
-void print(const Row& row) {
-  fmt::print("{:<34} {:>10.2f} {:>12.0f} {:>12.2g} {:>12.2g}\n", row.method, row.build_ms, row.query_ns, row.over_mm,
-             row.under_mm);
+struct Capsule {
+  Vector3d a, b;
+};
+
+// ---- brute force ----
+
+// The occupied voxels of a crop, one bit each; all else is free.
+class Voxels {
+ public:
+  Voxels(const std::vector<Cell>& cells, double resolution) : resolution_(resolution) {
+    lo_.fill(std::numeric_limits<std::int32_t>::max());
+    std::array<std::int32_t, 3> hi{};
+    hi.fill(std::numeric_limits<std::int32_t>::min());
+    for (const Cell& cell : cells)
+      for (std::size_t i = 0; i < 3; ++i) {
+        lo_[i] = std::min(lo_[i], cell.lo[i]);
+        hi[i] = std::max(hi[i], cell.lo[i] + cell.size);
+      }
+    for (std::size_t i = 0; i < 3; ++i) size_[i] = static_cast<std::size_t>(hi[i] - lo_[i]);
+    bits_.resize(size_[0] * size_[1] * size_[2]);
+    for (const Cell& cell : cells)
+      for (std::int32_t x = cell.lo[0]; x < cell.lo[0] + cell.size; ++x)
+        for (std::int32_t y = cell.lo[1]; y < cell.lo[1] + cell.size; ++y)
+          for (std::int32_t z = cell.lo[2]; z < cell.lo[2] + cell.size; ++z) bits_[index(x, y, z)] = true;
+  }
+
+  // Distance to the nearest free voxel, by rings of voxels around p's own; nothing nearer than `enough` is looked for.
+  [[nodiscard]] double depth(const Vector3d& p, double enough = -1.0) const {
+    std::array<std::int32_t, 3> at{};
+    for (std::size_t i = 0; i < 3; ++i)
+      at[i] = static_cast<std::int32_t>(std::floor(p[static_cast<Eigen::Index>(i)] / resolution_));
+    double best = infinity;
+    for (std::int32_t ring = 0; (ring - 1) * resolution_ < best && best > enough; ++ring)
+      for (std::int32_t x = -ring; x <= ring; ++x)
+        for (std::int32_t y = -ring; y <= ring; ++y) {
+          const bool face = std::abs(x) == ring || std::abs(y) == ring;
+          for (std::int32_t z = -ring; z <= ring; z += face || ring == 0 ? 1 : 2 * ring) {
+            if (occupied(at[0] + x, at[1] + y, at[2] + z)) continue;
+            const Box box = to_metres(Cell{{at[0] + x, at[1] + y, at[2] + z}, 1}, resolution_);
+            best = std::min(best, (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).norm());
+          }
+        }
+    return best;
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    return (static_cast<std::size_t>(x - lo_[0]) * size_[1] + static_cast<std::size_t>(y - lo_[1])) * size_[2] +
+           static_cast<std::size_t>(z - lo_[2]);
+  }
+  [[nodiscard]] bool occupied(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const std::array<std::int32_t, 3> at{x, y, z};
+    for (std::size_t i = 0; i < 3; ++i)
+      if (at[i] < lo_[i] || static_cast<std::size_t>(at[i] - lo_[i]) >= size_[i]) return false;
+    return bits_[index(x, y, z)];
+  }
+
+  double resolution_;
+  std::array<std::int32_t, 3> lo_{};
+  std::array<std::size_t, 3> size_{};
+  std::vector<bool> bits_;
+};
+
+// Distance of a segment from a union of boxes, by golden section on the convex distance of each.
+double brute_force_distance(const std::vector<Box>& leaves, const Capsule& c) {
+  const double half = 0.5 * (c.b - c.a).norm();
+  const auto distance = [&](const Box& box, double t) {
+    const Vector3d p = c.a + t * (c.b - c.a);
+    return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).squaredNorm();
+  };
+  double best = infinity;
+  for (const Box& box : leaves) {
+    if (std::sqrt(distance(box, 0.5)) - half > std::sqrt(best)) continue;
+    double left = 0.0, right = 1.0;
+    for (int k = 0; k < 70; ++k) {
+      const double x = left + 0.381966 * (right - left), y = left + 0.618034 * (right - left);
+      (distance(box, x) < distance(box, y) ? right : left) = distance(box, x) < distance(box, y) ? y : x;
+    }
+    best = std::min({best, distance(box, left), distance(box, 0.0), distance(box, 1.0)});
+  }
+  return std::sqrt(best);
+}
+
+struct Errors {
+  double outside = 0.0, inside = 0.0;
+  std::size_t n_outside = 0, n_inside = 0;
+};
+
+Errors point_errors(const MapField& field, const std::vector<Box>& leaves, const Voxels& voxels,
+                    const std::vector<Vector3d>& points) {
+  Errors errors;
+  for (const Vector3d& p : points) {
+    BoxHit hit;
+    if (!field.nearest(p, infinity, hit)) throw Error(ErrorCode::invalid, "no answer for a point");
+    const double truth = test::brute_force_distance(leaves, p);
+    const bool inside = truth == 0.0;
+    double& worst = inside ? errors.inside : errors.outside;
+    worst = std::max(worst, std::abs(hit.distance - (inside ? -voxels.depth(p) : truth)));
+    ++(inside ? errors.n_inside : errors.n_outside);
+  }
+  return errors;
+}
+
+Errors capsule_errors(const MapField& field, const std::vector<Box>& leaves, const Voxels& voxels,
+                      const std::vector<Capsule>& capsules) {
+  Errors errors;
+  for (const Capsule& c : capsules) {
+    SegmentHit hit;
+    if (!field.nearest(c.a, c.b, infinity, hit)) throw Error(ErrorCode::invalid, "no answer for a capsule");
+    if (hit.distance > 0.0) {
+      ++errors.n_outside;
+      errors.outside = std::max(errors.outside, std::abs(hit.distance - brute_force_distance(leaves, c)));
+      continue;
+    }
+    ++errors.n_inside;
+    // as deep as said, and nowhere on the axis deeper
+    errors.inside = std::max(errors.inside, std::abs(-hit.distance - voxels.depth(hit.axis_point)));
+    for (int k = 0; k <= 100; ++k)
+      errors.inside = std::max(errors.inside, voxels.depth(c.a + 0.01 * k * (c.b - c.a), -hit.distance) + hit.distance);
+  }
+  return errors;
+}
+
+// ---- what is printed ----
+
+// The best of several passes over all queries [ns].
+template <class Query>
+double least_ns(std::size_t count, const Query& query) {
+  double best = infinity;
+  for (int pass = 0; pass < passes; ++pass) {
+    const auto start = Clock::now();
+    for (std::size_t i = 0; i < count; ++i) query(i);
+    best = std::min(best, 1e9 * seconds_since(start) / static_cast<double>(count));
+  }
+  return best;
+}
+
+// Largest errors to the unsafe and to the safe side.
+template <class Query>
+void row(const std::string& method, double build_ms, const std::vector<Vector3d>& points,
+         const std::vector<double>& truth, const Query& query) {
+  std::vector<double> answers(truth.size());
+  const double ns = least_ns(points.size(), [&](std::size_t i) { answers[i] = query(i); });
+  double over = 0.0, under = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    over = std::max(over, std::max(answers[i], 0.0) - truth[i]);
+    under = std::max(under, truth[i] - std::max(answers[i], 0.0));
+  }
+  fmt::print("{:<34} {:>10.2f} {:>12.0f} {:>12.2g} {:>12.2g}\n", method, build_ms, ns, 1e3 * over, 1e3 * under);
+}
+
+void print_changes(const MapField& made, const std::vector<Cell>& cells, double resolution, const Ball& region) {
+  Rng rng(7);
+  const auto timed = [&](const char* what, const auto& make) {
+    MapField field(cells, resolution, region);
+    double ms = 0.0;
+    std::size_t voxels = 0;
+    constexpr int rounds = 20;
+    for (int round = 0; round < rounds; ++round) {
+      const std::vector<VoxelBox> boxes = make();
+      const bool add = round % 2 == 0;
+      const auto start = Clock::now();
+      const MapField::Changed changed = add ? field.change(boxes, {}) : field.change({}, boxes);
+      ms += 1e3 * seconds_since(start);
+      voxels += changed.added + changed.removed;
+    }
+    fmt::print("{:<34} {:>10.3f} ms a change of {:.0f} voxels, {:.3f} ms per 1000\n", what, ms / rounds,
+               static_cast<double>(voxels) / rounds, 1e3 * ms / static_cast<double>(voxels));
+  };
+  const auto voxel_of = [&](const Vector3d& p) {
+    std::array<std::int32_t, 3> v{};
+    for (std::size_t i = 0; i < 3; ++i)
+      v[i] = static_cast<std::int32_t>(std::floor(p[static_cast<Eigen::Index>(i)] / resolution));
+    return v;
+  };
+  const auto near_box = [&] { return made.boxes().boxes()[rng.below(made.boxes().boxes().size())]; };
+  timed("change: a cube of 10 x 10 x 10", [&] {
+    const auto lo = voxel_of(near_box().lo);
+    return std::vector<VoxelBox>{{{lo[0] - 5, lo[1] - 5, lo[2] - 5}, {lo[0] + 5, lo[1] + 5, lo[2] + 5}}};
+  });
+  timed("change: 1000 scattered voxels", [&] {
+    std::vector<Cell> scattered;
+    for (int i = 0; i < 1000; ++i)
+      scattered.push_back({voxel_of(region.center + region.radius * rng.uniform() * test::random_direction(rng)), 1});
+    return merge(scattered);
+  });
 }
 
 int run(int argc, char** argv) {
-  if (argc < 6) {
+  std::vector<std::string> words;
+  double scale = 1.0;
+  std::size_t point_count = 4000, capsule_count = 1000;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto value = [&] { return i + 1 < argc ? std::atof(argv[++i]) : 0.0; };
+    if (word == "--scale")
+      scale = value();
+    else if (word == "--points")
+      point_count = static_cast<std::size_t>(value());
+    else if (word == "--capsules")
+      capsule_count = static_cast<std::size_t>(value());
+    else
+      words.push_back(word);
+  }
+  if (words.size() != 5) {
     fmt::print(stderr,
-               "usage: {} MAP X Y Z RADIUS [SCALE]   (crop in the map's frame, m)\n"
+               "usage: {} MAP X Y Z RADIUS [--scale S] [--points N] [--capsules N]   (crop in the map's frame, m)\n"
                "example: {} map.bt 0.5 0 1 1.35\n",
                argv[0], argv[0]);
     return 2;
   }
-  const std::string file = argv[1];
-  const Ball region{{std::atof(argv[2]), std::atof(argv[3]), std::atof(argv[4])}, std::atof(argv[5])};
-  const double scale = argc > 6 ? std::atof(argv[6]) : 1.0;
+  const std::string& file = words[0];
+  const Ball region{{std::stod(words[1]), std::stod(words[2]), std::stod(words[3])}, std::stod(words[4])};
 
-  auto start = Clock::now();
+  const auto start_of_read = Clock::now();
   const MapData map = read_map(file, {scale, 0.5});
-  const double read_s = seconds_since(start);
-  start = Clock::now();
-  const auto cells = crop(map.occupied, map.resolution, region);
-  std::vector<Box> merged;
-  for (const VoxelBox& box : merge(cells)) merged.push_back(to_metres(box, map.resolution));
-  const double merge_s = seconds_since(start);
-  const BoxField field(merged, region.center);
-  const double build_s = seconds_since(start);
+  const double read_ms = 1e3 * seconds_since(start_of_read);
+  std::vector<Cell> cells;
+  MapField field;
+  const double crop_ms = least_ms([&] { cells = crop(map.occupied, map.resolution, region); });
+  const double build_ms = least_ms([&] { field = MapField(cells, map.resolution, region); });
   if (field.empty()) throw Error(ErrorCode::invalid, fmt::format("{}: no occupied leaf in that ball", file));
   std::vector<Box> leaves;
   for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
-  fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; read {:.1f} ms, crop and merge {:.1f} ms\n",
-             file, map.resolution, map.occupied.size(), leaves.size(), field.boxes().size(), 1e3 * read_s,
-             1e3 * merge_s);
+  fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n", file, map.resolution,
+             map.occupied.size(), leaves.size(), field.boxes().boxes().size(), instruction_set());
+  fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms, crop_ms, build_ms,
+             1e-3 * static_cast<double>(field.bytes()));
 
-  const auto points = test::points_near(leaves, 4000, 0.5, 1);
-  std::vector<double> truth;
-  for (const Vector3d& p : points) truth.push_back(test::brute_force_distance(leaves, p));
+  std::vector<Vector3d> points, inside;
+  for (const Vector3d& p : test::points_near(leaves, 6000, 0.5, 1))
+    (test::brute_force_distance(leaves, p) > 0.0 ? points : inside).push_back(p);
+  std::vector<double> truth, truth_moved;
   std::vector<Vector3d> moved;  // each point again, 2 mm on
+  std::vector<Capsule> capsules, capsules_moved, capsules_inside;
   Rng rng(2);
-  for (const Vector3d& p : points) moved.push_back(p + 0.002 * test::random_direction(rng));
-  std::vector<double> truth_moved;
-  for (const Vector3d& p : moved) truth_moved.push_back(test::brute_force_distance(leaves, p));
+  for (const Vector3d& p : points) {
+    truth.push_back(test::brute_force_distance(leaves, p));
+    const Vector3d way = 0.002 * test::random_direction(rng);
+    moved.push_back(p + way);
+    truth_moved.push_back(test::brute_force_distance(leaves, moved.back()));
+    const Vector3d end = p + rng.uniform(0.05, 0.4) * test::random_direction(rng);
+    SegmentHit hit;
+    const bool entered = field.nearest(p, end, infinity, hit) && hit.distance <= 0.0;
+    (entered ? capsules_inside : capsules).push_back({p, end});
+    if (!entered) capsules_moved.push_back({p + way, end + way});
+  }
 
   fmt::print("{:<34} {:>10} {:>12} {:>12} {:>12}\n", "method", "build ms", "ns a query", "over mm", "under mm");
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  const int passes = 15;
-  print(measure("hamelin, cold", build_s, points, truth, passes, [&](const Vector3d& p) {
-    BoxHit hit;
-    return field.nearest(p, infinity, hit) ? hit.distance : infinity;
-  }));
+  BoxHit hit;
+  (void)least_ns(points.size(),
+                 [&](std::size_t i) { (void)field.nearest(points[i], infinity, hit); });  // fills the table
+  row("hamelin, cold", crop_ms + build_ms, points, truth,
+      [&](std::size_t i) { return field.nearest(points[i], infinity, hit) ? hit.distance : infinity; });
+  row("hamelin, cold, without the table", crop_ms + build_ms, points, truth,
+      [&](std::size_t i) { return field.boxes().nearest(points[i], infinity, hit) ? hit.distance : infinity; });
   std::vector<std::int32_t> hints;
-  for (const Vector3d& p : points) {
-    BoxHit hit;
-    hints.push_back(field.nearest(p, infinity, hit) ? hit.box : -1);
-  }
-  std::size_t at = 0;
-  print(measure("hamelin, warm (2 mm on)", build_s, moved, truth_moved, passes, [&](const Vector3d& p) {
-    BoxHit hit;
-    const std::int32_t hint = hints[at];
-    at = at + 1 == hints.size() ? 0 : at + 1;
-    return field.nearest(p, infinity, hit, hint) ? hit.distance : infinity;
-  }));
-  BoxField::Scratch scratch(field);
-  std::array<BoxHit, 3> hits;
-  print(measure("hamelin, 3 points within 0.25 m", build_s, points, truth, passes, [&](const Vector3d& p) {
-    const std::size_t count = field.several(p, 0.25, std::cos(std::acos(-1.0) / 6.0), scratch, hits);
-    return count > 0 ? hits[0].distance : -1.0;  // beyond the limit; shown as an error to the safe side
-  }));
+  for (const Vector3d& p : points) hints.push_back(field.nearest(p, infinity, hit) ? hit.box : -1);
+  row("hamelin, warm (2 mm on)", crop_ms + build_ms, moved, truth_moved,
+      [&](std::size_t i) { return field.nearest(moved[i], infinity, hit, hints[i]) ? hit.distance : infinity; });
+  MapField::Scratch scratch(field);
+  std::array<BoxHit, MapField::points_max> hits;
+  std::array<SegmentHit, MapField::points_max> segment_hits;
+  SegmentHit segment;
+  const auto line = [](const char* what, double ns) { fmt::print("{:<34} {:>10} {:>12.0f}\n", what, "", ns); };
+  line("hamelin, 3 points within 0.1 m",
+       least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.1, scratch, hits); }));
+  line("hamelin, 3 points within 0.25 m",
+       least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.25, scratch, hits); }));
+  std::vector<std::int32_t> segment_hints;
+  for (const Capsule& c : capsules)
+    segment_hints.push_back(field.nearest(c.a, c.b, infinity, segment) ? segment.box : -1);
+  line("hamelin, capsule, cold", least_ns(capsules.size(), [&](std::size_t i) {
+         (void)field.nearest(capsules[i].a, capsules[i].b, infinity, segment);
+       }));
+  line("hamelin, capsule, warm", least_ns(capsules.size(), [&](std::size_t i) {
+         (void)field.nearest(capsules_moved[i].a, capsules_moved[i].b, infinity, segment, segment_hints[i]);
+       }));
+  line("hamelin, capsule, 3 within 0.1 m", least_ns(capsules.size(), [&](std::size_t i) {
+         (void)field.several(capsules[i].a, capsules[i].b, 0.1, scratch, segment_hits);
+       }));
+  line("hamelin, depth of a point",
+       least_ns(inside.size(), [&](std::size_t i) { (void)field.nearest(inside[i], infinity, hit); }));
+  line("hamelin, depth of a capsule", least_ns(capsules_inside.size(), [&](std::size_t i) {
+         (void)field.nearest(capsules_inside[i].a, capsules_inside[i].b, infinity, segment);
+       }));
+  // 40 spheres at a time, each 2 mm on from where its hint is from
+  std::vector<double> ticks;
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t first = 0; first + 40 <= moved.size(); first += 40) {
+      const auto start = Clock::now();
+      for (std::size_t i = first; i < first + 40; ++i) (void)field.nearest(moved[i], infinity, hit, hints[i]);
+      ticks.push_back(1e6 * seconds_since(start));
+    }
+  std::sort(ticks.begin(), ticks.end());
+  fmt::print("{:<34} {:>10} p50 {:.1f} us, p99 {:.1f} us\n", "hamelin, 40 spheres, warm", "", ticks[ticks.size() / 2],
+             ticks[ticks.size() * 99 / 100]);
+  print_changes(field, cells, map.resolution, region);
 
-  if (scale != 1.0) return 0;
   const auto tree = std::make_shared<octomap::OcTree>(map.resolution);
-  for (const Cell& cell : cells) {
+  for (const Cell& cell : cells)
     // The crop as a tree of its own, at the finest depth.
     for (std::int32_t x = 0; x < cell.size; ++x)
       for (std::int32_t y = 0; y < cell.size; ++y)
@@ -142,40 +362,61 @@ int run(int argc, char** argv) {
           tree->setNodeValue(octomap::OcTreeKey(key(cell.lo[0] + x), key(cell.lo[1] + y), key(cell.lo[2] + z)), 3.5F,
                              true);
         }
-  }
   tree->updateInnerOccupancy();
   tree->prune();
 #ifdef HAMELIN_WITH_FCL
   const fcl::OcTreed octree(tree);
   const double radius = 1e-3;
   const fcl::Sphered sphere(radius);
-  const std::vector<Vector3d> few(points.begin(), points.begin() + 400);
-  print(measure("FCL octree and sphere", 0.0, few, truth, 1, [&](const Vector3d& p) {
-    fcl::Transform3d pose = fcl::Transform3d::Identity();
-    pose.translation() = p;
+  const std::vector<Vector3d> few(points.begin(), points.begin() + 100);
+  const std::vector<double> few_truth(truth.begin(), truth.begin() + 100);
+  const auto fcl_distance = [&](const auto& shape, const fcl::Transform3d& pose) {
     const fcl::DistanceRequestd request;
     fcl::DistanceResultd result;
-    fcl::distance(&octree, fcl::Transform3d::Identity(), &sphere, pose, request, result);
+    fcl::distance(&octree, fcl::Transform3d::Identity(), &shape, pose, request, result);
     return result.min_distance > 0.0 ? result.min_distance + radius : 0.0;
-  }));
+  };
+  row("FCL octree and sphere of 1 mm", 0.0, few, few_truth, [&](std::size_t i) {
+    fcl::Transform3d pose = fcl::Transform3d::Identity();
+    pose.translation() = points[i];
+    return fcl_distance(sphere, pose);
+  });
+  line("FCL octree and capsule", least_ns(20, [&](std::size_t i) {
+         const Vector3d way = capsules[i].b - capsules[i].a;
+         fcl::Transform3d pose = fcl::Transform3d::Identity();
+         pose.translation() = 0.5 * (capsules[i].a + capsules[i].b);
+         pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix();
+         (void)fcl_distance(fcl::Capsuled(radius, way.norm()), pose);
+       }));
 #else
   fmt::print("FCL was not found when this was built\n");
 #endif
 #ifdef HAMELIN_WITH_EDT
-  start = Clock::now();
+  const auto start_of_edt = Clock::now();
   const Vector3d lo = region.center.array() - region.radius - 0.5, hi = region.center.array() + region.radius + 0.5;
   const auto point = [](const Vector3d& p) {
     return octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
   };
   DynamicEDTOctomap edt(1.0F, tree.get(), point(lo), point(hi), false);
   edt.update();
-  const double edt_s = seconds_since(start);
   // Beyond its largest distance it answers that distance; a metre covers the points.
-  print(measure("dynamicEDT3D", edt_s, points, truth, passes,
-                [&](const Vector3d& p) { return static_cast<double>(edt.getDistance(point(p))); }));
+  row("dynamicEDT3D", 1e3 * seconds_since(start_of_edt), points, truth,
+      [&](std::size_t i) { return static_cast<double>(edt.getDistance(point(points[i]))); });
 #else
   fmt::print("dynamicEDT3D was not found when this was built\n");
 #endif
+
+  const Voxels voxels(cells, map.resolution);
+  const auto print_errors = [](const char* what, const Errors& errors) {
+    fmt::print("{:<34} largest error outside {:.2g} m ({}), inside {:.2g} m ({})\n", what, errors.outside,
+               errors.n_outside, errors.inside, errors.n_inside);
+  };
+  print_errors("brute force, points",
+               point_errors(field, leaves, voxels, test::points_near(leaves, point_count, 0.5, 3)));
+  std::vector<Capsule> many;
+  for (const Vector3d& p : test::points_near(leaves, capsule_count, 0.5, 4))
+    many.push_back({p, p + rng.uniform(0.05, 0.4) * test::random_direction(rng)});
+  print_errors("brute force, capsules", capsule_errors(field, leaves, voxels, many));
   return 0;
 }
 

@@ -1,14 +1,22 @@
 #include "hamelin/scene/boxes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
-#include <tuple>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/scene/distance.hpp"
 
 namespace hamelin::scene {
 
 namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double squared_distance(const Eigen::Vector3d& p, const Box& box) {
   return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).squaredNorm();
@@ -27,6 +35,39 @@ void push_children(const Cell& cell, std::vector<Cell>& stack) {
   }
 }
 
+// Tells whether a box touches any of some rods, by the boxes around these first.
+class Rods {
+ public:
+  explicit Rods(std::span<const Rod> rods) : rods_(rods) {
+    for (const Rod& rod : rods) {
+      hulls_.push_back(
+          {rod.from.cwiseMin(rod.to).array() - rod.radius, rod.from.cwiseMax(rod.to).array() + rod.radius});
+      hull_ = {hull_.lo.cwiseMin(hulls_.back().lo), hull_.hi.cwiseMax(hulls_.back().hi)};
+    }
+  }
+
+  [[nodiscard]] bool touch(const Box& box) const {
+    if (apart(box, hull_)) return false;
+    for (std::size_t i = 0; i < rods_.size(); ++i) {
+      const Rod& rod = rods_[i];
+      if (apart(box, hulls_[i])) continue;
+      const bool touches = rod.from == rod.to ? squared_distance(rod.from, box) <= rod.radius * rod.radius
+                                              : closest_on_box(rod.from, rod.to, box).distance <= rod.radius;
+      if (touches) return true;
+    }
+    return false;
+  }
+
+ private:
+  static bool apart(const Box& a, const Box& b) {
+    return (a.lo.array() > b.hi.array()).any() || (b.lo.array() > a.hi.array()).any();
+  }
+
+  std::span<const Rod> rods_;
+  std::vector<Box> hulls_;
+  Box hull_{Eigen::Vector3d::Constant(infinity), Eigen::Vector3d::Constant(-infinity)};
+};
+
 constexpr std::int32_t tile = 256;  // voxels; a multiple of every small cell's size, so that none straddles tiles
 constexpr std::int32_t wide = 32;   // cells from this size on are boxes already
 
@@ -36,15 +77,19 @@ class BitGrid {
   BitGrid() : words_(std::size_t{tile} * tile * words_per_row) {}
 
   void set_row(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z) {
-    for (std::int32_t x = x0; x < x1; ++x) word(x, y, z) |= bit(x);
+    each_word(x0, x1, y, z, [](std::uint64_t& word, std::uint64_t bits) {
+      word |= bits;
+      return true;
+    });
   }
   void clear_row(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z) {
-    for (std::int32_t x = x0; x < x1; ++x) word(x, y, z) &= ~bit(x);
+    each_word(x0, x1, y, z, [](std::uint64_t& word, std::uint64_t bits) {
+      word &= ~bits;
+      return true;
+    });
   }
   [[nodiscard]] bool row_is_full(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z) {
-    for (std::int32_t x = x0; x < x1; ++x)
-      if ((word(x, y, z) & bit(x)) == 0) return false;
-    return true;
+    return each_word(x0, x1, y, z, [](std::uint64_t& word, std::uint64_t bits) { return (word & bits) == bits; });
   }
   /// The first set x from x0 on, or `tile`.
   [[nodiscard]] std::int32_t next(std::int32_t x0, std::int32_t y, std::int32_t z) {
@@ -58,7 +103,17 @@ class BitGrid {
 
  private:
   static constexpr std::size_t words_per_row = tile / 64;
-  static std::uint64_t bit(std::int32_t x) { return std::uint64_t{1} << (static_cast<unsigned>(x) % 64U); }
+  /// f of each word that the run [x0, x1) touches and of the bits in it, as long as it says so.
+  template <class F>
+  bool each_word(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z, const F& f) {
+    for (std::int32_t x = x0; x < x1;) {
+      const std::int32_t end = std::min(x1, (x / 64 + 1) * 64);
+      const std::uint64_t bits = ~std::uint64_t{0} >> static_cast<unsigned>(64 - (end - x));
+      if (!f(word(x, y, z), bits << (static_cast<unsigned>(x) % 64U))) return false;
+      x = end;
+    }
+    return true;
+  }
   std::uint64_t& word(std::int32_t x, std::int32_t y, std::int32_t z) {
     const auto row = static_cast<std::size_t>(z) * tile + static_cast<std::size_t>(y);
     return words_[row * words_per_row + static_cast<std::size_t>(x) / 64];
@@ -93,14 +148,27 @@ void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int3
 // Joins boxes that share a whole face across `axis`. Returns whether any were.
 bool join(std::vector<VoxelBox>& boxes, std::size_t axis) {
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-  const auto cross_section = [&](const VoxelBox& box) { return std::tie(box.lo[u], box.hi[u], box.lo[v], box.hi[v]); };
-  std::sort(boxes.begin(), boxes.end(), [&](const VoxelBox& a, const VoxelBox& b) {
-    return std::tuple_cat(cross_section(a), std::tie(a.lo[axis])) <
-           std::tuple_cat(cross_section(b), std::tie(b.lo[axis]));
-  });
+  // Cross section, then place along the axis, as numbers that sort fast: a coordinate and 2²⁰ fit into 21 bits.
+  struct Key {
+    std::uint64_t section, rest;
+    std::uint32_t box;
+    bool operator<(const Key& other) const {
+      return section != other.section ? section < other.section : rest < other.rest;
+    }
+  };
+  const auto bits = [](std::int32_t x) { return static_cast<std::uint64_t>(x + (1 << 20)); };
+  std::vector<Key> keys(boxes.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const VoxelBox& box = boxes[i];
+    keys[i] = {bits(box.lo[u]) << 42U | bits(box.hi[u]) << 21U | bits(box.lo[v]),
+               bits(box.hi[v]) << 21U | bits(box.lo[axis]), static_cast<std::uint32_t>(i)};
+  }
+  std::sort(keys.begin(), keys.end());
   std::vector<VoxelBox> joined;
-  for (const VoxelBox& box : boxes) {
-    if (!joined.empty() && cross_section(joined.back()) == cross_section(box) &&
+  joined.reserve(boxes.size());
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    const VoxelBox& box = boxes[keys[k].box];
+    if (k > 0 && keys[k - 1].section == keys[k].section && keys[k - 1].rest >> 21U == keys[k].rest >> 21U &&
         joined.back().hi[axis] == box.lo[axis]) {
       joined.back().hi[axis] = box.hi[axis];
     } else {
@@ -122,36 +190,64 @@ std::vector<Cell> crop(const std::vector<Cell>& cells, double resolution, const 
   return kept;
 }
 
-std::vector<Cell> cut_out(const std::vector<Cell>& cells, double resolution, const Ball& ball) {
-  std::vector<Cell> kept, stack(cells.rbegin(), cells.rend());
-  while (!stack.empty()) {
-    const Cell cell = stack.back();
-    stack.pop_back();
-    if (squared_distance(ball.center, to_metres(cell, resolution)) > ball.radius * ball.radius) {
-      kept.push_back(cell);
-    } else if (cell.size > 1) {
-      push_children(cell, stack);
+std::size_t count_touched(const std::vector<Cell>& cells, double resolution, std::span<const Rod> rods) {
+  const Rods all(rods);
+  return static_cast<std::size_t>(std::count_if(
+      cells.begin(), cells.end(), [&](const Cell& cell) { return all.touch(to_metres(cell, resolution)); }));
+}
+
+CutOut cut_out(const std::vector<Cell>& cells, double resolution, std::span<const Rod> rods) {
+  constexpr std::size_t more_max = std::size_t{1} << 22U;
+  const Rods all(rods);
+  CutOut cut;
+  std::vector<Cell> stack;
+  for (const Cell& leaf : cells) {
+    const std::size_t before = cut.voxels;
+    stack.push_back(leaf);
+    while (!stack.empty()) {
+      const Cell cell = stack.back();
+      stack.pop_back();
+      if (!all.touch(to_metres(cell, resolution))) {
+        cut.cells.push_back(cell);
+      } else if (cell.size > 1) {
+        push_children(cell, stack);
+      } else {
+        ++cut.voxels;
+      }
+      if (cut.cells.size() + cut.voxels > cells.size() + more_max)
+        throw Error(ErrorCode::invalid,
+                    fmt::format("voxels of {} m are too fine to take out what is touched: more than {} pieces",
+                                resolution, more_max));
     }
+    cut.leaves += cut.voxels > before ? 1 : 0;
   }
-  return kept;
+  return cut;
 }
 
 double volume_inside(const std::vector<Cell>& cells, double resolution, const Ball& ball) {
   double voxels = 0.0;
   const double radius2 = ball.radius * ball.radius;
+  // Voxels count by the middle of the grain they are in, so that volumes add up however space is cut into cells.
+  std::int32_t grain = 1;
+  while (2.0 * grain * 128.0 * resolution <= ball.radius && grain < (1 << 15)) grain *= 2;
   std::vector<Cell> stack(cells.rbegin(), cells.rend());
   while (!stack.empty()) {
     const Cell cell = stack.back();
     stack.pop_back();
+    const double edge = cell.size, volume = edge * edge * edge;
+    if (cell.size <= grain) {
+      Cell around{cell.lo, grain};
+      for (std::int32_t& lo : around.lo) lo &= ~(grain - 1);
+      const Box box = to_metres(around, resolution);
+      if ((0.5 * (box.lo + box.hi) - ball.center).squaredNorm() <= radius2) voxels += volume;
+      continue;
+    }
     const Box box = to_metres(cell, resolution);
     if (squared_distance(ball.center, box) > radius2) continue;
-    const double edge = cell.size;
     if (squared_distance_to_farthest_corner(ball.center, box) <= radius2) {
-      voxels += edge * edge * edge;
-    } else if (cell.size > 1) {
+      voxels += volume;
+    } else {
       push_children(cell, stack);
-    } else if ((0.5 * (box.lo + box.hi) - ball.center).squaredNorm() <= radius2) {
-      voxels += 1.0;
     }
   }
   return voxels * resolution * resolution * resolution;
@@ -186,10 +282,86 @@ std::vector<VoxelBox> merge(const std::vector<Cell>& cells) {
       take_blocks(grid, used, origin, boxes);
     }
   }
-  // Blocks end at tiles and at wide cells; what still fits together is joined until nothing does.
-  while (join(boxes, 0) || join(boxes, 1) || join(boxes, 2)) {
-  }
+  join(boxes);  // blocks end at tiles and at wide cells
   return boxes;
+}
+
+void join(std::vector<VoxelBox>& boxes) {
+  // done when no axis has found any since its last turn
+  for (std::size_t axis = 0, idle = 0; idle < 3; axis = (axis + 1) % 3) idle = join(boxes, axis) ? 1 : idle + 1;
+}
+
+void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole) {
+  const std::size_t count = boxes.size();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    VoxelBox rest = boxes[i];
+    if (!overlap(rest, hole)) {
+      boxes[kept++] = rest;
+      continue;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (rest.lo[axis] < hole.lo[axis]) {
+        VoxelBox piece = rest;
+        piece.hi[axis] = rest.lo[axis] = hole.lo[axis];
+        boxes.push_back(piece);
+      }
+      if (rest.hi[axis] > hole.hi[axis]) {
+        VoxelBox piece = rest;
+        piece.lo[axis] = rest.hi[axis] = hole.hi[axis];
+        boxes.push_back(piece);
+      }
+    }
+  }
+  boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(kept), boxes.begin() + static_cast<std::ptrdiff_t>(count));
+}
+
+std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes) {
+  std::vector<VoxelBox> faces;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t u = (axis + 1) % 3;
+    // Faces by plane, those of one side apart from those of the other; given a width of one, they overlap like boxes.
+    struct Side {
+      std::vector<VoxelBox> up, down;
+    };
+    std::map<std::int32_t, Side> planes;
+    for (const VoxelBox& box : boxes) {
+      const auto face = [&](std::int32_t at) {
+        VoxelBox flat = box;
+        flat.lo[axis] = at;
+        flat.hi[axis] = at + 1;
+        return flat;
+      };
+      planes[box.hi[axis]].up.push_back(face(box.hi[axis]));
+      planes[box.lo[axis]].down.push_back(face(box.lo[axis]));
+    }
+    const auto by_u = [&](const VoxelBox& a, const VoxelBox& b) { return a.lo[u] < b.lo[u]; };
+    std::vector<VoxelBox> pieces;
+    const auto expose = [&](const std::vector<VoxelBox>& of, std::vector<VoxelBox>& covers) {
+      std::sort(covers.begin(), covers.end(), by_u);
+      std::int32_t widest = 0;
+      for (const VoxelBox& cover : covers) widest = std::max(widest, cover.hi[u] - cover.lo[u]);
+      for (const VoxelBox& face : of) {
+        pieces.assign(1, face);
+        VoxelBox from = face;
+        from.lo[u] -= widest;
+        for (auto cover = std::lower_bound(covers.begin(), covers.end(), from, by_u);
+             cover != covers.end() && cover->lo[u] < face.hi[u]; ++cover)
+          if (overlap(*cover, face)) subtract(pieces, *cover);
+        for (VoxelBox& piece : pieces) {
+          piece.hi[axis] = piece.lo[axis];
+          faces.push_back(piece);
+        }
+      }
+    };
+    for (auto& plane : planes) {
+      Side& sides = plane.second;
+      std::vector<VoxelBox> up = sides.up;
+      expose(sides.up, sides.down);
+      expose(sides.down, up);
+    }
+  }
+  return faces;
 }
 
 Box to_metres(const VoxelBox& box, double resolution) {
@@ -202,6 +374,16 @@ Box to_metres(const VoxelBox& box, double resolution) {
 Box to_metres(const Cell& cell, double resolution) {
   return to_metres(VoxelBox{cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}},
                    resolution);
+}
+
+VoxelBox to_voxels(const Box& box, double resolution) {
+  VoxelBox voxels;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    voxels.lo[axis] = static_cast<std::int32_t>(std::lround(box.lo[a] / resolution));
+    voxels.hi[axis] = static_cast<std::int32_t>(std::lround(box.hi[a] / resolution));
+  }
+  return voxels;
 }
 
 }  // namespace hamelin::scene

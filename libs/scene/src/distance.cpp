@@ -1,12 +1,19 @@
 #include "hamelin/scene/distance.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <numeric>
+
+#include "hamelin/core/isa_kernels.hpp"
+#include "kernel/segment_box.hpp"
 
 namespace hamelin::scene {
+
+namespace kernel {
+HAMELIN_SELECT_KERNELS(TreeKernels, tree_kernels)
+}  // namespace kernel
 
 namespace {
 
@@ -22,120 +29,166 @@ float round_up(double x) {
   return static_cast<double>(f) < x ? std::nextafter(f, float_infinity) : f;
 }
 
-// Four floats that go through the machine together; GCC and clang lower this to whatever there is. Element by element
-// it is plain arithmetic, so results do not depend on the machine.
-using Four [[gnu::vector_size(16)]] = float;
+// ---- the tree: cut by the surface area heuristic over 16 bins of the box centres on each axis ----
 
-inline Four splat(float x) {
-  return Four{x, x, x, x};
-}
-inline Four max(Four a, Four b) {
-  return a > b ? a : b;
-}
-inline Four load(const float* from) {
-  Four x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
+// What the builder moves about.
+struct Item {
+  Box box;
+  std::int32_t index;
+};
 
-double squared_distance(const Eigen::Vector3d& p, const Box& box) {
-  double sum = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double below = box.lo[axis] - p[axis], above = p[axis] - box.hi[axis];
-    const double out = below > above ? below : above;
-    const double o = out > 0.0 ? out : 0.0;
-    sum += o * o;
+struct Bounds {
+  Eigen::Vector3d lo = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector3d hi = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
+
+  template <class B>
+  void add(const B& box) {
+    lo = lo.cwiseMin(box.lo);
+    hi = hi.cwiseMax(box.hi);
   }
-  return sum;
-}
-
-double depth_inside(const Eigen::Vector3d& p, const Box& box) {
-  return (p - box.lo).cwiseMin(box.hi - p).minCoeff();
-}
-
-// Squared distance, or minus the squared depth inside: one number that orders boxes by signed distance.
-double signed_square(const Eigen::Vector3d& p, const Box& box) {
-  const double d2 = squared_distance(p, box);
-  if (d2 > 0.0) return d2;
-  const double depth = depth_inside(p, box);
-  return -depth * depth;
-}
-
-Box bounds_of(const std::vector<Box>& boxes, std::span<const std::int32_t> items) {
-  Box bounds = boxes[static_cast<std::size_t>(items.front())];
-  for (const std::int32_t item : items) {
-    const Box& box = boxes[static_cast<std::size_t>(item)];
-    bounds.lo = bounds.lo.cwiseMin(box.lo);
-    bounds.hi = bounds.hi.cwiseMax(box.hi);
+  [[nodiscard]] double half_area() const {
+    const Eigen::Vector3d e = hi - lo;
+    return e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
   }
-  return bounds;
+};
+
+struct Group {
+  std::span<Item> items;
+  Bounds bounds;
+  double cost = 0.0;  // the more, the sooner it is cut
+
+  explicit Group(std::span<Item> of = {}) : items(of) {
+    for (const Item& item : items) bounds.add(item.box);
+    cost = items.size() < 2 ? -1.0 : bounds.half_area() * static_cast<double>(items.size());
+  }
+};
+
+double twice_center(const Item& item, int axis) {
+  return item.box.lo[axis] + item.box.hi[axis];
 }
 
-double half_area(const Box& box) {
-  const Eigen::Vector3d e = box.hi - box.lo;
-  return e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
-}
-
-// Where to cut a group in two: by the surface area heuristic over 16 bins of the box centres on each axis, or in the
-// middle of their order where that finds nothing (or the tree grows too deep). Sorts the items accordingly.
-std::size_t split(const std::vector<Box>& boxes, std::span<std::int32_t> items, bool halve) {
+// Where to cut a group in two; in the middle of their order where the heuristic finds nothing (or the tree grows too
+// deep). Sorts the items accordingly.
+std::size_t split(std::span<Item> items, bool halve) {
   constexpr std::size_t bins = 16;
-  const auto center = [&](std::int32_t item, int axis) {
-    const Box& box = boxes[static_cast<std::size_t>(item)];
-    return box.lo[axis] + box.hi[axis];
-  };
-  double best_cost = std::numeric_limits<double>::infinity();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  double best_cost = infinity, best_cut = 0.0;
   int best_axis = -1;
-  double best_cut = 0.0;
-  Eigen::Vector3d spread;
-  for (int axis = 0; axis < 3; ++axis) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const std::int32_t item : items) {
-      low = std::min(low, center(item, axis));
-      high = std::max(high, center(item, axis));
-    }
-    spread[axis] = high - low;
-    if (halve || !(spread[axis] > 0.0)) continue;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(infinity), high = -low;
+  for (const Item& item : items) {
+    const Eigen::Vector3d center = item.box.lo + item.box.hi;
+    low = low.cwiseMin(center);
+    high = high.cwiseMax(center);
+  }
+  const Eigen::Vector3d spread = high - low;
+  for (int axis = 0; axis < 3 && !halve; ++axis) {
+    if (!(spread[axis] > 0.0)) continue;
     std::array<std::size_t, bins> count{};
-    std::array<Box, bins> bounds{};
-    const auto bin_of = [&](std::int32_t item) {
-      return std::min(bins - 1, static_cast<std::size_t>((center(item, axis) - low) / (high - low) * double{bins}));
-    };
-    for (const std::int32_t item : items) {
-      const std::size_t bin = bin_of(item);
-      const Box& box = boxes[static_cast<std::size_t>(item)];
-      bounds[bin] = count[bin] == 0 ? box : Box{bounds[bin].lo.cwiseMin(box.lo), bounds[bin].hi.cwiseMax(box.hi)};
+    std::array<Bounds, bins> bounds;
+    const double scale = double{bins} / spread[axis];
+    for (const Item& item : items) {
+      const auto bin = std::min(bins - 1, static_cast<std::size_t>((twice_center(item, axis) - low[axis]) * scale));
+      bounds[bin].add(item.box);
       ++count[bin];
     }
-    const auto sweep_cost = [&](std::size_t begin, std::size_t end) {
-      Box all;
+    // costs of what lies left of each cut, then of what lies right
+    std::array<double, bins> cost{};
+    const auto sweep = [&](auto cut_after, std::size_t from, std::size_t step) {
+      Bounds all;
       std::size_t n = 0;
-      for (std::size_t bin = begin; bin < end; ++bin) {
-        if (count[bin] == 0) continue;
-        all = n == 0 ? bounds[bin] : Box{all.lo.cwiseMin(bounds[bin].lo), all.hi.cwiseMax(bounds[bin].hi)};
+      for (std::size_t i = 0, bin = from; i + 1 < bins; ++i, bin += step) {
+        if (count[bin] > 0) all.add(bounds[bin]);
         n += count[bin];
+        cost[cut_after(bin)] += n == 0 ? infinity : static_cast<double>(n) * all.half_area();
       }
-      return n == 0 ? std::numeric_limits<double>::infinity() : static_cast<double>(n) * half_area(all);
     };
+    sweep([](std::size_t bin) { return bin + 1; }, 0, 1);
+    sweep([](std::size_t bin) { return bin; }, bins - 1, static_cast<std::size_t>(-1));
     for (std::size_t cut = 1; cut < bins; ++cut) {
-      const double cost = sweep_cost(0, cut) + sweep_cost(cut, bins);
-      if (cost < best_cost) {
-        best_cost = cost;
-        best_axis = axis;
-        best_cut = low + (high - low) * static_cast<double>(cut) / double{bins};
-      }
+      if (!(cost[cut] < best_cost)) continue;
+      best_cost = cost[cut];
+      best_axis = axis;
+      best_cut = low[axis] + spread[axis] * static_cast<double>(cut) / double{bins};
     }
   }
   if (best_axis >= 0) {
-    const auto middle = std::stable_partition(items.begin(), items.end(),
-                                              [&](std::int32_t item) { return center(item, best_axis) < best_cut; });
+    const auto middle = std::partition(items.begin(), items.end(),
+                                       [&](const Item& item) { return twice_center(item, best_axis) < best_cut; });
     if (middle != items.begin() && middle != items.end()) return static_cast<std::size_t>(middle - items.begin());
   }
   int axis = 0;
   spread.maxCoeff(&axis);
-  std::stable_sort(items.begin(), items.end(),
-                   [&](std::int32_t a, std::int32_t b) { return center(a, axis) < center(b, axis); });
+  const auto middle = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);
+  std::nth_element(items.begin(), middle, items.end(), [&](const Item& a, const Item& b) {
+    const double x = twice_center(a, axis), y = twice_center(b, axis);
+    return x != y ? x < y : a.index < b.index;
+  });
   return items.size() / 2;
+}
+
+constexpr std::size_t width = kernel::TreeNode::width;
+
+// Appends the node of these items and all below it. @return its index
+std::int32_t build(std::span<Item> items, int depth, const Eigen::Vector3d& origin,
+                   std::vector<kernel::TreeNode>& nodes) {
+  // Cutting in the middle below this depth keeps the traversal's stack within its fixed size.
+  constexpr int depth_of_free_cuts = 10;
+  std::array<Group, width> groups;
+  std::size_t count = 1;
+  if (items.size() <= width) {
+    count = items.size();
+    for (std::size_t i = 0; i < count; ++i) groups[i] = Group(items.subspan(i, 1));
+  } else {
+    groups[0] = Group(items);
+  }
+  while (count < width) {
+    auto* const costliest = std::max_element(groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(count),
+                                             [](const Group& a, const Group& b) { return a.cost < b.cost; });
+    if (costliest->cost < 0.0) break;
+    const std::span<Item> group = costliest->items;
+    const std::size_t cut = split(group, depth >= depth_of_free_cuts);
+    *costliest = Group(group.first(cut));
+    groups[count++] = Group(group.subspan(cut));
+  }
+  const std::size_t self = nodes.size();
+  nodes.emplace_back();
+  kernel::TreeNode node{};
+  node.count = static_cast<std::int32_t>(count);
+  for (std::size_t slot = 0; slot < width; ++slot) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<Eigen::Index>(axis);
+      node.lo[axis][slot] = slot < count ? round_down(groups[slot].bounds.lo[a] - origin[a]) : float_infinity;
+      node.hi[axis][slot] = slot < count ? round_up(groups[slot].bounds.hi[a] - origin[a]) : float_infinity;
+    }
+    if (slot >= count) continue;
+    node.child[slot] = groups[slot].items.size() == 1 ? -1 - groups[slot].items.front().index
+                                                      : build(groups[slot].items, depth + 1, origin, nodes);
+  }
+  nodes[self] = node;
+  return static_cast<std::int32_t>(self);
+}
+
+// Appends the tree of these boxes and puts them into its order: what is near in space is near in memory.
+// @param first index of the first of them
+void build_tree(std::vector<Box>& boxes, std::size_t first, const Eigen::Vector3d& origin,
+                std::vector<kernel::TreeNode>& nodes, std::vector<std::int32_t>& slot_of) {
+  std::vector<Item> items(boxes.size());
+  for (std::size_t i = 0; i < items.size(); ++i) items[i] = {boxes[i], static_cast<std::int32_t>(i)};
+  const std::size_t root = nodes.size();
+  nodes.reserve(root + boxes.size() / 3 + 1);
+  build(items, 0, origin, nodes);
+  std::vector<Box> ordered;
+  ordered.reserve(boxes.size());
+  slot_of.resize(first);
+  for (std::size_t n = root; n < nodes.size(); ++n)
+    for (std::int32_t slot = 0; slot < nodes[n].count; ++slot) {
+      std::int32_t& child = nodes[n].child[slot];
+      if (child >= 0) continue;
+      ordered.push_back(boxes[static_cast<std::size_t>(-1 - child)]);
+      child = -static_cast<std::int32_t>(first + ordered.size());
+      slot_of.push_back(static_cast<std::int32_t>(n * width) + slot);
+    }
+  boxes = std::move(ordered);
 }
 
 }  // namespace
@@ -163,267 +216,242 @@ BoxHit closest_on_box(const Eigen::Vector3d& p, const Box& box) {
   return hit;
 }
 
-// The query point as the nodes need it: in single precision, with a slack for its own rounding on either side.
-struct BoxField::Query {
-  std::array<float, 3> low, high;
-  float bound = 0.0F;
-
-  Query(const Eigen::Vector3d& p, const Eigen::Vector3d& origin) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto at = static_cast<float>(p[axis] - origin[axis]);
-      const float slack = std::abs(at) * 1.2e-7F + 1e-37F;
-      low[static_cast<std::size_t>(axis)] = at - slack;
-      high[static_cast<std::size_t>(axis)] = at + slack;
-    }
+SegmentHit closest_on_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Box& box) {
+  const kernel::Axis axis = kernel::axis_of(a.data(), b.data());
+  SegmentHit hit;
+  hit.along = kernel::nearest_along(axis, box.lo.data(), box.hi.data());
+  hit.axis_point = a + hit.along * (b - a);
+  // where it is as near as this the axis enters, but for rounding
+  constexpr double hair = 1e-12;
+  if (kernel::squared_distance(axis, box.lo.data(), box.hi.data(), hit.along) <= hair * hair) {
+    // The depth is the least of six linear functions. Where it is greatest two of them cross, or the axis ends.
+    const auto depth_at = [&](double t) {
+      const Eigen::Vector3d p = a + t * (b - a);
+      return (p - box.lo).cwiseMin(box.hi - p).minCoeff();
+    };
+    double deepest = depth_at(hit.along);
+    const auto consider = [&](double t) {
+      if (!(t >= 0.0 && t <= 1.0) || !(depth_at(t) > deepest)) return;
+      deepest = depth_at(t);
+      hit.along = t;
+    };
+    consider(0.0);
+    consider(1.0);
+    const auto face = [&](int i) {  // value at a and slope
+      return std::array<double, 2>{i < 3 ? a[i] - box.lo[i] : box.hi[i - 3] - a[i - 3],
+                                   i < 3 ? b[i] - a[i] : a[i - 3] - b[i - 3]};
+    };
+    for (int i = 0; i < 6; ++i)
+      for (int j = i + 1; j < 6; ++j)
+        if (face(i)[1] != face(j)[1]) consider((face(j)[0] - face(i)[0]) / (face(i)[1] - face(j)[1]));
+    hit.axis_point = a + hit.along * (b - a);
   }
-
-  // Three subtractions, squares and sums in single precision are off by less than 8 units in the last place.
-  void limit_to(double squared) { bound = static_cast<float>(squared * (1.0 + 2e-6)) + 1e-37F; }
-
-  void squared_distances(const Node& node, Lanes& out) const {
-    for (std::size_t half = 0; half < width; half += 4) {
-      Four sum = splat(0.0F);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Four below = load(&node.lo[axis][half]) - splat(high[axis]);
-        const Four above = splat(low[axis]) - load(&node.hi[axis][half]);
-        const Four outside = max(max(below, above), splat(0.0F));
-        sum += outside * outside;
-      }
-      std::memcpy(&out[half], &sum, sizeof sum);
-    }
-  }
-};
-
-BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin) : boxes_(std::move(boxes)), origin_(origin) {
-  if (boxes_.empty()) return;
-  std::vector<std::int32_t> items(boxes_.size());
-  std::iota(items.begin(), items.end(), 0);
-  build(items, 0);
-  // Leaves in the order of the tree: what is near in space is near in memory.
-  std::vector<Box> ordered;
-  ordered.reserve(boxes_.size());
-  for (Node& node : nodes_) {
-    for (std::size_t slot = 0; slot < static_cast<std::size_t>(node.count); ++slot) {
-      if (node.child[slot] >= 0) continue;
-      ordered.push_back(boxes_[static_cast<std::size_t>(-1 - node.child[slot])]);
-      node.child[slot] = -static_cast<std::int32_t>(ordered.size());
-    }
-  }
-  boxes_ = std::move(ordered);
+  static_cast<BoxHit&>(hit) = closest_on_box(hit.axis_point, box);
+  return hit;
 }
 
-std::int32_t BoxField::build(std::span<std::int32_t> items, int depth) {
-  // Cutting in the middle below this depth keeps the traversal's stack within its fixed size.
-  constexpr int depth_of_free_cuts = 10;
-  std::array<std::span<std::int32_t>, width> groups;
-  std::size_t count = 1;
-  groups[0] = items;
-  while (count < width) {
-    std::size_t widest = width;
-    double widest_area = -1.0;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (groups[i].size() < 2) continue;
-      const double area = half_area(bounds_of(boxes_, groups[i])) * static_cast<double>(groups[i].size());
-      if (area > widest_area) {
-        widest_area = area;
-        widest = i;
-      }
-    }
-    if (widest == width) break;
-    const std::span<std::int32_t> group = groups[widest];
-    const std::size_t cut = split(boxes_, group, depth >= depth_of_free_cuts);
-    groups[widest] = group.first(cut);
-    groups[count++] = group.subspan(cut);
+BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin) : boxes_(std::move(boxes)), origin_(origin) {
+  if (!boxes_.empty()) build_all();
+}
+
+void BoxField::build_all() {
+  kernels_ = &kernel::selected_tree_kernels();
+  nodes_.clear();
+  first_added_ = 0;
+  build_tree(boxes_, 0, origin_, nodes_, slot_of_);
+  nodes_.shrink_to_fit();
+  first_added_ = boxes_.size();
+  first_added_node_ = nodes_.size();
+}
+
+void BoxField::change(std::span<const std::int32_t> removed, std::span<const Box> added) {
+  const Box nowhere{Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()),
+                    Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
+  // From here on boxes may be many more than the tree that they hang on was made for.
+  constexpr std::size_t few = 1024;
+  for (const std::int32_t box : removed) {
+    boxes_[static_cast<std::size_t>(box)] = nowhere;
+    if (static_cast<std::size_t>(box) >= first_added_) continue;  // goes with its tree
+    const std::int32_t place = slot_of_[static_cast<std::size_t>(box)];
+    kernel::TreeNode& node = nodes_[static_cast<std::size_t>(place) / width];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      node.lo[axis][static_cast<std::size_t>(place) % width] = node.hi[axis][static_cast<std::size_t>(place) % width] =
+          float_infinity;
   }
-  const auto self = static_cast<std::int32_t>(nodes_.size());
-  nodes_.emplace_back();
-  Node node;
-  node.count = static_cast<std::int32_t>(count);
-  for (std::size_t slot = 0; slot < width; ++slot) {
-    node.child[slot] = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) node.lo[axis][slot] = node.hi[axis][slot] = float_infinity;
-    if (slot >= count) continue;
-    const Box bounds = bounds_of(boxes_, groups[slot]);
+  const bool anew = first_added_ == 0 || added.size() > few + first_added_ / 4;
+  if (anew) {
+    boxes_.resize(first_added_);
+    boxes_.erase(std::remove_if(boxes_.begin(), boxes_.end(),
+                                [](const Box& box) { return !(box.lo.x() < std::numeric_limits<double>::infinity()); }),
+                 boxes_.end());
+    boxes_.insert(boxes_.end(), added.begin(), added.end());
+    nodes_.clear();
+    slot_of_.clear();
+    first_added_ = first_added_node_ = 0;
+    if (!boxes_.empty()) build_all();
+    return;
+  }
+  // The first root goes behind the tree's nodes and makes room for one above both trees.
+  if (nodes_.size() == first_added_node_) {
+    nodes_.push_back(nodes_.front());
+    for (std::size_t slot = 0; slot < static_cast<std::size_t>(nodes_.back().count); ++slot)
+      if (const std::int32_t child = nodes_.back().child[slot]; child < 0)
+        slot_of_[static_cast<std::size_t>(-1 - child)] = static_cast<std::int32_t>(first_added_node_ * width + slot);
+  }
+  nodes_.resize(first_added_node_ + 1);
+  boxes_.resize(first_added_);
+  slot_of_.resize(first_added_);
+  kernel::TreeNode root{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::fill(std::begin(root.lo[axis]), std::end(root.lo[axis]), float_infinity);
+    std::fill(std::begin(root.hi[axis]), std::end(root.hi[axis]), float_infinity);
+  }
+  const auto hang = [&](std::size_t from) {
+    const kernel::TreeNode& node = nodes_[from];
+    const auto slot = static_cast<std::size_t>(root.count++);
+    root.child[slot] = static_cast<std::int32_t>(from);
+    const auto count = static_cast<std::size_t>(node.count);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      node.lo[axis][slot] = round_down(bounds.lo[a] - origin_[a]);
-      node.hi[axis][slot] = round_up(bounds.hi[a] - origin_[a]);
+      root.lo[axis][slot] = *std::min_element(node.lo[axis], node.lo[axis] + count);
+      // slots of what is gone lie at infinity, on both sides
+      float high = -float_infinity;
+      for (std::size_t i = 0; i < count; ++i)
+        if (node.lo[axis][i] < float_infinity) high = std::max(high, node.hi[axis][i]);
+      root.hi[axis][slot] = root.lo[axis][slot] < float_infinity ? high : float_infinity;
     }
-    node.child[slot] = groups[slot].size() == 1 ? -1 - groups[slot].front() : build(groups[slot], depth + 1);
+  };
+  hang(first_added_node_);
+  if (!added.empty()) {
+    std::vector<Box> own(added.begin(), added.end());
+    const std::size_t at = nodes_.size();
+    build_tree(own, first_added_, origin_, nodes_, slot_of_);
+    boxes_.insert(boxes_.end(), own.begin(), own.end());
+    hang(at);
   }
-  nodes_[static_cast<std::size_t>(self)] = node;
-  return self;
+  nodes_.front() = root;
+}
+
+void BoxField::overlapping(const Box& box, std::vector<std::int32_t>& out) const {
+  out.clear();
+  if (boxes_.empty()) return;
+  std::array<float, 3> lo{}, hi{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    lo[axis] = round_down(box.lo[a] - origin_[a]);
+    hi[axis] = round_up(box.hi[a] - origin_[a]);
+  }
+  std::vector<std::int32_t> waiting{0};
+  while (!waiting.empty()) {
+    const kernel::TreeNode& node = nodes_[static_cast<std::size_t>(waiting.back())];
+    waiting.pop_back();
+    for (std::size_t slot = 0; slot < static_cast<std::size_t>(node.count); ++slot) {
+      bool apart = false;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        apart = apart || node.lo[axis][slot] > hi[axis] || node.hi[axis][slot] < lo[axis];
+      if (apart) continue;
+      if (node.child[slot] >= 0) {
+        waiting.push_back(node.child[slot]);
+        continue;
+      }
+      const Box& other = boxes_[static_cast<std::size_t>(-1 - node.child[slot])];
+      if ((other.lo.array() < box.hi.array()).all() && (box.lo.array() < other.hi.array()).all())
+        out.push_back(-1 - node.child[slot]);
+    }
+  }
+  std::sort(out.begin(), out.end());
+}
+
+kernel::Tree BoxField::tree() const noexcept {
+  static_assert(sizeof(Box) == 6 * sizeof(double));
+  return {nodes_.data(), boxes_.front().lo.data(), {origin_[0], origin_[1], origin_[2]}};
 }
 
 bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std::int32_t hint) const {
-  if (nodes_.empty() || !(limit >= 0.0)) return false;
-  double best = limit * limit;
-  std::int32_t best_box = -1;
-  const auto try_box = [&](std::int32_t index) {
-    const double key = signed_square(p, boxes_[static_cast<std::size_t>(index)]);
-    if (key < best || (key == best && (best_box < 0 || index < best_box))) {
-      best = key;
-      best_box = index;
-      return true;
-    }
-    return false;
-  };
-  Query query(p, origin_);
-  if (hint >= 0 && static_cast<std::size_t>(hint) < boxes_.size()) try_box(hint);
-  query.limit_to(std::max(best, 0.0));
+  if (boxes_.empty() || !(limit >= 0.0)) return false;
+  kernel::Found found{0.0, usable(hint)};
+  if (!kernels_->nearest(tree(), p.data(), nullptr, limit, found)) return false;
+  hit = closest_on_box(p, boxes_[static_cast<std::size_t>(found.box)]);
+  hit.box = found.box;
+  return true;
+}
 
-  struct Entry {
-    float bound;
-    std::int32_t node;
-  };
-  // At most 10 levels of free cuts and 31 of halving, each leaving at most 7 siblings behind.
-  std::array<Entry, 512> stack;
-  std::size_t waiting = 0;
-  stack[waiting++] = {0.0F, 0};
-  Lanes squares;
-  while (waiting > 0) {
-    const Entry entry = stack[--waiting];
-    if (entry.bound > query.bound) continue;
-    const Node& node = nodes_[static_cast<std::size_t>(entry.node)];
-    query.squared_distances(node, squares);
-    const std::size_t first = waiting;
-    for (std::size_t slot = 0; slot < static_cast<std::size_t>(node.count); ++slot) {
-      const float bound = squares[slot];
-      if (bound > query.bound) continue;
-      const std::int32_t child = node.child[slot];
-      if (child < 0) {
-        if (try_box(-1 - child)) query.limit_to(std::max(best, 0.0));
-        continue;
-      }
-      // Nearest on top of the stack.
-      std::size_t at = waiting++;
-      for (; at > first && stack[at - 1].bound < bound; --at) stack[at] = stack[at - 1];
-      stack[at] = {bound, child};
-    }
-  }
-  if (best_box < 0) return false;
-  hit = closest_on_box(p, boxes_[static_cast<std::size_t>(best_box)]);
-  hit.box = best_box;
+bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, SegmentHit& hit,
+                       std::int32_t hint) const {
+  if (boxes_.empty() || !(limit >= 0.0)) return false;
+  kernel::Found found{0.0, usable(hint)};
+  if (!kernels_->nearest(tree(), a.data(), b.data(), limit, found)) return false;
+  hit = closest_on_box(a, b, boxes_[static_cast<std::size_t>(found.box)]);
+  hit.box = found.box;
   return true;
 }
 
 std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch,
                               std::span<BoxHit> out) const {
-  if (nodes_.empty() || out.empty() || !(limit >= 0.0)) return 0;
+  if (boxes_.empty() || !(limit >= 0.0)) return 0;
   scratch.fit(*this);
-  // All boxes whose bounds are within the limit. Each slot is written and then counted or not: what a slot holds is
-  // hard to foretell, so branches would cost more than this.
-  Query query(p, origin_);
-  query.limit_to(limit * limit);
-  query.bound = std::min(query.bound, std::numeric_limits<float>::max());  // slots not in use are at infinity
-  std::int32_t* const nodes = scratch.nodes_.data();
-  std::int32_t* const boxes = scratch.boxes_.data();
-  std::size_t waiting = 1, count = 0;
-  nodes[0] = 0;
-  Lanes squares;
-  while (waiting > 0) {
-    const Node& node = nodes_[static_cast<std::size_t>(nodes[--waiting])];
-    query.squared_distances(node, squares);
-    for (std::size_t slot = 0; slot < width; ++slot) {
-      const std::int32_t child = node.child[slot];
-      const unsigned near = squares[slot] <= query.bound, leaf = child < 0;
-      nodes[waiting] = child;
-      boxes[count] = -1 - child;
-      waiting += near & ~leaf & 1U;
-      count += near & leaf;
-    }
-  }
-  // Their squared distances, and the way from each one's nearest point to p.
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  double* const key = scratch.key_.data();
-  const std::array<double*, 3> away{scratch.away_[0].data(), scratch.away_[1].data(), scratch.away_[2].data()};
+  std::array<kernel::Found, several_max> found;
+  const auto count =
+      static_cast<std::size_t>(kernels_->several(tree(), p.data(), nullptr, limit, cone_cosine, scratch.room_.data(),
+                                                 found.data(), static_cast<int>(std::min(out.size(), several_max))));
   for (std::size_t i = 0; i < count; ++i) {
-    const Box& box = boxes_[static_cast<std::size_t>(boxes[i])];
-    double sum = 0.0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      const double below = box.lo[a] - p[a], above = p[a] - box.hi[a];
-      away[axis][i] = (above > 0.0 ? above : 0.0) - (below > 0.0 ? below : 0.0);
-      sum += away[axis][i] * away[axis][i];
-    }
-    if (!(sum > 0.0)) sum = signed_square(p, box);
-    key[i] = sum <= limit * limit ? sum : infinity;
+    out[i] = closest_on_box(p, boxes_[static_cast<std::size_t>(found[i].box)]);
+    out[i].box = found[i].box;
   }
-  // The nearest; what it sees by a hair more than the cone asks, so that what is left out early would be later as well;
-  // the nearest of the rest.
-  const bool narrow = cone_cosine > 0.0;
-  const double seen_square = cone_cosine * cone_cosine * (1.0 + 1e-9);
-  std::size_t found = 0;
-  while (found < out.size()) {
-    double least = infinity;
-    for (std::size_t i = 0; i < count; ++i) least = key[i] < least ? key[i] : least;
-    if (least == infinity) break;
-    std::size_t first = count;
-    for (std::size_t i = 0; i < count; ++i)
-      if (key[i] == least && (first == count || boxes[i] < boxes[first])) first = i;
-    key[first] = infinity;
-    BoxHit hit = closest_on_box(p, boxes_[static_cast<std::size_t>(boxes[first])]);
-    hit.box = boxes[first];
-    const bool seen = std::any_of(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found),
-                                  [&](const BoxHit& kept) { return kept.direction.dot(hit.direction) > cone_cosine; });
-    if (seen) continue;
-    out[found++] = hit;
-    if (!narrow) continue;
-    const Eigen::Vector3d d = hit.direction;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double along = d[0] * away[0][i] + d[1] * away[1][i] + d[2] * away[2][i];
-      const double square = along > 0.0 ? along * along : 0.0;
-      // inside a box nothing is along any way, and its key is not positive
-      key[i] = square > seen_square * std::abs(key[i]) ? infinity : key[i];
-    }
-  }
-  return found;
+  return count;
 }
 
-FarTable::FarTable(const BoxField& field, const Ball& region, double edge, double exact_up_to) {
-  constexpr std::size_t block = 4;          // cells along a block's edge
-  constexpr std::size_t cells_max = 100;    // along an axis, a multiple of it
-  constexpr double hair = 1e-6;             // far above the rounding of points, cells and floats [m]
-  constexpr double cell_reach = 0.8660255;  // half a cube's diagonal over its edge
-  if (field.empty() || !(region.radius > 0.0)) return;
-  const auto blocks = static_cast<std::size_t>(
-      std::ceil(std::min(2.0 * region.radius / edge, static_cast<double>(cells_max)) / double{block}));
-  cells_ = block * blocks;
-  edge_ = std::max(edge, 2.0 * region.radius / static_cast<double>(cells_));
+std::size_t BoxField::several(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, double cone_cosine,
+                              Scratch& scratch, std::span<SegmentHit> out) const {
+  if (boxes_.empty() || !(limit >= 0.0)) return 0;
+  scratch.fit(*this);
+  std::array<kernel::Found, several_max> found;
+  const auto count =
+      static_cast<std::size_t>(kernels_->several(tree(), a.data(), b.data(), limit, cone_cosine, scratch.room_.data(),
+                                                 found.data(), static_cast<int>(std::min(out.size(), several_max))));
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i] = closest_on_box(a, b, boxes_[static_cast<std::size_t>(found[i].box)]);
+    out[i].box = found[i].box;
+  }
+  return count;
+}
+
+NearTable::NearTable(const Ball& region, double edge) {
+  constexpr double cells_max = 100.0;  // along an axis
+  if (!(region.radius > 0.0)) return;
+  count_ = static_cast<std::size_t>(std::ceil(std::min(2.0 * region.radius / edge, cells_max)));
+  edge_ = std::max(edge, 2.0 * region.radius / static_cast<double>(count_));
   per_edge_ = 1.0 / edge_;
-  low_ = region.center - Eigen::Vector3d::Constant(0.5 * edge_ * static_cast<double>(cells_));
-  bounds_.assign(cells_ * cells_ * cells_, -float_infinity);
-  const auto middle = [&](const std::array<std::size_t, 3>& cell, double half) {
-    return Eigen::Vector3d(low_ + edge_ * Eigen::Vector3d(static_cast<double>(cell[0]) + half,
-                                                          static_cast<double>(cell[1]) + half,
-                                                          static_cast<double>(cell[2]) + half));
-  };
-  BoxHit hit;
-  std::int32_t hint = -1;
-  const auto distance = [&](const Eigen::Vector3d& p) {
-    (void)field.nearest(p, std::numeric_limits<double>::infinity(), hit, hint);
-    hint = hit.box;
-    return hit.distance;
-  };
-  const double block_reach = cell_reach * static_cast<double>(block) * edge_;
-  std::array<std::size_t, 3> first{}, cell{};
-  for (first[0] = 0; first[0] < cells_; first[0] += block)
-    for (first[1] = 0; first[1] < cells_; first[1] += block)
-      for (first[2] = 0; first[2] < cells_; first[2] += block) {
-        const Eigen::Vector3d center = middle(first, 0.5 * double{block});
-        if ((center - region.center).norm() > region.radius + block_reach) continue;
-        const double around = distance(center);
-        const bool coarse = around - block_reach > exact_up_to;
-        // deep inside: nothing is beyond any limit there
-        if (around < -block_reach) continue;
-        for (cell[0] = first[0]; cell[0] < first[0] + block; ++cell[0])
-          for (cell[1] = first[1]; cell[1] < first[1] + block; ++cell[1])
-            for (cell[2] = first[2]; cell[2] < first[2] + block; ++cell[2]) {
-              const Eigen::Vector3d at = middle(cell, 0.5);
-              const double bound = coarse ? around - (at - center).norm() : distance(at);
-              bounds_[(cell[0] * cells_ + cell[1]) * cells_ + cell[2]] = round_down(bound - hair);
-            }
-      }
+  low_ = region.center - Eigen::Vector3d::Constant(0.5 * edge_ * static_cast<double>(count_));
+  cells_.resize(count_ * count_ * count_);
+}
+
+void NearTable::forget() {
+  std::fill(cells_.begin(), cells_.end(), std::uint64_t{0});
+}
+
+NearTable::Answer NearTable::ask(const BoxField& field, const Eigen::Vector3d& p) const {
+  constexpr double hair = 1e-6;  // far above the rounding of points, cells and floats [m]
+  constexpr float nothing = -float_infinity;
+  if (cells_.empty() || field.empty()) return {nothing, -1};
+  const Eigen::Vector3d at = (p - low_) * per_edge_;
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(at[axis] >= 0.0 && at[axis] < static_cast<double>(count_))) return {nothing, -1};
+  const auto x = static_cast<std::size_t>(at.x()), y = static_cast<std::size_t>(at.y()),
+             z = static_cast<std::size_t>(at.z());
+  const Eigen::Vector3d middle =
+      low_ +
+      edge_ * Eigen::Vector3d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, static_cast<double>(z) + 0.5);
+  const std::atomic_ref<std::uint64_t> cell(cells_[(x * count_ + y) * count_ + z]);
+  std::uint64_t known = cell.load(std::memory_order_relaxed);
+  if (known == 0) {
+    BoxHit hit;
+    (void)field.nearest(middle, std::numeric_limits<double>::infinity(), hit);
+    known = (static_cast<std::uint64_t>(hit.box + 1) << 32U) |
+            std::bit_cast<std::uint32_t>(round_down(hit.distance - hair));
+    cell.store(known, std::memory_order_relaxed);
+  }
+  const auto bound = static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(known)));
+  return {round_down(bound - (p - middle).norm()), static_cast<std::int32_t>(known >> 32U) - 1};
 }
 
 }  // namespace hamelin::scene

@@ -12,27 +12,53 @@
 
 namespace hamelin::scene {
 
+namespace {
+
+// Points of a capsule's axis this share of its length apart are different places.
+constexpr double elsewhere_share = 1.0 / 3.0;
+
+}  // namespace
+
 Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
-                         double reach, double influence)
+                         double reach, double influence, const RobotAtStart& robot)
     : obstacles_(std::move(obstacles)) {
   for (const Obstacle& obstacle : obstacles_) check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
   summary_.obstacles = obstacles_.size();
   if (!map) return;
-  const MapRegion region = read_region(*map, base, reach, influence);
+  const MapRegion region = read_region(*map, base, reach, influence, robot);
   static_cast<MapSummary&>(summary_) = region.summary;
   map_pose_ = map->pose;
   map_pose_inverse_ = map->pose.inverse();
-  map_ = MapField(region.occupied, region.resolution_m, region.reachable, influence);
-  unknown_ = MapField(region.unknown, region.resolution_m, region.reachable, influence);
+  map_ = MapField(region.occupied, region.resolution_m, region.reachable);
+  unknown_ = MapField(region.unknown, region.resolution_m, region.reachable);
   summary_.boxes = map_.boxes().boxes().size();
   summary_.unknown_boxes = unknown_.boxes().boxes().size();
+  for (const MapChangeSpec& change : map->changes) changes_.push_back(read_change(change, *map, region));
 }
 
-Environment::Scratch::Scratch(const Environment& environment, std::size_t spheres)
+std::string Environment::advance(double time_s) {
+  std::string said;
+  for (; next_change_ < changes_.size() && changes_[next_change_].time_s <= time_s + 1e-9; ++next_change_) {
+    const MapChange& change = changes_[next_change_];
+    const MapField::Changed changed = map_.change(change.occupied, change.free);
+    if (summary_.unknown != UnknownPolicy::free) {
+      unknown_.change({}, change.free);
+      unknown_.change({}, change.occupied);
+    }
+    said += fmt::format("{}the map changes: {} voxels are occupied now, {} free", said.empty() ? "" : "; ",
+                        changed.added, changed.removed);
+  }
+  return said;
+}
+
+Environment::Scratch::Scratch(const Environment& environment, std::size_t shapes)
     : map_(environment.map_), unknown_(environment.unknown_) {
-  const std::size_t room = spheres * (2 * points_per_sphere + environment.obstacles_.size());
-  found_.reserve(room);
-  order_.reserve(room);
+  found_.reserve(environment.contacts_max(shapes));
+  order_.reserve(environment.contacts_max(shapes));
+}
+
+std::size_t Environment::contacts_max(std::size_t shapes) const noexcept {
+  return shapes * (2 * points_per_sphere + 3 * obstacles_.size());
 }
 
 std::string Environment::words(int obstacle) const {
@@ -41,19 +67,34 @@ std::string Environment::words(int obstacle) const {
   return fmt::format("obstacle '{}'", obstacles_[static_cast<std::size_t>(obstacle)].name);
 }
 
-bool Environment::has_obstacles() const noexcept {
-  return !map_.empty() || !obstacles_.empty() || (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
+std::string Environment::words(const Contact& contact, const model::Model& model) const {
+  return fmt::format("{} is {:.2g} mm inside {}", model.words(model.shapes()[static_cast<std::size_t>(contact.sphere)]),
+                     -1e3 * contact.distance, words(contact.obstacle));
 }
 
-double Environment::clearance_to(const Obstacle& obstacle, std::span<const Eigen::Vector3d> centers,
-                                 std::span<const double> radii, double time_s, double limit) const {
+std::string way_out(const Contact& contact) {
+  constexpr double digits = 100.0;
+  const auto rounded = [](double x) { return std::round(digits * x) / digits + 0.0; };  // no "-0"
+  const Eigen::Vector3d& n = contact.direction;
+  return fmt::format("({}, {}, {})", rounded(n.x()), rounded(n.y()), rounded(n.z()));
+}
+
+bool Environment::has_obstacles() const noexcept {
+  return !map_.empty() || !changes_.empty() || !obstacles_.empty() ||
+         (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
+}
+
+double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s, double limit) {
   const Eigen::Vector3d at = position_at(obstacle, time_s);
   const double ball = bounding_radius(obstacle);
   double smallest = limit;
-  for (std::size_t i = 0; i < centers.size(); ++i) {
-    const double near = smallest + radii[i] + ball;
-    if (near <= 0.0 || (centers[i] - at).squaredNorm() >= near * near) continue;
-    smallest = std::min(smallest, closest_on(obstacle, at, centers[i]).distance - radii[i]);
+  for (std::size_t i = 0; i < arm.size(); ++i) {
+    const bool capsule = arm.is_capsule(i);
+    const double near = smallest + arm.radii[i] + ball + (capsule ? arm.half_axes[i].norm() : 0.0);
+    if (near <= 0.0 || (arm.centers[i] - at).squaredNorm() >= near * near) continue;
+    const double distance = capsule ? closest_on(obstacle, at, arm.from(i), arm.to(i)).distance
+                                    : closest_on(obstacle, at, arm.centers[i]).distance;
+    smallest = std::min(smallest, distance - arm.radii[i]);
   }
   return smallest;
 }
@@ -65,51 +106,76 @@ bool Environment::shown(std::size_t obstacle, double time_s, View view, std::spa
   return view == View::judge || told == (view == View::planner);
 }
 
-int Environment::see(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-                     std::span<std::uint8_t> seen) const {
+int Environment::see(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const {
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     const Obstacle& o = obstacles_[k];
     if (o.known || o.judge_only || !o.visible_within_m || seen[k] != 0 || !exists(o, time_s)) continue;
     // any limit above visible_within_m will do
-    if (!visible(o, time_s, clearance_to(o, centers, radii, time_s, 2.0 * *o.visible_within_m + 1.0))) continue;
+    if (!visible(o, time_s, clearance_to(o, arm, time_s, 2.0 * *o.visible_within_m + 1.0))) continue;
     seen[k] = 1;
     return static_cast<int>(k);
   }
   return -1;
 }
 
-std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii,
-                                 double influence, double time_s, Scratch& scratch, std::span<Contact> out, View view,
-                                 std::span<const std::uint8_t> seen) const {
+std::size_t Environment::closest(const Shapes& arm, double influence, double time_s, Scratch& scratch,
+                                 std::span<Contact> out, View view, std::span<const std::uint8_t> seen) const {
   auto& found = scratch.found_;
   found.clear();
   std::array<BoxHit, points_per_sphere> hits;
-  const auto add = [&](std::size_t sphere, int obstacle, double center_distance, const Eigen::Vector3d& point,
-                       const Eigen::Vector3d& direction, const Eigen::Vector3d& velocity) {
-    found.push_back({static_cast<int>(sphere), obstacle, center_distance - radii[sphere],
-                     centers[sphere] - radii[sphere] * direction, point, direction, velocity});
+  std::array<SegmentHit, points_per_sphere> axis_hits;
+  // `at`: a sphere's centre, a capsule's nearest axis point
+  const auto add = [&](std::size_t shape, int obstacle, const Eigen::Vector3d& at, double distance,
+                       const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+                       const Eigen::Vector3d& velocity) {
+    found.push_back({static_cast<int>(shape), obstacle, distance - arm.radii[shape], at - arm.radii[shape] * direction,
+                     point, direction, velocity});
   };
-  const auto add_boxes = [&](const MapField& field, MapField::Scratch& room, int id, std::size_t sphere) {
+  const auto add_boxes = [&](const MapField& field, MapField::Scratch& room, int id, std::size_t shape) {
     if (field.empty()) return;
-    const std::size_t count = field.several(map_pose_inverse_ * centers[sphere], influence + radii[sphere], room, hits);
-    for (std::size_t i = 0; i < count; ++i)
-      add(sphere, id, hits[i].distance, map_pose_ * hits[i].point, map_pose_.R() * hits[i].direction,
-          Eigen::Vector3d::Zero());
+    const double limit = influence + arm.radii[shape];
+    const auto add_hit = [&](const BoxHit& hit, const Eigen::Vector3d& at) {
+      add(shape, id, at, hit.distance, map_pose_ * hit.point, map_pose_.R() * hit.direction, Eigen::Vector3d::Zero());
+    };
+    if (arm.is_capsule(shape)) {
+      const std::size_t count =
+          field.several(map_pose_inverse_ * arm.from(shape), map_pose_inverse_ * arm.to(shape), limit, room, axis_hits);
+      for (std::size_t i = 0; i < count; ++i) add_hit(axis_hits[i], map_pose_ * axis_hits[i].axis_point);
+    } else {
+      const std::size_t count = field.several(map_pose_inverse_ * arm.centers[shape], limit, room, hits);
+      for (std::size_t i = 0; i < count; ++i) add_hit(hits[i], arm.centers[shape]);
+    }
   };
-  for (std::size_t sphere = 0; view != View::hidden && sphere < centers.size(); ++sphere) {
-    add_boxes(map_, scratch.map_, Contact::map, sphere);
-    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, sphere);
+  for (std::size_t shape = 0; view != View::hidden && shape < arm.size(); ++shape) {
+    add_boxes(map_, scratch.map_, Contact::map, shape);
+    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, shape);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     if (!shown(k, time_s, view, seen)) continue;
     const Obstacle& obstacle = obstacles_[k];
     const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
     const double ball = bounding_radius(obstacle);
-    for (std::size_t sphere = 0; sphere < centers.size(); ++sphere) {
-      const double limit = influence + radii[sphere], near = limit + ball;
-      if ((centers[sphere] - at).squaredNorm() > near * near) continue;
-      const SurfacePoint hit = closest_on(obstacle, at, centers[sphere]);
-      if (hit.distance <= limit) add(sphere, static_cast<int>(k), hit.distance, hit.point, hit.direction, velocity);
+    for (std::size_t shape = 0; shape < arm.size(); ++shape) {
+      const bool capsule = arm.is_capsule(shape);
+      const double limit = influence + arm.radii[shape];
+      const double near = limit + ball + (capsule ? arm.half_axes[shape].norm() : 0.0);
+      if ((arm.centers[shape] - at).squaredNorm() > near * near) continue;
+      const auto add_hit = [&](const SurfacePoint& hit, const Eigen::Vector3d& from) {
+        if (hit.distance <= limit)
+          add(shape, static_cast<int>(k), from, hit.distance, hit.point, hit.direction, velocity);
+      };
+      if (!capsule) {
+        add_hit(closest_on(obstacle, at, arm.centers[shape]), arm.centers[shape]);
+        continue;
+      }
+      // a capsule that lies along an obstacle is near it at its ends, too
+      const Eigen::Vector3d from = arm.from(shape), to = arm.to(shape);
+      const AxisPoint nearest = closest_on(obstacle, at, from, to);
+      add_hit(nearest, nearest.axis_point);
+      const double elsewhere = elsewhere_share * 2.0 * arm.half_axes[shape].norm();
+      for (const Eigen::Vector3d& end : {from, to})
+        if ((end - nearest.axis_point).squaredNorm() > elsewhere * elsewhere)
+          add_hit(closest_on(obstacle, at, end), end);
     }
   }
 
@@ -131,34 +197,45 @@ std::size_t Environment::closest(std::span<const Eigen::Vector3d> centers, std::
   return found.size();
 }
 
-double Environment::clearance(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-                              double limit, View view, std::span<const std::uint8_t> seen) const {
+double Environment::clearance(const Shapes& arm, double time_s, double limit, View view,
+                              std::span<const std::uint8_t> seen) const {
   double smallest = limit;
   BoxHit hit;
+  SegmentHit axis_hit;
   const auto consider = [&](const MapField& field) {
     if (field.empty() || view == View::hidden) return;
     std::int32_t hint = -1;
-    for (std::size_t i = 0; i < centers.size(); ++i) {
-      // Beyond contact the search must not end at a sphere's radius: a deeper one may follow.
-      const Eigen::Vector3d local = map_pose_inverse_ * centers[i];
-      const double near = std::max(0.0, smallest + radii[i]);
-      if (!field.nearest(local, near, hit, hint)) continue;
+    for (std::size_t i = 0; i < arm.size(); ++i) {
+      // Beyond contact the search must not end at a shape's radius: a deeper one may follow.
+      const double near = std::max(0.0, smallest + arm.radii[i]);
+      if (arm.is_capsule(i)) {
+        if (!field.nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i), near, axis_hit, hint))
+          continue;
+        hit = axis_hit;
+      } else if (!field.nearest(map_pose_inverse_ * arm.centers[i], near, hit, hint)) {
+        continue;
+      }
       hint = hit.box;
-      smallest = std::min(smallest, hit.distance - radii[i]);
+      smallest = std::min(smallest, hit.distance - arm.radii[i]);
     }
   };
   consider(map_);
   if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (shown(k, time_s, view, seen)) smallest = clearance_to(obstacles_[k], centers, radii, time_s, smallest);
+    if (shown(k, time_s, view, seen)) smallest = clearance_to(obstacles_[k], arm, time_s, smallest);
   return smallest;
 }
 
-bool Environment::in_slow_space(std::span<const Eigen::Vector3d> centers, std::span<const double> radii) const {
+bool Environment::in_slow_space(const Shapes& arm) const {
   if (summary_.unknown != UnknownPolicy::slow || unknown_.empty()) return false;
   BoxHit hit;
-  for (std::size_t i = 0; i < centers.size(); ++i)
-    if (unknown_.nearest(map_pose_inverse_ * centers[i], radii[i], hit)) return true;
+  SegmentHit axis_hit;
+  for (std::size_t i = 0; i < arm.size(); ++i) {
+    const bool touches = arm.is_capsule(i) ? unknown_.nearest(map_pose_inverse_ * arm.from(i),
+                                                              map_pose_inverse_ * arm.to(i), arm.radii[i], axis_hit)
+                                           : unknown_.nearest(map_pose_inverse_ * arm.centers[i], arm.radii[i], hit);
+    if (touches) return true;
+  }
   return false;
 }
 

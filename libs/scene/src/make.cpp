@@ -1,14 +1,14 @@
 #include "hamelin/scene/make.hpp"
 
 #include <fmt/format.h>
-#include <octomap/OcTree.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
+#include <numeric>
 
+#include "bt_writer.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
@@ -20,7 +20,8 @@ namespace hamelin::scene {
 
 namespace {
 
-constexpr std::int32_t half_key = 1 << 15;
+constexpr std::int32_t half_key = BtWriter::half;
+constexpr std::size_t looks_max = std::size_t{1} << 25U;
 
 // Half the extent along a unit direction: the support function from the centre.
 double half_extent(const Obstacle& o, const Eigen::Vector3d& direction) {
@@ -52,24 +53,26 @@ VoxelBox voxel_range(const Box& box, double resolution, double offset) {
   return range;
 }
 
-void check_count(const VoxelBox& range) {
-  double count = 1.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) count *= range.hi[axis] - range.lo[axis];
-  if (count > 0x1p28)
-    throw Error(ErrorCode::invalid, fmt::format("{:.3g} voxels in one region, expected at most 2^28", count));
+bool meets(const VoxelBox& range, const Cell& cell) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (cell.lo[axis] + cell.size <= range.lo[axis] || cell.lo[axis] >= range.hi[axis]) return false;
+  return true;
 }
 
-template <typename Visit>
-void for_each_voxel(const VoxelBox& range, const Visit& visit) {
-  check_count(range);
-  for (std::int32_t z = range.lo[2]; z < range.hi[2]; ++z)
-    for (std::int32_t y = range.lo[1]; y < range.hi[1]; ++y)
-      for (std::int32_t x = range.lo[0]; x < range.hi[0]; ++x) visit(VoxelBox{{x, y, z}, {x + 1, y + 1, z + 1}});
+bool holds(const VoxelBox& range, const Cell& cell) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (cell.lo[axis] < range.lo[axis] || cell.lo[axis] + cell.size > range.hi[axis]) return false;
+  return true;
 }
 
-octomap::OcTreeKey key_of(const VoxelBox& voxel) {
-  const auto key = [](std::int32_t i) { return static_cast<octomap::key_type>(i + half_key); };
-  return {key(voxel.lo[0]), key(voxel.lo[1]), key(voxel.lo[2])};
+// A convex body holds a box if it holds its corners.
+bool holds(const Obstacle& o, const Box& box) {
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p((corner & 1U) != 0 ? box.hi.x() : box.lo.x(), (corner & 2U) != 0 ? box.hi.y() : box.lo.y(),
+                            (corner & 4U) != 0 ? box.hi.z() : box.lo.z());
+    if (closest_on(o, o.pose.p(), p).distance > 0.0) return false;
+  }
+  return true;
 }
 
 Eigen::Matrix3d random_rotation(Rng& rng) {
@@ -167,47 +170,59 @@ MakeReport make_map(const MakeMapOptions& options) {
     const auto clutter = make_clutter(*options.clutter);
     primitives.insert(primitives.end(), clutter.begin(), clutter.end());
   }
-  octomap::OcTree tree(resolution);
   MakeReport report;
   report.primitives = primitives.size();
-  if (options.free_bounds)
-    for_each_voxel(voxel_range(*options.free_bounds, resolution, 0.5), [&](const VoxelBox& voxel) {
-      tree.setNodeValue(key_of(voxel), tree.getClampingThresMinLog(), true);
-    });
+  VoxelBox free;
+  if (options.free_bounds) free = voxel_range(*options.free_bounds, resolution, 0.5);
+  std::vector<VoxelBox> ranges;
   for (const Obstacle& o : primitives) {
     check(o, fmt::format("primitive '{}'", o.name));
     const Eigen::Vector3d center = o.pose.p();
     Eigen::Vector3d reach;
     for (int axis = 0; axis < 3; ++axis) reach[axis] = half_extent(o, Eigen::Vector3d::Unit(axis));
     if (options.mark == Mark::touch) reach.array() += 0.5 * resolution;
-    for_each_voxel(voxel_range({center - reach, center + reach}, resolution, 0.5), [&](const VoxelBox& voxel) {
-      const Box cube = to_metres(voxel, resolution);
-      const bool marked = options.mark == Mark::touch
-                              ? touches(o, cube)
-                              : closest_on(o, center, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
-      if (marked) tree.setNodeValue(key_of(voxel), tree.getClampingThresMaxLog(), true);
-    });
+    ranges.push_back(voxel_range({center - reach, center + reach}, resolution, 0.5));
   }
-  if (tree.size() == 0)
+  // A voxel that a primitive just touches may, by rounding, stand in a wide cell that it just does not.
+  const double hair = 1e-3 * resolution;
+  // From wide cells to narrow ones, each with the primitives that may hold a part of it.
+  std::vector<std::size_t> all(primitives.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::size_t looks = 0;
+  const BtWriter writer(all, [&](const Cell& cell, const std::vector<std::size_t>& above,
+                                 std::vector<std::size_t>& here) {
+    if (++looks > looks_max)
+      throw Error(ErrorCode::invalid, fmt::format("more than {} cells to look at: the resolution {} m is too fine for "
+                                                  "what is to be marked",
+                                                  looks_max, resolution));
+    const Box cube = to_metres(cell, resolution);
+    for (const std::size_t i : above) {
+      const Obstacle& o = primitives[i];
+      if (!meets(ranges[i], cell)) continue;
+      if (cell.size == 1) {
+        const bool marked = options.mark == Mark::touch
+                                ? touches(o, cube)
+                                : closest_on(o, o.pose.p(), 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
+        if (marked) return BtNode::occupied;
+      } else if (touches(o, {cube.lo.array() - hair, cube.hi.array() + hair})) {
+        if (holds(ranges[i], cell) && holds(o, cube)) return BtNode::occupied;
+        here.push_back(i);
+      }
+    }
+    if (!here.empty()) return BtNode::parts;
+    return !meets(free, cell) ? BtNode::unknown : holds(free, cell) ? BtNode::free : BtNode::parts;
+  });
+  if (writer.nodes() == 0)
     throw Error(ErrorCode::invalid, "the map would be empty, expected primitives, clutter or free bounds");
-  tree.updateInnerOccupancy();
-  tree.toMaxLikelihood();
-  tree.prune();
-  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
-    const std::size_t voxels = std::size_t{1} << (3U * (tree.getTreeDepth() - leaf.getDepth()));
-    (tree.isNodeOccupied(*leaf) ? report.occupied_voxels : report.free_voxels) += voxels;
-  }
-  // OctoMap's own writer of whole files prints; its body is the same.
-  std::ostringstream bytes;
-  bytes << fmt::format(
-      "# Octomap OcTree binary file\n# made by hamelin from {} primitives\n#\nid OcTree\nsize {}\nres {}\ndata\n",
-      primitives.size(), tree.size(), resolution);
-  tree.writeBinaryData(bytes);
-  write_file_aside(options.output, bytes.str());
+  const std::string bytes =
+      writer.file(resolution, fmt::format("made by hamelin from {} primitives", primitives.size()));
+  write_file_aside(options.output, bytes);
   report.output = options.output;
-  report.sha256 = sha256_hex(bytes.str());
-  report.bytes = bytes.str().size();
-  report.nodes = tree.size();
+  report.sha256 = sha256_hex(bytes);
+  report.bytes = bytes.size();
+  report.nodes = writer.nodes();
+  report.occupied_voxels = writer.occupied_voxels();
+  report.free_voxels = writer.free_voxels();
   return report;
 }
 
@@ -240,72 +255,170 @@ MakeMapOptions make_options_from_json(const Json& document, const std::string& w
 
 namespace {
 
+// How far beyond the arm's reach a problem's map knows free space [m]: more than a planner looks.
+constexpr double free_margin_m = 0.5;
+// Its faces are multiples of this many voxels, so that few nodes say it.
+constexpr double free_grain = 16.0;
+
+// A problem's keys, each message with its place.
+class ProblemReader {
+ public:
+  ProblemReader(const Json& document, std::string where) : document_(document), where_(std::move(where)) {
+    if (!document.is_object()) fail("", "is no object, expected a problem with start, goal and obstacles");
+    if (const Json* units = find(document, "units"); units != nullptr && *units != "m,rad")
+      fail("/units", fmt::format("are {}, expected \"m,rad\"", units->dump()));
+  }
+
+  [[nodiscard]] std::vector<double> joints(const char* key, int dof) const {
+    const std::string place = fmt::format("/{}", key);
+    const Json* value = find(document_, key);
+    if (value == nullptr) fail(place, fmt::format("is missing, expected {} numbers, one a joint", dof));
+    return numbers(*value, place, static_cast<std::size_t>(dof));
+  }
+
+  [[nodiscard]] Json obstacles() const {
+    const Json* list = find(document_, "obstacles");
+    if (list == nullptr || !list->is_array()) fail("/obstacles", "is missing, expected a list of primitives");
+    Json out = Json::array();
+    for (std::size_t i = 0; i < list->size(); ++i) out.push_back(obstacle((*list)[i], fmt::format("/obstacles/{}", i)));
+    return out;
+  }
+
+  [[noreturn]] void fail(const std::string& place, const std::string& what) const {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}: {}", where_, place.empty() ? "/" : place, what));
+  }
+
+ private:
+  static const Json* find(const Json& object, const char* key) {
+    const auto it = object.find(key);
+    return it == object.end() || it->is_null() ? nullptr : &*it;
+  }
+
+  [[nodiscard]] std::vector<double> numbers(const Json& value, const std::string& place, std::size_t count) const {
+    if (!value.is_array() || value.size() != count ||
+        !std::all_of(value.begin(), value.end(), [](const Json& x) { return x.is_number(); }))
+      fail(place, fmt::format("is {}, expected {} numbers", brief(value), count));
+    return value.get<std::vector<double>>();
+  }
+
+  static std::string brief(const Json& value) {
+    if (value.is_array()) return fmt::format("a list of {}", value.size());
+    if (value.is_object()) return "an object";
+    const std::string text = value.dump();
+    return text.size() > 40 ? text.substr(0, 40) + "..." : text;
+  }
+
+  // In a scene's form.
+  [[nodiscard]] Json obstacle(const Json& from, const std::string& place) const {
+    if (!from.is_object()) fail(place, fmt::format("is {}, expected a primitive", brief(from)));
+    const Json* type = find(from, "type");
+    const Json given = type != nullptr ? *type : Json(nullptr);
+    const bool box = given == "box", sphere = given == "sphere", cylinder = given == "cylinder";
+    if (!box && !sphere && !cylinder)
+      fail(place + "/type", fmt::format("is {}, expected \"sphere\", \"box\" or \"cylinder\"", brief(given)));
+    Json out{{"name", ""}, {"type", given}};
+    const auto length = [&](const Json& value, const std::string& at) {
+      if (!value.is_number() || !(value.get<double>() > 0.0 && std::isfinite(value.get<double>())))
+        fail(at, fmt::format("is {}, expected a length above 0", brief(value)));
+    };
+    bool placed = false;
+    for (const auto& [key, value] : from.items()) {
+      const std::string at = fmt::format("{}/{}", place, key);
+      if (key == "type") continue;
+      if (key == "name") {
+        if (!value.is_string()) fail(at, fmt::format("is {}, expected a name", brief(value)));
+        out["name"] = value;
+      } else if (key == "position") {
+        out["position_m"] = numbers(value, at, 3);
+        placed = true;
+      } else if (key == "quaternion_wxyz") {
+        out["quaternion_wxyz"] = numbers(value, at, 4);
+      } else if (key == "size" && box) {
+        for (const double edge : numbers(value, at, 3)) length(edge, at);
+        out["size_m"] = value;
+      } else if ((key == "radius" && !box) || (key == "length" && cylinder)) {
+        length(value, at);
+        out[key + "_m"] = value;
+      } else {
+        fail(at, fmt::format("is not known, a {} has name, type, position, quaternion_wxyz and {}",
+                             given.get<std::string>(),
+                             box      ? "size"
+                             : sphere ? "radius"
+                                      : "radius, length"));
+      }
+    }
+    if (!placed) fail(place + "/position", "is missing, expected 3 numbers");
+    for (const char* needed : {box ? "size" : "radius", cylinder ? "length" : "type"})
+      if (find(from, needed) == nullptr)
+        fail(fmt::format("{}/{}", place, needed), fmt::format("is missing, a {} has it", given.get<std::string>()));
+    out["judge_only"] = true;
+    return out;
+  }
+
+  const Json& document_;
+  std::string where_;
+};
+
 // The problem's goal as the scene shall have it.
-Json goal_json(const Eigen::VectorXd& q, const ProblemOptions& options, const std::string& where) {
-  if (options.goal == GoalType::joint) return {{"type", "joint"}, {"q", std::vector<double>(q.begin(), q.end())}};
-  model::RobotOptions of_robot;
-  if (!options.tip.empty()) of_robot.tip = options.tip;
-  const model::Model model(model::read_robot(options.robot, of_robot));
-  if (q.size() != model.dof())
-    throw Error(ErrorCode::invalid, fmt::format("{}: /goal: {} numbers given, expected {}, one a joint of '{}'", where,
-                                                q.size(), model.dof(), model.robot().name));
+Json goal_json(const std::vector<double>& q, GoalType type, const model::Model& model) {
+  if (type == GoalType::joint) return {{"type", "joint"}, {"q", q}};
   dynamics::Workspace ws(model);
-  dynamics::forward_kinematics(model, ws, q);
+  dynamics::forward_kinematics(model, ws,
+                               Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size())));
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
-  Json goal{{"type", to_string(options.goal)}, {"position_m", {tip.p().x(), tip.p().y(), tip.p().z()}}};
-  if (options.goal == GoalType::pose) {
+  Json goal{{"type", to_string(type)}, {"position_m", {tip.p().x(), tip.p().y(), tip.p().z()}}};
+  if (type == GoalType::pose) {
     const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(tip.R());
     goal["quaternion_wxyz"] = {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
   }
   return goal;
 }
 
+// A cube around the base that holds all that the arm can come near; a problem's space is known.
+Box free_space(const model::Model& model, double resolution) {
+  const double grain = free_grain * resolution;
+  const double half = grain * std::ceil((model.reach() + free_margin_m) / grain);
+  return {Eigen::Vector3d::Constant(-half), Eigen::Vector3d::Constant(half)};
+}
+
 }  // namespace
 
 MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options) {
   const Json document = read_json(problem);
+  const ProblemReader in(document, problem.string());
   const auto directory = options.output.parent_path();
   const auto relative = [&](const std::filesystem::path& path) {
     return std::filesystem::proximate(path, directory.empty() ? "." : directory).generic_string();
   };
-  Json out{{"schema", "hamelin.scene/1"}};
-  Json judged = Json::array();
+  model::RobotOptions of_robot;
+  if (!options.tip.empty()) of_robot.tip = options.tip;
+  if (!options.spheres.empty()) of_robot.spheres = options.spheres;
+  const model::Model model(model::read_robot(options.robot, of_robot));
   MakeMapOptions map;
   map.resolution_m = options.resolution_m;
   map.mark = options.mark;
   map.output = options.output;
   map.output.replace_extension(".bt");
-  try {
-    out["robot"] = {{"file", relative(options.robot)}};
-    if (!options.tip.empty()) out["robot"]["tip"] = options.tip;
-    if (!options.spheres.empty()) out["robot"]["spheres"] = relative(options.spheres);
-    out["gravity_m_s2"] = {0.0, 0.0, -9.81};
-    out["start"] = {{"q", document.at("start")}};
-    const auto q = document.at("goal").get<std::vector<double>>();
-    const Eigen::Map<const Eigen::VectorXd> goal(q.data(), static_cast<Eigen::Index>(q.size()));
-    out["goals"] = Json::array({goal_json(goal, options, problem.string())});
-    out["map"] = {{"file", map.output.filename().string()}};
-    for (const Json& from : document.at("obstacles")) {
-      Json obstacle{{"name", from.at("name")}, {"type", from.at("type")}};
-      if (from.contains("radius")) obstacle["radius_m"] = from["radius"];
-      if (from.contains("length")) obstacle["length_m"] = from["length"];
-      if (from.contains("size")) obstacle["size_m"] = from["size"];
-      obstacle["position_m"] = from.at("position");
-      obstacle["quaternion_wxyz"] = from.at("quaternion_wxyz");
-      obstacle["judge_only"] = true;
-      judged.push_back(std::move(obstacle));
-    }
-  } catch (const nlohmann::json::exception& e) {
+  if (map.output == options.output)
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: is no problem with start, goal and obstacles: {}", problem.string(), e.what()));
-  }
-  out["obstacles"] = std::move(judged);
+                fmt::format("{}: is the map's name, expected that of a scene, such as {}", options.output.string(),
+                            std::filesystem::path(options.output).replace_extension(".json").string()));
+  Json out{{"schema", "hamelin.scene/1"}};
+  out["robot"] = {{"file", relative(options.robot)}};
+  if (!options.tip.empty()) out["robot"]["tip"] = options.tip;
+  if (!options.spheres.empty()) out["robot"]["spheres"] = relative(options.spheres);
+  out["gravity_m_s2"] = {0.0, 0.0, -9.81};
+  out["start"] = {{"q", in.joints("start", model.dof())}};
+  out["goals"] = Json::array({goal_json(in.joints("goal", model.dof()), options.goal, model)});
+  out["map"] = {{"file", map.output.filename().string()}};
+  out["obstacles"] = in.obstacles();
   out["model"] = {{"joint_limits", true}, {"velocity_limits", true}, {"torque_limits", true}, {"self_collision", true}};
   out["planner"] = {{"name", "hybrid"}};
   out["step_s"] = 0.001;
   out["duration_s"] = 30.0;
   out["seed"] = 1;
   map.primitives = scene_from_json(out, directory, problem.string()).obstacles;
+  map.free_bounds = free_space(model, map.resolution_m);
   MakeReport report = make_map(map);
   write_file_aside(options.output, out.dump(2) + "\n");
   return report;

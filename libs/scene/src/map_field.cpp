@@ -1,30 +1,242 @@
 #include "hamelin/scene/map_field.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
 namespace hamelin::scene {
 
 namespace {
 
 constexpr double cone_cosine = 0.86602540378443865;  // 30°
-constexpr double far_table_edge_m = 0.05;
-// Tables are exact this much farther than asked: no sphere of an arm is much larger.
-constexpr double far_table_radius_m = 0.2;
+constexpr double table_edge_m = 0.05;
 
-std::vector<Box> boxes_of(const std::vector<Cell>& cells, double resolution) {
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolution) {
   std::vector<Box> boxes;
-  for (const VoxelBox& box : merge(cells)) boxes.push_back(to_metres(box, resolution));
+  boxes.reserve(voxels.size());
+  for (const VoxelBox& box : voxels) boxes.push_back(to_metres(box, resolution));
   return boxes;
+}
+
+std::size_t volume(const std::vector<VoxelBox>& boxes) {
+  std::size_t voxels = 0;
+  for (const VoxelBox& box : boxes) {
+    std::size_t product = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) product *= static_cast<std::size_t>(box.hi[axis] - box.lo[axis]);
+    voxels += product;
+  }
+  return voxels;
 }
 
 }  // namespace
 
-MapField::MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable, double far)
-    : boxes_(boxes_of(cells, resolution), reachable.center),
-      far_(boxes_, reachable, far_table_edge_m, far + far_table_radius_m) {}
+MapField::MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable)
+    : resolution_(resolution),
+      reachable_(reachable),
+      boxes_(in_metres(merge(cells), resolution), reachable.center),
+      surface_(std::make_unique<Surface>()) {
+  if (!boxes_.empty()) near_ = NearTable(reachable, table_edge_m);
+}
+
+std::vector<VoxelBox> MapField::voxel_boxes(std::size_t from) const {
+  std::vector<VoxelBox> voxels;
+  for (std::size_t i = from; i < boxes_.boxes().size(); ++i)
+    if (boxes_.alive(i)) voxels.push_back(to_voxels(boxes_.boxes()[i], resolution_));
+  return voxels;
+}
+
+MapField::Changed MapField::change(const std::vector<VoxelBox>& add, const std::vector<VoxelBox>& remove) {
+  Changed changed;
+  const std::size_t first_added = boxes_.first_added();
+  const auto voxels_of = [&](std::int32_t box) {
+    return to_voxels(boxes_.boxes()[static_cast<std::size_t>(box)], resolution_);
+  };
+  // What is cut by which hole, box by box, and what is left of it.
+  std::vector<std::int32_t> near, cut;
+  std::vector<std::pair<std::int32_t, const VoxelBox*>> cuts;
+  for (const VoxelBox& hole : remove) {
+    boxes_.overlapping(to_metres(hole, resolution_), near);
+    for (const std::int32_t box : near) cuts.emplace_back(box, &hole);
+  }
+  std::stable_sort(cuts.begin(), cuts.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
+  std::vector<std::vector<VoxelBox>> rest;
+  for (const auto& one : cuts) {
+    if (cut.empty() || cut.back() != one.first) {
+      cut.push_back(one.first);
+      rest.push_back({voxels_of(one.first)});
+      changed.removed += volume(rest.back());
+    }
+    subtract(rest.back(), *one.second);
+  }
+  for (const auto& pieces : rest) changed.removed -= volume(pieces);
+  // What was added before, as far as it is whole, is put together with these rests and with what is new.
+  std::vector<VoxelBox> added;
+  for (std::size_t box = first_added; box < boxes_.boxes().size(); ++box)
+    if (!std::binary_search(cut.begin(), cut.end(), static_cast<std::int32_t>(box)))
+      added.push_back(voxels_of(static_cast<std::int32_t>(box)));
+  for (const auto& pieces : rest) added.insert(added.end(), pieces.begin(), pieces.end());
+  for (const VoxelBox& box : add) {
+    std::vector<VoxelBox> pieces{box};
+    boxes_.overlapping(to_metres(box, resolution_), near);
+    for (const std::int32_t there : near) {
+      const auto at = std::lower_bound(cut.begin(), cut.end(), there);
+      if (at == cut.end() || *at != there) {
+        subtract(pieces, voxels_of(there));
+        continue;
+      }
+      for (const VoxelBox& piece : rest[static_cast<std::size_t>(at - cut.begin())]) subtract(pieces, piece);
+    }
+    changed.added += volume(pieces);
+    added.insert(added.end(), pieces.begin(), pieces.end());
+  }
+  if (changed.added == 0 && changed.removed == 0) return changed;
+  join(added);
+  cut.erase(std::lower_bound(cut.begin(), cut.end(), static_cast<std::int32_t>(first_added)), cut.end());
+  boxes_.change(cut, in_metres(added, resolution_));
+  if (near_.bytes() == 0) near_ = NearTable(reachable_, table_edge_m);
+  if (changed.added > 0) near_.forget();
+  surface_ = std::make_unique<Surface>();
+  return changed;
+}
+
+const BoxField& MapField::faces() const {
+  std::call_once(surface_->made, [this] {
+    surface_->faces = BoxField(in_metres(surface(voxel_boxes(0)), resolution_), reachable_.center);
+  });
+  return surface_->faces;
+}
+
+void MapField::find_way_out(const Eigen::Vector3d& p, BoxHit& hit) const {
+  BoxHit face;
+  if (!faces().nearest(p, infinity, face)) return;
+  const double depth = std::abs(face.distance);
+  hit.distance = -depth;
+  hit.point = face.point;
+  hit.direction = -face.direction;
+  constexpr double on_surface = 1e-9;
+  if (depth > on_surface) return;
+  // the normal, towards where half a voxel on nothing is
+  const Box& flat = faces().boxes()[static_cast<std::size_t>(face.box)];
+  int axis = 0;
+  (flat.hi - flat.lo).minCoeff(&axis);
+  const Eigen::Vector3d normal = Eigen::Vector3d::Unit(axis);
+  BoxHit beyond;
+  const bool up = !boxes_.nearest(face.point + 0.5 * resolution_ * normal, 0.0, beyond);
+  hit.direction = up ? normal : Eigen::Vector3d(-normal);
+}
+
+void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, SegmentHit& hit) const {
+  // The depth at t is the least of the distances to the faces, each of which is convex in t: between two points it is
+  // no more than the chords of any two of them. The interval with the greatest such bound is cut where the chords
+  // cross.
+  struct Sample {
+    double t, depth;
+    std::int32_t face;
+  };
+  struct Interval {
+    Sample left, right;
+    double bound, cut;
+  };
+  constexpr double tolerance = 1e-10;
+  constexpr int samples_max = 500;
+  constexpr std::size_t room = 64;
+  const auto at = [&](double t) { return Eigen::Vector3d(a + t * (b - a)); };
+  const auto sample = [&](double t) {
+    BoxHit face, inside;
+    (void)faces().nearest(at(t), infinity, face);
+    const double distance = std::abs(face.distance);
+    return Sample{t, boxes_.nearest(at(t), 0.0, inside) ? distance : -distance, face.box};
+  };
+  const auto interval = [&](const Sample& left, const Sample& right) {
+    const auto distance = [&](const Sample& of, const Sample& to) {
+      return std::abs(closest_on_box(at(to.t), faces().boxes()[static_cast<std::size_t>(of.face)]).distance);
+    };
+    const double a0 = std::abs(left.depth), a1 = distance(left, right), b0 = distance(right, left),
+                 b1 = std::abs(right.depth);
+    // where the chords a0..a1 and b0..b1 cross; b0 ≥ a0 and a1 ≥ b1, as each is the nearest at its own end
+    const double apart = (b0 - a0) + (a1 - b1);
+    const double share = apart > 0.0 ? (b0 - a0) / apart : 0.5;
+    Interval out{left, right, a0 + share * (a1 - a0), left.t + share * (right.t - left.t)};
+    out.bound = std::max({out.bound, a0, b1});
+    const double width = right.t - left.t;
+    // and depth changes no faster than the place
+    out.bound = std::min(out.bound, 0.5 * (left.depth + right.depth + width * (b - a).norm()));
+    // outside the chords say little: halving is faster
+    const bool entered = left.depth >= 0.0 && right.depth >= 0.0;
+    out.cut = entered ? std::clamp(out.cut, left.t + 0.05 * width, right.t - 0.05 * width) : left.t + 0.5 * width;
+    return out;
+  };
+  Sample best = sample(hit.along);
+  std::array<Interval, room> waiting;
+  std::size_t count = 0;
+  const std::array<double, 3> starts{0.0, hit.along, 1.0};
+  Sample last = sample(0.0);
+  for (const double t : starts) {
+    const Sample next = sample(t);
+    if (next.depth > best.depth) best = next;
+    if (next.t > last.t) waiting[count++] = interval(last, next);
+    last = next;
+  }
+  for (int samples = 0; samples < samples_max && count > 0 && count < room; ++samples) {
+    auto* const widest = std::max_element(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(count),
+                                          [](const Interval& x, const Interval& y) { return x.bound < y.bound; });
+    if (widest->bound <= best.depth + tolerance) break;
+    const Interval open = *widest;
+    *widest = waiting[--count];
+    const Sample middle = sample(open.cut);
+    if (middle.depth > best.depth) best = middle;
+    if (!(middle.t > open.left.t && middle.t < open.right.t)) continue;
+    waiting[count++] = interval(open.left, middle);
+    waiting[count++] = interval(middle, open.right);
+  }
+  hit.along = best.t;
+  hit.axis_point = at(best.t);
+  find_way_out(hit.axis_point, hit);
+}
+
+bool MapField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std::int32_t hint) const {
+  // with a hint and no limit the table has nothing to tell
+  if (hint < 0 || limit < infinity) {
+    const NearTable::Answer near = near_.ask(boxes_, p);
+    if (static_cast<double>(near.lower) > limit) return false;
+    if (hint < 0) hint = near.hint;
+  }
+  if (!boxes_.nearest(p, limit, hit, hint)) return false;
+  if (hit.distance <= 0.0) find_way_out(p, hit);
+  return true;
+}
+
+bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, SegmentHit& hit,
+                       std::int32_t hint) const {
+  if (hint < 0 || limit < infinity) {
+    const NearTable::Answer near = near_.ask(boxes_, 0.5 * (a + b));
+    if (static_cast<double>(near.lower) > limit + 0.5 * (b - a).norm()) return false;
+    if (hint < 0) hint = near.hint;
+  }
+  if (!boxes_.nearest(a, b, limit, hit, hint)) return false;
+  if (hit.distance <= 0.0) find_deepest(a, b, hit);
+  return true;
+}
 
 std::size_t MapField::several(const Eigen::Vector3d& p, double limit, Scratch& scratch,
                               std::span<BoxHit, points_max> out) const {
-  if (boxes_.empty() || far_.beyond(p, limit)) return 0;
-  return boxes_.several(p, limit, cone_cosine, scratch.boxes_, out);
+  if (static_cast<double>(near_.ask(boxes_, p).lower) > limit) return 0;
+  const std::size_t count = boxes_.several(p, limit, cone_cosine, scratch.boxes_, out);
+  if (count == 0 || out[0].distance > 0.0) return count;
+  find_way_out(p, out[0]);
+  return 1;
+}
+
+std::size_t MapField::several(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, Scratch& scratch,
+                              std::span<SegmentHit, points_max> out) const {
+  if (static_cast<double>(near_.ask(boxes_, 0.5 * (a + b)).lower) > limit + 0.5 * (b - a).norm()) return 0;
+  const std::size_t count = boxes_.several(a, b, limit, cone_cosine, scratch.boxes_, out);
+  if (count == 0 || out[0].distance > 0.0) return count;
+  find_deepest(a, b, out[0]);
+  return 1;
 }
 
 }  // namespace hamelin::scene

@@ -1,13 +1,12 @@
 #include "hamelin/scene/map_file.hpp"
 
 #include <fmt/format.h>
-#include <octomap/OcTree.h>
 
 #include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <sstream>
+#include <cstring>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
@@ -16,7 +15,7 @@ namespace hamelin::scene {
 
 namespace {
 
-constexpr int max_depth = 16;
+constexpr std::size_t max_depth = 16;
 constexpr std::string_view first_line_bt = "# Octomap OcTree binary file";
 constexpr std::string_view first_line_ot = "# Octomap OcTree file";
 constexpr double resolution_min = 1e-5, resolution_max = 1e4;
@@ -34,12 +33,31 @@ std::string shown(std::string_view text) {
   return text.size() > 40 ? out + "..." : out;
 }
 
+// Files from before OctoMap had headers begin with the tree's type, 3, as four bytes, then the resolution as a double.
+[[noreturn]] void refuse_legacy(std::string_view bytes, const std::string& where) {
+  constexpr std::size_t header_size = 4 + 8 + 4;
+  double resolution = 0.0;
+  std::uint32_t nodes = 0;
+  if (bytes.size() <= header_size)
+    refuse(where, "byte 0", "a legacy file without header lines, and cut off, expected an OctoMap");
+  std::memcpy(&resolution, bytes.data() + 4, sizeof resolution);
+  std::memcpy(&nodes, bytes.data() + 12, sizeof nodes);
+  if (!(resolution >= resolution_min && resolution <= resolution_max))
+    refuse(where, "byte 4",
+           fmt::format("a legacy file without header lines, of resolution {}, expected an OctoMap", resolution));
+  refuse(where, "byte 0",
+         fmt::format("a legacy file without header lines (resolution {}, {} nodes), expected '{}' or '{}': OctoMap's "
+                     "convert_octree makes one of it",
+                     resolution, nodes, first_line_bt, first_line_ot));
+}
+
 MapFormat format_of(std::string_view bytes, const std::string& where) {
   const auto starts = [&](std::string_view head) { return bytes.substr(0, head.size()) == head; };
   if (bytes.empty()) refuse(where, "byte 0", "the file is empty, expected an OctoMap");
   if (starts("\x1f\x8b")) refuse(where, "byte 0", "gzip-compressed, expected an OctoMap: gunzip it first");
   if (starts("version https://git-lfs"))
     refuse(where, "byte 0", "a Git LFS pointer, expected an OctoMap: run 'git lfs pull' first");
+  if (starts(std::string_view("\3\0\0\0", 4))) refuse_legacy(bytes, where);
   const std::string_view line = bytes.substr(0, bytes.find('\n'));
   if (starts(first_line_bt) || starts(first_line_ot)) {
     if (line.back() == '\r')
@@ -48,9 +66,7 @@ MapFormat format_of(std::string_view bytes, const std::string& where) {
     if (line == first_line_ot) return MapFormat::ot;
   }
   refuse(where, "header line 1",
-         fmt::format(
-             "is '{}', expected '{}' or '{}'; a legacy file without header must go through OctoMap's convert_octree",
-             shown(line), first_line_bt, first_line_ot));
+         fmt::format("is '{}', expected '{}' or '{}'", shown(line), first_line_bt, first_line_ot));
 }
 
 template <typename T>
@@ -93,9 +109,9 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
     };
     if (key == "id") {
       once(has_id);
-      // The binary form of a coloured tree is the plain one; its full form has wider nodes.
-      if (value != "OcTree" && !(value == "ColorOcTree" && header.format == MapFormat::bt))
-        refuse(where, place, fmt::format("tree type '{}' is not known, expected OcTree", shown(value)));
+      header.colored = value == "ColorOcTree";
+      if (value != "OcTree" && !header.colored)
+        refuse(where, place, fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree", shown(value)));
     } else if (key == "size") {
       once(has_size);
       stated.size_line = number;
@@ -120,60 +136,109 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
   return stated;
 }
 
-// Walks the body depth first, as it is stored. Each level of `waiting` holds a bit for each child still to be read.
-class BodyCheck {
+enum class Holds { unknown, free, occupied };
+
+// Walks the body depth first, as it is stored, without recursion, and checks every byte on the way. `visit(Holds,
+// Cell)` is called for each leaf and for each child that an inner node lacks. Returns the number of nodes.
+class Body {
  public:
-  BodyCheck(std::string_view bytes, std::size_t offset, const std::string& where)
-      : bytes_(bytes), at_(offset), where_(where) {}
+  Body(std::string_view bytes, const MapHeader& header, float threshold, const std::string& where)
+      : bytes_(bytes), header_(header), threshold_(threshold), where_(where) {}
 
-  std::size_t count_bt() {
-    std::size_t nodes = 1;
-    walk(max_depth - 1, [&] {  // only inner nodes are stored
-      const std::size_t begin = at_;
-      const unsigned low = byte(), high = byte();
-      const unsigned code = low | (high << 8U);
-      unsigned inner = 0;
-      for (unsigned child = 0; child < 8; ++child) {
-        const unsigned bits = (code >> (2U * child)) & 3U;
-        nodes += bits != 0 ? 1 : 0;
-        if (bits == 3) inner |= 1U << child;
-      }
-      if (code == 0) fail(begin, "inner node without children");
-      return inner;
-    });
-    return nodes;
-  }
-
-  std::size_t count_ot() {
-    std::size_t nodes = 0;
-    walk(max_depth, [&] {
-      const std::size_t begin = at_;
-      std::uint32_t word = 0;
-      for (unsigned i = 0; i < 4; ++i) word |= byte() << (8U * i);
-      const float log_odds = std::bit_cast<float>(word);
-      if (!(std::abs(log_odds) <= log_odds_max))
-        fail(begin, fmt::format("log-odds {} of a node, expected a number within ±{}", log_odds, log_odds_max));
-      ++nodes;
-      return byte();
-    });
+  template <typename Visit>
+  std::size_t walk(const Visit& visit) {
+    at_ = header_.data_offset;
+    const std::size_t nodes = header_.format == MapFormat::bt ? walk_bt(visit) : walk_ot(visit);
+    if (at_ != bytes_.size()) fail(at_, fmt::format("{} bytes behind the end of the tree", bytes_.size() - at_));
     return nodes;
   }
 
  private:
-  template <typename ReadNode>
-  void walk(int deepest, const ReadNode& read_node) {
-    std::array<unsigned, max_depth + 1> waiting{};
-    int depth = 0;
-    for (bool done = false; !done;) {
-      if (depth > deepest) fail(at_, fmt::format("the tree is deeper than {} levels", max_depth));
-      waiting[static_cast<std::size_t>(depth)] = read_node();
-      while (waiting[static_cast<std::size_t>(depth)] == 0 && depth > 0) --depth;
-      auto& here = waiting[static_cast<std::size_t>(depth)];
-      done = here == 0;
-      here &= here - 1;
-      ++depth;
+  struct Level {
+    unsigned children = 0;  // a .bt's code, two bits each, or a .ot's mask
+    unsigned next = 0;
+    std::array<std::int32_t, 3> lo{};
+  };
+  static constexpr std::int32_t half = 1 << (max_depth - 1);
+
+  // Only inner nodes are stored: two bytes, of which each child has two bits.
+  template <typename Visit>
+  std::size_t walk_bt(const Visit& visit) {
+    std::size_t nodes = 1, depth = 0;
+    levels_[0] = {code(), 0, {-half, -half, -half}};
+    for (;;) {
+      Level& level = levels_[depth];
+      if (level.next == 8) {
+        if (depth-- == 0) return nodes;
+        continue;
+      }
+      const unsigned bits = (level.children >> (2U * level.next)) & 3U;
+      const Cell cell = child_of(level, depth);
+      ++level.next;
+      nodes += bits != 0 ? 1 : 0;
+      if (bits != 3) {
+        visit(bits == 0 ? Holds::unknown : bits == 1 ? Holds::free : Holds::occupied, cell);
+      } else {
+        if (++depth == max_depth) fail(at_, too_deep);
+        levels_[depth] = {code(), 0, cell.lo};
+      }
     }
-    if (at_ != bytes_.size()) fail(at_, fmt::format("{} bytes behind the end of the tree", bytes_.size() - at_));
+  }
+
+  // Every node is stored: its log-odds, its colour if it has one, a bit for each child.
+  template <typename Visit>
+  std::size_t walk_ot(const Visit& visit) {
+    std::size_t nodes = 0, depth = 0;
+    const auto enter = [&](const Cell& cell) {
+      ++nodes;
+      const Holds holds = log_odds() >= threshold_ ? Holds::occupied : Holds::free;
+      if (header_.colored)
+        for (int i = 0; i < 3; ++i) byte();
+      levels_[depth] = {byte(), 0, cell.lo};
+      if (levels_[depth].children == 0) {
+        levels_[depth].next = 8;
+        visit(holds, cell);
+      }
+    };
+    enter({{-half, -half, -half}, 2 * half});
+    for (;;) {
+      Level& level = levels_[depth];
+      if (level.next == 8) {
+        if (depth-- == 0) return nodes;
+        continue;
+      }
+      if (depth == max_depth) fail(at_, too_deep);
+      const Cell cell = child_of(level, depth);
+      if (((level.children >> level.next++) & 1U) == 0) {
+        visit(Holds::unknown, cell);
+      } else {
+        ++depth;
+        enter(cell);
+      }
+    }
+  }
+
+  static Cell child_of(const Level& level, std::size_t depth) {
+    Cell cell{level.lo, half >> depth};
+    for (unsigned axis = 0; axis < 3; ++axis) cell.lo[axis] += (level.next >> axis) & 1U ? cell.size : 0;
+    return cell;
+  }
+
+  unsigned code() {
+    const std::size_t begin = at_;
+    const unsigned low = byte(), high = byte();
+    if ((low | high) == 0) fail(begin, "inner node without children");
+    return low | (high << 8U);
+  }
+
+  float log_odds() {
+    const std::size_t begin = at_;
+    std::uint32_t word = 0;
+    for (unsigned i = 0; i < 4; ++i) word |= byte() << (8U * i);
+    const float value = std::bit_cast<float>(word);
+    if (!(std::abs(value) <= log_odds_max))
+      fail(begin, fmt::format("log-odds {} of a node, expected a number within ±{}", value, log_odds_max));
+    return value;
   }
 
   unsigned byte() {
@@ -185,39 +250,25 @@ class BodyCheck {
     refuse(where_, fmt::format("byte {}", offset), what);
   }
 
+  static constexpr const char* too_deep = "the tree is deeper than 16 levels";
+
   std::string_view bytes_;
-  std::size_t at_;
+  const MapHeader& header_;
+  float threshold_;
   const std::string& where_;
+  std::size_t at_ = 0;
+  std::array<Level, max_depth + 1> levels_{};
 };
 
-void collect_cells(const octomap::OcTree& tree, MapData& map) {
-  struct Entry {
-    const octomap::OcTreeNode* node;
-    Cell cell;
-  };
-  constexpr std::int32_t half = 1 << (max_depth - 1);
-  std::vector<Entry> stack{{tree.getRoot(), {{-half, -half, -half}, 2 * half}}};
-  while (!stack.empty()) {
-    const Entry entry = stack.back();
-    stack.pop_back();
-    if (entry.node == nullptr) {
-      map.unknown.push_back(entry.cell);
-    } else if (!tree.nodeHasChildren(entry.node)) {
-      if (tree.isNodeOccupied(entry.node)) {
-        map.occupied.push_back(entry.cell);
-      } else {
-        ++map.free_leaves;
-      }
-    } else {
-      const std::int32_t size = entry.cell.size / 2;
-      for (unsigned child = 8; child-- > 0;) {
-        Cell cell{entry.cell.lo, size};
-        for (unsigned axis = 0; axis < 3; ++axis) cell.lo[axis] += (child >> axis) & 1U ? size : 0;
-        stack.push_back(
-            {tree.nodeChildExists(entry.node, child) ? tree.getNodeChild(entry.node, child) : nullptr, cell});
-      }
-    }
-  }
+// As OctoMap rounds it.
+float log_odds_of(double probability) {
+  return static_cast<float>(std::log(probability / (1.0 - probability)));
+}
+
+void check_count(const StatedHeader& stated, std::size_t nodes, const std::string& where) {
+  if (nodes != stated.header.node_count)
+    refuse(where, fmt::format("header line {}", stated.size_line),
+           fmt::format("size {}, but the file has {} nodes", stated.header.node_count, nodes));
 }
 
 void warn(MapData& map) {
@@ -246,16 +297,11 @@ void warn(MapData& map) {
 
 MapHeader check_map_bytes(std::string_view bytes, const std::string& where) {
   const StatedHeader stated = read_header(bytes, where);
-  BodyCheck body(bytes, stated.header.data_offset, where);
-  const std::size_t nodes = stated.header.format == MapFormat::bt ? body.count_bt() : body.count_ot();
-  if (nodes != stated.header.node_count)
-    refuse(where, fmt::format("header line {}", stated.size_line),
-           fmt::format("size {}, but the file has {} nodes", stated.header.node_count, nodes));
+  check_count(stated, Body(bytes, stated.header, 0.0F, where).walk([](Holds, const Cell&) {}), where);
   return stated.header;
 }
 
-MapData read_map(const std::filesystem::path& file, const ReadMapOptions& options) {
-  const std::string where = file.string();
+MapData map_from_bytes(std::string_view bytes, const std::string& where, const ReadMapOptions& options) {
   const auto invalid = [&](const std::string& what) {
     throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
   };
@@ -264,8 +310,12 @@ MapData read_map(const std::filesystem::path& file, const ReadMapOptions& option
   if (!(options.occupancy_threshold > 0.0 && options.occupancy_threshold < 1.0))
     invalid(fmt::format("occupancy threshold {} is not allowed, expected above 0 and below 1",
                         options.occupancy_threshold));
-  const std::string bytes = read_file(file);
-  const MapHeader header = check_map_bytes(bytes, where);
+  const StatedHeader stated = read_header(bytes, where);
+  const MapHeader& header = stated.header;
+  Body body(bytes, header, log_odds_of(options.occupancy_threshold), where);
+  // Once for the checks and to count, so that a bad file takes no memory and a good one no more than it needs.
+  std::array<std::size_t, 3> count{};
+  check_count(stated, body.walk([&](Holds holds, const Cell&) { ++count[static_cast<std::size_t>(holds)]; }), where);
   if (header.resolution > 0.5 && !options.scale)
     invalid(fmt::format(
         "resolution {} is above 0.5: expected an explicit scale, metres per unit of the file (0.001 if it is in "
@@ -276,20 +326,28 @@ MapData read_map(const std::filesystem::path& file, const ReadMapOptions& option
   map.file = where;
   map.sha256 = sha256_hex(bytes);
   map.resolution = header.resolution * options.scale.value_or(1.0);
+  if (!(map.resolution >= resolution_min && map.resolution <= resolution_max))
+    invalid(fmt::format("resolution {} times scale {} is {} m, expected {} to {}", header.resolution,
+                        options.scale.value_or(1.0), map.resolution, resolution_min, resolution_max));
   map.node_count = header.node_count;
-  octomap::OcTree tree(header.resolution);
-  tree.setOccupancyThres(options.occupancy_threshold);
-  std::istringstream body(bytes.substr(header.data_offset));
-  if (header.format == MapFormat::bt) {
-    tree.readBinaryData(body);
-  } else {
-    tree.readData(body);
-  }
-  if (tree.size() != header.node_count)
-    invalid(fmt::format("OctoMap reads {} nodes of {}", tree.size(), header.node_count));
-  collect_cells(tree, map);
+  map.free_leaves = count[static_cast<std::size_t>(Holds::free)];
+  map.occupied.reserve(count[static_cast<std::size_t>(Holds::occupied)]);
+  map.unknown.reserve(count[static_cast<std::size_t>(Holds::unknown)]);
+  if (options.keep_free) map.free.reserve(map.free_leaves);
+  body.walk([&](Holds holds, const Cell& cell) {
+    if (holds == Holds::occupied) map.occupied.push_back(cell);
+    if (holds == Holds::unknown) map.unknown.push_back(cell);
+    if (holds == Holds::free && options.keep_free) map.free.push_back(cell);
+  });
   warn(map);
+  if (header.format == MapFormat::bt && options.occupancy_threshold != 0.5)
+    map.warnings.push_back(fmt::format("the occupancy threshold {} has no effect: a .bt tells occupied from free only",
+                                       options.occupancy_threshold));
   return map;
+}
+
+MapData read_map(const std::filesystem::path& file, const ReadMapOptions& options) {
+  return map_from_bytes(read_file(file), file.string(), options);
 }
 
 }  // namespace hamelin::scene

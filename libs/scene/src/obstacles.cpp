@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -38,6 +39,55 @@ SurfacePoint on_cylinder(double radius, double length, const Eigen::Vector3d& p)
   return {end, rho * radial + half * axial, axial};
 }
 
+// A signed distance of a convex body, with its gradient at every point of the axis, is convex along the axis: two
+// tangents bound the minimum between them from below.
+template <class PointDistance>
+AxisPoint along_axis(const PointDistance& nearest, double size, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  struct Place {
+    double t;
+    SurfacePoint hit;
+    double slope;
+  };
+  const Eigen::Vector3d axis = b - a;
+  const auto at = [&](double t) {
+    const SurfacePoint hit = nearest(a + t * axis);
+    return Place{t, hit, hit.direction.dot(axis)};
+  };
+  Place low = at(0.0), high = at(1.0);
+  const auto answer = [&](const Place& best) { return AxisPoint{best.hit, a + best.t * axis}; };
+  if (low.slope >= 0.0) return answer(low);
+  if (high.slope <= 0.0) return answer(high);
+  const double gap = 1e-13 * (1.0 + size + axis.norm());
+  constexpr int rounds_max = 100;
+  for (int round = 0; round < rounds_max; ++round) {
+    const Place& best = low.hit.distance < high.hit.distance ? low : high;
+    const double width = high.t - low.t;
+    const double step =
+        (low.hit.distance - high.hit.distance + high.slope * width) / (high.slope - low.slope);  // to where they cross
+    if (best.hit.distance - (low.hit.distance + low.slope * step) <= gap) return answer(best);
+    // halving now and then: tangents alone may creep up from one side
+    const double t = low.t + (round % 3 == 2 ? 0.5 * width : std::clamp(step, 0.01 * width, 0.99 * width));
+    if (!(t > low.t && t < high.t)) return answer(best);
+    const Place middle = at(t);
+    (middle.slope < 0.0 ? low : high) = middle;
+  }
+  return answer(low.hit.distance < high.hit.distance ? low : high);
+}
+
+// The axis's point nearest to the centre; where the axis passes through it, the way out is across the axis.
+AxisPoint on_sphere(double radius, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const Eigen::Vector3d axis = b - a;
+  const double square = axis.squaredNorm();
+  const double t = square > 0.0 ? std::clamp(-a.dot(axis) / square, 0.0, 1.0) : 0.0;
+  const Eigen::Vector3d p = a + t * axis;
+  SurfacePoint hit = on_sphere(radius, p);
+  if (p.isZero(0.0) && square > 0.0) {
+    hit.direction = axis.unitOrthogonal();
+    hit.point = radius * hit.direction;
+  }
+  return {hit, p};
+}
+
 }  // namespace
 
 std::string_view to_string(Shape shape) noexcept {
@@ -54,14 +104,28 @@ std::string_view to_string(Shape shape) noexcept {
 
 Eigen::Vector3d position_at(const Obstacle& obstacle, double time_s) {
   if (!obstacle.motion) return obstacle.pose.p();
-  return obstacle.pose.p() +
-         std::sin(2.0 * std::numbers::pi * time_s / obstacle.motion->period_s) * obstacle.motion->amplitude_m;
+  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion))
+    return obstacle.pose.p() + std::sin(2.0 * std::numbers::pi * time_s / sine->period_s) * sine->amplitude_m;
+  const auto& line = std::get<LinearMotion>(*obstacle.motion);
+  return obstacle.pose.p() + std::clamp(time_s - line.start_s, 0.0, line.duration_s) * line.velocity_m_s;
 }
 
 Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s) {
   if (!obstacle.motion) return Eigen::Vector3d::Zero();
-  const double omega = 2.0 * std::numbers::pi / obstacle.motion->period_s;
-  return omega * std::cos(omega * time_s) * obstacle.motion->amplitude_m;
+  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion)) {
+    const double omega = 2.0 * std::numbers::pi / sine->period_s;
+    return omega * std::cos(omega * time_s) * sine->amplitude_m;
+  }
+  const auto& line = std::get<LinearMotion>(*obstacle.motion);
+  const bool moves = time_s >= line.start_s && time_s - line.start_s < line.duration_s;
+  return moves ? line.velocity_m_s : Eigen::Vector3d::Zero();
+}
+
+double max_speed(const Obstacle& obstacle) {
+  if (!obstacle.motion) return 0.0;
+  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion))
+    return 2.0 * std::numbers::pi * sine->amplitude_m.norm() / sine->period_s;
+  return std::get<LinearMotion>(*obstacle.motion).velocity_m_s.norm();
 }
 
 double bounding_radius(const Obstacle& obstacle) {
@@ -94,6 +158,28 @@ SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
   return {hit.distance, R * hit.point + center, R * hit.direction};
 }
 
+AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, const Eigen::Vector3d& a,
+                     const Eigen::Vector3d& b) {
+  const Eigen::Matrix3d& R = obstacle.pose.R();
+  const Eigen::Vector3d from = R.transpose() * (a - center), to = R.transpose() * (b - center);
+  AxisPoint hit;
+  switch (obstacle.shape) {
+    case Shape::sphere:
+      hit = on_sphere(obstacle.radius_m, from, to);
+      break;
+    case Shape::box: {
+      const SegmentHit on = closest_on_box(from, to, Box{-0.5 * obstacle.size_m, 0.5 * obstacle.size_m});
+      hit = {{on.distance, on.point, on.direction}, on.axis_point};
+      break;
+    }
+    case Shape::cylinder:
+      hit = along_axis([&](const Eigen::Vector3d& p) { return on_cylinder(obstacle.radius_m, obstacle.length_m, p); },
+                       obstacle.radius_m + obstacle.length_m, from, to);
+      break;
+  }
+  return {{hit.distance, R * hit.point + center, R * hit.direction}, R * hit.axis_point + center};
+}
+
 bool visible(const Obstacle& obstacle, double time_s, double clearance_m) {
   if (obstacle.judge_only || !exists(obstacle, time_s)) return false;
   return obstacle.known || (obstacle.visible_within_m && clearance_m <= *obstacle.visible_within_m);
@@ -109,9 +195,12 @@ void check(const Obstacle& obstacle, const std::string& where) {
   if (obstacle.shape == Shape::cylinder) positive("length_m", obstacle.length_m);
   if (obstacle.shape == Shape::box)
     for (int axis = 0; axis < 3; ++axis) positive("size_m", obstacle.size_m[axis]);
-  if (obstacle.motion && !(obstacle.motion->period_s > 0.0))
+  if (!obstacle.motion) return;
+  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion); sine != nullptr && !(sine->period_s > 0.0))
+    throw Error(ErrorCode::invalid, fmt::format("{}: motion needs period_s above 0, not {}", where, sine->period_s));
+  if (const auto* line = std::get_if<LinearMotion>(&*obstacle.motion); line != nullptr && !(line->duration_s > 0.0))
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: motion needs period_s above 0, not {}", where, obstacle.motion->period_s));
+                fmt::format("{}: motion needs duration_s above 0, not {}", where, line->duration_s));
 }
 
 }  // namespace hamelin::scene

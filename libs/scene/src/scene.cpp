@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
 
 namespace hamelin::scene {
 
@@ -133,13 +134,48 @@ Obstacle read_obstacle(const Reader& in) {
   o.quaternion_wxyz = in.quaternion();
   if (in.find("motion") != nullptr) {
     const Reader motion = in.child("motion");
-    o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()), motion.get("period_s", 0.0)};
+    if (motion.get<std::string>("type", "") == "sine") {
+      motion.need("amplitude_m", "sine");
+      motion.need("period_s", "sine");
+      for (const char* key : {"velocity_m_s", "start_s", "duration_s"}) motion.refuse(key, "sine");
+      o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()), motion.get("period_s", 0.0)};
+    } else {
+      motion.need("velocity_m_s", "linear motion");
+      for (const char* key : {"amplitude_m", "period_s"}) motion.refuse(key, "linear motion");
+      o.motion = LinearMotion{motion.vector("velocity_m_s", Eigen::Vector3d::Zero()), motion.get("start_s", 0.0),
+                              motion.get("duration_s", std::numeric_limits<double>::infinity())};
+    }
   }
   o.known = in.get("known", true);
   o.visible_within_m = in.maybe<double>("visible_within_m");
   o.appears_s = in.get("appears_s", 0.0);
   o.judge_only = in.get("judge_only", false);
   return o;
+}
+
+// @param not_before the time of the change before [s]
+template <class Resolve>
+MapChangeSpec read_map_change(const Reader& in, const Resolve& resolve, double not_before) {
+  MapChangeSpec change;
+  change.time_s = in.get("time_s", 0.0);
+  if (change.time_s < not_before)
+    in.fail("time_s",
+            fmt::format("{} s is before the change at {} s, expected changes by time", change.time_s, not_before));
+  if (const auto file = in.maybe<std::string>("file")) change.file = resolve(*file);
+  const auto boxes = [&](const char* key, std::vector<Box>& out) {
+    for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
+      const Box box{{six[0], six[1], six[2]}, {six[3], six[4], six[5]}};
+      if (!(box.lo.array() < box.hi.array()).all())
+        in.fail(fmt::format("{}/{}", key, out.size()).c_str(),
+                "its low corner is not below its high one, expected [x, y, z, x, y, z]");
+      out.push_back(box);
+    }
+  };
+  boxes("free_boxes_m", change.free_m);
+  boxes("occupied_boxes_m", change.occupied_m);
+  if (!change.file && change.free_m.empty() && change.occupied_m.empty())
+    in.fail("file", "is missing, a change needs a file, free_boxes_m or occupied_boxes_m");
+  return change;
 }
 
 Goal read_goal(const Reader& in) {
@@ -268,6 +304,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.robot.file = resolve(robot.get<std::string>("file", ""));
   scene.robot.tip = robot.maybe<std::string>("tip");
   if (const auto spheres = robot.maybe<std::string>("spheres")) scene.robot.spheres = resolve(*spheres);
+  if (const auto srdf = robot.maybe<std::string>("srdf")) scene.robot.srdf = resolve(*srdf);
   scene.base = in.child("base").pose();
   scene.base_quaternion_wxyz = in.child("base").quaternion();
   if (in.find("gravity_m_s2") != nullptr) scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
@@ -293,6 +330,12 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
                    : unknown == "block" ? UnknownPolicy::block
                                         : UnknownPolicy::free;
     spec.keep_out_radius_m = map.get("keep_out_radius_m", 0.0);
+    if (const Json* filter = map.find("self_filter"); filter != nullptr && *filter != Json(false))
+      spec.self_filter_padding_m = map.child("self_filter").get("padding_m", default_self_filter_padding_m);
+    const Json* changes = map.find("changes");
+    for (std::size_t i = 0; changes != nullptr && i < changes->size(); ++i)
+      spec.changes.push_back(read_map_change(Reader((*changes)[i], fmt::format("{}/{}", map.place_of("changes"), i)),
+                                             resolve, spec.changes.empty() ? 0.0 : spec.changes.back().time_s));
     scene.map = spec;
   }
   scene.model = read_model(in.child("model"));
@@ -318,6 +361,16 @@ Scene read_scene(const std::filesystem::path& file) {
   return scene_from_json(read_json(file), file.parent_path(), file.string());
 }
 
+Json motion_json(const std::variant<SineMotion, LinearMotion>& motion) {
+  if (const auto* sine = std::get_if<SineMotion>(&motion))
+    return {{"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
+  const auto& line = std::get<LinearMotion>(motion);
+  return {{"type", "linear"},
+          {"velocity_m_s", array(line.velocity_m_s)},
+          {"start_s", line.start_s},
+          {"duration_s", std::isinf(line.duration_s) ? Json(nullptr) : Json(line.duration_s)}};
+}
+
 Json to_json(const Obstacle& o) {
   Json out{{"name", o.name}, {"type", to_string(o.shape)}};
   if (o.shape == Shape::box) {
@@ -329,8 +382,7 @@ Json to_json(const Obstacle& o) {
   out["position_m"] = array(o.pose.p());
   out["quaternion_wxyz"] = quaternion_json(o.pose.R(), o.quaternion_wxyz);
   out["motion"] = nullptr;
-  if (o.motion)
-    out["motion"] = {{"type", "sine"}, {"amplitude_m", array(o.motion->amplitude_m)}, {"period_s", o.motion->period_s}};
+  if (o.motion) out["motion"] = motion_json(*o.motion);
   out["known"] = o.known;
   out["visible_within_m"] = or_null(o.visible_within_m);
   out["appears_s"] = o.appears_s;
@@ -347,6 +399,7 @@ Json resolved_json(const Scene& scene) {
   out["schema"] = "hamelin.scene/1";
   out["robot"] = {{"file", scene.robot.file.string()}, {"tip", or_null(scene.robot.tip)}, {"spheres", nullptr}};
   if (scene.robot.spheres) out["robot"]["spheres"] = scene.robot.spheres->string();
+  if (scene.robot.srdf) out["robot"]["srdf"] = scene.robot.srdf->string();
   out["base"] = pose(scene.base, scene.base_quaternion_wxyz);
   out["gravity_m_s2"] = scene.gravity_m_s2 ? array(*scene.gravity_m_s2) : Json(nullptr);
   out["start"] = {{"q", nullptr}, {"v", nullptr}};
@@ -378,6 +431,21 @@ Json resolved_json(const Scene& scene) {
     map["occupancy_threshold"] = scene.map->occupancy_threshold;
     map["unknown"] = to_string(scene.map->unknown);
     map["keep_out_radius_m"] = scene.map->keep_out_radius_m;
+    map["self_filter"] = nullptr;
+    if (scene.map->self_filter_padding_m) map["self_filter"] = {{"padding_m", *scene.map->self_filter_padding_m}};
+    map["changes"] = Json::array();
+    for (const MapChangeSpec& change : scene.map->changes) {
+      const auto boxes = [](const std::vector<Box>& from) {
+        Json list = Json::array();
+        for (const Box& box : from)
+          list.push_back({box.lo.x(), box.lo.y(), box.lo.z(), box.hi.x(), box.hi.y(), box.hi.z()});
+        return list;
+      };
+      map["changes"].push_back({{"time_s", change.time_s},
+                                {"file", change.file ? Json(change.file->generic_string()) : Json(nullptr)},
+                                {"free_boxes_m", boxes(change.free_m)},
+                                {"occupied_boxes_m", boxes(change.occupied_m)}});
+    }
     out["map"] = std::move(map);
   }
   out["obstacles"] = Json::array();
@@ -422,6 +490,50 @@ Json resolved_json(const Scene& scene) {
   out["duration_s"] = scene.duration_s;
   out["seed"] = scene.seed;
   return out;
+}
+
+namespace {
+
+// The robot as it stands when the scene starts; its shapes live as long as this.
+class StandingRobot {
+ public:
+  StandingRobot(const Scene& scene, const model::Model& model);
+  [[nodiscard]] RobotAtStart view() const { return {arm_.view(), {centers_, radii_, half_axes_}}; }
+
+ private:
+  PlacedShapes arm_;
+  std::vector<Eigen::Vector3d> centers_, half_axes_;  // of the base
+  std::vector<double> radii_;
+};
+
+StandingRobot::StandingRobot(const Scene& scene, const model::Model& model) : arm_(model) {
+  const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+  if (q.size() != model.dof())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /start/q: {} numbers given, expected {}", scene.name, q.size(), model.dof()));
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, q);
+  arm_.place(model, ws);
+  const auto add = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius) {
+    centers_.push_back(model.base() * Eigen::Vector3d(0.5 * (from + to)));
+    half_axes_.push_back(model.base().R() * (0.5 * (to - from)));
+    radii_.push_back(radius);
+  };
+  for (const auto& sphere : model.robot().base_spheres) add(sphere.center_m, sphere.center_m, sphere.radius_m);
+  for (const auto& capsule : model.robot().base_segments) add(capsule.from_m, capsule.to_m, capsule.radius_m);
+}
+
+}  // namespace
+
+MapRegion make_region(const Scene& scene, const model::Model& model, double influence) {
+  if (!scene.map) throw Error(ErrorCode::usage, fmt::format("{}: /map: is missing", scene.name));
+  const StandingRobot robot(scene, model);
+  return read_region(*scene.map, scene.base, model.reach(), influence, robot.view());
+}
+
+Environment make_environment(const Scene& scene, const model::Model& model, double influence) {
+  const StandingRobot robot(scene, model);
+  return {scene.map, scene.obstacles, scene.base, model.reach(), influence, robot.view()};
 }
 
 void set_pointer(Json& document, std::string_view assignment) {

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The sphere about which the ball around all of a part's is smallest. Its centre is known wherever the arm is.
+// The shape about whose centre the ball around all of a part's is smallest. It is known wherever the arm is.
 void draw_ball(SelfField::Part& part, const std::vector<Vector3d>& centers, const std::vector<double>& radii) {
   part.radius = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < centers.size(); ++i) {
@@ -23,42 +23,86 @@ void draw_ball(SelfField::Part& part, const std::vector<Vector3d>& centers, cons
       reach = std::max(reach, (centers[j] - centers[i]).norm() + radii[j]);
     if (reach < part.radius) {
       part.radius = reach;
-      part.center = part.spheres[i];
+      part.center = part.shapes[i];
     }
   }
 }
 
+// Where on the axis c + u h, u from −1 to 1, the point nearest to p is.
+double nearest_on_axis(const Vector3d& center, const Vector3d& half, const Vector3d& p) {
+  const double square = half.squaredNorm();
+  return square > 0.0 ? std::clamp(half.dot(p - center) / square, -1.0, 1.0) : 0.0;
+}
+
 }  // namespace
 
-SelfField::SelfField(const model::Model& model) {
+AxisPair nearest_on_axes(const Vector3d& center_a, const Vector3d& half_a, const Vector3d& center_b,
+                         const Vector3d& half_b) {
+  AxisPair best;
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](double on_a, double on_b) {
+    const double square = (center_a + on_a * half_a - center_b - on_b * half_b).squaredNorm();
+    if (!(square < least)) return;
+    least = square;
+    best = {on_a, on_b};
+  };
+  const double aa = half_a.squaredNorm(), bb = half_b.squaredNorm(), ab = half_a.dot(half_b);
+  const Vector3d apart = center_a - center_b;
+  const double across = half_a.cross(half_b).squaredNorm();  // aa bb − ab², without its cancellation
+  // the lines' nearest points; each of the two is then put where it is nearest to the other
+  if (across > 0.0) {
+    const double a = std::clamp((ab * half_b.dot(apart) - bb * half_a.dot(apart)) / across, -1.0, 1.0);
+    const double on_b = nearest_on_axis(center_b, half_b, center_a + a * half_a);
+    consider(nearest_on_axis(center_a, half_a, center_b + on_b * half_b), on_b);
+  }
+  // an end of one and a point of the other: all there is where the axes are parallel or points
+  for (const double end : {-1.0, 1.0}) {
+    consider(end, nearest_on_axis(center_b, half_b, center_a + end * half_a));
+    consider(nearest_on_axis(center_a, half_a, center_b + end * half_b), end);
+  }
+  if (aa == 0.0) best.on_a = 0.0;
+  if (bb == 0.0) best.on_b = 0.0;
+  return best;
+}
+
+SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsules()) {
   const model::Robot& robot = model.robot();
+  has_capsules_ = has_capsules_ || !robot.base_segments.empty();
   const auto part_named = [&](const std::string& name, int body) -> Part& {
     for (Part& part : parts_)
       if (part.name == name) return part;
     parts_.push_back({name, body, {}});
     return parts_.back();
   };
-  for (std::size_t i = 0; i < model.spheres().size(); ++i) {
-    const auto& sphere = model.spheres()[i];
-    const auto& link = robot.links[static_cast<std::size_t>(sphere.link)];
-    const std::string& part = link.spheres[static_cast<std::size_t>(sphere.index_in_link)].part;
-    part_named(part.empty() ? link.name : part, sphere.link).spheres.push_back(static_cast<int>(i));
-    radii_.push_back(sphere.radius);
+  for (std::size_t i = 0; i < model.shapes().size(); ++i) {
+    const auto& shape = model.shapes()[i];
+    const auto& link = robot.links[static_cast<std::size_t>(shape.link)];
+    const auto index = static_cast<std::size_t>(shape.index_in_link);
+    const std::string& part = shape.is_capsule ? link.segments[index].part : link.spheres[index].part;
+    part_named(part.empty() ? link.name : part, shape.link).shapes.push_back(static_cast<int>(i));
+    radii_.push_back(shape.radius);
+    half_lengths_.push_back(shape.half_axis.norm());
   }
-  for (std::size_t i = 0; i < robot.base_spheres.size(); ++i) {
-    const auto& sphere = robot.base_spheres[i];
-    part_named(sphere.part, -1).spheres.push_back(-1 - static_cast<int>(i));
-    base_centers_.push_back(model.base() * sphere.center_m);
-    base_radii_.push_back(sphere.radius_m);
-  }
+  const auto add_to_base = [&](const std::string& part, const Vector3d& center, const Vector3d& half, double radius) {
+    part_named(part, -1).shapes.push_back(-1 - static_cast<int>(base_centers_.size()));
+    base_centers_.push_back(model.base() * center);
+    base_half_axes_.push_back(model.base().R() * half);
+    base_radii_.push_back(radius);
+    base_half_lengths_.push_back(half.norm());
+  };
+  for (const auto& sphere : robot.base_spheres)
+    add_to_base(sphere.part, sphere.center_m, Vector3d::Zero(), sphere.radius_m);
+  for (const auto& capsule : robot.base_segments)
+    add_to_base(capsule.part, 0.5 * (capsule.from_m + capsule.to_m), 0.5 * (capsule.to_m - capsule.from_m),
+                capsule.radius_m);
   for (Part& part : parts_) {
     std::vector<Vector3d> centers;
     std::vector<double> radii;
-    for (const int sphere : part.spheres) {
+    for (const int shape : part.shapes) {
       // any frame that keeps them apart as they are will do
-      centers.push_back(sphere >= 0 ? model.spheres()[static_cast<std::size_t>(sphere)].center
-                                    : base_centers_[static_cast<std::size_t>(-1 - sphere)]);
-      radii.push_back(radius(sphere));
+      centers.push_back(shape >= 0 ? model.shapes()[static_cast<std::size_t>(shape)].center
+                                   : base_centers_[static_cast<std::size_t>(-1 - shape)]);
+      radii.push_back(radius(shape) + half_length(shape));
     }
     draw_ball(part, centers, radii);
   }
@@ -92,9 +136,15 @@ std::string SelfField::words(int pair) const {
                      parts_[static_cast<std::size_t>(both.part_b)].name);
 }
 
-bool SelfField::nearer(const Pair& pair, std::span<const Vector3d> centers, Nearest& best) const {
+Vector3d SelfField::half_axis(int shape, const Shapes& arm) const {
+  if (shape < 0) return base_half_axes_[static_cast<std::size_t>(-1 - shape)];
+  return arm.half_axes.empty() ? Vector3d::Zero() : arm.half_axes[static_cast<std::size_t>(shape)];
+}
+
+template <bool capsules>
+bool SelfField::nearer(const Pair& pair, const Shapes& arm, Nearest& best) const {
   const Part &a = parts_[static_cast<std::size_t>(pair.part_a)], &b = parts_[static_cast<std::size_t>(pair.part_b)];
-  const Vector3d &ball_a = center(a.center, centers), &ball_b = center(b.center, centers);
+  const Vector3d &ball_a = center(a.center, arm), &ball_b = center(b.center, arm);
   // Whether two balls are at least `best` apart; a hair wider than that, for what rounding can do.
   const auto apart = [&](const Vector3d& p, const Vector3d& q, double radii) {
     const double near = (best.distance + radii) * (1.0 + 1e-12);
@@ -102,15 +152,21 @@ bool SelfField::nearer(const Pair& pair, std::span<const Vector3d> centers, Near
   };
   if (apart(ball_a, ball_b, a.radius + b.radius)) return false;
   bool found = false;
-  for (const int i : a.spheres) {
-    const Vector3d& p = center(i, centers);
-    const double r = radius(i);
-    if (apart(p, ball_b, r + b.radius)) continue;
-    for (const int j : b.spheres) {
-      const Vector3d& q = center(j, centers);
+  for (const int i : a.shapes) {
+    const Vector3d& p = center(i, arm);
+    const double r = radius(i), around_p = capsules ? r + half_length(i) : r;
+    if (apart(p, ball_b, around_p + b.radius)) continue;
+    for (const int j : b.shapes) {
+      const Vector3d& q = center(j, arm);
       const double both = r + radius(j);
-      if (apart(p, q, both)) continue;
-      const double distance = (p - q).norm() - both;
+      if (apart(p, q, capsules ? around_p + radius(j) + half_length(j) : both)) continue;
+      double between = (p - q).norm();
+      if constexpr (capsules) {
+        const Vector3d half_p = half_axis(i, arm), half_q = half_axis(j, arm);
+        const AxisPair on = nearest_on_axes(p, half_p, q, half_q);
+        between = (p + on.on_a * half_p - q - on.on_b * half_q).norm();
+      }
+      const double distance = between - both;
       if (distance > best.distance || (found && distance == best.distance)) continue;
       best = {distance, i, j};
       found = true;
@@ -119,23 +175,33 @@ bool SelfField::nearer(const Pair& pair, std::span<const Vector3d> centers, Near
   return found;
 }
 
-std::size_t SelfField::closest(std::span<const Vector3d> centers, double limit, std::span<SelfContact> out) const {
+std::size_t SelfField::closest(const Shapes& arm, double limit, std::span<SelfContact> out) const {
   std::size_t found = 0;
   const auto farther = [](const SelfContact& x, const SelfContact& y) {
     return x.distance != y.distance ? x.distance < y.distance : x.pair < y.pair;
   };
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     Nearest best{limit, 0, 0};
-    if (!nearer(pairs_[k], centers, best)) continue;
+    if (!nearer(pairs_[k], arm, best)) continue;
     ++found;
     SelfContact contact;
     contact.pair = static_cast<int>(k);
     contact.sphere_a = best.a;
     contact.sphere_b = std::max(best.b, SelfContact::base);
     contact.distance = best.distance;
-    const Vector3d &p = center(best.a, centers), &q = center(best.b, centers);
+    Vector3d p = center(best.a, arm), q = center(best.b, arm), across = Vector3d::Zero();
+    if (has_capsules_) {
+      const Vector3d half_p = half_axis(best.a, arm), half_q = half_axis(best.b, arm);
+      const AxisPair on = nearest_on_axes(p, half_p, q, half_q);
+      p += on.on_a * half_p;
+      q += on.on_b * half_q;
+      across = half_p.cross(half_q);
+    }
     const double between = (p - q).norm();
-    contact.direction = between > 0.0 ? Vector3d((p - q) / between) : Vector3d::UnitZ();
+    // axes that cross part across both
+    contact.direction = between > 0.0        ? Vector3d((p - q) / between)
+                        : across.isZero(0.0) ? Vector3d(Vector3d::UnitZ())
+                                             : Vector3d(across.normalized());
     contact.point_a = p - radius(best.a) * contact.direction;
     contact.point_b = q + radius(best.b) * contact.direction;
     if (found <= out.size()) {
@@ -150,9 +216,9 @@ std::size_t SelfField::closest(std::span<const Vector3d> centers, double limit, 
   return found;
 }
 
-double SelfField::distance(std::size_t pair, std::span<const Vector3d> centers, double limit) const {
+double SelfField::distance(std::size_t pair, const Shapes& arm, double limit) const {
   Nearest best{limit, 0, 0};
-  (void)nearer(pairs_[pair], centers, best);
+  (void)nearer(pairs_[pair], arm, best);
   return best.distance;
 }
 

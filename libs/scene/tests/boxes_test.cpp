@@ -30,7 +30,7 @@ double volume(const std::vector<VoxelBox>& boxes) {
   return sum;
 }
 
-bool overlap(const VoxelBox& a, const VoxelBox& b) {
+bool share_volume(const VoxelBox& a, const VoxelBox& b) {
   for (std::size_t axis = 0; axis < 3; ++axis)
     if (a.hi[axis] <= b.lo[axis] || b.hi[axis] <= a.lo[axis]) return false;
   return true;
@@ -45,13 +45,13 @@ void check_same_union(const std::vector<Cell>& cells, const std::vector<VoxelBox
   REQUIRE(volume(boxes) == volume(cells));
   std::size_t overlaps = 0;
   for (std::size_t i = 0; i < boxes.size(); ++i)
-    for (std::size_t j = i + 1; j < boxes.size(); ++j) overlaps += overlap(boxes[i], boxes[j]) ? 1 : 0;
+    for (std::size_t j = i + 1; j < boxes.size(); ++j) overlaps += share_volume(boxes[i], boxes[j]) ? 1 : 0;
   CHECK(overlaps == 0);
   double inside = 0.0;
   for (const VoxelBox& box : boxes) {
     for (const Cell& cell : cells) {
       const VoxelBox other = box_of(cell);
-      if (!overlap(box, other)) continue;
+      if (!share_volume(box, other)) continue;
       double common = 1.0;
       for (std::size_t axis = 0; axis < 3; ++axis)
         common *= std::min(box.hi[axis], other.hi[axis]) - std::max(box.lo[axis], other.lo[axis]);
@@ -76,7 +76,7 @@ TEST_CASE("merged boxes are disjoint and have exactly the cells' union", "[scene
   for (int i = 0; i < 300; ++i) {
     Cell cell = aligned(std::int32_t{1} << rng.below(7));
     bool free = true;
-    for (const Cell& other : cells) free = free && !overlap(box_of(other), box_of(cell));
+    for (const Cell& other : cells) free = free && !share_volume(box_of(other), box_of(cell));
     if (free) cells.push_back(cell);
   }
   check_same_union(cells, merge(cells));
@@ -128,7 +128,8 @@ TEST_CASE("cutting out a ball leaves no voxel that touches it and takes no other
   const std::vector<Cell> cells{{{-32, -32, -32}, 64}};
   const Ball ball{{0.02, -0.03, 0.01}, 0.13};
   const double resolution = 0.02;
-  const auto kept = cut_out(cells, resolution, ball);
+  const std::vector<Rod> rods{{ball.center, ball.center, ball.radius}};
+  const auto [kept, voxels, leaves] = cut_out(cells, resolution, rods);
   const auto distance = [&](const VoxelBox& voxel) {
     const Box box = to_metres(voxel, resolution);
     return (box.lo - ball.center).cwiseMax(ball.center - box.hi).cwiseMax(0.0).norm();
@@ -139,5 +140,7 @@ TEST_CASE("cutting out a ball leaves no voxel that touches it and takes no other
       for (std::int32_t z = -32; z < 32; ++z)
         expected += distance(VoxelBox{{x, y, z}, {x + 1, y + 1, z + 1}}) > ball.radius ? 1.0 : 0.0;
   CHECK(volume(kept) == expected);
+  CHECK(static_cast<double>(voxels) == volume(cells) - expected);
+  CHECK(leaves == 1);
   for (const Cell& cell : kept) CHECK(distance(box_of(cell)) > ball.radius);
 }

@@ -4,10 +4,13 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/scene/boxes.hpp"
 #include "hamelin/scene/map_file.hpp"
@@ -170,27 +173,184 @@ TEST_CASE("several returns what its definition says", "[scene][property]") {
   }
 }
 
-TEST_CASE("a far table never says far of what is near, and says it of most that is far", "[scene][property]") {
-  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{5}));
+TEST_CASE(
+    "a segment's nearest point of a box is the least of a convex function, its deepest the greatest of a concave one",
+    "[scene][property]") {
+  Rng rng(21);
+  int entered = 0, clear = 0;
+  for (int i = 0; i < 3000; ++i) {
+    Box box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lo[axis] = rng.uniform(-0.5, 0.4);
+      box.hi[axis] = box.lo[axis] + rng.uniform(0.01, 0.5);
+    }
+    Vector3d a, b;
+    for (int axis = 0; axis < 3; ++axis) {
+      a[axis] = rng.uniform(-1.0, 1.0);
+      b[axis] = rng.below(5) == 0 ? a[axis] : rng.uniform(-1.0, 1.0);  // often parallel to faces, now and then a point
+      if (rng.below(10) == 0) a[axis] = box.lo[axis];                  // and often in their planes
+    }
+    if (i % 3 == 0) b = box.lo + rng.uniform() * (box.hi - box.lo);
+    const SegmentHit hit = closest_on_box(a, b, box);
+    CHECK((hit.axis_point - (a + hit.along * (b - a))).norm() <= 1e-15);
+    CHECK(hit.along >= 0.0);
+    CHECK(hit.along <= 1.0);
+    const BoxHit from_there = closest_on_box(hit.axis_point, box);
+    CHECK(hit.distance == from_there.distance);
+    CHECK(hit.point == from_there.point);
+    // golden section on the distance outside, and on the depth where that is nothing
+    const auto least = [&](const auto& f) {
+      double left = 0.0, right = 1.0;
+      for (int k = 0; k < 100; ++k) {
+        const double x = left + 0.382 * (right - left), y = left + 0.618 * (right - left);
+        if (f(x) < f(y))
+          right = y;
+        else
+          left = x;
+      }
+      return std::min({f(left), f(0.0), f(1.0)});
+    };
+    const auto outside = [&](double t) {
+      const Vector3d p = a + t * (b - a);
+      return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).norm();
+    };
+    const auto shallow = [&](double t) {
+      const Vector3d p = a + t * (b - a);
+      return -(p - box.lo).cwiseMin(box.hi - p).minCoeff();
+    };
+    const double distance = least(outside);
+    if (distance > 1e-7) {
+      ++clear;
+      CHECK(hit.distance == Approx(distance).margin(1e-12));
+    } else if (least(shallow) < -1e-7) {
+      ++entered;
+      CHECK(hit.distance == Approx(least(shallow)).margin(1e-12));
+    }
+  }
+  CHECK(clear > 500);
+  CHECK(entered > 500);
+}
+
+TEST_CASE("nearest and several of a segment are those of all boxes", "[scene][property]") {
+  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);
   Rng rng(seed);
-  const BoxField field(random_boxes(rng, 1 + rng.below(200)));
-  const Ball region{rng.uniform(0.0, 0.5) * test::random_direction(rng), 1.0};
-  const FarTable table(field, region, 0.05, 0.3);
-  int far = 0, said = 0;
-  for (int i = 0; i < 5000; ++i) {
-    const Vector3d p = region.center + 1.2 * rng.uniform() * test::random_direction(rng);
-    const double limit = rng.uniform(0.0, 0.3), truth = test::brute_force_distance(field.boxes(), p);
-    if (table.beyond(p, limit)) {
-      CHECK(truth > limit);
-      ++said;
+  const BoxField field(random_boxes(rng, 1 + rng.below(400)));
+  BoxField::Scratch scratch(field);
+  const double cosine = std::cos(std::acos(-1.0) / 6.0);
+  for (const Vector3d& a : test::points_near(field.boxes(), 100, 0.4, seed)) {
+    const Vector3d b = a + rng.uniform(0.0, 0.5) * test::random_direction(rng);
+    std::vector<SegmentHit> all;
+    for (const Box& box : field.boxes()) all.push_back(closest_on_box(a, b, box));
+    const auto nearer = [](const SegmentHit& x, const SegmentHit& y) { return x.distance < y.distance; };
+    const SegmentHit least = *std::min_element(all.begin(), all.end(), nearer);
+    SegmentHit hit;
+    REQUIRE(field.nearest(a, b, infinity, hit));
+    CHECK(std::max(hit.distance, 0.0) == Approx(std::max(least.distance, 0.0)).margin(1e-12));
+    if (least.distance <= 0.0) continue;  // which of the entered boxes is not promised
+    CHECK_FALSE(field.nearest(a, b, least.distance * (1.0 - 1e-9), hit));
+    SegmentHit hinted;
+    REQUIRE(field.nearest(a, b, infinity, hinted, static_cast<std::int32_t>(rng.below(all.size()))));
+    CHECK(hinted.box == hit.box);
+    std::stable_sort(all.begin(), all.end(), nearer);
+    std::vector<SegmentHit> expected;
+    for (const SegmentHit& other : all) {
+      if (other.distance > 0.25 || expected.size() == 3) break;
+      if (std::none_of(expected.begin(), expected.end(), [&](const SegmentHit& kept) {
+            return kept.direction.dot(other.direction) > cosine && std::abs(kept.along - other.along) < 1.0 / 3.0;
+          }))
+        expected.push_back(other);
     }
-    far += truth > limit + 0.0867 && (p - region.center).norm() < 1.0 ? 1 : 0;  // a cell's diagonal
+    std::array<SegmentHit, 3> hits;
+    REQUIRE(field.several(a, b, 0.25, cosine, scratch, hits) == expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      CHECK(hits[i].distance == Approx(expected[i].distance).margin(1e-12));
+      CHECK((hits[i].point - expected[i].point).norm() <= 1e-9);
+    }
   }
-  CHECK(said >= far);
-  CHECK(far > 100);
-  CHECK_FALSE(FarTable().beyond(region.center, 0.0));
-  CHECK_FALSE(FarTable(BoxField(), region, 0.05, 0.3).beyond(region.center, 0.0));
+}
+
+TEST_CASE(
+    "a near table's bounds are below the distance, no looser than its cells, and the same for any order of asking",
+    "[scene][property]") {
+  Rng rng(11);
+  const std::vector<Box> boxes = random_boxes(rng, 100);
+  const BoxField field(boxes);
+  const Ball region{{0.3, -0.2, 0.1}, 1.0};
+  const NearTable table(region, 0.05), again(region, 0.05);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 3000; ++i) points.push_back(region.center + 1.2 * rng.uniform() * test::random_direction(rng));
+  std::vector<NearTable::Answer> answers;
+  int known = 0;
+  for (const Vector3d& p : points) {
+    const NearTable::Answer answer = table.ask(field, p);
+    answers.push_back(answer);
+    if (answer.hint < 0) {
+      CHECK((p - region.center).norm() >= 1.0);
+      CHECK(answer.lower == -std::numeric_limits<float>::infinity());
+      continue;
+    }
+    ++known;
+    BoxHit hit;
+    REQUIRE(field.nearest(p, 10.0, hit));
+    CHECK(static_cast<double>(answer.lower) <= hit.distance);
+    CHECK(static_cast<double>(answer.lower) >= hit.distance - 0.05 * std::sqrt(3.0) - 2e-6);
+    CHECK(static_cast<std::size_t>(answer.hint) < boxes.size());
+  }
+  CHECK(known > 1000);
+  for (std::size_t i = points.size(); i-- > 0;) {
+    const NearTable::Answer answer = again.ask(field, points[i]);
+    CHECK(answer.lower == answers[i].lower);
+    CHECK(answer.hint == answers[i].hint);
+  }
+  CHECK(NearTable().ask(field, region.center).hint == -1);
+  CHECK(table.ask(BoxField(), region.center).hint == -1);
+}
+
+TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
+  const char* given = std::getenv("HAMELIN_ISA");
+  const std::string before = given != nullptr ? given : "";
+  Rng rng(12);
+  const std::vector<Box> boxes = random_boxes(rng, 1000);
+  std::vector<Vector3d> points, ends;
+  for (int i = 0; i < 500; ++i) {
+    points.push_back(1.5 * rng.uniform() * test::random_direction(rng));
+    ends.push_back(points.back() + 0.4 * rng.uniform() * test::random_direction(rng));
+  }
+  std::vector<double> first;
+  for (const char* name : {"x86-64", "v3", "v4"}) {
+    try {
+      force_instruction_set(name);
+    } catch (const Error&) {
+      WARN("this machine has no " << name << ": not compared");
+      continue;
+    }
+    const BoxField field(boxes);
+    BoxField::Scratch scratch(field);
+    std::vector<double> all;
+    std::array<BoxHit, 3> hits;
+    std::array<SegmentHit, 3> segment_hits;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      BoxHit hit;
+      if (field.nearest(points[i], 1.0, hit))
+        all.insert(all.end(), {hit.distance, hit.point.x(), static_cast<double>(hit.box)});
+      SegmentHit segment;
+      if (field.nearest(points[i], ends[i], 1.0, segment))
+        all.insert(all.end(), {segment.distance, segment.along, static_cast<double>(segment.box)});
+      const std::size_t n = field.several(points[i], 0.5, 0.8, scratch, hits);
+      for (std::size_t k = 0; k < n; ++k) all.insert(all.end(), {hits[k].distance, static_cast<double>(hits[k].box)});
+      const std::size_t m = field.several(points[i], ends[i], 0.5, 0.8, scratch, segment_hits);
+      for (std::size_t k = 0; k < m; ++k)
+        all.insert(all.end(), {segment_hits[k].distance, static_cast<double>(segment_hits[k].box)});
+    }
+    if (first.empty()) first = all;
+    CHECK(all == first);
+  }
+  if (before.empty())
+    unsetenv("HAMELIN_ISA");
+  else
+    setenv("HAMELIN_ISA", before.c_str(), 1);
+  CHECK(first.size() > 1000);
 }
 
 TEST_CASE("queries far from the origin, on wide boxes and on none stay exact", "[scene][unit]") {

@@ -70,15 +70,15 @@ TEST_CASE("contacts of a map come back in the world frame", "[scene][unit]") {
   const std::vector<Vector3d> centers{{1.1, 0.2, 2.05}, {1.0, -0.3, 2.0}};
   const std::vector<double> radii{0.05, 0.1};
   std::array<Contact, 8> out;
-  REQUIRE(environment.closest(centers, radii, 0.3, 0.0, scratch, out) == 1);
+  REQUIRE(environment.closest({centers, radii}, 0.3, 0.0, scratch, out) == 1);
   CHECK(out[0].sphere == 0);
   CHECK(out[0].obstacle == Contact::map);
   CHECK(out[0].distance == Approx(0.15).epsilon(1e-12));
   CHECK((out[0].direction - Vector3d(0.0, -1.0, 0.0)).norm() < 1e-12);
   CHECK((out[0].obstacle_point - Vector3d(1.1, 0.4, 2.05)).norm() < 1e-12);
   CHECK((out[0].arm_point - Vector3d(1.1, 0.25, 2.05)).norm() < 1e-12);
-  CHECK(environment.clearance(centers, radii, 0.0, 1.0) == Approx(0.15).epsilon(1e-12));
-  CHECK(environment.clearance(centers, radii, 0.0, 0.1) == 0.1);
+  CHECK(environment.clearance({centers, radii}, 0.0, 1.0) == Approx(0.15).epsilon(1e-12));
+  CHECK(environment.clearance({centers, radii}, 0.0, 0.1) == 0.1);
 }
 
 TEST_CASE("unknown space is free, slow or an obstacle, as stated", "[scene][unit]") {
@@ -95,18 +95,40 @@ TEST_CASE("unknown space is free, slow or an obstacle, as stated", "[scene][unit
     Environment::Scratch scratch(environment, 1);
     // The voxels reach to ±0.76. Of the unit ball, what is outside them is unknown: six caps of height h = 0.24, with
     // π h² (3 − h)/3 each.
-    CHECK(environment.summary().unknown_share == Approx(6.0 * 0.24 * 0.24 * 2.76 / 3.0 / (4.0 / 3.0)).epsilon(0.01));
-    CHECK(environment.in_slow_space(outside, radii) == (policy == UnknownPolicy::slow));
-    CHECK_FALSE(environment.in_slow_space(centers, radii));
-    const std::size_t count = environment.closest(centers, radii, 0.2, 0.0, scratch, out);
+    CHECK(environment.summary().within_reach.unknown ==
+          Approx(6.0 * 0.24 * 0.24 * 2.76 / 3.0 / (4.0 / 3.0)).epsilon(0.01));
+    CHECK(environment.in_slow_space({outside, radii}) == (policy == UnknownPolicy::slow));
+    CHECK_FALSE(environment.in_slow_space({centers, radii}));
+    const std::size_t count = environment.closest({centers, radii}, 0.2, 0.0, scratch, out);
     CHECK(count == (policy == UnknownPolicy::block ? 1 : 0));
     if (count > 0) {
       CHECK(out[0].obstacle == Contact::unknown);
       CHECK(out[0].distance == Approx(0.76 - 0.65 - 0.05).epsilon(1e-9));
       CHECK(out[0].direction.x() == Approx(1.0));
     }
-    CHECK((environment.clearance(outside, radii, 0.0, 1.0) <= 0.0) == (policy == UnknownPolicy::block));
+    CHECK((environment.clearance({outside, radii}, 0.0, 1.0) <= 0.0) == (policy == UnknownPolicy::block));
   }
+}
+
+TEST_CASE("a map changes when its time has come, and what was unknown there is known", "[scene][unit]") {
+  MapSpec spec;
+  spec.file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "shelf.bt";
+  spec.unknown = UnknownPolicy::block;
+  spec.changes = {{1.0, std::nullopt, {{{-0.2, -0.2, 0.9}, {0.2, 0.2, 1.3}}}, {{{0.05, 0.05, 1.0}, {0.1, 0.1, 1.05}}}}};
+  Environment environment(spec, {}, {}, 0.9, 0.2);
+  const std::vector<Vector3d> centers{{0.075, 0.075, 1.15}};
+  const std::vector<double> radii{0.02};
+  const auto clearance = [&] { return environment.clearance({centers, radii}, 0.0, 0.2); };
+  const double before = clearance();
+  CHECK(environment.advance(0.5).empty());
+  CHECK(clearance() == before);
+  CHECK_THAT(environment.advance(1.0), Catch::Contains("125 voxels are occupied"));
+  CHECK(clearance() == Approx(0.1 - 0.02));
+  CHECK(environment.advance(9.0).empty());
+
+  // a change by file must be of the same grid
+  spec.changes = {{1.0, std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "clutter.bt", {}, {}}};
+  CHECK_THROWS_WITH(Environment(spec, {}, {}, 0.9, 0.2), Catch::Contains("clutter.bt: resolution 0.02 m"));
 }
 
 TEST_CASE("the keep-out frees unknown space around the base", "[scene][unit]") {
@@ -117,9 +139,9 @@ TEST_CASE("the keep-out frees unknown space around the base", "[scene][unit]") {
   const geometry::SE3 base{Eigen::Matrix3d::Identity(), {-0.9, 0.0, 0.0}};
   const std::vector<Vector3d> centers{{-0.9, 0.0, 0.0}};
   const std::vector<double> radii{0.05};
-  CHECK(Environment(spec, {}, base, 1.0, 0.2).clearance(centers, radii, 0.0, 1.0) < 0.0);
+  CHECK(Environment(spec, {}, base, 1.0, 0.2).clearance({centers, radii}, 0.0, 1.0) < 0.0);
   spec.keep_out_radius_m = 0.2;
-  const double clearance = Environment(spec, {}, base, 1.0, 0.2).clearance(centers, radii, 0.0, 1.0);
+  const double clearance = Environment(spec, {}, base, 1.0, 0.2).clearance({centers, radii}, 0.0, 1.0);
   CHECK(clearance > 0.15 - 1e-12);
   CHECK(clearance < 0.15 + 0.02 * std::sqrt(3.0));
 }
@@ -136,14 +158,14 @@ TEST_CASE("obstacles come with index, velocity and time of appearance", "[scene]
   const std::vector<Vector3d> centers{{0.5, 0.0, 0.0}};
   const std::vector<double> radii{0.1};
   std::array<Contact, 8> out;
-  REQUIRE(environment.closest(centers, radii, 0.6, 0.0, scratch, out) == 1);
+  REQUIRE(environment.closest({centers, radii}, 0.6, 0.0, scratch, out) == 1);
   CHECK(out[0].obstacle == 0);
   CHECK(out[0].distance == Approx(0.3));
   CHECK((out[0].obstacle_velocity - Vector3d(0.0, 0.3 * std::acos(-1.0), 0.0)).norm() < 1e-12);
-  REQUIRE(environment.closest(centers, radii, 0.6, 1.0, scratch, out) == 2);
+  REQUIRE(environment.closest({centers, radii}, 0.6, 1.0, scratch, out) == 2);
   CHECK(out[0].obstacle == 0);
   CHECK(out[1].obstacle == 1);
-  CHECK(environment.clearance(centers, radii, 0.5, infinity) == Approx(std::hypot(0.5, 0.3) - 0.2));
+  CHECK(environment.clearance({centers, radii}, 0.5, infinity) == Approx(std::hypot(0.5, 0.3) - 0.2));
 }
 
 TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
@@ -157,25 +179,25 @@ TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
   const std::vector<Vector3d> far{{0.0, 0.0, 0.0}}, near{{-0.15, 0.0, 0.0}};
   const std::vector<double> radii{0.1};
   std::array<Contact, 8> out;
-  CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out) == 0);
-  CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::judge) == 2);
-  CHECK(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::hidden) == 2);
+  CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out) == 0);
+  CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::judge) == 2);
+  CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::hidden) == 2);
   // nobody sees what he only thinks of
-  CHECK(environment.closest(near, radii, 0.5, 0.0, scratch, out) == 0);
+  CHECK(environment.closest({near, radii}, 0.5, 0.0, scratch, out) == 0);
   std::array<std::uint8_t, 2> seen{};
-  CHECK(environment.see(far, radii, 0.0, seen) == -1);
-  CHECK(environment.closest(near, radii, 0.5, 0.0, scratch, out, View::planner, seen) == 0);
+  CHECK(environment.see({far, radii}, 0.0, seen) == -1);
+  CHECK(environment.closest({near, radii}, 0.5, 0.0, scratch, out, View::planner, seen) == 0);
   // what came near is remembered
-  CHECK(environment.see(near, radii, 0.0, seen) == 1);
-  CHECK(environment.see(near, radii, 0.0, seen) == -1);
-  CHECK(environment.see(far, radii, 0.0, seen) == -1);
-  REQUIRE(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::planner, seen) == 1);
+  CHECK(environment.see({near, radii}, 0.0, seen) == 1);
+  CHECK(environment.see({near, radii}, 0.0, seen) == -1);
+  CHECK(environment.see({far, radii}, 0.0, seen) == -1);
+  REQUIRE(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::planner, seen) == 1);
   CHECK(out[0].obstacle == 1);
-  REQUIRE(environment.closest(far, radii, 0.5, 0.0, scratch, out, View::hidden, seen) == 1);
+  REQUIRE(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::hidden, seen) == 1);
   CHECK(out[0].obstacle == 0);
-  CHECK(environment.clearance(far, radii, 0.0, infinity, View::planner, seen) == Approx(0.3));
-  CHECK(environment.clearance(far, radii, 0.0, infinity) == Approx(0.3));
-  CHECK(environment.clearance(far, radii, 0.0, infinity, View::planner) == infinity);
+  CHECK(environment.clearance({far, radii}, 0.0, infinity, View::planner, seen) == Approx(0.3));
+  CHECK(environment.clearance({far, radii}, 0.0, infinity) == Approx(0.3));
+  CHECK(environment.clearance({far, radii}, 0.0, infinity, View::planner) == infinity);
 }
 
 TEST_CASE("a full output keeps the nearest and tells how many there are", "[scene][unit]") {
@@ -187,8 +209,8 @@ TEST_CASE("a full output keeps the nearest and tells how many there are", "[scen
   const std::vector<double> radii{0.02, 0.03};
   std::array<Contact, 12> all;
   std::array<Contact, 4> few;
-  REQUIRE(environment.closest(centers, radii, 2.0, 0.0, scratch, all) == 12);
-  CHECK(environment.closest(centers, radii, 2.0, 0.0, scratch, few) == 12);
+  REQUIRE(environment.closest({centers, radii}, 2.0, 0.0, scratch, all) == 12);
+  CHECK(environment.closest({centers, radii}, 2.0, 0.0, scratch, few) == 12);
   const auto in_order = [](const Contact& a, const Contact& b) {
     return a.sphere != b.sphere ? a.sphere < b.sphere : a.distance < b.distance;
   };
@@ -223,11 +245,11 @@ TEST_CASE("clearance is the smallest contact distance, inside obstacles too", "[
       radii.push_back(rng.uniform(0.01, 0.1));
     }
     std::array<Contact, 64> out;
-    const std::size_t count = environment.closest(centers, radii, 0.4, 0.0, scratch, out);
+    const std::size_t count = environment.closest({centers, radii}, 0.4, 0.0, scratch, out);
     REQUIRE(count <= out.size());
     double smallest = 0.4;
     for (std::size_t c = 0; c < count; ++c) smallest = std::min(smallest, out[c].distance);
-    CHECK(environment.clearance(centers, radii, 0.0, 0.4) == smallest);
+    CHECK(environment.clearance({centers, radii}, 0.0, 0.4) == smallest);
     deep += smallest < -0.05 ? 1 : 0;
   }
   CHECK(deep > 10);
@@ -249,11 +271,11 @@ TEST_CASE("contacts and clearance do not allocate", "[scene][unit]") {
   Environment::Scratch scratch(environment, centers.size());
   std::vector<Contact> out(100);
   std::size_t count = 0;
-  double clearance = 0.0;
+  double clearance = environment.clearance({centers, radii}, 0.0, 0.4);  // the first to be inside makes the surface
   const long allocations = test::allocations_in([&] {
     for (int i = 0; i < 20; ++i) {
-      count += environment.closest(centers, radii, 0.4, 0.1 * i, scratch, out);
-      clearance += environment.clearance(centers, radii, 0.1 * i, 0.4);
+      count += environment.closest({centers, radii}, 0.4, 0.1 * i, scratch, out);
+      clearance += environment.clearance({centers, radii}, 0.1 * i, 0.4);
     }
   });
   CHECK(allocations == 0);

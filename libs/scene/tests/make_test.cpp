@@ -1,6 +1,7 @@
 #include "hamelin/scene/make.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include <octomap/OcTree.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +13,8 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/map_file.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/test/scene_data.hpp"
@@ -106,6 +109,66 @@ TEST_CASE("touch is exact for turned boxes and cylinders", "[scene][property]") 
   CHECK(apart > 20);
 }
 
+TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene][property]") {
+  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{6}));
+  CAPTURE(seed);
+  MakeMapOptions options;
+  options.resolution_m = 0.03;
+  options.mark = seed % 2 == 0 ? Mark::touch : Mark::centre;
+  options.free_bounds = Box{{-0.7, -0.55, -0.2}, {0.4, 0.61, 0.9}};
+  options.output = temporary("hamelin_scene_exhaustive.bt");
+  Clutter clutter;
+  clutter.count = 7;
+  clutter.size_min_m = 0.02;
+  clutter.size_max_m = 0.6;
+  clutter.bounds = {{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}};
+  clutter.seed = seed;
+  options.clutter = clutter;
+  Obstacle slab;  // its faces are a hair beyond voxels' faces
+  slab.shape = Shape::box;
+  slab.size_m = Vector3d(0.6, 0.3, 0.06).array() + 2e-7;
+  slab.pose = {Eigen::Matrix3d::Identity(), {0.12, -0.21, 0.72 + 0.03 * static_cast<double>(seed)}};
+  options.primitives = {slab};
+  const MakeReport report = make_map(options);
+  const MapData map = read_map(options.output, {std::nullopt, 0.5, true});
+  Voxels occupied, free;
+  auto made = make_clutter(clutter);
+  made.push_back(slab);
+  for (int x = -40; x < 40; ++x)
+    for (int y = -40; y < 40; ++y)
+      for (int z = -40; z < 40; ++z) {
+        const Box cube = to_metres(Cell{{x, y, z}, 1}, options.resolution_m);
+        const Vector3d middle = 0.5 * (cube.lo + cube.hi);
+        const bool marked = std::any_of(made.begin(), made.end(), [&](const Obstacle& o) {
+          return options.mark == Mark::touch ? touches(o, cube) : closest_on(o, o.pose.p(), middle).distance <= 0.0;
+        });
+        const bool inside = (middle.array() >= options.free_bounds->lo.array()).all() &&
+                            (middle.array() <= options.free_bounds->hi.array()).all();
+        if (marked) occupied.insert({x, y, z});
+        if (inside && !marked) free.insert({x, y, z});
+      }
+  CHECK((voxels_of(map.occupied) == occupied));
+  CHECK((voxels_of(map.free) == free));
+  CHECK(report.occupied_voxels == occupied.size());
+  CHECK(report.free_voxels == free.size());
+  std::filesystem::remove(options.output);
+}
+
+TEST_CASE("a map that is all one kind is written so that OctoMap reads it", "[scene][unit]") {
+  MakeMapOptions options;
+  options.resolution_m = 0.5;
+  options.output = temporary("hamelin_scene_whole.bt");
+  options.free_bounds = Box{Vector3d::Constant(-16384.0), Vector3d::Constant(16384.0)};
+  const MakeReport report = make_map(options);
+  CHECK(report.free_voxels == std::size_t{1} << 48U);
+  octomap::OcTree tree(options.output.string());
+  CHECK(tree.size() == report.nodes);
+  CHECK(tree.getNumLeafNodes() == 8);
+  CHECK(tree.search(100.0, -3000.0, 7.0) != nullptr);
+  CHECK(read_map(options.output).free_leaves == 8);
+  std::filesystem::remove(options.output);
+}
+
 TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.1;
@@ -152,7 +215,7 @@ TEST_CASE("what cannot be made is refused", "[scene][unit]") {
   options.output = temporary("hamelin_scene_none.bt");
   CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("empty"));
   options.free_bounds = Box{{-300.0, -300.0, -300.0}, {300.0, 300.0, 300.0}};
-  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("2^28"));
+  CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("too fine"));
   options.free_bounds = Box{{-1e6, -1.0, -1.0}, {1.0, 1.0, 1.0}};
   CHECK_THROWS_AS(make_map(options), Error);
   options.resolution_m = 0.0;
@@ -178,15 +241,15 @@ TEST_CASE("the maps in data are those their primitives make", "[scene][unit]") {
 }
 
 TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][unit]") {
-  const auto problems = test::shared_data("problems");
-  if (!problems) return;
+  const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
+  if (!problems || !robots) return;
   const auto directory = temporary("hamelin_scene_problem");
   std::filesystem::create_directories(directory);
   for (const std::string name : {"bookshelf_small_0001", "table_pick_0001", "box_0001"}) {
     CAPTURE(name);
     ProblemOptions options;
-    options.robot = directory / "robots" / "panda.urdf";
-    options.spheres = directory / "robots" / "panda.spheres.json";
+    options.robot = *robots / "panda.urdf";
+    options.spheres = *robots / "panda_spheres.json";
     options.tip = "panda_grasptarget";
     options.resolution_m = 0.04;
     options.output = directory / (name + ".json");
@@ -194,8 +257,8 @@ TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][
     make_scene_from_problem(source, options);
     const Json problem = read_json(source);
     const Scene scene = read_scene(options.output);
-    CHECK(scene.robot.file == options.robot);
-    CHECK(scene.robot.spheres == options.spheres);
+    CHECK(std::filesystem::equivalent(scene.robot.file, options.robot));
+    CHECK(std::filesystem::equivalent(*scene.robot.spheres, options.spheres));
     CHECK(scene.robot.tip == "panda_grasptarget");
     REQUIRE(scene.goals.size() == 1);
     CHECK(scene.goals[0].q.size() == 7);
@@ -204,17 +267,69 @@ TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][
     CHECK(scene.obstacles.size() == problem["obstacles"].size());
     REQUIRE(scene.map);
     // The map is marked by touch, so it holds every primitive: their centres are in contact.
-    const Environment environment = make_environment(scene, 2.5, 0.1);
+    const model::Model model(model::read_robot(options.robot, {options.tip, options.spheres}));
+    const auto environment = make_environment(scene, model, 2.0);  // some stand out of the arm's reach
+    CHECK(environment.summary().warnings.empty());
+    CHECK(environment.summary().within_reach.unknown == 0.0);
+    CHECK(environment.summary().within_reach.free > 0.9);
     for (const Obstacle& o : scene.obstacles) {
       CHECK(o.judge_only);
       const std::vector<Vector3d> center{o.pose.p()};
       const std::vector<double> radius{0.0};
-      CHECK(environment.clearance(center, radius, 0.0, 1.0, View::planner) <= 0.0);
+      CHECK(environment.clearance({center, radius}, 0.0, 1.0, View::planner) <= 0.0);
     }
   }
-  CHECK_THROWS_WITH(
-      make_scene_from_problem(directory / "box_0001.json", {"r", "", "", 0.04, Mark::touch, directory / "x.json"}),
-      Catch::Matchers::Contains("is no problem"));
+  std::filesystem::remove_all(directory);
+}
+
+TEST_CASE("what is no problem is refused with its place, and nothing is written", "[scene][unit]") {
+  const auto robots = test::shared_data("robots");
+  if (!robots) return;
+  const auto directory = temporary("hamelin_scene_no_problem");
+  std::filesystem::create_directories(directory);
+  ProblemOptions options;
+  options.robot = *robots / "panda.urdf";
+  options.tip = "panda_grasptarget";
+  options.resolution_m = 0.04;
+  options.output = directory / "scene.json";
+  const Json good = Json::parse(R"({"start": [0, -0.785, 0, -2.356, 0, 1.571, 0.785], "goal": [1, 0, 0, -1, 0, 1, 0],
+    "obstacles": [{"name": "a", "type": "sphere", "position": [0.5, 0, 0.5], "radius": 0.1},
+                  {"type": "box", "position": [0.5, 0, 0.1], "quaternion_wxyz": [1, 0, 0, 0], "size": [1, 1, 0.1]},
+                  {"type": "cylinder", "position": [0.5, 0, 0.1], "radius": 0.1, "length": 0.2}]})");
+  const auto refusal = [&](const std::string& pointer, const Json& value) {
+    Json document = good;
+    document[Json::json_pointer(pointer)] = value;
+    const auto file = directory / "problem.json";
+    write_file_aside(file, document.dump());
+    try {
+      make_scene_from_problem(file, options);
+    } catch (const Error& e) {
+      CHECK_FALSE(std::filesystem::exists(directory / "scene.json"));
+      CHECK_FALSE(std::filesystem::exists(directory / "scene.bt"));
+      const std::string message = e.what(), named = file.string() + ": ";
+      CHECK(message.rfind(named, 0) == 0);
+      return message.substr(std::min(message.size(), named.size()));
+    }
+    for (const char* made : {"scene.json", "scene.bt"}) std::filesystem::remove(directory / made);
+    return std::string();
+  };
+  using Catch::Matchers::StartsWith;
+  CHECK(refusal("/name", "whatever") == "");
+  CHECK_THAT(refusal("/units", "mm,deg"), StartsWith("/units: are \"mm,deg\""));
+  CHECK_THAT(refusal("/start", {1, 2, 3}), StartsWith("/start: is a list of 3, expected 7 numbers"));
+  CHECK_THAT(refusal("/goal", nullptr), StartsWith("/goal: is missing"));
+  CHECK_THAT(refusal("/goal/3", "x"), StartsWith("/goal: is a list of 7, expected 7 numbers"));
+  CHECK_THAT(refusal("/obstacles", 3), StartsWith("/obstacles: is missing"));
+  CHECK_THAT(refusal("/obstacles/1", 3), StartsWith("/obstacles/1: is 3, expected a primitive"));
+  CHECK_THAT(refusal("/obstacles/0/type", "mesh"), StartsWith("/obstacles/0/type: is \"mesh\", expected \"sphere\""));
+  CHECK_THAT(refusal("/obstacles/0/pose", {0, 0, 0, 1, 0, 0, 0}), StartsWith("/obstacles/0/pose: is not known"));
+  CHECK_THAT(refusal("/obstacles/0/length", 1), StartsWith("/obstacles/0/length: is not known, a sphere has"));
+  CHECK_THAT(refusal("/obstacles/0/radius", -1), StartsWith("/obstacles/0/radius: is -1, expected a length above 0"));
+  CHECK_THAT(refusal("/obstacles/1/size", {1, 0, 1}), StartsWith("/obstacles/1/size: is 0"));
+  CHECK_THAT(refusal("/obstacles/1/size", nullptr), StartsWith("/obstacles/1/size: is null, expected 3 numbers"));
+  CHECK_THAT(refusal("/obstacles/2/position", {1, 2}), StartsWith("/obstacles/2/position: is a list of 2"));
+  CHECK_THAT(refusal("/obstacles/1/quaternion_wxyz", {2, 0, 0, 0}),
+             StartsWith("/obstacles/1/quaternion_wxyz: the norm is 2"));
   std::filesystem::remove_all(directory);
 }
 

@@ -1,6 +1,8 @@
 #include "hamelin/scene/map_file.hpp"
 
+#include <octomap/ColorOcTree.h>
 #include <octomap/OcTree.h>
+#include <octomap/OcTreeStamped.h>
 
 #include <algorithm>
 #include <array>
@@ -18,6 +20,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/file.hpp"
+#include "hamelin/core/rng.hpp"
 #include "hamelin/test/scene_data.hpp"
 
 namespace {
@@ -68,6 +71,7 @@ TEST_CASE("every corrupt map ends as wanted, in one line that names file and pla
                         message.find("resolution 50 ") != std::string::npos;
     CHECK(placed);
     if (wanted.find("convert_octree") != std::string::npos) CHECK(message.find("convert_octree") != std::string::npos);
+    if (name.rfind("e_legacy", 0) == 0) CHECK(message.find("legacy") != std::string::npos);
   }
   CHECK(seen == 47);
 }
@@ -119,8 +123,9 @@ TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][
       tree.reset(dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(file)));
     }
     REQUIRE(tree);
+    // In the same order, too: its iterator goes depth first.
     using Key = std::tuple<int, int, int, int>;
-    std::set<Key> theirs, ours;
+    std::vector<Key> theirs, ours;
     std::size_t free_leaves = 0;
     for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf) {
       if (!tree->isNodeOccupied(*leaf)) {
@@ -128,11 +133,15 @@ TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][
         continue;
       }
       const auto key = leaf.getIndexKey();
-      theirs.insert({key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth())});
+      theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
     }
-    for (const Cell& cell : map.occupied) ours.insert({cell.lo[0], cell.lo[1], cell.lo[2], cell.size});
-    CHECK(ours.size() == map.occupied.size());
-    CHECK(ours == theirs);
+    for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
+    CHECK((ours == theirs));
+    CHECK(map.free.empty());
+    CHECK(map.occupied.capacity() + map.unknown.capacity() == map.occupied.size() + map.unknown.size());
+    const auto whole = read_map(file, {scale, 0.5, true});
+    CHECK(whole.free.size() == free_leaves);
+    CHECK(whole.occupied.size() == map.occupied.size());
     CHECK(map.free_leaves == free_leaves);
     CHECK(map.node_count == tree->size());
     CHECK(map.resolution == Approx(tree->getResolution() * scale));
@@ -159,8 +168,99 @@ TEST_CASE("the occupancy threshold grades a .ot", "[scene][unit]") {
   CHECK(read_map(file, {std::nullopt, 1.0 / (1.0 + std::exp(-0.95))}).occupied.size() == 10);
   CHECK(read_map(file, {std::nullopt, 0.95}).occupied.empty());
   CHECK(read_map(file, {std::nullopt, 0.95}).free_leaves == 20);
-  CHECK(refusal(file, {std::nullopt, 1.5}).find("occupancy threshold") != std::string::npos);
+  for (const double threshold : {1.5, 1.0, 0.0, -0.5, std::nan("")})
+    CHECK(refusal(file, {std::nullopt, threshold}).find("occupancy threshold") != std::string::npos);
   std::filesystem::remove(file);
+}
+
+TEST_CASE("at any occupancy threshold a .ot's leaves are graded as OctoMap grades them", "[scene][property]") {
+  octomap::OcTree tree(0.1);
+  Rng rng(5);
+  std::vector<double> thresholds{1e-9, 0.1192, 0.5, 0.7, 0.971, 1.0 - 1e-9};
+  for (int i = 0; i < 200; ++i) {
+    const double threshold = rng.uniform(0.02, 0.98);
+    thresholds.push_back(threshold);
+    // On the very threshold, and a rounding step to either side of it.
+    const float at = octomap::logodds(threshold);
+    for (const float value : {at, std::nextafter(at, -10.0F), std::nextafter(at, 10.0F)})
+      tree.setNodeValue(octomap::OcTreeKey(static_cast<octomap::key_type>(rng.below(65536)),
+                                           static_cast<octomap::key_type>(rng.below(65536)), 32768),
+                        value);
+  }
+  std::ostringstream out;
+  tree.write(out);
+  for (const double threshold : thresholds) {
+    CAPTURE(threshold);
+    tree.setOccupancyThres(threshold);
+    std::size_t occupied = 0;
+    for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf)
+      occupied += tree.isNodeOccupied(*leaf) ? 1 : 0;
+    CHECK(map_from_bytes(out.str(), "graded.ot", {std::nullopt, threshold}).occupied.size() == occupied);
+  }
+}
+
+TEST_CASE("a .bt has no grades: no occupancy threshold changes it", "[scene][unit]") {
+  octomap::OcTree tree(0.1);
+  tree.updateNode(octomap::point3d(0.05F, 0.05F, 0.05F), true);
+  tree.updateNode(octomap::point3d(0.55F, 0.05F, 0.05F), false);
+  std::ostringstream out;
+  tree.writeBinary(out);
+  for (const double threshold : {0.01, 0.5, 0.99}) {
+    const auto map = map_from_bytes(out.str(), "two.bt", {std::nullopt, threshold});
+    CHECK(map.occupied.size() == 1);
+    CHECK(map.free_leaves == 1);
+    CHECK(map.warnings.size() == (threshold == 0.5 ? 0 : 1));
+  }
+}
+
+TEST_CASE("a coloured tree is read in both its forms, as OctoMap reads it", "[scene][property]") {
+  octomap::ColorOcTree tree(0.05);
+  Rng rng(9);
+  for (int i = 0; i < 400; ++i) {
+    const octomap::point3d p(static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0)),
+                             static_cast<float>(rng.uniform(0.0, 0.3)));
+    tree.updateNode(p, rng.below(3) != 0);
+    const auto shade = static_cast<std::uint8_t>(rng.below(256));
+    tree.integrateNodeColor(p.x(), p.y(), p.z(), shade, 200, 0);
+  }
+  tree.updateInnerOccupancy();
+  for (const bool binary : {false, true}) {
+    std::ostringstream out;
+    binary ? tree.writeBinary(out) : tree.write(out);  // the binary form last: it prunes
+    const std::string where = binary ? "colour.bt" : "colour.ot", bytes = out.str();
+    CAPTURE(where);
+    CHECK(check_map_bytes(bytes, where).colored);
+    const auto map = map_from_bytes(bytes, where);
+    std::vector<std::tuple<int, int, int, int>> theirs, ours;
+    std::size_t free_leaves = 0;
+    for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+      const auto key = leaf.getIndexKey();
+      if (tree.isNodeOccupied(*leaf))
+        theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
+      else
+        ++free_leaves;
+    }
+    for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
+    CHECK(ours.size() > 100);
+    CHECK((ours == theirs));
+    CHECK(map.free_leaves == free_leaves);
+    CHECK(map.node_count == tree.size());
+    for (std::size_t length = 0; length < bytes.size(); length += 7)
+      CHECK_THROWS_AS(map_from_bytes(std::string_view(bytes).substr(0, length), where), Error);
+    CHECK_THROWS_AS(map_from_bytes(bytes + "x", where), Error);
+  }
+}
+
+TEST_CASE("other trees are refused by name", "[scene][unit]") {
+  octomap::OcTreeStamped stamped(0.1);
+  stamped.updateNode(octomap::point3d(0.0F, 0.0F, 0.0F), true);
+  std::ostringstream out;
+  stamped.write(out);
+  std::string bytes = out.str();
+  CHECK_THROWS_WITH(map_from_bytes(bytes, "tree.ot"),
+                    "tree.ot: header line 4: tree type 'OcTreeStamped' is not known, expected OcTree or ColorOcTree");
+  bytes.replace(bytes.find("OcTreeStamped"), 13, "SemanticOcTree");
+  CHECK_THROWS_WITH(map_from_bytes(bytes, "tree.ot"), Catch::Contains("'SemanticOcTree'"));
 }
 
 TEST_CASE("a truncation anywhere in a map is refused", "[scene][property]") {

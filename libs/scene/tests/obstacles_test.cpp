@@ -158,6 +158,24 @@ TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative
   }
 }
 
+TEST_CASE("an obstacle on a line moves while it should, at its speed", "[scene][unit]") {
+  Obstacle o;
+  o.radius_m = 0.06;
+  o.pose = {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.5}};
+  o.motion = LinearMotion{{0.2, -0.1, 0.0}, 1.0, 2.0};
+  CHECK(position_at(o, 0.5) == o.pose.p());
+  CHECK(velocity_at(o, 0.5) == Vector3d::Zero());
+  CHECK((position_at(o, 2.0) - Vector3d(0.7, -0.1, 0.5)).norm() < 1e-15);
+  CHECK(velocity_at(o, 2.0) == Vector3d(0.2, -0.1, 0.0));
+  CHECK((position_at(o, 9.0) - Vector3d(0.9, -0.2, 0.5)).norm() < 1e-15);
+  CHECK(velocity_at(o, 9.0) == Vector3d::Zero());
+  CHECK(max_speed(o) == Approx(std::sqrt(0.05)));
+  o.motion = LinearMotion{{0.0, 0.0, 1.0}};
+  CHECK((position_at(o, 100.0) - Vector3d(0.5, 0.0, 100.5)).norm() < 1e-12);
+  o.motion = LinearMotion{{0.0, 0.0, 1.0}, 0.0, 0.0};
+  CHECK_THROWS_WITH(check(o, "here"), Catch::Matchers::Contains("duration_s"));
+}
+
 TEST_CASE("what a planner sees depends on time and clearance", "[scene][unit]") {
   Obstacle o;
   o.radius_m = 0.1;

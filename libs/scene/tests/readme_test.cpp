@@ -23,7 +23,7 @@ Environment::Scratch scratch(environment, 1);
 const std::vector<Eigen::Vector3d> centers{{0.5, 0.2, 0.55}};
 const std::vector<double> radii{0.06};
 std::array<Contact, 8> contacts;
-const std::size_t count = environment.closest(centers, radii, influence, 0.0, scratch, contacts);
+const std::size_t count = environment.closest({centers, radii}, influence, 0.0, scratch, contacts);
   // [example]
   // clang-format on
   REQUIRE(count >= 1);

@@ -29,13 +29,18 @@ Json full_document() {
       {"type": "pose", "position_m": [0.5, 0.1, 0.4], "quaternion_wxyz": [0, 1, 0, 0], "tolerance_m": 0.02}
     ],
     "map": {"file": "shelf.bt", "position_m": [1, 0, 0], "quaternion_wxyz": [1, 0, 0, 0], "scale": 1,
-            "occupancy_threshold": 0.7, "unknown": "block", "keep_out_radius_m": 0.1},
+            "occupancy_threshold": 0.7, "unknown": "block", "keep_out_radius_m": 0.1,
+            "self_filter": {"padding_m": 0.015},
+            "changes": [{"time_s": 1.5, "file": "later.bt"},
+                        {"time_s": 2, "free_boxes_m": [[0, 0, 0, 1, 1, 1]], "occupied_boxes_m": [[0, 0, 0, 0.5, 1, 1]]}]},
     "obstacles": [
       {"name": "ball", "type": "sphere", "radius_m": 0.06, "position_m": [0.5, 0, 0.5],
        "motion": {"type": "sine", "amplitude_m": [0.25, 0, 0], "period_s": 6},
        "known": false, "visible_within_m": 0.15, "appears_s": 2, "judge_only": false},
       {"name": "can", "type": "cylinder", "radius_m": 0.06, "length_m": 0.2, "position_m": [0.5, 0, 0.5], "judge_only": true},
-      {"type": "box", "size_m": [0.1, 0.2, 0.3], "position_m": [0.5, 0, 0.5]}
+      {"type": "box", "size_m": [0.1, 0.2, 0.3], "position_m": [0.5, 0, 0.5]},
+      {"type": "sphere", "radius_m": 0.1, "position_m": [0.5, 0, 0.5],
+       "motion": {"type": "linear", "velocity_m_s": [0, 0.1, 0], "start_s": 2}}
     ],
     "model": {"joint_damping": [0.1, 0.2], "joint_limits": true, "payload": {"mass_kg": 0.5, "inertia_kg_m2": [1, 2, 3, 0.1, 0.2, 0.3]}},
     "actuation": {"type": "sampled", "control_period_s": 0.002, "delay_s": 0.001, "joint_noise_rad": 1e-4, "planner_mass_scale": 1.1},
@@ -103,8 +108,9 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.map->occupancy_threshold == 0.7);
   CHECK(scene.map->unknown == UnknownPolicy::block);
   CHECK(scene.map->keep_out_radius_m == 0.1);
-  REQUIRE(scene.obstacles.size() == 3);
-  CHECK(scene.obstacles[0].motion->period_s == 6.0);
+  CHECK(scene.map->self_filter_padding_m == 0.015);
+  REQUIRE(scene.obstacles.size() == 4);
+  CHECK(std::get<SineMotion>(*scene.obstacles[0].motion).period_s == 6.0);
   CHECK_FALSE(scene.obstacles[0].known);
   CHECK(scene.obstacles[0].visible_within_m == 0.15);
   CHECK(scene.obstacles[0].appears_s == 2.0);
@@ -198,6 +204,12 @@ TEST_CASE("bad scenes are refused in one line that names file, place and what wa
       {with("/obstacles/2/size_m", Json{1, 1}), "/obstacles/2/size_m"},
       {with("/obstacles/0/motion/type", "saw"), "/obstacles/0/motion/type"},
       {with("/obstacles/0/motion/period", 3), "'period_s'"},
+      {with("/obstacles/0/motion/start_s", 3), "/obstacles/0/motion/start_s"},
+      {with("/obstacles/3/motion/period_s", 3), "/obstacles/3/motion/period_s"},
+      {with("/map/changes/1/time_s", 1), "expected changes by time"},
+      {with("/map/changes/0/file", nullptr), "/map/changes/0/file"},
+      {with("/map/changes/1/free_boxes_m/0/3", 0), "/map/changes/1/free_boxes_m/0"},
+      {with("/map/changes/1/free_boxes_m/0", Json{1, 2}), "/map/changes/1/free_boxes_m/0"},
       {with("/map/unknown", "wall"), "/map/unknown"},
       {with("/map/occupancy_threshold", 1), "/map/occupancy_threshold"},
       {with("/map/scale", 0), "/map/scale"},
@@ -213,6 +225,41 @@ TEST_CASE("bad scenes are refused in one line that names file, place and what wa
     CHECK(message.find(expected) != std::string::npos);
     CHECK(message.find('\n') == std::string::npos);
   }
+}
+
+TEST_CASE("changes of a map and motion on a line are read", "[scene][unit]") {
+  const Scene scene = scene_from_json(full_document(), "/scenes", "x.json");
+  REQUIRE(scene.map->changes.size() == 2);
+  CHECK(scene.map->changes[0].time_s == 1.5);
+  CHECK(scene.map->changes[0].file == "/scenes/later.bt");
+  CHECK_FALSE(scene.map->changes[1].file);
+  CHECK(scene.map->changes[1].free_m.at(0).hi == Eigen::Vector3d::Ones());
+  CHECK(scene.map->changes[1].occupied_m.at(0).hi.x() == 0.5);
+  const auto& line = std::get<LinearMotion>(*scene.obstacles.at(3).motion);
+  CHECK(line.velocity_m_s.y() == 0.1);
+  CHECK(line.start_s == 2.0);
+  CHECK(std::isinf(line.duration_s));
+}
+
+TEST_CASE("a self-filter may be true, false or a padding", "[scene][unit]") {
+  Json document = full_document();
+  const auto padding = [&](const Json& value) {
+    document["map"]["self_filter"] = value;
+    const Scene scene = scene_from_json(document, ".", "x.json");
+    const Json resolved = resolved_json(scene)["map"]["self_filter"];
+    CHECK(resolved ==
+          (scene.map->self_filter_padding_m ? Json{{"padding_m", *scene.map->self_filter_padding_m}} : Json()));
+    return scene.map->self_filter_padding_m;
+  };
+  CHECK(padding(true) == default_self_filter_padding_m);
+  CHECK(padding(Json::object()) == default_self_filter_padding_m);
+  CHECK(padding({{"padding_m", 0}}) == 0.0);
+  CHECK(padding(false) == std::nullopt);
+  CHECK(padding(nullptr) == std::nullopt);
+  document["map"]["self_filter"] = {{"padding_m", -0.1}};
+  CHECK(refusal(document).find("/map/self_filter/padding_m") != std::string::npos);
+  document["map"]["self_filter"] = {{"paddng_m", 0.1}};
+  CHECK(refusal(document).find("'padding_m'") != std::string::npos);
 }
 
 TEST_CASE("set_pointer changes what the schema knows and nothing else", "[scene][unit]") {

@@ -83,7 +83,7 @@ void check_against_brute_force(const model::Robot& robot) {
   const model::Model model(robot, base);
   const SelfField field(model);
   dynamics::Workspace ws(model);
-  std::vector<Vector3d> centers(model.spheres().size());
+  std::vector<Vector3d> centers(model.shapes().size());
   std::vector<SelfContact> out(field.pairs().size());
   Rng rng(5);
   std::size_t near = 0, touching = 0;
@@ -92,9 +92,9 @@ void check_against_brute_force(const model::Robot& robot) {
     const auto expected = brute_force(robot, placed(robot, base, q));
     REQUIRE(expected.size() == field.pairs().size());
     dynamics::forward_kinematics(model, ws, q);
-    dynamics::sphere_centers(model, ws, centers);
+    dynamics::shape_centers(model, ws, centers);
     const double limit = 0.1;
-    const std::size_t found = field.closest(centers, limit, out);
+    const std::size_t found = field.closest({centers}, limit, out);
     std::size_t within = 0;
     for (const auto& [pair, distance] : expected) within += distance <= limit ? 1 : 0;
     CHECK(found == within);
@@ -103,21 +103,21 @@ void check_against_brute_force(const model::Robot& robot) {
       if (i > 0) CHECK(out[i - 1].pair < contact.pair);
       const auto pair = static_cast<std::size_t>(contact.pair);
       CHECK(contact.distance == Approx(expected.at(names(field, pair))).margin(1e-12));
-      CHECK(field.distance(pair, centers, limit) == contact.distance);
+      CHECK(field.distance(pair, {centers}, limit) == contact.distance);
       // the points lie on the named spheres, that distance apart along the direction
       const auto a = static_cast<std::size_t>(contact.sphere_a);
-      CHECK((contact.point_a - centers[a]).norm() == Approx(model.spheres()[a].radius));
+      CHECK((contact.point_a - centers[a]).norm() == Approx(model.shapes()[a].radius));
       CHECK((contact.point_b + contact.distance * contact.direction - contact.point_a).norm() < 1e-12);
       const int body_b = field.parts()[static_cast<std::size_t>(field.pairs()[pair].part_b)].body;
       CHECK((contact.sphere_b == SelfContact::base) == (body_b < 0));
-      if (body_b >= 0) CHECK(model.spheres()[static_cast<std::size_t>(contact.sphere_b)].link == body_b);
+      if (body_b >= 0) CHECK(model.shapes()[static_cast<std::size_t>(contact.sphere_b)].link == body_b);
       touching += contact.distance <= 0.0 ? 1 : 0;
     }
     near += found;
     // a short list keeps the nearest, in order
     if (found < 3) continue;
     std::vector<SelfContact> few(2), all(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found));
-    CHECK(field.closest(centers, limit, few) == found);
+    CHECK(field.closest({centers}, limit, few) == found);
     std::stable_sort(all.begin(), all.end(), [](const auto& x, const auto& y) { return x.distance < y.distance; });
     CHECK(few[0].pair < few[1].pair);
     CHECK(std::min(few[0].distance, few[1].distance) == all[0].distance);

@@ -22,17 +22,17 @@ class Sampler {
   Sampler(const scene::Scene& scene, const PairOptions& options)
       : model_(simulation::load_model(scene)),
         ws_(model_),
-        environment_(scene::make_environment(scene, model_.reach(), options.min_clearance_m)),
+        environment_(scene::make_environment(scene, model_, options.min_clearance_m)),
         min_clearance_(options.min_clearance_m),
         rng_(options.seed),
         lower_(model_.dof()),
         upper_(model_.dof()),
-        centers_(model_.spheres().size()) {
-    for (const auto& sphere : model_.spheres()) radii_.push_back(sphere.radius);
+        arm_(model_) {
     if (scene.model.self_collision) self_.emplace(model_);
-    if (environment_.has_obstacles() && centers_.empty())
+    if (environment_.has_obstacles() && model_.shapes().empty())
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
+                  fmt::format("{}: /robot: '{}' has no collision spheres or capsules, expected some "
+                              "where there are obstacles",
                               scene.name, model_.robot().name));
     for (int i = 0; i < model_.dof(); ++i) {
       const auto& joint = model_.robot().links[static_cast<std::size_t>(i)].joint;
@@ -53,14 +53,14 @@ class Sampler {
 
   [[nodiscard]] bool clear(const VectorXd& q) {
     dynamics::forward_kinematics(model_, ws_, q);
-    dynamics::sphere_centers(model_, ws_, centers_);
-    return environment_.clearance(centers_, radii_, 0.0, min_clearance_) >= min_clearance_ && clear_of_itself();
+    arm_.place(model_, ws_);
+    return environment_.clearance(arm_.view(), 0.0, min_clearance_) >= min_clearance_ && clear_of_itself();
   }
 
  private:
   [[nodiscard]] bool clear_of_itself() const {
     for (std::size_t pair = 0; self_ && pair < self_->pairs().size(); ++pair)
-      if (self_->distance(pair, centers_, min_clearance_) <= 0.0) return false;
+      if (self_->distance(pair, arm_.view(), min_clearance_) <= 0.0) return false;
     return true;
   }
 
@@ -71,8 +71,7 @@ class Sampler {
   double min_clearance_;
   Rng rng_;
   VectorXd lower_, upper_;
-  std::vector<Eigen::Vector3d> centers_;
-  std::vector<double> radii_;
+  scene::PlacedShapes arm_;
 };
 
 void check(const PairOptions& options) {

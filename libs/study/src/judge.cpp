@@ -1,6 +1,7 @@
 #include "hamelin/study/judge.hpp"
 
 #include <fmt/format.h>
+#include <octomap/ColorOcTree.h>
 #include <octomap/OcTree.h>
 
 #include <algorithm>
@@ -34,6 +35,17 @@ Isometry3d isometry(const geometry::SE3& g) {
   return made;
 }
 
+// Points on a capsule's axis about which balls of its radius leave less than `capsule_gap_m` of it out.
+std::vector<Vector3d> along(const model::Segment& capsule) {
+  const Vector3d axis = capsule.to_m - capsule.from_m;
+  // a gap s between centres leaves r − √(r² − s²/4) < s²/4r out
+  const auto parts =
+      static_cast<int>(std::ceil(axis.norm() / std::sqrt(4.0 * capsule.radius_m * JudgedArm::capsule_gap_m)));
+  std::vector<Vector3d> points{capsule.from_m};
+  for (int i = 1; i <= parts; ++i) points.emplace_back(capsule.from_m + (static_cast<double>(i) / parts) * axis);
+  return points;
+}
+
 // Positive outside, negative inside, of a body that is the product of intervals |x_i| <= h_i.
 template <typename Vector>
 double distance_from_block(const Vector& outside) {
@@ -52,10 +64,12 @@ double distance_from_boxes(const std::vector<scene::Box>& boxes, const Vector3d&
 }
 
 Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
-  Vector3d center = obstacle.pose.p();
-  if (obstacle.motion)
-    center += obstacle.motion->amplitude_m * std::sin(2.0 * std::numbers::pi * time_s / obstacle.motion->period_s);
-  return center;
+  const Vector3d rest = obstacle.pose.p();
+  if (!obstacle.motion) return rest;
+  if (const auto* sine = std::get_if<scene::SineMotion>(&*obstacle.motion))
+    return rest + sine->amplitude_m * std::sin(2.0 * std::numbers::pi * time_s / sine->period_s);
+  const auto& line = std::get<scene::LinearMotion>(*obstacle.motion);
+  return rest + line.velocity_m_s * std::min(std::max(time_s - line.start_s, 0.0), line.duration_s);
 }
 
 double radius_around(const scene::Obstacle& obstacle) {
@@ -73,7 +87,8 @@ double radius_around(const scene::Obstacle& obstacle) {
 }  // namespace
 
 JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
-  const model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres});
+  const model::Robot robot =
+      model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   std::vector<std::string> parts;  // of each ball
   std::map<std::string, int> counts;
   const auto add = [&](const std::string& part, int link, const Vector3d& center, double radius) {
@@ -86,9 +101,21 @@ JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
     for (const auto& sphere : link.spheres)
       add(sphere.part.empty() ? link.name : sphere.part, static_cast<int>(i), isometry(link.com) * sphere.center_m,
           sphere.radius_m);
+    for (const auto& segment : link.segments)
+      if (segment.is_capsule())
+        for (const Vector3d& point : along(segment))
+          add(segment.part.empty() ? link.name : segment.part, static_cast<int>(i), isometry(link.com) * point,
+              segment.radius_m);
   }
-  if (!scene.model.self_collision) return;
+  const std::size_t moving = balls_.size();
   for (const auto& sphere : robot.base_spheres) add(sphere.part, -1, sphere.center_m, sphere.radius_m);
+  for (const auto& capsule : robot.base_segments)
+    for (const Vector3d& point : along(capsule)) add(capsule.part, -1, point, capsule.radius_m);
+  base_balls_.assign(balls_.begin() + static_cast<std::ptrdiff_t>(moving), balls_.end());
+  if (!scene.model.self_collision) {
+    balls_.resize(moving);
+    return;
+  }
   std::set<std::pair<std::string, std::string>> disabled;
   for (const auto& [a, b] : robot.self_collision_disabled) disabled.insert(std::minmax(a, b));
   const auto parent = [&](int link) { return link < 0 ? -1 : robot.links[static_cast<std::size_t>(link)].parent; };
@@ -142,15 +169,62 @@ JudgedMap::JudgedMap(const scene::MapSpec& spec) : from_world_(isometry(spec.pos
   const auto header = scene::check_map_bytes(bytes, spec.file.string());
   const double scale = spec.scale.value_or(1.0);
   std::istringstream body(bytes.substr(header.data_offset));
-  octomap::OcTree tree(header.resolution);
-  tree.setOccupancyThres(spec.occupancy_threshold);
-  header.format == scene::MapFormat::bt ? tree.readBinaryData(body) : tree.readData(body);
-  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
-    if (!tree.isNodeOccupied(*leaf)) continue;
-    const Vector3d center{leaf.getX(), leaf.getY(), leaf.getZ()};
-    const Vector3d half = Vector3d::Constant(0.5 * leaf.getSize());
-    leaves_.push_back({scale * (center - half), scale * (center + half)});
+  const auto take = [&](auto tree) {
+    if (header.format == scene::MapFormat::bt) {
+      tree.readBinaryData(body);
+    } else {
+      tree.setOccupancyThres(spec.occupancy_threshold);
+      tree.readData(body);
+    }
+    for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+      if (!tree.isNodeOccupied(*leaf)) continue;
+      const Vector3d center{leaf.getX(), leaf.getY(), leaf.getZ()};
+      const Vector3d half = Vector3d::Constant(0.5 * leaf.getSize());
+      leaves_.push_back({scale * (center - half), scale * (center + half)});
+    }
+  };
+  if (header.colored)
+    take(octomap::ColorOcTree(header.resolution));
+  else
+    take(octomap::OcTree(header.resolution));
+}
+
+JudgedMap::JudgedMap(const scene::Scene& scene, const JudgedArm& arm) : JudgedMap(*scene.map) {
+  if (!scene.map->self_filter_padding_m) return;
+  // balls that stand for a capsule leave that much of it out
+  const double padding = *scene.map->self_filter_padding_m + JudgedArm::capsule_gap_m;
+  const double voxel = scene::check_map_bytes(read_file(scene.map->file), scene.map->file.string()).resolution *
+                       scene.map->scale.value_or(1.0);
+  std::vector<Vector3d> centers;
+  arm.place(scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(arm.dof())),
+            centers);
+  std::vector<JudgedBall> balls = arm.balls();
+  for (std::size_t k = 0; k < balls.size(); ++k) balls[k].center = local(centers[k]);
+  for (JudgedBall ball : arm.base_balls()) {
+    ball.center = local(isometry(scene.base) * ball.center);
+    balls.push_back(ball);
   }
+  const auto touched = [&](const scene::Box& box) {
+    return std::any_of(balls.begin(), balls.end(), [&](const JudgedBall& ball) {
+      return distance_from_box(box, ball.center) <= ball.radius + padding;
+    });
+  };
+  std::vector<scene::Box> kept;
+  while (!leaves_.empty()) {
+    const scene::Box box = leaves_.back();
+    leaves_.pop_back();
+    if (!touched(box)) {
+      kept.push_back(box);
+    } else if (box.hi.x() - box.lo.x() > 1.5 * voxel) {
+      const Vector3d half = 0.5 * (box.hi - box.lo);
+      for (unsigned part = 0; part < 8; ++part) {
+        const Vector3d lo = box.lo + Vector3d((part & 1U) != 0 ? half.x() : 0.0, (part & 2U) != 0 ? half.y() : 0.0,
+                                              (part & 4U) != 0 ? half.z() : 0.0);
+        leaves_.push_back({lo, lo + half});
+      }
+    }
+  }
+  leaves_ = std::move(kept);
 }
 
 double JudgedMap::distance(const Vector3d& p) const {
@@ -180,7 +254,7 @@ Judge::Judge(const scene::Scene& scene)
     : arm_(scene), obstacles_(scene.obstacles), best_(infinity), best_self_(infinity) {
   for (const auto& obstacle : obstacles_) bounds_.push_back(radius_around(obstacle));
   const bool exact = std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
-  if (scene.map && !exact) map_ = JudgedMap(*scene.map);
+  if (scene.map && !exact) map_ = JudgedMap(scene, arm_);
   nearby_.resize(arm_.balls().size());
 }
 
@@ -244,7 +318,7 @@ double Judge::map_distance(std::size_t ball, double enough) {
 
 Feasibility feasibility(const scene::Scene& scene, const std::vector<Eigen::VectorXd>& goals_q) {
   const JudgedArm arm(scene);
-  const JudgedMap map = scene.map ? JudgedMap(*scene.map) : JudgedMap();
+  const JudgedMap map = scene.map ? JudgedMap(scene, arm) : JudgedMap();
   std::vector<std::pair<std::string, Eigen::VectorXd>> places;
   const auto dof = static_cast<Eigen::Index>(arm.dof());
   places.emplace_back("start", scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(dof));

@@ -260,6 +260,7 @@ class Maker {
     document["robot"]["file"] = fs::proximate(scene.robot.file, scenes()).generic_string();
     if (scene.robot.spheres)
       document["robot"]["spheres"] = fs::proximate(*scene.robot.spheres, scenes()).generic_string();
+    if (scene.robot.srdf) document["robot"]["srdf"] = fs::proximate(*scene.robot.srdf, scenes()).generic_string();
     return document;
   }
 
@@ -302,14 +303,14 @@ class Maker {
   // Links as rows of tiny spheres; the set-up of SPEC §4.
   void add_gain_scenes() {
     const scene::Scene base = scene::read_scene(*options_.base);
-    model::Robot robot = model::read_robot(base.robot.file, {base.robot.tip, base.robot.spheres});
+    model::Robot robot = model::read_robot(base.robot.file, {base.robot.tip, base.robot.spheres, base.robot.srdf});
     for (auto& link : robot.links) {
       if (link.segments.empty())
         throw Error(ErrorCode::invalid,
                     fmt::format("{}: link '{}' has no segments, gain sets need the links as segments",
                                 base.robot.file.string(), link.name));
       link.spheres.clear();
-      for (const auto& segment : link.segments) {
+      for (auto& segment : link.segments) {
         const double length = (segment.to_m - segment.from_m).norm();
         const int parts = std::max(1, static_cast<int>(std::ceil(length / segment_spacing_m - 1e-9)));
         for (int i = 0; i <= parts; ++i) {
@@ -318,6 +319,7 @@ class Maker {
           sphere.radius_m = std::max(segment.radius_m, segment_radius_m);
           link.spheres.push_back(sphere);
         }
+        segment.radius_m = 0.0;  // a line: the row collides for it
       }
     }
     const std::string robot_file = fmt::format("{}_segments.json", robot.name);

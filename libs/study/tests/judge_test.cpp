@@ -54,9 +54,9 @@ VectorXd random_q(const model::Model& model, Rng& rng) {
 /// Centres of the moving spheres, by the library that planners and runs use.
 std::vector<Vector3d> centers_of(const model::Model& model, const VectorXd& q) {
   dynamics::Workspace ws(model);
-  std::vector<Vector3d> centers(model.spheres().size());
+  std::vector<Vector3d> centers(model.shapes().size());
   dynamics::forward_kinematics(model, ws, q);
-  dynamics::sphere_centers(model, ws, centers);
+  dynamics::shape_centers(model, ws, centers);
   return centers;
 }
 
@@ -67,7 +67,7 @@ TEST_CASE("the judge places spheres where the dynamics place them, on a turned b
       scene_of({{"base", {{"position_m", {0.3, -0.2, 0.5}}, {"quaternion_wxyz", {0.8, 0.0, 0.6, 0.0}}}}});
   const model::Model model = simulation::load_model(scene);
   const JudgedArm arm(scene);
-  REQUIRE(arm.balls().size() == model.spheres().size());
+  REQUIRE(arm.balls().size() == model.shapes().size());
   Rng rng(3);
   std::vector<Vector3d> centers;
   for (int i = 0; i < 50; ++i) {
@@ -126,7 +126,7 @@ double fcl_distance(const std::vector<Vector3d>& centers, const model::Model& mo
                     const fcl::CollisionGeometryd& body, const fcl::Transform3d& pose) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < centers.size(); ++k) {
-    const fcl::Sphered sphere(model.spheres()[k].radius);
+    const fcl::Sphered sphere(model.shapes()[k].radius);
     fcl::CollisionResultd hit;
     fcl::collide(&body, pose, &sphere, at(centers[k]), fcl::CollisionRequestd(), hit);
     if (hit.isCollision()) return -1.0;
@@ -213,7 +213,7 @@ TEST_CASE("what the judge remembers of the map changes nothing along a motion", 
       judge.node(0.001 * i, q);
       const auto centers = centers_of(model, q);
       for (std::size_t k = 0; k < centers.size(); ++k)
-        nearest = std::min(nearest, map.distance(centers[k]) - model.spheres()[k].radius);
+        nearest = std::min(nearest, map.distance(centers[k]) - model.shapes()[k].radius);
     }
     REQUIRE(judge.verdict().configurations == 101);
     CHECK(judge.verdict().obstacles->clearance_m == Approx(nearest).margin(1e-12));
@@ -282,7 +282,7 @@ TEST_CASE("the judge's pairs of the arm itself and their distances are those of 
       const auto centers = centers_of(model, q);
       double nearest = 10.0;
       for (std::size_t pair = 0; pair < field.pairs().size(); ++pair)
-        nearest = std::min(nearest, field.distance(pair, centers, 10.0));
+        nearest = std::min(nearest, field.distance(pair, {centers}, 10.0));
       Judge judge(scene);
       judge.node(0.0, q);
       REQUIRE(judge.verdict().self.has_value());

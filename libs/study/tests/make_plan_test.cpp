@@ -279,7 +279,7 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
       for (const auto& sphere : link.spheres) nearest = std::min(nearest, (sphere.center_m - p).norm());
       if (nearest > 0.01 + 1e-9) FAIL_CHECK(link.name << " at " << share);
     }
-  CHECK(model.spheres().front().radius <= 1e-3);
+  CHECK(model.shapes().front().radius <= 1e-3);
 }
 
 TEST_CASE("a motion is thinned to a spacing, and loops are cut out of it", "[study][unit]") {
@@ -327,13 +327,13 @@ TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start 
   // where the arm is, by the kinematics that runs use
   const model::Model model = simulation::load_model(scene);
   dynamics::Workspace ws(model);
-  std::vector<Eigen::Vector3d> centers(model.spheres().size());
+  std::vector<Eigen::Vector3d> centers(model.shapes().size());
   const auto clearance = [&](const Eigen::VectorXd& q) {
     dynamics::forward_kinematics(model, ws, q);
-    dynamics::sphere_centers(model, ws, centers);
+    dynamics::shape_centers(model, ws, centers);
     double nearest = 1e9;
     for (std::size_t i = 0; i < centers.size(); ++i)
-      nearest = std::min(nearest, (centers[i] - sphere.pose.p()).norm() - model.spheres()[i].radius - sphere.radius_m);
+      nearest = std::min(nearest, (centers[i] - sphere.pose.p()).norm() - model.shapes()[i].radius - sphere.radius_m);
     return nearest;
   };
   CHECK(clearance(scene.start_q) >= 0.02);

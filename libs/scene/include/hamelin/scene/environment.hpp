@@ -13,19 +13,21 @@
 #include "hamelin/scene/map_field.hpp"
 #include "hamelin/scene/map_region.hpp"
 #include "hamelin/scene/obstacles.hpp"
+#include "hamelin/scene/shapes.hpp"
 
 namespace hamelin::scene {
 
-/// A near obstacle point of one sphere of the arm; world frame. The fields are those of hamelin_contact.
+/// A near obstacle point of one shape of the arm; world frame. The fields are those of hamelin_contact. A capsule is
+/// nearest at one point of its axis, which stands for a sphere's centre.
 struct Contact {
-  static constexpr int map = -1;      ///< `obstacle`: the map
-  static constexpr int unknown = -2;  ///< `obstacle`: unknown space that blocks
-  int sphere = 0;
+  static constexpr int map = -1;                        ///< `obstacle`: the map
+  static constexpr int unknown = -2;                    ///< `obstacle`: unknown space that blocks
+  int sphere = 0;                                       ///< index of the shape, in the order of Model::shapes()
   int obstacle = map;                                   ///< map, unknown, or the obstacle's index
-  double distance = 0.0;                                ///< from the sphere's surface [m]; zero or below is contact
-  Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();  ///< on the sphere's surface
+  double distance = 0.0;                                ///< from the shape's surface [m]; zero or below is contact
+  Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();  ///< on the shape's surface
   Eigen::Vector3d obstacle_point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();          ///< unit, from the obstacle towards the sphere
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();          ///< unit, from the obstacle towards the shape
   Eigen::Vector3d obstacle_velocity = Eigen::Vector3d::Zero();  ///< [m/s]
 };
 
@@ -37,7 +39,7 @@ enum class View : std::int32_t { planner, hidden, judge };
 /// Scratch of its own.
 class Environment {
  public:
-  /// Nearest points of the map (and of blocking unknown space) per sphere.
+  /// Nearest points of the map (and of blocking unknown space) per shape.
   static constexpr std::size_t points_per_sphere = MapField::points_max;
 
   struct Summary : MapSummary {
@@ -51,14 +53,15 @@ class Environment {
   /// @param base pose of the robot's base frame in the world
   /// @param reach distance from the base that no point of the arm exceeds [m]
   /// @param influence the largest distance that will be asked for [m]
+  /// @param robot see read_region()
   /// @throws Error io, parse or invalid for the map or an obstacle
   Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
-              double reach, double influence);
+              double reach, double influence, const RobotAtStart& robot = {});
 
   class Scratch {
    public:
-    /// @param spheres how many will be asked for at once; more allocate at the first such call
-    Scratch(const Environment& environment, std::size_t spheres);
+    /// @param shapes how many will be asked for at once; more allocate at the first such call
+    Scratch(const Environment& environment, std::size_t shapes);
 
    private:
     friend class Environment;
@@ -67,35 +70,47 @@ class Environment {
     std::vector<std::size_t> order_;
   };
 
-  /// All near obstacle points of all spheres: spheres in order, within a sphere nearest first.
-  /// @param centers, radii the spheres, world [m]
-  /// @param influence largest distance from a sphere's surface [m]
+  /// How many contacts so many shapes can have at most.
+  [[nodiscard]] std::size_t contacts_max(std::size_t shapes) const noexcept;
+
+  /// All near obstacle points of all shapes: shapes in order, within a shape nearest first.
+  /// @param influence largest distance from a shape's surface [m]
   /// @param out receives them; if it is too small, the nearest of all
   /// @param seen see(): one flag an obstacle; empty: none was seen
   /// @return how many there are, also if out is smaller. No allocation.
-  std::size_t closest(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double influence,
-                      double time_s, Scratch& scratch, std::span<Contact> out, View view = View::planner,
-                      std::span<const std::uint8_t> seen = {}) const;
+  std::size_t closest(const Shapes& arm, double influence, double time_s, Scratch& scratch, std::span<Contact> out,
+                      View view = View::planner, std::span<const std::uint8_t> seen = {}) const;
 
   /// Marks the obstacles that are not known but come into sight of the arm as it stands: they are there, and its
   /// clearance to them is at most their visible_within_m. Marks stay: what was seen is remembered.
   /// @param seen one flag an obstacle, zero at first
   /// @return the index of one that was newly seen, or −1 if there is none (any more). No allocation.
-  int see(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-          std::span<std::uint8_t> seen) const;
+  int see(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const;
 
-  /// Smallest distance between any sphere's surface and any obstacle [m], or `limit` if all is farther. Zero or below
+  /// Smallest distance between any shape's surface and any obstacle [m], or `limit` if all is farther. Zero or below
   /// is contact. No allocation.
-  [[nodiscard]] double clearance(std::span<const Eigen::Vector3d> centers, std::span<const double> radii, double time_s,
-                                 double limit, View view = View::judge, std::span<const std::uint8_t> seen = {}) const;
+  [[nodiscard]] double clearance(const Shapes& arm, double time_s, double limit, View view = View::judge,
+                                 std::span<const std::uint8_t> seen = {}) const;
 
-  /// Whether a sphere touches unknown space where the policy is `slow`.
-  [[nodiscard]] bool in_slow_space(std::span<const Eigen::Vector3d> centers, std::span<const double> radii) const;
+  /// Whether a shape touches unknown space where the policy is `slow`.
+  [[nodiscard]] bool in_slow_space(const Shapes& arm) const;
 
+  /// Distance of the arm from one obstacle [m], whether it is there or not, or `limit` if that is less. No allocation.
+  [[nodiscard]] double clearance_to(std::size_t obstacle, const Shapes& arm, double time_s, double limit) const {
+    return clearance_to(obstacles_[obstacle], arm, time_s, limit);
+  }
+
+  /// A contact of the arm in words: "sphere 2 of link 'hand' is 4.2 mm inside the map".
+  [[nodiscard]] std::string words(const Contact& contact, const model::Model& model) const;
   /// A Contact's obstacle in words: "the map", "unknown space" or "obstacle 'NAME'".
   [[nodiscard]] std::string words(int obstacle) const;
 
-  /// Whether there is anything at all to hit.
+  /// Makes the map's changes that are due, see MapSpec::changes; what was unknown there is known from then on. To be
+  /// called with times that do not fall, between ticks: nobody else may look meanwhile.
+  /// @return a line about them; empty if none was due
+  std::string advance(double time_s);
+
+  /// Whether there is anything at all to hit, now or later.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
   [[nodiscard]] const MapField& map_field() const noexcept { return map_; }
@@ -105,13 +120,17 @@ class Environment {
 
  private:
   [[nodiscard]] bool shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const;
-  [[nodiscard]] double clearance_to(const Obstacle& obstacle, std::span<const Eigen::Vector3d> centers,
-                                    std::span<const double> radii, double time_s, double limit) const;
+  [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s, double limit);
 
   geometry::SE3 map_pose_, map_pose_inverse_;
   MapField map_, unknown_;  ///< in the map's frame [m]
+  std::vector<MapChange> changes_;
+  std::size_t next_change_ = 0;
   std::vector<Obstacle> obstacles_;
   Summary summary_;
 };
+
+/// A contact's way out in words: "(0, 0, 1)", to two digits.
+[[nodiscard]] std::string way_out(const Contact& contact);
 
 }  // namespace hamelin::scene

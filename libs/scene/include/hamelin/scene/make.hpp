@@ -55,7 +55,7 @@ struct MakeReport {
 [[nodiscard]] bool touches(const Obstacle& primitive, const Box& cube);
 
 /// Marks the primitives in an OctoMap and writes it beside, then renames. Same options, same bytes.
-/// @throws Error invalid (sizes, more than 2²⁸ voxels) or io
+/// @throws Error invalid (sizes; more than 2²⁵ cells to look at, which grow with surfaces, not volumes) or io
 MakeReport make_map(const MakeMapOptions& options);
 
 /// Options from a document of the form hamelin.primitives/1 (docs/schema); `output` is left empty.
@@ -72,9 +72,9 @@ struct ProblemOptions {
 };
 
 /// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the
-/// planner sees the map, the primitives themselves are there for the judge. Joints go by order. Joint, velocity and
-/// torque limits and self-collision are modelled, and gravity.
-/// @throws Error io, parse or invalid
+/// planner sees the map, the primitives themselves are there for the judge. Joints go by order. The map is free up to
+/// 0.5 m beyond the arm's reach. Joint, velocity and torque limits and self-collision are modelled, and gravity.
+/// @throws Error io, parse or invalid, naming the key in the problem that is not understood; then nothing is written
 MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options);
 
 }  // namespace hamelin::scene

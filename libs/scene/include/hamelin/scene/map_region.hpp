@@ -9,8 +9,10 @@
 
 #include "hamelin/geometry/se3.hpp"
 #include "hamelin/scene/boxes.hpp"
+#include "hamelin/scene/map_change.hpp"
 #include "hamelin/scene/map_file.hpp"
 #include "hamelin/scene/obstacles.hpp"
+#include "hamelin/scene/shapes.hpp"
 
 namespace hamelin::scene {
 
@@ -28,6 +30,28 @@ struct MapSpec {
   double occupancy_threshold = 0.5;
   UnknownPolicy unknown = UnknownPolicy::free;
   double keep_out_radius_m = 0.0;  ///< unknown voxels touched by this ball around the base count as free
+  /// If given: the map holds the robot itself, so voxels are taken out that its shapes, this much thicker, touch at the
+  /// start [m].
+  std::optional<double> self_filter_padding_m;
+  std::vector<MapChangeSpec> changes;  ///< by time
+};
+
+/// The padding of a self-filter that a scene does not give [m].
+inline constexpr double default_self_filter_padding_m = 0.02;
+
+/// What a ball holds of each kind of space, as shares of its volume that add up to one. Beyond the octree all is
+/// unknown. See volume_inside() for how exact they are.
+struct Shares {
+  double occupied = 0.0, free = 0.0, unknown = 0.0;
+};
+
+/// @param ball in the map's frame [m]; zero shares if its radius is zero
+[[nodiscard]] Shares shares_within(const MapData& map, const Ball& ball);
+
+/// The robot where it stands when a run begins, in the world.
+struct RobotAtStart {
+  Shapes arm;   ///< what moves
+  Shapes base;  ///< what does not
 };
 
 /// What was read and what is left of it where the arm can be.
@@ -38,8 +62,14 @@ struct MapSummary {
   std::size_t nodes = 0;
   std::size_t leaves = 0;          ///< occupied leaves in the file
   std::size_t leaves_cropped = 0;  ///< of these within reach + influence
-  double unknown_share = 0.0;      ///< of the ball of radius reach around the base
+  std::size_t free_leaves = 0;     ///< in the file
+  Shares within_reach;             ///< of the file's map, before anything is taken out of it
   UnknownPolicy unknown = UnknownPolicy::free;
+  std::optional<double> self_filter_padding_m;
+  std::size_t self_filter_voxels = 0;          ///< occupied ones that the self-filter took out
+  std::size_t self_filter_leaves = 0;          ///< occupied leaves that lost any
+  std::size_t self_filter_unknown_voxels = 0;  ///< unknown ones, unless unknown space is free
+  std::size_t leaves_in_arm = 0;               ///< without a self-filter: occupied ones that touch the arm at its start
   std::vector<std::string> warnings;
 };
 
@@ -53,10 +83,14 @@ struct MapRegion {
   MapSummary summary;
 };
 
-/// Reads a map and cuts it down: crop, unknown space by its policy, keep-out around the base, shares within reach.
+/// Reads a map and cuts it down: shares within reach, crop, self-filter, unknown space by its policy, keep-out around
+/// the base.
 /// @param base pose of the robot's base frame in the world
 /// @param reach, influence see Environment [m]
-/// @throws Error io, parse or invalid for the map, usage for reach and influence
-[[nodiscard]] MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence);
+/// @param robot for the self-filter, and to notice a map that holds the robot itself
+/// @throws Error io, parse or invalid for the map, also where unknown space blocks and there is no free space within
+///         reach though most of it is unknown; usage for reach and influence
+[[nodiscard]] MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence,
+                                    const RobotAtStart& robot = {});
 
 }  // namespace hamelin::scene

@@ -2,9 +2,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "hamelin/geometry/se3.hpp"
 
@@ -24,6 +26,13 @@ struct SineMotion {
   double period_s = 1.0;
 };
 
+/// Motion p(t) = p_0 + v clamp(t − start, 0, duration) on a line, without turning.
+struct LinearMotion {
+  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
+  double start_s = 0.0;
+  double duration_s = std::numeric_limits<double>::infinity();
+};
+
 /// A solid primitive in the world.
 struct Obstacle {
   std::string name;
@@ -33,7 +42,7 @@ struct Obstacle {
   Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  ///< box: full edges
   geometry::SE3 pose;                                ///< centre and axes in the world at rest
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};    ///< see Quaternion
-  std::optional<SineMotion> motion;
+  std::optional<std::variant<SineMotion, LinearMotion>> motion;
   bool known = true;                       ///< whether the planner is told of it from the start
   std::optional<double> visible_within_m;  ///< if not known: seen once the arm is this near; none = never
   double appears_s = 0.0;                  ///< before this time it is not there, for nobody
@@ -51,6 +60,9 @@ struct SurfacePoint {
 [[nodiscard]] Eigen::Vector3d position_at(const Obstacle& obstacle, double time_s);
 [[nodiscard]] Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s);
 
+/// No point of it is ever faster than this [m/s].
+[[nodiscard]] double max_speed(const Obstacle& obstacle);
+
 /// Radius of the ball about the centre that holds the obstacle [m].
 [[nodiscard]] double bounding_radius(const Obstacle& obstacle);
 
@@ -58,6 +70,17 @@ struct SurfacePoint {
 /// an axis) one of them, always the same.
 [[nodiscard]] SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
                                       const Eigen::Vector3d& p);
+
+/// The nearest pair of an obstacle's surface and the axis of a capsule.
+struct AxisPoint : SurfacePoint {
+  Eigen::Vector3d axis_point = Eigen::Vector3d::Zero();  ///< on the axis; `distance` is measured from here, world
+};
+
+/// The same for the axis from a to b; where it enters the obstacle, its deepest point. Closed forms for sphere and box;
+/// for the cylinder, a convex body, the distance is convex along the axis and its minimum is enclosed between tangents
+/// until these leave less than 1e-13 of a metre and of the lengths.
+[[nodiscard]] AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b);
 
 /// Whether the obstacle is there at all.
 [[nodiscard]] inline bool exists(const Obstacle& obstacle, double time_s) {

@@ -10,6 +10,7 @@
 
 #include "hamelin/core/json.hpp"
 #include "hamelin/geometry/se3.hpp"
+#include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/obstacles.hpp"
 
@@ -19,6 +20,7 @@ struct RobotRef {
   std::filesystem::path file;
   std::optional<std::string> tip;                ///< none: the only leaf
   std::optional<std::filesystem::path> spheres;  ///< sidecar file
+  std::optional<std::filesystem::path> srdf;     ///< its pairs never count as colliding
 };
 
 enum class GoalType : std::int32_t { joint, position, pose };
@@ -133,10 +135,14 @@ void set_pointer(Json& document, std::string_view assignment);
 /// One obstacle in a scene's form. @throws Error invalid, "where: …"
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
+[[nodiscard]] Json motion_json(const std::variant<SineMotion, LinearMotion>& motion);
 
-/// The surroundings of a scene. See Environment.
-[[nodiscard]] inline Environment make_environment(const Scene& scene, double reach, double influence) {
-  return Environment(scene.map, scene.obstacles, scene.base, reach, influence);
-}
+/// A scene's map cut down to its robot, which stands in it as the scene starts. See read_region().
+/// @throws Error io, parse or invalid, also if start/q does not fit the model; usage if there is no map
+[[nodiscard]] MapRegion make_region(const Scene& scene, const model::Model& model, double influence);
+
+/// The surroundings of a scene's robot, which stands in them as the scene starts. See Environment.
+/// @throws Error io, parse or invalid, also if start/q does not fit the model
+[[nodiscard]] Environment make_environment(const Scene& scene, const model::Model& model, double influence);
 
 }  // namespace hamelin::scene

@@ -6,14 +6,15 @@
 #include <vector>
 
 #include "hamelin/model/model.hpp"
+#include "hamelin/scene/shapes.hpp"
 
 namespace hamelin::scene {
 
-/// The nearest spheres of two parts of the arm; world frame. The fields are those of hamelin_self_contact.
+/// The nearest shapes of two parts of the arm; world frame. The fields are those of hamelin_self_contact.
 struct SelfContact {
-  static constexpr int base = -1;  ///< `sphere_b`: one of Robot::base_spheres
+  static constexpr int base = -1;  ///< `sphere_b`: one of Robot::base_spheres or base_segments
   int pair = 0;                    ///< index into SelfField::pairs()
-  int sphere_a = 0, sphere_b = 0;  ///< indices into Model::spheres()
+  int sphere_a = 0, sphere_b = 0;  ///< indices into Model::shapes()
   double distance = 0.0;           ///< between the surfaces [m]; zero or below is contact
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero(), point_b = Eigen::Vector3d::Zero();  ///< on the surfaces
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();                                   ///< unit, from b towards a
@@ -26,10 +27,10 @@ class SelfField {
  public:
   struct Part {
     std::string name;
-    int body = 0;              ///< the moving link it is on; −1: the base
-    std::vector<int> spheres;  ///< indices into Model::spheres(); of the base −1 − (index into base_spheres)
-    int center = 0;            ///< the sphere about which the part's ball is drawn
-    double radius = 0.0;       ///< of that ball, which holds the part [m]
+    int body = 0;             ///< the moving link it is on; −1: the base
+    std::vector<int> shapes;  ///< indices into Model::shapes(); of the base −1 − (index into spheres, then capsules)
+    int center = 0;           ///< the shape about whose centre the part's ball is drawn
+    double radius = 0.0;      ///< of that ball, which holds the part [m]
   };
   struct Pair {
     int part_a = 0, part_b = 0;  ///< indices into parts(); a moves, and is nearer to the base if both do
@@ -44,35 +45,54 @@ class SelfField {
   /// One line if pairs of neighbours were left out for want of a list; else empty.
   [[nodiscard]] const std::string& note() const noexcept { return note_; }
 
-  /// The nearest spheres of each pair of parts no farther apart than `limit` [m], in the order of pairs().
-  /// @param centers of Model::spheres(), world [m], as dynamics::sphere_centers gives them
+  /// The nearest shapes of each pair of parts no farther apart than `limit` [m], in the order of pairs().
+  /// @param arm Model::shapes() in the world, as PlacedShapes has them
   /// @param out receives them; if it is too small, the nearest of all
   /// @return how many there are, also if out is smaller. No allocation.
-  std::size_t closest(std::span<const Eigen::Vector3d> centers, double limit, std::span<SelfContact> out) const;
+  std::size_t closest(const Shapes& arm, double limit, std::span<SelfContact> out) const;
 
   /// Distance of one pair of parts [m], or `limit` if that is less. No allocation.
-  [[nodiscard]] double distance(std::size_t pair, std::span<const Eigen::Vector3d> centers, double limit) const;
+  [[nodiscard]] double distance(std::size_t pair, const Shapes& arm, double limit) const;
 
  private:
   struct Nearest {
     double distance = 0.0;
     int a = 0, b = 0;
   };
-  [[nodiscard]] const Eigen::Vector3d& center(int sphere, std::span<const Eigen::Vector3d> centers) const {
-    return sphere >= 0 ? centers[static_cast<std::size_t>(sphere)]
-                       : base_centers_[static_cast<std::size_t>(-1 - sphere)];
+  [[nodiscard]] const Eigen::Vector3d& center(int shape, const Shapes& arm) const {
+    return shape >= 0 ? arm.centers[static_cast<std::size_t>(shape)]
+                      : base_centers_[static_cast<std::size_t>(-1 - shape)];
   }
-  [[nodiscard]] double radius(int sphere) const {
-    return sphere >= 0 ? radii_[static_cast<std::size_t>(sphere)] : base_radii_[static_cast<std::size_t>(-1 - sphere)];
+  [[nodiscard]] double radius(int shape) const {
+    return shape >= 0 ? radii_[static_cast<std::size_t>(shape)] : base_radii_[static_cast<std::size_t>(-1 - shape)];
   }
-  /// Lowers `best` to the pair's nearest spheres if they are nearer.
-  bool nearer(const Pair& pair, std::span<const Eigen::Vector3d> centers, Nearest& best) const;
+  [[nodiscard]] Eigen::Vector3d half_axis(int shape, const Shapes& arm) const;
+  /// Half the length of a shape's axis.
+  [[nodiscard]] double half_length(int shape) const {
+    return shape >= 0 ? half_lengths_[static_cast<std::size_t>(shape)]
+                      : base_half_lengths_[static_cast<std::size_t>(-1 - shape)];
+  }
+  /// Lowers `best` to the pair's nearest shapes if they are nearer. `capsules`: whether there may be any.
+  template <bool capsules>
+  bool nearer(const Pair& pair, const Shapes& arm, Nearest& best) const;
+  bool nearer(const Pair& pair, const Shapes& arm, Nearest& best) const {
+    return has_capsules_ ? nearer<true>(pair, arm, best) : nearer<false>(pair, arm, best);
+  }
 
   std::vector<Part> parts_;
   std::vector<Pair> pairs_;
-  std::vector<double> radii_, base_radii_;
-  std::vector<Eigen::Vector3d> base_centers_;  ///< world
+  bool has_capsules_ = false;
+  std::vector<double> radii_, base_radii_, half_lengths_, base_half_lengths_;
+  std::vector<Eigen::Vector3d> base_centers_, base_half_axes_;  ///< world
   std::string note_;
 };
+
+/// The nearest points of two segments, each given by its centre and half axis (zero for a point): where on the axes,
+/// −1 to 1. Parallel and degenerate segments give one pair of the nearest, always the same.
+struct AxisPair {
+  double on_a = 0.0, on_b = 0.0;
+};
+[[nodiscard]] AxisPair nearest_on_axes(const Eigen::Vector3d& center_a, const Eigen::Vector3d& half_a,
+                                       const Eigen::Vector3d& center_b, const Eigen::Vector3d& half_b);
 
 }  // namespace hamelin::scene

@@ -13,23 +13,29 @@
 /// is placed, and distances are taken, by code of its own.
 namespace hamelin::study {
 
-/// A collision sphere of the arm.
+/// A collision sphere of the arm, or one of those that stand for a capsule.
 struct JudgedBall {
-  std::string name;        ///< "part/3": the fourth sphere of that part of the arm
+  std::string name;        ///< "part/3": the fourth ball of that part of the arm
   int link = -1;           ///< it moves with; −1: the base
   Eigen::Vector3d center;  ///< in the base frame at q = 0 [m]
   double radius = 0.0;     ///< [m]
 };
 
-/// The arm of a scene, placed by the product of exponentials (SPEC §2): exp(S_1 q_1) … exp(S_i q_i) moves a point of
-/// link i from where it is at q = 0.
+/// The arm of a scene, its capsules as rows of balls, placed by the product of exponentials (SPEC §2): exp(S_1 q_1) …
+/// exp(S_i q_i) moves a point of link i from where it is at q = 0.
 class JudgedArm {
  public:
+  /// Rows of balls lie within their capsules and reach to within this of their surfaces [m].
+  static constexpr double capsule_gap_m = 1e-4;
+
   /// @throws Error as model::read_robot does
   explicit JudgedArm(const scene::Scene& scene);
 
   [[nodiscard]] std::size_t dof() const noexcept { return joints_.size(); }
+  /// Those that move, then those of the base if the scene models self-collision.
   [[nodiscard]] const std::vector<JudgedBall>& balls() const noexcept { return balls_; }
+  /// Those of the base, whatever the scene models.
+  [[nodiscard]] const std::vector<JudgedBall>& base_balls() const noexcept { return base_balls_; }
   /// Pairs of balls that must not touch each other: of two parts that move against each other and are not listed as
   /// disabled; where a robot lists no pair at all, not of neighbouring links. None unless the scene models it.
   [[nodiscard]] const std::vector<std::pair<std::size_t, std::size_t>>& self_pairs() const noexcept {
@@ -45,7 +51,7 @@ class JudgedArm {
   };
   Eigen::Isometry3d base_;
   std::vector<Screw> joints_;
-  std::vector<JudgedBall> balls_;
+  std::vector<JudgedBall> balls_, base_balls_;
   std::vector<std::pair<std::size_t, std::size_t>> self_pairs_;
 };
 
@@ -58,6 +64,8 @@ class JudgedMap {
   JudgedMap() = default;
   /// @throws Error io, parse or invalid
   explicit JudgedMap(const scene::MapSpec& spec);
+  /// The same without the voxels that a self-filter takes out: those that the robot touches, padded, at its start.
+  JudgedMap(const scene::Scene& scene, const JudgedArm& arm);
 
   [[nodiscard]] const std::vector<scene::Box>& leaves() const noexcept { return leaves_; }
   /// Distance of a world point from the nearest leaf [m]; 0 inside, infinite without leaves. O(leaves).

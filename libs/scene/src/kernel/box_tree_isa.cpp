@@ -1,0 +1,396 @@
+// Compiled once for each instruction set; see dynamics/kernel/lanes.hpp on what may be used here. Unlike other kernels
+// this one is compiled without fused products.
+#include "hamelin/scene/kernel/box_tree.hpp"
+#include "segment_box.hpp"
+
+namespace hamelin::scene::kernel {
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+namespace {
+
+#if defined(__AVX2__)
+constexpr int lanes = 8;
+#else
+constexpr int lanes = 4;
+#endif
+typedef float Lanes __attribute__((vector_size(4 * lanes)));
+constexpr int width = TreeNode::width;
+
+HAMELIN_INLINE Lanes splat(float x) {
+  return x - Lanes{};
+}
+HAMELIN_INLINE Lanes max(Lanes a, Lanes b) {
+  return a > b ? a : b;
+}
+HAMELIN_INLINE Lanes min(Lanes a, Lanes b) {
+  return a < b ? a : b;
+}
+HAMELIN_INLINE Lanes load(const float* from) {
+  Lanes x;
+  __builtin_memcpy(&x, from, sizeof x);
+  return x;
+}
+HAMELIN_INLINE void store(Lanes x, float* to) {
+  __builtin_memcpy(to, &x, sizeof x);
+}
+HAMELIN_INLINE float magnitude(float x) {
+  return x < 0.0F ? -x : x;
+}
+
+// Which of a node's numbers are not above the bound, a bit each.
+HAMELIN_INLINE unsigned not_above(const float* x, float bound) {
+  unsigned bits = 0;
+#if defined(__AVX2__)
+  bits = static_cast<unsigned>(__builtin_ia32_movmskps256(load(x) <= splat(bound)));
+#elif defined(__SSE2__)
+  for (int half = 0; half < width; half += lanes)
+    bits |= static_cast<unsigned>(__builtin_ia32_movmskps(load(x + half) <= splat(bound))) << half;
+#else
+  for (int i = 0; i < width; ++i) bits |= (x[i] <= bound ? 1U : 0U) << i;
+#endif
+  return bits;
+}
+
+constexpr float float_max = 3.4e38F;
+
+// The largest float not above: what a bound is compared with. Three subtractions, squares and sums in single precision
+// are off by less than 8 units in the last place.
+HAMELIN_INLINE float bound_of(double squared) {
+  const double wide = (squared > 0.0 ? squared : 0.0) * (1.0 + 2e-6);
+  return wide < 3.3e38 ? static_cast<float>(wide) + 1e-37F : float_max;
+}
+
+// The way from a box's nearest point, its direction, and the key.
+struct Away {
+  double x[3];
+  double key;
+  int face;  ///< inside: the nearest one, lo's before hi's; else −1
+};
+
+HAMELIN_INLINE Away away_from(const double* p, const double* box) {
+  Away away{};
+  away.face = -1;
+  for (int i = 0; i < 3; ++i) {
+    away.x[i] = outside(p[i], box[i], box[3 + i]);
+    away.key += away.x[i] * away.x[i];
+  }
+  if (away.key > 0.0) return away;
+  double depth = p[0] - box[0];
+  away.face = 0;
+  for (int i = 1; i < 6; ++i) {
+    const double d = i < 3 ? p[i] - box[i] : box[i] - p[i - 3];
+    if (d < depth) {
+      depth = d;
+      away.face = i;
+    }
+  }
+  away.key = -depth * depth;
+  return away;
+}
+
+// A point, as nodes and leaves ask it.
+class Point {
+ public:
+  HAMELIN_INLINE Point(const Tree& tree, const double* p) noexcept : p_(p) {
+    for (int i = 0; i < 3; ++i) {
+      const float at = static_cast<float>(p[i] - tree.origin[i]);
+      const float slack = magnitude(at) * 1.2e-7F + 1e-37F;
+      low_[i] = at - slack;
+      high_[i] = at + slack;
+      at_[i] = at;
+    }
+  }
+
+  // Lower bounds of the squared distances of a node's slots.
+  HAMELIN_INLINE void bounds(const TreeNode& node, float* out) const {
+    for (int half = 0; half < width; half += lanes) {
+      Lanes sum{};
+      for (int i = 0; i < 3; ++i) {
+        const Lanes below = load(node.lo[i] + half) - splat(high_[i]);
+        const Lanes above = splat(low_[i]) - load(node.hi[i] + half);
+        const Lanes out_by = max(max(below, above), Lanes{});
+        sum += out_by * out_by;
+      }
+      store(sum, out + half);
+    }
+  }
+
+  HAMELIN_INLINE double key(const double* box) const { return away_from(p_, box).key; }
+
+  struct Taken {
+    double direction[3];
+    float direction_f[3];
+  };
+  HAMELIN_INLINE Taken take(const double* box) const {
+    const Away away = away_from(p_, box);
+    Taken taken{};
+    const double length = __builtin_sqrt(away.key > 0.0 ? away.key : 1.0);
+    for (int i = 0; i < 3; ++i) taken.direction[i] = away.face < 0 ? away.x[i] / length : 0.0;
+    if (away.face >= 0) taken.direction[away.face % 3] = away.face < 3 ? -1.0 : 1.0;
+    for (int i = 0; i < 3; ++i) taken.direction_f[i] = static_cast<float>(taken.direction[i]);
+    return taken;
+  }
+  HAMELIN_INLINE bool same(const Taken& taken, const Taken& other, double cone_cosine) const {
+    double dot = 0.0;
+    for (int i = 0; i < 3; ++i) dot += taken.direction[i] * other.direction[i];
+    return dot > cone_cosine;
+  }
+
+  // Whether all that a slot holds is seen within the cone of what was taken: its ball is, by some hair.
+  HAMELIN_INLINE bool hidden(const TreeNode& node, int slot, const Taken& taken, float cosine, float sine) const {
+    float along = 0.0F, square = 0.0F, radius2 = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      const float half = 0.5F * (node.hi[i][slot] - node.lo[i][slot]);
+      const float away = at_[i] - (node.lo[i][slot] + half);
+      along += away * taken.direction_f[i];
+      square += away * away;
+      radius2 += half * half;
+    }
+    if (!(square > radius2 * 1.001F) || !(along > 0.0F)) return false;
+    return along > (cosine * __builtin_sqrtf(square - radius2) + sine * __builtin_sqrtf(radius2)) * 1.00001F;
+  }
+
+ private:
+  const double* p_;
+  float low_[3], high_[3], at_[3];
+};
+
+// A capsule's axis, likewise.
+class Segment {
+ public:
+  HAMELIN_INLINE Segment(const Tree& tree, const double* p, const double* q) noexcept : axis_(axis_of(p, q)) {
+    float length2 = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      from_[i] = static_cast<float>(p[i] - tree.origin[i]);
+      way_[i] = static_cast<float>(axis_.way[i]);
+      slack_[i] = (magnitude(from_[i]) + magnitude(way_[i])) * 4e-7F + 1e-37F;
+      length2 += way_[i] * way_[i];
+      reach_ += slack_[i];
+    }
+    loss_ = 4.0F * reach_ * __builtin_sqrtf(length2) + 2e-6F * length2;
+  }
+
+  // f(t) = the squared distance of the axis' point at t is convex: f(s) ≥ f(t) + f'(t)(s − t), whatever t is. Three of
+  // Newton's steps bring it near the least f. `loss_` is what rounding can do to f' within [0, 1].
+  HAMELIN_INLINE void bounds(const TreeNode& node, float* out) const {
+    for (int half = 0; half < width; half += lanes) {
+      Lanes t = splat(0.5F), f{}, g{};
+      for (int step = 0;; ++step) {
+        Lanes w = splat(1e-30F);
+        f = Lanes{};
+        g = Lanes{};
+        for (int i = 0; i < 3; ++i) {
+          const Lanes at = splat(from_[i]) + t * splat(way_[i]);
+          const Lanes above = max(at - (load(node.hi[i] + half) + splat(slack_[i])), Lanes{});
+          const Lanes below = max((load(node.lo[i] + half) - splat(slack_[i])) - at, Lanes{});
+          const Lanes e = above - below;
+          f += e * e;
+          g += splat(way_[i]) * e;
+          w += e != Lanes{} ? splat(way_[i] * way_[i]) : Lanes{};
+        }
+        if (step == 3) break;
+        t = min(max(t - g / w, Lanes{}), splat(1.0F));
+      }
+      const Lanes falls = min(min(-(g * t), g * (splat(1.0F) - t)), Lanes{});
+      store(max(f * splat(1.0F - 4e-6F) + splat(2.0F) * falls - splat(loss_), Lanes{}), out + half);
+    }
+  }
+
+  HAMELIN_INLINE double key(const double* box) const {
+    return squared_distance(axis_, box, box + 3, nearest_along(axis_, box, box + 3));
+  }
+
+  struct Taken {
+    double direction[3];
+    double along;
+  };
+  HAMELIN_INLINE Taken take(const double* box) const {
+    Taken taken{};
+    taken.along = nearest_along(axis_, box, box + 3);
+    double square = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      taken.direction[i] = outside(axis_.from[i] + taken.along * axis_.way[i], box[i], box[3 + i]);
+      square += taken.direction[i] * taken.direction[i];
+    }
+    const double length = __builtin_sqrt(square);
+    for (double& x : taken.direction) x = length > 0.0 ? x / length : 0.0;
+    return taken;
+  }
+  // Far apart on the axis they are two, whatever their directions.
+  HAMELIN_INLINE bool same(const Taken& taken, const Taken& other, double cone_cosine) const {
+    const double apart = taken.along - other.along;
+    double dot = 0.0;
+    for (int i = 0; i < 3; ++i) dot += taken.direction[i] * other.direction[i];
+    return dot > cone_cosine && apart < 1.0 / 3.0 && apart > -1.0 / 3.0;
+  }
+  HAMELIN_INLINE bool hidden(const TreeNode&, int, const Taken&, float, float) const { return false; }
+
+ private:
+  Axis axis_;
+  float from_[3], way_[3], slack_[3];
+  float reach_ = 0.0F, loss_ = 0.0F;
+};
+
+template <class Query>
+HAMELIN_INLINE bool nearest_of(const Tree& tree, const Query& query, double limit, Found& found) {
+  double best = limit * limit;
+  std::int32_t best_box = -1;
+  const auto try_box = [&](std::int32_t index) __attribute__((always_inline)) {
+    const double key = query.key(tree.boxes + 6 * static_cast<std::int64_t>(index));
+    const bool better = key < best || (key == best && (best_box < 0 || index < best_box));
+    if (better) {
+      best = key;
+      best_box = index;
+    }
+    return better;
+  };
+  if (found.box >= 0) try_box(found.box);
+  float bound = bound_of(best);
+
+  struct Entry {
+    float bound;
+    std::int32_t node;
+  };
+  // At most 10 levels of free cuts and 31 of halving, each leaving at most 7 siblings behind.
+  Entry stack[512];
+  int waiting = 0;
+  stack[waiting++] = {0.0F, 0};
+  alignas(32) float squares[width];
+  while (waiting > 0) {
+    const Entry entry = stack[--waiting];
+    if (entry.bound > bound) continue;
+    const TreeNode& node = tree.nodes[entry.node];
+    query.bounds(node, squares);
+    unsigned near = not_above(squares, bound) & ((1U << static_cast<unsigned>(node.count)) - 1U);
+    const int first = waiting;
+    // Nearest box first: its bound all but settles the others.
+    for (;;) {
+      int box_slot = -1;
+      for (unsigned rest = near; rest != 0; rest &= rest - 1U) {
+        const int slot = __builtin_ctz(rest);
+        if (node.child[slot] < 0 && (box_slot < 0 || squares[slot] < squares[box_slot])) box_slot = slot;
+      }
+      if (box_slot < 0) break;
+      near &= ~(1U << static_cast<unsigned>(box_slot));
+      if (try_box(-1 - node.child[box_slot])) {
+        bound = bound_of(best);
+        near &= not_above(squares, bound);
+      }
+    }
+    for (; near != 0; near &= near - 1U) {
+      const int slot = __builtin_ctz(near);
+      // nearest on top of the stack
+      int at = waiting++;
+      for (; at > first && stack[at - 1].bound < squares[slot]; --at) stack[at] = stack[at - 1];
+      stack[at] = {squares[slot], node.child[slot]};
+    }
+  }
+  if (best_box < 0) return false;
+  found = {best, best_box};
+  return true;
+}
+
+// Nodes before boxes, then boxes by index.
+HAMELIN_INLINE bool before(const Waiting& a, const Waiting& b) {
+  return a.key < b.key || (a.key == b.key && a.id > b.id);
+}
+
+HAMELIN_INLINE void push(Waiting* heap, int& size, const Waiting& entry) {
+  int at = size++;
+  while (at > 0) {
+    const int parent = (at - 1) / 2;
+    if (!before(entry, heap[parent])) break;
+    heap[at] = heap[parent];
+    at = parent;
+  }
+  heap[at] = entry;
+}
+
+HAMELIN_INLINE Waiting pop(Waiting* heap, int& size) {
+  const Waiting top = heap[0];
+  const Waiting last = heap[--size];
+  int at = 0;
+  for (int child = 1; child < size; child = 2 * at + 1) {
+    if (child + 1 < size && before(heap[child + 1], heap[child])) ++child;
+    if (!before(heap[child], last)) break;
+    heap[at] = heap[child];
+    at = child;
+  }
+  heap[at] = last;
+  return top;
+}
+
+template <class Query>
+HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit, double cone_cosine, Waiting* heap,
+                              Found* out, int count) {
+  constexpr int most = 8;
+  typename Query::Taken taken[most];
+  const double limit2 = limit * limit;
+  const float bound = bound_of(limit2);
+  const float cosine = static_cast<float>(cone_cosine);
+  const float sine = cone_cosine > 0.0 ? __builtin_sqrtf(1.0F - cosine * cosine) : 2.0F;
+  int found = 0, size = 0;
+  const auto hidden = [&](const TreeNode& node, int slot) __attribute__((always_inline)) {
+    for (int i = 0; i < found; ++i)
+      if (query.hidden(node, slot, taken[i], cosine, sine)) return true;
+    return false;
+  };
+  alignas(32) float squares[width];
+  const auto open = [&](std::int32_t index) __attribute__((always_inline)) {
+    const TreeNode& node = tree.nodes[index];
+    query.bounds(node, squares);
+    unsigned near = not_above(squares, bound) & ((1U << static_cast<unsigned>(node.count)) - 1U);
+    for (; near != 0; near &= near - 1U) {
+      const int slot = __builtin_ctz(near);
+      if (node.child[slot] < 0 || !hidden(node, slot))
+        push(heap, size, {static_cast<double>(squares[slot]), index * width + slot});
+    }
+  };
+  open(0);
+  while (size > 0 && found < count && found < most) {
+    Waiting next = pop(heap, size);
+    if (next.id >= 0) {
+      const TreeNode& parent = tree.nodes[next.id / width];
+      const int slot = next.id % width;
+      const std::int32_t child = parent.child[slot];
+      if (child >= 0) {
+        if (!hidden(parent, slot)) open(child);
+        continue;
+      }
+      // a box whose turn it is by its bound: now by its distance
+      next = {query.key(tree.boxes + 6 * static_cast<std::int64_t>(-1 - child)), child};
+      if (!(next.key <= limit2)) continue;
+      if (size > 0 && before(heap[0], next)) {
+        push(heap, size, next);
+        continue;
+      }
+    }
+    const std::int32_t index = -1 - next.id;
+    const typename Query::Taken hit = query.take(tree.boxes + 6 * static_cast<std::int64_t>(index));
+    bool seen = false;
+    for (int i = 0; i < found; ++i) seen = seen || query.same(taken[i], hit, cone_cosine);
+    if (seen) continue;
+    taken[found] = hit;
+    out[found++] = {next.key, index};
+  }
+  return found;
+}
+
+bool nearest(const Tree& tree, const double* p, const double* q, double limit, Found& found) noexcept {
+  return q == nullptr ? nearest_of(tree, Point(tree, p), limit, found)
+                      : nearest_of(tree, Segment(tree, p, q), limit, found);
+}
+
+int several(const Tree& tree, const double* p, const double* q, double limit, double cone_cosine, Waiting* room,
+            Found* out, int count) noexcept {
+  return q == nullptr ? several_of(tree, Point(tree, p), limit, cone_cosine, room, out, count)
+                      : several_of(tree, Segment(tree, p, q), limit, cone_cosine, room, out, count);
+}
+
+}  // namespace
+
+extern const TreeKernels tree_kernels;
+constexpr TreeKernels tree_kernels{nearest, several};
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::scene::kernel

@@ -1,0 +1,64 @@
+#include "hamelin/scene/map_change.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/scene/map_region.hpp"
+
+namespace hamelin::scene {
+
+namespace {
+
+// The voxels that boxes touch, faces not counted, as far as they lie in the cube around the ball.
+std::vector<VoxelBox> touched(const std::vector<Box>& boxes, double resolution, const Ball& ball) {
+  constexpr double hair = 1e-9;  // of a voxel: a face at 0.3 m is that of a voxel of 0.1 m
+  std::vector<VoxelBox> voxels;
+  for (const Box& box : boxes) {
+    VoxelBox out;
+    bool any = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<Eigen::Index>(axis);
+      const double lo = std::max(box.lo[a], ball.center[a] - ball.radius - resolution) / resolution,
+                   hi = std::min(box.hi[a], ball.center[a] + ball.radius + resolution) / resolution;
+      any = any && hi > lo;
+      if (!any) break;
+      out.lo[axis] = static_cast<std::int32_t>(std::floor(lo + hair));
+      out.hi[axis] = static_cast<std::int32_t>(std::ceil(hi - hair));
+      any = out.hi[axis] > out.lo[axis];
+    }
+    if (any) voxels.push_back(out);
+  }
+  return voxels;
+}
+
+}  // namespace
+
+MapChange read_change(const MapChangeSpec& change, const MapSpec& map, const MapRegion& region) {
+  MapChange out;
+  out.time_s = change.time_s;
+  if (change.file) {
+    ReadMapOptions options{map.scale, map.occupancy_threshold};
+    options.keep_free = true;
+    const MapData data = read_map(*change.file, options);
+    if (std::abs(data.resolution - region.resolution_m) > 1e-9 * region.resolution_m)
+      throw Error(ErrorCode::invalid, fmt::format("{}: resolution {} m, expected {} m as the map that it changes",
+                                                  change.file->string(), data.resolution, region.resolution_m));
+    out.free = merge(crop(data.free, data.resolution, region.ball));
+    out.occupied = merge(crop(data.occupied, data.resolution, region.ball));
+  }
+  const auto append = [&](const std::vector<Box>& boxes, std::vector<VoxelBox>& to) {
+    for (const VoxelBox& box : touched(boxes, region.resolution_m, region.ball)) {
+      std::vector<VoxelBox> pieces{box};
+      for (const VoxelBox& there : to) subtract(pieces, there);
+      to.insert(to.end(), pieces.begin(), pieces.end());
+    }
+  };
+  append(change.free_m, out.free);
+  append(change.occupied_m, out.occupied);
+  return out;
+}
+
+}  // namespace hamelin::scene
