@@ -64,7 +64,7 @@ function arm() {
   const fill = (link, from, to, radius, count) => {
     for (let i = 0; i < count; ++i) {
       const s = (i + 0.5) / count;
-      spheres.push({ link, center_m: from.map((c, k) => c + s * (to[k] - c)), radius_m: radius });
+      spheres.push({ link, center_m: from.map((c, k) => c + s * (to[k] - c)), radius_m: radius, shape: spheres.length });
     }
   };
   fill(0, [0, 0, 0.12], [0, 0, 0.34], 0.085, 3);
@@ -76,7 +76,7 @@ function arm() {
   return {
     name: 'arm6',
     base: { position_m: [0, 0, 0], quaternion_wxyz: [1, 0, 0, 0] },
-    joints, skeleton, spheres, tip_link: 5, segments: [], planar_normal: null,
+    joints, skeleton, spheres, shapes: spheres.length, tip_link: 5, segments: [], planar_normal: null,
   };
 }
 
@@ -88,12 +88,12 @@ function bars() {
   const segments = [];
   for (let i = 0; i < 3; ++i) {
     segments.push({ link: i, from_m: skeleton[i], to_m: skeleton[i + 1], radius_m: 0 });
-    for (let k = 0; k <= 20; ++k) spheres.push({ link: i, center_m: [i + k / 20, 0, 0], radius_m: 0.03 });
+    for (let k = 0; k <= 20; ++k) spheres.push({ link: i, center_m: [i + k / 20, 0, 0], radius_m: 0.03, shape: spheres.length });
   }
   return {
     name: 'planar3',
     base: { position_m: [0, 0, 0], quaternion_wxyz: [1, 0, 0, 0] },
-    joints, skeleton, spheres, tip_link: 2, segments, planar_normal: [0, 0, 1],
+    joints, skeleton, spheres, shapes: spheres.length, tip_link: 2, segments, planar_normal: [0, 0, 1],
   };
 }
 

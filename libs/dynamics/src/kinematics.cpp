@@ -86,12 +86,17 @@ geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
   return geometry::SE3{f.R, f.p} * model.tip_in_frame();
 }
 
-void sphere_centers(const Model& model, const Workspace& ws, std::span<Vector3d> centers) {
+void shape_centers(const Model& model, const Workspace& ws, std::span<Vector3d> centers) {
   std::size_t i = 0;
-  for (const auto& s : model.spheres()) {
+  for (const auto& s : model.shapes()) {
     const Frame& f = frame(ws, s.link);
     centers[i++] = f.p + f.R * s.center;
   }
+}
+
+void shape_half_axes(const Model& model, const Workspace& ws, std::span<Vector3d> half_axes) {
+  std::size_t i = 0;
+  for (const auto& s : model.shapes()) half_axes[i++] = frame(ws, s.link).R * s.half_axis;
 }
 
 void point_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world, Matrix3Xd& J) {

@@ -135,8 +135,8 @@ TEST_CASE("kinematics equal the product of exponentials, Jacobians its differenc
   }
   const Vector3d x = point_position(model, ws, link, point);
   CHECK((x - dense.com_pose(link, q) * point).norm() < 1e-13);
-  std::vector<Vector3d> centers(model.spheres().size());
-  sphere_centers(model, ws, centers);
+  std::vector<Vector3d> centers(model.shapes().size());
+  shape_centers(model, ws, centers);
   for (int i = 0; i < c.n; ++i)
     CHECK((centers[static_cast<std::size_t>(i)] -
            dense.com_pose(i, q) * model.robot().links[static_cast<std::size_t>(i)].spheres[0].center_m)

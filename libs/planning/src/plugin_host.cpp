@@ -84,16 +84,23 @@ SetupData::SetupData(const model::Model& nominal)
       base_position_world_m(nominal.base().p()) {
   const Eigen::Quaterniond quaternion(nominal.base().R());
   base_quaternion_wxyz << quaternion.w(), quaternion.vec();
-  std::int32_t link_index = 0;
-  for (const auto& link : nominal.robot().links) {
-    std::int32_t index_in_link = 0;
-    for (const auto& sphere : link.spheres) {
-      spheres.push_back({link_index,
-                         index_in_link++,
-                         {sphere.center_m.x(), sphere.center_m.y(), sphere.center_m.z()},
-                         sphere.radius_m});
+  for (const auto& shape : nominal.shapes()) {
+    const auto& link = nominal.robot().links[static_cast<std::size_t>(shape.link)];
+    const auto index = static_cast<std::size_t>(shape.index_in_link);
+    hamelin_sphere out{};
+    out.link = shape.link;
+    out.index_in_link = shape.index_in_link;
+    out.radius_m = shape.radius;
+    for (int i = 0; i < 3; ++i) {
+      if (shape.is_capsule) {
+        const auto& capsule = link.segments[index];
+        out.center_link_m[i] = 0.5 * (capsule.from_m[i] + capsule.to_m[i]);
+        out.half_axis_link_m[i] = 0.5 * (capsule.to_m[i] - capsule.from_m[i]);
+      } else {
+        out.center_link_m[i] = link.spheres[index].center_m[i];
+      }
     }
-    ++link_index;
+    spheres.push_back(out);
   }
 }
 

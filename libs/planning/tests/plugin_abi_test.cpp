@@ -3,10 +3,11 @@
 #include <catch2/catch.hpp>
 #include <cstddef>
 
-// The layout that ABI 2 promises on a 64-bit machine. A change here needs a new HAMELIN_PLUGIN_ABI_VERSION, unless it
+// The layout that ABI 3 promises on a 64-bit machine. A change here needs a new HAMELIN_PLUGIN_ABI_VERSION, unless it
 // only appends.
-static_assert(HAMELIN_PLUGIN_ABI_VERSION == 2u);
-static_assert(sizeof(hamelin_sphere) == 40 && offsetof(hamelin_sphere, center_link_m) == 8);
+static_assert(HAMELIN_PLUGIN_ABI_VERSION == 3u);
+static_assert(sizeof(hamelin_sphere) == 64 && offsetof(hamelin_sphere, center_link_m) == 8 &&
+              offsetof(hamelin_sphere, half_axis_link_m) == 40);
 static_assert(sizeof(hamelin_contact) == 112 && offsetof(hamelin_contact, distance_m) == 8 &&
               offsetof(hamelin_contact, obstacle_velocity_world_m_s) == 88);
 static_assert(sizeof(hamelin_self_contact) == 88 && offsetof(hamelin_self_contact, direction_world) == 64);

@@ -93,7 +93,7 @@ TEST_CASE("a plugin that is no plugin is refused with one line that names it", "
   };
   expect("no_entry", "no symbol hamelin_plugin_entry, so it is no planner plugin");
   expect("null_entry", "hamelin_plugin_entry returned null");
-  expect("wrong_abi", "built for plugin ABI 8, this host has ABI 2");
+  expect("wrong_abi", "built for plugin ABI 9, this host has ABI 3");
   expect("short_struct", "its hamelin_plugin has 64 bytes, expected at least 72");
   expect("null_create", "its function 'create' is null");
   expect("null_tick", "its function 'tick' is null");
@@ -202,7 +202,9 @@ TEST_CASE("closest points at any q come from the host, and its failure ends the 
 
 TEST_CASE("the setup carries the nominal model across the border", "[planning][plugin]") {
   const geometry::SE3 base = geometry::SE3::exp((Eigen::Matrix<double, 6, 1>() << 0.3, -0.2, 0.9, 1, 2, 3).finished());
-  const model::Model model(test::random_robot(3, 4, 2), base, {0.0, 1.0, -9.0});
+  model::Robot robot = test::random_robot(3, 4, 2);
+  robot.links[2].segments = {{{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 0.0}, {{0.0, 0.1, -0.1}, {0.0, 0.3, 0.1}, 0.03}};
+  const model::Model model(std::move(robot), base, {0.0, 1.0, -9.0});
   SetupData data(model);
   data.q_lower = Eigen::Vector4d::Constant(-2.0);
   hamelin_goal goal{};
@@ -218,8 +220,16 @@ TEST_CASE("the setup carries the nominal model across the border", "[planning][p
   CHECK_THROWS_AS(setup.goal(1), Error);
   CHECK(setup.q_lower()->minCoeff() == -2.0);
   CHECK_FALSE(setup.effort_max().has_value());
-  REQUIRE(setup.spheres().size() == 4);
+  REQUIRE(setup.spheres().size() == 5);
   CHECK(vec3(setup.spheres()[2].center_link_m) == model.robot().links[2].spheres[0].center_m);
+  CHECK(vec3(setup.spheres()[2].half_axis_link_m).isZero(0.0));
+  const hamelin_sphere& capsule = setup.spheres()[3];  // a line is no shape
+  CHECK(capsule.link == 2);
+  CHECK(capsule.index_in_link == 1);
+  CHECK(vec3(capsule.center_link_m).isApprox(Eigen::Vector3d(0.0, 0.2, 0.0)));
+  CHECK(vec3(capsule.half_axis_link_m).isApprox(Eigen::Vector3d(0.0, 0.1, 0.1)));
+  CHECK(capsule.radius_m == 0.03);
+  CHECK(setup.spheres()[4].link == 3);
   for (int i = 0; i < 4; ++i) {
     const auto& a = back.robot().links[static_cast<std::size_t>(i)];
     const auto& b = model.robot().links[static_cast<std::size_t>(i)];
@@ -266,7 +276,7 @@ TEST_CASE("a planner that is not found: every directory, what is there, the near
   const auto listed = list_plugins(directories);
   REQUIRE(listed.size() == 2);
   CHECK_FALSE(listed[0].plugin.has_value());
-  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for plugin ABI 8"));
+  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for plugin ABI 9"));
   REQUIRE(listed[1].plugin.has_value());
   CHECK(listed[1].plugin->version() == "1.0");
 }

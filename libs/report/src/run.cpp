@@ -305,15 +305,13 @@ Json Run::frames_json(const std::vector<Frame>& frames, Container& container) {
   constexpr int force_bits = 10;
   constexpr std::size_t contacts_max = 6;
   const model::Model& model = world_.model;
-  const std::size_t spheres = model.spheres().size();
+  const std::size_t shapes = model.shapes().size();
 
-  std::vector<double> t, q, radii;
+  std::vector<double> t, q;
   std::vector<std::uint16_t> goal_index;
-  for (const auto& sphere : model.spheres()) radii.push_back(sphere.radius);
-  std::vector<Vector3d> centers(spheres);
-  scene::Environment::Scratch scratch(world_.environment, spheres);
-  std::vector<scene::Contact> found(
-      spheres * (2 * scene::Environment::points_per_sphere + world_.environment.obstacles().size()) + 1);
+  scene::PlacedShapes arm(model);
+  scene::Environment::Scratch scratch(world_.environment, shapes);
+  std::vector<scene::Contact> found(world_.environment.contacts_max(shapes));
   std::vector<double> clearances, points;
   std::vector<std::uint8_t> counts;
   std::array<std::vector<double>, channel_names.size()> forces;
@@ -327,11 +325,11 @@ Json Run::frames_json(const std::vector<Frame>& frames, Container& container) {
     goal_index.push_back(static_cast<std::uint16_t>(frame.goal_index));
     dynamics::forward_kinematics(model, ws_, frame.q);
     if (world_.judged) {
-      dynamics::sphere_centers(model, ws_, centers);
-      const std::size_t count =
-          std::min(found.size(), world_.environment.closest(centers, radii, world_.influence_m, frame.time_s, scratch,
-                                                            found, scene::View::judge));
-      std::vector<const scene::Contact*> nearest(spheres, nullptr);
+      arm.place(model, ws_);
+      const std::size_t count = std::min(
+          found.size(),
+          world_.environment.closest(arm.view(), world_.influence_m, frame.time_s, scratch, found, scene::View::judge));
+      std::vector<const scene::Contact*> nearest(shapes, nullptr);
       for (std::size_t i = 0; i < count; ++i) {
         auto& known = nearest[static_cast<std::size_t>(found[i].sphere)];
         if (known == nullptr || found[i].distance < known->distance) known = &found[i];

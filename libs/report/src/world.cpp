@@ -38,6 +38,9 @@ Json pose_json(const geometry::SE3& pose) {
 
 // ---- robot
 
+// Balls that stand for a capsule: so many radii apart, and not more than so many.
+constexpr double ball_spacing_share = 0.4, balls_max = 60.0;
+
 Json robot_json(const model::Model& model) {
   const model::Robot& robot = model.robot();
   Json joints = Json::array(), spheres = Json::array(), segments = Json::array(), points = Json::array();
@@ -47,20 +50,36 @@ Json robot_json(const model::Model& model) {
                       {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
                       {"screw", array(link.joint.screw)},
                       {"link", link.name}});
-    for (const auto& sphere : link.spheres)
-      spheres.push_back({{"link", i}, {"center_m", array(link.com * sphere.center_m)}, {"radius_m", sphere.radius_m}});
     for (const auto& segment : link.segments)
       segments.push_back({{"link", i},
                           {"from_m", array(link.com * segment.from_m)},
                           {"to_m", array(link.com * segment.to_m)},
                           {"radius_m", segment.radius_m}});
   }
+  // a capsule is drawn as a row of balls
+  for (std::size_t s = 0; s < model.shapes().size(); ++s) {
+    const auto& shape = model.shapes()[s];
+    const auto i = static_cast<std::size_t>(shape.link), index = static_cast<std::size_t>(shape.index_in_link);
+    const model::Link& link = robot.links[i];
+    const auto add = [&](const Vector3d& center) {
+      spheres.push_back(
+          {{"link", i}, {"center_m", array(link.com * center)}, {"radius_m", shape.radius}, {"shape", s}});
+    };
+    if (!shape.is_capsule) {
+      add(link.spheres[index].center_m);
+      continue;
+    }
+    const model::Segment& capsule = link.segments[index];
+    const Vector3d axis = capsule.to_m - capsule.from_m;
+    const double parts = std::clamp(std::ceil(axis.norm() / (ball_spacing_share * shape.radius)), 1.0, balls_max);
+    for (double part = 0.0; part <= parts; part += 1.0) add(capsule.from_m + (part / parts) * axis);
+  }
   for (const Vector3d& point : skeleton(robot)) points.push_back(array(point));
   Json normal = nullptr;
   if (model.planar()) normal = array(model.root().R().col(2));
   return {{"name", robot.name},   {"base", pose_json(model.base())}, {"joints", std::move(joints)},
           {"skeleton", points},   {"tip_link", robot.tip.link},      {"spheres", std::move(spheres)},
-          {"segments", segments}, {"planar_normal", normal}};
+          {"segments", segments}, {"planar_normal", normal},         {"shapes", model.shapes().size()}};
 }
 
 // ---- map
@@ -130,11 +149,11 @@ std::vector<scene::Cell> coarsened(const std::vector<scene::Cell>& cells, std::i
   return out;
 }
 
-Json map_json(const scene::MapSpec& spec, const model::Model& model, double influence, Container& container,
+Json map_json(const scene::Scene& scene, const model::Model& model, double influence, Container& container,
               std::vector<std::string>& notes) {
-  const scene::MapData data = scene::read_map(spec.file, {spec.scale, spec.occupancy_threshold});
-  const Vector3d center = spec.pose.inverse() * model.base().p();
-  std::vector<scene::Cell> cells = scene::crop(data.occupied, data.resolution, {center, model.reach() + influence});
+  const scene::MapSpec& spec = *scene.map;
+  const scene::MapRegion region = scene::make_region(scene, model, influence);
+  std::vector<scene::Cell> cells = region.occupied;
   std::size_t left_out = 0;
   if (cells.size() > cells_max) {
     const Occupancy occupancy(cells);
@@ -150,7 +169,7 @@ Json map_json(const scene::MapSpec& spec, const model::Model& model, double infl
       notes.push_back(
           fmt::format("the map's {} visible cells are drawn {} m wide at least, {} m is its resolution; "
                       "clearances are from the map itself",
-                      visible, size * data.resolution, data.resolution));
+                      visible, size * region.resolution_m, region.resolution_m));
   }
   std::sort(cells.begin(), cells.end(), [](const auto& a, const auto& b) { return key_of(a) < key_of(b); });
   std::vector<std::int16_t> lo;
@@ -159,7 +178,7 @@ Json map_json(const scene::MapSpec& spec, const model::Model& model, double infl
     for (const std::int32_t at : cell.lo) lo.push_back(static_cast<std::int16_t>(at));
     level.push_back(static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(cell.size))));
   }
-  Json json{{"file", spec.file.string()}, {"resolution_m", data.resolution}};
+  Json json{{"file", spec.file.string()}, {"resolution_m", region.resolution_m}};
   json.update(pose_json(spec.pose));
   json["lo"] = container.exact(lo);
   json["level"] = container.exact(level);
@@ -179,8 +198,7 @@ Json obstacle_json(const scene::Obstacle& obstacle) {
   if (obstacle.shape == scene::Shape::cylinder) json["length_m"] = obstacle.length_m;
   json.update(pose_json(obstacle.pose));
   json["motion"] = nullptr;
-  if (obstacle.motion)
-    json["motion"] = {{"amplitude_m", array(obstacle.motion->amplitude_m)}, {"period_s", obstacle.motion->period_s}};
+  if (obstacle.motion) json["motion"] = scene::motion_json(*obstacle.motion);
   json["appears_s"] = obstacle.appears_s;
   json["judge_only"] = obstacle.judge_only;
   return json;
@@ -239,13 +257,15 @@ std::string world_key(const simulation::Recorded& recorded) {
   Json key;
   for (const char* part : {"robot", "base", "map", "obstacles", "goals"}) key[part] = config[part];
   key["payload"] = config["model"]["payload"];
+  if (recorded.scene.map && recorded.scene.map->self_filter_padding_m) key["start"] = config["start"];
   const auto content = [&key](const Json::json_pointer& file) {
     if (!key.contains(file) || !key[file].is_string()) return;
     std::error_code ec;
     const std::filesystem::path path = key[file].get<std::string>();
     if (std::filesystem::is_regular_file(path, ec)) key[file] = sha256_hex(read_file(path));
   };
-  for (const char* file : {"/robot/file", "/robot/spheres", "/map/file"}) content(Json::json_pointer(file));
+  for (const char* file : {"/robot/file", "/robot/spheres", "/robot/srdf", "/map/file"})
+    content(Json::json_pointer(file));
   return key.dump();
 }
 
@@ -257,15 +277,19 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
   auto world =
       std::make_unique<World>(World{std::move(key), std::move(model), scene.goals, {}, false, influence, {}, {}});
   const double reach = world->model.reach();
-  const auto map = map_at_hand ? scene.map : std::nullopt;
-  world->environment = scene::Environment(map, scene.obstacles, scene.base, reach, influence);
-  world->judged = (map_at_hand || !scene.map) && world->environment.has_obstacles() && !world->model.spheres().empty();
+  scene::Scene shown = scene;
+  if (!map_at_hand) shown.map.reset();
+  world->environment = scene::make_environment(shown, world->model, influence);
+  world->judged = (map_at_hand || !scene.map) && world->environment.has_obstacles() && !world->model.shapes().empty();
+  if (shown.map && !shown.map->changes.empty())
+    world->notes.push_back(fmt::format("{}: changes during the run, from {} s on; shown and measured as at the start",
+                                       scene.map->file.string(), scene.map->changes.front().time_s));
   Json goals = Json::array(), obstacles = Json::array();
   for (const auto& goal : scene.goals) goals.push_back(goal_json(goal));
   for (const auto& obstacle : scene.obstacles) obstacles.push_back(obstacle_json(obstacle));
   world->json = {{"robot", robot_json(world->model)},
                  {"goals", std::move(goals)},
-                 {"map", map ? map_json(*map, world->model, influence, container, world->notes) : Json(nullptr)},
+                 {"map", shown.map ? map_json(shown, world->model, influence, container, world->notes) : Json(nullptr)},
                  {"obstacles", std::move(obstacles)},
                  {"reach_m", reach}};
   return world;

@@ -91,12 +91,12 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
       return base * (T.at(link.get<std::size_t>()) * Vector3d(vector_of(point)));
     };
     dynamics::forward_kinematics(model, ws, q);
-    std::vector<Vector3d> centers(model.spheres().size());
-    dynamics::sphere_centers(model, ws, centers);
+    std::vector<Vector3d> centers(model.shapes().size());
+    dynamics::shape_centers(model, ws, centers);
     REQUIRE(robot["spheres"].size() == centers.size());
     for (std::size_t s = 0; s < centers.size(); ++s) {
       REQUIRE((place(robot["spheres"][s]["link"], robot["spheres"][s]["center_m"]) - centers[s]).norm() < 1e-12);
-      REQUIRE(robot["spheres"][s]["radius_m"] == model.spheres()[s].radius);
+      REQUIRE(robot["spheres"][s]["radius_m"] == model.shapes()[s].radius);
     }
     const auto& links = model.robot().links;
     std::size_t segments = 0;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -95,17 +96,17 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         steps_ = in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
 
         const auto n = plant_.dof();
-        const auto spheres = plant_.spheres().size();
-        environment_ = std::make_unique<scene::Environment>(scene::make_environment(scene, plant_.reach(), influence_));
-        if (environment_->has_obstacles() && spheres == 0)
-          throw Error(ErrorCode::invalid,
-                      fmt::format("{}: /robot: '{}' has no collision spheres, expected some where there are obstacles",
-                                  scene.name, plant_.robot().name));
-        scratch_ = std::make_unique<scene::Environment::Scratch>(*environment_, spheres);
+        const auto shapes = plant_.shapes().size();
+        environment_ = std::make_unique<scene::Environment>(scene::make_environment(scene, plant_, influence_));
+        if (environment_->has_obstacles() && shapes == 0)
+          throw Error(ErrorCode::invalid, fmt::format("{}: /robot: '{}' has no collision spheres or capsules, expected "
+                                                      "some where there are obstacles",
+                                                      scene.name, plant_.robot().name));
+        scratch_ = std::make_unique<scene::Environment::Scratch>(*environment_, shapes);
         if (scene.model.self_collision) {
-          if (spheres == 0)
-            throw Error(ErrorCode::invalid, fmt::format("{}: /model/self_collision: '{}' has no collision spheres, "
-                                                        "expected some or false",
+          if (shapes == 0)
+            throw Error(ErrorCode::invalid, fmt::format("{}: /model/self_collision: '{}' has no collision spheres or "
+                                                        "capsules, expected some or false",
                                                         scene.name, plant_.robot().name));
           self_ = std::make_unique<scene::SelfField>(plant_);
           self_influence_ = std::min(influence_, self_influence_max_m);
@@ -120,12 +121,11 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
         for (const auto& obstacle : environment_->obstacles())
           hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
 
-        contacts_.resize(spheres * (scene::Environment::points_per_sphere + environment_->obstacles().size()) + 1);
+        contacts_.resize(environment_->contacts_max(shapes) + 1);
         shown_.resize(contacts_.size());
-        centers_.resize(spheres);
-        clearance_.assign(spheres, influence_);
+        arm_ = arm_before_ = asked_ = scene::PlacedShapes(plant_);
+        clearance_.assign(shapes, influence_);
         clearance_before_ = clearance_;
-        for (const auto& sphere : plant_.spheres()) radii_.push_back(sphere.radius);
         command_ = std::make_unique<planning::CommandBuffers>(static_cast<std::size_t>(n), shown_.size());
         for (auto* x : {&v_, &q_before_, &v_before_, &gradient_, &gradient_before_, &impulse_, &q_shown_, &v_shown_,
                         &q_asked_, &node_velocity_, &turning_, &tau_})
@@ -162,7 +162,11 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
                    : plugin.create(setup_data(scaled_masses(plant_, mass_scale), influence_), *this, planner_params_);
       }()) {
   inputs_ = inputs_of(scene);
-  if (scene.map) inputs_.push_back({"map", scene.map->file});
+  if (scene.map) {
+    inputs_.push_back({"map", scene.map->file});
+    for (std::size_t i = 0; i < scene.map->changes.size(); ++i)
+      if (const auto& file = scene.map->changes[i].file) inputs_.push_back({fmt::format("map_change_{}", i), *file});
+  }
   inputs_.push_back({"plugin", planner_.plugin().file()});
 }
 
@@ -237,9 +241,9 @@ std::size_t ClosedLoop::closest_points(std::span<const double> q, double influen
   if (!environment_->has_obstacles()) return 0;
   q_asked_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
   dynamics::forward_kinematics(plant_, ws_, q_asked_);
-  dynamics::sphere_centers(plant_, ws_, centers_);
+  asked_.place(plant_, ws_);
   const std::size_t found = environment_->closest(
-      centers_, radii_, std::min(influence_m, influence_), state_.time_s, *scratch_,
+      asked_.view(), std::min(influence_m, influence_), state_.time_s, *scratch_,
       std::span(contacts_).first(std::min(contacts_.size(), out.size())), scene::View::planner, seen_);
   const std::size_t written = std::min({found, contacts_.size(), out.size()});
   for (std::size_t i = 0; i < written; ++i) out[i] = to_c(contacts_[i]);
@@ -251,9 +255,9 @@ std::size_t ClosedLoop::closest_self(std::span<const double> q, double influence
   if (!self_) return 0;
   q_asked_ = Eigen::Map<const VectorXd>(q.data(), plant_.dof());
   dynamics::forward_kinematics(plant_, ws_, q_asked_);
-  dynamics::sphere_centers(plant_, ws_, centers_);
+  asked_.place(plant_, ws_);
   const auto room = std::span(self_contacts_).first(std::min(self_contacts_.size(), out.size()));
-  const std::size_t found = self_->closest(centers_, std::min(influence_m, self_influence_), room);
+  const std::size_t found = self_->closest(asked_.view(), std::min(influence_m, self_influence_), room);
   const std::size_t written = std::min(found, room.size());
   for (std::size_t i = 0; i < written; ++i) out[i] = to_c(room[i]);
   return found;
@@ -263,11 +267,11 @@ void ClosedLoop::look(const VectorXd& q) {
   dynamics::forward_kinematics(plant_, ws_, q);
   clearance_now_ = influence_;
   self_clearance_now_ = self_influence_;
-  nearest_sphere_ = -1;
+  nearest_.sphere = -1;
   contact_count_ = 0;
   speed_scale_ = 1.0;
   const bool obstacles = environment_->has_obstacles();
-  if (obstacles || self_) dynamics::sphere_centers(plant_, ws_, centers_);
+  if (obstacles || self_) arm_.place(plant_, ws_);
   if (obstacles) look_at_obstacles();
   if (self_) look_at_itself();
 }
@@ -281,30 +285,29 @@ void ClosedLoop::look_at_obstacles() {
       clearance = std::min(clearance, contact.distance);
       if (contact.distance < clearance_now_) {
         clearance_now_ = contact.distance;
-        nearest_sphere_ = contact.sphere;
-        nearest_obstacle_ = contact.obstacle;
+        nearest_ = contact;
       }
     }
   };
   const auto contacts = [&](scene::View view) {
-    return std::min(contacts_.size(), environment_->closest(centers_, radii_, influence_, state_.time_s, *scratch_,
-                                                            contacts_, view, seen_));
+    return std::min(contacts_.size(),
+                    environment_->closest(arm_.view(), influence_, state_.time_s, *scratch_, contacts_, view, seen_));
   };
   if (hidden_obstacles_)
-    for (int found = environment_->see(centers_, radii_, state_.time_s, seen_); found >= 0;
-         found = environment_->see(centers_, radii_, state_.time_s, seen_))
+    for (int found = environment_->see(arm_.view(), state_.time_s, seen_); found >= 0;
+         found = environment_->see(arm_.view(), state_.time_s, seen_))
       recorder_->event(state_.time_s, fmt::format("obstacle '{}' comes into sight",
                                                   environment_->obstacles()[static_cast<std::size_t>(found)].name));
   contact_count_ = contacts(scene::View::planner);
   for (std::size_t i = 0; i < contact_count_; ++i) shown_[i] = to_c(contacts_[i]);
   judge(contact_count_);
   if (hidden_obstacles_) judge(contacts(scene::View::hidden));
-  if (scene_.map && scene_.map->unknown == scene::UnknownPolicy::slow && environment_->in_slow_space(centers_, radii_))
+  if (scene_.map && scene_.map->unknown == scene::UnknownPolicy::slow && environment_->in_slow_space(arm_.view()))
     speed_scale_ = slow_speed_scale;
 }
 
 void ClosedLoop::look_at_itself() {
-  self_contact_count_ = self_->closest(centers_, self_influence_, self_contacts_);
+  self_contact_count_ = self_->closest(arm_.view(), self_influence_, self_contacts_);
   std::fill(self_clearance_.begin(), self_clearance_.end(), self_influence_);
   for (std::size_t i = 0; i < self_contact_count_; ++i) {
     const auto& contact = self_contacts_[i];
@@ -400,11 +403,64 @@ void ClosedLoop::finish(log::Outcome outcome, std::string cause) {
   done_ = true;
 }
 
-std::string ClosedLoop::where_nearest() const {
-  const auto& sphere = plant_.spheres()[static_cast<std::size_t>(nearest_sphere_)];
-  return fmt::format("sphere {} of link '{}' is {:.2g} mm inside {}", sphere.index_in_link,
-                     plant_.robot().links[static_cast<std::size_t>(sphere.link)].name, -1e3 * clearance_now_,
-                     environment_->words(nearest_obstacle_));
+Certificate::Verdict ClosedLoop::certify() {
+  const auto to_obstacles = [&](const std::vector<double>& all) {
+    return environment_->has_obstacles() ? std::span<const double>(all) : std::span<const double>();
+  };
+  return certificate_->check(ws_,
+                             {q_before_, v_before_, time_before_s_, arm_before_.view(), to_obstacles(clearance_before_),
+                              self_clearance_before_},
+                             {state_.q, v_, state_.time_s, arm_.view(), to_obstacles(clearance_), self_clearance_});
+}
+
+std::string ClosedLoop::where_touching() const {
+  if (nearest_.sphere >= 0 && clearance_now_ <= 0.0)
+    return fmt::format("{} at {} s; the way out is {}", environment_->words(nearest_, plant_), state_.time_s,
+                       scene::way_out(nearest_));
+  return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s", self_->words(nearest_pair_),
+                     -1e3 * self_clearance_now_, state_.time_s);
+}
+
+void ClosedLoop::look_at_goals(const Watch& watch) {
+  if (!environment_->has_obstacles() && !self_) return;
+  const std::array<double, 1> point{0.0};
+  for (std::size_t i = 0; i < scene_.goals.size(); ++i) {
+    const auto& goal = scene_.goals[i];
+    const bool of_joints = goal.type == scene::GoalType::joint;
+    const auto warn = [&](const std::string& what) {
+      result_.warnings.push_back(fmt::format("goal {}: {}", i + 1, what));
+      if (watch.warn) watch.warn(result_.warnings.back());
+    };
+    scene::Shapes there{{&goal.pose.p(), 1}, point};
+    if (of_joints) {
+      dynamics::forward_kinematics(plant_, ws_, goal.q);
+      asked_.place(plant_, ws_);
+      there = asked_.view();
+    }
+    const std::size_t count =
+        std::min(contacts_.size(), environment_->closest(there, 0.0, 0.0, *scratch_, contacts_, scene::View::judge));
+    const scene::Contact* deepest = nullptr;
+    for (const auto& contact : std::span(contacts_).first(count)) {
+      // what moves may be elsewhere by then
+      if (contact.obstacle >= 0 &&
+          scene::max_speed(environment_->obstacles()[static_cast<std::size_t>(contact.obstacle)]) > 0.0)
+        continue;
+      if (deepest == nullptr || contact.distance < deepest->distance) deepest = &contact;
+    }
+    if (deepest != nullptr)
+      warn(fmt::format("{}; the way out is {}",
+                       of_joints ? environment_->words(*deepest, plant_)
+                                 : fmt::format("its tip is {:.2g} mm inside {}", -1e3 * deepest->distance,
+                                               environment_->words(deepest->obstacle)),
+                       scene::way_out(*deepest)));
+    if (!of_joints || !self_) continue;
+    const std::size_t near = std::min(self_contacts_.size(), self_->closest(there, 0.0, self_contacts_));
+    const auto worst = std::min_element(self_contacts_.begin(), self_contacts_.begin() + static_cast<long>(near),
+                                        [](const auto& a, const auto& b) { return a.distance < b.distance; });
+    if (near > 0)
+      warn(fmt::format("the arm touches itself: {} are {:.2g} mm inside each other", self_->words(worst->pair),
+                       -1e3 * worst->distance));
+  }
 }
 
 bool ClosedLoop::call_planner() {
@@ -621,6 +677,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
   const bool obstacles = environment_->has_obstacles();
   double min_clearance = influence_, min_self_clearance = self_influence_;
   bool certified = true;
+  look_at_goals(watch);
   while (!done_) {
     const double tick_started = thread_cpu_s();
     if (kicked_) {
@@ -631,14 +688,9 @@ log::Result ClosedLoop::run(const Watch& watch) {
     look(state_.q);
     min_clearance = std::min(min_clearance, clearance_now_);
     min_self_clearance = std::min(min_self_clearance, self_clearance_now_);
-    const bool touching = (obstacles && clearance_now_ <= 0.0) || (self_ && self_clearance_now_ <= 0.0);
+    bool touching = (obstacles && clearance_now_ <= 0.0) || (self_ && self_clearance_now_ <= 0.0);
     if (state_.k > 0 && (obstacles || self_)) {
-      const auto of_spheres = [&](const std::vector<double>& all) {
-        return obstacles ? std::span<const double>(all) : std::span<const double>();
-      };
-      const auto verdict = certificate_->check(ws_, q_before_, state_.q, v_before_, v_, state_.time_s - scene_.step_s,
-                                               scene_.step_s, {of_spheres(clearance_before_), self_clearance_before_},
-                                               {of_spheres(clearance_), self_clearance_});
+      const auto verdict = certify();
       certified = verdict.certified;
       ++checked_steps_;
       if (certified) ++certified_steps_;
@@ -650,18 +702,19 @@ log::Result ClosedLoop::run(const Watch& watch) {
                            state_.k - 1, state_.k));
       dynamics::forward_kinematics(plant_, ws_, state_.q);
     }
+    // what led here met the map as it was; what follows meets the new one
+    if (const std::string said = environment_->advance(state_.time_s); !said.empty()) {
+      recorder.event(state_.time_s, said);
+      look(state_.q);
+      min_clearance = std::min(min_clearance, clearance_now_);
+      touching = touching || clearance_now_ <= 0.0;
+    }
     recorder.observe(clearance_now_, certified, v_, scene_.step_s);
     if (watch.at_node) watch.at_node(state_.time_s, state_.q);
     if (!v_.allFinite() || !state_.q.allFinite()) {
       finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state_.k));
     } else if (touching) {
-      const bool itself = !obstacles || clearance_now_ > 0.0;
-      finish(state_.k == 0 ? log::Outcome::refused : log::Outcome::collision,
-             fmt::format("{} at {} s",
-                         itself ? fmt::format("the arm touches itself: {} are {:.2g} mm inside each other",
-                                              self_->words(nearest_pair_), -1e3 * self_clearance_now_)
-                                : where_nearest(),
-                         state_.time_s));
+      finish(state_.k == 0 ? log::Outcome::refused : log::Outcome::collision, where_touching());
     } else if (!done_) {
       if (all_reached())
         finish(log::Outcome::reached, "");
@@ -692,6 +745,8 @@ log::Result ClosedLoop::run(const Watch& watch) {
     if (done_) break;
 
     q_before_ = state_.q;
+    time_before_s_ = state_.time_s;
+    std::swap(arm_before_, arm_);
     std::swap(clearance_before_, clearance_);
     std::swap(self_clearance_before_, self_clearance_);
     if (kicked_)
@@ -760,11 +815,11 @@ void ClosedLoop::log_tick(bool certified) {
   if (self_) fields["self_clearance_m"] = self_clearance_now_;
   if (environment_->has_obstacles()) {
     fields["clearance_m"] = clearance_now_;
-    if (nearest_sphere_ >= 0) {
-      fields["closest"] = {{"sphere", nearest_sphere_}, {"obstacle", "map"}};
-      if (nearest_obstacle_ == scene::Contact::unknown) fields["closest"]["obstacle"] = "unknown";
-      if (nearest_obstacle_ >= 0)
-        fields["closest"]["obstacle"] = environment_->obstacles()[static_cast<std::size_t>(nearest_obstacle_)].name;
+    if (nearest_.sphere >= 0) {
+      fields["closest"] = {{"sphere", nearest_.sphere}, {"obstacle", "map"}};
+      if (nearest_.obstacle == scene::Contact::unknown) fields["closest"]["obstacle"] = "unknown";
+      if (nearest_.obstacle >= 0)
+        fields["closest"]["obstacle"] = environment_->obstacles()[static_cast<std::size_t>(nearest_.obstacle)].name;
     }
   }
   recorder_->tick(state_.k, std::move(fields));

@@ -70,7 +70,12 @@ class ClosedLoop final : private planning::HostServices {
   [[nodiscard]] static hamelin_self_contact to_c(const scene::SelfContact& contact);
   [[nodiscard]] bool at_rest_away_from_goal();
   void finish(log::Outcome outcome, std::string cause);
-  [[nodiscard]] std::string where_nearest() const;
+  /// Whether the step that led here stayed clear, from what was looked at here and at the node before. A map that
+  /// changed in between asks for it twice: with both nodes looked at before the change, and after.
+  [[nodiscard]] Certificate::Verdict certify();
+  [[nodiscard]] std::string where_touching() const;
+  /// Warns of goals that stand in contact.
+  void look_at_goals(const Watch& watch);
   [[nodiscard]] Json header() const;
   /// The torques of each channel at this node, for the log: tau_ and channel_torques_.
   void gather_torques();
@@ -120,11 +125,12 @@ class ClosedLoop final : private planning::HostServices {
   Json channel_torques_;
 
   // surroundings at this node
-  std::vector<Eigen::Vector3d> centers_;
-  std::vector<double> radii_, clearance_, clearance_before_, self_clearance_, self_clearance_before_;
+  scene::PlacedShapes arm_, arm_before_, asked_;  ///< at this node, at the last, where the planner asks
+  std::vector<double> clearance_, clearance_before_, self_clearance_, self_clearance_before_;
   double clearance_now_ = 0.0, self_clearance_now_ = 0.0;
+  double time_before_s_ = 0.0;
   int nearest_pair_ = -1;
-  int nearest_sphere_ = -1, nearest_obstacle_ = scene::Contact::map;
+  scene::Contact nearest_;  ///< sphere −1: nothing is near
 
   std::size_t goal_index_ = 0;
   double rest_s_ = 0.0;

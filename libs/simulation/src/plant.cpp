@@ -51,7 +51,7 @@ Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbe
 }  // namespace
 
 model::Model load_model(const scene::Scene& scene) {
-  model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres});
+  model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   if (scene.model.payload) add_payload(robot, *scene.model.payload);
   if (!scene.model.armature.from_robot) {
     const Eigen::VectorXd armature =
@@ -77,6 +77,7 @@ std::vector<log::Input> inputs_of(const scene::Scene& scene) {
     inputs.push_back({"scene", scene.name});
   inputs.push_back({"robot", scene.robot.file});
   if (scene.robot.spheres) inputs.push_back({"spheres", *scene.robot.spheres});
+  if (scene.robot.srdf) inputs.push_back({"srdf", *scene.robot.srdf});
   return inputs;
 }
 

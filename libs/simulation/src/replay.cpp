@@ -74,10 +74,21 @@ std::vector<std::string> differences_of_build(const Json& then) {
   return lines;
 }
 
+// Where a run's configuration names its files, by their role among the inputs.
+std::vector<std::pair<std::string, std::string>> places_of_files(const Json& config) {
+  std::vector<std::pair<std::string, std::string>> places{
+      {"robot", "/robot/file"}, {"spheres", "/robot/spheres"}, {"srdf", "/robot/srdf"}, {"map", "/map/file"}};
+  const Json::json_pointer changes("/map/changes");
+  for (std::size_t i = 0; config.contains(changes) && i < config[changes].size(); ++i)
+    places.emplace_back(fmt::format("map_change_{}", i), fmt::format("/map/changes/{}/file", i));
+  return places;
+}
+
 // What the run was made from; a file's place may differ, its content is checked by its hash.
 void forget_places(Json& header) {
-  for (const char* pointer : {"/config/robot/file", "/config/robot/spheres", "/config/map/file"})
-    if (const Json::json_pointer at(pointer); header.contains(at)) header[at] = nullptr;
+  if (!header.contains("config")) return;
+  for (const auto& place : places_of_files(header["config"]))
+    if (const Json::json_pointer at(place.second); header["config"].contains(at)) header["config"][at] = nullptr;
 }
 
 std::string shown(const Json& value) {
@@ -206,10 +217,8 @@ Recorded read_header(const Json& header, const fs::path& log) {
   recorded.other_build = differences_of_build(provenance);
 
   Json config = header["config"];
-  const std::pair<const char*, const char*> places[] = {
-      {"robot", "/robot/file"}, {"spheres", "/robot/spheres"}, {"map", "/map/file"}};
   const fs::path cwd = text_at(provenance, "/cwd");
-  for (const auto& [role, pointer] : places) {
+  for (const auto& [role, pointer] : places_of_files(config)) {
     const Json::json_pointer at(pointer);
     if (!config.contains(at) || !config[at].is_string()) continue;
     const std::string sha256 = logged_hash(header, role);

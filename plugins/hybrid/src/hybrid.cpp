@@ -66,8 +66,9 @@ VectorXd lever_weights(const model::Model& model) {
         j + 1 < n ? lever[j + 1] +
                         (ws.frames[static_cast<std::size_t>(j) + 1].p - ws.frames[static_cast<std::size_t>(j)].p).norm()
                   : (dynamics::tip_pose(model, ws).p() - ws.frames[static_cast<std::size_t>(j)].p).norm();
-    for (const auto& sphere : model.spheres())
-      if (sphere.link == j) beyond = std::max(beyond, sphere.center.norm());
+    for (const auto& shape : model.shapes())
+      if (shape.link == j)
+        beyond = std::max({beyond, (shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm()});
     lever[j] = beyond;
   }
   return (lever / (0.25 * std::max(1e-9, lever.maxCoeff()))).cwiseMin(1.0).cwiseMax(0.3);

@@ -54,10 +54,10 @@ TEST_CASE("scene info tells how near the arm is to itself, and names contacts at
   REQUIRE_FALSE(notes.empty());
   CHECK_THAT(notes[0], Catch::Contains("link1-link2"));
   notes.erase(notes.begin());
-  CHECK(notes ==
-        std::vector<std::string>{"start: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'",
-                                 "goal 1: the arm touches itself: 'link1' and 'link4' are 40 mm inside each other",
-                                 "goal 3: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'"});
+  CHECK(notes == std::vector<std::string>{
+                     "start: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'; the way out is (-1, 0, 0)",
+                     "goal 1: the arm touches itself: 'link1' and 'link4' are 40 mm inside each other",
+                     "goal 3: sphere 25 of link 'link4' is 10 mm inside obstacle 'ahead'; the way out is (-1, 0, 0)"});
 
   scene["model"]["self_collision"] = false;
   scene["obstacles"] = Json::array();

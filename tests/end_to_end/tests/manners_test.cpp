@@ -254,7 +254,7 @@ TEST_CASE("bash completes commands, options, values, planners and files", "[mann
     return;
   }
   CHECK(completions({"sc"}) == Words{"scene", "schema"});
-  CHECK(completions({"scene", ""}) == Words{"info", "make"});
+  CHECK(completions({"scene", ""}) == Words{"crop", "info", "make"});
   CHECK(completions({"help", "scene", "m"}) == Words{"make"});
   CHECK(completions({"-q", "plugins", "l"}) == Words{"list"});
   CHECK(completions({"run", "--pl"}) == Words{"--planner", "--plugin-path"});

@@ -33,7 +33,7 @@ class Balls {
   }
 }
 
-/** Collision spheres, coloured by clearance; those beyond the influence distance are faint and grey. */
+/** Collision spheres, and rows of balls for capsules, coloured by their shape's clearance; those beyond the influence distance are faint and grey. */
 export class Spheres {
   constructor(robot, frames, thin) {
     this.robot = robot;
@@ -55,14 +55,14 @@ export class Spheres {
   }
 
   follow(chain, k) {
-    const { spheres } = this.robot;
+    const { spheres, shapes } = this.robot;
     const { clearance, influence } = this.frames;
     this.near.count = this.far.count = 0;
     spheres.forEach((sphere, i) => {
       chain.point(sphere.link, sphere.center_m, this.p);
       this.balls.set(this.p, 4 * i);
       this.balls[4 * i + 3] = sphere.radius_m;
-      const d = clearance ? clearance[k * spheres.length + i] : NaN;
+      const d = clearance ? clearance[k * shapes + sphere.shape] : NaN;
       if (!(d < influence)) {
         this.far.put(this.p, sphere.radius_m);
         return;
@@ -300,10 +300,21 @@ export class Obstacles {
   follow(t) {
     for (const { o, mesh } of this.items) {
       mesh.visible = t >= (o.appears_s ?? 0);
-      const s = o.motion ? Math.sin((2 * Math.PI * t) / o.motion.period_s) : 0;
-      mesh.position.set(...o.position_m.map((c, i) => c + (o.motion ? s * o.motion.amplitude_m[i] : 0)));
+      const moved = displacement(o.motion, t);
+      mesh.position.set(...o.position_m.map((c, i) => c + moved[i]));
     }
   }
+}
+
+/** How far a motion of the scene file has led by time t [m]. */
+function displacement(motion, t) {
+  if (!motion) return [0, 0, 0];
+  if (motion.type === 'linear') {
+    const s = Math.min(Math.max(t - motion.start_s, 0), motion.duration_s ?? Infinity);
+    return motion.velocity_m_s.map((v) => s * v);
+  }
+  const s = Math.sin((2 * Math.PI * t) / motion.period_s);
+  return motion.amplitude_m.map((a) => s * a);
 }
 
 /** A grid under the arm, or in the plane of a planar one. */

@@ -55,8 +55,10 @@ void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q);
 [[nodiscard]] geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link);
 /// World pose of the tip, after forward_kinematics.
 [[nodiscard]] geometry::SE3 tip_pose(const Model& model, const Workspace& ws);
-/// World centres of all collision spheres, in the order of Model::spheres(), after forward_kinematics.
-void sphere_centers(const Model& model, const Workspace& ws, std::span<Eigen::Vector3d> centers);
+/// World centres of all collision shapes, in the order of Model::shapes(), after forward_kinematics.
+void shape_centers(const Model& model, const Workspace& ws, std::span<Eigen::Vector3d> centers);
+/// Their half axes in world axes, zero for spheres, likewise.
+void shape_half_axes(const Model& model, const Workspace& ws, std::span<Eigen::Vector3d> half_axes);
 
 /// J with ẋ = J v for the world point x that moves with link i, after forward_kinematics; 3 × dof, columns past the
 /// link are zero.

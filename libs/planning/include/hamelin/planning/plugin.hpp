@@ -40,7 +40,7 @@ class Setup {
   /// The nominal robot where it stands, with the scene's gravity. Builds it anew at each call.
   /// @throws Error invalid if the robot's JSON is not what the border promises
   [[nodiscard]] model::Model model() const;
-  /// Control spheres, centres in their link's COM frame [m].
+  /// Control shapes, spheres and capsules, in their link's COM frame [m].
   [[nodiscard]] std::span<const hamelin_sphere> spheres() const { return {raw_->spheres, raw_->sphere_count}; }
   /// Goals, to be reached in this order.
   [[nodiscard]] std::span<const hamelin_goal> goals() const { return {raw_->goals, raw_->goal_count}; }
@@ -94,7 +94,7 @@ class Tick {
   /// Joint positions [rad or m] and velocities.
   [[nodiscard]] ConstVectorMap q() const { return {raw_->q, dof_}; }
   [[nodiscard]] ConstVectorMap v() const { return {raw_->v, dof_}; }
-  /// Near obstacle points: spheres in order, nearest first within a sphere.
+  /// Near obstacle points: shapes in order, nearest first within a shape.
   [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {raw_->contacts, raw_->contact_count}; }
   /// Near pairs of parts of the arm itself; empty unless the scene models self-collision.
   [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
@@ -168,7 +168,7 @@ class Host {
 
   void info(std::string_view line) const { log(HAMELIN_LOG_INFO, line); }
   void warning(std::string_view line) const { log(HAMELIN_LOG_WARNING, line); }
-  /// Contacts of the control spheres at any q, obstacles standing where they are now.
+  /// Contacts of the control shapes at any q, obstacles standing where they are now.
   /// @param q dof numbers
   /// @return how many there are; more than out.size() means that the farthest are left out
   [[nodiscard]] std::size_t closest_points(std::span<const double> q, double influence_m,

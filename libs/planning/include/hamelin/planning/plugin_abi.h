@@ -14,35 +14,39 @@
 extern "C" {
 #endif
 
-#define HAMELIN_PLUGIN_ABI_VERSION 2u
+#define HAMELIN_PLUGIN_ABI_VERSION 3u
 #define HAMELIN_PLUGIN_ENTRY_NAME "hamelin_plugin_entry"
 
-/* A sphere of the arm that obstacles are measured from. Listed once, in hamelin_setup, link by link. */
+/* A control shape, a part of the arm that obstacles are measured from: a sphere, or a capsule, which is a sphere swept
+ * along its axis from center - half_axis to center + half_axis. Listed once, in hamelin_setup, link by link, a link's
+ * spheres first. */
 typedef struct hamelin_sphere {
-  int32_t link; /* index of the moving link, 0 .. dof - 1 */
-  int32_t index_in_link;
+  int32_t link;          /* index of the moving link, 0 .. dof - 1 */
+  int32_t index_in_link; /* among the link's "spheres" in the robot JSON; a capsule's among its "segments" */
   double center_link_m[3];
   double radius_m;
+  double half_axis_link_m[3]; /* zero for a sphere */
 } hamelin_sphere;
 
 #define HAMELIN_OBSTACLE_MAP (-1)
 
-/* One near obstacle point of one control sphere. */
+/* One near obstacle point of one control shape. A capsule is nearest at one point of its axis, which stands for a
+ * sphere's centre; a capsule along a wall has further contacts at other places of its axis. */
 typedef struct hamelin_contact {
   int32_t sphere;              /* index into hamelin_setup.spheres */
   int32_t obstacle;            /* HAMELIN_OBSTACLE_MAP, or the index of the scene's obstacle */
-  double distance_m;           /* from the sphere's surface; zero or below is contact */
-  double arm_point_world_m[3]; /* on the sphere's surface */
+  double distance_m;           /* from the shape's surface; zero or below is contact */
+  double arm_point_world_m[3]; /* on the shape's surface */
   double obstacle_point_world_m[3];
-  double direction_world[3]; /* unit, from the obstacle towards the sphere: the gradient of the distance */
+  double direction_world[3]; /* unit, from the obstacle towards the shape: the gradient of the distance */
   double obstacle_velocity_world_m_s[3];
 } hamelin_contact;
 
-/* The base, where a sphere of the arm is meant that does not move. */
+/* The base, where a shape of the arm is meant that does not move. */
 #define HAMELIN_SPHERE_OF_BASE (-1)
 
-/* A near pair of spheres of the arm itself, the nearest of two parts that may touch. Listed where the scene models
- * self-collision. */
+/* A near pair of control shapes of the arm itself, the nearest of two parts that may touch. Listed where the scene
+ * models self-collision. */
 typedef struct hamelin_self_contact {
   int32_t sphere_a, sphere_b; /* indices into hamelin_setup.spheres; b may be HAMELIN_SPHERE_OF_BASE */
   double distance_m;          /* between the surfaces; zero or below is contact */
@@ -102,7 +106,7 @@ typedef struct hamelin_tick {
   uint64_t k;
   double time_s;
   const double *q, *v;             /* dof numbers each */
-  const hamelin_contact* contacts; /* several a sphere, nearest first within a sphere, spheres in order */
+  const hamelin_contact* contacts; /* several a shape, nearest first within a shape, shapes in order */
   size_t contact_count;
   size_t goal_index;
   double speed_scale; /* 1, or less where the arm is in unknown space and the scene says "slow" */
@@ -147,7 +151,7 @@ typedef struct hamelin_host {
   void* context;
   /* [only inside create and tick] text is one line, not nul-terminated */
   void (*log)(void* context, int32_t level, const char* text, size_t size);
-  /* [only inside create and tick] Contacts of the control spheres at any q, up to `influence_m`, obstacles standing
+  /* [only inside create and tick] Contacts of the control shapes at any q, up to `influence_m`, obstacles standing
    * where they are now. Writes up to `capacity` of them and returns how many there are; if that is more than capacity,
    * the farthest are left out. */
   size_t (*closest_points)(void* context, const double* q, double influence_m, hamelin_contact* out, size_t capacity);

@@ -26,7 +26,7 @@ class HostServices {
   virtual ~HostServices() = default;
   /// @param level HAMELIN_LOG_INFO or HAMELIN_LOG_WARNING
   virtual void log(std::int32_t level, std::string_view line) = 0;
-  /// Contacts of the control spheres at q; returns how many there are, writes the nearest out.size() of them.
+  /// Contacts of the control shapes at q; returns how many there are, writes the nearest out.size() of them.
   virtual std::size_t closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) = 0;
   /// The same for pairs of parts of the arm itself. None unless overridden.
   virtual std::size_t closest_self(std::span<const double> /*q*/, double /*influence_m*/,
@@ -38,7 +38,7 @@ class HostServices {
 /// Owns what a hamelin_setup points at. Fill the fields; a planner made from it keeps its own copy.
 struct SetupData {
   SetupData() = default;
-  /// Everything the model knows: robot, base, gravity, control spheres.
+  /// Everything the model knows: robot, base, gravity, control shapes.
   /// @param nominal the robot the planner shall believe in
   explicit SetupData(const model::Model& nominal);
 

@@ -24,6 +24,7 @@ struct Watch {
   /// Called at every node of a run in closed loop, the first and the last included.
   std::function<void(double time_s, const Eigen::VectorXd& q)> at_node;
   std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
+  std::function<void(const std::string& line)> warn;  ///< called before a run begins for each goal that is in contact
   /// Called once before a run that is logged: tick lines to come at most, and joints.
   std::function<void(double ticks, int dof)> announce;
 };

@@ -1,7 +1,7 @@
 #pragma once
 #include <variant>
 
-#include "hamelin/core/isa.hpp"
+#include "hamelin/core/isa_kernels.hpp"
 #include "hamelin/dynamics/kernel/groups.hpp"
 #include "hamelin/model/model.hpp"
 
@@ -16,30 +16,3 @@ decltype(auto) with_group(const model::Model& model, const Groups<Entry>& groups
 }
 
 }  // namespace hamelin::dynamics::kernel
-
-/// `const Set& selected_NAME()`: the object NAME of the instruction set that selected_isa() names, of those that a
-/// source under hamelin_isa_sources defines. To be written in the namespace around theirs.
-#if defined(__x86_64__)
-#define HAMELIN_SELECT_KERNELS(Set, name)                                                      \
-  inline namespace isa_baseline {                                                              \
-  extern const Set name;                                                                       \
-  }                                                                                            \
-  namespace isa_v3 {                                                                           \
-  extern const Set name;                                                                       \
-  }                                                                                            \
-  namespace isa_v4 {                                                                           \
-  extern const Set name;                                                                       \
-  }                                                                                            \
-  static const Set& selected_##name() {                                                        \
-    const Isa isa = selected_isa();                                                            \
-    return isa == Isa::v4 ? isa_v4::name : isa == Isa::v3 ? isa_v3::name : isa_baseline::name; \
-  }
-#else
-#define HAMELIN_SELECT_KERNELS(Set, name) \
-  inline namespace isa_baseline {         \
-  extern const Set name;                  \
-  }                                       \
-  static const Set& selected_##name() {   \
-    return isa_baseline::name;            \
-  }
-#endif
