@@ -231,6 +231,33 @@ TEST_CASE(
   CHECK(entered > 500);
 }
 
+TEST_CASE("several of a rugged floor is what its definition says, from near and far", "[scene][property]") {
+  // many small boxes around a point: nodes are large and near, and most of what they hold is in a cone
+  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{6}));
+  CAPTURE(seed);
+  Rng rng(seed);
+  std::vector<Box> boxes;
+  for (int x = 0; x < 30; ++x)
+    for (int y = 0; y < 30; ++y) {
+      const double z = 0.02 * static_cast<double>(rng.below(5));
+      boxes.push_back({{0.02 * x, 0.02 * y, z}, {0.02 * x + 0.02, 0.02 * y + 0.02, z + 0.02}});
+    }
+  const BoxField field(boxes, {5.0, -3.0, 2.0});
+  BoxField::Scratch scratch(field);
+  for (int i = 0; i < 150; ++i) {
+    const Vector3d p(rng.uniform(-0.1, 0.7), rng.uniform(-0.1, 0.7), rng.uniform(-0.05, 0.4));
+    const double cosine = rng.below(4) == 0 ? rng.uniform(-0.5, 0.99) : std::cos(std::acos(-1.0) / 6.0);
+    std::array<BoxHit, 5> hits;
+    const std::size_t count = field.several(p, 0.3, cosine, scratch, hits);
+    const auto expected = several_by_definition(field.boxes(), p, 0.3, cosine, hits.size());
+    REQUIRE(count == expected.size());
+    for (std::size_t k = 0; k < count; ++k) {
+      CHECK(hits[k].distance == expected[k].distance);
+      CHECK(hits[k].direction == expected[k].direction);
+    }
+  }
+}
+
 TEST_CASE("nearest and several of a segment are those of all boxes", "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);

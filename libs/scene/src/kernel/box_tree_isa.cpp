@@ -98,6 +98,7 @@ class Point {
       low_[i] = at - slack;
       high_[i] = at + slack;
       at_[i] = at;
+      slack_ += magnitude(at) * 1e-6F;
     }
   }
 
@@ -136,7 +137,8 @@ class Point {
     return dot > cone_cosine;
   }
 
-  // Whether all that a slot holds is seen within the cone of what was taken: its ball is, by some hair.
+  // Whether all that a slot holds is seen within the cone of what was taken: its ball (radius R, at distance d) is,
+  // where the angle to its centre plus asin(R/d) is no more than the cone's, by some hair.
   HAMELIN_INLINE bool hidden(const TreeNode& node, int slot, const Taken& taken, float cosine, float sine) const {
     float along = 0.0F, square = 0.0F, radius2 = 0.0F;
     for (int i = 0; i < 3; ++i) {
@@ -146,13 +148,14 @@ class Point {
       square += away * away;
       radius2 += half * half;
     }
-    if (!(square > radius2 * 1.001F) || !(along > 0.0F)) return false;
-    return along > (cosine * __builtin_sqrtf(square - radius2) + sine * __builtin_sqrtf(radius2)) * 1.00001F;
+    if (!(radius2 < 0.999F * sine * sine * square) || !(along > slack_)) return false;
+    return along - slack_ > (cosine * __builtin_sqrtf(square - radius2) + sine * __builtin_sqrtf(radius2)) * 1.00001F;
   }
 
  private:
   const double* p_;
   float low_[3], high_[3], at_[3];
+  float slack_ = 0.0F;  // for rounding in single precision, far more than that takes
 };
 
 // A capsule's axis, likewise.
@@ -328,7 +331,8 @@ HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit
   const double limit2 = limit * limit;
   const float bound = bound_of(limit2);
   const float cosine = static_cast<float>(cone_cosine);
-  const float sine = cone_cosine > 0.0 ? __builtin_sqrtf(1.0F - cosine * cosine) : 2.0F;
+  // cones of a right angle and more hide nothing early
+  const float sine = cone_cosine > 0.0 ? __builtin_sqrtf(1.0F - cosine * cosine) : 0.0F;
   int found = 0, size = 0;
   const auto hidden = [&](const TreeNode& node, int slot) __attribute__((always_inline)) {
     for (int i = 0; i < found; ++i)
