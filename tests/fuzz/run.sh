@@ -14,8 +14,8 @@ cmake -S "$source" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DHAME
   -DHAMELIN_SANITIZE='fuzzer-no-link;address;undefined' >/dev/null
 cmake --build "$build" --target "${targets[@]/#/hamelin_fuzz_}" hamelin_fuzz_replay
 
-# Freed memory is kept for a while so that its use is seen; the default of 256 MiB makes each execution slow.
-export ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=8
+# Freed memory is kept for a while so that its use is seen; much of it, or long inputs, make each execution slow.
+export ASAN_OPTIONS=quarantine_size_mb=1:thread_local_quarantine_size_kb=64:malloc_context_size=4
 status=0
 for name in "${targets[@]}"; do
   found=$build/fuzz/found/$name
@@ -27,7 +27,7 @@ for name in "${targets[@]}"; do
   # Beside the corpus, what FUZZ_SEEDS/<target>/ holds is a seed as well.
   seeds=("$source/tests/fuzz/corpus/$name")
   [[ -d ${FUZZ_SEEDS:-/nowhere}/$name ]] && seeds+=("$FUZZ_SEEDS/$name")
-  nice -n 10 "$build/bin/hamelin_fuzz_$name" -runs="$executions" -timeout=1 -rss_limit_mb=1024 -max_len=8192 \
+  nice -n 10 "$build/bin/hamelin_fuzz_$name" -runs="$executions" -timeout=1 -rss_limit_mb=1024 -max_len=2000 \
     -print_final_stats=1 -artifact_prefix="$found/" "${dictionary[@]}" "$work" "${seeds[@]}" >"$work.log" 2>&1 || status=$?
   grep -aE 'broken promise|runtime error|ERROR|SUMMARY|Test unit written|DONE|number_of_executed|average_exec' "$work.log" || true
 done
