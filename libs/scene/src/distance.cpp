@@ -366,53 +366,74 @@ kernel::Tree BoxField::tree() const noexcept {
   return {nodes_.data(), boxes_.front().lo.data(), {origin_[0], origin_[1], origin_[2]}};
 }
 
+namespace {
+
+// A point or an axis, as kernels take it (see TreeKernels) and as it meets a box that they found.
+struct Point {
+  const Eigen::Vector3d& p;
+  [[nodiscard]] const double* first() const { return p.data(); }
+  [[nodiscard]] const double* second() const { return nullptr; }
+  [[nodiscard]] BoxHit on(const Box& box) const { return closest_on_box(p, box); }
+};
+struct Axis {
+  const Eigen::Vector3d &a, &b;
+  [[nodiscard]] const double* first() const { return a.data(); }
+  [[nodiscard]] const double* second() const { return b.data(); }
+  [[nodiscard]] SegmentHit on(const Box& box) const { return closest_on_box(a, b, box); }
+};
+
+template <class From, class Hit>
+void meet(const From& from, const std::vector<Box>& boxes, std::int32_t box, Hit& hit) {
+  hit = from.on(boxes[static_cast<std::size_t>(box)]);
+  hit.box = box;
+}
+
+template <class From, class Hit>
+bool nearest_of(const From& from, const kernel::TreeKernels& kernels, const kernel::Tree& tree,
+                const std::vector<Box>& boxes, double limit, std::int32_t hint, Hit& hit) {
+  kernel::Found found{0.0, hint};
+  if (!kernels.nearest(tree, from.first(), from.second(), limit, found)) return false;
+  meet(from, boxes, found.box, hit);
+  return true;
+}
+
+template <class From, class Hit>
+std::size_t several_of(const From& from, const kernel::TreeKernels& kernels, const kernel::Tree& tree,
+                       const std::vector<Box>& boxes, double limit, double cone_cosine, kernel::Waiting* room,
+                       std::span<Hit> out) {
+  std::array<kernel::Found, BoxField::several_max> found;
+  const auto count = static_cast<std::size_t>(
+      kernels.several(tree, from.first(), from.second(), limit, cone_cosine, room, found.data(),
+                      static_cast<int>(std::min(out.size(), BoxField::several_max))));
+  for (std::size_t i = 0; i < count; ++i) meet(from, boxes, found[i].box, out[i]);
+  return count;
+}
+
+}  // namespace
+
 bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std::int32_t hint) const {
   if (boxes_.empty() || !(limit >= 0.0)) return false;
-  kernel::Found found{0.0, usable(hint)};
-  if (!kernels_->nearest(tree(), p.data(), nullptr, limit, found)) return false;
-  hit = closest_on_box(p, boxes_[static_cast<std::size_t>(found.box)]);
-  hit.box = found.box;
-  return true;
+  return nearest_of(Point{p}, *kernels_, tree(), boxes_, limit, usable(hint), hit);
 }
 
 bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, SegmentHit& hit,
                        std::int32_t hint) const {
   if (boxes_.empty() || !(limit >= 0.0)) return false;
-  kernel::Found found{0.0, usable(hint)};
-  if (!kernels_->nearest(tree(), a.data(), b.data(), limit, found)) return false;
-  hit = closest_on_box(a, b, boxes_[static_cast<std::size_t>(found.box)]);
-  hit.box = found.box;
-  return true;
+  return nearest_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, usable(hint), hit);
 }
 
 std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch,
                               std::span<BoxHit> out) const {
   if (boxes_.empty() || !(limit >= 0.0)) return 0;
   scratch.fit(*this);
-  std::array<kernel::Found, several_max> found;
-  const auto count =
-      static_cast<std::size_t>(kernels_->several(tree(), p.data(), nullptr, limit, cone_cosine, scratch.room_.data(),
-                                                 found.data(), static_cast<int>(std::min(out.size(), several_max))));
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i] = closest_on_box(p, boxes_[static_cast<std::size_t>(found[i].box)]);
-    out[i].box = found[i].box;
-  }
-  return count;
+  return several_of(Point{p}, *kernels_, tree(), boxes_, limit, cone_cosine, scratch.room_.data(), out);
 }
 
 std::size_t BoxField::several(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, double cone_cosine,
                               Scratch& scratch, std::span<SegmentHit> out) const {
   if (boxes_.empty() || !(limit >= 0.0)) return 0;
   scratch.fit(*this);
-  std::array<kernel::Found, several_max> found;
-  const auto count =
-      static_cast<std::size_t>(kernels_->several(tree(), a.data(), b.data(), limit, cone_cosine, scratch.room_.data(),
-                                                 found.data(), static_cast<int>(std::min(out.size(), several_max))));
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i] = closest_on_box(a, b, boxes_[static_cast<std::size_t>(found[i].box)]);
-    out[i].box = found[i].box;
-  }
-  return count;
+  return several_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, cone_cosine, scratch.room_.data(), out);
 }
 
 NearTable::NearTable(const Ball& region, double edge) {
