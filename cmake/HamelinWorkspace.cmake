@@ -9,11 +9,19 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
 set(HAMELIN_PLUGIN_DIR "${CMAKE_INSTALL_LIBDIR}/hamelin/plugins")
 set(HAMELIN_BUILD_PLUGIN_DIR "${PROJECT_BINARY_DIR}/lib/hamelin/plugins")
 
+# Sources of a target are compiled a few at a time as one ("unity"): most of the time goes into headers, which are then
+# read once. The dev preset compiles each by itself, so that a change compiles little and a missing include is seen.
+option(HAMELIN_UNITY "Compile several sources of a target as one: a full build takes a third of the time" ON)
+set(CMAKE_UNITY_BUILD ${HAMELIN_UNITY})
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
+
 # Linked as $<BUILD_INTERFACE:...> only, so that no flag of ours reaches a user of the installed package.
 add_library(hamelin_options INTERFACE)
 target_compile_features(hamelin_options INTERFACE cxx_std_20)
 target_compile_options(hamelin_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast
+  -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast
+  # In a unity build a local name "shadows" a global one of another file.
+  $<$<NOT:$<BOOL:${HAMELIN_UNITY}>>:-Wshadow>
   # Debug keeps its checks but is run by people too: light optimisation makes Eigen bearable.
   $<$<CONFIG:Debug>:-Og>
   # GCC 12 sees overlapping copies where strings are joined and there are none.
@@ -33,13 +41,19 @@ if(HAMELIN_SANITIZE)
   target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
 endif()
 
-# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen] [PRIVATE_LINKS ...])
+# fmt compiled into a library: for those that must not ask their users for more than Eigen.
+set(HAMELIN_FMT_INLINE $<BUILD_INTERFACE:fmt::fmt-header-only>)
+
+# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen] [PRIVATE_LINKS ...]
+#                 [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...])
 #
+# PACKAGES are what find_package(hamelin COMPONENTS NAME) must find for the libraries in LINKS and PRIVATE_LINKS; tests
+# may use libraries below it, TEST_LINKS.
 # Makes hamelin::NAME from the folder it is called in: headers in include/hamelin/NAME, tests/*_test.cpp as one
 # test program, bench/*_bench.cpp as one benchmark program. A DEP must stand above in libs/CMakeLists.txt, so the
 # order there is the dependency order and a cycle cannot be written.
 function(hamelin_library)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -66,8 +80,10 @@ function(hamelin_library)
   target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS include FILES ${headers})
   set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
   set_property(GLOBAL APPEND PROPERTY HAMELIN_LIBS ${arg_NAME})
-  install(TARGETS ${target} EXPORT hamelinTargets FILE_SET HEADERS)
-  hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
+  set_property(GLOBAL PROPERTY HAMELIN_DEPS_${arg_NAME} ${arg_DEPS})
+  set_property(GLOBAL PROPERTY HAMELIN_PACKAGES_${arg_NAME} ${arg_PACKAGES})
+  install(TARGETS ${target} EXPORT hamelin_${arg_NAME} FILE_SET HEADERS)
+  hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME} ${arg_TEST_LINKS})
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
@@ -110,7 +126,9 @@ function(hamelin_tests)
   endif()
   set(target hamelin_${arg_NAME}_tests)
   add_executable(${target} ${tests})
-  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin_options Catch2::Catch2WithMain)
+  # Compiling tests takes longer than running them.
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin::io hamelin_options Catch2::Catch2WithMain)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/include")
   target_compile_definitions(${target} PRIVATE
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
@@ -152,16 +170,19 @@ function(hamelin_embed)
   target_sources(${arg_TARGET} PRIVATE "${source}")
 endfunction()
 
+# One export a library, so that find_package(hamelin COMPONENTS dynamics) loads no more than what dynamics needs.
 function(hamelin_install_package)
-  get_property(libs GLOBAL PROPERTY HAMELIN_LIBS)
-  add_library(hamelin_all INTERFACE)
-  add_library(hamelin::hamelin ALIAS hamelin_all)
-  set_target_properties(hamelin_all PROPERTIES EXPORT_NAME hamelin)
-  list(TRANSFORM libs PREPEND hamelin::)
-  target_link_libraries(hamelin_all INTERFACE ${libs})
-  install(TARGETS hamelin_all EXPORT hamelinTargets)
+  get_property(HAMELIN_LIBS GLOBAL PROPERTY HAMELIN_LIBS)
+  set(HAMELIN_COMPONENTS "")
+  foreach(lib IN LISTS HAMELIN_LIBS)
+    get_property(deps GLOBAL PROPERTY HAMELIN_DEPS_${lib})
+    get_property(packages GLOBAL PROPERTY HAMELIN_PACKAGES_${lib})
+    string(APPEND HAMELIN_COMPONENTS "set(_hamelin_deps_${lib} ${deps})\nset(_hamelin_packages_${lib} ${packages})\n")
+  endforeach()
   set(dest "${CMAKE_INSTALL_LIBDIR}/cmake/hamelin")
-  install(EXPORT hamelinTargets NAMESPACE hamelin:: DESTINATION ${dest})
+  foreach(lib IN LISTS HAMELIN_LIBS)
+    install(EXPORT hamelin_${lib} FILE hamelin_${lib}.cmake NAMESPACE hamelin:: DESTINATION ${dest})
+  endforeach()
   configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/hamelinConfig.cmake.in" hamelinConfig.cmake
     INSTALL_DESTINATION ${dest} PATH_VARS HAMELIN_PLUGIN_DIR)
   write_basic_package_version_file(hamelinConfigVersion.cmake COMPATIBILITY SameMinorVersion)

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "hamelin/core/file.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/arm_loop.hpp"
 
@@ -37,7 +37,7 @@ inline const std::vector<std::filesystem::path> plugin_directories{HAMELIN_TEST_
 /// Writes robot and scene as files, reads them as the program does, and runs.
 inline log::Result run_scene(const ScratchFolder& folder, const Json& document, const simulation::Watch& watch = {},
                              const model::Robot& robot = planar4()) {
-  write_file_aside(folder.path() / "robot.json", model::robot_to_json(robot).dump(1));
+  write_file_aside(folder.path() / "robot.json", description::robot_to_json(robot).dump(1));
   write_file_aside(folder.path() / "scene.json", document.dump(1));
   return simulation::run(scene::read_scene(folder.path() / "scene.json"), plugin_directories, watch);
 }
@@ -55,6 +55,12 @@ inline Json scene_52() {
 
 inline Json ball(const std::string& name, double x, double y, double radius) {
   return {{"name", name}, {"type", "sphere"}, {"radius_m", radius}, {"position_m", {x, y, 0.0}}};
+}
+
+inline Eigen::VectorXd vector_of(const Json& numbers) {
+  Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
+  return x;
 }
 
 }  // namespace hamelin::test

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/file.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/io/json.hpp"
 
 /// Running the built program in a directory of its own.
 namespace hamelin::test {

@@ -17,7 +17,7 @@
 #include <map>
 #include <vector>
 
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "targets.hpp"
 
 namespace {

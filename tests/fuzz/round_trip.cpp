@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "targets.hpp"
 
 namespace hamelin::fuzz {
@@ -26,9 +26,9 @@ bool close(const geometry::SE3& a, const geometry::SE3& b) {
 void promise_round_trip(const model::Robot& robot) {
   const std::string file = "again.json";
   const bool good = accepts(file, [&] {
-    const Json written = model::robot_to_json(robot);
-    const model::Robot again = model::robot_from_json(parse_json(written.dump(), file), file);
-    const Json before = without_rotations(written), after = without_rotations(model::robot_to_json(again));
+    const Json written = description::robot_to_json(robot);
+    const model::Robot again = description::robot_from_json(parse_json(written.dump(), file), file);
+    const Json before = without_rotations(written), after = without_rotations(description::robot_to_json(again));
     if (before != after)
       promise(false, "a robot survives its JSON form, differs in " + Json::diff(before, after).dump());
     for (std::size_t i = 0; i < robot.links.size(); ++i)

@@ -1,5 +1,5 @@
-#include "hamelin/model/robot_io.hpp"
-#include "robot_detail.hpp"
+#include "detail.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "targets.hpp"
 
 namespace hamelin::fuzz {
@@ -15,10 +15,10 @@ constexpr const char* arm = R"(<robot name="arm"><link name="base"/><link name="
 void spheres(std::string_view bytes) {
   const MemoryFile file(bytes);
   std::size_t count = 0;
-  if (!accepts(file.path(), [&] { count = model::check_spheres(file.path()); })) return;
+  if (!accepts(file.path(), [&] { count = description::check_spheres(file.path()); })) return;
   // The links may not be this arm's: then that is said.
   (void)accepts("", [&] {
-    const model::Robot robot = model::detail::read_urdf(arm, "arm.urdf", {std::nullopt, file.path()});
+    const model::Robot robot = description::detail::read_urdf(arm, "arm.urdf", {std::nullopt, file.path()});
     promise(robot.links[0].spheres.size() + robot.base_spheres.size() == count, "all spheres are on the robot");
   });
 }

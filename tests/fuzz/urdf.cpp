@@ -1,4 +1,4 @@
-#include "robot_detail.hpp"
+#include "detail.hpp"
 #include "round_trip.hpp"
 #include "targets.hpp"
 
@@ -7,7 +7,7 @@ namespace hamelin::fuzz {
 void urdf(std::string_view bytes) {
   const std::string file = "arm.urdf";
   model::Robot robot;
-  if (accepts(file, [&] { robot = model::detail::read_urdf(std::string(bytes), file, {}); }))
+  if (accepts(file, [&] { robot = description::detail::read_urdf(std::string(bytes), file, {}); }))
     promise_round_trip(robot);
   else
     promise(robot.links.empty(), "a refused robot leaves nothing");

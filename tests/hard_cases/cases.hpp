@@ -4,9 +4,9 @@
 #include <functional>
 #include <string>
 
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 
 /// Motions that integrators find hard (SPEC §7), set up once for the tests and for the table of their figures.
 namespace hamelin::hard_cases {
@@ -121,7 +121,7 @@ inline Motion mass_ratio(std::size_t heavy_link, double step_s, long steps) {
 inline Motion falling_on_barrier(double stiffness, double step_s, long steps) {
   const auto depth = [](const VectorXd& q) { return std::max(0.0, -0.5 - q[0]); };
   Motion motion{"barrier",
-                model::Model(model::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+                model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
                 VectorXd::Zero(3),
                 VectorXd::Zero(3),
                 step_s,
@@ -139,7 +139,7 @@ inline Motion falling_on_barrier(double stiffness, double step_s, long steps) {
 /// Example 5.1 of the paper, 10⁶ steps of 10 ms.
 inline Motion million_steps() {
   Motion motion{"10^6 steps",
-                model::Model(model::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+                model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
                 VectorXd::Zero(3),
                 VectorXd::Zero(3),
                 0.01,

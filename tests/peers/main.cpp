@@ -15,11 +15,11 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
-#include "hamelin/core/json.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "peer.hpp"
 
 namespace hamelin::peers {
@@ -55,7 +55,7 @@ model::Robot unit_chain_xyz() {
   return robot;
 }
 model::Robot data_robot(const char* file) {
-  return model::read_robot(std::string(HAMELIN_SOURCE_DIR "/data/robots/") + file);
+  return description::read_robot(std::string(HAMELIN_SOURCE_DIR "/data/robots/") + file);
 }
 
 std::vector<VectorXd> random_states(std::uint64_t seed, int n, double size) {

@@ -8,7 +8,7 @@
 #include "commands.hpp"
 #include "free_motion.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "output.hpp"
 #include "scene_flags.hpp"

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "help.hpp"
 #include "terminal.hpp"

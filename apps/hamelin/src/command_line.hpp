@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 /// What the subcommands share in reading the command line.
 namespace hamelin::app {

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::app {
 

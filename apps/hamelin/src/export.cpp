@@ -4,7 +4,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/log/trajectory.hpp"
 #include "output.hpp"
 #include "terminal.hpp"

@@ -6,7 +6,7 @@
 
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "output.hpp"
 #include "summary.hpp"
 #include "terminal.hpp"

@@ -6,11 +6,11 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "robot_commands.hpp"
 #include "terminal.hpp"
@@ -19,7 +19,7 @@ namespace hamelin::app {
 
 namespace {
 
-struct InfoOptions {
+struct RobotInfoOptions {
   std::filesystem::path file;
   std::optional<std::string> tip;
   std::optional<std::filesystem::path> spheres, srdf;
@@ -111,8 +111,8 @@ void print_table(const Json& robot) {
   for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
 }
 
-void info(const InfoOptions& options) {
-  const model::Model model(model::read_robot(options.file, {options.tip, options.spheres, options.srdf}));
+void print_robot_info(const RobotInfoOptions& options) {
+  const model::Model model(description::read_robot(options.file, {options.tip, options.spheres, options.srdf}));
   const Json robot = describe(model, options.file);
   if (options.json)
     print_json(robot);
@@ -128,7 +128,7 @@ struct ChainFlags {
 
 void make_chain(const ChainFlags& flags) {
   const model::Robot robot = model::make_chain(flags.chain);
-  write_file_aside(flags.output, model::robot_to_json(robot).dump(1) + "\n");
+  write_file_aside(flags.output, description::robot_to_json(robot).dump(1) + "\n");
   if (flags.json)
     print_json({{"file", flags.output.string()}, {"dof", robot.dof()}});
   else
@@ -148,7 +148,7 @@ void add_robot(CLI::App& app, int& exit_code) {
       *robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
       "hamelin robot info data/robots/arm7.urdf\n"
       "hamelin robot info data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json --json");
-  const auto info_options = std::make_shared<InfoOptions>();
+  const auto info_options = std::make_shared<RobotInfoOptions>();
   info_command->add_option("file", info_options->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
   info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")
       ->type_name("LINK");
@@ -158,7 +158,7 @@ void add_robot(CLI::App& app, int& exit_code) {
       ->type_name("FILE.srdf");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options, &exit_code] {
-    info(*info_options);
+    print_robot_info(*info_options);
     exit_code = 0;
   });
 

@@ -5,10 +5,10 @@
 
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/description/srdf.hpp"
 #include "hamelin/fit/self_check.hpp"
-#include "hamelin/model/robot_io.hpp"
-#include "hamelin/model/srdf.hpp"
+#include "hamelin/io/file.hpp"
 #include "output.hpp"
 #include "robot_commands.hpp"
 #include "terminal.hpp"
@@ -17,9 +17,9 @@ namespace hamelin::app {
 
 namespace {
 
-struct Flags {
+struct RobotCheckFlags {
   std::filesystem::path file;
-  model::RobotOptions robot;
+  description::RobotOptions robot;
   fit::SelfCheckOptions check;
   std::optional<std::filesystem::path> output;
   bool never = false;
@@ -98,7 +98,7 @@ void print(const fit::SelfCheck& check, const model::Robot& robot, const std::fi
 }
 
 // The list as an SRDF, or in a copy of the sidecar given.
-std::string list_text(const Flags& flags, const fit::SelfCheck& check, const model::Robot& robot) {
+std::string list_text(const RobotCheckFlags& flags, const fit::SelfCheck& check, const model::Robot& robot) {
   const auto pairs = check.disabled(flags.never);
   if (flags.output->extension() == ".srdf") return fit::srdf_text(robot.name, pairs);
   if (!flags.robot.spheres)
@@ -112,7 +112,7 @@ std::string list_text(const Flags& flags, const fit::SelfCheck& check, const mod
   return document.dump(1) + "\n";
 }
 
-int run(const Flags& flags) {
+int run(const RobotCheckFlags& flags) {
   std::filesystem::path target;
   if (flags.output) {
     std::vector<std::filesystem::path> inputs = {flags.file};
@@ -120,9 +120,9 @@ int run(const Flags& flags) {
     if (flags.robot.srdf) inputs.push_back(*flags.robot.srdf);
     target = output_target(*flags.output, inputs);
   }
-  const model::Robot robot = model::read_robot(flags.file, flags.robot);
-  std::vector<model::DisabledPair> listed;
-  if (flags.robot.srdf) listed = model::read_srdf(*flags.robot.srdf);
+  const model::Robot robot = description::read_robot(flags.file, flags.robot);
+  std::vector<description::DisabledPair> listed;
+  if (flags.robot.srdf) listed = description::read_srdf(*flags.robot.srdf);
   const fit::SelfCheck check = fit::check_self(robot, listed, flags.check);
   if (flags.output) write_file_aside(target, list_text(flags, check, robot));
   if (flags.json)
@@ -141,7 +141,7 @@ void add_robot_check(CLI::App& robot, int& exit_code) {
                   "hamelin robot check data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json\n"
                   "hamelin robot check arm.urdf --spheres arm.spheres.json --srdf arm.srdf --samples 100000\n"
                   "hamelin robot check arm.urdf --spheres arm.spheres.json --write arm.checked.spheres.json");
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<RobotCheckFlags>();
   command->add_option("file", flags->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
   command->add_option("--tip", flags->robot.tip, "link that is the tip (URDF: default the only leaf)")
       ->type_name("LINK");

@@ -5,10 +5,10 @@
 
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/description/srdf.hpp"
+#include "hamelin/description/urdf_geometry.hpp"
 #include "hamelin/fit/robot_fit.hpp"
-#include "hamelin/model/srdf.hpp"
-#include "hamelin/model/urdf_geometry.hpp"
+#include "hamelin/io/file.hpp"
 #include "output.hpp"
 #include "robot_commands.hpp"
 #include "terminal.hpp"
@@ -17,7 +17,7 @@ namespace hamelin::app {
 
 namespace {
 
-struct Flags {
+struct RobotFitFlags {
   std::filesystem::path file;
   std::optional<std::filesystem::path> output, srdf, compare;
   fit::FitOptions fit;
@@ -25,7 +25,7 @@ struct Flags {
   bool json = false;
 };
 
-void check_flags(Flags& flags) {
+void check_flags(RobotFitFlags& flags) {
   const auto positive = [](const char* option, double value, bool zero) {
     if (!(value > 0.0 || (zero && value == 0.0)) || value > 10.0)
       throw Error(ErrorCode::usage,
@@ -72,7 +72,7 @@ void print_table(const fit::RobotFit& fit, const std::string& title) {
   report(text);
 }
 
-void run(Flags& flags) {
+void run(RobotFitFlags& flags) {
   check_flags(flags);
   std::filesystem::path target;
   if (flags.output) {
@@ -84,8 +84,8 @@ void run(Flags& flags) {
   std::vector<std::pair<std::string, std::string>> disabled;
   if (flags.srdf) {
     std::vector<std::string> links;
-    for (const auto& link : model::read_urdf_geometry(flags.file)) links.push_back(link.name);
-    for (const auto& pair : model::read_srdf(*flags.srdf, links)) disabled.emplace_back(pair.link_a, pair.link_b);
+    for (const auto& link : description::read_urdf_geometry(flags.file)) links.push_back(link.name);
+    for (const auto& pair : description::read_srdf(*flags.srdf, links)) disabled.emplace_back(pair.link_a, pair.link_b);
   }
   Json out{{"robot", flags.file.string()}};
   if (flags.compare) {
@@ -122,7 +122,7 @@ void add_robot_fit(CLI::App& robot, int& exit_code) {
       "hamelin robot fit arm.urdf --package arm_description=~/arm --total 50 -o arm.spheres.json\n"
       "hamelin robot fit arm.urdf --capsules --excess 0.03 --srdf arm.srdf -o arm.capsules.json\n"
       "hamelin robot fit arm.urdf --meshes meshes --compare by_hand.spheres.json --json");
-  const auto flags = std::make_shared<Flags>();
+  const auto flags = std::make_shared<RobotFitFlags>();
   auto& fit = flags->fit;
   command->add_option("file", flags->file, "a robot, .urdf")->required()->type_name("FILE.urdf");
   command

@@ -24,7 +24,7 @@ namespace {
 // Without a planner that says how far it looks, surroundings are shown up to here.
 constexpr double shown_influence_m = 0.2;
 
-struct InfoOptions {
+struct SceneInfoOptions {
   std::filesystem::path file;
   MapInfoOptions map;
   bool json = false;
@@ -211,7 +211,7 @@ std::string scene_text(const Json& info) {
   return out;
 }
 
-void info(const InfoOptions& options) {
+void print_scene_info(const SceneInfoOptions& options) {
   const Kind kind = kind_of(options.file);
   if (kind != Kind::map && kind != Kind::scene)
     throw Error(ErrorCode::usage,
@@ -309,7 +309,7 @@ void add_scene(CLI::App& app, int&) {
                                    "hamelin scene info data/scenes/shelf.json\n"
                                    "hamelin scene info data/maps/clutter.bt --base 0,0,0.3 --reach 0.9\n"
                                    "hamelin scene info data/maps/clutter.bt --json");
-  const auto info_options = std::make_shared<InfoOptions>();
+  const auto info_options = std::make_shared<SceneInfoOptions>();
   info_command->add_option("file", info_options->file, "a map (.bt, .ot) or a scene")
       ->required()
       ->type_name("MAP_OR_SCENE");
@@ -326,7 +326,7 @@ void add_scene(CLI::App& app, int&) {
   info_command->add_option("--reach", of_map.reach, "how far it would reach [m] (default all that is occupied)")
       ->type_name("R");
   info_command->add_flag("--json", info_options->json, "print JSON");
-  info_command->callback([info_options] { info(*info_options); });
+  info_command->callback([info_options] { print_scene_info(*info_options); });
 
   add_scene_crop(*scene);
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 /// `hamelin scene info` of a bare map, and `hamelin scene crop`.
 namespace hamelin::app {

@@ -4,7 +4,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::app {
 

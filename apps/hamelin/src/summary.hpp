@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::app {
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "command_line.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/study/merge.hpp"
 #include "output.hpp"
 #include "sweep.hpp"

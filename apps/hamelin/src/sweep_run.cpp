@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct RunOptions {
+struct SweepRunOptions {
   fs::path directory;
   study::SweepOptions sweep;
   std::vector<fs::path> plugin_path;
@@ -31,7 +31,7 @@ struct OneOptions {
   std::vector<fs::path> plugin_path;
 };
 
-int sweep_run(const RunOptions& options) {
+int sweep_run(const SweepRunOptions& options) {
   study::SweepOptions sweep = options.sweep;
   // this very program, also if another was built in its place meanwhile
   sweep.command = {"/proc/self/exe", "sweep", "one"};
@@ -81,7 +81,7 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
                               "killed, it goes on where it was when called again",
                               "hamelin sweep run tries\n"
                               "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
-  const auto options = std::make_shared<RunOptions>();
+  const auto options = std::make_shared<SweepRunOptions>();
   options->sweep.timeout_s = 600.0;
   options->sweep.jobs = std::max(1U, std::thread::hardware_concurrency());
   command->add_option("directory", options->directory, "made by `hamelin sweep plan`")->required()->type_name("DIR");

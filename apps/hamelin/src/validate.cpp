@@ -7,9 +7,9 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/log/read_log.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/study/accuracy.hpp"
@@ -67,7 +67,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     }
     case Kind::urdf:
     case Kind::robot:
-      return robot_words(model::read_robot(file, {options.tip, {}}));
+      return robot_words(description::read_robot(file, {options.tip, {}}));
     case Kind::scene:
       return check_scene(file);
     case Kind::result:
@@ -77,7 +77,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       return fmt::format("primitives, {} obstacles",
                          scene::make_options_from_json(read_json(file), file.string()).primitives.size());
     case Kind::spheres:
-      return fmt::format("collision spheres, {}", model::check_spheres(file));
+      return fmt::format("collision spheres, {}", description::check_spheres(file));
     case Kind::sweep: {
       const auto plan = study::read_plan_file(file);
       return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());

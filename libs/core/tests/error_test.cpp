@@ -15,15 +15,3 @@ TEST_CASE("an error's text is one line of UTF-8, whatever it speaks of", "[core]
   CHECK(text(std::string(5000, 'x')) == std::string(2000, 'x') + "...");
   CHECK(text(std::string(1999, 'x') + "é") == std::string(1999, 'x') + "...");
 }
-
-TEST_CASE("what is not UTF-8 is found where it stands", "[core][unit]") {
-  CHECK(utf8_prefix("") == 0);
-  CHECK(utf8_prefix("plain") == 5);
-  CHECK(utf8_prefix("é€😀") == 9);
-  CHECK(utf8_prefix("ab\xe9 cd") == 2);          // Latin-1
-  CHECK(utf8_prefix("\xc0\xaf") == 0);           // overlong
-  CHECK(utf8_prefix("\xe0\x80\xaf") == 0);       // overlong
-  CHECK(utf8_prefix("\xed\xa0\x80") == 0);       // half of a surrogate pair
-  CHECK(utf8_prefix("a\xf4\x90\x80\x80") == 1);  // beyond U+10FFFF
-  CHECK(utf8_prefix("a\xf0\x9f\x98") == 1);      // cut
-}

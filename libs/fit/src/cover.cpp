@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/fit/coverage.hpp"
 
@@ -18,7 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double grains = 1e5;      // of written coordinates, in a metre
 constexpr double piece_m = 2.5e-4;  // how fine coverage is proven
 constexpr std::size_t samples_wanted = 4000;

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
+
+#include "hamelin/core/numbers.hpp"
 
 namespace hamelin::fit {
 
@@ -14,7 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Cutting stops there in any case, and the bound says what was reached.
 constexpr std::size_t pieces_max = 40'000'000;
 // Pieces so short are cut on only for the sake of the tolerance. Half of what seal leaves whole.

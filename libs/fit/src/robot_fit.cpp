@@ -9,10 +9,10 @@
 #include <memory>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/description/urdf_geometry.hpp"
 #include "hamelin/fit/mesh.hpp"
 #include "hamelin/fit/solid.hpp"
-#include "hamelin/model/robot_io.hpp"
-#include "hamelin/model/urdf_geometry.hpp"
 
 namespace hamelin::fit {
 
@@ -52,7 +52,7 @@ class Gatherer {
   std::vector<LinkSolid> gather() {
     std::vector<LinkSolid> solids;
     std::vector<std::string> bare, by_visual;
-    for (const model::LinkGeometry& link : model::read_urdf_geometry(urdf_)) {
+    for (const description::LinkGeometry& link : description::read_urdf_geometry(urdf_)) {
       const bool visual = link.collision.empty() && !link.visual.empty() && options_.visual;
       const auto& shapes = visual ? link.visual : link.collision;
       if (shapes.empty()) {
@@ -73,22 +73,22 @@ class Gatherer {
   }
 
  private:
-  LinkSolid solid_of(const std::string& name, const std::vector<model::LinkShape>& shapes) {
+  LinkSolid solid_of(const std::string& name, const std::vector<description::LinkShape>& shapes) {
     LinkSolid out;
     out.name = name;
     Mesh all;
-    for (const model::LinkShape& shape : shapes) {
+    for (const description::LinkShape& shape : shapes) {
       switch (shape.kind) {
-        case model::LinkShape::Kind::sphere:
+        case description::LinkShape::Kind::sphere:
           out.balls.push_back({shape.pose.p(), shape.pose.p(), shape.radius_m});
           break;
-        case model::LinkShape::Kind::box:
+        case description::LinkShape::Kind::box:
           append(all, box_mesh(shape.size_m), shape.pose);
           break;
-        case model::LinkShape::Kind::cylinder:
+        case description::LinkShape::Kind::cylinder:
           append(all, cylinder_mesh(shape.radius_m, shape.length_m), shape.pose);
           break;
-        case model::LinkShape::Kind::mesh:
+        case description::LinkShape::Kind::mesh:
           append(all, mesh_of(name, shape), shape.pose);
           break;
       }
@@ -109,7 +109,7 @@ class Gatherer {
     return out;
   }
 
-  Mesh mesh_of(const std::string& name, const model::LinkShape& shape) const {
+  Mesh mesh_of(const std::string& name, const description::LinkShape& shape) const {
     const std::string place = fmt::format("{}: line {}: link '{}'", urdf_.string(), shape.line, name);
     std::vector<fs::path> tried;
     const auto file = find_mesh(shape.mesh, urdf_, options_.meshes, &tried);
@@ -297,7 +297,7 @@ RobotFit fit_robot(const fs::path& urdf, const FitOptions& options) {
 RobotFit measure_sidecar(const fs::path& urdf, const fs::path& sidecar, const FitOptions& options) {
   RobotFit out;
   const std::vector<LinkSolid> solids = Gatherer(urdf, options, out.notes).gather();
-  (void)model::check_spheres(sidecar);
+  (void)description::check_spheres(sidecar);
   const Json document = read_json(sidecar);
   std::map<std::string, std::vector<Shape>> shapes;
   for (const auto& [name, list] : document["links"].items())

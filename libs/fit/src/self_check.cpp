@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/fit/shape.hpp"
 
@@ -17,8 +17,6 @@ namespace {
 
 using Eigen::Vector3d;
 using geometry::SE3;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 struct Part {
   std::string name;
@@ -138,8 +136,8 @@ std::vector<PartPair> SelfCheck::faults() const {
   return out;
 }
 
-std::vector<model::DisabledPair> SelfCheck::disabled(bool never) const {
-  std::vector<model::DisabledPair> out;
+std::vector<description::DisabledPair> SelfCheck::disabled(bool never) const {
+  std::vector<description::DisabledPair> out;
   for (const PartPair& pair : pairs) {
     const bool touches = pair.touches_at_rest() || pair.contacts > 0;
     const bool listed = !pair.checked && !pair.neighbours;
@@ -160,7 +158,7 @@ std::vector<model::DisabledPair> SelfCheck::disabled(bool never) const {
   return out;
 }
 
-SelfCheck check_self(const model::Robot& robot, const std::vector<model::DisabledPair>& listed,
+SelfCheck check_self(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
                      const SelfCheckOptions& options) {
   SelfCheck out;
   const std::vector<Part> parts = parts_of(robot);
@@ -185,7 +183,7 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<model::Disable
         pair.checked = false;
         pair.reason = "neighbours, and nothing is listed";
       }
-      for (const model::DisabledPair& why : listed)
+      for (const description::DisabledPair& why : listed)
         if (!pair.checked && same(why.link_a, why.link_b, pair) && !why.reason.empty()) pair.reason = why.reason;
       out.pairs.push_back(std::move(pair));
       indices.emplace_back(a, b);
@@ -223,7 +221,7 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<model::Disable
   return out;
 }
 
-std::string srdf_text(const std::string& robot, const std::vector<model::DisabledPair>& pairs) {
+std::string srdf_text(const std::string& robot, const std::vector<description::DisabledPair>& pairs) {
   const auto quoted = [](const std::string& text) {
     std::string out;
     for (const char c : text) {
@@ -240,7 +238,7 @@ std::string srdf_text(const std::string& robot, const std::vector<model::Disable
     return out;
   };
   std::string text = fmt::format("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", quoted(robot));
-  for (const model::DisabledPair& pair : pairs)
+  for (const description::DisabledPair& pair : pairs)
     text += fmt::format("  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{}\"/>\n", quoted(pair.link_a),
                         quoted(pair.link_b), quoted(pair.reason));
   return text + "</robot>\n";

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 
 namespace hamelin::fit {
 
@@ -18,7 +18,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int leaf_triangles = 4;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Nearest point of a triangle with an area (Ericson 2005, 5.1.5).
 Vector3d closest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {

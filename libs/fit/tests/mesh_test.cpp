@@ -23,7 +23,7 @@ std::array<Vector3d, 2> bounds(const Mesh& mesh) {
   return out;
 }
 
-std::string error_of(const std::filesystem::path& file) {
+std::string mesh_error(const std::filesystem::path& file) {
   try {
     (void)load_mesh(file, Vector3d::Ones());
   } catch (const Error& e) {
@@ -72,18 +72,18 @@ TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]"
 TEST_CASE("files that are no mesh end in one line with their name", "[fit][unit]") {
   const test::Scratch scratch;
   Mesh bad = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
-  CHECK_THAT(error_of(scratch.path("absent.stl")), Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
-  CHECK_THAT(error_of(scratch.put("junk.stl", "this is no mesh")), Catch::Contains("junk.stl: not a mesh"));
-  CHECK_THAT(error_of(scratch.put("empty.obj", "")), Catch::Contains("empty.obj: not a mesh"));
-  CHECK_THAT(error_of(scratch.put("kind.xyzzy", "1")), Catch::Contains("kind.xyzzy: not a mesh"));
+  CHECK_THAT(mesh_error(scratch.path("absent.stl")), Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
+  CHECK_THAT(mesh_error(scratch.put("junk.stl", "this is no mesh")), Catch::Contains("junk.stl: not a mesh"));
+  CHECK_THAT(mesh_error(scratch.put("empty.obj", "")), Catch::Contains("empty.obj: not a mesh"));
+  CHECK_THAT(mesh_error(scratch.put("kind.xyzzy", "1")), Catch::Contains("kind.xyzzy: not a mesh"));
   bad.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THAT(error_of(scratch.put("nan.stl", test::binary_stl(bad))),
+  CHECK_THAT(mesh_error(scratch.put("nan.stl", test::binary_stl(bad))),
              Catch::Contains("nan.stl") && Catch::Contains("finite"));
   bad.vertices[3].y() = std::numeric_limits<double>::infinity();
-  CHECK_THAT(error_of(scratch.put("inf.stl", test::binary_stl(bad))),
+  CHECK_THAT(mesh_error(scratch.put("inf.stl", test::binary_stl(bad))),
              Catch::Contains("inf.stl") && Catch::Contains("finite"));
   const std::string whole = test::binary_stl(test::ball(0.1, 8));
-  CHECK_THAT(error_of(scratch.put("cut.stl", whole.substr(0, whole.size() / 2))),
+  CHECK_THAT(mesh_error(scratch.put("cut.stl", whole.substr(0, whole.size() / 2))),
              Catch::Contains("cut.stl: not a mesh"));
 }
 

@@ -15,7 +15,9 @@
 #include "hamelin/fit/mesh.hpp"
 
 /// Meshes and files for the tests, made here and not by the library.
-namespace hamelin::fit::test {
+namespace hamelin::test {
+
+using fit::Mesh;
 
 using Eigen::Vector3d;
 
@@ -182,4 +184,4 @@ inline std::vector<Vector3d> random_points(const Mesh& mesh, std::size_t count, 
   return points;
 }
 
-}  // namespace hamelin::fit::test
+}  // namespace hamelin::test

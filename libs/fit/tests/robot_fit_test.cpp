@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "meshes.hpp"
 
 using namespace hamelin;
@@ -98,7 +98,7 @@ TEST_CASE("the sidecar is what read_robot takes, and measures as it did", "[fit]
     options.padding_m = 0.01;
     const RobotFit fit = fit_robot(urdf, options);
     const auto file = scratch.put("s.json", sidecar_json(fit, "note", {{"base", "arm"}}).dump());
-    const model::Robot read = model::read_robot(urdf, {{}, file});
+    const model::Robot read = description::read_robot(urdf, {{}, file});
     CHECK(read.links[0].spheres.size() + read.links[0].segments.size() == fit.shapes());
     CHECK((read.links[0].segments.empty() != capsules));
     const RobotFit again = measure_sidecar(urdf, file, {});

@@ -84,7 +84,7 @@ TEST_CASE("pairs fall into always, sometimes and never in contact", "[fit][unit]
   for (const auto& pair : listed) CHECK(pair.reason == "Adjacent");
   const auto with_never = check.disabled(true);
   CHECK(std::count_if(with_never.begin(), with_never.end(),
-                      [](const model::DisabledPair& p) { return p.reason == "Never"; }) >= 1);
+                      [](const description::DisabledPair& p) { return p.reason == "Never"; }) >= 1);
 }
 
 TEST_CASE("what touches at rest and is checked is a fault; listed with its reason it is none", "[fit][unit]") {
@@ -120,8 +120,8 @@ TEST_CASE("capsules are measured by their segments", "[fit][unit]") {
 
 TEST_CASE("an SRDF written reads back", "[fit][unit]") {
   const test::Scratch scratch;
-  const std::vector<model::DisabledPair> pairs = {{"a<b", "c&d", "Adjacent", 0}, {"e", "f\"g", "Never", 0}};
-  const auto read = model::read_srdf(scratch.put("x.srdf", srdf_text("r", pairs)));
+  const std::vector<description::DisabledPair> pairs = {{"a<b", "c&d", "Adjacent", 0}, {"e", "f\"g", "Never", 0}};
+  const auto read = description::read_srdf(scratch.put("x.srdf", srdf_text("r", pairs)));
   REQUIRE(read.size() == 2);
   CHECK(read[0].link_a == "a<b");
   CHECK(read[0].link_b == "c&d");

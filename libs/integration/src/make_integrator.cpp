@@ -10,6 +10,7 @@
 #include "gauss.hpp"
 #include "hamel.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 #include "lie_exact.hpp"
 #include "newmark.hpp"
 #include "rosenbrock.hpp"
@@ -125,10 +126,9 @@ std::unique_ptr<Integrator> make_integrator(const std::string& name, const Model
     if (!entry.scheme.iterates) options.max_halvings = 0;  // explicit: a shorter step finds no other root
     return entry.make(model, options);
   }
-  const auto near = nearest_name(name, integrator_names());
-  throw Error(ErrorCode::usage, fmt::format("integrator '{}' is not known, expected one of {}{}", name,
-                                            fmt::join(integrator_names(), ", "),
-                                            near.empty() ? "" : fmt::format("; did you mean '{}'?", near)));
+  throw Error(ErrorCode::usage,
+              fmt::format("integrator '{}' is not known, expected one of {}{}", name,
+                          fmt::join(integrator_names(), ", "), did_you_mean(name, integrator_names())));
 }
 
 }  // namespace hamelin::integration

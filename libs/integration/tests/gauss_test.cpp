@@ -19,7 +19,7 @@ State run(const Model& model, const Options& options, const VectorXd& q0, const 
   return state;
 }
 
-Options of_order(int order) {
+Options gauss_of_order(int order) {
   Options options;
   options.order = order;
   return options;
@@ -31,13 +31,13 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
   // Slow enough for the asymptotic range: a chain in a slow swing, errors well above rounding.
   const Model model(test::random_robot(20, 3, GENERATE(0, 2)));
   const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
-  const VectorXd truth = run(model, of_order(16), q0, v0, 1e-3, 400).q;
+  const VectorXd truth = run(model, gauss_of_order(16), q0, v0, 1e-3, 400).q;
   const auto rk4 = make_integrator("rk4", model);
   State peer = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
   REQUIRE((truth - peer.q).norm() < 1e-10);
   for (const int order : {4, 6, 8}) {
-    const auto error = [&](int n) { return (run(model, of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
+    const auto error = [&](int n) { return (run(model, gauss_of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
     int steps = 2;
     while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
     CAPTURE(order, steps, error(steps), error(2 * steps));
@@ -45,7 +45,7 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
     CHECK(observed > order - 0.7);
   }
   for (const int order : {10, 12, 14, 16})  // beneath what doubles can tell apart
-    CHECK((run(model, of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
+    CHECK((run(model, gauss_of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
 }
 
 TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",
@@ -54,7 +54,7 @@ TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start i
   Rng rng(21);
   const VectorXd q0 = test::random_joints(rng, 5), v0 = test::random_joints(rng, 5);
   for (const int order : {4, 8, 16}) {
-    const auto integrator = make_integrator("gauss", model, of_order(order));
+    const auto integrator = make_integrator("gauss", model, gauss_of_order(order));
     State state = integrator->start(q0, v0);
     const VectorXd p0 = state.p;
     for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(state, {}, 0.02).converged);
@@ -71,12 +71,12 @@ TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start i
 TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss][step-control]") {
   const Model model(test::spatial_chain(7));
   const VectorXd q0 = VectorXd::Constant(7, 0.3);
-  const auto truth = run(model, of_order(16), q0, VectorXd::Zero(7), 1e-3, 500);
+  const auto truth = run(model, gauss_of_order(16), q0, VectorXd::Zero(7), 1e-3, 500);
   for (const int order : {8, 12, 16}) {
     double before = 1.0;
     for (const double rtol : {1e-4, 1e-6, 1e-8}) {
       CAPTURE(order, rtol);
-      Options options = of_order(order);
+      Options options = gauss_of_order(order);
       options.rtol = options.atol = rtol;
       const auto integrator = make_integrator("gauss", model, options);
       State state = integrator->start(q0, VectorXd::Zero(7));
@@ -114,7 +114,7 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
   const auto rk4 = make_integrator("rk4", model);
   State truth = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(truth, channels, 0.5 / 8000).converged);
-  const auto gauss = make_integrator("gauss", model, of_order(8));
+  const auto gauss = make_integrator("gauss", model, gauss_of_order(8));
   State state = gauss->start(q0, v0);
   const double start = gauss->energy(state).total();
   double booked = 0.0;
@@ -131,7 +131,7 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
 
 TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to rounding", "[integration][gauss]") {
   const Model model(test::planar3());
-  const auto gauss = make_integrator("gauss", model, of_order(8));
+  const auto gauss = make_integrator("gauss", model, gauss_of_order(8));
   State state = gauss->start(VectorXd::Zero(3), VectorXd::Zero(3));
   const double start = gauss->energy(state).total();
   double early = 0.0, late = 0.0;
@@ -151,7 +151,7 @@ TEST_CASE("all instruction sets come to the same motion but for rounding", "[int
   const VectorXd q0 = test::random_joints(rng, 6), v0 = test::random_joints(rng, 6);
   const std::string best(instruction_set());
   for (const int order : {4, 6, 8, 10, 16}) {
-    const VectorXd q = run(model, of_order(order), q0, v0, 0.005, 50).q;
+    const VectorXd q = run(model, gauss_of_order(order), q0, v0, 0.005, 50).q;
     for (const char* isa : {"x86-64", "v3", "v4"}) {
       CAPTURE(order, isa);
       try {
@@ -159,7 +159,7 @@ TEST_CASE("all instruction sets come to the same motion but for rounding", "[int
       } catch (const std::exception&) {
         continue;  // not on this machine
       }
-      CHECK((run(model, of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
+      CHECK((run(model, gauss_of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
     }
     force_instruction_set(best);
   }

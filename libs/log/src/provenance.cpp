@@ -12,8 +12,8 @@
 #include <string_view>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::log {
 

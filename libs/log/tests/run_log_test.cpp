@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/log/result.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::test {
 

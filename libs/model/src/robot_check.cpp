@@ -7,8 +7,8 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 #include "hamelin/model/robot.hpp"
-#include "robot_detail.hpp"
 
 namespace hamelin::model {
 
@@ -81,7 +81,7 @@ void check_body(const Link& link, const std::string& where) {
   if (!(link.mass_kg >= 0.0 && link.mass_kg <= mass_max_kg))
     fail(where, fmt::format("mass {} kg, expected 0 to {}", link.mass_kg, mass_max_kg));
   if (link.mass_kg > 0.0 || !link.inertia_kg_m2.isZero(0.0)) {
-    const std::string fault = detail::inertia_fault(link.inertia_kg_m2, true);
+    const std::string fault = inertia_fault(link.inertia_kg_m2, true);
     if (!fault.empty()) fail(where, "inertia " + fault);
   }
   for (const auto& sphere : link.spheres) {
@@ -167,12 +167,12 @@ void check_parts(const Robot& robot, const std::string& where) {
   for (const auto& [a, b] : robot.self_collision_disabled)
     for (const auto& name : {a, b})
       if (body_of.count(name) == 0)
-        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name, detail::suggestion(name, names)));
+        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name, did_you_mean(name, names)));
 }
 
 }  // namespace
 
-std::string detail::inertia_fault(const Matrix3d& inertia, bool strict) {
+std::string inertia_fault(const Matrix3d& inertia, bool strict) {
   // Published figures are rounded; what they miss the inequality by is their last digit.
   constexpr double triangle_tolerance = 1e-4;
   constexpr double definite_tolerance = 1e-12;

@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -106,8 +106,8 @@ TEST_CASE("a robot written as JSON reads back as the same", "[model][io]") {
   model::ChainOptions options;
   options.links = 5;
   const auto robot = model::make_chain(options);
-  const Json written = model::robot_to_json(robot);
-  const Json again = model::robot_to_json(model::robot_from_json(written, "again"));
+  const Json written = description::robot_to_json(robot);
+  const Json again = description::robot_to_json(description::robot_from_json(written, "again"));
   CHECK(written == again);
 }
 

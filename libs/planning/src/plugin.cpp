@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
 
 namespace hamelin::planning {
 
@@ -11,7 +11,7 @@ model::Model Setup::model() const {
   const auto& w = raw_->base_quaternion_wxyz;
   const geometry::SE3 base(Eigen::Quaterniond(w[0], w[1], w[2], w[3]).normalized().toRotationMatrix(),
                            vec3(raw_->base_position_world_m));
-  return model::Model(model::robot_from_json(parse_json(robot_json(), where), where), base,
+  return model::Model(description::robot_from_json(parse_json(robot_json(), where), where), base,
                       vec3(raw_->gravity_world_m_s2));
 }
 

@@ -11,7 +11,8 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/core/text.hpp"
+#include "hamelin/description/robot_io.hpp"
 
 namespace hamelin::planning {
 
@@ -79,7 +80,7 @@ const char* defect(const CommandBuffers& out, std::size_t dof, std::size_t gyros
 
 SetupData::SetupData(const model::Model& nominal)
     : dof(static_cast<std::size_t>(nominal.dof())),
-      robot_json(model::robot_to_json(nominal.robot()).dump()),
+      robot_json(description::robot_to_json(nominal.robot()).dump()),
       gravity_world_m_s2(nominal.gravity()),
       base_position_world_m(nominal.base().p()) {
   const Eigen::Quaterniond quaternion(nominal.base().R());

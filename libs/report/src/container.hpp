@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::report {
 

@@ -7,8 +7,8 @@
 
 #include "bins.hpp"
 #include "container.hpp"
-#include "hamelin/core/json.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/replay.hpp"

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 
 namespace hamelin::report {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "container.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/simulation/replay.hpp"

@@ -5,8 +5,8 @@
 
 #include "decode.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/scene/distance.hpp"
 
 using namespace hamelin;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/report/report.hpp"

@@ -4,7 +4,7 @@
 
 #include "decode.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/scene/make.hpp"
 
 using namespace hamelin;

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "decode.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/test/readme.hpp"
 
 using namespace hamelin;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
@@ -44,7 +44,8 @@ int run(int argc, char** argv) {
   }
   const Scene scene = read_scene(argv[1]);
   const double influence = std::stod(argv[2]), spread = argc > 3 ? std::stod(argv[3]) : 0.6;
-  const model::Model model(model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres}), scene.base);
+  const model::Model model(description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres}),
+                           scene.base);
   auto start = Clock::now();
   const Environment environment = make_environment(scene, model, influence);
   const double build_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();

@@ -6,17 +6,15 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <map>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/scene/distance.hpp"
 
 namespace hamelin::scene {
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double squared_distance(const Eigen::Vector3d& p, const Box& box) {
   return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).squaredNorm();

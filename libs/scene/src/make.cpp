@@ -10,10 +10,10 @@
 
 #include "bt_writer.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::scene {
@@ -390,10 +390,10 @@ MakeReport make_scene_from_problem(const std::filesystem::path& problem, const P
   const auto relative = [&](const std::filesystem::path& path) {
     return std::filesystem::proximate(path, directory.empty() ? "." : directory).generic_string();
   };
-  model::RobotOptions of_robot;
+  description::RobotOptions of_robot;
   if (!options.tip.empty()) of_robot.tip = options.tip;
   if (!options.spheres.empty()) of_robot.spheres = options.spheres;
-  const model::Model model(model::read_robot(options.robot, of_robot));
+  const model::Model model(description::read_robot(options.robot, of_robot));
   MakeMapOptions map;
   map.resolution_m = options.resolution_m;
   map.mark = options.mark;

@@ -7,7 +7,7 @@
 
 #include "bt_writer.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::scene {
 

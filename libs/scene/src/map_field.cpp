@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "hamelin/core/numbers.hpp"
 
 namespace hamelin::scene {
 
@@ -11,8 +12,6 @@ namespace {
 
 constexpr double cone_cosine = 0.86602540378443865;  // 30°
 constexpr double table_edge_m = 0.05;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::vector<Box> in_metres(const std::vector<VoxelBox>& voxels, double resolution) {
   std::vector<Box> boxes;

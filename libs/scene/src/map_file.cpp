@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::scene {
 

@@ -61,12 +61,12 @@ AxisPoint along_axis(const PointDistance& nearest, double size, const Eigen::Vec
   constexpr int rounds_max = 100;
   for (int round = 0; round < rounds_max; ++round) {
     const Place& best = low.hit.distance < high.hit.distance ? low : high;
-    const double width = high.t - low.t;
-    const double step =
-        (low.hit.distance - high.hit.distance + high.slope * width) / (high.slope - low.slope);  // to where they cross
+    const double interval = high.t - low.t;
+    const double step = (low.hit.distance - high.hit.distance + high.slope * interval) /
+                        (high.slope - low.slope);  // to where they cross
     if (best.hit.distance - (low.hit.distance + low.slope * step) <= gap) return answer(best);
     // halving now and then: tangents alone may creep up from one side
-    const double t = low.t + (round % 3 == 2 ? 0.5 * width : std::clamp(step, 0.01 * width, 0.99 * width));
+    const double t = low.t + (round % 3 == 2 ? 0.5 * interval : std::clamp(step, 0.01 * interval, 0.99 * interval));
     if (!(t > low.t && t < high.t)) return answer(best);
     const Place middle = at(t);
     (middle.slope < 0.0 ? low : high) = middle;

@@ -11,6 +11,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/scene/boxes.hpp"
 #include "hamelin/scene/map_file.hpp"
@@ -22,8 +23,6 @@ namespace {
 using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::vector<Box> random_boxes(Rng& rng, std::size_t count) {
   std::vector<Cell> cells;

@@ -6,10 +6,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/test/allocations.hpp"
@@ -20,8 +20,6 @@ namespace {
 using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 Obstacle ball(double radius, const Vector3d& at) {
   Obstacle o;

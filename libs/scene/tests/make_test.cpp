@@ -11,24 +11,21 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/map_file.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/test/scene_data.hpp"
 #include "hamelin/test/scene_queries.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
 using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
-
-std::filesystem::path temporary(const std::string& name) {
-  return std::filesystem::temp_directory_path() / name;
-}
 
 using Voxels = std::set<std::tuple<int, int, int>>;
 
@@ -46,7 +43,7 @@ Voxels voxels_of(const std::vector<Cell>& cells) {
 TEST_CASE("a made map marks the voxels whose centre or any part a sphere holds", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.05;
-  options.output = temporary("hamelin_scene_made.bt");
+  options.output = test::temporary("hamelin_scene_made.bt");
   Obstacle ball;
   ball.radius_m = 0.31;
   ball.pose = {Eigen::Matrix3d::Identity(), {0.11, -0.23, 0.4}};
@@ -116,7 +113,7 @@ TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene]
   options.resolution_m = 0.03;
   options.mark = seed % 2 == 0 ? Mark::touch : Mark::centre;
   options.free_bounds = Box{{-0.7, -0.55, -0.2}, {0.4, 0.61, 0.9}};
-  options.output = temporary("hamelin_scene_exhaustive.bt");
+  options.output = test::temporary("hamelin_scene_exhaustive.bt");
   Clutter clutter;
   clutter.count = 7;
   clutter.size_min_m = 0.02;
@@ -157,7 +154,7 @@ TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene]
 TEST_CASE("a map that is all one kind is written so that OctoMap reads it", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.5;
-  options.output = temporary("hamelin_scene_whole.bt");
+  options.output = test::temporary("hamelin_scene_whole.bt");
   options.free_bounds = Box{Vector3d::Constant(-16384.0), Vector3d::Constant(16384.0)};
   const MakeReport report = make_map(options);
   CHECK(report.free_voxels == std::size_t{1} << 48U);
@@ -173,7 +170,7 @@ TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.1;
   options.free_bounds = Box{{-1.0, -1.0, 0.0}, {1.0, 1.0, 1.0}};
-  options.output = temporary("hamelin_scene_free.bt");
+  options.output = test::temporary("hamelin_scene_free.bt");
   Obstacle slab;
   slab.shape = Shape::box;
   slab.size_m = {1.0, 1.0, 0.18};
@@ -189,7 +186,7 @@ TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
 TEST_CASE("clutter keeps out of balls and the same seed gives the same bytes", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.04;
-  options.output = temporary("hamelin_scene_clutter.bt");
+  options.output = test::temporary("hamelin_scene_clutter.bt");
   Clutter clutter;
   clutter.count = 30;
   clutter.size_min_m = 0.05;
@@ -212,7 +209,7 @@ TEST_CASE("clutter keeps out of balls and the same seed gives the same bytes", "
 
 TEST_CASE("what cannot be made is refused", "[scene][unit]") {
   MakeMapOptions options;
-  options.output = temporary("hamelin_scene_none.bt");
+  options.output = test::temporary("hamelin_scene_none.bt");
   CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("empty"));
   options.free_bounds = Box{{-300.0, -300.0, -300.0}, {300.0, 300.0, 300.0}};
   CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("too fine"));
@@ -231,7 +228,7 @@ TEST_CASE("the maps in data are those their primitives make", "[scene][unit]") {
     const auto source = directory / (name + ".primitives.json");
     MakeMapOptions options = make_options_from_json(read_json(source), source.string());
     CHECK(options.resolution_m <= 0.02);
-    options.output = temporary("hamelin_scene_" + name + ".bt");
+    options.output = test::temporary("hamelin_scene_" + name + ".bt");
     const MakeReport report = make_map(options);
     CHECK(report.bytes < 200000);
     CHECK(report.sha256 == sha256_hex(read_file(directory / (name + ".bt"))));
@@ -243,7 +240,7 @@ TEST_CASE("the maps in data are those their primitives make", "[scene][unit]") {
 TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][unit]") {
   const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
   if (!problems || !robots) return;
-  const auto directory = temporary("hamelin_scene_problem");
+  const auto directory = test::temporary("hamelin_scene_problem");
   std::filesystem::create_directories(directory);
   for (const std::string name : {"bookshelf_small_0001", "table_pick_0001", "box_0001"}) {
     CAPTURE(name);
@@ -267,7 +264,7 @@ TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][
     CHECK(scene.obstacles.size() == problem["obstacles"].size());
     REQUIRE(scene.map);
     // The map is marked by touch, so it holds every primitive: their centres are in contact.
-    const model::Model model(model::read_robot(options.robot, {options.tip, options.spheres}));
+    const model::Model model(description::read_robot(options.robot, {options.tip, options.spheres}));
     const auto environment = make_environment(scene, model, 2.0);  // some stand out of the arm's reach
     CHECK(environment.summary().warnings.empty());
     CHECK(environment.summary().within_reach.unknown == 0.0);
@@ -285,7 +282,7 @@ TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][
 TEST_CASE("what is no problem is refused with its place, and nothing is written", "[scene][unit]") {
   const auto robots = test::shared_data("robots");
   if (!robots) return;
-  const auto directory = temporary("hamelin_scene_no_problem");
+  const auto directory = test::temporary("hamelin_scene_no_problem");
   std::filesystem::create_directories(directory);
   ProblemOptions options;
   options.robot = *robots / "panda.urdf";
@@ -336,7 +333,7 @@ TEST_CASE("what is no problem is refused with its place, and nothing is written"
 TEST_CASE("a problem's goal may be asked for as where the tip is then", "[scene][unit]") {
   const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
   if (!problems || !robots) return;
-  const auto directory = temporary("hamelin_scene_goal");
+  const auto directory = test::temporary("hamelin_scene_goal");
   std::filesystem::create_directories(directory);
   ProblemOptions options;
   options.robot = *robots / "panda.urdf";
@@ -345,7 +342,7 @@ TEST_CASE("a problem's goal may be asked for as where the tip is then", "[scene]
   options.output = directory / "scene.json";
   const auto source = *problems / "box_0001.json";
   // the tip by the product of exponentials
-  const auto robot = model::read_robot(options.robot, {options.tip, std::nullopt});
+  const auto robot = description::read_robot(options.robot, {options.tip, std::nullopt});
   const auto q = read_json(source)["goal"].get<std::vector<double>>();
   geometry::SE3 tip;
   for (std::size_t i = 0; i < q.size(); ++i)

@@ -8,21 +8,18 @@
 #include <string>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/map_field.hpp"
 #include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
 using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
-
-std::filesystem::path temporary(const std::string& name) {
-  return std::filesystem::temp_directory_path() / name;
-}
 
 // 'u', 'f' or 'o' by OctoMap's own search.
 char kind_at(const octomap::OcTree& tree, const Vector3d& p) {
@@ -33,7 +30,7 @@ char kind_at(const octomap::OcTree& tree, const Vector3d& p) {
 std::filesystem::path clutter_map() {
   MakeMapOptions options;
   options.resolution_m = 0.02;
-  options.output = temporary("hamelin_scene_uncropped.bt");
+  options.output = test::temporary("hamelin_scene_uncropped.bt");
   options.free_bounds = Box{{-1.1, -0.9, -0.3}, {1.0, 1.2, 1.0}};
   Clutter clutter;
   clutter.count = 60;
@@ -51,7 +48,7 @@ std::filesystem::path clutter_map() {
 TEST_CASE("inside the region a cropped map is the map, to OctoMap and in distances", "[scene][property]") {
   CropOptions options;
   options.map = clutter_map();
-  options.output = temporary("hamelin_scene_cropped.bt");
+  options.output = test::temporary("hamelin_scene_cropped.bt");
   const bool as_ball = GENERATE(true, false);
   const Ball ball{{0.2, -0.1, 0.4}, 0.5};
   const Box box{{-0.3, -0.4, 0.1}, {0.6, 0.2, 0.7}};
@@ -100,7 +97,7 @@ TEST_CASE("a crop to more than the map gives the map's own tree", "[scene][unit]
   const auto directory = test::shared_data("maps");
   if (!directory) return;
   CropOptions options;
-  options.output = temporary("hamelin_scene_whole_crop.bt");
+  options.output = test::temporary("hamelin_scene_whole_crop.bt");
   for (const std::string name : {"aurora.bt", "octomap_python_test.bt", "velma_world1.bt", "geb079.bt"}) {
     CAPTURE(name);
     options.map = *directory / name;
@@ -120,7 +117,7 @@ TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space
   const auto directory = test::shared_data("bad_maps");
   if (!directory) return;
   CropOptions options;
-  options.output = temporary("hamelin_scene_huge_crop.bt");
+  options.output = test::temporary("hamelin_scene_huge_crop.bt");
   options.region = Ball{{-0.3, -0.3, -0.3}, 0.1};
   options.map = *directory / "e_rootocc.ot";
   crop_map(options);
@@ -152,9 +149,9 @@ TEST_CASE("what cannot be cropped is refused and nothing is written", "[scene][u
   options.region = Ball{{0.0, 0.0, 0.4}, 0.5};
   CHECK_THROWS_WITH(crop_map(options), Catch::Contains("is the map itself"));
   CHECK(read_file(options.map) == bytes);
-  options.output = temporary("hamelin_scene_crop.ot");
+  options.output = test::temporary("hamelin_scene_crop.ot");
   CHECK_THROWS_WITH(crop_map(options), Catch::Contains("expected a name that ends in .bt"));
-  options.output = temporary("hamelin_scene_no_crop.bt");
+  options.output = test::temporary("hamelin_scene_no_crop.bt");
   options.region = Ball{{300.0, 0.0, 0.4}, 0.5};
   CHECK_THROWS_WITH(crop_map(options), Catch::Contains("nothing of the map is in the region"));
   options.region = Ball{{0.0, 0.0, 0.4}, -0.5};

@@ -4,9 +4,9 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <vector>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/scene_queries.hpp"
 
@@ -16,8 +16,7 @@ using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double resolution = 0.05;
+constexpr double voxel_m = 0.05;
 
 // Voxels [0, n)³ by hand: what is occupied, and the exact signed distance to it by looking at all of them and at a rim
 // of free ones around.
@@ -51,7 +50,7 @@ class Grid {
   [[nodiscard]] double signed_distance(const Vector3d& p) const {
     double to_occupied = infinity, to_free = infinity;
     each([&](const std::array<std::int32_t, 3>& voxel, bool is) {
-      const Box box = to_metres(Cell{voxel, 1}, resolution);
+      const Box box = to_metres(Cell{voxel, 1}, voxel_m);
       const double distance = (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).norm();
       (is ? to_occupied : to_free) = std::min(is ? to_occupied : to_free, distance);
     });
@@ -82,7 +81,7 @@ Vector3d random_point(Rng& rng) {
 Vector3d random_point(Rng& rng, const Grid& grid) {
   const std::vector<Cell> cells = grid.occupied();
   if (cells.empty() || rng.below(2) == 0) return random_point(rng);
-  const Box box = to_metres(cells[rng.below(cells.size())], resolution);
+  const Box box = to_metres(cells[rng.below(cells.size())], voxel_m);
   return box.lo + rng.uniform() * (box.hi - box.lo);
 }
 
@@ -112,7 +111,7 @@ TEST_CASE("a map's distance is signed: inside it is minus that to the nearest fr
   CAPTURE(seed);
   Rng rng(seed);
   const Grid grid = random_grid(rng);
-  const MapField field(grid.occupied(), resolution, reachable);
+  const MapField field(grid.occupied(), voxel_m, reachable);
   MapField::Scratch scratch(field);
   int inside = 0;
   for (int i = 0; i < 60; ++i) {
@@ -153,7 +152,7 @@ TEST_CASE("a capsule's axis is as deep as its deepest point, and as near as its 
   CAPTURE(seed);
   Rng rng(seed);
   const Grid grid = random_grid(rng);
-  const MapField field(grid.occupied(), resolution, reachable);
+  const MapField field(grid.occupied(), voxel_m, reachable);
   MapField::Scratch scratch(field);
   int inside = 0;
   for (int i = 0; i < 25; ++i) {
@@ -181,7 +180,7 @@ TEST_CASE("a map that changed answers as one made anew", "[scene][property]") {
   CAPTURE(seed);
   Rng rng(seed);
   Grid grid = seed == 0 ? Grid() : random_grid(rng);
-  MapField field(grid.occupied(), resolution, reachable);
+  MapField field(grid.occupied(), voxel_m, reachable);
   for (int round = 0; round < 12; ++round) {
     CAPTURE(round);
     // seen before the change, so that the table knows the old state
@@ -199,7 +198,7 @@ TEST_CASE("a map that changed answers as one made anew", "[scene][property]") {
     for (const Cell& cell : remove) without.set(cell.lo, false);
     CHECK(changed.removed == before.count() - without.count());
     CHECK(changed.added == grid.count() - without.count());
-    const MapField anew(grid.occupied(), resolution, reachable);
+    const MapField anew(grid.occupied(), voxel_m, reachable);
     MapField::Scratch scratch(field), scratch_anew(anew);
     for (int i = 0; i < 15; ++i) {
       const Vector3d p = random_point(rng, grid), q = random_point(rng);

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/test/scene_data.hpp"
 
 namespace {

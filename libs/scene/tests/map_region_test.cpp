@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/test/scene_data.hpp"

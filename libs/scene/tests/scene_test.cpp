@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/test/scene_data.hpp"
 
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
 using namespace hamelin;
@@ -137,7 +137,7 @@ TEST_CASE("distances of the arm to itself are those of all sphere pairs, the Pan
     return;
   }
   const model::Robot robot =
-      model::read_robot(robots / "panda.urdf", {"panda_grasptarget", robots / "panda_spheres.json"});
+      description::read_robot(robots / "panda.urdf", {"panda_grasptarget", robots / "panda_spheres.json"});
   check_against_brute_force(robot);
   const SelfField field{model::Model(robot)};
   CHECK(field.note().empty());
@@ -157,7 +157,8 @@ TEST_CASE("distances of the arm to itself are those of all sphere pairs, the Pan
 TEST_CASE("a robot that lists no disabled pairs is checked but for neighbouring links, which is said",
           "[scene][self]") {
   const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
-  const model::Robot robot = model::read_robot(robots / "arm7.urdf", {std::nullopt, robots / "arm7.spheres.json"});
+  const model::Robot robot =
+      description::read_robot(robots / "arm7.urdf", {std::nullopt, robots / "arm7.spheres.json"});
   check_against_brute_force(robot);
   const SelfField field{model::Model(robot)};
   CHECK(field.pairs().size() == 7 * 6 / 2 - 6);

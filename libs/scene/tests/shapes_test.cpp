@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <vector>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/self_collision.hpp"
@@ -19,8 +19,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using namespace hamelin;
 using namespace hamelin::scene;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // The least of a function that is convex on [0, 1], by sections; an independent way to what closest_on does.
 template <class F>

@@ -10,6 +10,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/provenance.hpp"
+#include "hamelin/simulation/integrator_options.hpp"
 #include "plant.hpp"
 
 namespace hamelin::simulation {
@@ -84,7 +85,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
     : scene_(scene),
       plant_(load_model(scene)),
       ws_(plant_),
-      options_(integration::options_from_json(scene.integrator.params, scene.name + ": /integrator/params")),
+      options_(integrator_options(scene.integrator.params, scene.name + ": /integrator/params")),
       integrator_(integration::make_integrator(scene.integrator.name, plant_, options_)),
       noise_(scene.seed),
       planner_([&] {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/simulation/integrator_options.hpp"
 #include "plant.hpp"
 #include "recorder.hpp"
 
@@ -26,7 +27,7 @@ FreeMotion free_motion(const scene::Scene& given, const model::Model& model) {
   motion.step_s = scene.step_s;
   motion.duration_s = scene.duration_s;
   motion.integrator = scene.integrator.name;
-  motion.options = integration::options_from_json(scene.integrator.params, scene.name + ": /integrator/params");
+  motion.options = integrator_options(scene.integrator.params, scene.name + ": /integrator/params");
   motion.damping = plant_damping(scene, model.robot());
   motion.coulomb = plant_friction(scene, model.robot());
   motion.coulomb_speed = scene.model.friction_speed;

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/simulation/run.hpp"
 
 namespace hamelin::simulation {
@@ -51,7 +51,8 @@ Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbe
 }  // namespace
 
 model::Model load_model(const scene::Scene& scene) {
-  model::Robot robot = model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
+  model::Robot robot =
+      description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   if (scene.model.payload) add_payload(robot, *scene.model.payload);
   if (!scene.model.armature.from_robot) {
     const Eigen::VectorXd armature =

@@ -8,8 +8,8 @@
 #include <cstdlib>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/planning/plugin_host.hpp"

@@ -1,4 +1,5 @@
 #include "closed_loop.hpp"
+#include "hamelin/simulation/integrator_options.hpp"
 #include "plant.hpp"
 
 namespace hamelin::simulation {
@@ -9,7 +10,7 @@ log::Result run(const scene::Scene& scene, const std::vector<std::filesystem::pa
 }
 
 Json full_config(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories) {
-  (void)integration::options_from_json(scene.integrator.params, scene.name + ": /integrator/params");
+  (void)integrator_options(scene.integrator.params, scene.name + ": /integrator/params");
   Json config = resolved_config(scene);
   if (scene.planner)
     config["planner"]["params"] =

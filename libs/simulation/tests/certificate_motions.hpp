@@ -17,8 +17,8 @@
 
 #include "certificate.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 #include "hamelin/scene/make.hpp"
 
 /// Random motions of an arm, judged twice: by the certificate, and by dense sampling with FCL, which shares no code
@@ -281,16 +281,16 @@ inline std::vector<Stage> stages(const std::filesystem::path& folder) {
   };
   const scene::Box around{{-0.8, -0.8, 0.0}, {0.8, 0.8, 1.0}};
   const auto arm7 = [&] {
-    model::RobotOptions options;
+    description::RobotOptions options;
     options.spheres = data / "robots/arm7.spheres.json";
-    return model::Model(model::read_robot(data / "robots/arm7.urdf", options));
+    return model::Model(description::read_robot(data / "robots/arm7.urdf", options));
   };
   scene::MapSpec shelf;
   shelf.file = data / "maps/shelf.bt";
   std::vector<Stage> all;
   all.push_back({"arm7, clutter", arm7(), clutter("hamelin_certificate_a.bt", 1, around, 0.25)});
   all.push_back({"arm7, shelf", arm7(), shelf});
-  all.push_back({"planar3, clutter", model::Model(model::read_robot(data / "robots/planar3.json")),
+  all.push_back({"planar3, clutter", model::Model(description::read_robot(data / "robots/planar3.json")),
                  clutter("hamelin_certificate_b.bt", 2, {{-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}}, 0.08)});
   all.push_back({"capsules, clutter", model::Model(model::make_chain({7, "x,z,x", 0.15, 1.0, 0.04})),
                  clutter("hamelin_certificate_c.bt", 3, around, 0.25)});

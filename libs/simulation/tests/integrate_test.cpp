@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/simulation/integrator_options.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/chains.hpp"
 
@@ -89,4 +90,10 @@ TEST_CASE("free motion can be stopped from outside", "[simulation][outcome]") {
   const auto result = simulation::integrate(arm, rest(3, 0.001, 10.0), watch);
   CHECK(result.outcome == log::Outcome::interrupted);
   CHECK(result.steps == 2000);
+}
+
+TEST_CASE("unknown keys and values of integrator parameters are refused", "[simulation][unit]") {
+  CHECK_THROWS_WITH(simulation::integrator_options(Json{{"tolerence", 1e-9}}, "scene.json"),
+                    Catch::Contains("tolerance"));
+  CHECK_THROWS_AS(simulation::integrator_options(Json{{"alpha", 1.5}}, "scene.json"), Error);
 }

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "hamelin/core/file.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/chains.hpp"
 
@@ -29,7 +29,7 @@ class ScratchScene {
  public:
   explicit ScratchScene(const model::Robot& robot)
       : robot_(std::filesystem::temp_directory_path() / ("hamelin_resistance_" + robot.name + ".json")) {
-    write_file_aside(robot_, model::robot_to_json(robot).dump());
+    write_file_aside(robot_, description::robot_to_json(robot).dump());
   }
   ~ScratchScene() {
     std::error_code ignored;

@@ -6,15 +6,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
 #include <sstream>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/core/numbers.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::study {
 
@@ -22,8 +22,6 @@ namespace {
 
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Leaves this much beyond the nearest are kept with it: they serve until the ball has moved half as far.
 constexpr double nearby_m = 0.04;
@@ -88,7 +86,7 @@ double radius_around(const scene::Obstacle& obstacle) {
 
 JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
   const model::Robot robot =
-      model::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
+      description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   std::vector<std::string> parts;  // of each ball
   std::map<std::string, int> counts;
   const auto add = [&](const std::string& part, int link, const Vector3d& center, double radius) {

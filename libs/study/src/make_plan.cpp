@@ -7,9 +7,9 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/study/judge.hpp"
 #include "sphere_on_path.hpp"
 
@@ -303,7 +303,8 @@ class Maker {
   // Links as rows of tiny spheres; the set-up of SPEC §4.
   void add_gain_scenes() {
     const scene::Scene base = scene::read_scene(*options_.base);
-    model::Robot robot = model::read_robot(base.robot.file, {base.robot.tip, base.robot.spheres, base.robot.srdf});
+    model::Robot robot =
+        description::read_robot(base.robot.file, {base.robot.tip, base.robot.spheres, base.robot.srdf});
     for (auto& link : robot.links) {
       if (link.segments.empty())
         throw Error(ErrorCode::invalid,
@@ -323,7 +324,7 @@ class Maker {
       }
     }
     const std::string robot_file = fmt::format("{}_segments.json", robot.name);
-    write_file_aside(scenes() / robot_file, model::robot_to_json(robot).dump(1) + "\n");
+    write_file_aside(scenes() / robot_file, description::robot_to_json(robot).dump(1) + "\n");
     Json document = read_json(*options_.base);
     document["robot"] = {{"file", robot_file}};
     document.erase("gravity_m_s2");

@@ -12,7 +12,7 @@ namespace hamelin::study {
 namespace {
 
 // Colours after Okabe and Ito, told apart by the colour-blind too; shapes differ as well.
-constexpr std::string_view style = R"css(
+constexpr std::string_view sweep_page_style = R"css(
 :root { --reached: #00845f; --contact: #c8480a; --stalled: #c98600; --timeout: #3b8fd0; --other: #8a8a8a; }
 @media (prefers-color-scheme: dark) { :root { --reached: #2fc79a; --contact: #ff7a45; --stalled: #f0b429;
   --timeout: #6cb8f2; --other: #8f979f; } }
@@ -266,7 +266,7 @@ std::string to_page(const Merged& merged) {
                                  merged.runs.size(), escaped(fmt::format("{}", fmt::join(directories, ", "))));
   for (const auto& note : merged.notes) html += fmt::format("<p>Note: {}.</p>\n", escaped(note));
   html += success_table(merged) + gain_map(merged) + causes_table(merged) + failures(merged);
-  return html_page("hamelin sweep", style, html);
+  return html_page("hamelin sweep", sweep_page_style, html);
 }
 
 }  // namespace hamelin::study

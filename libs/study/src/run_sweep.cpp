@@ -15,7 +15,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/study/sweep.hpp"
 
 namespace hamelin::study {

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <optional>
 
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/study/judge.hpp"
 

@@ -2,7 +2,7 @@
 #include <optional>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::study {
 

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::study {
 

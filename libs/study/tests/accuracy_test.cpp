@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 
 using namespace hamelin;
 using namespace hamelin::study;
@@ -24,7 +24,8 @@ model::Model chain(int links, const std::string& axes = "x,z,x") {
 }
 
 model::Model planar3() {
-  return model::Model(model::read_robot(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots/planar3.json", {}));
+  return model::Model(
+      description::read_robot(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots/planar3.json", {}));
 }
 
 AccuracyOptions falling(const std::string& schemes, const VectorXd& q0, double duration_s) {

@@ -13,8 +13,8 @@
 
 #include "../src/sphere_on_path.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/study/judge.hpp"
 

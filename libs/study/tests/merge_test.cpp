@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 using namespace hamelin;
 using namespace hamelin::study;

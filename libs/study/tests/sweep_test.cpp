@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/study/merge.hpp"
 
 using namespace hamelin;

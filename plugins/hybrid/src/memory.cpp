@@ -6,7 +6,7 @@ namespace hamelin::hybrid {
 
 namespace {
 
-constexpr double global_share = 0.2;  // of candidates drawn from all of joint space
+constexpr double memory_global_share = 0.2;  // of candidates drawn from all of joint space
 
 }  // namespace
 
@@ -30,7 +30,7 @@ void Memory::draw_all(const Eigen::VectorXd& q) {
   const double radius = std::min(2.5, 0.4 + 0.2 * count_);
   const auto known = std::min<Eigen::Index>(crumbs_, crumb_.cols());
   for (Eigen::Index c = 0; c < candidates; ++c) {
-    if (rng_.uniform() < global_share)
+    if (rng_.uniform() < memory_global_share)
       box_.draw(rng_, draw_);
     else
       box_.draw_near(rng_, q, radius * rng_.uniform(0.5, 1.0), draw_);

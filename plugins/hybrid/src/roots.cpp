@@ -11,7 +11,7 @@ namespace {
 
 // Tip goals: Newton-like steps along the law's own pull.
 constexpr int attempts = 60, iterations = 40;
-constexpr double step_s = 0.25;
+constexpr double newton_step = 0.25;
 constexpr double share = 0.6;  // of the goal's tolerances
 // A root keeps this share of the margins that the goal itself may keep.
 constexpr double clear_m = 0.003, clear_self_m = 0.001;
@@ -91,7 +91,7 @@ void Roots::solve_tip(Rng& rng) {
   const bool there = law_.within(model_, ws_, x_, *goal_, share);
   if (!there && iteration_++ < iterations) {
     law_.attract(model_, ws_, x_, {goal_, nullptr}, u_);
-    x_ = (x_ + step_s * u_).cwiseMax(box_.lower).cwiseMin(box_.upper);
+    x_ = (x_ + newton_step * u_).cwiseMax(box_.lower).cwiseMin(box_.upper);
     return;
   }
   if (there && surroundings_.clear(x_, clear_m, clear_self_m)) add(x_, 0.0);

@@ -3,6 +3,9 @@
 
 namespace hamelin::hybrid {
 
+/// A via counts as reached when no joint is farther from it than this [rad or m].
+inline constexpr double via_tolerance = 0.1;
+
 /// Looks for a way out of a stall, some configurations a tick.
 class Search {
  public:

@@ -8,8 +8,8 @@ namespace hamelin::hybrid {
 namespace {
 
 constexpr int extend_steps = 40, connect_steps = 80, direct_tries = 4;
-constexpr double via_tolerance = 0.1, join_tolerance = 0.04;
-constexpr double global_share = 0.3;                            // of vias drawn from all of joint space
+constexpr double join_tolerance = 0.04;
+constexpr double tree_global_share = 0.3;                       // of vias drawn from all of joint space
 constexpr double local_share = 0.5;                             // around a block on a path: of vias drawn nearby
 constexpr double near_radius = 0.3, far_radius = 2.5;           // of the others, around a node
 constexpr int cut_tries = 40;                                   // straight lines tried
@@ -123,7 +123,7 @@ void Tree::start_extension() {
   side_ = rounds_++ % 2;
   const auto& tree = trees_[static_cast<std::size_t>(side_)];
   const bool local = local_ && rng_.uniform() < local_share;
-  if (!local && rng_.uniform() < global_share) {
+  if (!local && rng_.uniform() < tree_global_share) {
     box_.draw(rng_, via_);
   } else {
     point_ = tree.q.col(static_cast<Eigen::Index>(rng_.below(static_cast<std::uint64_t>(tree.size()))));

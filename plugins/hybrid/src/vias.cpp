@@ -7,8 +7,8 @@ namespace hamelin::hybrid {
 namespace {
 
 constexpr int most_vias = 64, most_targets = 3, most_legs = 4, via_steps = 25, target_steps = 60;
-constexpr double via_tolerance = 0.1, target_tolerance = 0.04;
-constexpr double global_share = 0.25;
+constexpr double target_tolerance = 0.04;
+constexpr double via_global_share = 0.25;
 constexpr double worth = 0.05;  // nearer to the goal by this much, a way that does not arrive is taken
 
 }  // namespace
@@ -54,7 +54,7 @@ void Vias::next_via() {
   }
   begin_ = trial_.size();
   point_ = trial_.end();
-  if (rng_.uniform() < global_share)
+  if (rng_.uniform() < via_global_share)
     box_.draw(rng_, via_);
   else
     box_.draw_near(rng_, point_, rng_.uniform(0.2, std::min(2.5, 0.6 + 0.2 * stalls_)), via_);

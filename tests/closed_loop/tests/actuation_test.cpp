@@ -11,6 +11,7 @@ using log::Outcome;
 using test::run_scene;
 using test::scene_52;
 using test::ScratchFolder;
+using test::vector_of;
 
 namespace {
 
@@ -47,12 +48,6 @@ Logged logged_run(const ScratchFolder& folder, const Json& scene, const model::R
     if (line["type"] == "event") logged.events.push_back(line);
   }
   return logged;
-}
-
-Eigen::VectorXd vector_of(const Json& numbers) {
-  Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
-  return x;
 }
 
 }  // namespace

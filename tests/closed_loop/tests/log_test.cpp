@@ -14,7 +14,7 @@ using test::ScratchFolder;
 
 namespace {
 
-Json scene_of(const Json& planner) {
+Json logged_scene(const Json& planner) {
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
   scene["planner"] = planner;
@@ -45,12 +45,6 @@ double balance(const Json& tick) {
          energy("held_work_J") + energy("dissipated_J") - energy("node_work_J");
 }
 
-Eigen::VectorXd vector_of(const Json& numbers) {
-  Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
-  return x;
-}
-
 }  // namespace
 
 TEST_CASE("the logged torques are those that move the arm, in every channel", "[simulation][log]") {
@@ -64,19 +58,19 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
       {{{"name", "hybrid"}}, {"node"}}};
   for (const auto& [planner, channels] : planners) {
     CAPTURE(planner);
-    const auto ticks = ticks_of(folder, scene_of(planner), 1);
+    const auto ticks = ticks_of(folder, logged_scene(planner), 1);
     REQUIRE(ticks.size() > 1000);
     std::map<std::string, int> seen;
     double largest = 0.0, scale = 0.0;
     for (std::size_t i = 0; i + 2 < ticks.size(); ++i) {
-      const auto q = vector_of(ticks[i]["q"]), v = vector_of(ticks[i]["v"]), tau = vector_of(ticks[i]["tau"]);
+      const auto q = test::vector_of(ticks[i]["q"]), v = test::vector_of(ticks[i]["v"]), tau = test::vector_of(ticks[i]["tau"]);
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(4), expected(4);
       for (const auto& [channel, torque] : ticks[i]["channels"].items()) {
-        sum += vector_of(torque);
+        sum += test::vector_of(torque);
         ++seen[channel];
       }
       REQUIRE((sum - tau).norm() <= 1e-12 * (1.0 + tau.norm()));
-      const Eigen::VectorXd moved = (vector_of(ticks[i + 1]["v"]) - v) / 0.001;
+      const Eigen::VectorXd moved = (test::vector_of(ticks[i + 1]["v"]) - v) / 0.001;
       dynamics::forward_dynamics(model, ws, q, v, tau, expected);
       largest = std::max(largest, (moved - expected).norm());
       scale = std::max(scale, expected.norm());
@@ -93,7 +87,7 @@ TEST_CASE("the energies in a log balance at every tick, the last too, in every c
   Json potential = {{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
   for (const Json& planner : {potential, Json{{"name", "gyro"}}, Json{{"name", "hybrid"}}}) {
     CAPTURE(planner);
-    const auto ticks = ticks_of(folder, scene_of(planner), 1);
+    const auto ticks = ticks_of(folder, logged_scene(planner), 1);
     double error = 0.0, work = 0.0;
     for (const auto& tick : ticks) {
       error = std::max(error, std::abs(balance(tick) - balance(ticks[0])));
@@ -107,7 +101,7 @@ TEST_CASE("the energies in a log balance at every tick, the last too, in every c
 
 TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation][log]") {
   const ScratchFolder folder;
-  const Json scene = scene_of({{"name", "gyro"}});
+  const Json scene = logged_scene({{"name", "gyro"}});
   Json result;
   const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37, &result);
   REQUIRE(few.size() == (all.size() - 1 + 36) / 37 + 1);

@@ -3,8 +3,8 @@
 #include <string>
 
 #include "../scratch_scene.hpp"
-#include "hamelin/core/json.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/scene/make.hpp"
 
@@ -37,7 +37,7 @@ void make_maps(const ScratchFolder& folder) {
   (void)scene::make_map(options);
 }
 
-Json scene_of(const std::string& planner) {
+Json wall_scene(const std::string& planner) {
   const std::filesystem::path data = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
   Json scene = read_json(data / "scenes" / ("paper_52_" + planner + ".json"));
   scene["robot"]["file"] = (data / "robots" / "planar4.json").string();
@@ -56,7 +56,7 @@ Run run(const ScratchFolder& folder, const Json& document) {
   const auto file = folder.path() / "scene.json";
   write_file_aside(file, document.dump(1));
   const scene::Scene scene = scene::read_scene(file);
-  const model::Model model(model::read_robot(scene.robot.file));
+  const model::Model model(description::read_robot(scene.robot.file));
   const scene::Environment walls({}, {wall()}, {}, model.reach(), 0.1);
   dynamics::Workspace ws(model);
   scene::PlacedShapes arm(model);
@@ -85,7 +85,7 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
   CAPTURE(planner);
   const ScratchFolder folder;
   make_maps(folder);
-  Json scene = scene_of(planner);
+  Json scene = wall_scene(planner);
 
   const Run without = run(folder, scene);
   REQUIRE(without.through_s);  // else the wall would prove nothing
@@ -115,7 +115,7 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
 TEST_CASE("a wall that is taken away is no longer there", "[simulation][map]") {
   const ScratchFolder folder;
   make_maps(folder);
-  Json scene = scene_of("apf");
+  Json scene = wall_scene("apf");
   scene["map"] = {{"file", "wall.bt"}};
   const Run with = run(folder, scene);
   CHECK_FALSE(with.through_s);

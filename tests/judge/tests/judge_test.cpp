@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/simulation/run.hpp"
 

@@ -1,8 +1,6 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 
 namespace hamelin {
@@ -18,18 +16,11 @@ enum class ErrorCode : std::int32_t {
 
 [[nodiscard]] std::string_view to_string(ErrorCode code) noexcept;
 
-/// How many bytes from the beginning are UTF-8: all of them if it is UTF-8 text.
-[[nodiscard]] std::size_t utf8_prefix(std::string_view text) noexcept;
-
-/// Text for one line, whatever was in the file it speaks of: control characters become blanks, what is not UTF-8
-/// question marks, and beyond 2000 bytes it is cut.
-[[nodiscard]] std::string one_line(std::string_view text);
-
 /// Bad input, found by a constructor, reader or loader. The text is one line: file, place, what is wrong, what was
 /// expected. Numeric outcomes (a step that did not converge) are values, never exceptions.
 class Error : public std::runtime_error {
  public:
-  Error(ErrorCode code, std::string_view what) : std::runtime_error(one_line(what)), code_(code) {}
+  Error(ErrorCode code, std::string_view what);
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
 
  private:

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
 #include "hamelin/fit/cover.hpp"
 #include "hamelin/fit/coverage.hpp"
 #include "hamelin/fit/shape.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::fit {
 

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/description/srdf.hpp"
 #include "hamelin/model/robot.hpp"
-#include "hamelin/model/srdf.hpp"
 
 namespace hamelin::fit {
 
@@ -38,16 +38,16 @@ struct SelfCheck {
   /// What a user would list as disabled, as MoveIt's setup assistant does, with the reasons it gives: what is listed
   /// already, neighbours that touch ("Adjacent"), what touches in all samples ("Always") or at rest ("Default"); and,
   /// if `never`, what touched in none ("Never"), which no number of samples proves.
-  [[nodiscard]] std::vector<model::DisabledPair> disabled(bool never) const;
+  [[nodiscard]] std::vector<description::DisabledPair> disabled(bool never) const;
 };
 
 /// Distances of all pairs of parts at rest and over random configurations, by the product of exponentials. Joints
 /// without limits turn through [−π, π] or slide through [−1, 1] m.
 /// @param listed where reasons are taken from for pairs that the robot lists as disabled
-[[nodiscard]] SelfCheck check_self(const model::Robot& robot, const std::vector<model::DisabledPair>& listed,
+[[nodiscard]] SelfCheck check_self(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
                                    const SelfCheckOptions& options);
 
 /// The text of an SRDF with these pairs.
-[[nodiscard]] std::string srdf_text(const std::string& robot, const std::vector<model::DisabledPair>& pairs);
+[[nodiscard]] std::string srdf_text(const std::string& robot, const std::vector<description::DisabledPair>& pairs);
 
 }  // namespace hamelin::fit

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 
 namespace hamelin::integration {
@@ -85,10 +84,6 @@ struct Options {
 
   [[nodiscard]] bool step_control() const noexcept { return rtol > 0.0 || atol > 0.0; }
 };
-
-/// Options from a scene's or command line's parameters, docs/schema/integrator.schema.json.
-/// @throws Error invalid naming `where` and the key
-[[nodiscard]] Options options_from_json(const Json& params, const std::string& where);
 
 /// A one-step scheme for a chain: θ^k → θ^{k+1}. One object a thread; State is the memory. No allocation in a step.
 class Integrator {

@@ -83,4 +83,7 @@ struct Robot {
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 
+/// How a matrix fails to be the inertia of a body: empty if it is one. `strict`: definite, not only semi-definite.
+[[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool strict);
+
 }  // namespace hamelin::model

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_abi.h"
 

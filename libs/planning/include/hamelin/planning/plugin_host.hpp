@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_abi.h"
 

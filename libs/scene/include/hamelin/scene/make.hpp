@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/scene/boxes.hpp"
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/scene/scene.hpp"

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
 #include "hamelin/geometry/se3.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/obstacles.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/simulation/run.hpp"
 
 namespace hamelin::simulation {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 
 /// Speed against error of integrators in free motion; behind `hamelin accuracy`.

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
 
 /// A second opinion on contact. It shares with what planners and runs use only the files and how they are read: the arm
@@ -28,7 +28,7 @@ class JudgedArm {
   /// Rows of balls lie within their capsules and reach to within this of their surfaces [m].
   static constexpr double capsule_gap_m = 1e-4;
 
-  /// @throws Error as model::read_robot does
+  /// @throws Error as description::read_robot does
   explicit JudgedArm(const scene::Scene& scene);
 
   [[nodiscard]] std::size_t dof() const noexcept { return joints_.size(); }

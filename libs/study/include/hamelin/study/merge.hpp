@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/study/sweep.hpp"
 
 namespace hamelin::study {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/log/result.hpp"
 #include "hamelin/scene/scene.hpp"
 

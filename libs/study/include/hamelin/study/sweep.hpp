@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 /// A sweep is a directory: `plan.json` (hamelin.sweep/1), what the plan made (`scenes/`), and `records.jsonl`
 /// (hamelin.record/1), one line a run in the order in which they ended.

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::test {
 

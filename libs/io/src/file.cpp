@@ -1,4 +1,4 @@
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>

@@ -4,12 +4,24 @@
 #include <utility>
 #include <vector>
 
+#include "hamelin/core/text.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/description/srdf.hpp"
 #include "hamelin/model/robot.hpp"
-#include "hamelin/model/robot_io.hpp"
-#include "hamelin/model/srdf.hpp"
 
 /// What the readers share.
-namespace hamelin::model::detail {
+namespace hamelin::description {
+
+using geometry::SE3;
+using model::Joint;
+using model::JointType;
+using model::Link;
+using model::Robot;
+using model::Segment;
+using model::Sphere;
+using model::Vector6d;
+
+namespace detail {
 
 /// Spheres and capsules by link, and pairs of links that never count as colliding.
 struct SphereFile {
@@ -40,15 +52,10 @@ void round_to_quaternions(Robot& robot);
 /// "a, b, c"
 [[nodiscard]] std::string join(const std::vector<std::string>& names);
 
-/// "; did you mean 'x'?" or nothing.
-[[nodiscard]] std::string suggestion(const std::string& name, const std::vector<std::string>& candidates);
-
 /// Makes the screw's direction a unit vector.
 /// @return what to note, empty if it was one (to 1e-6)
 /// @throws Error invalid if it is zero; `where` opens the message
 [[nodiscard]] std::string normalise_screw(Joint& joint, const std::string& where);
 
-/// How a matrix fails to be the inertia of a body: empty if it is one. `strict`: definite, not only semi-definite.
-[[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool strict);
-
-}  // namespace hamelin::model::detail
+}  // namespace detail
+}  // namespace hamelin::description

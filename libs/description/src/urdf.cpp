@@ -14,13 +14,13 @@
 #include <set>
 #include <string_view>
 
+#include "detail.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
-#include "hamelin/model/srdf.hpp"
-#include "hamelin/model/urdf_geometry.hpp"
-#include "robot_detail.hpp"
+#include "hamelin/description/srdf.hpp"
+#include "hamelin/description/urdf_geometry.hpp"
+#include "hamelin/io/file.hpp"
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 namespace {
 
@@ -249,7 +249,7 @@ void check_edges(const TiXmlElement& robot, const std::string& where, const Outl
       if (outline.link_lines.count(link) == 0)
         fail(ErrorCode::invalid, place,
              fmt::format("joint '{}': its {} '{}' is no link of the file{}", joint, end, link,
-                         detail::suggestion(link, names)));
+                         did_you_mean(link, names)));
       if (std::string_view(end) == "child") {
         const auto [before, is_new] = carrier.emplace(link, joint);
         if (!is_new)
@@ -440,7 +440,7 @@ class Reader {
       if (tip_ == nullptr)
         fail(ErrorCode::invalid, where_,
              fmt::format("no link '{}' for the tip{}; leaves are: {}", *options_.tip,
-                         detail::suggestion(*options_.tip, names), detail::join(leaves)));
+                         did_you_mean(*options_.tip, names), detail::join(leaves)));
     } else {
       if (leaves.size() != 1)
         fail(ErrorCode::invalid, where_, fmt::format("several leaves, name one as the tip: {}", detail::join(leaves)));
@@ -555,7 +555,7 @@ class Reader {
     const std::vector<std::string> names = link_names();
     if (std::find(names.begin(), names.end(), name) == names.end())
       fail(ErrorCode::invalid, options_.spheres->string(),
-           fmt::format("the robot has no link '{}'{}", name, detail::suggestion(name, names)));
+           fmt::format("the robot has no link '{}'{}", name, did_you_mean(name, names)));
   }
 
   struct Inertial {
@@ -572,7 +572,7 @@ class Reader {
     Matrix3d I;
     I << given.ixx, given.ixy, given.ixz, given.ixy, given.iyy, given.iyz, given.ixz, given.iyz, given.izz;
     if (!(given.mass >= 0.0)) fail_at_link(link.name, fmt::format("mass {} kg, expected at least 0", given.mass));
-    const std::string fault = detail::inertia_fault(I, false);
+    const std::string fault = model::inertia_fault(I, false);
     if (!fault.empty()) fail_at_link(link.name, "inertia " + fault);
     if (given.mass == 0.0 && I.isZero(0.0)) return std::nullopt;
     if (given.mass == 0.0) note("warning: link '{}' has inertia but no mass; the inertia counts", link.name);
@@ -825,4 +825,4 @@ std::vector<LinkGeometry> read_urdf_geometry(const std::filesystem::path& file) 
   return links;
 }
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

@@ -10,12 +10,13 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/model/make_chain.hpp"
-#include "hamelin/model/robot_io.hpp"
 
 using namespace hamelin;
+using namespace hamelin::description;
 using namespace hamelin::model;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -165,7 +166,7 @@ void check_same(const Robot& a, const Robot& b) {
 
 }  // namespace
 
-TEST_CASE("a URDF's joints, limits, spheres and tip come out in the base frame at q = 0", "[model][robot]") {
+TEST_CASE("a URDF's joints, limits, spheres and tip come out in the base frame at q = 0", "[description][robot]") {
   const Robot robot = read_text("arm.urdf", arm);
   REQUIRE(robot.dof() == 2);
   CHECK(robot.name == "arm");
@@ -191,7 +192,7 @@ TEST_CASE("a URDF's joints, limits, spheres and tip come out in the base frame a
   CHECK(noted(robot, "base: base (does not move"));
 }
 
-TEST_CASE("the inertial frame's rotation is honoured", "[model][robot]") {
+TEST_CASE("the inertial frame's rotation is honoured", "[description][robot]") {
   const Robot robot = read_text(
       "arm.urdf", replaced(arm, R"(<origin xyz="0 0 0.1"/><mass)", R"(<origin xyz="0 0 0.1" rpy="0 0 0.5"/><mass)"));
   const Matrix3d& R = robot.links[0].com.R();
@@ -200,7 +201,7 @@ TEST_CASE("the inertial frame's rotation is honoured", "[model][robot]") {
   CHECK(robot.links[0].inertia_kg_m2 == Matrix3d(Vector3d(0.02, 0.02, 0.01).asDiagonal()));
 }
 
-TEST_CASE("lumping keeps mass, COM, inertia and spheres: against a cloud of points", "[model][robot]") {
+TEST_CASE("lumping keeps mass, COM, inertia and spheres: against a cloud of points", "[description][robot]") {
   // Two bodies of point masses; the second hangs on the first by a fixed joint and a locked one. The reference sums the
   // points, the reader only sees each body's mass, COM and inertia.
   Rng rng(7);
@@ -275,7 +276,7 @@ TEST_CASE("lumping keeps mass, COM, inertia and spheres: against a cloud of poin
   CHECK_FALSE(link.joint.lower.has_value());  // continuous
 }
 
-TEST_CASE("what a URDF offers and is not used is noted", "[model][robot]") {
+TEST_CASE("what a URDF offers and is not used is noted", "[description][robot]") {
   SECTION("no spheres") {
     const Robot robot = read_text("arm.urdf", replaced(arm, "<sphere radius=\"0.05\"/>", "<box size=\"1 1 1\"/>"));
     CHECK(noted(robot, "no collision spheres"));
@@ -329,7 +330,7 @@ TEST_CASE("what a URDF offers and is not used is noted", "[model][robot]") {
 }
 
 TEST_CASE("a massless moving link is accepted only where what it carries has inertia about its joint",
-          "[model][robot]") {
+          "[description][robot]") {
   // A universal joint: the cross piece weighs nothing, its joint turns the lower link.
   const std::string cross = replaced(replaced(arm, inertial, ""), "type=\"prismatic\"", "type=\"revolute\"");
   CHECK(read_text("arm.urdf", cross).links[0].mass_kg == 0.0);
@@ -342,7 +343,7 @@ TEST_CASE("a massless moving link is accepted only where what it carries has ine
              Catch::Contains("nothing it moves has inertia"));
 }
 
-TEST_CASE("a bad URDF is refused in one line that says where and what", "[model][robot]") {
+TEST_CASE("a bad URDF is refused in one line that says where and what", "[description][robot]") {
   struct Bad {
     const char* what;
     std::string text;
@@ -471,7 +472,7 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[model]
   }
 }
 
-TEST_CASE("a file that is no robot file is refused", "[model][robot]") {
+TEST_CASE("a file that is no robot file is refused", "[description][robot]") {
   CHECK_THROWS_AS(read_robot(data), Error);  // a directory
   CHECK_THROWS_AS(read_robot(data / "absent.urdf"), Error);
   CHECK_THAT(message_of("arm.txt", arm), Catch::Contains("unknown kind of robot file '.txt', expected .urdf or .json"));
@@ -481,7 +482,7 @@ TEST_CASE("a file that is no robot file is refused", "[model][robot]") {
              Catch::Contains("no link 'toll' for the tip; did you mean 'tool'?; leaves are: tool"));
 }
 
-TEST_CASE("a bad JSON robot is refused with its place", "[model][robot]") {
+TEST_CASE("a bad JSON robot is refused with its place", "[description][robot]") {
   const Json good = robot_to_json(make_chain({}));
   const auto message = [&](const std::string& pointer, const Json& value) {
     Json bad = good;
@@ -521,7 +522,7 @@ TEST_CASE("a bad JSON robot is refused with its place", "[model][robot]") {
              Catch::Contains("no tip 'hand': a JSON robot has the one tip it names, 'link7'"));
 }
 
-TEST_CASE("a robot survives its JSON form bit for bit", "[model][robot]") {
+TEST_CASE("a robot survives its JSON form bit for bit", "[description][robot]") {
   std::vector<Robot> robots{make_chain({}), read_text("arm.urdf", arm), read_robot(data / "planar3.json"),
                             read_robot(data / "planar4.json")};
   RobotOptions options;
@@ -547,7 +548,7 @@ TEST_CASE("a robot survives its JSON form bit for bit", "[model][robot]") {
   }
 }
 
-TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
+TEST_CASE("a sidecar's spheres replace the file's own", "[description][robot]") {
   const Scratch spheres(
       "spheres.json",
       R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}], "tool": [{"center": [0.1, 0, 0], "radius": 0.2}],
@@ -592,7 +593,8 @@ TEST_CASE("a sidecar's spheres replace the file's own", "[model][robot]") {
              Catch::Contains("pairs of link names"));
 }
 
-TEST_CASE("a sidecar's capsules come to their links as its spheres do, and replace the file's own", "[model][robot]") {
+TEST_CASE("a sidecar's capsules come to their links as its spheres do, and replace the file's own",
+          "[description][robot]") {
   const Scratch sidecar("shapes.json",
                         R"({"links": {"upper": [{"center": [0, 0, 0.2], "radius": 0.1}]},
     "capsules": {"lower": [{"from": [0, 0, 0], "to": [0, 0, 0.2], "radius": 0.1}],
@@ -653,7 +655,7 @@ TEST_CASE("a sidecar's capsules come to their links as its spheres do, and repla
              Catch::Contains("/capsules/lower/0/radius"));
 }
 
-TEST_CASE("parts of a JSON robot are checked, and a sidecar replaces them with their pairs", "[model][robot]") {
+TEST_CASE("parts of a JSON robot are checked, and a sidecar replaces them with their pairs", "[description][robot]") {
   const Scratch spheres("spheres.json", R"({"links": {"lower": [{"center": [0, 0, 0], "radius": 0.1}],
     "tool": [{"center": [0.1, 0, 0], "radius": 0.2}], "base": [{"center": [0, 0, 0], "radius": 0.2}]},
     "self_collision_disabled": [["upper", "lower"], ["base", "tool"]]})");
@@ -685,7 +687,7 @@ TEST_CASE("parts of a JSON robot are checked, and a sidecar replaces them with t
   CHECK(robot.self_collision_disabled == std::vector<std::pair<std::string, std::string>>{{"upper", "lower"}});
 }
 
-TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[model][robot]") {
+TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[description][robot]") {
   const Robot robot = make_chain({4, "x,z,x", 0.2, 1.0, 0.03});
   REQUIRE(robot.dof() == 4);
   for (int i = 0; i < 4; ++i) {
@@ -714,7 +716,7 @@ TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[model]
     CHECK_THROWS_AS(make_chain(bad), Error);
 }
 
-TEST_CASE("public URDFs load with their tips, and without one name the leaves", "[model][robot]") {
+TEST_CASE("public URDFs load with their tips, and without one name the leaves", "[description][robot]") {
   if (!fs::exists(shared)) {
     WARN("no shared robots here: skipped");
     return;
@@ -765,7 +767,7 @@ TEST_CASE("public URDFs load with their tips, and without one name the leaves", 
   }
 }
 
-TEST_CASE("the example robot file's form is read", "[model][robot]") {
+TEST_CASE("the example robot file's form is read", "[description][robot]") {
   const fs::path example = fs::path(HAMELIN_SOURCE_DIR "/../shared/examples/robot.json");
   if (!fs::exists(example)) {
     WARN("no shared examples here: skipped");
@@ -780,7 +782,7 @@ TEST_CASE("the example robot file's form is read", "[model][robot]") {
 }
 
 TEST_CASE("arm7's spheres cover it and no two links more than a joint apart overlap at the ready pose",
-          "[model][robot]") {
+          "[description][robot]") {
   RobotOptions options;
   options.spheres = data / "arm7.spheres.json";
   const Robot robot = read_robot(data / "arm7.urdf", options);

@@ -3,10 +3,10 @@
 #include <optional>
 #include <string>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/robot.hpp"
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 /// What a robot file leaves open.
 struct RobotOptions {
@@ -25,7 +25,7 @@ struct RobotOptions {
 /// Reads a robot from a .urdf or a .json file (schema "robot") and checks it. What was lumped, locked or skipped stands
 /// in `notes`.
 /// @throws Error io, parse or invalid: "file: place: what is wrong, what was expected"
-[[nodiscard]] Robot read_robot(const std::filesystem::path& file, const RobotOptions& options = {});
+[[nodiscard]] model::Robot read_robot(const std::filesystem::path& file, const RobotOptions& options = {});
 
 /// Checks a sidecar with collision shapes by itself: whether its link names fit shows only with its robot.
 /// @return how many spheres and capsules it holds
@@ -35,10 +35,10 @@ struct RobotOptions {
 /// A self-contained description, of schema "robot". Reading it back gives the same robot, bit for bit, if the robot
 /// came from read_robot, robot_from_json or make_chain (else its rotations are rounded to quaternions). Some rotations
 /// have no quaternion of doubles that leads back to them: those move by some 1e-16.
-[[nodiscard]] Json robot_to_json(const Robot& robot);
+[[nodiscard]] Json robot_to_json(const model::Robot& robot);
 
 /// @param where opens the error messages (a file name)
 /// @throws Error invalid
-[[nodiscard]] Robot robot_from_json(const Json& document, const std::string& where);
+[[nodiscard]] model::Robot robot_from_json(const Json& document, const std::string& where);
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

@@ -48,8 +48,4 @@ void check_shipped_schema(const Json& document, std::string_view schema_name, co
 /// nested objects included.
 [[nodiscard]] Json with_defaults(Json document, const Json& schema);
 
-/// The candidate nearest to `name`, or empty if none is near (edits up to a third of its letters, a swap of neighbours
-/// being one edit, and less than half of the longer name): for "did you mean". Of names beyond 100 bytes none is near.
-[[nodiscard]] std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
-
 }  // namespace hamelin

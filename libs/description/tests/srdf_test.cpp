@@ -1,4 +1,4 @@
-#include "hamelin/model/srdf.hpp"
+#include "hamelin/description/srdf.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/model/robot_io.hpp"
+#include "hamelin/description/robot_io.hpp"
 
 using namespace hamelin;
 namespace fs = std::filesystem;
@@ -50,7 +50,7 @@ const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
 
 }  // namespace
 
-TEST_CASE("disabled pairs are read with their reasons and lines, all else is passed over", "[model][unit]") {
+TEST_CASE("disabled pairs are read with their reasons and lines, all else is passed over", "[description][unit]") {
   const Folder folder;
   const auto file = folder.put("a.srdf", R"(<?xml version="1.0"?>
 <!-- a comment -->
@@ -60,7 +60,7 @@ TEST_CASE("disabled pairs are read with their reasons and lines, all else is pas
   <disable_collisions link1="b" link2="c &amp; d"/>
   <virtual_joint name="v" type="fixed" parent_frame="w" child_link="a"/>
 </robot>)");
-  const auto pairs = model::read_srdf(file);
+  const auto pairs = description::read_srdf(file);
   REQUIRE(pairs.size() == 2);
   CHECK(pairs[0].link_a == "a");
   CHECK(pairs[0].link_b == "b");
@@ -70,10 +70,10 @@ TEST_CASE("disabled pairs are read with their reasons and lines, all else is pas
   CHECK(pairs[1].reason.empty());
 }
 
-TEST_CASE("a broken SRDF ends in one line with file, line and what was expected", "[model][unit]") {
+TEST_CASE("a broken SRDF ends in one line with file, line and what was expected", "[description][unit]") {
   const Folder folder;
   const auto of = [&](const std::string& text) {
-    return error_of([&] { (void)model::read_srdf(folder.put("x.srdf", text)); });
+    return error_of([&] { (void)description::read_srdf(folder.put("x.srdf", text)); });
   };
   CHECK_THAT(of(""), Catch::Contains("x.srdf") && Catch::Contains("empty"));
   CHECK_THAT(of("<robot>\n<disable_collisions link1=\"a\"/></robot>"),
@@ -89,7 +89,7 @@ TEST_CASE("a broken SRDF ends in one line with file, line and what was expected"
   CHECK_THAT(of(deep), Catch::Contains("nest"));
 }
 
-TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note says so", "[model][unit]") {
+TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note says so", "[description][unit]") {
   const Folder folder;
   const auto srdf = folder.put("x.srdf",
                                "<robot name=\"arm7\"><disable_collisions link1=\"link2\" link2=\"link1\"/>"
@@ -97,7 +97,7 @@ TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note sa
   const auto spheres = folder.put("s.json", R"({"links": {"link1": [{"center": [0, 0, 0], "radius": 0.1}],
       "link2": [{"center": [0, 0, 0], "radius": 0.1}], "link3": [{"center": [0, 0, 0], "radius": 0.1}]},
       "self_collision_disabled": [["link1", "link2"]]})");
-  const auto robot = model::read_robot(robots / "arm7.urdf", {{}, spheres, srdf});
+  const auto robot = description::read_robot(robots / "arm7.urdf", {{}, spheres, srdf});
   CHECK(robot.self_collision_disabled ==
         std::vector<std::pair<std::string, std::string>>{{"link1", "link2"}, {"link2", "link3"}});
   CHECK(std::any_of(robot.notes.begin(), robot.notes.end(), [](const std::string& note) {
@@ -105,22 +105,22 @@ TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note sa
   }));
 }
 
-TEST_CASE("a link that the URDF has not is an error with the nearest name", "[model][unit]") {
+TEST_CASE("a link that the URDF has not is an error with the nearest name", "[description][unit]") {
   const Folder folder;
   const auto srdf = folder.put("x.srdf", "<robot>\n<disable_collisions link1=\"link1\" link2=\"linc2\"/></robot>");
-  const std::string said = error_of([&] { (void)model::read_robot(robots / "arm7.urdf", {{}, {}, srdf}); });
+  const std::string said = error_of([&] { (void)description::read_robot(robots / "arm7.urdf", {{}, {}, srdf}); });
   CHECK_THAT(said, Catch::Contains("x.srdf: line 2") && Catch::Contains("no link 'linc2'") &&
                        Catch::Contains("did you mean 'link2'"));
 }
 
-TEST_CASE("a JSON robot takes the pairs of links it has and notes the others", "[model][unit]") {
+TEST_CASE("a JSON robot takes the pairs of links it has and notes the others", "[description][unit]") {
   const Folder folder;
-  const auto urdf = model::read_robot(robots / "arm7.urdf", {{}, robots / "arm7.spheres.json"});
-  const auto json = folder.put("r.json", model::robot_to_json(urdf).dump());
+  const auto urdf = description::read_robot(robots / "arm7.urdf", {{}, robots / "arm7.spheres.json"});
+  const auto json = folder.put("r.json", description::robot_to_json(urdf).dump());
   const auto srdf = folder.put("x.srdf",
                                "<robot><disable_collisions link1=\"link1\" link2=\"link2\"/>"
                                "<disable_collisions link1=\"link1\" link2=\"gripper\"/></robot>");
-  const auto robot = model::read_robot(json, {{}, {}, srdf});
+  const auto robot = description::read_robot(json, {{}, {}, srdf});
   CHECK(robot.self_collision_disabled == std::vector<std::pair<std::string, std::string>>{{"link1", "link2"}});
   CHECK(std::any_of(robot.notes.begin(), robot.notes.end(),
                     [](const std::string& note) { return note.find("1 more are of links") != std::string::npos; }));

@@ -1,4 +1,4 @@
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 #include <unistd.h>
 
@@ -32,7 +32,7 @@ struct Folder {
 
 }  // namespace
 
-TEST_CASE("bytes come back as they were written, and nothing else is left in the folder", "[core][unit]") {
+TEST_CASE("bytes come back as they were written, and nothing else is left in the folder", "[io][unit]") {
   const Folder folder;
   const std::string bytes("a\0b\r\n\xff", 6);
   write_file_aside(folder.path / "f", bytes);
@@ -44,11 +44,11 @@ TEST_CASE("bytes come back as they were written, and nothing else is left in the
   CHECK(folder.files() == 2);
 }
 
-TEST_CASE("a device is refused: it may have no end", "[core][unit]") {
+TEST_CASE("a device is refused: it may have no end", "[io][unit]") {
   CHECK_THROWS_WITH(read_file("/dev/zero"), "/dev/zero: is a device, want a file");
 }
 
-TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit]") {
+TEST_CASE("a write that fails leaves the old file and no half one", "[io][unit]") {
   const Folder folder;
   SECTION("where a folder stands in the way") {
     fs::create_directory(folder.path / "taken");
@@ -81,14 +81,14 @@ TEST_CASE("a write that fails leaves the old file and no half one", "[core][unit
   }
 }
 
-TEST_CASE("what cannot be read is named with the system's reason", "[core][unit]") {
+TEST_CASE("what cannot be read is named with the system's reason", "[io][unit]") {
   const Folder folder;
   CHECK_THROWS_WITH(read_file(folder.path / "absent"),
                     Catch::Contains("absent: cannot be opened: No such file or directory"));
   CHECK_THROWS_WITH(read_file(folder.path), Catch::Contains("is a directory, want a file"));
 }
 
-TEST_CASE("SHA-256 of the standard's examples", "[core][unit]") {
+TEST_CASE("SHA-256 of the standard's examples", "[io][unit]") {
   // FIPS 180-2, appendix B, and the empty message
   CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   CHECK(sha256_hex("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq") ==

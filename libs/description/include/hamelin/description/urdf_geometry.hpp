@@ -6,7 +6,7 @@
 
 #include "hamelin/geometry/se3.hpp"
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 /// One <collision> or <visual> of a URDF link: a shape and where it stands in the link's frame.
 struct LinkShape {
@@ -32,4 +32,4 @@ struct LinkGeometry {
 /// @throws Error io, parse or invalid: "file: line N: link 'x': what is wrong, what was expected"
 [[nodiscard]] std::vector<LinkGeometry> read_urdf_geometry(const std::filesystem::path& file);
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

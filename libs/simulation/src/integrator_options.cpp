@@ -1,11 +1,12 @@
-#include <fmt/format.h>
+#include "hamelin/simulation/integrator_options.hpp"
 
-#include "hamelin/core/error.hpp"
-#include "hamelin/integration/integrator.hpp"
+namespace hamelin::simulation {
 
-namespace hamelin::integration {
+using integration::Options;
+using integration::Solver;
+using integration::Start;
 
-Options options_from_json(const Json& params, const std::string& where) {
+Options integrator_options(const Json& params, const std::string& where) {
   check_shipped_schema(params, "integrator", where);
   Options options;
   options.alpha = params.value("alpha", options.alpha);
@@ -27,4 +28,4 @@ Options options_from_json(const Json& params, const std::string& where) {
   return options;
 }
 
-}  // namespace hamelin::integration
+}  // namespace hamelin::simulation

@@ -1,4 +1,4 @@
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 #include <catch2/catch.hpp>
 #include <iterator>
@@ -25,7 +25,7 @@ std::string refusal(ErrorCode code, F&& f) {
 
 }  // namespace
 
-TEST_CASE("a parse error names file, line and column", "[core][unit]") {
+TEST_CASE("a parse error names file, line and column", "[io][unit]") {
   const auto parse = [](const std::string& text) {
     return refusal(ErrorCode::parse, [&] { (void)parse_json(text, "a.json"); });
   };
@@ -37,7 +37,7 @@ TEST_CASE("a parse error names file, line and column", "[core][unit]") {
   CHECK_THAT(parse("{\"a\": \"\xff\"}"), Catch::StartsWith("a.json: line 1, column"));
 }
 
-TEST_CASE("a key given twice is refused at any depth, equal keys of different objects are not", "[core][unit]") {
+TEST_CASE("a key given twice is refused at any depth, equal keys of different objects are not", "[io][unit]") {
   CHECK_THAT(refusal(ErrorCode::parse, [] { (void)parse_json(R"({"a": 1, "b": 2, "a": 3})", "a.json"); }),
              Catch::Contains("a.json: key 'a' is given twice"));
   CHECK_THAT(refusal(ErrorCode::parse, [] { (void)parse_json(R"([{"x": {"in": 1, "in": 1}}])", "a.json"); }),
@@ -45,7 +45,7 @@ TEST_CASE("a key given twice is refused at any depth, equal keys of different ob
   CHECK_NOTHROW(parse_json(R"([{"a": {"a": 1}}, {"a": 2}])", "a.json"));
 }
 
-TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[core][unit]") {
+TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[io][unit]") {
   const auto nested = [](std::size_t depth, std::size_t closed) {
     return std::string(depth, '[') + std::string(closed, ']');
   };
@@ -57,7 +57,7 @@ TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[cor
 }
 
 // With time that grows as the square of these, this test would not end.
-TEST_CASE("long lists of objects and objects of many keys are read", "[core][unit]") {
+TEST_CASE("long lists of objects and objects of many keys are read", "[io][unit]") {
   constexpr std::size_t count = 200000;
   std::string list = "[{}", object = "{\"k\": 0";
   for (std::size_t i = 1; i < count; ++i) {
@@ -72,39 +72,12 @@ TEST_CASE("long lists of objects and objects of many keys are read", "[core][uni
              Catch::Contains("key 'k7' is given twice"));
 }
 
-TEST_CASE("numbers, words, texts and empty parts are read as they stand", "[core][unit]") {
+TEST_CASE("numbers, words, texts and empty parts are read as they stand", "[io][unit]") {
   const char* text = R"({"a":[1,-2,18446744073709551615,0.5,true,false,null,"x",[],{}],"b":{"c":{}}})";
   CHECK(parse_json(text, "a.json").dump() == text);
   CHECK(parse_json("7", "a.json") == 7);
 }
 
-TEST_CASE("keys keep the order in which they were written", "[core][unit]") {
+TEST_CASE("keys keep the order in which they were written", "[io][unit]") {
   CHECK(parse_json(R"({"z": 1, "a": 2, "m": 3})", "").dump() == R"({"z":1,"a":2,"m":3})");
-}
-
-TEST_CASE("the nearest name is one within a third of its letters, or none", "[core][unit]") {
-  const std::vector<std::string> names{"duration_s", "step_s", "seed"};
-  CHECK(nearest_name("duraton_s", names) == "duration_s");
-  CHECK(nearest_name("sdee", {"sxex", "step_s"}).empty());  // two changes in four letters
-  CHECK(nearest_name("sed", names) == "seed");
-  CHECK(nearest_name("gravity", names).empty());
-  CHECK(nearest_name("step_s", names) == "step_s");
-  CHECK(nearest_name("", names).empty());
-  CHECK(nearest_name("x", {}).empty());
-}
-
-TEST_CASE("two neighbours swapped are one slip, and capitals none", "[core][unit]") {
-  CHECK(nearest_name("sede", {"seed", "step_s"}) == "seed");
-  CHECK(nearest_name("rnu", {"run", "robot"}) == "run");
-  CHECK(nearest_name("--setp", {"--set", "--step", "--seed"}) == "--set");  // one slip from both: the first
-  CHECK(nearest_name("RK4", {"hamel", "rk4"}) == "rk4");
-  CHECK(nearest_name("abcd", {"badc"}).empty());  // two swaps in four letters
-}
-
-TEST_CASE("no name is near that shares less than half of its letters", "[core][unit]") {
-  CHECK(nearest_name("x", {"y"}).empty());
-  CHECK(nearest_name("q0", {"v0"}).empty());
-  CHECK(nearest_name("a", {"ab"}).empty());
-  CHECK(nearest_name("rn", {"run"}) == "run");
-  CHECK(nearest_name(std::string(100000, 'x'), {"x", std::string(100000, 'x')}).empty());  // no one mistypes that
 }

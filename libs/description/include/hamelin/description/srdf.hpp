@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 /// <disable_collisions link1 link2 reason>: two links that never count as colliding.
 struct DisabledPair {
@@ -24,4 +24,4 @@ struct DisabledPair {
 [[nodiscard]] std::vector<DisabledPair> read_srdf(const std::filesystem::path& file,
                                                   const std::vector<std::string>& links);
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

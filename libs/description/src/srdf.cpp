@@ -1,15 +1,15 @@
-#include "hamelin/model/srdf.hpp"
+#include "hamelin/description/srdf.hpp"
 
 #include <fmt/format.h>
 #include <tinyxml.h>
 
 #include <algorithm>
 
+#include "detail.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
-#include "robot_detail.hpp"
+#include "hamelin/io/file.hpp"
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 namespace {
 
@@ -88,8 +88,8 @@ std::vector<DisabledPair> read_srdf(const std::filesystem::path& file, const std
     for (const std::string& link : {pair.link_a, pair.link_b})
       if (std::find(links.begin(), links.end(), link) == links.end())
         fail(ErrorCode::invalid, file.string(), pair.line,
-             fmt::format("the robot has no link '{}'{}", link, detail::suggestion(link, links)));
+             fmt::format("the robot has no link '{}'{}", link, did_you_mean(link, links)));
   return pairs;
 }
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

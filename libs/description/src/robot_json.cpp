@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "detail.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
 #include "hamelin/core/rng.hpp"
-#include "hamelin/model/robot_io.hpp"
-#include "robot_detail.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/io/file.hpp"
 
-namespace hamelin::model {
+namespace hamelin::description {
 
 namespace {
 
@@ -169,7 +169,7 @@ void take_spheres(Robot& robot, const std::filesystem::path& file) {
     for (auto& link : robot.links)
       if (link.name == name) return link;
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: the robot has no link '{}'{}", file.string(), name, detail::suggestion(name, names)));
+                fmt::format("{}: the robot has no link '{}'{}", file.string(), name, did_you_mean(name, names)));
   };
   for (const auto& [name, spheres] : given.links) link_named(name).spheres = spheres;
   for (const auto& [name, capsules] : given.capsules) {
@@ -210,11 +210,6 @@ void take_srdf(Robot& robot, const std::filesystem::path& file) {
 
 std::string detail::join(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
-}
-
-std::string detail::suggestion(const std::string& name, const std::vector<std::string>& candidates) {
-  const std::string near = nearest_name(name, candidates);
-  return near.empty() ? "" : fmt::format("; did you mean '{}'?", near);
 }
 
 void detail::round_to_quaternions(Robot& robot) {
@@ -394,4 +389,4 @@ Robot read_robot(const std::filesystem::path& file, const RobotOptions& options)
   return robot;
 }
 
-}  // namespace hamelin::model
+}  // namespace hamelin::description

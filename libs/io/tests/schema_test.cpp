@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 using namespace hamelin;
 
@@ -43,11 +43,11 @@ std::string refusal(const std::string& document, const Json& by = schema) {
 
 }  // namespace
 
-TEST_CASE("what a schema allows passes", "[core][unit]") {
+TEST_CASE("what a schema allows passes", "[io][unit]") {
   CHECK(refusal(R"({"name": "a", "arm": {"file": "f", "q": [1, 2.5]}, "step_s": 1})").empty());
 }
 
-TEST_CASE("an unknown key is named with its place and the key that was probably meant", "[core][unit]") {
+TEST_CASE("an unknown key is named with its place and the key that was probably meant", "[io][unit]") {
   CHECK(refusal(R"({"name": "a", "arm": {"file": "f"}, "stp_s": 1})") ==
         "a.json: /: unknown key 'stp_s', expected 'step_s'?");
   CHECK(refusal(R"({"name": "a", "arm": {"file": "f", "scal": 1}})") ==
@@ -56,12 +56,12 @@ TEST_CASE("an unknown key is named with its place and the key that was probably 
              Catch::StartsWith("a.json: /arm: unknown key 'colour', expected one of ") && Catch::Contains("scale"));
 }
 
-TEST_CASE("a missing key is named with the object that lacks it", "[core][unit]") {
+TEST_CASE("a missing key is named with the object that lacks it", "[io][unit]") {
   CHECK(refusal(R"({"arm": {"file": "f"}})") == "a.json: /: key 'name' is missing");
   CHECK(refusal(R"({"name": "a", "arm": {}})") == "a.json: /arm: key 'file' is missing");
 }
 
-TEST_CASE("a wrong type or value is shown with what was expected", "[core][unit]") {
+TEST_CASE("a wrong type or value is shown with what was expected", "[io][unit]") {
   CHECK(refusal(R"({"name": 7, "arm": {"file": "f"}})") == "a.json: /name: 7 is not allowed, expected type string");
   CHECK(refusal(R"({"name": "a", "arm": {"file": "f"}, "step_s": 0})") ==
         "a.json: /step_s: 0 is not allowed, expected type number, above 0");
@@ -74,7 +74,7 @@ TEST_CASE("a wrong type or value is shown with what was expected", "[core][unit]
   CHECK_THAT(refusal("[]"), Catch::StartsWith("a.json: /: [] is not allowed, expected type object"));
 }
 
-TEST_CASE("an unknown key is named with its hint where the schema speaks by reference, too", "[core][unit]") {
+TEST_CASE("an unknown key is named with its hint where the schema speaks by reference, too", "[io][unit]") {
   const Json referring = Json::parse(R"({
     "type": "object",
     "properties": {"links": {"type": "array", "items": {"$ref": "#/definitions/link"}}},
@@ -84,7 +84,7 @@ TEST_CASE("an unknown key is named with its hint where the schema speaks by refe
         "a.json: /links/1: unknown key 'mas_kg', expected 'mass_kg'?");
 }
 
-TEST_CASE("the first fault of a long list is named, wherever it stands", "[core][unit]") {
+TEST_CASE("the first fault of a long list is named, wherever it stands", "[io][unit]") {
   const Json numbers = Json::parse(R"({"type": "array", "items": {"type": "number"}, "maxItems": 100000})");
   for (const std::size_t at : {0U, 999U, 1000U, 4321U, 99999U}) {
     CAPTURE(at);
@@ -98,7 +98,7 @@ TEST_CASE("the first fault of a long list is named, wherever it stands", "[core]
   CHECK_THAT(refusal(Json(std::vector<double>(100001, 0.5)).dump(), numbers), Catch::Contains("items at most 100000"));
 }
 
-TEST_CASE("a schema made ready once checks many documents", "[core][unit]") {
+TEST_CASE("a schema made ready once checks many documents", "[io][unit]") {
   const Schema ready(schema, "schema.json");
   const Schema copy = ready;
   CHECK_NOTHROW(ready.check(Json::parse(R"({"name": "a", "arm": {"file": "f"}})"), "a.json"));
@@ -106,20 +106,20 @@ TEST_CASE("a schema made ready once checks many documents", "[core][unit]") {
   CHECK_THROWS_WITH(Schema(Json::parse(R"({"type": 12})"), "s.json"), Catch::StartsWith("s.json: its JSON Schema"));
 }
 
-TEST_CASE("a long value is cut and one with line breaks stays on one line", "[core][unit]") {
+TEST_CASE("a long value is cut and one with line breaks stays on one line", "[io][unit]") {
   const std::string text =
       refusal(Json{{"name", Json::array({std::string(500, 'x') + "\n"})}, {"arm", {{"file", "f"}}}}.dump());
   CHECK_THAT(text, Catch::Contains("..."));
   CHECK(text.size() < 200);
 }
 
-TEST_CASE("a schema that is none is an error, not the end of the program", "[core][unit]") {
+TEST_CASE("a schema that is none is an error, not the end of the program", "[io][unit]") {
   CHECK_THAT(refusal("{}", Json::parse(R"({"type": 12})")), Catch::Contains("its JSON Schema cannot be used"));
   CHECK_THAT(refusal("{}", Json::parse(R"({"properties": [1]})")), Catch::Contains("its JSON Schema cannot be used"));
   CHECK_THAT(refusal("{}", Json::parse(R"({"$ref": "#/nowhere"})")), Catch::Contains("its JSON Schema cannot be used"));
 }
 
-TEST_CASE("defaults are filled in at every depth and never over what is given", "[core][unit]") {
+TEST_CASE("defaults are filled in at every depth and never over what is given", "[io][unit]") {
   const Json filled = with_defaults(Json::parse(R"({"name": "a", "arm": {"file": "f"}, "mode": "sampled"})"), schema);
   CHECK(filled["step_s"] == 0.001);
   CHECK(filled["mode"] == "sampled");
@@ -129,7 +129,7 @@ TEST_CASE("defaults are filled in at every depth and never over what is given", 
   CHECK_FALSE(with_defaults(Json::parse(R"({"name": "a"})"), schema).contains("arm"));  // it has no default of its own
 }
 
-TEST_CASE("the shipped schemas are there by name, and each is usable", "[core][unit]") {
+TEST_CASE("the shipped schemas are there by name, and each is usable", "[io][unit]") {
   for (const char* name : {"scene", "robot", "integrator", "primitives", "result", "run"}) {
     CAPTURE(name);
     REQUIRE_FALSE(schema_text(name).empty());

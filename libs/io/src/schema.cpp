@@ -12,7 +12,8 @@
 #include <valijson/validator.hpp>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/json.hpp"
+#include "hamelin/core/text.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin {
 

@@ -1,14 +1,13 @@
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <utility>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/file.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin {
 
@@ -105,46 +104,6 @@ Json parse_json(std::string_view text, const std::string& where) {
 
 Json read_json(const std::filesystem::path& file) {
   return parse_json(read_file(file), file.string());
-}
-
-namespace {
-
-// Edits that turn a into b: insert, delete, change, or swap two neighbours (optimal string alignment). Case is no edit.
-std::size_t edits_between(std::string_view a, std::string_view b) {
-  const auto same = [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
-  };
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i)
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
-        continue;
-      }
-      const std::size_t change = d[i - 1][j - 1] + (same(a[i - 1], b[j - 1]) ? 0 : 1);
-      d[i][j] = std::min({change, d[i - 1][j] + 1, d[i][j - 1] + 1});
-      if (i > 1 && j > 1 && same(a[i - 1], b[j - 2]) && same(a[i - 2], b[j - 1]))
-        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-    }
-  return d[a.size()][b.size()];
-}
-
-}  // namespace
-
-std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
-  constexpr std::size_t longest = 100;  // no one mistypes a longer one, and the time grows with the square
-  if (name.size() > longest) return {};
-  std::string best;
-  std::size_t fewest = 1 + std::max<std::size_t>(1, name.size() / 3);
-  for (const auto& candidate : candidates) {
-    if (candidate.size() > longest) continue;
-    const std::size_t edits = edits_between(name, candidate);
-    // Names that share less than half of their letters are not alike, however short they are.
-    if (edits >= fewest || 2 * edits >= std::max(name.size(), candidate.size())) continue;
-    fewest = edits;
-    best = candidate;
-  }
-  return best;
 }
 
 }  // namespace hamelin

@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/io/json.hpp"
+
+namespace hamelin::simulation {
+
+/// The options of an integrator from a scene's `/integrator/params`, docs/schema/integrator.schema.json.
+/// @param where file and place, with which an error message begins
+/// @throws Error invalid, naming `where` and the key
+[[nodiscard]] integration::Options integrator_options(const Json& params, const std::string& where);
+
+}  // namespace hamelin::simulation
