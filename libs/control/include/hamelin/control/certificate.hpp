@@ -9,7 +9,7 @@
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
 
-namespace hamelin::simulation {
+namespace hamelin::control {
 
 /// Proves that the motion between two nodes stays clear. Between nodes the motion is the joint-space line q + s Δq, off
 /// which a trajectory strays by at most σ_j = h |v⁺_j − v_j| / 4 a joint. A shape whose axis moves by the chord Δc
@@ -101,4 +101,4 @@ class Certificate {
   scene::PlacedShapes arm_;
 };
 
-}  // namespace hamelin::simulation
+}  // namespace hamelin::control

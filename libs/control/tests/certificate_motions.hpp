@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "certificate.hpp"
+#include "hamelin/control/certificate.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
@@ -94,7 +94,7 @@ class MotionJudge {
         obstacles = {moving_, sudden_};
       }
       const scene::Environment environment(stage_.map, obstacles, stage_.model.base(), stage_.model.reach(), limit_m);
-      simulation::Certificate certificate(stage_.model, environment, limit_m, &self_, self_limit_m);
+      control::Certificate certificate(stage_.model, environment, limit_m, &self_, self_limit_m);
       for (int i = 0; i < in_a_row && counts.motions < motions; ++i)
         if (!motion(environment, certificate, counts)) break;
     }
@@ -133,7 +133,7 @@ class MotionJudge {
   static double least(const std::vector<double>& x) { return x.empty() ? 1.0 : *std::min_element(x.begin(), x.end()); }
 
   /// False if no start was found: a ball may stand in the arm's base.
-  bool motion(const scene::Environment& environment, simulation::Certificate& certificate, MotionCounts& counts) {
+  bool motion(const scene::Environment& environment, control::Certificate& certificate, MotionCounts& counts) {
     // displacements of 1e-3 to 5e-2 a joint; of every other motion the velocity changes, by up to a quarter of it
     const bool straight = counts.motions % 2 == 0;
     const double size = std::exp(rng_.uniform(std::log(1e-3), std::log(5e-2)));

@@ -1,9 +1,9 @@
-#include "certificate.hpp"
+#include "hamelin/control/certificate.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace hamelin::simulation {
+namespace hamelin::control {
 
 using Eigen::Index;
 using Eigen::Vector3d;
@@ -202,4 +202,4 @@ double Certificate::prove(dynamics::Workspace& ws, Subject subject, const Piece&
   return std::min(first, prove(ws, subject, {middle, half, there, piece.to}));
 }
 
-}  // namespace hamelin::simulation
+}  // namespace hamelin::control

@@ -1,4 +1,4 @@
-#include "certificate.hpp"
+#include "hamelin/control/certificate.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -11,9 +11,9 @@
 #endif
 
 using namespace hamelin;
+using control::Certificate;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using simulation::Certificate;
 
 namespace {
 
@@ -59,7 +59,7 @@ scene::Obstacle ball(const Vector3d& at, double radius) {
 
 }  // namespace
 
-TEST_CASE("a small turn away from everything is proved clear, with nearly its own clearance", "[simulation][unit]") {
+TEST_CASE("a small turn away from everything is proved clear, with nearly its own clearance", "[control][unit]") {
   Rig rig(ball({0.2, 1.0, 0.0}, 0.1));
   const auto verdict = rig.turn(0.0, 0.001, 0.0, 0.001);
   CHECK(rig.before[0] == Approx(0.05));
@@ -69,7 +69,7 @@ TEST_CASE("a small turn away from everything is proved clear, with nearly its ow
   CHECK(verdict.margin_m <= 0.05);
 }
 
-TEST_CASE("a capsule that sweeps through a ball between two clear nodes is caught", "[simulation][unit]") {
+TEST_CASE("a capsule that sweeps through a ball between two clear nodes is caught", "[control][unit]") {
   Rig rig(ball({-0.5, 0.5, 0.0}, 0.02));
   const auto verdict = rig.turn(0.2, 1.4, 0.0, 0.01);
   REQUIRE(rig.before[0] > 0.1);
@@ -78,7 +78,7 @@ TEST_CASE("a capsule that sweeps through a ball between two clear nodes is caugh
   CHECK(verdict.contact);
 }
 
-TEST_CASE("clearances down to the resolution are proved on a long way", "[simulation][unit]") {
+TEST_CASE("clearances down to the resolution are proved on a long way", "[control][unit]") {
   // the middle of the way passes the ball at so many metres
   for (const double gap : {1e-2, 1e-3, 2e-4}) {
     CAPTURE(gap);
@@ -93,7 +93,7 @@ TEST_CASE("clearances down to the resolution are proved on a long way", "[simula
   CHECK_FALSE(touching.turn(-0.3, 0.35, 0.0, 0.01).certified);
 }
 
-TEST_CASE("what a trajectory may stray from its line counts in full", "[simulation][unit]") {
+TEST_CASE("what a trajectory may stray from its line counts in full", "[control][unit]") {
   // a turn and back within one step: at its middle it has turned by a h²/8 = 0.02 rad, the tip by 2 cm
   Rig rig(ball({-0.01 - 0.05 - 0.1, 1.0, 0.0}, 0.1));
   CHECK(rig.turn(0.0, 0.0, 0.0, 0.01).certified);
@@ -102,8 +102,7 @@ TEST_CASE("what a trajectory may stray from its line counts in full", "[simulati
   CHECK(farther.turn(0.0, 0.0, 0.0, 0.01, -1600.0).certified);
 }
 
-TEST_CASE("an obstacle counts with its speed, and in the step in which it appears from its start",
-          "[simulation][unit]") {
+TEST_CASE("an obstacle counts with its speed, and in the step in which it appears from its start", "[control][unit]") {
   scene::Obstacle swinging = ball({0.0, 1.35, 0.0}, 0.1);
   swinging.motion = scene::SineMotion{{0.0, -0.3, 0.0}, 0.02};  // at the arm and back within half a period
   Rig rig(swinging);
@@ -130,7 +129,7 @@ TEST_CASE("an obstacle counts with its speed, and in the step in which it appear
   CHECK(Rig(far).turn(0.5, 1.4, 0.0, 0.01).certified);
 }
 
-TEST_CASE("a sliding joint without limits is bounded by where it goes", "[simulation][unit]") {
+TEST_CASE("a sliding joint without limits is bounded by where it goes", "[control][unit]") {
   model::Robot robot = model::make_chain({2, "z", 0.2, 1.0, 0.05});
   robot.links[1].joint.type = model::JointType::prismatic;
   robot.links[1].joint.screw << Vector3d::Zero(), Vector3d::UnitY();
@@ -160,7 +159,7 @@ TEST_CASE("a sliding joint without limits is bounded by where it goes", "[simula
 }
 
 #ifdef HAMELIN_WITH_FCL
-TEST_CASE("no random motion is certified that dense sampling with FCL finds in contact", "[simulation][property]") {
+TEST_CASE("no random motion is certified that dense sampling with FCL finds in contact", "[control][property]") {
   std::uint64_t seed = 1;
   for (test::Stage& stage : test::stages(std::filesystem::temp_directory_path())) {
     CAPTURE(stage.name);

@@ -1,0 +1,186 @@
+#include "hamelin/control/world_view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::control {
+
+namespace {
+
+// The arm is looked at this far from itself, at most.
+constexpr double self_influence_max_m = 0.10;
+// Motion in unknown space that is to be crossed slowly is asked for at this share of the speed.
+constexpr double slow_speed_scale = 0.25;
+
+void require_shapes(const scene::Scene& scene, const model::Model& model, const char* place, const char* expected) {
+  if (!model.shapes().empty()) return;
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}: '{}' has no collision spheres or capsules, expected {}",
+                                              scene.name, place, model.robot().name, expected));
+}
+
+}  // namespace
+
+WorldView::WorldView(const scene::Scene& scene, const model::Model& model, double influence_m)
+    : model_(model),
+      environment_(scene::make_environment(scene, model, influence_m)),
+      scratch_(environment_, model.shapes().size()),
+      influence_(influence_m),
+      slow_in_unknown_(scene.map && scene.map->unknown == scene::UnknownPolicy::slow),
+      poses_(model),
+      arm_(model),
+      arm_before_(model),
+      asked_poses_(model),
+      asked_(model) {
+  if (environment_.has_obstacles()) require_shapes(scene, model, "/robot", "some where there are obstacles");
+  if (scene.model.self_collision) {
+    require_shapes(scene, model, "/model/self_collision", "some or false");
+    self_ = std::make_unique<scene::SelfField>(model);
+    self_influence_ = std::min(influence_, self_influence_max_m);
+    self_contacts_.resize(self_->pairs().size());
+    self_clearance_.assign(self_->pairs().size(), self_influence_);
+    self_clearance_before_ = self_clearance_;
+  }
+  certificate_ = std::make_unique<Certificate>(model, environment_, influence_, self_.get(), self_influence_);
+  seen_.assign(environment_.obstacles().size(), 0);
+  revealed_.reserve(environment_.obstacles().size());
+  for (const auto& obstacle : environment_.obstacles())
+    hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
+  contacts_.resize(environment_.contacts_max(model.shapes().size()) + 1);
+  other_contacts_.resize(contacts_.size());
+  clearance_.assign(model.shapes().size(), influence_);
+  clearance_before_ = clearance_;
+  q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
+}
+
+void WorldView::look(const Eigen::VectorXd& q, double time_s) {
+  time_s_ = time_s;
+  dynamics::forward_kinematics(model_, poses_, q);
+  clearance_now_ = influence_;
+  self_clearance_now_ = self_influence_;
+  nearest_.sphere = -1;
+  contact_count_ = 0;
+  speed_scale_ = 1.0;
+  revealed_.clear();
+  if (has_obstacles() || has_self()) arm_.place(model_, poses_);
+  if (has_obstacles()) look_at_obstacles();
+  if (has_self()) look_at_itself();
+}
+
+void WorldView::look_at_obstacles() {
+  std::fill(clearance_.begin(), clearance_.end(), influence_);
+  if (hidden_obstacles_) reveal_visible();
+  contact_count_ = find(scene::View::planner, contacts_);
+  count_clearances(contacts());
+  if (hidden_obstacles_) {
+    const std::size_t hidden = find(scene::View::hidden, other_contacts_);
+    count_clearances(std::span(other_contacts_).first(hidden));
+  }
+  if (slow_in_unknown_ && environment_.in_slow_space(arm_.view())) speed_scale_ = slow_speed_scale;
+}
+
+void WorldView::reveal_visible() {
+  for (int found = environment_.see(arm_.view(), time_s_, seen_); found >= 0;
+       found = environment_.see(arm_.view(), time_s_, seen_))
+    revealed_.push_back(found);
+}
+
+std::size_t WorldView::find(scene::View view, std::span<scene::Contact> out) {
+  return std::min(out.size(), environment_.closest(arm_.view(), influence_, time_s_, scratch_, out, view, seen_));
+}
+
+void WorldView::count_clearances(std::span<const scene::Contact> contacts) {
+  for (const auto& contact : contacts) {
+    auto& clearance = clearance_[static_cast<std::size_t>(contact.sphere)];
+    clearance = std::min(clearance, contact.distance);
+    if (contact.distance < clearance_now_) {
+      clearance_now_ = contact.distance;
+      nearest_ = contact;
+    }
+  }
+}
+
+void WorldView::look_at_itself() {
+  self_contact_count_ = self_->closest(arm_.view(), self_influence_, self_contacts_);
+  std::fill(self_clearance_.begin(), self_clearance_.end(), self_influence_);
+  for (const auto& contact : self_contacts()) {
+    self_clearance_[static_cast<std::size_t>(contact.pair)] = contact.distance;
+    if (contact.distance < self_clearance_now_) {
+      self_clearance_now_ = contact.distance;
+      nearest_pair_ = contact.pair;
+    }
+  }
+}
+
+void WorldView::depart(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  q_before_ = q;
+  v_before_ = v;
+  time_before_s_ = time_s_;
+  std::swap(arm_before_, arm_);
+  std::swap(clearance_before_, clearance_);
+  std::swap(self_clearance_before_, self_clearance_);
+}
+
+Certificate::Verdict WorldView::certify(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  const auto to_obstacles = [&](const std::vector<double>& all) {
+    return has_obstacles() ? std::span<const double>(all) : std::span<const double>();
+  };
+  return certificate_->check(asked_poses_,
+                             {q_before_, v_before_, time_before_s_, arm_before_.view(), to_obstacles(clearance_before_),
+                              self_clearance_before_},
+                             {q, v, time_s_, arm_.view(), to_obstacles(clearance_), self_clearance_});
+}
+
+scene::Shapes WorldView::place(const Eigen::VectorXd& q) {
+  dynamics::forward_kinematics(model_, asked_poses_, q);
+  asked_.place(model_, asked_poses_);
+  return asked_.view();
+}
+
+std::size_t WorldView::closest(const Eigen::VectorXd& q, double influence_m, std::span<scene::Contact> out) {
+  if (!has_obstacles()) return 0;
+  return environment_.closest(place(q), std::min(influence_m, influence_), time_s_, scratch_, out, scene::View::planner,
+                              seen_);
+}
+
+std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m, std::span<scene::SelfContact> out) {
+  if (!has_self()) return 0;
+  return self_->closest(place(q), std::min(influence_m, self_influence_), out);
+}
+
+bool WorldView::deepest_at_start(const scene::Shapes& shapes, scene::Contact& deepest) {
+  const std::size_t count = std::min(
+      other_contacts_.size(), environment_.closest(shapes, 0.0, 0.0, scratch_, other_contacts_, scene::View::judge));
+  bool found = false;
+  for (const auto& contact : std::span(other_contacts_).first(count)) {
+    // what moves may be elsewhere by then
+    if (contact.obstacle >= 0 &&
+        scene::max_speed(environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)]) > 0.0)
+      continue;
+    if (!found || contact.distance < deepest.distance) deepest = contact;
+    found = true;
+  }
+  return found;
+}
+
+bool WorldView::deepest_self(const scene::Shapes& shapes, scene::SelfContact& deepest) {
+  if (!has_self()) return false;
+  const std::size_t count = std::min(self_contacts_.size(), self_->closest(shapes, 0.0, self_contacts_));
+  if (count == 0) return false;
+  deepest = *std::min_element(self_contacts_.begin(), self_contacts_.begin() + static_cast<long>(count),
+                              [](const auto& a, const auto& b) { return a.distance < b.distance; });
+  return true;
+}
+
+std::string WorldView::describe_contact() const {
+  if (nearest() != nullptr && clearance_now_ <= 0.0)
+    return fmt::format("{} at {} s; the way out is {}", environment_.words(nearest_, model_), time_s_,
+                       scene::way_out(nearest_));
+  return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s", self_->words(nearest_pair_),
+                     -1e3 * self_clearance_now_, time_s_);
+}
+
+}  // namespace hamelin::control

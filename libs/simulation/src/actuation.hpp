@@ -1,0 +1,54 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "energy_audit.hpp"
+#include "hamelin/control/torque_limits.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+#include "simulated_arm.hpp"
+
+namespace hamelin::simulation {
+
+/// How a planner's answers become motion.
+class Actuation {
+ public:
+  Actuation() = default;
+  Actuation(const Actuation&) = delete;
+  Actuation& operator=(const Actuation&) = delete;
+  virtual ~Actuation() = default;
+
+  /// The arm's velocity at a node, into arm.v, with what is known before the planner is asked.
+  virtual void reach_node(SimulatedArm& arm) = 0;
+  /// Whether the planner is asked at node k.
+  [[nodiscard]] virtual bool asks_planner(long k) const = 0;
+  /// Books the node's energies with the planner's answer there.
+  virtual void book(SimulatedArm& arm, const planning::CommandBuffers& answer, EnergyAudit& audit) = 0;
+  /// Puts the answer into the channels and the state; it acts until the next node.
+  /// @param q_measured where the planner saw the arm
+  virtual void act(SimulatedArm& arm, const planning::CommandBuffers& answer, const Eigen::VectorXd& q_measured,
+                   EnergyAudit& audit) = 0;
+  /// Whether the last node's account needs one more answer of the planner.
+  [[nodiscard]] virtual bool needs_answer_at_end() const = 0;
+  /// Velocity with which the motion leaves the node.
+  [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity(SimulatedArm& arm) = 0;
+  /// Torque of each channel that acts from this node on, and their sum, for the log.
+  virtual void torques(SimulatedArm& arm, const planning::CommandBuffers& answer, Eigen::VectorXd& sum,
+                       Json& channels) = 0;
+  /// Whether a limit cut the answer that acts now.
+  [[nodiscard]] virtual bool saturated() const = 0;
+  /// Whether the scene limits torques.
+  [[nodiscard]] virtual bool limited() const = 0;
+};
+
+/// The one that the scene asks for.
+/// @param gyroscopic_terms so many a planner answers with at most
+/// @throws Error invalid for periods and delays that are not integer multiples of the step
+[[nodiscard]] std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm,
+                                                        std::size_t gyroscopic_terms);
+
+/// Steps between two ticks of the planner. @throws Error invalid
+[[nodiscard]] long steps_per_tick(const scene::Scene& scene);
+
+}  // namespace hamelin::simulation

@@ -1,0 +1,65 @@
+#include "energy_audit.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace hamelin::simulation {
+
+namespace {
+
+// Figures that must be zero are so up to this share of the kinetic energy and 1 J: far above rounding, far below what
+// matters.
+constexpr double rounding_share = 1e-9;
+// What the energy account is off by is the scheme's own: a second-order step that resolves the motion at all (h times
+// its frequency below 0.5) errs by (0.5)²/12 = 2 % of the energy in motion or exchanged.
+constexpr double account_share = 0.02;
+
+}  // namespace
+
+void EnergyAudit::book_node(SimulatedArm& arm, double control_J) {
+  const auto energy = arm.integrator->energy(arm.state);
+  ledger_.kinetic = energy.kinetic_J;
+  ledger_.potential = energy.potential_J;
+  ledger_.control = control_J;
+  const Ledger& last = recorder_.last_node();
+  if (arm.state.k > 0)
+    for (const auto account : {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
+      exchanged_J_ += std::abs(ledger_.*account - last.*account);
+  recorder_.node(ledger_);
+}
+
+void EnergyAudit::book_node_velocity(double work_J, const hamelin_command& answer) noexcept {
+  ledger_.node += work_J;
+  book_filter(answer);
+}
+
+void EnergyAudit::book_filter(const hamelin_command& answer) noexcept {
+  ledger_.filter += answer.filter_work_J;
+  ledger_.recovery += answer.recovery_work_J;
+}
+
+std::string EnergyAudit::fault(const SimulatedArm& arm) const {
+  if (!closes_ || arm.state.k == 0) return {};
+  const double turned = arm.report.gyroscopic_work_J;
+  if (std::abs(turned) > rounding_share * (ledger_.kinetic + 1.0))
+    return fmt::format("step {}: steering did {:.3g} J of work, expected none", arm.state.k, turned);
+  if (has_potential_ || !(recorder_.energy_error() > account_share * (exchanged_J_ + ledger_.kinetic))) return {};
+  return fmt::format(
+      "step {}: the energy account is off by {:.3g} J, with {:.3g} J in motion and {:.3g} J exchanged; expected less "
+      "than {} of them: a smaller step?",
+      arm.state.k, recorder_.energy_error(), ledger_.kinetic, exchanged_J_, account_share);
+}
+
+std::string EnergyAudit::fault_of_planner(const hamelin_command& answer) const {
+  if (!closes_) return {};
+  const double rounding = rounding_share * (ledger_.kinetic + 1.0);
+  if (answer.filter_work_J > rounding)
+    return fmt::format("its filter added {:.3g} J where standing still was admitted, expected none",
+                       answer.filter_work_J);
+  if (answer.recovery_work_J < -rounding)
+    return fmt::format("its recovery took out {:.3g} J, expected none", -answer.recovery_work_J);
+  return {};
+}
+
+}  // namespace hamelin::simulation

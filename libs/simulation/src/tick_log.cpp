@@ -1,0 +1,61 @@
+#include "tick_log.hpp"
+
+#include <utility>
+
+#include "hamelin/core/rng.hpp"
+#include "plant.hpp"
+
+namespace hamelin::simulation {
+
+namespace {
+
+std::string obstacle_name(const scene::Environment& environment, int obstacle) {
+  if (obstacle == scene::Contact::unknown) return "unknown";
+  if (obstacle < 0) return "map";
+  return environment.obstacles()[static_cast<std::size_t>(obstacle)].name;
+}
+
+}  // namespace
+
+void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
+                     const Json& provenance, long steps) {
+  Json config = resolved_config(scene);
+  config["planner"]["params"] = params;
+  Json fields{{"program", "run"},
+              {"scene", scene.name},
+              {"seed", scene.seed},
+              {"generator", Rng::name},
+              {"config", std::move(config)},
+              {"robot_notes", arm_.model.robot().notes},
+              {"plugin", {{"name", plugin.name()}, {"version", plugin.version()}, {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
+              {"provenance", provenance}};
+  recorder_.header(std::move(fields), arm_.model.robot(), steps);
+}
+
+void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
+  Json channels = Json::object();
+  if (answer != nullptr) actuation_.torques(arm_, *answer, torque_, channels);
+  Json fields{{"k", arm_.state.k},
+              {"time_s", arm_.state.time_s},
+              {"q", to_json(arm_.state.q)},
+              {"v", to_json(arm_.v)},
+              {"tau", to_json(torque_)},
+              {"goal_index", goals_.index()},
+              {"clearance_m", nullptr},
+              {"closest", nullptr},
+              {"energy", energy_json(recorder_.last_node())},
+              {"solver", solver_json(arm_.report)},
+              {"certified", certified}};
+  if (answer != nullptr) fields["channels"] = std::move(channels);
+  if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
+  if (world_.has_self()) fields["self_clearance_m"] = world_.self_clearance_m();
+  if (world_.has_obstacles()) {
+    fields["clearance_m"] = world_.clearance_m();
+    if (const auto* nearest = world_.nearest())
+      fields["closest"] = {{"sphere", nearest->sphere},
+                           {"obstacle", obstacle_name(world_.environment(), nearest->obstacle)}};
+  }
+  recorder_.tick(arm_.state.k, std::move(fields));
+}
+
+}  // namespace hamelin::simulation

@@ -1,0 +1,36 @@
+#pragma once
+#include <string>
+
+#include "actuation.hpp"
+#include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/world_view.hpp"
+#include "recorder.hpp"
+
+namespace hamelin::simulation {
+
+/// Writes what a run in closed loop logs: header and ticks.
+class TickLog {
+ public:
+  TickLog(Recorder& recorder, SimulatedArm& arm, const control::WorldView& world, const control::GoalTracker& goals,
+          Actuation& actuation)
+      : recorder_(recorder), arm_(arm), world_(world), goals_(goals), actuation_(actuation) {
+    torque_.setZero(arm.model.dof());
+  }
+
+  /// @param params the planner's, with defaults
+  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
+              const Json& provenance, long steps);
+  /// The line of this node. @param answer the planner's, which acts from here on; null at a last node
+  void tick(bool certified, const planning::CommandBuffers* answer);
+
+ private:
+  Recorder& recorder_;
+  SimulatedArm& arm_;
+  const control::WorldView& world_;
+  const control::GoalTracker& goals_;
+  Actuation& actuation_;
+  Eigen::VectorXd torque_;  ///< of the last node at which something acted
+};
+
+}  // namespace hamelin::simulation
