@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 namespace {
@@ -153,7 +155,7 @@ StepReport Dop853::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   first_stage(state, channels, report);
   stages(state, channels, h, report);
-  report.converged = q_new_.allFinite() && v_new_.allFinite();
+  report.converged = all_finite(q_new_) && all_finite(v_new_);
   if (!report.converged) return report;
   state.q = q_new_;
   state.v = v_new_;
@@ -187,7 +189,7 @@ StepReport Dop853::controlled(State& state, const Channels& channels, double lim
     if (stretch * h >= limit) h = limit;
     stages(state, channels, h, report);
     report.residual = error_norm(state, h);
-    if (!std::isfinite(report.residual)) {
+    if (!std::isfinite(report.residual) || !all_finite(q_new_) || !all_finite(v_new_)) {
       ++report.rejected;
       h *= least;
       continue;

@@ -1,5 +1,7 @@
 #include "explicit.hpp"
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Explicit::Explicit(std::string name, const Model& model, const Options& options)
@@ -16,14 +18,21 @@ void Explicit::accelerate(const Channels& channels, const VectorXd& q, const Vec
   ++report.evaluations;
 }
 
+SemiImplicitEuler::SemiImplicitEuler(const Model& model, const Options& options)
+    : Explicit("semi-implicit-euler", model, options) {
+  q_ = v_ = VectorXd::Zero(model.dof());
+}
+
 StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   accelerate(channels, state.q, state.v, report);
-  report.converged = acceleration_.allFinite();
+  v_ = state.v + h * acceleration_;
+  q_ = state.q + h * v_;
+  report.converged = all_finite(q_) && all_finite(v_);
   if (!report.converged) return report;
-  state.v += h * acceleration_;
-  book_work(report, state.v, h);
-  state.q += h * state.v;
+  book_work(report, v_, h);
+  state.q = q_;
+  state.v = v_;
   return report;
 }
 
@@ -47,7 +56,7 @@ StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
     q_sum_ += b[i] * h * v_;
     v_sum_ += b[i] * h * acceleration_;
   }
-  report.converged = q_sum_.allFinite() && v_sum_.allFinite();
+  report.converged = all_finite(q_sum_) && all_finite(v_sum_);
   if (!report.converged) return report;
   state.q = q_sum_;
   state.v = v_sum_;

@@ -25,11 +25,13 @@ class Explicit : public Integrator {
 /// v⁺ = v + h a(q, v), q⁺ = q + h v⁺: the paper's baseline. Order 1.
 class SemiImplicitEuler final : public Explicit {
  public:
-  SemiImplicitEuler(const Model& model, const Options& options) : Explicit("semi-implicit-euler", model, options) {}
+  SemiImplicitEuler(const Model& model, const Options& options);
   [[nodiscard]] int order() const override { return 1; }
 
  private:
   StepReport attempt(State& state, const Channels& channels, double h) override;
+
+  VectorXd q_, v_;
 };
 
 /// The classical Runge–Kutta scheme of order 4.

@@ -18,11 +18,11 @@ class Feedback final : public Explicit {
  private:
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  /// State::memory from q, v: the pairs (c, s) on the circle and E* = E.
-  void embed(State& state);
+  /// embedded_ from State::memory, or where that is stale from q and v: the pairs (c, s) on the circle and E* = E.
+  void embed(const State& state);
 
   std::vector<bool> turns_;  ///< which joints are revolute
-  VectorXd q_, v_, c_, s_, dc_, ds_, dv_, c_sum_, s_sum_, v_sum_;
+  VectorXd embedded_, q_, v_, c_, s_, dc_, ds_, dv_, c_sum_, s_sum_, v_sum_;
 };
 
 }  // namespace hamelin::integration

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "finite.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
 
@@ -116,27 +117,28 @@ kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& ch
                                           StepReport& report) {
   slopes_ = state.memory;
   to_spins(model_, channels.gyroscopic, spins_);
-  const auto outcome = dynamics::kernel::with_group(
-      model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
-        const kernel::GaussCall<Chain> call{chain,
-                                            tableau_,
-                                            h,
-                                            state.q.data(),
-                                            state.p.data(),
-                                            q_next_.data(),
-                                            p_next_.data(),
-                                            slopes_.data(),
-                                            state.step_previous,
-                                            data_or_null(channels.damping),
-                                            data_or_null(channels.coulomb),
-                                            data_or_null(channels.held_torque),
-                                            channels.coulomb_speed,
-                                            spins_.data(),
-                                            spins_.size(),
-                                            tolerance,
-                                            max_sweeps};
-        return entry.step(call, memory_.get());
-      });
+  auto outcome = dynamics::kernel::with_group(model_, *kernels_,
+                                              [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
+                                                const kernel::GaussCall<Chain> call{chain,
+                                                                                    tableau_,
+                                                                                    h,
+                                                                                    state.q.data(),
+                                                                                    state.p.data(),
+                                                                                    q_next_.data(),
+                                                                                    p_next_.data(),
+                                                                                    slopes_.data(),
+                                                                                    state.step_previous,
+                                                                                    data_or_null(channels.damping),
+                                                                                    data_or_null(channels.coulomb),
+                                                                                    data_or_null(channels.held_torque),
+                                                                                    channels.coulomb_speed,
+                                                                                    spins_.data(),
+                                                                                    spins_.size(),
+                                                                                    tolerance,
+                                                                                    max_sweeps};
+                                                return entry.step(call, memory_.get());
+                                              });
+  outcome.converged = outcome.converged && all_finite(q_next_) && all_finite(p_next_);
   report.updates += outcome.sweeps;
   report.evaluations += outcome.sweeps * static_cast<int>(tableau_.stages);
   return outcome;

@@ -4,6 +4,8 @@
 
 #include <cstring>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
@@ -162,7 +164,8 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
     ++report.updates;
     ++report.factorizations;
   }
-  report.converged = true;
+  report.converged = all_finite(delta_) && all_finite(rate_) && all_finite(force_);
+  if (!report.converged) return report;
   book_work(report, delta_, 1.0);
   with_links([&]<class Space>(Space, const auto&, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);

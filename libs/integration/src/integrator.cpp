@@ -37,6 +37,17 @@ StepReport together(const StepReport& a, const StepReport& b) {
   return sum;
 }
 
+namespace {
+
+/// What a failed step reports: its cost. It moved nothing, so it did no work.
+StepReport failed(StepReport report) {
+  report.converged = false;
+  report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J = 0.0;
+  return report;
+}
+
+}  // namespace
+
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   const long k = state.k;
@@ -50,12 +61,15 @@ StepReport Integrator::step(State& state, const Channels& channels, double h) {
       left = part.step_s == left ? 0.0 : left - part.step_s;
       report = together(report, part);
     }
-    if (!report.converged) state = saved_[0];
+    if (!report.converged) {
+      state = saved_[0];
+      return failed(report);
+    }
     report.step_s = h;
   } else {
     report = advance(state, channels, h);
+    if (!report.converged) return report;
   }
-  if (!report.converged) return report;
   state.k = k + 1;
   state.time_s = time + h;
   return report;
@@ -64,7 +78,7 @@ StepReport Integrator::step(State& state, const Channels& channels, double h) {
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
-  if (!report.converged) return report;
+  if (!report.converged) return failed(report);
   ++state.k;
   state.time_s += report.step_s;
   return report;
@@ -80,18 +94,20 @@ StepReport Integrator::controlled(State&, const Channels&, double) {
 StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
   StepReport report = attempt(state, channels, h);
   report.step_s = h;
-  if (report.converged || depth == options_.max_halvings) return report;
+  if (report.converged) return report;
+  report = failed(report);
+  if (depth == options_.max_halvings) return report;
   State& before = saved_[static_cast<std::size_t>(depth)];
   before = state;
-  StepReport total = report;  // what the failed attempt cost; it moved nothing
+  StepReport total = report;
   total.converged = true;
-  total.residual = total.step_s = 0.0;
-  total.gyroscopic_work_J = total.dissipated_J = total.held_work_J = 0.0;
+  total.residual = 0.0;
   ++total.halvings;
   for (int half = 0; half < 2 && total.converged; ++half)
     total = together(total, divide(state, channels, 0.5 * h, depth + 1));
-  if (!total.converged) state = before;
-  return total;
+  if (total.converged) return total;
+  state = before;
+  return failed(total);
 }
 
 void Integrator::sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "finite.hpp"
 #include "guess.hpp"
 
 namespace hamelin::integration {
@@ -23,7 +24,7 @@ LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-e
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
   else
     links_ = kernel::LieScratch<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_})
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_, &q_next_})
     *x = VectorXd::Zero(model.dof());
 }
 
@@ -46,7 +47,7 @@ bool LieExact::evaluate(const State& state, const Channels& channels, double h) 
   rate_ = delta_ / h;
   evaluate_forces(channels, mid_, rate_);
   residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
-  return residual_.allFinite();
+  return all_finite(residual_);
 }
 
 bool LieExact::factor(const State& state, const Channels& channels, double h) {
@@ -81,7 +82,7 @@ bool LieExact::solve(const State& state, const Channels& channels, double h, Ste
     ++report.evaluations;
     if (riqn || report.factorizations > 0) {
       correct(state, h);
-      report.residual = correction_.lpNorm<Eigen::Infinity>();
+      report.residual = largest_size(correction_);
       report.factorizations += riqn ? 1 : 0;
       if (report.residual <= options_.tolerance) {
         delta_ += correction_;
@@ -94,7 +95,7 @@ bool LieExact::solve(const State& state, const Channels& channels, double h, Ste
       ++report.factorizations;
       correct(state, h);
     }
-    const double size = correction_.lpNorm<Eigen::Infinity>();
+    const double size = largest_size(correction_);
     if (!(size <= allowed)) return false;
     allowed = riqn ? largest_correction : std::max(contraction * size, 1e3 * options_.tolerance);
     delta_ += correction_;
@@ -113,15 +114,19 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   report.converged = solve(state, channels, h, report);
   if (!report.converged) return report;
   book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
-  state.q += delta_;
+  q_next_ = state.q + delta_;
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     for (std::size_t i = 0; i < k.size(); ++i)
-      k[i].after = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
+      k[i].after = Space::place(chain.links[i], q_next_[static_cast<Eigen::Index>(i)]);
     kernel::lie_right<Space>(chain, k, delta_.data(), h, plus_.data());
   });
   // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F; the last correction took R out of p⁻, and p⁺ moves along
-  dynamics::gravity_torque(model_, ws_, state.q, mid_);
-  state.p = plus_ - residual_ + 0.5 * h * (force_ - mid_);
+  dynamics::gravity_torque(model_, ws_, q_next_, mid_);
+  plus_ += 0.5 * h * (force_ - mid_) - residual_;
+  report.converged = all_finite(q_next_) && all_finite(plus_);
+  if (!report.converged) return report;
+  state.q = q_next_;
+  state.p = plus_;
   remember(state, h, delta_);
   return report;
 }

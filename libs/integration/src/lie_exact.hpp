@@ -30,7 +30,7 @@ class LieExact final : public Momentum {
   std::variant<kernel::LieScratch<dynamics::kernel::Spatial<double>>,
                kernel::LieScratch<dynamics::kernel::Planar<double>>>
       links_;
-  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_;
+  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_, q_next_;
 };
 
 }  // namespace hamelin::integration

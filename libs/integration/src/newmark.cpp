@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Newmark::Newmark(const Model& model, const Options& options) : Explicit("newmark", model, options) {
@@ -56,13 +58,15 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
     if (report.updates == options_.max_updates) return report;
     place(state, h);
     accelerate(channels, q_, v_, report);
-    report.residual = h * h * (acceleration_ - a_new_).lpNorm<Eigen::Infinity>();
+    moved_ = acceleration_ - a_new_;
+    report.residual = h * h * largest_size(moved_);
     if (!std::isfinite(report.residual)) return report;
     a_new_ = acceleration_;
     ++report.updates;
   } while (report.residual > options_.tolerance);
-  report.converged = true;
   place(state, h);
+  report.converged = all_finite(q_) && all_finite(v_) && all_finite(a_new_);
+  if (!report.converged) return report;
   state.memory.head(n) = a_new_;
   state.memory.tail(n) = a_;
   state.force_previous = force_;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "finite.hpp"
 #include "guess.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
@@ -110,7 +111,7 @@ StepReport Variational::attempt(State& state, const Channels& channels, double h
   const auto out =
       options_.solver == Solver::newton ? solve_newton(state, channels, h) : solve_feedback(state, channels, h);
   StepReport report;
-  report.converged = out.converged;
+  report.converged = out.converged && all_finite(delta_) && all_finite(p_next_);
   report.updates = out.updates;
   report.factorizations = out.factorizations;
   report.evaluations = out.evaluations;

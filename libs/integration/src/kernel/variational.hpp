@@ -270,7 +270,7 @@ class Variational {
       const double correction = sigma_[i] * call_.h;
       call_.delta[i] += correction;
       const double size = __builtin_fabs(correction);
-      most = most >= size ? most : size;  // what is no number stays
+      if (size > most || size != size) most = size;  // NaN stays to the end
       step = Space::sum(y, Space::scaled(f.b, sigma_[i]));
       Space::add_along_axis(l, step, sigma_[i]);
     }

@@ -85,15 +85,16 @@ template <int W>
 HAMELIN_INLINE Lanes<W> abs(Lanes<W> a) noexcept {
   return {a.v < 0.0 ? -a.v : a.v};
 }
-/// Lane by lane; a lane of a that is no number yields it, so that it is seen.
+/// The larger number, lane by lane; NaN where either is NaN.
 template <int W>
 HAMELIN_INLINE Lanes<W> max(Lanes<W> a, Lanes<W> b) noexcept {
-  return {a.v <= b.v ? b.v : a.v};
+  return {(a.v <= b.v) | (b.v != b.v) ? b.v : a.v};
 }
+/// The largest of all lanes; NaN where any is NaN.
 template <int W>
 HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
   double most = a[0];
-  for (int i = 1; i < W; ++i) most = most <= a[i] ? a[i] : most;
+  for (int i = 1; i < W; ++i) most = (most <= a[i]) | (a[i] != a[i]) ? a[i] : most;
   return most;
 }
 
