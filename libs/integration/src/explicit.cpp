@@ -7,7 +7,7 @@ namespace hamelin::integration {
 Explicit::Explicit(std::string name, const Model& model, const Options& options)
     : Integrator(std::move(name), model, options), acceleration_(VectorXd::Zero(model.dof())) {}
 
-void Explicit::kick(State& state, const VectorXd& dp) {
+void Explicit::add_momentum(State& state, const VectorXd& dp) {
   dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
   state.v += acceleration_;
 }

@@ -10,12 +10,12 @@ class Explicit : public Integrator {
  public:
   [[nodiscard]] std::string criterion() const override { return "explicit"; }
   void velocity(const State& state, VectorXd& v) override { v = state.v; }
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override { state.v = v; }
 
  protected:
   Explicit(std::string name, const Model& model, const Options& options);
   void begin(State& state, const VectorXd& v0) override { state.v = v0; }
+  void add_momentum(State& state, const VectorXd& dp) override;
+  void replace_velocity(State& state, const VectorXd& v) override { state.v = v; }
   /// acceleration_ at (q, v) under gravity and the channels.
   void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
 

@@ -18,25 +18,15 @@ Feedback::Feedback(const Model& model, const Options& options) : Explicit("feedb
   embedded_ = VectorXd::Zero(2 * model.dof() + 1);
 }
 
-// State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*. delta_count 0: stale.
+// State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*.
 void Feedback::begin(State& state, const VectorXd& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof() + 1);
-  set_velocity(state, v0);
-}
-
-void Feedback::kick(State& state, const VectorXd& dp) {
-  Explicit::kick(state, dp);
-  state.delta_count = 0;
-}
-
-void Feedback::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
-  state.delta_count = 0;
+  Explicit::begin(state, v0);
 }
 
 void Feedback::embed(const State& state) {
   const Eigen::Index n = model_.dof();
-  if (state.delta_count > 0) {
+  if (!state.jumped) {
     embedded_ = state.memory;
     return;
   }
@@ -101,7 +91,6 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
   state.memory.head(n) = c_sum_;
   state.memory.segment(n, n) = s_sum_;
   state.memory[2 * n] = target;
-  state.delta_count = 1;
   return report;
 }
 

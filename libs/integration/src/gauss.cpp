@@ -108,8 +108,8 @@ std::string GaussLegendre::mode() const {
 
 void GaussLegendre::begin(State& state, const VectorXd& v0) {
   state.memory = slopes_;
-  state.step_previous = 0.0;
-  set_velocity(state, v0);
+  state.p = VectorXd::Zero(model_.dof());
+  replace_velocity(state, v0);
   if (adaptive()) ahead_ = state;
 }
 
@@ -128,6 +128,7 @@ kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& ch
                                                                                     p_next_.data(),
                                                                                     slopes_.data(),
                                                                                     state.step_previous,
+                                                                                    state.jumped,
                                                                                     data_or_null(channels.damping),
                                                                                     data_or_null(channels.coulomb),
                                                                                     data_or_null(channels.held_torque),
@@ -149,6 +150,7 @@ void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, do
   state.p = p_next_;
   state.memory = slopes_;
   state.step_previous = h;
+  state.jumped = false;
   report.held_work_J = outcome.held_work;
   report.dissipated_J = outcome.dissipated;
   report.gyroscopic_work_J = outcome.gyroscopic_work;
@@ -166,8 +168,8 @@ StepReport GaussLegendre::attempt(State& state, const Channels& channels, double
 
 // The guess is the last step's polynomial of degree s, so what the first sweep changes, e, is its error O(h^{s+1}),
 // while the step's own is O(h^{2s+1}): relative to the displacement scale 1 it is taken for e^{(2s+1)/(s+1)}. It costs
-// nothing, and it sees a motion that quickens one step late at most. The first step has no guess; it is judged by a
-// second one like it, which is then dropped.
+// nothing, and it sees a motion that quickens one step late at most. The first step has no guess, and after an impulse
+// the guess is of a motion that ended there: such a step is judged by a second one like it, which is then dropped.
 StepReport GaussLegendre::controlled(State& state, const Channels& channels, double limit) {
   StepReport report;
   report.converged = false;
@@ -178,7 +180,7 @@ StepReport GaussLegendre::controlled(State& state, const Channels& channels, dou
   const auto wanted_after = [&](const kernel::GaussOutcome& outcome) {
     return outcome.starter_error > 0.0 ? std::pow(target / outcome.starter_error, 1.0 / (s + 1.0)) : most;
   };
-  const bool first = state.step_previous == 0.0;
+  const bool first = state.jumped;
   const double wish = state.step_next > 0.0 ? state.step_next : limit;
   for (double h = std::min(wish, limit); report.rejected <= max_rejections;) {
     auto outcome = solve(state, channels, h, tolerance, report);

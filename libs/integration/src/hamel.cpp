@@ -31,15 +31,15 @@ decltype(auto) Hamel::with_links(F&& f) {
 }
 
 void Hamel::begin(State& state, const VectorXd& v0) {
-  set_velocity(state, v0);
+  state.p = state.force_previous = VectorXd::Zero(model_.dof());
+  state.history.assign(1, StepHistory(model_.dof()));
+  replace_velocity(state, v0);
 }
 
-void Hamel::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
+void Hamel::replace_velocity(State& state, const VectorXd& v) {
   state.p.setZero();  // pending node impulse
   state.force_previous.setZero();
   state.step_previous = 0.0;
-  state.delta_count = 0;
   // ξ^{−1+α} from the velocity by (5)
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
@@ -56,7 +56,7 @@ void Hamel::set_velocity(State& state, const VectorXd& v) {
   state.memory.tail(v.size()) = v;  // joint rates of ξ', for the rotors
 }
 
-void Hamel::kick(State& state, const VectorXd& dp) {
+void Hamel::add_momentum(State& state, const VectorXd& dp) {
   state.p += dp;
 }
 
@@ -100,9 +100,11 @@ void Hamel::velocity(const State& state, VectorXd& v) {
 }
 
 Energy Hamel::energy(const State& state) {
-  if (state.delta_count == 0)
-    return {dynamics::kinetic_energy(model_, ws_, state.q, state.v), dynamics::potential_energy(model_, ws_, state.q)};
-  const VectorXd& delta = state.deltas[0];
+  if (state.step_previous == 0.0) {
+    rate_ = state.memory.tail(model_.dof());  // as set
+    return {dynamics::kinetic_energy(model_, ws_, state.q, rate_), dynamics::potential_energy(model_, ws_, state.q)};
+  }
+  const VectorXd& delta = state.history[0].last();
   rate_ = delta / state.step_previous;
   mid_ = state.q - 0.5 * delta;
   Energy energy{dynamics::kinetic_energy(model_, ws_, mid_, rate_), 0.0};
@@ -174,8 +176,7 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
   });
   state.memory.tail(rate_.size()) = rate_;
   state.q += delta_;
-  state.deltas[0] = delta_;
-  state.delta_count = 1;
+  state.history[0].record(h, delta_);
   state.p.setZero();
   state.force_previous = force_;
   state.step_previous = h;

@@ -12,13 +12,19 @@ Integrator::Integrator(std::string name, const Model& model, const Options& opti
 State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   State state;
   state.q = q0;
-  state.v = v0;
-  state.p = VectorXd::Zero(model_.dof());
-  state.force_previous = VectorXd::Zero(model_.dof());
-  state.deltas.assign(4, VectorXd::Zero(model_.dof()));
   begin(state, v0);
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   return state;
+}
+
+void Integrator::kick(State& state, const VectorXd& dp) {
+  add_momentum(state, dp);
+  state.jumped = true;
+}
+
+void Integrator::set_velocity(State& state, const VectorXd& v) {
+  replace_velocity(state, v);
+  state.jumped = true;
 }
 
 StepReport together(const StepReport& a, const StepReport& b) {
@@ -79,6 +85,7 @@ StepReport Integrator::advance(State& state, const Channels& channels, double li
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
   if (!report.converged) return failed(report);
+  state.jumped = false;
   ++state.k;
   state.time_s += report.step_s;
   return report;
@@ -94,7 +101,10 @@ StepReport Integrator::controlled(State&, const Channels&, double) {
 StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
   StepReport report = attempt(state, channels, h);
   report.step_s = h;
-  if (report.converged) return report;
+  if (report.converged) {
+    state.jumped = false;  // for the other half
+    return report;
+  }
   report = failed(report);
   if (depth == options_.max_halvings) return report;
   State& before = saved_[static_cast<std::size_t>(depth)];

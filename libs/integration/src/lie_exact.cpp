@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "finite.hpp"
-#include "guess.hpp"
 
 namespace hamelin::integration {
 
@@ -110,7 +109,7 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
     for (std::size_t i = 0; i < k.size(); ++i)
       k[i].before = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
   });
-  extrapolate(state, h, delta_);
+  state.history[0].guess(h, delta_);
   report.converged = solve(state, channels, h, report);
   if (!report.converged) return report;
   book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
@@ -127,7 +126,7 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   if (!report.converged) return report;
   state.q = q_next_;
   state.p = plus_;
-  remember(state, h, delta_);
+  state.history[0].record(h, delta_);
   return report;
 }
 

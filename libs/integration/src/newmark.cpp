@@ -16,20 +16,11 @@ std::string Newmark::criterion() const {
   return fmt::format("h^2 |change of the acceleration|_inf <= {}", options_.tolerance);
 }
 
-// State::memory holds the node's acceleration and the one before; delta_count says whether they stand.
+// State::memory holds the node's acceleration and the one before.
 void Newmark::begin(State& state, const VectorXd& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof());
-  set_velocity(state, v0);
-}
-
-void Newmark::kick(State& state, const VectorXd& dp) {
-  Explicit::kick(state, dp);
-  state.delta_count = 0;
-}
-
-void Newmark::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
-  state.delta_count = 0;
+  state.force_previous = VectorXd::Zero(model_.dof());
+  Explicit::begin(state, v0);
 }
 
 void Newmark::place(const State& state, double h) {
@@ -45,7 +36,7 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   evaluate_forces(channels, state.q, state.v);
   node_force_ = force_;
   // the acceleration carried over belongs to the forces it was made with
-  const bool stands = state.delta_count > 0 && state.force_previous == node_force_;
+  const bool stands = !state.jumped && state.force_previous == node_force_;
   if (stands) {
     a_ = state.memory.head(n);
   } else {
@@ -77,7 +68,6 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   book_work(report, moved_, 0.5);
   state.q = q_;
   state.v = v_;
-  state.delta_count = 1;
   state.step_previous = h;
   return report;
 }

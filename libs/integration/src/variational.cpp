@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "finite.hpp"
-#include "guess.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
 
@@ -81,7 +80,7 @@ kernel::VariationalOutcome Variational::with_call(const State& state, const Chan
 }
 
 kernel::VariationalOutcome Variational::solve_newton(const State& state, const Channels& channels, double h) {
-  extrapolate(state, h, delta_);
+  state.history[0].guess(h, delta_);
   return with_call(state, channels, h,
                    [&](const auto& entry, const auto& call) { return entry.step(call, memory_.get()); });
 }
@@ -122,7 +121,7 @@ StepReport Variational::attempt(State& state, const Channels& channels, double h
   if (!report.converged) return report;
   state.q += delta_;
   state.p = p_next_ - 0.5 * h * gradient(state.q);
-  remember(state, h, delta_);
+  state.history[0].record(h, delta_);
   return report;
 }
 

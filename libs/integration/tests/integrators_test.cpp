@@ -7,6 +7,7 @@
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/test/chains.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -347,6 +348,32 @@ TEST_CASE("node impulses add momentum, node velocities replace it", "[integratio
   integrator->set_velocity(state, v0);
   integrator->velocity(state, v);
   CHECK((v - v0).norm() < 1e-12);
+}
+
+TEST_CASE("a state shows no velocity or momentum but that of its node", "[integration][state]") {
+  const auto name = GENERATE(from_range(integrator_names()));
+  CAPTURE(name);
+  const Model model(test::random_robot(9, 4));
+  dynamics::Workspace ws(model);
+  const auto integrator = make_integrator(name, model);
+  State state = integrator->start(VectorXd::Constant(4, 0.3), VectorXd::Constant(4, 0.5));
+  const auto check = [&] {
+    const VectorXd v = test::velocity(*integrator, state);
+    VectorXd p(4);
+    dynamics::momentum(model, ws, state.q, v, p);
+    if (state.v.size() > 0) CHECK(state.v == v);
+    if (state.p.size() > 0 && name != "hamel" && name != "hamel-midpoint") CHECK((state.p - p).norm() < 1e-12 * p.norm());
+    CHECK((state.v.size() == 0) != (state.p.size() == 0));
+  };
+  check();
+  for (int k = 0; k < 3; ++k) REQUIRE(integrator->step(state, {}, 1e-2).converged);
+  check();
+  integrator->kick(state, VectorXd::Constant(4, 0.2));
+  check();
+  integrator->set_velocity(state, VectorXd::Constant(4, -0.1));
+  check();
+  REQUIRE(integrator->advance(state, {}, 1e-2).converged);
+  check();
 }
 
 TEST_CASE("the variational step runs backwards along its own way", "[integration][property]") {

@@ -36,11 +36,9 @@ inline Eigen::VectorXd velocity(integration::Integrator& integrator, const integ
 /// Whether all fields of two states are the same numbers.
 inline bool same_state(const integration::State& a, const integration::State& b) {
   const auto same = [](const Eigen::VectorXd& x, const Eigen::VectorXd& y) { return x.size() == y.size() && x == y; };
-  bool deltas = a.deltas.size() == b.deltas.size();
-  for (std::size_t i = 0; deltas && i < a.deltas.size(); ++i) deltas = same(a.deltas[i], b.deltas[i]);
   return a.time_s == b.time_s && a.k == b.k && same(a.q, b.q) && same(a.v, b.v) && same(a.p, b.p) &&
-         same(a.memory, b.memory) && same(a.force_previous, b.force_previous) && a.step_previous == b.step_previous &&
-         deltas && a.delta_count == b.delta_count && a.step_next == b.step_next;
+         a.jumped == b.jumped && same(a.memory, b.memory) && same(a.force_previous, b.force_previous) &&
+         a.step_previous == b.step_previous && a.history == b.history && a.step_next == b.step_next;
 }
 
 }  // namespace hamelin::test
