@@ -5,7 +5,7 @@
 namespace hamelin::integration {
 
 Explicit::Explicit(std::string name, const Model& model, const Options& options)
-    : Integrator(std::move(name), model, options), acceleration_(VectorXd::Zero(model.dof())) {}
+    : Integrator(std::move(name), model, options), forces_(model), acceleration_(VectorXd::Zero(model.dof())) {}
 
 void Explicit::add_momentum(State& state, const VectorXd& dp) {
   dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
@@ -13,8 +13,7 @@ void Explicit::add_momentum(State& state, const VectorXd& dp) {
 }
 
 void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
-  evaluate_forces(channels, q, v);
-  dynamics::forward_dynamics(model_, ws_, q, v, force_, acceleration_);
+  dynamics::forward_dynamics(model_, ws_, q, v, forces_.evaluate(channels, ws_, q, v), acceleration_);
   ++report.evaluations;
 }
 
@@ -30,7 +29,7 @@ StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, do
   q_ = state.q + h * v_;
   report.converged = all_finite(q_) && all_finite(v_);
   if (!report.converged) return report;
-  book_work(report, v_, h);
+  forces_.add_work(report, v_, h);
   state.q = q_;
   state.v = v_;
   return report;
@@ -52,7 +51,7 @@ StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
     q_ = state.q + c[i] * h * v_;
     v_ = state.v + c[i] * h * acceleration_;
     accelerate(channels, q_, v_, report);
-    book_work(report, v_, b[i] * h);
+    forces_.add_work(report, v_, b[i] * h);
     q_sum_ += b[i] * h * v_;
     v_sum_ += b[i] * h * acceleration_;
   }

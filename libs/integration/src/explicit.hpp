@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 
+#include "channel_forces.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {
@@ -19,6 +20,7 @@ class Explicit : public Integrator {
   /// acceleration_ at (q, v) under gravity and the channels.
   void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
 
+  ChannelForces forces_;
   VectorXd acceleration_;
 };
 

@@ -66,7 +66,7 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
     v_ = state.v + ahead * dv_;
     for (Eigen::Index i = 0; i < n; ++i) q_[i] = joint(i, c_[i], s_[i]);
     accelerate(channels, q_, v_, report);
-    book_work(report, v_, weight);
+    forces_.add_work(report, v_, weight);
     for (Eigen::Index i = 0; i < n; ++i) {
       if (turns_[static_cast<std::size_t>(i)]) {
         const double off = gain * (c_[i] * c_[i] + s_[i] * s_[i] - 1.0);

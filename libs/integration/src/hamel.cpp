@@ -11,7 +11,8 @@ namespace hamelin::integration {
 Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
     : Integrator(midpoint ? "hamel-midpoint" : "hamel", model, options),
       midpoint_(midpoint),
-      alpha_(midpoint ? 0.5 : options.alpha) {
+      alpha_(midpoint ? 0.5 : options.alpha),
+      forces_(model) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = Links<dynamics::kernel::Planar<double>>(n);
@@ -139,8 +140,9 @@ void Hamel::evaluate(const State& state, const Channels& channels, double h, dou
       outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
     }
   });
-  evaluate_forces(channels, mid_, rate_);
-  residual_ += 0.5 * (h + h_before) * gradient_ - h_force * force_ - 0.5 * h_before * state.force_previous - state.p;
+  forces_.evaluate(channels, ws_, mid_, rate_);
+  residual_ +=
+      0.5 * (h + h_before) * gradient_ - h_force * forces_.total() - 0.5 * h_before * state.force_previous - state.p;
 }
 
 StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
@@ -166,9 +168,9 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
     ++report.updates;
     ++report.factorizations;
   }
-  report.converged = all_finite(delta_) && all_finite(rate_) && all_finite(force_);
+  report.converged = all_finite(delta_) && all_finite(rate_) && all_finite(forces_.total());
   if (!report.converged) return report;
-  book_work(report, delta_, 1.0);
+  forces_.add_work(report, delta_, 1.0);
   with_links([&]<class Space>(Space, const auto&, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
     for (std::size_t i = 0; i < k.size(); ++i)
@@ -178,7 +180,7 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
   state.q += delta_;
   state.history[0].record(h, delta_);
   state.p.setZero();
-  state.force_previous = force_;
+  state.force_previous = forces_.total();
   state.step_previous = h;
   return report;
 }

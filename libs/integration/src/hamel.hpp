@@ -1,6 +1,7 @@
 #pragma once
 #include <variant>
 
+#include "channel_forces.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/integration/integrator.hpp"
@@ -49,6 +50,7 @@ class Hamel final : public Integrator {
   bool midpoint_;
   double alpha_;
   std::variant<Links<dynamics::kernel::Spatial<double>>, Links<dynamics::kernel::Planar<double>>> links_;
+  ChannelForces forces_;
   VectorXd delta_, correction_, mid_, rate_, residual_, gradient_;
 };
 

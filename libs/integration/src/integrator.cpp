@@ -5,9 +5,7 @@
 namespace hamelin::integration {
 
 Integrator::Integrator(std::string name, const Model& model, const Options& options)
-    : model_(model), options_(options), ws_(model), force_(VectorXd::Zero(model.dof())), name_(std::move(name)) {
-  held_ = damped_ = dry_ = gyroscopic_ = VectorXd::Zero(model.dof());
-}
+    : model_(model), options_(options), ws_(model), name_(std::move(name)), velocity_(VectorXd::Zero(model.dof())) {}
 
 State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   State state;
@@ -120,39 +118,9 @@ StepReport Integrator::divide(State& state, const Channels& channels, double h, 
   return failed(total);
 }
 
-void Integrator::sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-  acts_ = {!channels.none(), channels.held_torque.size() > 0, channels.damping.size() > 0, channels.coulomb.size() > 0,
-           !channels.gyroscopic.empty()};
-  force_.setZero();
-  if (acts_.held) {
-    held_ = channels.held_torque;
-    force_ += held_;
-  }
-  if (acts_.damped) {
-    damped_ = channels.damping.cwiseProduct(v);
-    force_ -= damped_;
-  }
-  if (acts_.dry) {
-    dry_ = channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
-    force_ -= dry_;
-  }
-  if (acts_.gyroscopic) {
-    dynamics::gyroscopic_torque(model_, ws_, q, v, channels.gyroscopic, gyroscopic_);
-    force_ += gyroscopic_;
-  }
-}
-
-void Integrator::sum_work(StepReport& report, const VectorXd& displacement, double weight) const {
-  if (acts_.held) report.held_work_J += weight * held_.dot(displacement);
-  if (acts_.damped) report.dissipated_J += weight * damped_.dot(displacement);
-  if (acts_.dry) report.dissipated_J += weight * dry_.dot(displacement);
-  if (acts_.gyroscopic) report.gyroscopic_work_J += weight * gyroscopic_.dot(displacement);
-}
-
 Energy Integrator::energy(const State& state) {
-  VectorXd& v = held_;  // scratch: no forces are pending between steps
-  velocity(state, v);
-  return {dynamics::kinetic_energy(model_, ws_, state.q, v), dynamics::potential_energy(model_, ws_, state.q)};
+  velocity(state, velocity_);
+  return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_), dynamics::potential_energy(model_, ws_, state.q)};
 }
 
 }  // namespace hamelin::integration

@@ -2,22 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <limits>
 
 #include "finite.hpp"
+#include "kernel/corrections.hpp"
 
 namespace hamelin::integration {
 
 namespace {
 
-constexpr double largest_correction = 1.0;  // [rad or m]: beyond it another root of the step is nearer
-constexpr double contraction = 0.5;
-constexpr int max_newton_updates = 30;
+constexpr double largest_correction = 1.0;  // [rad or m]
 
 }  // namespace
 
-LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options) {
+LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options), forces_(model) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
@@ -44,8 +42,8 @@ bool LieExact::evaluate(const State& state, const Channels& channels, double h) 
   if (!found) return false;
   mid_ = state.q + 0.5 * delta_;
   rate_ = delta_ / h;
-  evaluate_forces(channels, mid_, rate_);
-  residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
+  forces_.evaluate(channels, ws_, mid_, rate_);
+  residual_ = minus_ + 0.5 * h * (gradient_ - forces_.total()) - state.p;
   return all_finite(residual_);
 }
 
@@ -75,7 +73,9 @@ void LieExact::correct(const State& state, double h) {
 // it stands at when the iterations are used up; here that step has failed.
 bool LieExact::solve(const State& state, const Channels& channels, double h, StepReport& report) {
   const bool riqn = options_.solver == Solver::riqn;
-  double allowed = largest_correction;
+  constexpr double any = std::numeric_limits<double>::infinity();  // RIQN may contract as slowly as it likes
+  kernel::Corrections corrections(riqn ? kernel::CorrectionRule{largest_correction, any, 0.0, 0}
+                                       : kernel::newton_rule(largest_correction, options_.tolerance));
   for (;;) {
     if (!evaluate(state, channels, h)) return false;
     ++report.evaluations;
@@ -88,15 +88,13 @@ bool LieExact::solve(const State& state, const Channels& channels, double h, Ste
         return true;
       }
     }
-    if (report.updates == (riqn ? options_.max_updates : max_newton_updates)) return false;
+    if (report.updates == (riqn ? options_.max_updates : kernel::max_newton_updates)) return false;
     if (!riqn) {
       if (!factor(state, channels, h)) return false;
       ++report.factorizations;
       correct(state, h);
     }
-    const double size = largest_size(correction_);
-    if (!(size <= allowed)) return false;
-    allowed = riqn ? largest_correction : std::max(contraction * size, 1e3 * options_.tolerance);
+    if (!corrections.take(largest_size(correction_))) return false;
     delta_ += correction_;
     ++report.updates;
   }
@@ -112,7 +110,7 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   state.history[0].guess(h, delta_);
   report.converged = solve(state, channels, h, report);
   if (!report.converged) return report;
-  book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
+  forces_.add_work(report, rate_, h);  // over the displacement that the forces were evaluated at
   q_next_ = state.q + delta_;
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     for (std::size_t i = 0; i < k.size(); ++i)
@@ -121,7 +119,7 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   });
   // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F; the last correction took R out of p⁻, and p⁺ moves along
   dynamics::gravity_torque(model_, ws_, q_next_, mid_);
-  plus_ += 0.5 * h * (force_ - mid_) - residual_;
+  plus_ += 0.5 * h * (forces_.total() - mid_) - residual_;
   report.converged = all_finite(q_next_) && all_finite(plus_);
   if (!report.converged) return report;
   state.q = q_next_;

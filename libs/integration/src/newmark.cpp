@@ -33,8 +33,8 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   const Eigen::Index n = model_.dof();
   StepReport report;
   report.converged = false;
-  evaluate_forces(channels, state.q, state.v);
-  node_force_ = force_;
+  forces_.evaluate(channels, ws_, state.q, state.v);
+  node_force_ = forces_.total();
   // the acceleration carried over belongs to the forces it was made with
   const bool stands = !state.jumped && state.force_previous == node_force_;
   if (stands) {
@@ -60,12 +60,12 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   if (!report.converged) return report;
   state.memory.head(n) = a_new_;
   state.memory.tail(n) = a_;
-  state.force_previous = force_;
+  state.force_previous = forces_.total();
   // work by the mean of both nodes' forces: those of the new node stand, the old one's are made again
   moved_ = q_ - state.q;
-  book_work(report, moved_, 0.5);
-  evaluate_forces(channels, state.q, state.v);
-  book_work(report, moved_, 0.5);
+  forces_.add_work(report, moved_, 0.5);
+  forces_.evaluate(channels, ws_, state.q, state.v);
+  forces_.add_work(report, moved_, 0.5);
   state.q = q_;
   state.v = v_;
   state.step_previous = h;

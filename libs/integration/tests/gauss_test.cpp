@@ -1,3 +1,5 @@
+#include "../src/gauss_tableau.hpp"
+
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -41,6 +43,51 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
   }
   for (const int order : {10, 12, 14, 16})  // beneath what doubles can tell apart
     CHECK((run(model, test::of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
+}
+
+TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), and is symplectic",
+          "[integration][gauss][order]") {
+  // Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7: with C(s) and D(s), B(2s) gives order 2s.
+  for (std::size_t s = 2; s <= kernel::most_stages; ++s) {
+    CAPTURE(s);
+    const auto t = gauss_tableau(s);
+    REQUIRE(t.stages == s);
+    const auto a = [&](std::size_t i, std::size_t j) { return t.a_column[j][i]; };
+    const auto power = [](double c, std::size_t k) { return std::pow(c, static_cast<double>(k)); };
+    const auto sum_b = [&](std::size_t k) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < s; ++j) sum += t.b[j] * power(t.c[j], k - 1);
+      return sum;
+    };
+    for (std::size_t k = 1; k <= 2 * s; ++k) CHECK(std::abs(sum_b(k) - 1.0 / static_cast<double>(k)) < 5e-16);
+    // and no more than that: Gauss quadrature misses x^2s by (s!)⁴/((2s+1) (2s)!²)
+    const auto stages = static_cast<double>(s);
+    const double some = std::tgamma(stages + 1.0), all = std::tgamma(2.0 * stages + 1.0);
+    const double missed = std::pow(some * some / all, 2) / (2.0 * stages + 1.0);
+    CHECK(1.0 / (2.0 * stages + 1.0) - sum_b(2 * s + 1) == Approx(missed).epsilon(1e-4));
+    for (std::size_t i = 0; i < s; ++i) {
+      double distances = t.barycentric[i];
+      for (std::size_t k = 1; k <= s; ++k) {
+        double c = 0.0, d = 0.0;
+        for (std::size_t j = 0; j < s; ++j) {
+          c += a(i, j) * power(t.c[j], k - 1);
+          d += t.b[j] * power(t.c[j], k - 1) * a(j, i);
+        }
+        const auto degree = static_cast<double>(k);
+        CHECK(std::abs(c - power(t.c[i], k) / degree) < 5e-16);
+        CHECK(std::abs(d - t.b[i] * (1.0 - power(t.c[i], k)) / degree) < 5e-16);
+      }
+      for (std::size_t j = 0; j < s; ++j) {
+        CHECK(std::abs(t.b[i] * a(i, j) + t.b[j] * a(j, i) - t.b[i] * t.b[j]) < 5e-17);
+        if (j != i) distances *= t.c[i] - t.c[j];
+      }
+      CHECK(distances == Approx(1.0).epsilon(1e-13));
+    }
+    for (std::size_t i = s; i < kernel::most_stages; ++i) {  // lanes without a stage
+      CHECK(t.c[i] == t.c[0]);
+      for (std::size_t j = 0; j < s; ++j) CHECK(a(i, j) == a(0, j));
+    }
+  }
 }
 
 TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",

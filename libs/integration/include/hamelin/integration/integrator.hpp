@@ -134,31 +134,16 @@ class Integrator {
   /// fails the state is left as it was. Schemes without step control never get here: make_integrator refuses.
   virtual StepReport controlled(State& state, const Channels& channels, double limit);
 
-  /// Generalised force of the channels at (q, v): total, with its parts kept for the work done.
-  void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-    if (acts_.any || !channels.none()) sum_forces(channels, q, v);  // else it is zero already
-  }
-  /// Adds the work of the forces last evaluated over the displacement to the report.
-  void book_work(StepReport& report, const VectorXd& displacement, double weight) const {
-    if (acts_.any) sum_work(report, displacement, weight);
-  }
-
   const Model& model_;
   Options options_;
   dynamics::Workspace ws_;
-  VectorXd force_;  ///< sum of the channels, as evaluate_forces left it
 
  private:
-  void sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
-  void sum_work(StepReport& report, const VectorXd& displacement, double weight) const;
   StepReport divide(State& state, const Channels& channels, double h, int depth);
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level
-  struct {
-    bool any = false, held = false, damped = false, dry = false, gyroscopic = false;
-  } acts_;  ///< what the forces last evaluated are made of
-  VectorXd held_, damped_, dry_, gyroscopic_;
+  VectorXd velocity_;         ///< scratch of energy()
 };
 
 /// What a scheme takes of Options.

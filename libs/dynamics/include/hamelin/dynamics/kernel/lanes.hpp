@@ -101,8 +101,9 @@ HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
 /// Beyond this [rad] the reduction below loses digits, and the C library takes over.
 inline constexpr double largest_reduced_angle = 1e6;
 
-/// Sine and cosine of all lanes to about one unit in the last place, without a branch for |x| ≤ 1e6: reduction to
-/// [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of fdlibm's kernels.
+/// Sine and cosine of all lanes, right to 1.5 units in the last place up to 100 rad and to 2.5 beyond, without a branch
+/// for |x| ≤ 1e6: reduction to [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of
+/// fdlibm's kernels.
 template <int W>
 HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
   using Real = typename Lanes<W>::Real;
