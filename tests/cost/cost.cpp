@@ -25,11 +25,11 @@ class Rk4Alone final : public integration::Integrator {
   [[nodiscard]] std::string criterion() const override { return "none"; }
   [[nodiscard]] int order() const override { return 4; }
   void velocity(const integration::State& state, VectorXd& v) override { v = state.v; }
-  void kick(integration::State&, const VectorXd&) override {}
-  void set_velocity(integration::State& state, const VectorXd& v) override { state.v = v; }
 
  protected:
   void begin(integration::State& state, const VectorXd& v0) override { state.v = v0; }
+  void add_momentum(integration::State&, const VectorXd&) override {}
+  void replace_velocity(integration::State& state, const VectorXd& v) override { state.v = v; }
   integration::StepReport attempt(integration::State& state, const integration::Channels&, double h) override {
     static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     integration::StepReport report;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hamelin/test/allocations.hpp"
+#include "hamelin/test/dense.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -15,60 +16,6 @@ using Eigen::Vector3d;
 using geometry::SE3;
 
 namespace {
-
-// An independent reference: product of exponentials (3) and dense Lagrangian mechanics, no recursion, no joint frames.
-struct Dense {
-  const Model& model;
-
-  SE3 com_pose(int link, const VectorXd& q) const {
-    SE3 g = model.base();
-    for (int j = 0; j <= link; ++j)
-      g = g * SE3::exp(model.robot().links[static_cast<std::size_t>(j)].joint.screw * q[j]);
-    return g * model.robot().links[static_cast<std::size_t>(link)].com;
-  }
-  MatrixXd mass(const VectorXd& q) const {
-    const int n = model.dof();
-    MatrixXd M = MatrixXd::Zero(n, n);
-    for (int i = 0; i < n; ++i) {
-      const auto& link = model.robot().links[static_cast<std::size_t>(i)];
-      Eigen::Matrix<double, 6, 6> G = Eigen::Matrix<double, 6, 6>::Zero();
-      G.topLeftCorner<3, 3>() = link.inertia_kg_m2;
-      G.bottomRightCorner<3, 3>() = link.mass_kg * Matrix3d::Identity();
-      MatrixXd J = MatrixXd::Zero(6, n);  // body Jacobian of the COM frame
-      SE3 g = model.base();
-      const SE3 inverse = com_pose(i, q).inverse();
-      for (int j = 0; j <= i; ++j) {
-        const auto& screw = model.robot().links[static_cast<std::size_t>(j)].joint.screw;
-        J.col(j) = (inverse * g).Ad() * screw;
-        g = g * SE3::exp(screw * q[j]);
-      }
-      M += J.transpose() * G * J;
-    }
-    return M;
-  }
-  double potential(const VectorXd& q) const {
-    double U = 0.0;
-    for (int i = 0; i < model.dof(); ++i)
-      U -= model.robot().links[static_cast<std::size_t>(i)].mass_kg * model.gravity().dot(com_pose(i, q).p());
-    return U;
-  }
-  // Christoffel symbols and ∂U by central differences
-  VectorXd bias(const VectorXd& q, const VectorXd& v) const {
-    const int n = model.dof();
-    const double e = 1e-5;
-    VectorXd out = VectorXd::Zero(n);
-    for (int i = 0; i < n; ++i) {
-      VectorXd qp = q, qm = q;
-      qp[i] += e;
-      qm[i] -= e;
-      const MatrixXd dM = (mass(qp) - mass(qm)) / (2.0 * e);
-      out += dM * v * v[i];
-      out[i] -= 0.5 * v.dot(dM * v);
-      out[i] += (potential(qp) - potential(qm)) / (2.0 * e);
-    }
-    return out;
-  }
-};
 
 struct Case {
   std::uint64_t seed;
@@ -88,7 +35,7 @@ TEST_CASE("recursive dynamics equal dense Lagrangian mechanics", "[dynamics][pro
   CAPTURE(c.seed, c.n, c.prismatic_every, c.planar);
   const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar), a_base(), Vector3d{1.0, -2.0, -9.0});
   REQUIRE(model.planar() == (c.planar || c.n == 1));
-  const Dense dense{model};
+  const test::Dense dense{model};
   Workspace ws(model);
   Rng rng(c.seed + 100);
   const VectorXd q = test::random_joints(rng, c.n, 2.0), v = test::random_joints(rng, c.n, 2.0),
@@ -122,7 +69,7 @@ TEST_CASE("kinematics equal the product of exponentials, Jacobians its differenc
   const auto c = GENERATE(Case{11, 7, 0, false}, Case{12, 6, 2, false}, Case{13, 5, 3, true});
   CAPTURE(c.seed);
   const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar), a_base());
-  const Dense dense{model};
+  const test::Dense dense{model};
   Workspace ws(model);
   Rng rng(c.seed);
   const VectorXd q = test::random_joints(rng, c.n, 2.0), v = test::random_joints(rng, c.n);
@@ -194,7 +141,7 @@ TEST_CASE("operational inertia inverts J M^-1 J^T, and is zero in a lost directi
   forward_kinematics(model, ws, q);
   Matrix3Xd J(3, 7);
   point_jacobian(model, ws, 6, tip_pose(model, ws).p(), J);
-  const Matrix3d inverse = J * Dense{model}.mass(q).ldlt().solve(J.transpose());
+  const Matrix3d inverse = J * test::Dense{model}.mass(q).ldlt().solve(J.transpose());
   const Matrix3d Mx = operational_inertia(model, ws, q, J, 1e-9);
   CHECK((Mx * inverse - Matrix3d::Identity()).norm() < 1e-9);
 
@@ -238,8 +185,8 @@ TEST_CASE("a mass ratio of 10^6 leaves the solve accurate", "[dynamics][hard]") 
   CHECK((back - a).lpNorm<Eigen::Infinity>() < 1e-8);
 }
 
-#ifndef HAMELIN_SANITIZED
 TEST_CASE("nothing allocates after construction", "[dynamics][allocation]") {
+  if (!test::counts_allocations()) return;
   const bool planar = GENERATE(false, true);
   const Model model(test::random_robot(61, 7, 3, planar));
   Workspace ws(model);
@@ -267,4 +214,3 @@ TEST_CASE("nothing allocates after construction", "[dynamics][allocation]") {
   CHECK(std::isfinite(sum));
   CHECK(count == 0);
 }
-#endif

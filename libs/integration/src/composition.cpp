@@ -1,14 +1,11 @@
 #include "composition.hpp"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 
 namespace hamelin::integration {
 
 namespace {
-
-constexpr std::size_t kept = 4;  // displacements that the guess of the variational step looks at
 
 // Suzuki 1990: 1/(4 − ∛4) four times about 1 − 4/(4 − ∛4).
 constexpr std::array<double, 5> order4{0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294856,
@@ -43,45 +40,32 @@ Composition::Composition(const Model& model, const Options& options)
       order_(options.order == 0 ? 4 : options.order),
       weights_(composition_weights(order_)),
       step_(model, undivided(options)),
-      history_(kept * weights_.size(), VectorXd::Zero(model.dof())),
-      last_(VectorXd::Zero(model.dof())) {
-  inner_ = step_.start(last_, last_);
+      history_(weights_.size(), StepHistory(model.dof())),
+      rate_(VectorXd::Zero(model.dof())) {
+  inner_ = step_.start(rate_, rate_);
 }
 
 void Composition::begin(State& state, const VectorXd& v0) {
-  state.deltas.assign(kept * weights_.size(), VectorXd::Zero(model_.dof()));
-  set_velocity(state, v0);
-}
-
-void Composition::swap_history(std::size_t slot) {
-  for (std::size_t j = 0; j < kept; ++j) inner_.deltas[j].swap(history_[kept * slot + j]);
+  Momentum::begin(state, v0);
+  state.history.assign(weights_.size(), state.history[0]);
 }
 
 StepReport Composition::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   inner_.q = state.q;
-  inner_.v = state.v;
   inner_.p = state.p;
-  history_ = state.deltas;
+  history_ = state.history;
   for (std::size_t i = 0; i < weights_.size() && report.converged; ++i) {
-    swap_history(i);
-    inner_.delta_count = state.delta_count;
-    inner_.step_previous = weights_[i] * state.step_previous;
-    if (state.delta_count <= 0 && i > 0) {  // no step before: the sub-step before will do
-      inner_.delta_count = 1;
-      inner_.deltas[0] = last_;
-      inner_.step_previous = weights_[i - 1] * h;
-    }
+    std::swap(inner_.history[0], history_[i]);
+    if (i > 0 && inner_.history[0].empty()) inner_.history[0].restart(rate_);  // the sub-step before will do
     report = together(report, step_.advance(inner_, channels, weights_[i] * h));
-    last_ = inner_.deltas[0];
-    swap_history(i);
+    rate_ = inner_.history[0].last() / (weights_[i] * h);
+    std::swap(inner_.history[0], history_[i]);
   }
   if (!report.converged) return report;
   state.q = inner_.q;
   state.p = inner_.p;
-  std::swap(state.deltas, history_);
-  state.delta_count = state.delta_count > 0 && state.step_previous == h ? std::min(state.delta_count + 1, 4) : 1;
-  state.step_previous = h;
+  std::swap(state.history, history_);
   return report;
 }
 

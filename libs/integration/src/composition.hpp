@@ -21,15 +21,13 @@ class Composition final : public Momentum {
  private:
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  /// Lends the history of a sub-step to inner_, or takes it back.
-  void swap_history(std::size_t slot);
 
   int order_;
   std::span<const double> weights_;
   Variational step_;
-  State inner_;                    ///< what the sub-steps move
-  std::vector<VectorXd> history_;  ///< State::deltas of all sub-steps, as a step changes it
-  VectorXd last_;                  ///< displacement of the sub-step before
+  State inner_;                       ///< what the sub-steps move
+  std::vector<StepHistory> history_;  ///< State::history as a step changes it
+  VectorXd rate_;                     ///< mean velocity of the sub-step before
 };
 
 }  // namespace hamelin::integration

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "finite.hpp"
+#include "step_controller.hpp"
 
 namespace hamelin::integration {
 
@@ -76,10 +78,8 @@ constexpr Row weights(std::size_t which) {
   return which == solution ? b : which == fifth ? error5 : which == third ? error3 : A[which - 1];
 }
 
-// The published controller with its default settings: no memory of past errors (beta = 0).
-constexpr double safety = 0.9, most = 6.0, least = 0.333;
-constexpr double stretch = 1.01;  // a step that ends this near to the limit ends at it
-constexpr int max_rejections = 60;
+// The published controller's default settings: no memory of past errors (beta = 0).
+constexpr StepController::Rule rule{8.0, 0.9, 0.333, 6.0};
 
 // out = base + h Σ_j w[j] k[j], over the weights that are not zero: one pass, no temporaries.
 template <std::size_t which>
@@ -125,7 +125,7 @@ void Dop853::first_stage(const State& state, const Channels& channels, StepRepor
   accelerate(channels, state.q, state.v, report);
   a_[0] = acceleration_;
   first_ = {};
-  book_work(first_, state.v, 1.0);
+  forces_.add_work(first_, state.v, 1.0);
 }
 
 template <std::size_t s>
@@ -134,7 +134,7 @@ void Dop853::stage(const State& state, const Channels& channels, double h, StepR
   combine<s>(state.v, h, a_, v_[s]);
   accelerate(channels, q_, v_[s], report);
   a_[s] = acceleration_;
-  book_work(report, v_[s], b[s] * h);
+  forces_.add_work(report, v_[s], b[s] * h);
 }
 
 void Dop853::stages(const State& state, const Channels& channels, double h, StepReport& report) {
@@ -153,7 +153,7 @@ StepReport Dop853::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   first_stage(state, channels, report);
   stages(state, channels, h, report);
-  report.converged = q_new_.allFinite() && v_new_.allFinite();
+  report.converged = all_finite(q_new_) && all_finite(v_new_);
   if (!report.converged) return report;
   state.q = q_new_;
   state.v = v_new_;
@@ -180,35 +180,16 @@ StepReport Dop853::controlled(State& state, const Channels& channels, double lim
   StepReport report;
   report.converged = false;
   first_stage(state, channels, report);
-  const double wish = state.step_next > 0.0 ? state.step_next : limit;
-  double h = wish;
-  const double shortest = 10.0 * std::numeric_limits<double>::epsilon() * std::abs(state.time_s);
-  while (report.rejected <= max_rejections && h > shortest) {
-    if (stretch * h >= limit) h = limit;
-    stages(state, channels, h, report);
-    report.residual = error_norm(state, h);
-    if (!std::isfinite(report.residual)) {
-      ++report.rejected;
-      h *= least;
-      continue;
-    }
-    const double wanted = std::pow(report.residual, 1.0 / 8.0) / safety;
-    if (report.residual > 1.0) {
-      ++report.rejected;
-      h /= std::min(1.0 / least, wanted);
-      continue;
-    }
-    double next = h / std::clamp(wanted, 1.0 / most, 1.0 / least);
-    if (report.rejected > 0) next = std::min(next, h);
-    // A step that the limit cut short says nothing against the wish there was.
-    if (report.rejected == 0 && h < wish) next = std::max(next, wish);
+  StepController control(rule, state, limit);
+  while (control.has_try()) {
+    stages(state, channels, control.step(), report);
+    report.residual = all_finite(q_new_) && all_finite(v_new_) ? error_norm(state, control.step()) : std::nan("");
+    if (!control.accepts(report.residual)) continue;
     state.q = q_new_;
     state.v = v_new_;
-    state.step_next = next;
-    report.step_s = h;
-    report.converged = true;
-    break;
+    control.finish(state, report);
   }
+  report.rejected = control.rejected();
   return report;
 }
 

@@ -1,29 +1,37 @@
 #include "explicit.hpp"
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Explicit::Explicit(std::string name, const Model& model, const Options& options)
-    : Integrator(std::move(name), model, options), acceleration_(VectorXd::Zero(model.dof())) {}
+    : Integrator(std::move(name), model, options), forces_(model), acceleration_(VectorXd::Zero(model.dof())) {}
 
-void Explicit::kick(State& state, const VectorXd& dp) {
+void Explicit::add_momentum(State& state, const VectorXd& dp) {
   dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
   state.v += acceleration_;
 }
 
 void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
-  evaluate_forces(channels, q, v);
-  dynamics::forward_dynamics(model_, ws_, q, v, force_, acceleration_);
+  dynamics::forward_dynamics(model_, ws_, q, v, forces_.evaluate(channels, ws_, q, v), acceleration_);
   ++report.evaluations;
+}
+
+SemiImplicitEuler::SemiImplicitEuler(const Model& model, const Options& options)
+    : Explicit("semi-implicit-euler", model, options) {
+  q_ = v_ = VectorXd::Zero(model.dof());
 }
 
 StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   accelerate(channels, state.q, state.v, report);
-  report.converged = acceleration_.allFinite();
+  v_ = state.v + h * acceleration_;
+  q_ = state.q + h * v_;
+  report.converged = all_finite(q_) && all_finite(v_);
   if (!report.converged) return report;
-  state.v += h * acceleration_;
-  book_work(report, state.v, h);
-  state.q += h * state.v;
+  forces_.add_work(report, v_, h);
+  state.q = q_;
+  state.v = v_;
   return report;
 }
 
@@ -43,11 +51,11 @@ StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
     q_ = state.q + c[i] * h * v_;
     v_ = state.v + c[i] * h * acceleration_;
     accelerate(channels, q_, v_, report);
-    book_work(report, v_, b[i] * h);
+    forces_.add_work(report, v_, b[i] * h);
     q_sum_ += b[i] * h * v_;
     v_sum_ += b[i] * h * acceleration_;
   }
-  report.converged = q_sum_.allFinite() && v_sum_.allFinite();
+  report.converged = all_finite(q_sum_) && all_finite(v_sum_);
   if (!report.converged) return report;
   state.q = q_sum_;
   state.v = v_sum_;

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 
+#include "channel_forces.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {
@@ -10,26 +11,29 @@ class Explicit : public Integrator {
  public:
   [[nodiscard]] std::string criterion() const override { return "explicit"; }
   void velocity(const State& state, VectorXd& v) override { v = state.v; }
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override { state.v = v; }
 
  protected:
   Explicit(std::string name, const Model& model, const Options& options);
   void begin(State& state, const VectorXd& v0) override { state.v = v0; }
+  void add_momentum(State& state, const VectorXd& dp) override;
+  void replace_velocity(State& state, const VectorXd& v) override { state.v = v; }
   /// acceleration_ at (q, v) under gravity and the channels.
   void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
 
+  ChannelForces forces_;
   VectorXd acceleration_;
 };
 
 /// v⁺ = v + h a(q, v), q⁺ = q + h v⁺: the paper's baseline. Order 1.
 class SemiImplicitEuler final : public Explicit {
  public:
-  SemiImplicitEuler(const Model& model, const Options& options) : Explicit("semi-implicit-euler", model, options) {}
+  SemiImplicitEuler(const Model& model, const Options& options);
   [[nodiscard]] int order() const override { return 1; }
 
  private:
   StepReport attempt(State& state, const Channels& channels, double h) override;
+
+  VectorXd q_, v_;
 };
 
 /// The classical Runge–Kutta scheme of order 4.

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 namespace {
@@ -13,44 +15,38 @@ constexpr double gain = 10.0;  // κ [1/s]: an error fades within 0.1 s, and ste
 Feedback::Feedback(const Model& model, const Options& options) : Explicit("feedback", model, options) {
   for (const auto& link : model.robot().links) turns_.push_back(link.joint.type == model::JointType::revolute);
   for (auto* x : {&q_, &v_, &c_, &s_, &dc_, &ds_, &dv_, &c_sum_, &s_sum_, &v_sum_}) *x = VectorXd::Zero(model.dof());
+  embedded_ = VectorXd::Zero(2 * model.dof() + 1);
 }
 
-// State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*. delta_count 0: stale.
+// State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*.
 void Feedback::begin(State& state, const VectorXd& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof() + 1);
-  set_velocity(state, v0);
+  Explicit::begin(state, v0);
 }
 
-void Feedback::kick(State& state, const VectorXd& dp) {
-  Explicit::kick(state, dp);
-  state.delta_count = 0;
-}
-
-void Feedback::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
-  state.delta_count = 0;
-}
-
-void Feedback::embed(State& state) {
+void Feedback::embed(const State& state) {
   const Eigen::Index n = model_.dof();
+  if (!state.jumped) {
+    embedded_ = state.memory;
+    return;
+  }
   for (Eigen::Index i = 0; i < n; ++i) {
     const bool turns = turns_[static_cast<std::size_t>(i)];
-    state.memory[i] = turns ? std::cos(state.q[i]) : state.q[i];
-    state.memory[n + i] = turns ? std::sin(state.q[i]) : 0.0;
+    embedded_[i] = turns ? std::cos(state.q[i]) : state.q[i];
+    embedded_[n + i] = turns ? std::sin(state.q[i]) : 0.0;
   }
-  state.memory[2 * n] = energy(state).total();
-  state.delta_count = 1;
+  embedded_[2 * n] = energy(state).total();
 }
 
 StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
   static constexpr std::array<double, 4> node{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   const Eigen::Index n = model_.dof();
   StepReport report;
-  if (state.delta_count == 0) embed(state);
-  const auto c0 = state.memory.head(n), s0 = state.memory.segment(n, n);
+  embed(state);
+  const auto c0 = embedded_.head(n), s0 = embedded_.segment(n, n);
   // The energy's term is as small as the scheme's error, so it may be held over the step.
   const Energy now = energy(state);
-  const double excess = now.total() - state.memory[2 * n];
+  const double excess = now.total() - embedded_[2 * n];
   const double brake = excess == 0.0 ? 0.0 : gain * excess / (2.0 * now.kinetic_J + std::abs(excess));
   // where a pair stands, as an angle counted on from the node's
   const auto joint = [&](Eigen::Index i, double c, double s) {
@@ -70,7 +66,7 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
     v_ = state.v + ahead * dv_;
     for (Eigen::Index i = 0; i < n; ++i) q_[i] = joint(i, c_[i], s_[i]);
     accelerate(channels, q_, v_, report);
-    book_work(report, v_, weight);
+    forces_.add_work(report, v_, weight);
     for (Eigen::Index i = 0; i < n; ++i) {
       if (turns_[static_cast<std::size_t>(i)]) {
         const double off = gain * (c_[i] * c_[i] + s_[i] * s_[i] - 1.0);
@@ -85,14 +81,16 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
     s_sum_ += weight * ds_;
     v_sum_ += weight * dv_;
   }
-  report.converged = c_sum_.allFinite() && s_sum_.allFinite() && v_sum_.allFinite();
-  if (!report.converged) return report;
   for (Eigen::Index i = 0; i < n; ++i) q_[i] = joint(i, c_sum_[i], s_sum_[i]);
+  const double target = embedded_[2 * n] + report.held_work_J + report.gyroscopic_work_J - report.dissipated_J;
+  report.converged =
+      all_finite(q_) && all_finite(v_sum_) && all_finite(c_sum_) && all_finite(s_sum_) && std::isfinite(target);
+  if (!report.converged) return report;
   state.q = q_;
   state.v = v_sum_;
   state.memory.head(n) = c_sum_;
   state.memory.segment(n, n) = s_sum_;
-  state.memory[2 * n] += report.held_work_J + report.gyroscopic_work_J - report.dissipated_J;
+  state.memory[2 * n] = target;
   return report;
 }
 

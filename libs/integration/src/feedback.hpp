@@ -12,17 +12,16 @@ class Feedback final : public Explicit {
  public:
   Feedback(const Model& model, const Options& options);
   [[nodiscard]] int order() const override { return 4; }
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override;
 
  private:
   void begin(State& state, const VectorXd& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  /// State::memory from q, v: the pairs (c, s) on the circle and E* = E.
-  void embed(State& state);
+  /// embedded_ from State::memory, or where the velocity jumped from q and v: the pairs (c, s) on the circle and E* =
+  /// E.
+  void embed(const State& state);
 
   std::vector<bool> turns_;  ///< which joints are revolute
-  VectorXd q_, v_, c_, s_, dc_, ds_, dv_, c_sum_, s_sum_, v_sum_;
+  VectorXd embedded_, q_, v_, c_, s_, dc_, ds_, dv_, c_sum_, s_sum_, v_sum_;
 };
 
 }  // namespace hamelin::integration

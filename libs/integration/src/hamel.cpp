@@ -4,12 +4,15 @@
 
 #include <cstring>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
     : Integrator(midpoint ? "hamel-midpoint" : "hamel", model, options),
       midpoint_(midpoint),
-      alpha_(midpoint ? 0.5 : options.alpha) {
+      alpha_(midpoint ? 0.5 : options.alpha),
+      forces_(model) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = Links<dynamics::kernel::Planar<double>>(n);
@@ -29,15 +32,15 @@ decltype(auto) Hamel::with_links(F&& f) {
 }
 
 void Hamel::begin(State& state, const VectorXd& v0) {
-  set_velocity(state, v0);
+  state.p = state.force_previous = VectorXd::Zero(model_.dof());
+  state.history.assign(1, StepHistory(model_.dof()));
+  replace_velocity(state, v0);
 }
 
-void Hamel::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
+void Hamel::replace_velocity(State& state, const VectorXd& v) {
   state.p.setZero();  // pending node impulse
   state.force_previous.setZero();
   state.step_previous = 0.0;
-  state.delta_count = 0;
   // ξ^{−1+α} from the velocity by (5)
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
@@ -54,7 +57,7 @@ void Hamel::set_velocity(State& state, const VectorXd& v) {
   state.memory.tail(v.size()) = v;  // joint rates of ξ', for the rotors
 }
 
-void Hamel::kick(State& state, const VectorXd& dp) {
+void Hamel::add_momentum(State& state, const VectorXd& dp) {
   state.p += dp;
 }
 
@@ -98,9 +101,11 @@ void Hamel::velocity(const State& state, VectorXd& v) {
 }
 
 Energy Hamel::energy(const State& state) {
-  if (state.delta_count == 0)
-    return {dynamics::kinetic_energy(model_, ws_, state.q, state.v), dynamics::potential_energy(model_, ws_, state.q)};
-  const VectorXd& delta = state.deltas[0];
+  if (state.step_previous == 0.0) {
+    rate_ = state.memory.tail(model_.dof());  // as set
+    return {dynamics::kinetic_energy(model_, ws_, state.q, rate_), dynamics::potential_energy(model_, ws_, state.q)};
+  }
+  const VectorXd& delta = state.history[0].last();
   rate_ = delta / state.step_previous;
   mid_ = state.q - 0.5 * delta;
   Energy energy{dynamics::kinetic_energy(model_, ws_, mid_, rate_), 0.0};
@@ -135,8 +140,9 @@ void Hamel::evaluate(const State& state, const Channels& channels, double h, dou
       outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
     }
   });
-  evaluate_forces(channels, mid_, rate_);
-  residual_ += 0.5 * (h + h_before) * gradient_ - h_force * force_ - 0.5 * h_before * state.force_previous - state.p;
+  forces_.evaluate(channels, ws_, mid_, rate_);
+  residual_ +=
+      0.5 * (h + h_before) * gradient_ - h_force * forces_.total() - 0.5 * h_before * state.force_previous - state.p;
 }
 
 StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
@@ -162,8 +168,9 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
     ++report.updates;
     ++report.factorizations;
   }
-  report.converged = true;
-  book_work(report, delta_, 1.0);
+  report.converged = all_finite(delta_) && all_finite(rate_) && all_finite(forces_.total());
+  if (!report.converged) return report;
+  forces_.add_work(report, delta_, 1.0);
   with_links([&]<class Space>(Space, const auto&, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
     for (std::size_t i = 0; i < k.size(); ++i)
@@ -171,10 +178,9 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
   });
   state.memory.tail(rate_.size()) = rate_;
   state.q += delta_;
-  state.deltas[0] = delta_;
-  state.delta_count = 1;
+  state.history[0].record(h, delta_);
   state.p.setZero();
-  state.force_previous = force_;
+  state.force_previous = forces_.total();
   state.step_previous = h;
   return report;
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <variant>
 
+#include "channel_forces.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/integration/integrator.hpp"
@@ -19,13 +20,13 @@ class Hamel final : public Integrator {
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return midpoint_ ? 2 : 1; }
   void velocity(const State& state, VectorXd& v) override;
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override;
   /// T(θ_mid, Δ/h) + ½U(θ^k) + ½U(θ^{k+1}) of the last step.
   [[nodiscard]] Energy energy(const State& state) override;
 
  private:
   void begin(State& state, const VectorXd& v0) override;
+  void add_momentum(State& state, const VectorXd& dp) override;
+  void replace_velocity(State& state, const VectorXd& v) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// τ_e of the node equation at delta_, times h.
   void evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force);
@@ -49,6 +50,7 @@ class Hamel final : public Integrator {
   bool midpoint_;
   double alpha_;
   std::variant<Links<dynamics::kernel::Spatial<double>>, Links<dynamics::kernel::Planar<double>>> links_;
+  ChannelForces forces_;
   VectorXd delta_, correction_, mid_, rate_, residual_, gradient_;
 };
 

@@ -5,20 +5,24 @@
 namespace hamelin::integration {
 
 Integrator::Integrator(std::string name, const Model& model, const Options& options)
-    : model_(model), options_(options), ws_(model), force_(VectorXd::Zero(model.dof())), name_(std::move(name)) {
-  held_ = damped_ = dry_ = gyroscopic_ = VectorXd::Zero(model.dof());
-}
+    : model_(model), options_(options), ws_(model), name_(std::move(name)), velocity_(VectorXd::Zero(model.dof())) {}
 
 State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   State state;
   state.q = q0;
-  state.v = v0;
-  state.p = VectorXd::Zero(model_.dof());
-  state.force_previous = VectorXd::Zero(model_.dof());
-  state.deltas.assign(4, VectorXd::Zero(model_.dof()));
   begin(state, v0);
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   return state;
+}
+
+void Integrator::kick(State& state, const VectorXd& dp) {
+  add_momentum(state, dp);
+  state.jumped = true;
+}
+
+void Integrator::set_velocity(State& state, const VectorXd& v) {
+  replace_velocity(state, v);
+  state.jumped = true;
 }
 
 StepReport together(const StepReport& a, const StepReport& b) {
@@ -37,6 +41,17 @@ StepReport together(const StepReport& a, const StepReport& b) {
   return sum;
 }
 
+namespace {
+
+/// What a failed step reports: its cost. It moved nothing, so it did no work.
+StepReport failed(StepReport report) {
+  report.converged = false;
+  report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J = 0.0;
+  return report;
+}
+
+}  // namespace
+
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   const long k = state.k;
@@ -50,12 +65,15 @@ StepReport Integrator::step(State& state, const Channels& channels, double h) {
       left = part.step_s == left ? 0.0 : left - part.step_s;
       report = together(report, part);
     }
-    if (!report.converged) state = saved_[0];
+    if (!report.converged) {
+      state = saved_[0];
+      return failed(report);
+    }
     report.step_s = h;
   } else {
     report = advance(state, channels, h);
+    if (!report.converged) return report;
   }
-  if (!report.converged) return report;
   state.k = k + 1;
   state.time_s = time + h;
   return report;
@@ -64,7 +82,8 @@ StepReport Integrator::step(State& state, const Channels& channels, double h) {
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
   StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
-  if (!report.converged) return report;
+  if (!report.converged) return failed(report);
+  state.jumped = false;
   ++state.k;
   state.time_s += report.step_s;
   return report;
@@ -80,53 +99,28 @@ StepReport Integrator::controlled(State&, const Channels&, double) {
 StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
   StepReport report = attempt(state, channels, h);
   report.step_s = h;
-  if (report.converged || depth == options_.max_halvings) return report;
+  if (report.converged) {
+    state.jumped = false;  // for the other half
+    return report;
+  }
+  report = failed(report);
+  if (depth == options_.max_halvings) return report;
   State& before = saved_[static_cast<std::size_t>(depth)];
   before = state;
-  StepReport total = report;  // what the failed attempt cost; it moved nothing
+  StepReport total = report;
   total.converged = true;
-  total.residual = total.step_s = 0.0;
-  total.gyroscopic_work_J = total.dissipated_J = total.held_work_J = 0.0;
+  total.residual = 0.0;
   ++total.halvings;
   for (int half = 0; half < 2 && total.converged; ++half)
     total = together(total, divide(state, channels, 0.5 * h, depth + 1));
-  if (!total.converged) state = before;
-  return total;
-}
-
-void Integrator::sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-  acts_ = {!channels.none(), channels.held_torque.size() > 0, channels.damping.size() > 0, channels.coulomb.size() > 0,
-           !channels.gyroscopic.empty()};
-  force_.setZero();
-  if (acts_.held) {
-    held_ = channels.held_torque;
-    force_ += held_;
-  }
-  if (acts_.damped) {
-    damped_ = channels.damping.cwiseProduct(v);
-    force_ -= damped_;
-  }
-  if (acts_.dry) {
-    dry_ = channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
-    force_ -= dry_;
-  }
-  if (acts_.gyroscopic) {
-    dynamics::gyroscopic_torque(model_, ws_, q, v, channels.gyroscopic, gyroscopic_);
-    force_ += gyroscopic_;
-  }
-}
-
-void Integrator::sum_work(StepReport& report, const VectorXd& displacement, double weight) const {
-  if (acts_.held) report.held_work_J += weight * held_.dot(displacement);
-  if (acts_.damped) report.dissipated_J += weight * damped_.dot(displacement);
-  if (acts_.dry) report.dissipated_J += weight * dry_.dot(displacement);
-  if (acts_.gyroscopic) report.gyroscopic_work_J += weight * gyroscopic_.dot(displacement);
+  if (total.converged) return total;
+  state = before;
+  return failed(total);
 }
 
 Energy Integrator::energy(const State& state) {
-  VectorXd& v = held_;  // scratch: no forces are pending between steps
-  velocity(state, v);
-  return {dynamics::kinetic_energy(model_, ws_, state.q, v), dynamics::potential_energy(model_, ws_, state.q)};
+  velocity(state, velocity_);
+  return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_), dynamics::potential_energy(model_, ws_, state.q)};
 }
 
 }  // namespace hamelin::integration

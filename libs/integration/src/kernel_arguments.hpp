@@ -4,6 +4,8 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
+#include "hamelin/integration/integrator.hpp"
+#include "kernel/forces.hpp"
 
 namespace hamelin::integration {
 
@@ -24,6 +26,24 @@ inline void to_spins(const model::Model& model, std::span<const dynamics::Gyrosc
     const Eigen::Vector3d w = model.root().R().transpose() * term.w_world;
     spins.push_back({static_cast<std::size_t>(term.link), {point.x(), point.y(), point.z()}, {w.x(), w.y(), w.z()}});
   }
+}
+
+/// The channels of a step as the kernels take them; `spins` keeps the gyroscopic terms meanwhile.
+inline kernel::Forces to_forces(const model::Model& model, const Channels& channels,
+                                std::vector<dynamics::kernel::Spin>& spins) {
+  to_spins(model, channels.gyroscopic, spins);
+  return {data_or_null(channels.damping),
+          data_or_null(channels.coulomb),
+          data_or_null(channels.held_torque),
+          channels.coulomb_speed,
+          spins.data(),
+          spins.size()};
+}
+
+inline void report_work(const kernel::Work& work, StepReport& report) noexcept {
+  report.held_work_J = work.held;
+  report.dissipated_J = work.dissipated;
+  report.gyroscopic_work_J = work.gyroscopic;
 }
 
 }  // namespace hamelin::integration

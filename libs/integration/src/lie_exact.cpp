@@ -2,28 +2,26 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <limits>
 
-#include "guess.hpp"
+#include "finite.hpp"
+#include "kernel/corrections.hpp"
 
 namespace hamelin::integration {
 
 namespace {
 
-constexpr double largest_correction = 1.0;  // [rad or m]: beyond it another root of the step is nearer
-constexpr double contraction = 0.5;
-constexpr int max_newton_updates = 30;
+constexpr double largest_correction = 1.0;  // [rad or m]
 
 }  // namespace
 
-LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options) {
+LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options), forces_(model) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
   else
     links_ = kernel::LieScratch<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_})
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_, &q_next_})
     *x = VectorXd::Zero(model.dof());
 }
 
@@ -44,9 +42,9 @@ bool LieExact::evaluate(const State& state, const Channels& channels, double h) 
   if (!found) return false;
   mid_ = state.q + 0.5 * delta_;
   rate_ = delta_ / h;
-  evaluate_forces(channels, mid_, rate_);
-  residual_ = minus_ + 0.5 * h * (gradient_ - force_) - state.p;
-  return residual_.allFinite();
+  forces_.evaluate(channels, ws_, mid_, rate_);
+  residual_ = minus_ + 0.5 * h * (gradient_ - forces_.total()) - state.p;
+  return all_finite(residual_);
 }
 
 bool LieExact::factor(const State& state, const Channels& channels, double h) {
@@ -75,28 +73,28 @@ void LieExact::correct(const State& state, double h) {
 // it stands at when the iterations are used up; here that step has failed.
 bool LieExact::solve(const State& state, const Channels& channels, double h, StepReport& report) {
   const bool riqn = options_.solver == Solver::riqn;
-  double allowed = largest_correction;
+  constexpr double any = std::numeric_limits<double>::infinity();  // RIQN may contract as slowly as it likes
+  kernel::Corrections corrections(riqn ? kernel::CorrectionRule{largest_correction, any, 0.0, 0}
+                                       : kernel::newton_rule(largest_correction, options_.tolerance));
   for (;;) {
     if (!evaluate(state, channels, h)) return false;
     ++report.evaluations;
     if (riqn || report.factorizations > 0) {
       correct(state, h);
-      report.residual = correction_.lpNorm<Eigen::Infinity>();
+      report.residual = largest_size(correction_);
       report.factorizations += riqn ? 1 : 0;
       if (report.residual <= options_.tolerance) {
         delta_ += correction_;
         return true;
       }
     }
-    if (report.updates == (riqn ? options_.max_updates : max_newton_updates)) return false;
+    if (report.updates == (riqn ? options_.max_updates : kernel::max_newton_updates)) return false;
     if (!riqn) {
       if (!factor(state, channels, h)) return false;
       ++report.factorizations;
       correct(state, h);
     }
-    const double size = correction_.lpNorm<Eigen::Infinity>();
-    if (!(size <= allowed)) return false;
-    allowed = riqn ? largest_correction : std::max(contraction * size, 1e3 * options_.tolerance);
+    if (!corrections.take(largest_size(correction_))) return false;
     delta_ += correction_;
     ++report.updates;
   }
@@ -109,20 +107,24 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
     for (std::size_t i = 0; i < k.size(); ++i)
       k[i].before = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
   });
-  extrapolate(state, h, delta_);
+  state.history[0].guess(h, delta_);
   report.converged = solve(state, channels, h, report);
   if (!report.converged) return report;
-  book_work(report, rate_, h);  // over the displacement that the forces were evaluated at
-  state.q += delta_;
+  forces_.add_work(report, rate_, h);  // over the displacement that the forces were evaluated at
+  q_next_ = state.q + delta_;
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     for (std::size_t i = 0; i < k.size(); ++i)
-      k[i].after = Space::place(chain.links[i], state.q[static_cast<Eigen::Index>(i)]);
+      k[i].after = Space::place(chain.links[i], q_next_[static_cast<Eigen::Index>(i)]);
     kernel::lie_right<Space>(chain, k, delta_.data(), h, plus_.data());
   });
   // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F; the last correction took R out of p⁻, and p⁺ moves along
-  dynamics::gravity_torque(model_, ws_, state.q, mid_);
-  state.p = plus_ - residual_ + 0.5 * h * (force_ - mid_);
-  remember(state, h, delta_);
+  dynamics::gravity_torque(model_, ws_, q_next_, mid_);
+  plus_ += 0.5 * h * (forces_.total() - mid_) - residual_;
+  report.converged = all_finite(q_next_) && all_finite(plus_);
+  if (!report.converged) return report;
+  state.q = q_next_;
+  state.p = plus_;
+  state.history[0].record(h, delta_);
   return report;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <variant>
 
+#include "channel_forces.hpp"
 #include "kernel/lie_exact.hpp"
 #include "momentum.hpp"
 
@@ -30,7 +31,8 @@ class LieExact final : public Momentum {
   std::variant<kernel::LieScratch<dynamics::kernel::Spatial<double>>,
                kernel::LieScratch<dynamics::kernel::Planar<double>>>
       links_;
-  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_;
+  ChannelForces forces_;
+  VectorXd delta_, correction_, mid_, rate_, minus_, plus_, residual_, gradient_, q_next_;
 };
 
 }  // namespace hamelin::integration

@@ -7,16 +7,19 @@ namespace hamelin::integration {
 class Momentum : public Integrator {
  public:
   void velocity(const State& state, VectorXd& v) override { dynamics::solve_mass(model_, ws_, state.q, state.p, v); }
-  void kick(State& state, const VectorXd& dp) override { state.p += dp; }
-  void set_velocity(State& state, const VectorXd& v) override {
-    dynamics::momentum(model_, ws_, state.q, v, state.p);
-    state.v = v;
-    state.delta_count = -1;  // a guess of the displacement is h v
-  }
 
  protected:
   using Integrator::Integrator;
-  void begin(State& state, const VectorXd& v0) override { set_velocity(state, v0); }
+  void begin(State& state, const VectorXd& v0) override {
+    state.history.assign(1, StepHistory(model_.dof()));
+    state.p = VectorXd::Zero(model_.dof());
+    replace_velocity(state, v0);
+  }
+  void add_momentum(State& state, const VectorXd& dp) override { state.p += dp; }
+  void replace_velocity(State& state, const VectorXd& v) override {
+    dynamics::momentum(model_, ws_, state.q, v, state.p);
+    for (auto& steps : state.history) steps.restart(v);
+  }
 };
 
 }  // namespace hamelin::integration

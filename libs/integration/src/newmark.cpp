@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "finite.hpp"
+
 namespace hamelin::integration {
 
 Newmark::Newmark(const Model& model, const Options& options) : Explicit("newmark", model, options) {
@@ -14,20 +16,11 @@ std::string Newmark::criterion() const {
   return fmt::format("h^2 |change of the acceleration|_inf <= {}", options_.tolerance);
 }
 
-// State::memory holds the node's acceleration and the one before; delta_count says whether they stand.
+// State::memory holds the node's acceleration and the one before.
 void Newmark::begin(State& state, const VectorXd& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof());
-  set_velocity(state, v0);
-}
-
-void Newmark::kick(State& state, const VectorXd& dp) {
-  Explicit::kick(state, dp);
-  state.delta_count = 0;
-}
-
-void Newmark::set_velocity(State& state, const VectorXd& v) {
-  state.v = v;
-  state.delta_count = 0;
+  state.force_previous = VectorXd::Zero(model_.dof());
+  Explicit::begin(state, v0);
 }
 
 void Newmark::place(const State& state, double h) {
@@ -40,10 +33,10 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   const Eigen::Index n = model_.dof();
   StepReport report;
   report.converged = false;
-  evaluate_forces(channels, state.q, state.v);
-  node_force_ = force_;
+  forces_.evaluate(channels, ws_, state.q, state.v);
+  node_force_ = forces_.total();
   // the acceleration carried over belongs to the forces it was made with
-  const bool stands = state.delta_count > 0 && state.force_previous == node_force_;
+  const bool stands = !state.jumped && state.force_previous == node_force_;
   if (stands) {
     a_ = state.memory.head(n);
   } else {
@@ -56,24 +49,25 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
     if (report.updates == options_.max_updates) return report;
     place(state, h);
     accelerate(channels, q_, v_, report);
-    report.residual = h * h * (acceleration_ - a_new_).lpNorm<Eigen::Infinity>();
+    moved_ = acceleration_ - a_new_;
+    report.residual = h * h * largest_size(moved_);
     if (!std::isfinite(report.residual)) return report;
     a_new_ = acceleration_;
     ++report.updates;
   } while (report.residual > options_.tolerance);
-  report.converged = true;
   place(state, h);
+  report.converged = all_finite(q_) && all_finite(v_) && all_finite(a_new_);
+  if (!report.converged) return report;
   state.memory.head(n) = a_new_;
   state.memory.tail(n) = a_;
-  state.force_previous = force_;
+  state.force_previous = forces_.total();
   // work by the mean of both nodes' forces: those of the new node stand, the old one's are made again
   moved_ = q_ - state.q;
-  book_work(report, moved_, 0.5);
-  evaluate_forces(channels, state.q, state.v);
-  book_work(report, moved_, 0.5);
+  forces_.add_work(report, moved_, 0.5);
+  forces_.evaluate(channels, ws_, state.q, state.v);
+  forces_.add_work(report, moved_, 0.5);
   state.q = q_;
   state.v = v_;
-  state.delta_count = 1;
   state.step_previous = h;
   return report;
 }

@@ -11,8 +11,6 @@ class Newmark final : public Explicit {
   Newmark(const Model& model, const Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return options_.newmark_gamma == 0.5 ? 2 : 1; }
-  void kick(State& state, const VectorXd& dp) override;
-  void set_velocity(State& state, const VectorXd& v) override;
 
  private:
   void begin(State& state, const VectorXd& v0) override;

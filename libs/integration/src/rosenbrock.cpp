@@ -2,18 +2,36 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "finite.hpp"
 
 namespace hamelin::integration {
 
 namespace {
 
 constexpr double default_tolerance = 1e-10;
-constexpr double safety = 0.9, most = 6.0, least = 0.2;  // growth and shrinking of a step, as odeint's controller has
-constexpr double difference = 1e-5;                      // of the Jacobian; central, so its error is about 1e-10
-constexpr int max_rejections = 60;
+constexpr double difference = 1e-5;  // of the Jacobian; central, so its error is about 1e-10
+constexpr StepController::Rule rule{4.0, 0.9, 0.2, 6.0};
+
+// The published coefficients, transformed as in rodas.f so that no stage multiplies by the Jacobian: stage i stands at
+// y + Σ a_ij u_j and solves (1/(γh) − J) u_i = f + Σ c_ij u_j / h. The last two rows of a are those of the embedded and
+// of the new solution: the fifth and sixth stage are added whole.
+constexpr double gamma = 0.25;
+using Row = std::array<double, 5>;
+constexpr std::array<Row, 6> a{Row{},
+                               Row{1.544},
+                               Row{0.9466785280815826, 0.2557011698983284},
+                               Row{3.314825187068521, 2.896124015972201, 0.9986419139977817},
+                               Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950},
+                               Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0}};
+constexpr std::array<Row, 6> c{
+    Row{},
+    Row{-5.6688},
+    Row{-2.430093356833875, -0.2063599157091915},
+    Row{-0.1073529058151375, -9.594562251023355, -20.47028614809616},
+    Row{7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160},
+    Row{8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}};
 
 Options controlled_always(Options options) {
   if (!options.step_control()) options.rtol = options.atol = default_tolerance;
@@ -23,44 +41,100 @@ Options controlled_always(Options options) {
 }  // namespace
 
 Rosenbrock::Rosenbrock(const Model& model, const Options& options)
-    : Explicit("rosenbrock", model, controlled_always(options)),
-      size_(2 * model.dof() + 3),
-      method_(
-          static_cast<std::size_t>(size_), [this](const double* y, double* dy) { derivative(y, dy); },
-          [this](const double* y, double* by_rows) { jacobian(y, by_rows); }) {
-  for (auto* x : {&y_, &next_, &error_, &point_, &up_, &down_}) *x = VectorXd::Zero(size_);
-  q_ = v_ = VectorXd::Zero(model.dof());
+    : Explicit("rosenbrock", model, controlled_always(options)), factors_(model.dof()) {
+  const int n = model.dof();
+  by_q_ = by_v_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
+  works_by_q_ = works_by_v_ = Eigen::Matrix3Xd::Zero(3, n);
+  for (auto* x : {&q_, &v_, &right_q_, &right_v_, &up_}) *x = VectorXd::Zero(n);
+  dq_.fill(q_);
+  dv_.fill(q_);
 }
 
 std::string Rosenbrock::criterion() const {
   return fmt::format("error <= {} + {} |(q, v)|, rms", options_.atol, options_.rtol);
 }
 
-void Rosenbrock::derivative(const double* y, double* dy) {
-  const Eigen::Index n = model_.dof();
-  q_ = Eigen::Map<const VectorXd>(y, n);
-  v_ = Eigen::Map<const VectorXd>(y + n, n);
-  accelerate(*channels_, q_, v_, *report_);
+Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorXd& q, const VectorXd& v,
+                                         StepReport& report) {
+  accelerate(channels, q, v, report);
   StepReport power;
-  book_work(power, v_, 1.0);
-  Eigen::Map<VectorXd> out(dy, size_);
-  out.head(n) = v_;
-  out.segment(n, n) = acceleration_;
-  out.tail(3) << power.gyroscopic_work_J, power.dissipated_J, power.held_work_J;
+  forces_.add_work(power, v, 1.0);
+  return {power.gyroscopic_work_J, power.dissipated_J, power.held_work_J};
 }
 
-void Rosenbrock::jacobian(const double* y, double* by_rows) {
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(by_rows, size_, size_);
-  J.setZero();
-  point_ = Eigen::Map<const VectorXd>(y, size_);
-  for (Eigen::Index j = 0; j < size_ - 3; ++j) {
-    point_[j] = y[j] + difference;
-    derivative(point_.data(), up_.data());
-    point_[j] = y[j] - difference;
-    derivative(point_.data(), down_.data());
-    point_[j] = y[j];
-    J.col(j) = (up_ - down_) / (2.0 * difference);
+void Rosenbrock::make_jacobian(const State& state, const Channels& channels, StepReport& report) {
+  q_ = state.q;
+  v_ = state.v;
+  const auto column = [&](double& number, auto&& acceleration, auto&& works) {
+    const double at = number;
+    number = at + difference;
+    const Works works_up = derivative(channels, q_, v_, report);
+    up_ = acceleration_;
+    number = at - difference;
+    const Works works_down = derivative(channels, q_, v_, report);
+    number = at;
+    acceleration = (up_ - acceleration_) / (2.0 * difference);
+    works = (works_up - works_down) / (2.0 * difference);
+  };
+  for (Eigen::Index j = 0; j < state.q.size(); ++j) {
+    column(q_[j], by_q_.col(j), works_by_q_.col(j));
+    column(v_[j], by_v_.col(j), works_by_v_.col(j));
   }
+}
+
+// The increments (dq, dv) of a stage solve dq/(γh) − dv = r_q and dv/(γh) − J_q dq − J_v dv = r_v: dq = γh (r_q + dv)
+// leaves a system for dv.
+void Rosenbrock::solve_stage(std::size_t stage, const Channels& channels, double h, StepReport& report) {
+  const double step = gamma * h;
+  Works right = derivative(channels, q_, v_, report);
+  right_q_ = v_;
+  right_v_ = acceleration_;
+  for (std::size_t j = 0; j < stage; ++j) {
+    right_q_ += (c[stage][j] / h) * dq_[j];
+    right_v_ += (c[stage][j] / h) * dv_[j];
+    right += (c[stage][j] / h) * dworks_[j];
+  }
+  right_v_.noalias() += step * (by_q_ * right_q_);
+  dv_[stage] = factors_.solve(right_v_);
+  dq_[stage] = step * (right_q_ + dv_[stage]);
+  right.noalias() += works_by_q_ * dq_[stage];
+  right.noalias() += works_by_v_ * dv_[stage];
+  dworks_[stage] = step * right;
+}
+
+void Rosenbrock::try_step(const State& state, const Channels& channels, double h, StepReport& report) {
+  const double step = gamma * h;
+  matrix_ = -by_v_ - step * by_q_;
+  matrix_.diagonal().array() += 1.0 / step;
+  factors_.compute(matrix_);
+  ++report.factorizations;
+  for (std::size_t stage = 0; stage < stages; ++stage) {
+    q_ = state.q;
+    v_ = state.v;
+    works_.setZero();
+    for (std::size_t j = 0; j < stage; ++j) {
+      q_ += a[stage][j] * dq_[j];
+      v_ += a[stage][j] * dv_[j];
+      works_ += a[stage][j] * dworks_[j];
+    }
+    solve_stage(stage, channels, h, report);
+  }
+  q_ += dq_.back();
+  v_ += dv_.back();
+  works_ += dworks_.back();
+}
+
+double Rosenbrock::error_norm(const State& state) const {
+  double sum = 0.0;
+  const auto add = [&](const VectorXd& before, const VectorXd& after, const VectorXd& error) {
+    for (Eigen::Index i = 0; i < before.size(); ++i) {
+      const double e = error[i] / (options_.atol + options_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
+      sum += e * e;
+    }
+  };
+  add(state.q, q_, dq_.back());
+  add(state.v, v_, dv_.back());
+  return std::sqrt(sum / static_cast<double>(2 * state.q.size()));
 }
 
 StepReport Rosenbrock::attempt(State&, const Channels&, double) {
@@ -70,40 +144,22 @@ StepReport Rosenbrock::attempt(State&, const Channels&, double) {
 }
 
 StepReport Rosenbrock::controlled(State& state, const Channels& channels, double limit) {
-  const Eigen::Index n = model_.dof();
   StepReport report;
   report.converged = false;
-  channels_ = &channels;
-  report_ = &report;
-  y_ << state.q, state.v, 0.0, 0.0, 0.0;
-  const double wish = state.step_next > 0.0 ? state.step_next : limit;
-  const double shortest = 10.0 * std::numeric_limits<double>::epsilon() * std::abs(state.time_s);
-  for (double h = wish; report.rejected <= max_rejections && h > shortest; ++report.rejected) {
-    h = std::min(h, limit);
-    method_.step(y_.data(), h, next_.data(), error_.data());
-    ++report.factorizations;
-    const auto scale = options_.atol + options_.rtol * y_.cwiseAbs().cwiseMax(next_.cwiseAbs()).array();
-    report.residual = std::sqrt((error_.array() / scale).head(2 * n).square().mean());
-    if (!std::isfinite(report.residual) || !next_.allFinite()) {
-      h *= least;
-      continue;
-    }
-    const double next = h * std::clamp(safety / std::pow(report.residual, 0.25), least, most);
-    if (report.residual > 1.0) {
-      h = next;
-      continue;
-    }
-    state.q = next_.head(n);
-    state.v = next_.segment(n, n);
-    report.gyroscopic_work_J = next_[2 * n];
-    report.dissipated_J = next_[2 * n + 1];
-    report.held_work_J = next_[2 * n + 2];
-    // a step that the limit cut short says nothing against the wish there was
-    state.step_next = report.rejected > 0 ? std::min(next, h) : h < wish ? std::max(next, wish) : next;
-    report.step_s = h;
-    report.converged = true;
-    break;
+  make_jacobian(state, channels, report);
+  StepController control(rule, state, limit);
+  while (control.has_try()) {
+    try_step(state, channels, control.step(), report);
+    report.residual = all_finite(q_) && all_finite(v_) && works_.allFinite() ? error_norm(state) : std::nan("");
+    if (!control.accepts(report.residual)) continue;
+    state.q = q_;
+    state.v = v_;
+    report.gyroscopic_work_J = works_[0];
+    report.dissipated_J = works_[1];
+    report.held_work_J = works_[2];
+    control.finish(state, report);
   }
+  report.rejected = control.rejected();
   return report;
 }
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "guess.hpp"
+#include "finite.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
 
@@ -58,38 +58,26 @@ const VectorXd& Variational::gradient(const VectorXd& q) {
 }
 
 template <class F>
-kernel::VariationalOutcome Variational::with_call(const State& state, const Channels& channels, double h, F&& f) {
-  return dynamics::kernel::with_group(model_, *kernels_,
-                                      [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
-                                        const kernel::VariationalCall<Chain> call{chain,
-                                                                                  h,
-                                                                                  state.q.data(),
-                                                                                  p_.data(),
-                                                                                  delta_.data(),
-                                                                                  p_next_.data(),
-                                                                                  data_or_null(channels.damping),
-                                                                                  data_or_null(channels.coulomb),
-                                                                                  data_or_null(channels.held_torque),
-                                                                                  channels.coulomb_speed,
-                                                                                  spins_.data(),
-                                                                                  spins_.size(),
-                                                                                  options_.tolerance,
-                                                                                  trusts_quadratic()};
-                                        return f(entry, call);
-                                      });
+kernel::VariationalOutcome Variational::with_call(const State& state, double h, F&& f) {
+  return dynamics::kernel::with_group(
+      model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
+        const kernel::VariationalCall<Chain> call{
+            chain,          h,       state.q.data(),     p_.data(),         delta_.data(),
+            p_next_.data(), forces_, options_.tolerance, trusts_quadratic()};
+        return f(entry, call);
+      });
 }
 
-kernel::VariationalOutcome Variational::solve_newton(const State& state, const Channels& channels, double h) {
-  extrapolate(state, h, delta_);
-  return with_call(state, channels, h,
-                   [&](const auto& entry, const auto& call) { return entry.step(call, memory_.get()); });
+kernel::VariationalOutcome Variational::solve_newton(const State& state, double h) {
+  state.history[0].guess(h, delta_);
+  return with_call(state, h, [&](const auto& entry, const auto& call) { return entry.step(call, memory_.get()); });
 }
 
-kernel::VariationalOutcome Variational::solve_feedback(const State& state, const Channels& channels, double h) {
+kernel::VariationalOutcome Variational::solve_feedback(const State& state, double h) {
   delta_.setZero();  // the paper's guess θ^k
   int updates = 0;
   for (;;) {
-    auto out = with_call(state, channels, h, [&](const auto& entry, const auto& call) {
+    auto out = with_call(state, h, [&](const auto& entry, const auto& call) {
       return entry.evaluate(call, memory_.get(), residual_.data());
     });
     out.updates = out.factorizations = updates;
@@ -106,22 +94,19 @@ kernel::VariationalOutcome Variational::solve_feedback(const State& state, const
 
 StepReport Variational::attempt(State& state, const Channels& channels, double h) {
   p_ = state.p - 0.5 * h * gradient(state.q);
-  to_spins(model_, channels.gyroscopic, spins_);
-  const auto out =
-      options_.solver == Solver::newton ? solve_newton(state, channels, h) : solve_feedback(state, channels, h);
+  forces_ = to_forces(model_, channels, spins_);
+  const auto out = options_.solver == Solver::newton ? solve_newton(state, h) : solve_feedback(state, h);
   StepReport report;
-  report.converged = out.converged;
+  report.converged = out.converged && all_finite(delta_) && all_finite(p_next_);
   report.updates = out.updates;
   report.factorizations = out.factorizations;
   report.evaluations = out.evaluations;
   report.residual = out.residual;
-  report.held_work_J = out.held_work;
-  report.dissipated_J = out.dissipated;
-  report.gyroscopic_work_J = out.gyroscopic_work;
+  report_work(out.work, report);
   if (!report.converged) return report;
   state.q += delta_;
   state.p = p_next_ - 0.5 * h * gradient(state.q);
-  remember(state, h, delta_);
+  state.history[0].record(h, delta_);
   return report;
 }
 

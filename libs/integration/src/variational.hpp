@@ -21,14 +21,15 @@ class Variational final : public Momentum {
   const VectorXd& gradient(const VectorXd& q);
   /// f(entry, call) for the kernel of this model.
   template <class F>
-  kernel::VariationalOutcome with_call(const State& state, const Channels& channels, double h, F&& f);
-  kernel::VariationalOutcome solve_newton(const State& state, const Channels& channels, double h);
-  kernel::VariationalOutcome solve_feedback(const State& state, const Channels& channels, double h);
+  kernel::VariationalOutcome with_call(const State& state, double h, F&& f);
+  kernel::VariationalOutcome solve_newton(const State& state, double h);
+  kernel::VariationalOutcome solve_feedback(const State& state, double h);
   [[nodiscard]] bool trusts_quadratic() const noexcept;
 
   const kernel::VariationalSet* kernels_;
   dynamics::Memory memory_;
   std::vector<dynamics::kernel::Spin> spins_;
+  kernel::Forces forces_{};  ///< of the step under way
   VectorXd delta_, p_, p_next_, correction_, residual_;
   VectorXd gradient_, gradient_at_;
 };

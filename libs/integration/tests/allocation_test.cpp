@@ -1,51 +1,108 @@
+#include "hamelin/test/allocations.hpp"
+
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "hamelin/integration/integrator.hpp"
-#include "hamelin/test/allocations.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;
 
-#ifndef HAMELIN_SANITIZED
+namespace {
+
+Channels all_channels(int n) {
+  Channels channels;
+  channels.damping = VectorXd::Constant(n, 0.1);
+  channels.coulomb = VectorXd::Constant(n, 0.05);
+  channels.coulomb_speed = 0.5;
+  channels.held_torque = VectorXd::Constant(n, 0.2);
+  channels.gyroscopic = {{2, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX()}};
+  return channels;
+}
+
+// Whatever a caller does in a tick, after the first step.
+void check_tick(Integrator& integrator, const Channels& channels, double h) {
+  const int n = integrator.model().dof();
+  State state = integrator.start(VectorXd::Constant(n, 0.2), VectorXd::Constant(n, 0.3));
+  REQUIRE(integrator.step(state, channels, h).converged);
+  const State kept = state;
+  VectorXd v(n);
+  double sum = 0.0;
+  CHECK(test::allocations_in([&] {
+          sum += integrator.step(state, channels, h).residual;
+          integrator.velocity(state, v);
+          integrator.kick(state, v);
+          sum += integrator.advance(state, channels, h).residual;
+          integrator.set_velocity(state, v);
+          sum += integrator.step(state, channels, 0.5 * h).residual;
+          sum += integrator.energy(state).total();
+          state = kept;
+        }) == 0);
+  CHECK(std::isfinite(sum));
+}
+
+}  // namespace
+
+TEST_CASE("the count sees what Eigen, operator new and the C library take from the heap", "[allocation]") {
+  if (!test::counts_allocations()) return;
+  const VectorXd a = VectorXd::Ones(5), b = a;
+  VectorXd c(5);
+  double sum = 0.0;
+  CHECK(test::allocations_in([&] { c = a + b; }) == 0);
+  CHECK(test::allocations_in([&] {
+          const VectorXd temporary = a + b;
+          sum += temporary[0];
+        }) == 1);
+  CHECK(test::allocations_in([&] { c.resize(6); }) == 1);
+  void* volatile p = nullptr;
+  CHECK(test::allocations_in([&] { p = ::operator new(64); }) == 1);
+  ::operator delete(p);
+  CHECK(test::allocations_in([&] { p = ::operator new (64, std::align_val_t{64}); }) == 1);
+  ::operator delete (p, std::align_val_t{64});
+  CHECK(test::allocations_in([&] { p = std::calloc(1, 64); }) == 1);
+  CHECK(test::allocations_in([&] { p = std::realloc(p, 4096); }) == 1);
+  std::free(p);
+  CHECK(sum == 2.0);
+}
+
 TEST_CASE("a step does not allocate", "[integration][allocation]") {
-  const bool planar = GENERATE(false, true);
-  const Model model(test::random_robot(10, 6, 0, planar));
-  for (const auto& name : integrator_names()) {
-    if (name == "rosenbrock") continue;  // odeint's linear algebra allocates; it is there to judge others by
-    CAPTURE(name);
-    const auto integrator = make_integrator(name, model);
-    Channels channels;
-    channels.damping = VectorXd::Constant(6, 0.1);
-    channels.held_torque = VectorXd::Zero(6);
-    channels.gyroscopic = {{2, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX()}};
-    State state = integrator->start(VectorXd::Constant(6, 0.2), VectorXd::Constant(6, 0.3));
-    REQUIRE(integrator->step(state, channels, 1e-3).converged);
-    VectorXd v(6);
-    double sum = 0.0;
-    CHECK(test::allocations_in([&] {
-            sum += integrator->step(state, channels, 1e-3).residual;
-            integrator->velocity(state, v);
-            integrator->kick(state, v);
-            integrator->set_velocity(state, v);
-            sum += integrator->energy(state).total();
-          }) == 0);
-    CHECK(std::isfinite(sum));
+  if (!test::counts_allocations()) return;
+  const auto name = GENERATE(from_range(integrator_names()));
+  const bool planar = GENERATE(false, true), prismatic = GENERATE(false, true);
+  const Model model(test::random_robot(10, 6, prismatic ? 3 : 0, planar));
+  auto orders = find_scheme(name)->orders;
+  if (orders.empty()) orders = {0};
+  for (const int order : orders) {
+    CAPTURE(name, planar, prismatic, order);
+    for (const Channels& channels : {Channels{}, all_channels(6)}) {
+      Options options = test::of_order(order);
+      check_tick(*make_integrator(name, model, options), channels, 1e-3);
+      if (!find_scheme(name)->step_control) continue;
+      options.rtol = options.atol = 1e-6;
+      check_tick(*make_integrator(name, model, options), channels, 0.05);
+    }
   }
 }
 
-TEST_CASE("a controlled step does not allocate", "[integration][allocation]") {
+TEST_CASE("solvers that are not the default do not allocate either, nor does a step that is halved or fails",
+          "[integration][allocation]") {
+  if (!test::counts_allocations()) return;
   const Model model(test::random_robot(10, 6));
-  Channels channels;
-  channels.damping = VectorXd::Constant(6, 0.1);
   Options options;
-  options.rtol = options.atol = 1e-9;
-  const auto integrator = make_integrator("dop853", model, options);
-  State state = integrator->start(VectorXd::Constant(6, 0.2), VectorXd::Constant(6, 0.3));
-  REQUIRE(integrator->step(state, channels, 1e-3).converged);
-  double sum = 0.0;
-  CHECK(test::allocations_in([&] { sum += integrator->step(state, channels, 0.1).residual; }) == 0);
-  CHECK(std::isfinite(sum));
+  options.solver_given = true;
+  options.solver = Solver::feedback;
+  check_tick(*make_integrator("hamel-variational", model, options), all_channels(6), 1e-3);
+  options.solver = Solver::riqn;
+  check_tick(*make_integrator("lie-exact", model, options), all_channels(6), 1e-3);
+  for (const std::string name : {"hamel-variational", "gauss", "composition", "lie-exact", "hamel", "newmark"}) {
+    CAPTURE(name);
+    const auto integrator = make_integrator(name, model);
+    State state = integrator->start(VectorXd::Constant(6, 0.2), VectorXd::Constant(6, 8.0));
+    StepReport report;
+    CHECK(test::allocations_in([&] { report = integrator->step(state, {}, 0.1); }) == 0);
+    CHECK(report.halvings > 0);
+    CHECK(test::allocations_in([&] { report = integrator->step(state, {}, 1e3); }) == 0);
+    CHECK_FALSE(report.converged);
+  }
 }
-#endif

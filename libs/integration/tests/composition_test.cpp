@@ -4,18 +4,13 @@
 #include <cmath>
 
 #include "hamelin/test/chains.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;
 
 namespace {
-
-Options of_order(int order) {
-  Options options;
-  options.order = order;
-  return options;
-}
 
 VectorXd end_of(Integrator& integrator, const VectorXd& q0, double duration, int steps, const Channels& channels = {}) {
   State state = integrator.start(q0, VectorXd::Zero(q0.size()));
@@ -61,7 +56,7 @@ TEST_CASE("compositions have their orders, with damping and gyroscopic terms too
   std::vector<double> errors;
   const int few = order == 8 ? 16 : 40;  // order 8 meets rounding soon
   for (const int steps : {few, 2 * few}) {
-    Options options = of_order(order);
+    Options options = test::of_order(order);
     options.tolerance = 1e-14;
     const auto integrator = make_integrator("composition", model, options);
     CHECK(integrator->order() == order);
@@ -75,13 +70,13 @@ TEST_CASE("a composition runs backwards along its own way and a state restored g
           "[integration][composition]") {
   const Model model(test::spatial_chain(5));
   const int order = GENERATE(4, 6, 8);
-  const auto integrator = make_integrator("composition", model, of_order(order));
+  const auto integrator = make_integrator("composition", model, test::of_order(order));
   const VectorXd q0 = VectorXd::Constant(5, 0.4), v0 = VectorXd::Constant(5, -0.5);
   State state = integrator->start(q0, v0);
   for (int k = 0; k < 50; ++k) REQUIRE(integrator->step(state, {}, 5e-3).converged);
   State kept = state;
   for (int k = 0; k < 50; ++k) REQUIRE(integrator->step(state, {}, 5e-3).converged);
-  const auto other = make_integrator("composition", model, of_order(order));
+  const auto other = make_integrator("composition", model, test::of_order(order));
   for (int k = 0; k < 50; ++k) REQUIRE(other->step(kept, {}, 5e-3).converged);
   CHECK(kept.q == state.q);
   CHECK(kept.p == state.p);

@@ -1,9 +1,12 @@
+#include "../src/gauss_tableau.hpp"
+
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "hamelin/core/isa.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/test/chains.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -19,25 +22,19 @@ State run(const Model& model, const Options& options, const VectorXd& q0, const 
   return state;
 }
 
-Options gauss_of_order(int order) {
-  Options options;
-  options.order = order;
-  return options;
-}
-
 }  // namespace
 
 TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gauss][order]") {
   // Slow enough for the asymptotic range: a chain in a slow swing, errors well above rounding.
   const Model model(test::random_robot(20, 3, GENERATE(0, 2)));
   const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
-  const VectorXd truth = run(model, gauss_of_order(16), q0, v0, 1e-3, 400).q;
+  const VectorXd truth = run(model, test::of_order(16), q0, v0, 1e-3, 400).q;
   const auto rk4 = make_integrator("rk4", model);
   State peer = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
   REQUIRE((truth - peer.q).norm() < 1e-10);
   for (const int order : {4, 6, 8}) {
-    const auto error = [&](int n) { return (run(model, gauss_of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
+    const auto error = [&](int n) { return (run(model, test::of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
     int steps = 2;
     while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
     CAPTURE(order, steps, error(steps), error(2 * steps));
@@ -45,7 +42,52 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
     CHECK(observed > order - 0.7);
   }
   for (const int order : {10, 12, 14, 16})  // beneath what doubles can tell apart
-    CHECK((run(model, gauss_of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
+    CHECK((run(model, test::of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
+}
+
+TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), and is symplectic",
+          "[integration][gauss][order]") {
+  // Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7: with C(s) and D(s), B(2s) gives order 2s.
+  for (std::size_t s = 2; s <= kernel::most_stages; ++s) {
+    CAPTURE(s);
+    const auto t = gauss_tableau(s);
+    REQUIRE(t.stages == s);
+    const auto a = [&](std::size_t i, std::size_t j) { return t.a_column[j][i]; };
+    const auto power = [](double c, std::size_t k) { return std::pow(c, static_cast<double>(k)); };
+    const auto sum_b = [&](std::size_t k) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < s; ++j) sum += t.b[j] * power(t.c[j], k - 1);
+      return sum;
+    };
+    for (std::size_t k = 1; k <= 2 * s; ++k) CHECK(std::abs(sum_b(k) - 1.0 / static_cast<double>(k)) < 5e-16);
+    // and no more than that: Gauss quadrature misses x^2s by (s!)⁴/((2s+1) (2s)!²)
+    const auto stages = static_cast<double>(s);
+    const double some = std::tgamma(stages + 1.0), all = std::tgamma(2.0 * stages + 1.0);
+    const double missed = std::pow(some * some / all, 2) / (2.0 * stages + 1.0);
+    CHECK(1.0 / (2.0 * stages + 1.0) - sum_b(2 * s + 1) == Approx(missed).epsilon(1e-4));
+    for (std::size_t i = 0; i < s; ++i) {
+      double distances = t.barycentric[i];
+      for (std::size_t k = 1; k <= s; ++k) {
+        double c = 0.0, d = 0.0;
+        for (std::size_t j = 0; j < s; ++j) {
+          c += a(i, j) * power(t.c[j], k - 1);
+          d += t.b[j] * power(t.c[j], k - 1) * a(j, i);
+        }
+        const auto degree = static_cast<double>(k);
+        CHECK(std::abs(c - power(t.c[i], k) / degree) < 5e-16);
+        CHECK(std::abs(d - t.b[i] * (1.0 - power(t.c[i], k)) / degree) < 5e-16);
+      }
+      for (std::size_t j = 0; j < s; ++j) {
+        CHECK(std::abs(t.b[i] * a(i, j) + t.b[j] * a(j, i) - t.b[i] * t.b[j]) < 5e-17);
+        if (j != i) distances *= t.c[i] - t.c[j];
+      }
+      CHECK(distances == Approx(1.0).epsilon(1e-13));
+    }
+    for (std::size_t i = s; i < kernel::most_stages; ++i) {  // lanes without a stage
+      CHECK(t.c[i] == t.c[0]);
+      for (std::size_t j = 0; j < s; ++j) CHECK(a(i, j) == a(0, j));
+    }
+  }
 }
 
 TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",
@@ -54,7 +96,7 @@ TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start i
   Rng rng(21);
   const VectorXd q0 = test::random_joints(rng, 5), v0 = test::random_joints(rng, 5);
   for (const int order : {4, 8, 16}) {
-    const auto integrator = make_integrator("gauss", model, gauss_of_order(order));
+    const auto integrator = make_integrator("gauss", model, test::of_order(order));
     State state = integrator->start(q0, v0);
     const VectorXd p0 = state.p;
     for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(state, {}, 0.02).converged);
@@ -71,12 +113,12 @@ TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start i
 TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss][step-control]") {
   const Model model(test::spatial_chain(7));
   const VectorXd q0 = VectorXd::Constant(7, 0.3);
-  const auto truth = run(model, gauss_of_order(16), q0, VectorXd::Zero(7), 1e-3, 500);
+  const auto truth = run(model, test::of_order(16), q0, VectorXd::Zero(7), 1e-3, 500);
   for (const int order : {8, 12, 16}) {
     double before = 1.0;
     for (const double rtol : {1e-4, 1e-6, 1e-8}) {
       CAPTURE(order, rtol);
-      Options options = gauss_of_order(order);
+      Options options = test::of_order(order);
       options.rtol = options.atol = rtol;
       const auto integrator = make_integrator("gauss", model, options);
       State state = integrator->start(q0, VectorXd::Zero(7));
@@ -114,7 +156,7 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
   const auto rk4 = make_integrator("rk4", model);
   State truth = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(truth, channels, 0.5 / 8000).converged);
-  const auto gauss = make_integrator("gauss", model, gauss_of_order(8));
+  const auto gauss = make_integrator("gauss", model, test::of_order(8));
   State state = gauss->start(q0, v0);
   const double start = gauss->energy(state).total();
   double booked = 0.0;
@@ -131,7 +173,7 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
 
 TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to rounding", "[integration][gauss]") {
   const Model model(test::planar3());
-  const auto gauss = make_integrator("gauss", model, gauss_of_order(8));
+  const auto gauss = make_integrator("gauss", model, test::of_order(8));
   State state = gauss->start(VectorXd::Zero(3), VectorXd::Zero(3));
   const double start = gauss->energy(state).total();
   double early = 0.0, late = 0.0;
@@ -151,7 +193,7 @@ TEST_CASE("all instruction sets come to the same motion but for rounding", "[int
   const VectorXd q0 = test::random_joints(rng, 6), v0 = test::random_joints(rng, 6);
   const std::string best(instruction_set());
   for (const int order : {4, 6, 8, 10, 16}) {
-    const VectorXd q = run(model, gauss_of_order(order), q0, v0, 0.005, 50).q;
+    const VectorXd q = run(model, test::of_order(order), q0, v0, 0.005, 50).q;
     for (const char* isa : {"x86-64", "v3", "v4"}) {
       CAPTURE(order, isa);
       try {
@@ -159,8 +201,78 @@ TEST_CASE("all instruction sets come to the same motion but for rounding", "[int
       } catch (const std::exception&) {
         continue;  // not on this machine
       }
-      CHECK((run(model, gauss_of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
+      CHECK((run(model, test::of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
     }
     force_instruction_set(best);
   }
+}
+
+TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer sweeps",
+          "[integration][gauss][impulse]") {
+  const int order = GENERATE(4, 8, 16);
+  const bool kicks = GENERATE(false, true);
+  CAPTURE(order, kicks);
+  const int n = 7;
+  const Model model(test::spatial_chain(n));
+  dynamics::Workspace ws(model);
+  const auto gauss = make_integrator("gauss", model, test::of_order(order)),
+             afresh = make_integrator("gauss", model, test::of_order(order));
+  State state = gauss->start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n)), other = state;
+  Rng rng(order);
+  VectorXd v(n), dp(n);
+  int sweeps = 0, sweeps_afresh = 0;
+  for (int k = 0; k < 100; ++k) {
+    v = test::velocity(*gauss, state) + test::random_joints(rng, n, 0.01);
+    if (kicks) {
+      dynamics::momentum(model, ws, state.q, v, dp);
+      gauss->kick(state, dp - state.p);
+    } else {
+      gauss->set_velocity(state, v);
+    }
+    other = afresh->start(state.q, v);
+    const auto report = gauss->step(state, {}, 1e-3), report_afresh = afresh->step(other, {}, 1e-3);
+    REQUIRE(report.converged);
+    REQUIRE(report_afresh.converged);
+    CHECK((state.q - other.q).lpNorm<Eigen::Infinity>() < 1e-13);
+    CHECK((state.p - other.p).lpNorm<Eigen::Infinity>() < 1e-13);
+    sweeps += report.updates;
+    sweeps_afresh += report_afresh.updates;
+  }
+  CAPTURE(sweeps, sweeps_afresh);
+  CHECK(sweeps < 400);  // 480 where the guess stays behind the impulse
+  CHECK(sweeps < sweeps_afresh - 100);
+}
+
+TEST_CASE("an impulse is no error of the step after it: step control goes on as it was",
+          "[integration][gauss][impulse][step-control]") {
+  const int order = GENERATE(4, 8, 16);
+  CAPTURE(order);
+  const int n = 7;
+  const Model model(test::spatial_chain(n));
+  auto options = test::tolerances(1e-8, 1e-8);
+  options.order = order;
+  const auto gauss = make_integrator("gauss", model, options),
+             peer = make_integrator("dop853", model, test::tolerances(1e-12, 1e-12));
+  const VectorXd jump = VectorXd::Unit(n, 2);
+  const auto steps_of = [&](Integrator& integrator, bool impulses, State& state) {
+    state = integrator.start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n));
+    state.step_next = 1e-3;
+    int steps = 0, rejected = 0;
+    for (int part = 0; part < 10; ++part) {
+      if (impulses && part > 0) integrator.set_velocity(state, test::velocity(integrator, state) + jump);
+      for (double left = 0.05; left > 0.0; ++steps) {
+        const auto report = integrator.advance(state, {}, left);
+        REQUIRE(report.converged);
+        rejected += report.rejected;
+        left = report.step_s == left ? 0.0 : left - report.step_s;
+      }
+    }
+    return steps + rejected;
+  };
+  State state, truth;
+  const int smooth = steps_of(*gauss, false, state), kicked = steps_of(*gauss, true, state);
+  (void)steps_of(*peer, true, truth);
+  CAPTURE(smooth, kicked);
+  CHECK(kicked < 1.2 * smooth);
+  CHECK((state.q - truth.q).lpNorm<Eigen::Infinity>() < 1e-6);
 }

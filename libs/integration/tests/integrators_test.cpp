@@ -1,20 +1,18 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <filesystem>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/test/chains.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;
 
 namespace {
-
-const std::filesystem::path reference_file = HAMELIN_SOURCE_DIR "/../shared/reference/integrators.json";
 
 VectorXd vector_of(const Json& numbers) {
   VectorXd x(static_cast<Eigen::Index>(numbers.size()));
@@ -44,41 +42,34 @@ Run run(Integrator& integrator, const VectorXd& q0, const VectorXd& v0, double h
   return out;
 }
 
-// q(0.5 s) and v(0.5 s) of the cylinder chains by RK4 with 40000 steps of an independent implementation.
-struct Reference {
-  int n;
-  std::vector<double> q0, q, v;
-};
-const std::vector<Reference>& references() {
-  static const std::vector<Reference> all{
-      {3,
-       {0.3, -0.25, 0.4},
-       {-2.34194673151142, 0.223630086085084, 0.160257721060387},
-       {-9.66556564840169, -0.0258096869410843, 18.8108029912881}},
-      {7,
-       {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6},
-       {-1.19333714080065, 0.0531078097491988, 0.226574331425119, 0.0265211887336785, -0.325661532073833,
-        0.330097906158339, 1.29168507184085},
-       {0.429718920452964, -0.357088757489762, -10.7968666138081, 8.7083051864382, 4.03105633152767, -26.7250837494429,
-        10.9490113735045}}};
-  return all;
+// Motions computed with an implementation that shares no code with this one.
+const Json& golden() {
+  static const Json motions = read_json(HAMELIN_SOURCE_DIR "/data/golden/integration/motions.json");
+  return motions;
 }
 
-VectorXd to_vector(const std::vector<double>& x) {
-  return Eigen::Map<const VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
+// q(0.5 s) and v(0.5 s) of chains of cylinders at rest at first, by RK4 with 40000 steps.
+struct Reference {
+  int n;
+  VectorXd q0, q, v;
+};
+const std::vector<Reference>& references() {
+  static const std::vector<Reference> all = [] {
+    std::vector<Reference> read;
+    for (const auto& r : golden()["rk4_reference"])
+      read.push_back({r["n"], vector_of(r["q0"]), vector_of(r["qT"]), vector_of(r["vT"])});
+    return read;
+  }();
+  return all;
 }
 
 }  // namespace
 
 TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integration][golden]") {
-  if (!std::filesystem::exists(reference_file)) {
-    WARN("skipped: the reference file is not beside this checkout");
-    return;
-  }
   const Model model(test::planar3());
   REQUIRE(model.planar());
-  const Json reference = read_json(reference_file);  // a range over a temporary's element would outlive it
-  for (const auto& scheme : reference["schemes"]) {
+  REQUIRE(golden()["schemes"].size() == 6);
+  for (const auto& scheme : golden()["schemes"]) {
     const std::string name = scheme["scheme"];
     Options options;
     options.start = Start::published;
@@ -124,10 +115,10 @@ TEST_CASE("observed orders against an independent RK4 reference", "[integration]
     std::vector<double> errors;
     for (const int steps : {250, 500, 1000, 2000}) {
       const auto integrator = make_integrator(expected.name, model);
-      const auto out = run(*integrator, to_vector(reference.q0), VectorXd::Zero(reference.n), 0.5 / steps, steps);
+      const auto out = run(*integrator, reference.q0, VectorXd::Zero(reference.n), 0.5 / steps, steps);
       VectorXd v(reference.n);
       integrator->velocity(out.state, v);
-      errors.push_back((out.state.q - to_vector(reference.q)).norm() + 0.1 * (v - to_vector(reference.v)).norm());
+      errors.push_back((out.state.q - reference.q).norm() + 0.1 * (v - reference.v).norm());
     }
     for (std::size_t i = 1; i < errors.size(); ++i)
       CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(expected.order).margin(0.2));
@@ -141,11 +132,11 @@ TEST_CASE("the published start costs hamel-midpoint its second order", "[integra
   options.start = Start::published;
   std::vector<double> errors;
   for (const int steps : {500, 1000, 2000})
-    errors.push_back((run(*make_integrator("hamel-midpoint", model, options), to_vector(reference.q0),
-                          VectorXd::Zero(3), 0.5 / steps, steps)
-                          .state.q -
-                      to_vector(reference.q))
-                         .norm());
+    errors.push_back(
+        (run(*make_integrator("hamel-midpoint", model, options), reference.q0, VectorXd::Zero(3), 0.5 / steps, steps)
+             .state.q -
+         reference.q)
+            .norm());
   for (std::size_t i = 1; i < errors.size(); ++i)
     CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(1.0).margin(0.1));
 }
@@ -349,6 +340,33 @@ TEST_CASE("node impulses add momentum, node velocities replace it", "[integratio
   CHECK((v - v0).norm() < 1e-12);
 }
 
+TEST_CASE("a state shows no velocity or momentum but that of its node", "[integration][state]") {
+  const auto name = GENERATE(from_range(integrator_names()));
+  CAPTURE(name);
+  const Model model(test::random_robot(9, 4));
+  dynamics::Workspace ws(model);
+  const auto integrator = make_integrator(name, model);
+  State state = integrator->start(VectorXd::Constant(4, 0.3), VectorXd::Constant(4, 0.5));
+  const auto check = [&] {
+    const VectorXd v = test::velocity(*integrator, state);
+    VectorXd p(4);
+    dynamics::momentum(model, ws, state.q, v, p);
+    if (state.v.size() > 0) CHECK(state.v == v);
+    if (state.p.size() > 0 && name != "hamel" && name != "hamel-midpoint")
+      CHECK((state.p - p).norm() < 1e-12 * p.norm());
+    CHECK((state.v.size() == 0) != (state.p.size() == 0));
+  };
+  check();
+  for (int k = 0; k < 3; ++k) REQUIRE(integrator->step(state, {}, 1e-2).converged);
+  check();
+  integrator->kick(state, VectorXd::Constant(4, 0.2));
+  check();
+  integrator->set_velocity(state, VectorXd::Constant(4, -0.1));
+  check();
+  REQUIRE(integrator->advance(state, {}, 1e-2).converged);
+  check();
+}
+
 TEST_CASE("the variational step runs backwards along its own way", "[integration][property]") {
   const Model model(test::spatial_chain(5));
   const VectorXd q0 = VectorXd::Constant(5, 0.4), v0 = VectorXd::Constant(5, -0.5);
@@ -446,19 +464,55 @@ TEST_CASE("Newton takes no far root: a whipping chain at a coarse step keeps its
   CHECK(halvings > 0);
 }
 
-TEST_CASE("the step grid from 1e-6 to 0.1 either converges or is refused", "[integration][hard]") {
+TEST_CASE("steps from 1e-6 to 0.01 s converge to the motion, with the error of their order", "[integration][hard]") {
+  const auto name = GENERATE(from_range(integrator_names()));
+  const double h = GENERATE(1e-6, 1e-5, 1e-4, 1e-3, 1e-2);
+  CAPTURE(name, h);
   const Model model(test::spatial_chain(7));
-  const VectorXd q0 = VectorXd::Constant(7, 0.3);
-  for (const auto& name : integrator_names()) {
-    for (double h = 1e-6; h < 0.2; h *= 10.0) {
-      CAPTURE(name, h);
-      const auto integrator = make_integrator(name, model);
-      State state = integrator->start(q0, VectorXd::Zero(7));
-      for (int k = 0; k < 20; ++k)
-        if (!integrator->step(state, {}, h).converged) break;
-      CHECK(state.q.allFinite());
-    }
+  const VectorXd q0 = VectorXd::Constant(7, 0.3), rest = VectorXd::Zero(7);
+  const auto integrator = make_integrator(name, model);
+  State state = integrator->start(q0, rest);
+  for (int k = 0; k < 20; ++k) {
+    const auto report = integrator->step(state, {}, h);
+    REQUIRE(report.converged);
+    CHECK(report.halvings == 0);
+    CHECK(report.step_s == h);
   }
+  CHECK(state.time_s == Approx(20.0 * h).epsilon(1e-14));
+  // another scheme of another kind, exact to rounding at these steps
+  const auto peer = name == "dop853" ? make_integrator("gauss", model, test::of_order(16))
+                                     : make_integrator("dop853", model, test::tolerances(1e-13, 1e-13));
+  State truth = peer->start(q0, rest);
+  for (int k = 0; k < 20; ++k) REQUIRE(peer->step(truth, {}, h).converged);
+  const double order = integrator->adaptive() ? 8.0 : integrator->order();  // else 1e-10 is its tolerance
+  CHECK((state.q - truth.q).lpNorm<Eigen::Infinity>() < std::pow(5.0 * h, order) + 1e-11);
+}
+
+TEST_CASE("steps of 0.1 s, which resolve nothing, are halved or refused: the state stays, or all of the step is done",
+          "[integration][hard]") {
+  const auto name = GENERATE(from_range(integrator_names()));
+  CAPTURE(name);
+  const double h = 0.1;
+  const Model model(test::spatial_chain(7));
+  const auto integrator = make_integrator(name, model);
+  State state = integrator->start(VectorXd::Constant(7, 0.3), VectorXd::Zero(7));
+  int trouble = 0;
+  for (int k = 0; k < 20; ++k) {
+    CAPTURE(k);
+    const State before = state;
+    const auto report = integrator->step(state, {}, h);
+    trouble += report.halvings + report.rejected + (report.converged ? 0 : 1);
+    if (!report.converged) {
+      CHECK(report.step_s == 0.0);
+      CHECK(test::same_state(state, before));
+      break;
+    }
+    CHECK(report.step_s == Approx(h).epsilon(1e-14));
+    CHECK(state.time_s == Approx((k + 1) * h).epsilon(1e-14));
+    CHECK(test::velocity(*integrator, state).allFinite());
+    CHECK(state.q != before.q);
+  }
+  CHECK(trouble > 0);
 }
 
 TEST_CASE("unknown names and solvers are refused with what is known", "[integration][unit]") {

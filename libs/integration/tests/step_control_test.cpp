@@ -4,19 +4,13 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/test/chains.hpp"
+#include "hamelin/test/integration.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
 using namespace hamelin::integration;
 
 namespace {
-
-Options tolerances(double rtol, double atol) {
-  Options options;
-  options.rtol = rtol;
-  options.atol = atol;
-  return options;
-}
 
 struct Outcome {
   State state;
@@ -45,13 +39,6 @@ Outcome run_to(Integrator& integrator, const VectorXd& q0, double duration, doub
   return out;
 }
 
-std::vector<std::string> controlled_names() {
-  std::vector<std::string> names;
-  for (const auto& name : integrator_names())
-    if (find_scheme(name)->step_control) names.push_back(name);
-  return names;
-}
-
 }  // namespace
 
 TEST_CASE("dop853 takes the evaluations of scipy's DOP853 at equal tolerances, within 10 percent",
@@ -67,7 +54,7 @@ TEST_CASE("dop853 takes the evaluations of scipy's DOP853 at equal tolerances, w
     const Model model(robot);
     for (const auto& count : counts) {
       CAPTURE(count.tolerance);
-      const auto integrator = make_integrator("dop853", model, tolerances(count.tolerance, count.tolerance));
+      const auto integrator = make_integrator("dop853", model, test::tolerances(count.tolerance, count.tolerance));
       const auto out = run_to(*integrator, q0, duration, first);
       CHECK(out.sum.evaluations == Approx(count.evaluations).epsilon(0.1));
       CHECK((out.state.q - expected).lpNorm<Eigen::Infinity>() < 1e3 * count.tolerance + 1e-8);
@@ -91,11 +78,11 @@ TEST_CASE("under step control the error follows the tolerance and the work close
   channels.held_torque = test::random_joints(rng, 4, 1.0);
   channels.gyroscopic = {{2, test::random_vector(rng, 0.2), test::random_vector(rng, 3.0)}};
   const VectorXd q0 = VectorXd::Constant(4, 0.3);
-  const auto truth = run_to(*make_integrator("dop853", model, tolerances(1e-13, 1e-13)), q0, 1.0, 1e-3, channels);
-  for (const auto& name : controlled_names())
+  const auto truth = run_to(*make_integrator("dop853", model, test::tolerances(1e-13, 1e-13)), q0, 1.0, 1e-3, channels);
+  for (const auto& name : test::controlled_names())
     for (const double tolerance : {1e-6, 1e-9}) {
       CAPTURE(name, tolerance);
-      const auto integrator = make_integrator(name, model, tolerances(tolerance, tolerance));
+      const auto integrator = make_integrator(name, model, test::tolerances(tolerance, tolerance));
       const auto out = run_to(*integrator, q0, 1.0, 1e-3, channels);
       CHECK((out.state.q - truth.state.q).norm() < 100.0 * tolerance);
       State start = integrator->start(q0, VectorXd::Zero(4));
@@ -109,9 +96,9 @@ TEST_CASE("a step too long for the tolerance is taken back and a state restored 
           "[integration][step-control]") {
   const Model model(test::spatial_chain(7));
   const VectorXd q0 = VectorXd::Constant(7, 0.3);
-  for (const auto& name : controlled_names()) {
+  for (const auto& name : test::controlled_names()) {
     CAPTURE(name);
-    const auto integrator = make_integrator(name, model, tolerances(1e-9, 1e-9));
+    const auto integrator = make_integrator(name, model, test::tolerances(1e-9, 1e-9));
     State state = integrator->start(q0, VectorXd::Zero(7));
     state.step_next = 0.5;
     const auto first = integrator->advance(state, {}, 1.0);
@@ -120,13 +107,11 @@ TEST_CASE("a step too long for the tolerance is taken back and a state restored 
     CHECK(first.step_s < 0.5);
     const State kept = state;
     for (int k = 0; k < 3; ++k) REQUIRE(integrator->advance(state, {}, 1.0).converged);
-    const auto other = make_integrator(name, model, tolerances(1e-9, 1e-9));
+    const auto other = make_integrator(name, model, test::tolerances(1e-9, 1e-9));
     State again = other->start(VectorXd::Zero(7), VectorXd::Zero(7));
     again = kept;
     for (int k = 0; k < 3; ++k) REQUIRE(other->advance(again, {}, 1.0).converged);
-    CHECK(again.q == state.q);
-    CHECK(again.v == state.v);
-    CHECK(again.step_next == state.step_next);
+    CHECK(test::same_state(again, state));
     // step(h) goes exactly as far as asked, by as many steps as it takes
     const double time = state.time_s;
     const auto whole = integrator->step(state, {}, 0.25);
@@ -140,11 +125,12 @@ TEST_CASE("schemes without step control refuse tolerances, and nonsense is refus
   for (const auto& name : integrator_names()) {
     CAPTURE(name);
     if (find_scheme(name)->step_control)
-      CHECK_NOTHROW(make_integrator(name, model, tolerances(1e-6, 0.0)));
+      CHECK_NOTHROW(make_integrator(name, model, test::tolerances(1e-6, 0.0)));
     else
-      CHECK_THROWS_WITH(make_integrator(name, model, tolerances(1e-6, 0.0)), Catch::Contains("neither rtol nor atol"));
+      CHECK_THROWS_WITH(make_integrator(name, model, test::tolerances(1e-6, 0.0)),
+                        Catch::Contains("neither rtol nor atol"));
   }
-  CHECK_THROWS_AS(make_integrator("dop853", model, tolerances(-1e-6, 0.0)), Error);
+  CHECK_THROWS_AS(make_integrator("dop853", model, test::tolerances(-1e-6, 0.0)), Error);
   Options order;
   order.order = 6;
   CHECK_THROWS_WITH(make_integrator("rk4", model, order), Catch::Contains("one order"));

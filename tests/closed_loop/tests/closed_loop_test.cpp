@@ -340,8 +340,8 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][inp
   CHECK_THAT(refusal("/integrator", {{"name", "euler"}}), Catch::Contains("euler"));
 }
 
-#ifndef HAMELIN_SANITIZED
 TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
+  if (!test::counts_allocations()) return;
   const ScratchFolder folder;
   const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
   CAPTURE(planner);
@@ -362,6 +362,7 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
 }
 
 TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation]") {
+  if (!test::counts_allocations()) return;
   const ScratchFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
   CAPTURE(actuation);
@@ -390,6 +391,7 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
 }
 
 TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation]") {
+  if (!test::counts_allocations()) return;
   // the first link cannot turn past either ball, so no search finds a way
   const ScratchFolder folder;
   Json scene = scene_52();
@@ -414,4 +416,3 @@ TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation
   (void)allocations(searching_from);
   CHECK(allocations(searching_from + 4.0) == allocations(searching_from));
 }
-#endif

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
 
+#include "corrections.hpp"
+#include "forces.hpp"
 #include "hamelin/dynamics/kernel/groups.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
 
@@ -28,11 +30,8 @@ struct GaussCall {
   /// step's.
   double* slopes;
   double h_before;
-  // Forces besides gravity; null or none: not computed.
-  const double *damping, *coulomb, *held;
-  double coulomb_speed;
-  const dynamics::kernel::Spin* spins;
-  std::size_t spin_count;
+  bool jumped;       ///< whether p was changed after that step
+  Forces forces;     ///< at the stages, with their own velocities
   double tolerance;  ///< on the displacement's error that is left [rad or m]
   int max_sweeps;
 };
@@ -42,7 +41,7 @@ struct GaussOutcome {
   int sweeps;            ///< each as many stage evaluations as there are stages
   double residual;       ///< what the last sweep still changed, times its contraction [rad or m]
   double starter_error;  ///< what the first sweep changed [rad or m]; 0 without a guess
-  double held_work, dissipated, gyroscopic_work;  ///< h Σ b_i F_i·v_i [J]
+  Work work;             ///< h Σ b_i F_i·v_i
 };
 
 /// The entry points for one instruction set.
@@ -103,11 +102,13 @@ class Gauss {
     for (std::size_t g = 0; g < groups_; ++g)
       for (std::size_t j = 0; j < s_; ++j) weights[g][j] = Pack::load(call_.tableau.a_column[j] + g * lanes) * h;
     const bool guessed = call_.h_before > 0.0;
+    if (call_.jumped || !guessed) start();
     if (guessed)
       extrapolate();
     else
-      repeat_first();
-    double before = 0.0;
+      repeat_start();
+    // A sweep may do anything at first, then each changes less than the one before.
+    Corrections corrections({1e3, 1.0, 0.0, 2});
     for (int sweep = 0;; ++sweep) {
       Pack change(0.0);
       for (std::size_t g = 0; g < groups_; ++g) {
@@ -132,14 +133,10 @@ class Gauss {
       if (sweep == 0 && guessed) out.starter_error = now;
       // An extrapolated guess is trusted to contract by a tenth at first. After a repeated first slope each sweep mends
       // one more order in h, at a pace that says nothing of the next.
-      const double contraction = !guessed ? 1.0 : sweep > 0 ? now / before : 0.1;
-      out.residual = now * (contraction < 1.0 ? contraction : 1.0);
-      // where sweeps only stir what rounding leaves, there is no more to gain
-      const bool stirring = sweep > 1 && now > 0.3 * before && now <= 1e4 * rounding();
-      if (out.residual <= call_.tolerance || stirring || (sweep > 1 && now <= rounding())) break;
-      const bool hopeless = !(now < 1e3) || (sweep > 2 && now > before);
-      if (hopeless || sweep + 1 == call_.max_sweeps) return out;
-      before = now;
+      const double pace = !guessed ? 1.0 : sweep == 0 && !call_.jumped ? 0.1 : corrections.pace(now);
+      out.residual = now * (pace < 1.0 ? pace : 1.0);
+      if (out.residual <= call_.tolerance || corrections.at_rounding_floor(now, rounding())) break;
+      if (!corrections.take(now) || sweep + 1 == call_.max_sweeps) return out;
     }
     out.converged = true;
     finish(out);
@@ -156,7 +153,9 @@ class Gauss {
     return 4e-16 * most;
   }
 
-  /// The polynomial through the slopes of the step before, read at this step's stages.
+  /// The polynomial through the slopes of the step before, read at this step's stages. After an impulse it is raised to
+  /// the slopes at the start: the motion goes on from there much as it did. That saves more than one sweep a step where
+  /// every tick sets a velocity; forgetting the polynomial would cost one more.
   void extrapolate() noexcept {
     const Pack ratio(call_.h / call_.h_before);
     const auto& t = call_.tableau;
@@ -167,22 +166,37 @@ class Gauss {
       for (std::size_t j = 0; j < s_; ++j) product *= at - t.c[j];
       for (std::size_t j = 0; j < s_; ++j) weights[g][j] = product * t.barycentric[j] / (at - t.c[j]);
     }
+    double end[most_stages];  // reads it at the end of the step before
+    for (std::size_t j = 0; j < s_; ++j) {
+      end[j] = t.barycentric[j];
+      for (std::size_t m = 0; m < s_; ++m)
+        if (m != j) end[j] *= 1.0 - t.c[m];
+    }
     for (std::size_t r = 0; r < 2 * n_; ++r) {
       const double* const old = call_.slopes + r * s_;
+      Pack jump(0.0);
+      if (call_.jumped) {
+        jump = rate_[r];
+        for (std::size_t j = 0; j < s_; ++j) jump -= Pack(end[j] * old[j]);
+      }
       for (std::size_t g = 0; g < groups_; ++g) {
-        Pack sum(0.0);
+        Pack sum = jump;
         for (std::size_t j = 0; j < s_; ++j) sum += weights[g][j] * old[j];
         slopes_[r * groups_ + g] = sum;
       }
     }
   }
 
-  void repeat_first() noexcept {
+  /// rate_ = f(y) at the step's start, in all lanes.
+  void start() noexcept {
     for (std::size_t r = 0; r < n_; ++r) {
       y_[r] = Pack(call_.q[r]);
       y_[n_ + r] = Pack(call_.p[r]);
     }
     rates();
+  }
+
+  void repeat_start() noexcept {
     for (std::size_t r = 0; r < 2 * n_; ++r)
       for (std::size_t g = 0; g < groups_; ++g) slopes_[r * groups_ + g] = rate_[r];
   }
@@ -190,21 +204,13 @@ class Gauss {
   /// rate_ = f(y_): Hamilton's equations and the forces at the stages' own velocities.
   HAMELIN_INLINE void rates() noexcept {
     dynamics::kernel::hamilton<Space>(call_.chain, scratch_, y_, y_ + n_, rate_, rate_ + n_);
-    if (call_.held != nullptr)
-      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += Pack(call_.held[r]);
-    if (call_.damping != nullptr)
-      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] -= rate_[r] * call_.damping[r];
-    if (call_.coulomb != nullptr)
-      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] -= dry(r, rate_[r]);
-    if (call_.spin_count > 0) {
-      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, call_.spins, call_.spin_count, force_);
+    const Forces& f = call_.forces;
+    if (f.held != nullptr || f.damping != nullptr || f.coulomb != nullptr)
+      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += joint_force(f, r, rate_[r]);
+    if (f.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, f.spins, f.spin_count, force_);
       for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += force_[r];
     }
-  }
-  Pack dry(std::size_t r, Pack v) const noexcept {
-    for (std::size_t lane = 0; lane < lanes; ++lane)
-      v.v[lane] = call_.coulomb[r] * __builtin_tanh(v.v[lane] / call_.coulomb_speed);
-    return v;
   }
 
   void finish(GaussOutcome& out) noexcept {
@@ -218,15 +224,13 @@ class Gauss {
         dp += weight * p_rate;
         call_.slopes[r * s_ + j] = v;
         call_.slopes[(n_ + r) * s_ + j] = p_rate;
-        if (call_.held != nullptr) out.held_work += weight * call_.held[r] * v;
-        if (call_.damping != nullptr) out.dissipated += weight * call_.damping[r] * v * v;
-        if (call_.coulomb != nullptr)
-          out.dissipated += weight * call_.coulomb[r] * __builtin_tanh(v / call_.coulomb_speed) * v;
       }
       call_.q_next[r] = call_.q[r] + dq;
       call_.p_next[r] = call_.p[r] + dp;
     }
-    if (call_.spin_count == 0) return;
+    for (std::size_t j = 0; j < s_; ++j)
+      add_joint_work(call_.forces, n_, h * b[j], out.work, [&](std::size_t r) { return slope(r, j); });
+    if (call_.forces.spin_count == 0) return;
     for (std::size_t g = 0; g < groups_; ++g) {
       // the terms' own power, at the stages as they came out
       for (std::size_t r = 0; r < 2 * n_; ++r) {
@@ -238,7 +242,7 @@ class Gauss {
       rates();
       for (std::size_t r = 0; r < n_; ++r)
         for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane)
-          out.gyroscopic_work += h * b[g * lanes + lane] * force_[r].v[lane] * rate_[r].v[lane];
+          out.work.gyroscopic += h * b[g * lanes + lane] * force_[r].v[lane] * rate_[r].v[lane];
     }
   }
 

@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
 
+#include "corrections.hpp"
+#include "forces.hpp"
 #include "hamelin/dynamics/kernel/groups.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
 
@@ -10,16 +12,12 @@ namespace hamelin::integration::kernel {
 template <class Chain>
 struct VariationalCall {
   const Chain& chain;
-  double h;         ///< may be negative (compositions)
-  const double* q;  ///< θ^k
-  const double* p;  ///< p_k − (h/2) ∂V(θ^k)
-  double* delta;    ///< in: the guess; out: Δ
-  double* p_next;   ///< out: p_{k+1}⁺ + (h/2) F
-  // Forces at θ_mid with velocity Δ/h; null or none: not computed.
-  const double *damping, *coulomb, *held;
-  double coulomb_speed;
-  const dynamics::kernel::Spin* spins;
-  std::size_t spin_count;
+  double h;          ///< may be negative (compositions)
+  const double* q;   ///< θ^k
+  const double* p;   ///< p_k − (h/2) ∂V(θ^k)
+  double* delta;     ///< in: the guess; out: Δ
+  double* p_next;    ///< out: p_{k+1}⁺ + (h/2) F
+  Forces forces;     ///< at θ_mid with velocity Δ/h
   double tolerance;  ///< ‖error of Δ‖∞ [rad or m]
   /// Whether a first correction whose square promises the tolerance needs no confirming (tolerances from 1e-10 up).
   bool trust_quadratic;
@@ -28,8 +26,8 @@ struct VariationalCall {
 struct VariationalOutcome {
   bool converged;
   int updates, factorizations, evaluations;
-  double residual;                                ///< the last correction, or what its square promises [rad or m]
-  double held_work, dissipated, gyroscopic_work;  ///< F·Δ [J]
+  double residual;  ///< the last correction, or what its square promises [rad or m]
+  Work work;        ///< F·Δ
 };
 
 template <class Chain>
@@ -42,11 +40,7 @@ struct VariationalEntry {
 };
 using VariationalSet = dynamics::kernel::Groups<VariationalEntry>;
 
-// Near a root Newton contracts quadratically, and the guess is near. A first correction beyond this [rad or m], or one
-// that is not well below the one before, is on its way to some other root of the step: better to halve the step.
 inline constexpr double largest_correction = 0.3;
-inline constexpr double contraction_asked = 0.5;
-inline constexpr int max_newton_updates = 30;  // at the worst contraction, from the largest correction to 1e-9
 // A correction of size e leaves an error of about 0.3 e² (measured on falling chains); this is on the safe side.
 inline constexpr double quadratic_constant = 10.0;
 
@@ -112,7 +106,7 @@ class Variational {
   void evaluate() noexcept { sweep<false>(); }
 
   /// The same, and the factors of the linearisation there. False where a pivot vanishes.
-  bool evaluate_and_factor() noexcept { return call_.spin_count > 0 ? eliminate<true>() : eliminate<false>(); }
+  bool evaluate_and_factor() noexcept { return call_.forces.spin_count > 0 ? eliminate<true>() : eliminate<false>(); }
 
   /// δΔ for the residual that the factors were made with, added to Δ; returns its largest size.
   double correct() noexcept { return substitute(); }
@@ -143,19 +137,12 @@ class Variational {
       Space::add_along_axis(links_[i], twist, rate_[i]);
       k_[i].motion = twist;
     }
-    for (std::size_t i = 0; i < n_; ++i) force_[i] = joint_force(i);
-    if (call_.spin_count > 0) {
-      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, call_.spins, call_.spin_count, sigma_);
+    const Forces& f = call_.forces;
+    for (std::size_t i = 0; i < n_; ++i) force_[i] = joint_force(f, i, rate_[i]);
+    if (f.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, f.spins, f.spin_count, sigma_);
       for (std::size_t i = 0; i < n_; ++i) force_[i] += sigma_[i];
     }
-  }
-
-  /// Held torque, damping and dry friction of a joint at its rate.
-  HAMELIN_INLINE double joint_force(std::size_t i) const noexcept {
-    double force = call_.held != nullptr ? call_.held[i] : 0.0;
-    if (call_.damping != nullptr) force -= call_.damping[i] * rate_[i];
-    if (call_.coulomb != nullptr) force -= call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed);
-    return force;
   }
 
   template <bool Correct>
@@ -172,11 +159,11 @@ class Variational {
       if constexpr (Correct) {
         auto& f = f_[i];
         double right = -residual_[i] - along_a(i, s);
-        if (call_.spin_count > 0) right += half_ * Space::along_axis(l, t);
+        if (call_.forces.spin_count > 0) right += half_ * Space::along_axis(l, t);
         f.rho = right * f.inv_d;
         if (i == 0) break;
         s = Space::to_parent(l, x, Space::sum(s, Space::scaled(f.u, f.rho)));
-        if (call_.spin_count > 0) t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
+        if (call_.forces.spin_count > 0) t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
       }
     }
   }
@@ -215,15 +202,11 @@ class Variational {
       const double along = Space::along_axis(l, PB);
       double d = along - Space::pair(f.b, PB) + Space::pair(f.b, z);
       if constexpr (Space::mixed) d += l.armature;
-      if (call_.damping != nullptr) d += half_ * call_.damping[i];
-      if (call_.coulomb != nullptr) {
-        const double slope = __builtin_tanh(rate_[i] / call_.coulomb_speed);
-        d += half_ * call_.coulomb[i] / call_.coulomb_speed * (1.0 - slope * slope);
-      }
+      d += half_ * joint_force_slope(call_.forces, i, rate_[i]);
       double right = -residual_[i] - along_a(i, s);
       if constexpr (Spins) {
-        for (std::size_t j = 0; j < call_.spin_count; ++j)
-          if (call_.spins[j].link == i) hang(call_.spins[j], Q, mu);
+        for (std::size_t j = 0; j < call_.forces.spin_count; ++j)
+          if (call_.forces.spins[j].link == i) add_gyroscopic(call_.forces.spins[j], Q, mu);
         const Force QB = Space::times_axis_and(l, Q, f.b);
         f.spin_u = Space::sum(QB, Space::scaled(Space::turned_axis(l, mu), -half_));
         f.w = Space::sum(f.w, Space::scaled(Space::row(l, Q), -half_));
@@ -252,7 +235,7 @@ class Variational {
 
   /// A term's wrench and its dependence on the link's twist. That its w stays put while the link turns is left out: it
   /// is of higher order in h.
-  void hang(const dynamics::kernel::Spin& spin, typename Space::Operator& Q, Force& mu) const noexcept {
+  void add_gyroscopic(const dynamics::kernel::Spin& spin, typename Space::Operator& Q, Force& mu) const noexcept {
     auto w = Space::spin_axis(spin.w);
     for (std::size_t j = 0; j <= spin.link; ++j) w = Space::to_child_axis(links_[j], k_[j].x, w);
     Space::add(Q, Space::spin_operator(w, k_[spin.link].x, spin.point));
@@ -270,7 +253,7 @@ class Variational {
       const double correction = sigma_[i] * call_.h;
       call_.delta[i] += correction;
       const double size = __builtin_fabs(correction);
-      most = most >= size ? most : size;  // what is no number stays
+      if (size > most || size != size) most = size;  // NaN stays to the end
       step = Space::sum(y, Space::scaled(f.b, sigma_[i]));
       Space::add_along_axis(l, step, sigma_[i]);
     }
@@ -292,7 +275,7 @@ class Variational {
       Space::add_along_axis(l, step, sigma_[i]);
       k_[i].force = Space::momentum(l, k_[i].x, step);
       rate_[i] = call_.delta[i] * inv_h;
-      force_[i] = joint_force(i);
+      force_[i] = joint_force(call_.forces, i, rate_[i]);
     }
     auto lambda = Space::zero_force();
     for (std::size_t i = n_; i-- > 0;) {
@@ -304,20 +287,20 @@ class Variational {
   }
 
   HAMELIN_INLINE void solve() noexcept {
-    double allowed = largest_correction;
+    Corrections corrections(newton_rule(largest_correction, call_.tolerance));
     for (;;) {
       if (!evaluate_and_factor()) return;
       const double first = correct();
       out_.residual = first;
-      if (!(first <= allowed)) return;
-      if (call_.trust_quadratic && call_.spin_count == 0 && quadratic_constant * first * first <= call_.tolerance) {
+      if (!corrections.take(first)) return;
+      if (call_.trust_quadratic && call_.forces.spin_count == 0 &&
+          quadratic_constant * first * first <= call_.tolerance) {
         out_.residual = quadratic_constant * first * first;
         follow();
         finish();
         return;
       }
       // confirmed by the sweep that p⁺ needs anyway: the kept factors turn its residual into the error of Δ
-      double size = first;
       for (bool again = true; again;) {
         const double error = evaluate_and_correct();
         out_.residual = error;
@@ -325,16 +308,12 @@ class Variational {
           finish();
           return;
         }
-        const double rate = error / size;
+        const double pace = corrections.pace(error);
         // on by the same factors where two sweeps will do, for they cost no more than new ones
-        again = rate < 0.1 && error * rate * rate <= 0.1 * call_.tolerance;
-        if (!(error <= contraction_asked * size) && error > 1e3 * call_.tolerance) return;
-        size = error;
+        again = pace < 0.1 && error * pace * pace <= 0.1 * call_.tolerance;
+        if (!corrections.take(error)) return;
       }
       if (out_.updates >= max_newton_updates) return;
-      // rounding of long chains ends the contraction, not the iteration
-      allowed = contraction_asked * size;
-      if (allowed < 1e3 * call_.tolerance) allowed = 1e3 * call_.tolerance;
     }
   }
 
@@ -343,16 +322,11 @@ class Variational {
   HAMELIN_INLINE void finish() noexcept {
     out_.converged = true;
     for (std::size_t i = 0; i < n_; ++i) call_.p_next[i] = plus_[i] - residual_[i] + half_ * force_[i];
-    if (call_.held != nullptr)
-      for (std::size_t i = 0; i < n_; ++i) out_.held_work += call_.held[i] * rate_[i] * call_.h;
-    if (call_.damping != nullptr)
-      for (std::size_t i = 0; i < n_; ++i) out_.dissipated += call_.damping[i] * rate_[i] * rate_[i] * call_.h;
-    if (call_.coulomb != nullptr)
-      for (std::size_t i = 0; i < n_; ++i)
-        out_.dissipated += call_.coulomb[i] * __builtin_tanh(rate_[i] / call_.coulomb_speed) * rate_[i] * call_.h;
-    if (call_.spin_count > 0) {
-      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, call_.spins, call_.spin_count, sigma_);
-      for (std::size_t i = 0; i < n_; ++i) out_.gyroscopic_work += sigma_[i] * rate_[i] * call_.h;
+    const Forces& f = call_.forces;
+    add_joint_work(f, n_, call_.h, out_.work, [&](std::size_t i) { return rate_[i]; });
+    if (f.spin_count > 0) {
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, k_, f.spins, f.spin_count, sigma_);
+      for (std::size_t i = 0; i < n_; ++i) out_.work.gyroscopic += sigma_[i] * rate_[i] * call_.h;
     }
   }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/integration/step_history.hpp"
 
 namespace hamelin::integration {
 
@@ -28,18 +29,20 @@ struct Channels {
   }
 };
 
-/// What an integrator remembers between steps: a plain value, to be copied, kept and restored. Schemes with a momentum
-/// use p and leave v to be asked for; explicit schemes use v.
+/// What an integrator remembers between steps: a plain value, to be copied, kept and restored. Of v and p a state has
+/// the one that its scheme steps, and the other is empty: Integrator::velocity() answers for all schemes.
 struct State {
   double time_s = 0.0;
   long k = 0;
-  VectorXd q, v, p;
-  VectorXd memory;               ///< the scheme's own; hamel: body twists of the last step, dof × (6 or 3)
-  VectorXd force_previous;       ///< hamel: generalised force of the last step
-  double step_previous = 0.0;    ///< hamel: 0 right after a (consistent) start
-  std::vector<VectorXd> deltas;  ///< last displacements, newest first, for the guess
-  int delta_count = 0;           ///< how many of them are valid
-  double step_next = 0.0;        ///< what step control takes next [s]: set it for a first step; 0 goes as far as asked
+  VectorXd q;
+  VectorXd v;                        ///< velocity at the node: explicit schemes, newmark, feedback
+  VectorXd p;                        ///< momentum at the node [Nm s]; hamel: impulses that no step has taken up yet
+  bool jumped = true;                ///< whether the velocity was set or kicked since the last step
+  VectorXd memory;                   ///< the scheme's own; hamel: body twists of the last step, dof × (6 or 3)
+  VectorXd force_previous;           ///< hamel, newmark: generalised force of the last step
+  double step_previous = 0.0;        ///< gauss, hamel, newmark: length of the last step; 0 where there is none
+  std::vector<StepHistory> history;  ///< composition: one for each sub-step
+  double step_next = 0.0;  ///< what step control takes next [s]: set it for a first step; 0 goes as far as asked
 };
 
 /// What one step did.
@@ -103,9 +106,9 @@ class Integrator {
   /// Velocity at the node.
   virtual void velocity(const State& state, VectorXd& v) = 0;
   /// Node impulse: p += dp [Nm s].
-  virtual void kick(State& state, const VectorXd& dp) = 0;
+  void kick(State& state, const VectorXd& dp);
   /// Node velocity: p = M(θ^k) v.
-  virtual void set_velocity(State& state, const VectorXd& v) = 0;
+  void set_velocity(State& state, const VectorXd& v);
   /// Exactly h > 0 ahead: one step, or under step control as many as it takes. If it reports converged = false no root
   /// was found, and the state is as it was.
   [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
@@ -121,39 +124,26 @@ class Integrator {
  protected:
   Integrator(std::string name, const Model& model, const Options& options);
 
-  /// Fills q, v and whatever the scheme keeps; sizes are set.
+  /// Sets whatever the scheme keeps besides q, which is there.
   virtual void begin(State& state, const VectorXd& v0) = 0;
+  virtual void add_momentum(State& state, const VectorXd& dp) = 0;
+  virtual void replace_velocity(State& state, const VectorXd& v) = 0;
   /// One undivided step. Where it does not converge the state is left as it was.
   virtual StepReport attempt(State& state, const Channels& channels, double h) = 0;
   /// One step under step control, of at most `limit`, chosen by State::step_next; rejected ones are counted. Where it
   /// fails the state is left as it was. Schemes without step control never get here: make_integrator refuses.
   virtual StepReport controlled(State& state, const Channels& channels, double limit);
 
-  /// Generalised force of the channels at (q, v): total, with its parts kept for the work done.
-  void evaluate_forces(const Channels& channels, const VectorXd& q, const VectorXd& v) {
-    if (acts_.any || !channels.none()) sum_forces(channels, q, v);  // else it is zero already
-  }
-  /// Adds the work of the forces last evaluated over the displacement to the report.
-  void book_work(StepReport& report, const VectorXd& displacement, double weight) const {
-    if (acts_.any) sum_work(report, displacement, weight);
-  }
-
   const Model& model_;
   Options options_;
   dynamics::Workspace ws_;
-  VectorXd force_;  ///< sum of the channels, as evaluate_forces left it
 
  private:
-  void sum_forces(const Channels& channels, const VectorXd& q, const VectorXd& v);
-  void sum_work(StepReport& report, const VectorXd& displacement, double weight) const;
   StepReport divide(State& state, const Channels& channels, double h, int depth);
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level
-  struct {
-    bool any = false, held = false, damped = false, dry = false, gyroscopic = false;
-  } acts_;  ///< what the forces last evaluated are made of
-  VectorXd held_, damped_, dry_, gyroscopic_;
+  VectorXd velocity_;         ///< scratch of energy()
 };
 
 /// What a scheme takes of Options.

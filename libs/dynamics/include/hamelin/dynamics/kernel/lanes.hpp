@@ -85,23 +85,25 @@ template <int W>
 HAMELIN_INLINE Lanes<W> abs(Lanes<W> a) noexcept {
   return {a.v < 0.0 ? -a.v : a.v};
 }
-/// Lane by lane; a lane of a that is no number yields it, so that it is seen.
+/// The larger number, lane by lane; NaN where either is NaN.
 template <int W>
 HAMELIN_INLINE Lanes<W> max(Lanes<W> a, Lanes<W> b) noexcept {
-  return {a.v <= b.v ? b.v : a.v};
+  return {(a.v <= b.v) | (b.v != b.v) ? b.v : a.v};
 }
+/// The largest of all lanes; NaN where any is NaN.
 template <int W>
 HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
   double most = a[0];
-  for (int i = 1; i < W; ++i) most = most <= a[i] ? a[i] : most;
+  for (int i = 1; i < W; ++i) most = (most <= a[i]) | (a[i] != a[i]) ? a[i] : most;
   return most;
 }
 
 /// Beyond this [rad] the reduction below loses digits, and the C library takes over.
 inline constexpr double largest_reduced_angle = 1e6;
 
-/// Sine and cosine of all lanes to about one unit in the last place, without a branch for |x| ≤ 1e6: reduction to
-/// [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of fdlibm's kernels.
+/// Sine and cosine of all lanes, right to 1.5 units in the last place up to 100 rad and to 2.5 beyond, without a branch
+/// for |x| ≤ 1e6: reduction to [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of
+/// fdlibm's kernels.
 template <int W>
 HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
   using Real = typename Lanes<W>::Real;

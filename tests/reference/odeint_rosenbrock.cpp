@@ -6,7 +6,7 @@
 #include <boost/numeric/odeint/stepper/rosenbrock4.hpp>
 #include <utility>
 
-namespace hamelin::integration {
+namespace hamelin::reference {
 
 namespace ublas = boost::numeric::ublas;
 
@@ -42,4 +42,4 @@ void OdeintRosenbrock::step(const double* y, double h, double* next, double* err
   std::copy_n(s.error.begin(), size, error);
 }
 
-}  // namespace hamelin::integration
+}  // namespace hamelin::reference

@@ -3,7 +3,7 @@
 #include <functional>
 #include <memory>
 
-namespace hamelin::integration {
+namespace hamelin::reference {
 
 /// One step of Boost.odeint's rosenbrock4 behind plain pointers: the linear algebra of Boost 1.74 does not compile as
 /// C++20, so its source is built as C++17 and this header must read as both.
@@ -24,4 +24,4 @@ class OdeintRosenbrock {
   std::unique_ptr<Implementation> implementation_;
 };
 
-}  // namespace hamelin::integration
+}  // namespace hamelin::reference

@@ -1,0 +1,45 @@
+#pragma once
+#include <array>
+
+#include "hamelin/integration/integrator.hpp"
+
+namespace hamelin::integration {
+
+/// The generalised force of the channels, by its parts, for schemes that evaluate it joint vector by joint vector. (The
+/// kernels of gauss and hamel-variational have kernel/forces.hpp.)
+class ChannelForces {
+ public:
+  explicit ChannelForces(const Model& model);
+  ChannelForces(const ChannelForces&) = delete;
+  ChannelForces& operator=(const ChannelForces&) = delete;
+
+  /// The force at (q, v). It stays until the next call.
+  const VectorXd& evaluate(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v) {
+    if (any_ || !channels.none()) sum(channels, ws, q, v);  // else it is zero already
+    return total_;
+  }
+  [[nodiscard]] const VectorXd& total() const noexcept { return total_; }
+  /// Adds the work of the force last evaluated over the displacement to the report.
+  void add_work(StepReport& report, const VectorXd& displacement, double weight) const {
+    if (any_) sum_work(report, displacement, weight);
+  }
+
+ private:
+  void sum(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v);
+  void sum_work(StepReport& report, const VectorXd& displacement, double weight) const;
+
+  struct Part {
+    double StepReport::*account;  ///< where its work is booked
+    double sign;                  ///< −1 for what is taken from the motion
+    bool acts = false;
+    VectorXd force{};
+  };
+  const Model& model_;
+  bool any_ = false;
+  VectorXd total_;
+  Part held_{&StepReport::held_work_J, 1.0}, damping_{&StepReport::dissipated_J, -1.0},
+      coulomb_{&StepReport::dissipated_J, -1.0}, gyroscopic_{&StepReport::gyroscopic_work_J, 1.0};
+  std::array<Part*, 4> parts_{&held_, &damping_, &coulomb_, &gyroscopic_};
+};
+
+}  // namespace hamelin::integration

@@ -1,0 +1,65 @@
+#pragma once
+#include <cstddef>
+
+#include "hamelin/dynamics/kernel/lanes.hpp"
+#include "hamelin/dynamics/kernel/sweeps.hpp"
+
+namespace hamelin::integration::kernel {
+
+/// The forces of a step's channels as the kernels take them; null or none: not computed.
+struct Forces {
+  const double *damping, *coulomb, *held;
+  double coulomb_speed;
+  const dynamics::kernel::Spin* spins;
+  std::size_t spin_count;
+};
+
+/// What they did in a step [J].
+struct Work {
+  double held, dissipated, gyroscopic;
+};
+
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+HAMELIN_INLINE double tanh_of(double x) noexcept {
+  return __builtin_tanh(x);
+}
+template <int W>
+HAMELIN_INLINE dynamics::kernel::Lanes<W> tanh_of(dynamics::kernel::Lanes<W> x) noexcept {
+  for (int lane = 0; lane < W; ++lane) x.v[lane] = __builtin_tanh(x.v[lane]);
+  return x;
+}
+
+/// Held torque, damping and dry friction of joint i at its rate.
+template <class Real>
+HAMELIN_INLINE Real joint_force(const Forces& f, std::size_t i, Real rate) noexcept {
+  Real force(f.held != nullptr ? f.held[i] : 0.0);
+  if (f.damping != nullptr) force -= rate * Real(f.damping[i]);
+  if (f.coulomb != nullptr) force -= tanh_of(rate / Real(f.coulomb_speed)) * Real(f.coulomb[i]);
+  return force;
+}
+
+/// −∂(joint force)/∂rate: what damping and dry friction add to the stiffness of a step.
+HAMELIN_INLINE double joint_force_slope(const Forces& f, std::size_t i, double rate) noexcept {
+  double slope = f.damping != nullptr ? f.damping[i] : 0.0;
+  if (f.coulomb != nullptr) {
+    const double t = tanh_of(rate / f.coulomb_speed);
+    slope += f.coulomb[i] / f.coulomb_speed * (1.0 - t * t);
+  }
+  return slope;
+}
+
+/// Adds the work of these forces over a time dt at the rates rate(i).
+template <class Rate>
+HAMELIN_INLINE void add_joint_work(const Forces& f, std::size_t n, double dt, Work& work, Rate&& rate) noexcept {
+  if (f.held != nullptr)
+    for (std::size_t i = 0; i < n; ++i) work.held += f.held[i] * rate(i) * dt;
+  if (f.damping != nullptr)
+    for (std::size_t i = 0; i < n; ++i) work.dissipated += f.damping[i] * rate(i) * rate(i) * dt;
+  if (f.coulomb != nullptr)
+    for (std::size_t i = 0; i < n; ++i)
+      work.dissipated += f.coulomb[i] * tanh_of(rate(i) / f.coulomb_speed) * rate(i) * dt;
+}
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::integration::kernel

@@ -1,0 +1,44 @@
+#pragma once
+#include "hamelin/integration/integrator.hpp"
+
+/// What tests of integrators share.
+namespace hamelin::test {
+
+/// Options with a scheme's order (composition, gauss).
+inline integration::Options of_order(int order) {
+  integration::Options options;
+  options.order = order;
+  return options;
+}
+
+/// Options that switch step control on.
+inline integration::Options tolerances(double rtol, double atol) {
+  integration::Options options;
+  options.rtol = rtol;
+  options.atol = atol;
+  return options;
+}
+
+/// Names of the schemes that take rtol and atol.
+inline std::vector<std::string> controlled_names() {
+  std::vector<std::string> names;
+  for (const auto& name : integration::integrator_names())
+    if (integration::find_scheme(name)->step_control) names.push_back(name);
+  return names;
+}
+
+inline Eigen::VectorXd velocity(integration::Integrator& integrator, const integration::State& state) {
+  Eigen::VectorXd v(state.q.size());
+  integrator.velocity(state, v);
+  return v;
+}
+
+/// Whether all fields of two states are the same numbers.
+inline bool same_state(const integration::State& a, const integration::State& b) {
+  const auto same = [](const Eigen::VectorXd& x, const Eigen::VectorXd& y) { return x.size() == y.size() && x == y; };
+  return a.time_s == b.time_s && a.k == b.k && same(a.q, b.q) && same(a.v, b.v) && same(a.p, b.p) &&
+         a.jumped == b.jumped && same(a.memory, b.memory) && same(a.force_previous, b.force_previous) &&
+         a.step_previous == b.step_previous && a.history == b.history && a.step_next == b.step_next;
+}
+
+}  // namespace hamelin::test
