@@ -665,7 +665,7 @@ void ClosedLoop::actuate_sampled() {
 }
 
 log::Result ClosedLoop::run(const Watch& watch) {
-  Recorder recorder(result_, watch, *integrator_, options_, steps_);
+  Recorder recorder(result_, watch, *integrator_, options_);
   recorder_ = &recorder;
   const auto n = plant_.dof();
   state_ = integrator_->start(scene_.start_q.size() > 0 ? scene_.start_q : VectorXd::Zero(n),
