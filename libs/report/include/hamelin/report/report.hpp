@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "hamelin/core/json.hpp"
+#include "hamelin/io/json.hpp"
 
 namespace hamelin::report {
 
