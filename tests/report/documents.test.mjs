@@ -77,7 +77,7 @@ function madeUpSweep() {
 }
 
 const templates = process.env.HAMELIN_TEMPLATES;
-const made = (name, data) => (templates ? [fill(path.join(templates, `${name}.html`), data, `${name}.html`)] : []);
+const made = (name, data) => (templates ? [fill(path.join(templates, `${name}.html`), data, `made-up-${name}.html`)] : []);
 const sweeps = [...(process.env.HAMELIN_SWEEP_PAGE ? [process.env.HAMELIN_SWEEP_PAGE] : []), ...made('sweep', madeUpSweep())];
 const accuracies = [...(process.env.HAMELIN_ACCURACY_PAGE ? [process.env.HAMELIN_ACCURACY_PAGE] : []), ...made('accuracy', madeUpAccuracy())];
 if (!sweeps.length && !accuracies.length) throw new Error('set HAMELIN_SWEEP_PAGE, HAMELIN_ACCURACY_PAGE or HAMELIN_TEMPLATES');

@@ -282,44 +282,41 @@ Json to_json(const Merged& merged) {
           {"notes", merged.notes}};
 }
 
-std::string to_table(const Merged& merged) {
-  const auto& by = merged.by;
+namespace {
+
+std::vector<std::string> table_row(const Group& g) {
   const auto shown = [](const std::optional<double>& value, double scale, int digits) {
     return value ? fmt::format("{:.{}f}", scale * *value, digits) : std::string("-");
   };
-  std::vector<std::vector<std::string>> rows(1, by);
-  for (const char* head : {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
-                           "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
-    rows.front().emplace_back(head);
-  for (const auto& g : merged.groups) {
-    std::vector<std::string> row = g.key;
-    const auto count = [&](const char* name) {
-      const auto found = g.outcomes.find(name);
-      return found == g.outcomes.end() ? std::size_t{0} : found->second;
-    };
-    const std::size_t stalled = count("stalled"), timeout = count("timeout"), collided = count("collision");
-    row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs) : fmt::format("{}/{}", g.runs, g.planned));
-    row.push_back(fmt::format("{}", g.feasible));
-    row.push_back(g.feasible > 0 ? fmt::format("{} ({:.1f} %)", g.reached,
-                                               100.0 * static_cast<double>(g.reached) / static_cast<double>(g.feasible))
-                                 : "-");
-    row.push_back(g.feasible > 0
-                      ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low, 100.0 * g.reached_interval.high)
-                      : "-");
-    row.push_back(fmt::format("{}", stalled));
-    row.push_back(fmt::format("{}", timeout));
-    row.push_back(fmt::format("{}", collided));
-    row.push_back(fmt::format("{}", g.runs - g.reached_all - stalled - timeout - collided));
-    row.push_back(fmt::format("{}", g.contacts));
-    row.push_back(shown(g.min_clearance_m, 1e3, 2));
-    row.push_back(shown(g.min_self_clearance_m, 1e3, 2));
-    row.push_back(shown(g.certified_share_mean, 100.0, 3));
-    row.push_back(shown(g.certified_share_min, 100.0, 2));
-    row.push_back(shown(g.reached_time_s_median, 1.0, 2));
-    row.push_back(shown(g.tick_us_p50_median, 1.0, 1));
-    row.push_back(shown(g.tick_us_p99_median, 1.0, 1));
-    rows.push_back(std::move(row));
-  }
+  const auto count = [&](const char* name) {
+    const auto found = g.outcomes.find(name);
+    return found == g.outcomes.end() ? std::size_t{0} : found->second;
+  };
+  const std::size_t stalled = count("stalled"), timeout = count("timeout"), collided = count("collision");
+  std::vector<std::string> row = g.key;
+  row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs) : fmt::format("{}/{}", g.runs, g.planned));
+  row.push_back(fmt::format("{}", g.feasible));
+  row.push_back(g.feasible > 0 ? fmt::format("{} ({:.1f} %)", g.reached,
+                                             100.0 * static_cast<double>(g.reached) / static_cast<double>(g.feasible))
+                               : "-");
+  row.push_back(g.feasible > 0
+                    ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low, 100.0 * g.reached_interval.high)
+                    : "-");
+  for (const std::size_t runs :
+       {stalled, timeout, collided, g.runs - g.reached_all - stalled - timeout - collided, g.contacts})
+    row.push_back(fmt::format("{}", runs));
+  row.push_back(shown(g.min_clearance_m, 1e3, 2));
+  row.push_back(shown(g.min_self_clearance_m, 1e3, 2));
+  row.push_back(shown(g.certified_share_mean, 100.0, 3));
+  row.push_back(shown(g.certified_share_min, 100.0, 2));
+  row.push_back(shown(g.reached_time_s_median, 1.0, 2));
+  row.push_back(shown(g.tick_us_p50_median, 1.0, 1));
+  row.push_back(shown(g.tick_us_p99_median, 1.0, 1));
+  return row;
+}
+
+/// Rows as lines of columns; the first `words` of them to the left, the others to the right.
+std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t words) {
   std::vector<std::size_t> widths(rows.front().size(), 0);
   for (const auto& row : rows)
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
@@ -327,10 +324,30 @@ std::string to_table(const Merged& merged) {
   for (const auto& row : rows) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i)
-      line += i < by.size() ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+      line += i < words ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + "\n";
   }
+  return text;
+}
+
+std::string causes_text(const Group& g) {
+  std::string text = fmt::format("\n{}: did not reach\n", fmt::join(g.key, ", "));
+  std::vector<std::pair<std::string, std::size_t>> causes(g.causes.begin(), g.causes.end());
+  std::stable_sort(causes.begin(), causes.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  for (const auto& [cause, count] : causes) text += fmt::format("{:>5}  {}\n", count, cause);
+  return text;
+}
+
+}  // namespace
+
+std::string to_table(const Merged& merged) {
+  std::vector<std::vector<std::string>> rows(1, merged.by);
+  for (const char* head : {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
+                           "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
+    rows.front().emplace_back(head);
+  for (const auto& g : merged.groups) rows.push_back(table_row(g));
+  std::string text = aligned(rows, merged.by.size());
   for (const auto& g : merged.gains)
     text += fmt::format(
         "\n{}, gain sets: reached {} of {}; {} of {} that reach without the obstacle ({:.1f}-{:.1f} %); {} of {} with "
@@ -338,13 +355,8 @@ std::string to_table(const Merged& merged) {
         g.planner, g.reached, g.sets, g.reached_of_reference, g.reference, 100.0 * g.interval.low,
         100.0 * g.interval.high, g.reached_of_apf_stalled, g.apf_stalled, g.contacts);
   if (!merged.gains.empty()) text += "\n";
-  for (const auto& g : merged.groups) {
-    if (g.causes.empty()) continue;
-    text += fmt::format("\n{}: did not reach\n", fmt::join(g.key, ", "));
-    std::vector<std::pair<std::string, std::size_t>> causes(g.causes.begin(), g.causes.end());
-    std::stable_sort(causes.begin(), causes.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-    for (const auto& [cause, count] : causes) text += fmt::format("{:>5}  {}\n", count, cause);
-  }
+  for (const auto& g : merged.groups)
+    if (!g.causes.empty()) text += causes_text(g);
   return text;
 }
 
