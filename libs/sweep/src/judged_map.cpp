@@ -108,17 +108,12 @@ std::vector<Cube> cubes_of(const std::array<int, 3>& lo, const std::array<int, 3
   return cubes;
 }
 
-}  // namespace
-
 /// Space that a change frees: which cubes wholly, and which hold such cubes.
-class JudgedMap::Freed {
+class Freed {
  public:
-  explicit Freed(const std::vector<Voxels>& all) {
-    for (const Voxels& voxels : all)
-      for (const Cube& cube : cubes_of(voxels.lo, voxels.hi)) {
-        whole_.insert(cube);
-        for (Cube above = cube.parent(); above.level < depth && holding_.insert(above).second;) above = above.parent();
-      }
+  void add(const Cube& cube) {
+    whole_.insert(cube);
+    for (Cube above = cube.parent(); above.level < depth && holding_.insert(above).second;) above = above.parent();
   }
 
   [[nodiscard]] Share of(const Cube& cube) const {
@@ -138,6 +133,8 @@ class JudgedMap::Freed {
  private:
   std::set<Cube> whole_, holding_;
 };
+
+}  // namespace
 
 JudgedMap::JudgedMap(const scene::MapSpec& spec) : from_world_(isometry(spec.pose).inverse()) {
   Leaves leaves = read_leaves(spec.file, spec);
@@ -240,7 +237,9 @@ bool JudgedMap::advance(double time_s) {
 
 void JudgedMap::free(const std::vector<Voxels>& freed_voxels) {
   if (freed_voxels.empty()) return;
-  const Freed freed(freed_voxels);
+  Freed freed;
+  for (const Voxels& voxels : freed_voxels)
+    for (const Cube& cube : cubes_of(voxels.lo, voxels.hi)) freed.add(cube);
   std::vector<scene::Box> kept;
   for (const auto& leaf : leaves_) {
     const Voxels voxels = voxels_of(leaf);

@@ -93,7 +93,6 @@ class JudgedMap {
     double time_s;
     std::vector<Voxels> free, occupied;
   };
-  class Freed;
 
   [[nodiscard]] Change read_change(const scene::MapChangeSpec& spec, const scene::MapSpec& map) const;
   [[nodiscard]] Voxels voxels_of(const scene::Box& leaf) const;
