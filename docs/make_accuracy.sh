@@ -101,7 +101,7 @@ cat <<'EOF'
 ## Long runs
 
 Fixed steps, no damping. Drift is the slope of the least-squares line through the energy error, with its half-width at 95 % from means of blocks
-([study](../libs/study/README.md)): a slope within it is none.
+([accuracy](../libs/accuracy/README.md)): a slope within it is none.
 
 Example 5.1, 10⁶ steps:
 

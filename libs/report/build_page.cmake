@@ -1,11 +1,11 @@
-# cmake -DNPM=… -DNODE=… -DSOURCE=page -DWORK=… -DOUT=page.html -P build_page.cmake
+# cmake -DNPM=… -DNODE=… -DSOURCE=page -DWORK=… -DOUT=folder -P build_page.cmake
 #
-# Fetches what the lock file names and bundles the report's page. Where that fails (no registry, say) the build goes on
-# without the page, saying so; `hamelin report` then says what is missing.
+# Fetches what the lock file names and bundles the pages of `hamelin report`, `sweep` and `accuracy`. Where that fails (no
+# registry, say) the build goes on without them, saying so; the commands then say what is missing.
 function(give_up what)
-  file(REMOVE "${OUT}")
-  message(WARNING "The page of `hamelin report` is not built: ${what}. All else is; build again to try again, or configure "
-    "with -DHAMELIN_BUILD_REPORT=OFF.")
+  file(REMOVE "${OUT}/page.html" "${OUT}/sweep.html" "${OUT}/accuracy.html")
+  message(WARNING "The pages of `hamelin report`, `sweep` and `accuracy` are not built: ${what}. Everything else is; build "
+    "again to try again, or configure with -DHAMELIN_BUILD_REPORT=OFF.")
 endfunction()
 
 # npm writes this file last, so it stands for all packages.
@@ -19,8 +19,7 @@ if("${SOURCE}/package-lock.json" IS_NEWER_THAN "${fetched}")  # also if there is
     return()
   endif()
 endif()
-cmake_path(GET OUT PARENT_PATH folder)
-file(MAKE_DIRECTORY "${folder}")
+file(MAKE_DIRECTORY "${OUT}")
 execute_process(COMMAND "${NODE}" "${SOURCE}/build.mjs" --modules "${WORK}/node_modules" --out "${OUT}"
   RESULT_VARIABLE failed)
 if(failed)

@@ -55,6 +55,7 @@ class Probe : public Planner {
       if (thought != thought_) host_.info("thought of " + std::to_string(thought) + " contacts");
       thought_ = thought;
     }
+    say_kinds(tick);
     if (tick.contacts().size() != shown_) host_.info("shown " + std::to_string(tick.contacts().size()) + " contacts");
     shown_ = tick.contacts().size();
     const auto found = host_.closest_self({tick.q().data(), dof}, setup_.influence_m(), self_);
@@ -70,6 +71,20 @@ class Probe : public Planner {
   }
 
  private:
+  /// What the contacts of the first tick are with, in one line.
+  void say_kinds(const Tick& tick) const {
+    if (tick.k() > 0) return;
+    std::size_t map = 0, unknown = 0, obstacles = 0;
+    for (const auto& contact : tick.contacts()) {
+      const ContactKind kind = kind_of(contact);
+      ++(kind == ContactKind::map ? map : kind == ContactKind::unknown ? unknown : obstacles);
+      if ((kind == ContactKind::unknown) != (contact.obstacle == HAMELIN_OBSTACLE_UNKNOWN))
+        throw std::runtime_error("kind_of() and the contact disagree");
+    }
+    host_.info("contacts with the map " + std::to_string(map > 0 ? 1 : 0) + ", unknown space " +
+               std::to_string(unknown > 0 ? 1 : 0) + ", obstacles " + std::to_string(obstacles > 0 ? 1 : 0));
+  }
+
   Host host_;
   Setup setup_;
   std::vector<double> torque_, velocity_, think_of_;

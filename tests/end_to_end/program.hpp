@@ -93,6 +93,14 @@ class Bench {
   std::filesystem::path root_, work_;
 };
 
+/// Whether the templates of the pages are there, which need Node.js when hamelin is built; says so if not.
+inline bool pages_were_built() {
+  const auto folder = std::filesystem::path(HAMELIN_PROGRAM).parent_path().parent_path() / "share/hamelin/report";
+  if (std::filesystem::exists(folder / "page.html")) return true;
+  WARN("the pages were not built: skipped");
+  return false;
+}
+
 /// The lines of a text.
 inline std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;

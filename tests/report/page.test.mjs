@@ -663,7 +663,7 @@ if (made.length) {
     const page = await browser.newPage();
     await page.goto(pathToFileURL(path.resolve(process.env.HAMELIN_TEMPLATE)).href);
     await page.getByRole('alert').waitFor();
-    assert.match(await page.getByRole('alert').textContent(), /hamelin report puts the runs into it/);
+    assert.match(await page.getByRole('alert').textContent(), /hamelin puts the data into it/);
     await page.close();
   });
 }

@@ -1,4 +1,4 @@
-#include "hamelin/study/accuracy.hpp"
+#include "hamelin/accuracy/accuracy.hpp"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,10 @@
 #include "free_motion.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/report/report.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "output.hpp"
+#include "page.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
 
@@ -28,14 +30,14 @@ struct AccuracyFlags {
   std::optional<std::filesystem::path> output, page;
 };
 
-int accuracy(const AccuracyFlags& flags) {
+int run_accuracy(const AccuracyFlags& flags) {
   scene::Scene scene = read_motion(flags.motion);
   const model::Model model = simulation::load_model(scene);
   set_start(flags.motion, model.dof(), scene);
   scene.integrator = {};  // those of the command line are measured instead
   const auto motion = simulation::free_motion(scene, model);
 
-  study::AccuracyOptions options;
+  accuracy::Options options;
   options.name = motion.name;
   options.q0 = motion.q0;
   options.v0 = motion.v0;
@@ -43,30 +45,31 @@ int accuracy(const AccuracyFlags& flags) {
   options.channels.coulomb = motion.coulomb;
   options.channels.coulomb_speed = motion.coulomb_speed;
   options.duration_s = flags.duration_s.value_or(motion.duration_s);
-  options.schemes = study::accuracy_schemes(flags.integrators);
+  options.schemes = accuracy::read_schemes(flags.integrators);
   if (flags.steps) options.steps_s = number_list("--steps", *flags.steps);
   if (flags.rtols) options.rtols = number_list("--rtol", *flags.rtols);
   if (flags.tolerances) options.tolerances = number_list("--tolerance", *flags.tolerances);
   options.atol = flags.atol;
   options.every = flags.every;
   options.reference = !flags.no_reference;
-  std::optional<std::filesystem::path> output, page;
+  std::optional<std::filesystem::path> output, page, template_file;
   if (flags.output) output = output_target(*flags.output, files_of(scene));
   if (flags.page) page = output_target(*flags.page, files_of(scene));
+  if (page) template_file = page_template("accuracy");  // before the work, which may take long
 
   const auto progress = std::make_shared<Progress>("rows measured");
   options.progress = [progress](std::size_t done, std::size_t all) {
     progress->show(static_cast<double>(done), static_cast<double>(all));
   };
-  const study::Accuracy found = study::measure_accuracy(model, options);
-  const Json document = study::to_json(found);
+  const accuracy::Measurement found = accuracy::measure(model, options);
+  const Json document = accuracy::to_json(found);
   if (output) write_file_aside(*output, document.dump(2) + "\n");
-  if (page) write_file_aside(*page, study::to_page({found}));
+  if (page) write_page(*template_file, report::pack(accuracy::page_json({found})), *page);
   for (const auto& text : found.notes) note(text);
   if (flags.json)
     print_json(document);
   else
-    report(flags.markdown ? study::to_markdown(found) : study::to_table(found));
+    report(flags.markdown ? accuracy::to_markdown(found) : accuracy::to_table(found));
   return 0;
 }
 
@@ -111,7 +114,7 @@ void add_accuracy(CLI::App& app, int& exit_code) {
   command->add_option("-o,--output", flags->output, "write the JSON")->type_name("ACCURACY.json");
   command->add_option("--page", flags->page, "write a page with plots and tables; `hamelin report` joins several")
       ->type_name("PAGE.html");
-  command->callback([flags, &exit_code] { exit_code = accuracy(*flags); });
+  command->callback([flags, &exit_code] { exit_code = run_accuracy(*flags); });
 }
 
 }  // namespace hamelin::app

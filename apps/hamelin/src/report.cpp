@@ -7,11 +7,10 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
+#include "hamelin/accuracy/accuracy.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/io/file.hpp"
-#include "hamelin/io/json.hpp"
-#include "hamelin/study/accuracy.hpp"
 #include "output.hpp"
+#include "page.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -27,42 +26,27 @@ struct ReportOptions {
   bool json = false;
 };
 
-// The page without runs, beside this program: the build makes it where it finds Node.js.
-fs::path page_template() {
-  std::error_code ec;
-  auto file = prefix().value_or("/") / "share" / "hamelin" / "report" / "page.html";
-  if (!fs::is_regular_file(file, ec))
-    throw Error(
-        ErrorCode::io,
-        fmt::format(
-            "{}: is missing: the page was not built because Node.js, npm or its registry was missing when hamelin "
-            "was built (or HAMELIN_BUILD_REPORT was OFF); install them (Debian: apt install nodejs npm) "
-            "and build hamelin again",
-            file.string()));
-  return file;
-}
-
 Json json_of(const report::RunSummary& run) {
   return {{"name", run.name},   {"log", run.log.string()}, {"outcome", run.outcome}, {"time_s", run.time_s},
           {"ticks", run.ticks}, {"frames", run.frames},    {"notes", run.notes}};
 }
 
-// Measurements of `hamelin accuracy` make a page of another kind, which needs no script.
+// Measurements of `hamelin accuracy` make a page of another kind.
 int make_accuracy_page(const ReportOptions& options, const fs::path& target) {
-  std::vector<study::Accuracy> all;
+  const fs::path template_file = page_template("accuracy");
+  std::vector<accuracy::Measurement> all;
   for (const auto& file : options.logs) {
     if (kind_of(file) != Kind::accuracy)
       throw Error(
           ErrorCode::invalid,
           fmt::format("{}: is no measurement of accuracy, expected either those alone or logs alone", file.string()));
-    all.push_back(study::accuracy_from_json(read_json(file), file.string()));
+    all.push_back(accuracy::measurement_from_json(read_json(file), file.string()));
   }
-  const std::string page = study::to_page(all);
-  write_file_aside(target, page);
+  const std::size_t size = write_page(template_file, report::pack(accuracy::page_json(all)), target);
   if (options.json)
-    print_json({{"page", options.output.string()}, {"bytes", page.size()}, {"measurements", all.size()}});
+    print_json({{"page", options.output.string()}, {"bytes", size}, {"measurements", all.size()}});
   else
-    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(page.size())));
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(size)));
   return 0;
 }
 
@@ -73,19 +57,14 @@ bool measurement(const fs::path& file) {
 int make_report(const ReportOptions& options) {
   const fs::path target = output_target(options.output, options.logs);
   if (measurement(options.logs.front())) return make_accuracy_page(options, target);
-  const fs::path template_file = page_template();
+  const fs::path template_file = page_template("page");
   report::Data data;
   {
     const Phase phase("reading the logs");
     data = report::make_data(options.logs, options.page);
   }
-  std::string page;
-  {
-    const Phase phase("packing the page");
-    page = report::make_page(read_file(template_file), data.bytes, template_file.string());
-  }
-  write_file_aside(target, page);
-  Json summary{{"page", options.output.string()}, {"bytes", page.size()}, {"runs", Json::array()}};
+  const std::size_t size = write_page(template_file, data.bytes, target);
+  Json summary{{"page", options.output.string()}, {"bytes", size}, {"runs", Json::array()}};
   for (const auto& run : data.runs) {
     summary["runs"].push_back(json_of(run));
     for (const auto& text : run.notes) note(fmt::format("{}: {}", run.log.string(), text));
@@ -96,7 +75,7 @@ int make_report(const ReportOptions& options) {
   if (options.json)
     print_json(summary);
   else
-    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(page.size())));
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(size)));
   return 0;
 }
 

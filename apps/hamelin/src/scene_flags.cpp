@@ -26,10 +26,8 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
 }
 
 std::vector<std::filesystem::path> files_of(const scene::Scene& scene) {
-  std::vector<std::filesystem::path> files = {scene.name, scene.robot.file};
-  if (scene.robot.spheres) files.push_back(*scene.robot.spheres);
-  if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
-  if (scene.map) files.push_back(scene.map->file);
+  std::vector<std::filesystem::path> files = scene::input_files(scene);
+  files.emplace_back(scene.name);
   return files;
 }
 

@@ -4,8 +4,10 @@
 
 #include "command_line.hpp"
 #include "hamelin/io/file.hpp"
-#include "hamelin/study/merge.hpp"
+#include "hamelin/report/report.hpp"
+#include "hamelin/sweep/merge.hpp"
 #include "output.hpp"
+#include "page.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
 
@@ -25,21 +27,22 @@ struct MergeOptions {
 int sweep_merge(const MergeOptions& options) {
   std::vector<fs::path> inputs;
   for (const auto& directory : options.directories) {
-    inputs.push_back(study::plan_file(directory));
-    inputs.push_back(study::records_file(directory));
+    inputs.push_back(sweep::plan_file(directory));
+    inputs.push_back(sweep::records_file(directory));
   }
-  std::optional<fs::path> output, page;
+  std::optional<fs::path> output, page, template_file;
   if (options.output) output = output_target(*options.output, inputs);
   if (options.page) page = output_target(*options.page, inputs);
-  const study::Merged merged = study::merge(options.directories, options.by);
-  const Json summary = study::to_json(merged);
+  if (page) template_file = page_template("sweep");
+  const sweep::Merged merged = sweep::merge(options.directories, options.by);
+  const Json summary = sweep::to_json(merged);
   if (output) write_file_aside(*output, summary.dump(2) + "\n");
-  if (page) write_file_aside(*page, study::to_page(merged));
+  if (page) write_page(*template_file, report::pack(sweep::page_json(merged)), *page);
   for (const auto& text : merged.notes) note(text);
   if (options.json)
     print_json(summary);
   else
-    report(study::to_table(merged));
+    report(sweep::to_table(merged));
   return 0;
 }
 

@@ -7,7 +7,7 @@
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/run_log.hpp"
-#include "hamelin/study/pairs.hpp"
+#include "hamelin/sweep/pairs.hpp"
 #include "scene_flags.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct PairsOptions {
   fs::path file;
-  study::PairOptions pairs;
+  sweep::PairOptions pairs;
   SceneFlags flags;
   std::size_t jobs = 1;
   std::vector<fs::path> plugin_path;
@@ -41,7 +41,7 @@ class Records {
     file_ = *file;
   }
 
-  void write(std::size_t index, const study::Pair& pair, const log::Result& result) {
+  void write(std::size_t index, const sweep::Pair& pair, const log::Result& result) {
     if (file_.empty()) return;
     if (!out_.is_open()) out_.open(file_, std::ios::binary | std::ios::trunc);
     const Json line{{"schema", "hamelin.pair/1"},
@@ -62,7 +62,7 @@ std::string number(const std::optional<double>& value, const char* unit, int dig
   return value ? fmt::format("{:.{}g} {}", *value, digits, unit) : "none";
 }
 
-std::string table(const study::Summary& s, const study::DrawnPairs& drawn, double wall_s) {
+std::string table(const sweep::Summary& s, const sweep::DrawnPairs& drawn, double wall_s) {
   std::string text;
   const auto line = [&](const char* name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
   line("pairs", fmt::format("{} run; {} of {} draws too near to something, {} goals too near to their start", s.runs,
@@ -89,12 +89,12 @@ int sweep_pairs(const PairsOptions& options) {
   using clock = std::chrono::steady_clock;
   const scene::Scene scene = read_scene(options.file, options.flags);
   Records records(options.output, options.file);
-  const study::DrawnPairs drawn = [&] {
+  const sweep::DrawnPairs drawn = [&] {
     const Phase phase("drawing pairs");
-    return study::draw_pairs(scene, options.pairs);
+    return sweep::draw_pairs(scene, options.pairs);
   }();
 
-  study::PairRuns runs;
+  sweep::PairRuns runs;
   runs.plugin_directories = plugin_path(options.plugin_path);
   runs.jobs = options.jobs;
   runs.stop = &stop_on_signals();
@@ -104,13 +104,13 @@ int sweep_pairs(const PairsOptions& options) {
     records.write(index, drawn.pairs[index], result);
     progress->show(static_cast<double>(index + 1), static_cast<double>(drawn.pairs.size()));
   };
-  const auto results = study::run_pairs(scene, drawn.pairs, runs);
+  const auto results = sweep::run_pairs(scene, drawn.pairs, runs);
   progress.reset();
   const double wall_s = std::chrono::duration<double>(clock::now() - begin).count();
 
-  const study::Summary summary = study::summarize(results);
+  const sweep::Summary summary = sweep::summarize(results);
   if (options.json) {
-    Json document = study::to_json(summary);
+    Json document = sweep::to_json(summary);
     document["draws"] = {{"all", drawn.draws}, {"near", drawn.near_draws}, {"close_goals", drawn.close_goals}};
     document["timing"]["wall_s"] = wall_s;
     print_json(document);

@@ -4,9 +4,7 @@
 #include <memory>
 
 #include "command_line.hpp"
-#include "hamelin/simulation/run.hpp"
-#include "hamelin/study/make_plan.hpp"
-#include "scene_flags.hpp"
+#include "hamelin/sweep/make_plan.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
 
@@ -15,7 +13,7 @@ namespace hamelin::app {
 namespace {
 
 struct PlanFlags {
-  study::PlanOptions plan;
+  sweep::PlanOptions plan;
   std::vector<std::string> goals;
   std::string mark = "touch", sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
   std::vector<std::string> keep_out;
@@ -34,7 +32,7 @@ scene::GoalType goal_from(const std::string& name) {
 }
 
 int sweep_plan(const PlanFlags& flags) {
-  study::PlanOptions options = flags.plan;
+  sweep::PlanOptions options = flags.plan;
   for (const auto& goal : flags.goals) options.goals.push_back(goal_from(goal));
   options.problem.mark = scene::mark_from(flags.mark);
   scene::Clutter& clutter = options.clutter.clutter;
@@ -56,33 +54,25 @@ int sweep_plan(const PlanFlags& flags) {
   std::vector<std::string> notes;  // for when the bar is gone
   options.on_note = [&notes](const std::string& text) { notes.push_back(text); };
   if (flags.sphere_m) {
-    study::SphereOnPath& sphere = options.sphere_on_path.emplace();
+    sweep::SphereOnPath& sphere = options.sphere_on_path.emplace();
     sphere.radius_m = *flags.sphere_m;
     sphere.visible_within_m = flags.visible_m;
     sphere.seed = flags.clutter_seed;
-    sphere.plugin_directories = plugin_path(flags.plugin_path);
   }
-  options.check = [&flags](const study::SweepRun& run) {
-    SceneFlags scene_flags;
-    scene_flags.planner = run.planner;
-    scene_flags.seed = run.seed;
-    scene_flags.set = run.set;
-    const scene::Scene scene = read_scene(flags.output / run.scene, scene_flags);
-    (void)simulation::full_config(scene, plugin_path(flags.plugin_path));
-  };
-  const study::SweepPlan plan = study::make_plan(flags.output, options);
+  options.plugin_directories = plugin_path(flags.plugin_path);
+  const sweep::Plan plan = sweep::make_plan(flags.output, options);
   progress.reset();
   for (const auto& text : notes) note(text);
   const auto feasible = static_cast<std::size_t>(
       std::count_if(plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return scene.feasible; }));
   if (flags.json)
-    print_json({{"file", study::plan_file(flags.output).string()},
+    print_json({{"file", sweep::plan_file(flags.output).string()},
                 {"scenes", plan.scenes.size()},
                 {"feasible", feasible},
                 {"runs", plan.runs.size()},
                 {"sha256", plan.sha256}});
   else
-    report(fmt::format("{}: {} runs of {} scenes, {} of them feasible\n", study::plan_file(flags.output).string(),
+    report(fmt::format("{}: {} runs of {} scenes, {} of them feasible\n", sweep::plan_file(flags.output).string(),
                        plan.runs.size(), plan.scenes.size(), feasible));
   return 0;
 }

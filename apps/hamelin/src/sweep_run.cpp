@@ -7,8 +7,9 @@
 
 #include "command_line.hpp"
 #include "hamelin/simulation/run.hpp"
-#include "hamelin/study/judge.hpp"
-#include "hamelin/study/sweep.hpp"
+#include "hamelin/sweep/judge.hpp"
+#include "hamelin/sweep/plan.hpp"
+#include "hamelin/sweep/run_sweep.hpp"
 #include "scene_flags.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 
 struct SweepRunOptions {
   fs::path directory;
-  study::SweepOptions sweep;
+  sweep::RunOptions sweep;
   std::vector<fs::path> plugin_path;
 };
 
@@ -32,26 +33,27 @@ struct OneOptions {
 };
 
 int sweep_run(const SweepRunOptions& options) {
-  study::SweepOptions sweep = options.sweep;
+  sweep::RunOptions sweep = options.sweep;
   // this very program, also if another was built in its place meanwhile
   sweep.command = {"/proc/self/exe", "sweep", "one"};
   for (const auto& directory : options.plugin_path) {
     sweep.command.emplace_back("--plugin-path");
     sweep.command.push_back(directory.string());
   }
+  sweep.plugin_directories = plugin_path(options.plugin_path);
   sweep.stop = &stop_on_signals();
-  study::SweepOutcome outcome;
+  sweep::RunOutcome outcome;
   {
     const Phase phase("the sweep");
     Progress progress("runs");
     sweep.on_done = [&progress](std::size_t done, std::size_t all) {
       progress.show(static_cast<double>(done), static_cast<double>(all));
     };
-    outcome = study::run_sweep(options.directory, sweep);
+    outcome = sweep::run_sweep(options.directory, sweep);
   }
   if (outcome.dropped_cut_line)
     note(
-        fmt::format("{}: the last line was cut; its run is repeated", study::records_file(options.directory).string()));
+        fmt::format("{}: the last line was cut; its run is repeated", sweep::records_file(options.directory).string()));
   const std::size_t left = outcome.planned - outcome.recorded - outcome.run;
   report(fmt::format("{}: {} runs recorded now, {} before, {} left{}\n", options.directory.string(), outcome.run,
                      outcome.recorded, left,
@@ -62,13 +64,13 @@ int sweep_run(const SweepRunOptions& options) {
 int sweep_one(const OneOptions& options) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // a sweep that is killed leaves nothing running
   const scene::Scene scene = read_scene(options.file, options.flags);
-  study::Judge judge(scene);
+  sweep::Judge judge(scene);
   simulation::Watch watch;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
   watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.node(time_s, q); };
   const log::Result result = simulation::run(scene, plugin_path(options.plugin_path), watch);
-  const Json line{{"result", log::to_json(result)}, {"judge", study::to_json(judge.verdict())}};
+  const Json line{{"result", log::to_json(result)}, {"judge", sweep::to_json(judge.verdict())}};
   fmt::print("{}\n", line.dump(-1, ' ', false, Json::error_handler_t::replace));
   return 0;
 }
@@ -77,8 +79,8 @@ int sweep_one(const OneOptions& options) {
 
 void add_sweep_run(CLI::App& sweep, int& exit_code) {
   auto* command = add_command(sweep, "run",
-                              "Run what a plan holds and has no record yet, one process a run. Stopped or "
-                              "killed, it goes on where it was when called again",
+                              "Run what a plan holds and has no record yet, one process per run. Resumes where "
+                              "it stopped if it was stopped or killed",
                               "hamelin sweep run tries\n"
                               "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
   const auto options = std::make_shared<SweepRunOptions>();

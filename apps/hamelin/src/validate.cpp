@@ -6,14 +6,14 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
+#include "hamelin/accuracy/accuracy.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
-#include "hamelin/study/accuracy.hpp"
-#include "hamelin/study/sweep.hpp"
+#include "hamelin/sweep/plan.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -79,7 +79,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::spheres:
       return fmt::format("collision spheres, {}", description::check_spheres(file));
     case Kind::sweep: {
-      const auto plan = study::read_plan_file(file);
+      const auto plan = sweep::read_plan_file(file);
       return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());
     }
     case Kind::records:
@@ -89,7 +89,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       return "sweep summary";
     case Kind::accuracy:
       return fmt::format("measurement of accuracy, {} rows",
-                         study::accuracy_from_json(read_json(file), file.string()).rows.size());
+                         accuracy::measurement_from_json(read_json(file), file.string()).rows.size());
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,

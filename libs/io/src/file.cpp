@@ -1,33 +1,80 @@
 #include "hamelin/io/file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 
 #include "hamelin/core/error.hpp"
 
 namespace hamelin {
 
+namespace {
+
+/// A file open for reading.
+class Descriptor {
+ public:
+  explicit Descriptor(const std::filesystem::path& file) : fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace
+
 std::string read_file(const std::filesystem::path& file) {
-  std::error_code ec;
-  if (std::filesystem::is_directory(file, ec))
-    throw Error(ErrorCode::io, fmt::format("{}: is a directory, want a file", file.string()));
+  const auto fail = [&file](const std::string& what) {
+    return Error(ErrorCode::io, fmt::format("{}: {}", file.string(), what));
+  };
+  const Descriptor in(file);
+  if (in.get() < 0) throw fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
+  struct stat about {};
+  if (::fstat(in.get(), &about) != 0) throw fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+  if (S_ISDIR(about.st_mode)) throw fail("is a directory, expected a file");
   // A scene may name /dev/zero as its map, which has no end.
-  if (std::filesystem::is_character_file(file, ec) || std::filesystem::is_block_file(file, ec))
-    throw Error(ErrorCode::io, fmt::format("{}: is a device, want a file", file.string()));
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw Error(ErrorCode::io, fmt::format("{}: cannot be opened: {}", file.string(), std::strerror(errno)));
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (in.bad()) throw Error(ErrorCode::io, fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
-  return std::move(text).str();
+  if (S_ISCHR(about.st_mode) || S_ISBLK(about.st_mode)) throw fail("is a device, expected a file");
+  constexpr std::size_t least_room = std::size_t{1} << 16;
+  std::string bytes;
+  for (std::size_t size = 0;;) {
+    // one byte more than the file has, so that the end of a whole file is seen without growing
+    if (size == bytes.size()) bytes.resize(std::max(static_cast<std::size_t>(about.st_size) + 1, size + least_room));
+    const ::ssize_t count = ::read(in.get(), bytes.data() + size, bytes.size() - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+    size += static_cast<std::size_t>(count);
+    if (count > 0) continue;
+    bytes.resize(size);
+    return bytes;
+  }
+}
+
+std::filesystem::path resolve_path(const std::filesystem::path& base, const std::filesystem::path& path) {
+  std::filesystem::path resolved;
+  for (const auto& part : base / path) {
+    if (part.empty() || part == ".") continue;
+    std::error_code ec;
+    const bool up = part == "..";
+    if (up && resolved.has_root_path() && !resolved.has_relative_path()) continue;  // above the root there is the root
+    if (up && resolved.has_filename() && resolved.filename() != ".." &&
+        std::filesystem::symlink_status(resolved, ec).type() == std::filesystem::file_type::directory)
+      resolved = resolved.parent_path();
+    else
+      resolved /= part;
+  }
+  return resolved.empty() ? std::filesystem::path(".") : resolved;
 }
 
 void write_file_aside(const std::filesystem::path& file, std::string_view content) {

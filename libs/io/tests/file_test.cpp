@@ -45,7 +45,34 @@ TEST_CASE("bytes come back as they were written, and nothing else is left in the
 }
 
 TEST_CASE("a device is refused: it may have no end", "[io][unit]") {
-  CHECK_THROWS_WITH(read_file("/dev/zero"), "/dev/zero: is a device, want a file");
+  CHECK_THROWS_WITH(read_file("/dev/zero"), "/dev/zero: is a device, expected a file");
+}
+
+TEST_CASE("a file that cannot be read to its end is refused, never taken for an empty one", "[io][unit]") {
+  // opens like a file, but address 0 is not mapped: the first read fails
+  CHECK_THROWS_WITH(read_file("/proc/self/mem"), "/proc/self/mem: cannot be read: Input/output error");
+  // states no size, but has an end
+  CHECK(read_file("/proc/self/cmdline").size() > 1);
+}
+
+TEST_CASE("a path is shortened only where that does not change the file", "[io][unit]") {
+  const Folder folder;
+  fs::create_directories(folder.path / "a" / "b");
+  fs::create_directories(folder.path / "elsewhere" / "deep");
+  fs::create_directory_symlink(folder.path / "elsewhere" / "deep", folder.path / "a" / "link");
+  std::ofstream(folder.path / "elsewhere" / "f") << "above the link's target";
+  std::ofstream(folder.path / "a" / "f") << "beside the link";
+  CHECK(resolve_path(folder.path / "a" / "b", "../f") == folder.path / "a" / "f");
+  CHECK(read_file(resolve_path(folder.path / "a" / "link", "../f")) == "above the link's target");
+  CHECK(read_file(resolve_path(folder.path, "a/link/../f")) == "above the link's target");
+  CHECK(resolve_path(folder.path / "a", "./b/./../f") == folder.path / "a" / "f");
+  CHECK(resolve_path(folder.path / "a", "/x/y") == "/x/y");
+  CHECK(resolve_path("/", "../x") == "/x");
+  CHECK(resolve_path("", "../x") == "../x");
+  CHECK(resolve_path("", "../../x") == "../../x");
+  CHECK(resolve_path("", "") == ".");
+  // the system refuses it, so it must not become another file
+  CHECK(resolve_path(folder.path, "absent/../a/f") == folder.path / "absent" / ".." / "a" / "f");
 }
 
 TEST_CASE("a write that fails leaves the old file and no half one", "[io][unit]") {
@@ -85,7 +112,7 @@ TEST_CASE("what cannot be read is named with the system's reason", "[io][unit]")
   const Folder folder;
   CHECK_THROWS_WITH(read_file(folder.path / "absent"),
                     Catch::Contains("absent: cannot be opened: No such file or directory"));
-  CHECK_THROWS_WITH(read_file(folder.path), Catch::Contains("is a directory, want a file"));
+  CHECK_THROWS_WITH(read_file(folder.path), Catch::Contains("is a directory, expected a file"));
 }
 
 TEST_CASE("SHA-256 of the standard's examples", "[io][unit]") {

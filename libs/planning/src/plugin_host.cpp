@@ -421,16 +421,20 @@ std::vector<fs::path> plugin_directories(const std::vector<fs::path>& given, con
 }
 
 Plugin find_plugin(const std::string& name_or_path, const std::vector<fs::path>& directories) {
+  return Plugin::load(find_plugin_file(name_or_path, directories));
+}
+
+fs::path find_plugin_file(const std::string& name_or_path, const std::vector<fs::path>& directories) {
   const bool is_path = name_or_path.find('/') != std::string::npos ||
                        (name_or_path.size() > plugin_suffix.size() &&
                         name_or_path.substr(name_or_path.size() - plugin_suffix.size()) == plugin_suffix);
-  if (is_path) return Plugin::load(name_or_path);
+  if (is_path) return name_or_path;
   std::string searched;
   std::vector<std::string> names;
   for (const auto& directory : directories) {
     std::vector<std::string> here;
     for (const auto& file : plugin_files(directory)) {
-      if (planner_name(file) == name_or_path) return Plugin::load(file);
+      if (planner_name(file) == name_or_path) return file;
       here.push_back(planner_name(file));
     }
     std::error_code code;

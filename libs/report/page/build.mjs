@@ -1,5 +1,5 @@
-// Makes the report's template: one HTML file with script and style inside.
-//   node build.mjs --modules DIR/node_modules --out FILE.html
+// Makes the templates of the pages, each one HTML file with script and style inside.
+//   node build.mjs --modules DIR/node_modules --out FOLDER
 // Imports are looked up in --modules, so this folder needs no node_modules of its own.
 import { readFile, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
@@ -7,7 +7,14 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 
-/** The place of the runs; must stand in the template exactly once. */
+/** Each becomes FOLDER/NAME.html. */
+const PAGES = [
+  { name: 'page', title: 'hamelin report', script: 'src/main.js', style: 'src/style.css' },
+  { name: 'sweep', title: 'hamelin sweep', script: 'src/sweep.js', style: 'src/document.css' },
+  { name: 'accuracy', title: 'hamelin accuracy', script: 'src/accuracy.js', style: 'src/document.css' },
+];
+
+/** The place of the data; must stand in a template exactly once. */
 const TOKEN = '__HAMELIN_REPORT_DATA__';
 
 function fail(message) {
@@ -22,7 +29,7 @@ try {
 } catch (error) {
   fail(error.message);
 }
-if (!args.modules || !args.out) fail('expected --modules DIR/node_modules --out FILE.html');
+if (!args.modules || !args.out) fail('expected --modules DIR/node_modules --out FOLDER');
 const modules = path.resolve(args.modules);
 
 let esbuild;
@@ -85,10 +92,14 @@ async function bundle(entry) {
 const forScript = (code) => code.replace(/<(?=\/script|script|!--)/gi, '\\x3C');
 
 const skeleton = await readFile(path.join(here, 'index.html'), 'utf8');
-const [script, style] = await Promise.all([bundle('src/main.js'), bundle('src/style.css')]).catch((error) => fail(error.message));
-if (/<\/style/i.test(style)) fail('src/style.css: contains "</style", which would end the element');
-const page = skeleton.replace('/* STYLE */', () => style).replace('/* SCRIPT */', () => forScript(script));
 
-const places = page.split(TOKEN).length - 1;
-if (places !== 1) fail(`the token ${TOKEN} occurs ${places} times, expected once`);
-await writeFile(args.out, page);
+async function makePage({ name, title, script, style }) {
+  const [code, looks] = await Promise.all([bundle(script), bundle(style)]);
+  if (/<\/style/i.test(looks)) throw new Error(`${style}: contains "</style", which would end the element`);
+  const page = skeleton.replace('/* TITLE */', () => title).replace('/* STYLE */', () => looks).replace('/* SCRIPT */', () => forScript(code));
+  const places = page.split(TOKEN).length - 1;
+  if (places !== 1) throw new Error(`${name}.html: the token ${TOKEN} occurs ${places} times, expected once`);
+  await writeFile(path.join(args.out, `${name}.html`), page);
+}
+
+await Promise.all(PAGES.map(makePage)).catch((error) => fail(error.message));

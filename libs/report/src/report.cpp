@@ -109,4 +109,8 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
   return data;
 }
 
+std::string pack(const Json& data) {
+  return Container().finish(data);
+}
+
 }  // namespace hamelin::report

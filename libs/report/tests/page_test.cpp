@@ -1,6 +1,8 @@
 #include <zlib.h>
 
 #include <catch2/catch.hpp>
+#include <cstdint>
+#include <cstring>
 #include <string>
 
 #include "hamelin/core/error.hpp"
@@ -65,4 +67,14 @@ TEST_CASE("a template without the token, or with two, is refused by name", "[rep
                     "share/page.html: the token __HAMELIN_REPORT_DATA__ is missing, expected it once");
   CHECK_THROWS_WITH(report::make_page(token + " " + token, "data", "share/page.html"),
                     "share/page.html: the token __HAMELIN_REPORT_DATA__ occurs twice, expected it once");
+}
+
+TEST_CASE("JSON alone is packed as a container without arrays", "[report]") {
+  const Json data{{"format", "hamelin.sweep-page/1"}, {"text", "<µ> & '"}};
+  const std::string bytes = report::pack(data);
+  std::uint32_t size = 0;
+  REQUIRE(bytes.size() > sizeof size);
+  std::memcpy(&size, bytes.data(), sizeof size);
+  CHECK(parse_json(bytes.substr(sizeof size, size), "page") == data);
+  CHECK(bytes.size() == (sizeof size + size + 7) / 8 * 8);
 }

@@ -1,11 +1,15 @@
 #include "hamelin/scene/scene.hpp"
 
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/test/scene_data.hpp"
 
@@ -150,10 +154,36 @@ TEST_CASE("what a scene does not name is not modelled, and null says the same", 
   CHECK(scene.integrator.name == "hamel-variational");
 }
 
+TEST_CASE("paths of a scene lead through links as the system follows them", "[scene][unit]") {
+  std::string name = (std::filesystem::temp_directory_path() / "hamelin_scene.XXXXXX").string();
+  REQUIRE(::mkdtemp(name.data()) != nullptr);
+  const std::filesystem::path root = name;
+  std::filesystem::create_directories(root / "project" / "scenes");
+  std::filesystem::create_directory(root / "mine");
+  // mine/scenes links to project/scenes, so mine/scenes/../robots is project/robots
+  std::filesystem::create_directory_symlink(root / "project" / "scenes", root / "mine" / "scenes");
+  const Json document{{"schema", "hamelin.scene/1"},
+                      {"robot", {{"file", "../robots/a.json"}, {"spheres", "../robots/s.json"}}},
+                      {"map", {{"file", "../maps/m.bt"}, {"changes", {{{"time_s", 1}, {"file", "../maps/c.bt"}}}}}}};
+  for (const char* folder : {"robots", "maps"})
+    for (const char* side : {"project", "mine"}) std::filesystem::create_directory(root / side / folder);
+  for (const char* file : {"robots/a.json", "robots/s.json", "maps/m.bt", "maps/c.bt"})
+    for (const char* side : {"project", "mine"}) write_file_aside(root / side / file, side);
+  const Scene scene = scene_from_json(document, root / "mine" / "scenes", "x.json");
+  for (const auto& file : input_files(scene)) {
+    CAPTURE(file);
+    CHECK(read_file(file) == "project");
+  }
+  CHECK(input_files(scene).size() == 4);
+  CHECK(scene_from_json(document, root / "project" / "scenes", "x.json").map->file == root / "project/maps/m.bt");
+  std::filesystem::remove_all(root);
+}
+
 TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
   for (const Json& document : {full_document(), small_document()}) {
     const Json resolved = resolved_json(scene_from_json(document, "a/b", "x.json"));
     CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
+    for (const char* key : {"file", "tip", "spheres", "srdf"}) CHECK(resolved["robot"].contains(key));
     CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")).dump() == resolved.dump());
     CHECK(scene_from_json(resolved, ".", "x.json").base == scene_from_json(document, "a/b", "x.json").base);
   }

@@ -110,7 +110,7 @@ void ClosedLoop::take_line(std::int32_t level, std::string_view line) {
 
 void ClosedLoop::start(const Watch& watch) {
   watch_ = &watch;
-  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator, options_, steps_);
+  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator, options_);
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
   audit_ = std::make_unique<EnergyAudit>(*recorder_, ideal && arm_.integrator->name() == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);

@@ -74,7 +74,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   log::Result result;
   result.scene = motion.name;
   result.provenance = log::provenance(motion.inputs, watch.argv);
-  Recorder recorder(result, watch, *integrator, motion.options, 0);
+  Recorder recorder(result, watch, *integrator, motion.options);
   recorder.header({{"program", "integrate"},
                    {"scene", motion.name},
                    {"config", motion.config},

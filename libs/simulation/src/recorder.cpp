@@ -20,14 +20,13 @@ void grow(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
 }  // namespace
 
 Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
-                   const integration::Options& options, long steps_expected)
+                   const integration::Options& options)
     : result_(result), watch_(watch) {
   result_.integrator = integrator.name();
   result_.solver.criterion = integrator.criterion();
   result_.solver.tolerance = integrator.adaptive()                          ? std::max(options.rtol, options.atol)
                              : integrator.criterion().starts_with("|tau_e") ? options.feedback_tolerance
                                                                             : options.tolerance;
-  tick_us_.reserve(static_cast<std::size_t>(steps_expected) + 1);
 }
 
 void Recorder::header(Json fields, const model::Robot& robot, long steps) {
@@ -90,10 +89,11 @@ void Recorder::step(const integration::StepReport& report) {
 }
 
 void Recorder::tick_time(double seconds) {
-  tick_us_.push_back(1e6 * seconds);
-  since_.tick_us = std::max(since_.tick_us, tick_us_.back());
+  const double tick_us = 1e6 * seconds;
+  tick_us_.add(tick_us);
+  since_.tick_us = std::max(since_.tick_us, tick_us);
   if (waiting_) {
-    (*waiting_)["timing"]["tick_us"] = tick_us_.back();
+    (*waiting_)["timing"]["tick_us"] = tick_us;
     write_waiting_tick();
   }
 }
@@ -134,13 +134,8 @@ void Recorder::close(const Ledger& ledger) {
   result_.recovery_work_J = ledger.recovery;
   write_waiting_tick();
   result_.cpu_s = thread_cpu_s() - started_cpu_s_;
-  if (!tick_us_.empty()) {
-    std::sort(tick_us_.begin(), tick_us_.end());
-    const auto at = [&](double share) {
-      return tick_us_[static_cast<std::size_t>(share * static_cast<double>(tick_us_.size() - 1))];
-    };
-    result_.tick_us = log::Result::TickTime{at(0.5), at(0.99), tick_us_.back()};
-  }
+  if (tick_us_.count() > 0)
+    result_.tick_us = log::Result::TickTime{tick_us_.quantile(0.5), tick_us_.quantile(0.99), tick_us_.largest()};
   if (watch_.log != nullptr) watch_.log->write("result", log::to_json(result_));
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hamelin/simulation/run.hpp"
+#include "time_histogram.hpp"
 
 namespace hamelin::simulation {
 
@@ -38,7 +39,7 @@ struct Ledger {
 class Recorder {
  public:
   Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
-           const integration::Options& options, long steps_expected);
+           const integration::Options& options);
 
   /// @param ticks how many steps there can be
   void header(Json fields, const model::Robot& robot, long steps);
@@ -83,7 +84,7 @@ class Recorder {
   };
   log::Result& result_;
   const Watch& watch_;
-  std::vector<double> tick_us_;
+  TimeHistogram tick_us_;
   double started_cpu_s_ = thread_cpu_s();
   double first_balance_ = 0.0, energy_error_ = 0.0;
   Eigen::VectorXd v_last_, a_, a_last_;

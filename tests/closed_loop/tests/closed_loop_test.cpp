@@ -277,6 +277,21 @@ TEST_CASE("a run's log fits its schemas, first line to last", "[simulation][log]
   CHECK(summary.ticks == 5);  // steps 0, 30, 60, 90 and the last, 100
 }
 
+TEST_CASE("the largest number of steps needs no memory for each of them", "[simulation][outcome]") {
+  const ScratchFolder folder;
+  Json scene = scene_52();
+  scene["duration_s"] = 4e7;  // 10^10 steps of 4 ms
+  simulation::Watch watch;
+  watch.stop_at = 3;
+  const auto result = run_scene(folder, scene, watch);
+  CHECK(result.outcome == Outcome::interrupted);
+  CHECK(result.steps == 3);
+  REQUIRE(result.tick_us.has_value());
+  CHECK(result.tick_us->p50 > 0.0);
+  CHECK(result.tick_us->p50 <= result.tick_us->p99);
+  CHECK(result.tick_us->p99 <= result.tick_us->max);
+}
+
 TEST_CASE("a stop from outside ends the run as interrupted, with its record whole", "[simulation][outcome]") {
   const ScratchFolder folder;
   std::atomic<bool> stop = false;

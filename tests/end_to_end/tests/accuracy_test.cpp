@@ -20,9 +20,32 @@ std::vector<std::string> with(std::vector<std::string> command, const std::vecto
 
 }  // namespace
 
-TEST_CASE("accuracy prints, writes and draws the same rows, and report joins several", "[end_to_end]") {
+TEST_CASE("accuracy draws a page, and report joins several; or one line says why there is none", "[end_to_end]") {
   Bench bench;
-  const Json printed = test::run_json(bench, with(measure, {"-o", "a.json", "--page", "a.html"}));
+  const auto drawn = bench.run(with(measure, {"-o", "a.json", "--page", "a.html"}));
+  CAPTURE(drawn.err);
+  if (!test::pages_were_built()) {
+    CHECK(drawn.exit_code == 2);
+    CHECK(test::lines_of(drawn.err).size() == 1);
+    CHECK(drawn.err.find("accuracy.html: is missing: the page was not built") != std::string::npos);
+    CHECK_FALSE(bench.has("a.json"));
+    return;
+  }
+  CHECK(drawn.exit_code == 0);
+  const auto joined = bench.run({"report", "a.json", "a.json", "-o", "both.html"});
+  CHECK(joined.exit_code == 0);
+  for (const char* file : {"a.html", "both.html"}) {
+    const std::string page = bench.text(file);
+    CHECK(page.find("default-src 'none'") != std::string::npos);
+    CHECK(page.find("<title>hamelin accuracy</title>") != std::string::npos);
+    CHECK(page.find("<script src") == std::string::npos);
+  }
+  CHECK(bench.run({"report", "a.json", "data/scenes/shelf.json", "-o", "no.html"}).exit_code == 2);
+}
+
+TEST_CASE("accuracy prints and writes the same rows", "[end_to_end]") {
+  Bench bench;
+  const Json printed = test::run_json(bench, with(measure, {"-o", "a.json"}));
   CHECK(printed == bench.json("a.json"));
   REQUIRE(printed["rows"].size() == 7);
   for (const auto& row : printed["rows"]) {
@@ -30,10 +53,6 @@ TEST_CASE("accuracy prints, writes and draws the same rows, and report joins sev
     CHECK(row["error_q"] < 0.1);
   }
   CHECK(bench.run({"validate", "a.json"}).out == "a.json: ok (measurement of accuracy, 7 rows)\n");
-  const auto page = bench.run({"report", "a.json", "a.json", "-o", "both.html"});
-  CAPTURE(page.err);
-  CHECK(page.exit_code == 0);
-  CHECK(bench.run({"report", "a.json", "data/scenes/shelf.json", "-o", "no.html"}).exit_code == 2);
   const auto table = bench.run(measure);
   CHECK(table.out.find("dop853, controlled") != std::string::npos);
   CHECK(bench.run(with(measure, {"--markdown"})).out.find("| hamel-variational") != std::string::npos);

@@ -8,21 +8,8 @@ using namespace hamelin;
 using Catch::Matchers::Contains;
 using test::Bench;
 
-namespace {
-
-// The page is there only if Node.js was when hamelin was built.
-bool page_was_built() {
-  const auto page =
-      std::filesystem::path(HAMELIN_PROGRAM).parent_path().parent_path() / "share/hamelin/report/page.html";
-  if (std::filesystem::exists(page)) return true;
-  WARN("the report's page was not built: skipped");
-  return false;
-}
-
-}  // namespace
-
 TEST_CASE("a report is one file that needs no other, small enough to send", "[end_to_end][report]") {
-  if (!page_was_built()) return;
+  if (!test::pages_were_built()) return;
   Bench bench;
   // 30 s, for apf does not arrive
   REQUIRE(bench.run({"run", "data/scenes/shelf.json", "--planner", "apf", "--log", "apf.jsonl.zst"}).exit_code == 1);
@@ -43,7 +30,7 @@ TEST_CASE("a report is one file that needs no other, small enough to send", "[en
 }
 
 TEST_CASE("free motion, and a log cut short, have a report too", "[end_to_end][report]") {
-  if (!page_was_built()) return;
+  if (!test::pages_were_built()) return;
   Bench bench;
   REQUIRE(bench.run({"integrate", "data/robots/planar3.json", "--step", "0.01", "--log", "fall.jsonl"}).exit_code == 0);
   const std::string log = bench.text("fall.jsonl");
@@ -54,7 +41,7 @@ TEST_CASE("free motion, and a log cut short, have a report too", "[end_to_end][r
 }
 
 TEST_CASE("report refuses what is no log with one line and leaves no page", "[end_to_end][report]") {
-  if (!page_was_built()) return;
+  if (!test::pages_were_built()) return;
   Bench bench;
   bench.put("empty.jsonl", "");
   bench.put("noise.jsonl", "{\"type\":\"header\"}\n");

@@ -48,8 +48,7 @@ TEST_CASE("a sweep is planned, run and summed up, and its files fit their schema
   const auto checked = bench.run({"validate", "tries/plan.json", "tries/records.jsonl"});
   CAPTURE(checked.err);
   CHECK(checked.exit_code == 0);
-  const Json summary = test::run_json(
-      bench, {"sweep", "merge", "tries", "--by", "problem", "-o", "summary.json", "--page", "page.html"});
+  const Json summary = test::run_json(bench, {"sweep", "merge", "tries", "--by", "problem", "-o", "summary.json"});
   CHECK(summary == bench.json("summary.json"));
   CHECK(bench.run({"validate", "summary.json"}).out == "summary.json: ok (sweep summary)\n");
   REQUIRE(summary["groups"].size() == 2);
@@ -60,10 +59,58 @@ TEST_CASE("a sweep is planned, run and summed up, and its files fit their schema
   CHECK(gyro["contacts"] == 0);
   CHECK(gyro["judged"] == 2);
   CHECK(gyro["min_clearance_m"].get<double>() > 0.0);
-  CHECK_THAT(bench.text("page.html"), Catch::Contains("data/scenes/paper_52_apf.json --seed 2</code>"));
   const auto table = bench.run({"sweep", "merge", "tries"});
   CHECK(table.exit_code == 0);
   CHECK_THAT(table.out, Catch::Contains("did not reach"));
+}
+
+TEST_CASE("the page of a sweep is one file that needs no other, or one line says why there is none", "[end_to_end]") {
+  Bench bench;
+  plan(bench);
+  REQUIRE(bench.run({"sweep", "run", "tries"}).exit_code == 0);
+  const auto output = bench.run({"sweep", "merge", "tries", "--page", "page.html"});
+  CAPTURE(output.err);
+  if (!test::pages_were_built()) {
+    CHECK(output.exit_code == 2);
+    CHECK(lines_of(output.err).size() == 1);
+    CHECK_THAT(output.err, Catch::Contains("sweep.html: is missing: the page was not built"));
+    CHECK_FALSE(bench.has("page.html"));
+    return;
+  }
+  CHECK(output.exit_code == 0);
+  const std::string page = bench.text("page.html");
+  CHECK(page.size() < 200'000);
+  CHECK_THAT(page, Catch::Contains("default-src 'none'") && Catch::Contains("<title>hamelin sweep</title>"));
+  CHECK(page.find("<script src") == std::string::npos);
+  CHECK(page.find("<link ") == std::string::npos);
+  REQUIRE(bench.run({"sweep", "merge", "tries", "--page", "again.html"}).exit_code == 0);
+  CHECK(bench.text("again.html") == page);
+}
+
+TEST_CASE("a sweep is not resumed with another map than was planned", "[end_to_end]") {
+  Bench bench;
+  bench.put("map.bt", read_file(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/maps/clutter.bt"));
+  bench.put("robot.urdf", read_file(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots/arm7.urdf"));
+  Json scene = bench.json("data/scenes/clutter.json");
+  scene["robot"] = {{"file", "robot.urdf"}, {"tip", "flange"}, {"spheres", "data/robots/arm7.spheres.json"}};
+  scene["map"] = {{"file", "map.bt"}};
+  scene["duration_s"] = 0.1;
+  scene["obstacles"] = Json::array();
+  bench.put("scene.json", scene.dump());
+  const auto planned = bench.run({"sweep", "plan", "scene.json", "--seeds", "1,2", "-o", "tries"});
+  CAPTURE(planned.err);
+  REQUIRE(planned.exit_code == 0);
+  CHECK(bench.run({"sweep", "run", "tries", "--limit", "1"}).exit_code == 0);
+  for (const char* file : {"map.bt", "robot.urdf"}) {
+    const std::string bytes = bench.text(file);
+    bench.put(file, bytes + " ");
+    const auto output = bench.run({"sweep", "run", "tries"});
+    CHECK(output.exit_code == 2);
+    CHECK(lines_of(output.err).size() == 1);
+    CHECK_THAT(output.err, Catch::Contains(std::string(file) + ": has changed since the sweep was planned"));
+    bench.put(file, bytes);
+  }
+  CHECK(bench.run({"sweep", "run", "tries"}).out == "tries: 1 runs recorded now, 1 before, 0 left\n");
 }
 
 TEST_CASE("a sweep that was killed goes on, and its records are those of one that was not", "[end_to_end]") {
@@ -95,6 +142,7 @@ TEST_CASE("Ctrl-C ends a sweep's children too, with exit code 130", "[end_to_end
   // fixed to the spot the arm neither arrives nor stalls, so each run takes long
   plan(bench,
        {"--duration", "100000", "--set", "/stall=null", "--set", "/planner/params/k_p=1e-6", "--set", "/step_s=0.001"});
+  std::filesystem::remove(bench.path("tries/records.jsonl"));  // made by the plan; the run makes it when it begins
   const pid_t child = bench.start({"sweep", "run", "tries", "--jobs", "2"});
   for (int i = 0; i < 2000 && !bench.has("tries/records.jsonl"); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -1,4 +1,4 @@
-// Reads the container that `hamelin report` puts into the page (format hamelin.report/1).
+// Reads the container that hamelin puts into a page.
 
 /**
  * @typedef {{at: number, n: number, type: string, scale?: number, offset?: number, none?: number}} Packed
@@ -88,14 +88,17 @@ function prepare(report) {
   return report;
 }
 
-/** Reads the runs out of the document; throws with one line when there are none. */
-export async function readReport() {
+/** Reads the page's data; throws with one line when there is none, or none of this format. */
+export async function readData(format) {
   const text = document.getElementById('hamelin-data').textContent.trim();
-  if (text.startsWith('_')) throw new Error('This is the empty template: hamelin report puts the runs into it.');
-  const report = unpack(await gunzip(bytesOf(text)));
-  if (report.format !== 'hamelin.report/1') throw new Error(`format "${report.format}" found, hamelin.report/1 expected`);
-  return prepare(report);
+  if (text.startsWith('_')) throw new Error('This is an empty template: hamelin puts the data into it.');
+  const data = unpack(await gunzip(bytesOf(text)));
+  if (data.format !== format) throw new Error(`format "${data.format}" found, ${format} expected`);
+  return data;
 }
+
+/** Reads the runs of a report. */
+export const readReport = async () => prepare(await readData('hamelin.report/1'));
 
 /** Index k of the last t[k] ≤ x (0 if there is none). */
 export function indexAt(t, x) {

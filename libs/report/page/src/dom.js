@@ -16,6 +16,16 @@ export function h(tag, props = {}, ...children) {
   return element;
 }
 
+/** An element of a drawing with attributes and children. */
+export function svg(tag, attributes = {}, ...children) {
+  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value !== undefined && value !== null && value !== false) element.setAttribute(key, value);
+  }
+  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
 const ICONS = {
   play: 'M5 3.2v11.6L15 9z',
   pause: 'M4.5 3h3v12h-3zM10.5 3h3v12h-3z',
@@ -26,13 +36,7 @@ const ICONS = {
 
 /** A drawn icon, hidden from readers: the button around it carries the name. */
 export function icon(name) {
-  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
-  svg.setAttribute('viewBox', '0 0 18 18');
-  svg.setAttribute('aria-hidden', 'true');
-  const path = document.createElementNS(svg.namespaceURI, 'path');
-  path.setAttribute('d', ICONS[name]);
-  svg.append(path);
-  return svg;
+  return svg('svg', { viewBox: '0 0 18 18', 'aria-hidden': 'true' }, svg('path', { d: ICONS[name] }));
 }
 
 /** A labelled check box; `changed` is called with the new state. */
@@ -73,4 +77,13 @@ export function choice(label, options, value, pick) {
   }
   element.set(value);
   return element;
+}
+
+/** Light, dark or as the system has it; `changed` is called after the switch. */
+export function themeSwitch(changed) {
+  return choice('Colours', [['auto', 'Auto', 'As the system has it'], ['light', 'Light', 'Light'], ['dark', 'Dark', 'Dark']], 'auto', (key) => {
+    if (key === 'auto') delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = key;
+    changed();
+  });
 }

@@ -14,6 +14,9 @@ export function number(value, digits = 4) {
   return tidy(value.toFixed(Math.min(decimals, 12)));
 }
 
+/** A number with so many decimals; a dash where there is none. */
+export const fixed = (value, decimals) => (value === null || value === undefined ? '–' : tidy(value.toFixed(decimals)));
+
 /** Labels of an axis: enough decimals to tell neighbours apart, and `least` significant digits for the largest. */
 export function ticks(splits, increment, least = 3) {
   const largest = Math.max(...splits.map(Math.abs));

@@ -1,7 +1,7 @@
 // Puts the page together and keeps its parts on one time.
 import { clearanceGradient, runColor, theme, themeName } from './colors.js';
 import { readReport, valueAt } from './data.js';
-import { choice, h } from './dom.js';
+import { h, themeSwitch } from './dom.js';
 import { number, unitText } from './format.js';
 import { Board } from './plots.js';
 import { Replay } from './replay.js';
@@ -60,14 +60,6 @@ function threeD(report, replays, panels, row, failed) {
     failed(error);
     return null;
   }
-}
-
-function themeSwitch(changed) {
-  return choice('Colours', [['auto', 'Auto', 'As the system has it'], ['light', 'Light', 'Light'], ['dark', 'Dark', 'Dark']], 'auto', (key) => {
-    if (key === 'auto') delete document.documentElement.dataset.theme;
-    else document.documentElement.dataset.theme = key;
-    changed();
-  });
 }
 
 async function start() {

@@ -4,7 +4,7 @@ import { h } from './dom.js';
 import { number, seconds, words } from './format.js';
 
 const GOOD = new Set(['reached', 'completed']);
-const BAD = new Set(['collision', 'diverged', 'defect', 'refused']);
+const BAD = new Set(['collision', 'diverged', 'defect', 'refused', 'crashed']);
 
 /** The outcome as a coloured word. */
 export function badge(outcome) {

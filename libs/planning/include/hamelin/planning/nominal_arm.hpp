@@ -48,8 +48,8 @@ class NominalArm {
   dynamics::Matrix3Xd J_;
 };
 
-/// Calls f(contact, link) for the nearest contact of each link with each obstacle (the map counts as one) within
-/// `range`: the x_i of (18). Equal distances: the first. Contacts as a tick lists them.
+/// Calls f(contact, link) for the nearest contact of each link with each obstacle (the map counts as one, unknown space
+/// that blocks as another) within `range`: the x_i of (18). Equal distances: the first. Contacts as a tick lists them.
 template <class F>
 void for_each_nearest(std::span<const hamelin_contact> contacts, std::span<const hamelin_sphere> spheres, double range,
                       F&& f) {

@@ -29,6 +29,18 @@ using VectorMap = Eigen::Map<Eigen::VectorXd>;
   return {x[0], x[1], x[2]};
 }
 
+/// Where a contact's obstacle point lies.
+enum class ContactKind : std::int32_t {
+  map,      ///< occupied space of the map
+  unknown,  ///< space that the map does not know, where the scene says that it blocks
+  obstacle  ///< of the scene: hamelin_contact::obstacle is its index
+};
+
+[[nodiscard]] inline ContactKind kind_of(const hamelin_contact& contact) noexcept {
+  if (contact.obstacle == HAMELIN_OBSTACLE_MAP) return ContactKind::map;
+  return contact.obstacle == HAMELIN_OBSTACLE_UNKNOWN ? ContactKind::unknown : ContactKind::obstacle;
+}
+
 /// What holds for a whole run.
 class Setup {
  public:

@@ -28,13 +28,16 @@ typedef struct hamelin_sphere {
   double half_axis_link_m[3]; /* zero for a sphere */
 } hamelin_sphere;
 
+/* What a contact is with, where that is no obstacle of the scene: the map's occupied space; or space that the map does
+ * not know, where the scene says that it blocks. */
 #define HAMELIN_OBSTACLE_MAP (-1)
+#define HAMELIN_OBSTACLE_UNKNOWN (-2)
 
 /* One near obstacle point of one control shape. A capsule is nearest at one point of its axis, which stands for a
  * sphere's centre; a capsule along a wall has further contacts at other places of its axis. */
 typedef struct hamelin_contact {
   int32_t sphere;              /* index into hamelin_setup.spheres */
-  int32_t obstacle;            /* HAMELIN_OBSTACLE_MAP, or the index of the scene's obstacle */
+  int32_t obstacle;            /* HAMELIN_OBSTACLE_MAP, _UNKNOWN, or the index of the scene's obstacle */
   double distance_m;           /* from the shape's surface; zero or below is contact */
   double arm_point_world_m[3]; /* on the shape's surface */
   double obstacle_point_world_m[3];

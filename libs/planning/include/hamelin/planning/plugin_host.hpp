@@ -168,6 +168,9 @@ inline constexpr std::string_view plugin_suffix = ".hamelin.so";
 /// @throws Error plugin; if none is found, with every directory searched, what is in it, and the nearest name
 [[nodiscard]] Plugin find_plugin(const std::string& name_or_path,
                                  const std::vector<std::filesystem::path>& directories);
+/// The file that find_plugin() would load, without running its code. @throws Error plugin if none is found
+[[nodiscard]] std::filesystem::path find_plugin_file(const std::string& name_or_path,
+                                                     const std::vector<std::filesystem::path>& directories);
 
 /// One *.hamelin.so of a directory, loaded or refused.
 struct ListedPlugin {

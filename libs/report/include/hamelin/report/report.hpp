@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "hamelin/io/json.hpp"
+
 namespace hamelin::report {
 
 struct Options {
@@ -37,6 +39,9 @@ struct Data {
 /// @throws Error usage for no logs or options out of range; io, parse or invalid for a file that is no log, a damaged
 /// line, or a robot that is missing or no longer fits
 [[nodiscard]] Data make_data(const std::vector<std::filesystem::path>& logs, const Options& options = {});
+
+/// A page's data that is JSON alone, as the pages of sweeps and of accuracy have it, in the same form as Data::bytes.
+[[nodiscard]] std::string pack(const Json& data);
 
 /// The text in a page's template that the data takes the place of.
 inline constexpr std::string_view token = "__HAMELIN_REPORT_DATA__";

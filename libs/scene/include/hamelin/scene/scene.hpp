@@ -115,7 +115,10 @@ struct Scene {
   std::uint64_t seed = 1;
 };
 
-/// Reads a scene file; paths inside are taken relative to it.
+/// The files that a run of the scene reads, the scene's own left out: robot, spheres, SRDF, map and its changes.
+[[nodiscard]] std::vector<std::filesystem::path> input_files(const Scene& scene);
+
+/// Reads a scene file; paths inside are taken relative to it, see resolve_path().
 /// @throws Error io, parse or invalid: "file: /json/pointer: what is wrong, what was expected"
 [[nodiscard]] Scene read_scene(const std::filesystem::path& file);
 

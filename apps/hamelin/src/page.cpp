@@ -1,0 +1,36 @@
+#include "page.hpp"
+
+#include <fmt/format.h>
+
+#include "command_line.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/report/report.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace fs = std::filesystem;
+
+fs::path page_template(const std::string& name) {
+  std::error_code ec;
+  auto file = prefix().value_or("/") / "share" / "hamelin" / "report" / (name + ".html");
+  if (!fs::is_regular_file(file, ec))
+    throw Error(
+        ErrorCode::io,
+        fmt::format(
+            "{}: is missing: the page was not built because Node.js, npm or its registry was missing when hamelin "
+            "was built (or HAMELIN_BUILD_REPORT was OFF); install them (Debian: apt install nodejs npm) "
+            "and build hamelin again",
+            file.string()));
+  return file;
+}
+
+std::size_t write_page(const fs::path& page_template, const std::string& data, const fs::path& target) {
+  const Phase phase("packing the page");
+  const std::string page = report::make_page(read_file(page_template), data, page_template.string());
+  write_file_aside(target, page);
+  return page.size();
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,178 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "hamelin/accuracy/accuracy.hpp"
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::accuracy {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double coarsest_step_s = 0.01;
+constexpr int halvings_max = 20;
+// Rounding of the motion itself: no finer run brings more.
+constexpr double rounding = 1e-14;
+
+struct Settings {
+  const char* integrator;
+  int order;        // 0: its only one
+  bool controlled;  // by rtol, else by halving a fixed step
+};
+
+// Best first; the first two that are there make the reference. They share the equations of motion, but neither stages
+// nor step lengths.
+constexpr std::array<Settings, 5> preferred{{{"dop853", 0, true},
+                                             {"gauss", 16, false},
+                                             {"composition", 8, false},
+                                             {"rk4", 0, false},
+                                             {"hamel-variational", 0, false}}};
+
+// The end of the motion by one scheme.
+struct End {
+  VectorXd q, v;
+  bool there = false;
+};
+
+// A scheme's finest run, and how far it is from the one before.
+struct Refined {
+  End end;
+  double error = std::numeric_limits<double>::infinity();
+  std::string words;
+  long evaluations = 0;
+};
+
+double distance(const VectorXd& a, const VectorXd& b) {
+  return (a - b).lpNorm<Eigen::Infinity>();
+}
+
+class Ladder {
+ public:
+  Ladder(const model::Model& model, const Options& options, const Settings& settings)
+      : model_(model), options_(options), settings_(settings) {
+    if (settings.controlled)
+      climb_tolerances();
+    else
+      climb_steps();
+  }
+  [[nodiscard]] const Refined& best() const noexcept { return best_; }
+
+ private:
+  // Whether a finer run is worth its cost.
+  bool take(const End& end, std::string words) {
+    if (!end.there) return true;
+    if (best_.end.there) {
+      const double scale = 1.0 + std::max(end.q.lpNorm<Eigen::Infinity>(), end.v.lpNorm<Eigen::Infinity>());
+      const double moved = std::max(distance(end.q, best_.end.q), distance(end.v, best_.end.v));
+      const bool floor = moved <= rounding * scale || (moved > 0.5 * best_.error && best_.error < 1e-8 * scale);
+      // where rounding rules the run before is as good
+      if (floor && moved > best_.error) return false;
+      best_.error = moved;
+      best_.end = end;
+      best_.words = std::move(words);
+      return !floor;
+    }
+    best_.end = end;
+    best_.words = std::move(words);
+    return true;
+  }
+
+  [[nodiscard]] bool affordable(double next) const {
+    return next * static_cast<double>(model_.dof()) <= options_.reference_work;
+  }
+
+  End run(const integration::Options& scheme, long steps) {
+    const auto integrator = integration::make_integrator(settings_.integrator, model_, scheme);
+    auto state = integrator->start(options_.q0, options_.v0);
+    const double h = steps > 0 ? options_.duration_s / static_cast<double>(steps) : 0.0;
+    double left = options_.duration_s;
+    last_ = 0;
+    state.step_next = std::min(1e-3, left);
+    for (long k = 0; left > 0.0; ++k) {
+      const auto report = integrator->advance(state, options_.channels, steps > 0 ? h : left);
+      last_ += report.evaluations;
+      // a step that was halved where it had to be is a step of the next run already: the two would agree for nothing
+      if (!report.converged || report.halvings > 0 || !affordable(static_cast<double>(last_))) return {};
+      if (steps > 0)
+        left = k + 1 == steps ? 0.0 : left;
+      else
+        left = report.step_s == left ? 0.0 : left - report.step_s;
+    }
+    End end{state.q, VectorXd(state.q.size()), true};
+    integrator->velocity(state, end.v);
+    end.there = end.q.allFinite() && end.v.allFinite();
+    return end;
+  }
+
+  integration::Options scheme() const {
+    integration::Options made;
+    made.order = settings_.order;
+    made.tolerance = 1e-14;
+    return made;
+  }
+
+  [[nodiscard]] std::string name() const {
+    return settings_.order > 0 ? fmt::format("{}:{}", settings_.integrator, settings_.order) : settings_.integrator;
+  }
+
+  void climb_tolerances() {
+    for (const double rtol : {1e-10, 1e-11, 1e-12, 1e-13}) {
+      auto made = scheme();
+      made.rtol = made.atol = rtol;
+      const End end = run(made, 0);
+      best_.evaluations += last_;
+      if (!end.there || !take(end, fmt::format("{} at rtol {}", name(), rtol))) return;
+    }
+  }
+
+  void climb_steps() {
+    long steps = static_cast<long>(std::ceil(options_.duration_s / coarsest_step_s));
+    for (int i = 0; i < halvings_max; ++i, steps *= 2) {
+      const End end = run(scheme(), steps);
+      best_.evaluations += last_;
+      const double h = options_.duration_s / static_cast<double>(steps);
+      if (!take(end, fmt::format("{} at {:.3g} s", name(), h)) || !affordable(2.0 * static_cast<double>(last_))) return;
+    }
+  }
+
+  const model::Model& model_;
+  const Options& options_;
+  const Settings& settings_;
+  Refined best_;
+  long last_ = 0;  // evaluations of the last run
+};
+
+}  // namespace
+
+Reference find_reference(const model::Model& model, const Options& options) {
+  std::vector<Refined> found;
+  Reference reference;
+  for (const auto& settings : preferred) {
+    if (found.size() == 2) break;
+    if (integration::find_scheme(settings.integrator) == nullptr) continue;
+    const Ladder ladder(model, options, settings);
+    reference.evaluations += ladder.best().evaluations;
+    if (ladder.best().end.there) found.push_back(ladder.best());
+  }
+  if (found.size() < 2)
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: no two schemes reach {} s within the cost of a reference, expected a shorter duration or "
+                    "--no-reference",
+                    options.name, options.duration_s));
+  const bool first_is_finer = found[0].error <= found[1].error;
+  const Refined &finer = found[first_is_finer ? 0 : 1], &other = found[first_is_finer ? 1 : 0];
+  reference.q = finer.end.q;
+  reference.v = finer.end.v;
+  reference.scheme = finer.words;
+  reference.check = other.words;
+  reference.error_q = distance(finer.end.q, other.end.q);
+  reference.error_v = distance(finer.end.v, other.end.v);
+  return reference;
+}
+
+}  // namespace hamelin::accuracy

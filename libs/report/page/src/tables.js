@@ -1,0 +1,24 @@
+// Tables of words and figures.
+import { h } from './dom.js';
+
+/** A cell that is more than its content: {content, class}. */
+const parts = (cell) => (cell !== null && typeof cell === 'object' && !Array.isArray(cell) && !(cell instanceof Node) ? cell : { content: cell });
+
+/**
+ * @param {{caption: string, shown?: boolean, head: Cell[], words?: number, rows: {cells: Cell[], class?: string}[]}} table
+ *   a Cell is a string, a node, a list of lines, or {content, class} with one of these;
+ *   the first `words` columns are words, the others figures unless a cell's class says otherwise; the first cell of a row
+ *   is its head; `shown`: the caption is shown, not only told
+ */
+export function table({ caption, shown = false, head, words = 1, rows }) {
+  const lines = (content) => (Array.isArray(content) ? content.flatMap((line, i) => (i ? [h('br'), line] : [line])) : content);
+  const cells = (list, tag) => list.map((cell, i) => {
+    const { content, class: kind = i < words ? 'text' : null } = parts(cell);
+    return h(...tag(i, kind), lines(content));
+  });
+  return h('div', { class: 'table-box', tabIndex: 0, role: 'region', 'aria-label': caption },
+    h('table', { class: 'figures' },
+      shown && h('caption', {}, caption),
+      h('thead', {}, h('tr', {}, cells(head, (i, kind) => ['th', { scope: 'col', class: kind }]))),
+      h('tbody', {}, rows.map((row) => h('tr', { class: row.class }, cells(row.cells, (i, kind) => (i ? ['td', { class: kind }] : ['th', { scope: 'row', class: kind }])))))));
+}

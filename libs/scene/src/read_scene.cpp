@@ -1,0 +1,333 @@
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/scene/scene.hpp"
+#include "rotation.hpp"
+
+namespace hamelin::scene {
+
+namespace {
+
+// Reads one JSON object whose form the schema has already vouched for; null is the same as absent.
+class Reader {
+ public:
+  Reader(const Json& object, std::string place) : object_(object), place_(std::move(place)) {}
+
+  [[nodiscard]] const Json* find(const char* key) const {
+    if (!object_.is_object()) return nullptr;
+    const auto it = object_.find(key);
+    return it == object_.end() || it->is_null() ? nullptr : &*it;
+  }
+  template <typename T>
+  [[nodiscard]] T get(const char* key, T otherwise) const {
+    const Json* value = find(key);
+    return value != nullptr ? value->get<T>() : otherwise;
+  }
+  template <typename T>
+  [[nodiscard]] std::optional<T> maybe(const char* key) const {
+    const Json* value = find(key);
+    return value != nullptr ? std::optional<T>(value->get<T>()) : std::nullopt;
+  }
+  [[nodiscard]] Reader child(const char* key) const {
+    static const Json nothing;
+    const Json* value = find(key);
+    return {value != nullptr ? *value : nothing, place_of(key)};
+  }
+  /// Calls `read` with each element of a list.
+  template <class Read>
+  void each(const char* key, const Read& read) const {
+    const Json* list = find(key);
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
+      read(Reader((*list)[i], fmt::format("{}/{}", place_of(key), i)));
+  }
+  [[nodiscard]] std::string place_of(const char* key) const { return fmt::format("{}/{}", place_, key); }
+
+  [[nodiscard]] Eigen::Vector3d vector(const char* key, const Eigen::Vector3d& otherwise) const {
+    const Json* value = find(key);
+    if (value == nullptr) return otherwise;
+    return {(*value)[0].get<double>(), (*value)[1].get<double>(), (*value)[2].get<double>()};
+  }
+  [[nodiscard]] Eigen::VectorXd joints(const char* key) const {
+    if (const Json* value = find(key); value != nullptr)
+      for (std::size_t i = 0; i < value->size(); ++i)
+        if (!(*value)[i].is_number())
+          fail(fmt::format("{}/{}", key, i).c_str(), "is a list, expected a number: lists make a goal of type path");
+    const auto values = get<std::vector<double>>(key, {});
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  }
+  // Way-points as columns.
+  [[nodiscard]] Eigen::MatrixXd joint_path(const char* key) const {
+    const Json& points = *find(key);
+    if (points.empty()) fail(key, "is empty, expected at least one way-point");
+    Eigen::MatrixXd path;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::string place = fmt::format("{}/{}", key, i);
+      if (!points[i].is_array() || points[i].empty())
+        fail(place.c_str(), "expected a way-point, a list of one number per joint");
+      const auto q = points[i].get<std::vector<double>>();
+      const auto size = static_cast<Eigen::Index>(q.size());
+      if (i == 0) path.resize(size, static_cast<Eigen::Index>(points.size()));
+      if (size != path.rows())
+        fail(place.c_str(), fmt::format("{} numbers given, expected {} as in the first way-point", size, path.rows()));
+      path.col(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::VectorXd>(q.data(), size);
+    }
+    return path;
+  }
+  [[nodiscard]] Quaternion quaternion() const {
+    Quaternion c{1.0, 0.0, 0.0, 0.0};
+    if (const Json* value = find("quaternion_wxyz"); value != nullptr)
+      for (std::size_t i = 0; i < c.size(); ++i) c[i] = (*value)[i].get<double>();
+    const double norm = Eigen::Map<const Eigen::Vector4d>(c.data()).norm();
+    if (!(std::abs(norm - 1.0) <= 1e-3))
+      fail("quaternion_wxyz", fmt::format("the norm is {:.6g}, expected a unit quaternion", norm));
+    return c;
+  }
+  [[nodiscard]] geometry::SE3 pose() const {
+    return {rotation_of(quaternion()), vector("position_m", Eigen::Vector3d::Zero())};
+  }
+  [[noreturn]] void fail(const char* key, const std::string& what) const {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place_of(key), what));
+  }
+  void need(const char* key, std::string_view kind) const {
+    if (find(key) == nullptr) fail(key, fmt::format("is missing, a {} needs it", kind));
+  }
+  void refuse(const char* key, std::string_view kind) const {
+    if (find(key) != nullptr) fail(key, fmt::format("is not allowed, a {} has none", kind));
+  }
+
+ private:
+  const Json& object_;
+  std::string place_;
+};
+
+Obstacle read_obstacle(const Reader& in) {
+  Obstacle o;
+  o.name = in.get<std::string>("name", "");
+  const auto type = in.get<std::string>("type", "");
+  o.shape = type == "sphere" ? Shape::sphere : type == "box" ? Shape::box : Shape::cylinder;
+  const bool box = o.shape == Shape::box, cylinder = o.shape == Shape::cylinder;
+  box ? in.need("size_m", type) : in.refuse("size_m", type);
+  box ? in.refuse("radius_m", type) : in.need("radius_m", type);
+  cylinder ? in.need("length_m", type) : in.refuse("length_m", type);
+  o.radius_m = in.get("radius_m", 0.0);
+  o.length_m = in.get("length_m", 0.0);
+  o.size_m = in.vector("size_m", Eigen::Vector3d::Zero());
+  o.pose = in.pose();
+  o.quaternion_wxyz = in.quaternion();
+  if (in.find("motion") != nullptr) {
+    const Reader motion = in.child("motion");
+    if (motion.get<std::string>("type", "") == "sine") {
+      motion.need("amplitude_m", "sine");
+      motion.need("period_s", "sine");
+      for (const char* key : {"velocity_m_s", "start_s", "duration_s"}) motion.refuse(key, "sine");
+      o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()), motion.get("period_s", 0.0)};
+    } else {
+      motion.need("velocity_m_s", "linear motion");
+      for (const char* key : {"amplitude_m", "period_s"}) motion.refuse(key, "linear motion");
+      o.motion = LinearMotion{motion.vector("velocity_m_s", Eigen::Vector3d::Zero()), motion.get("start_s", 0.0),
+                              motion.get("duration_s", std::numeric_limits<double>::infinity())};
+    }
+  }
+  o.known = in.get("known", true);
+  o.visible_within_m = in.maybe<double>("visible_within_m");
+  o.appears_s = in.get("appears_s", 0.0);
+  o.judge_only = in.get("judge_only", false);
+  return o;
+}
+
+// @param not_before the time of the change before [s]
+MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder, double not_before) {
+  MapChangeSpec change;
+  change.time_s = in.get("time_s", 0.0);
+  if (change.time_s < not_before)
+    in.fail("time_s",
+            fmt::format("{} s is before the change at {} s, expected changes by time", change.time_s, not_before));
+  if (const auto file = in.maybe<std::string>("file")) change.file = resolve_path(folder, *file);
+  const auto boxes = [&](const char* key, std::vector<Box>& out) {
+    for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
+      const Box box{{six[0], six[1], six[2]}, {six[3], six[4], six[5]}};
+      if (!(box.lo.array() < box.hi.array()).all())
+        in.fail(fmt::format("{}/{}", key, out.size()).c_str(),
+                "its low corner is not below its high one, expected [x, y, z, x, y, z]");
+      out.push_back(box);
+    }
+  };
+  boxes("free_boxes_m", change.free_m);
+  boxes("occupied_boxes_m", change.occupied_m);
+  if (!change.file && change.free_m.empty() && change.occupied_m.empty())
+    in.fail("file", "is missing, a change needs a file, free_boxes_m or occupied_boxes_m");
+  return change;
+}
+
+Goal read_goal(const Reader& in) {
+  Goal goal;
+  const auto type = in.get<std::string>("type", "");
+  const bool path = type == "path";
+  goal.type = type == "joint" || path ? GoalType::joint : type == "position" ? GoalType::position : GoalType::pose;
+  const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose;
+  const std::string kind = type + " goal";
+  joint ? in.need("q", kind) : in.refuse("q", kind);
+  joint ? in.refuse("position_m", kind) : in.need("position_m", kind);
+  pose ? in.need("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
+  if (joint) in.refuse("tolerance_m", kind);
+  if (joint) in.refuse("tip_speed_max_m_s", kind);
+  if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
+  if (path) {
+    goal.path = in.joint_path("q");
+    goal.q = goal.path.rightCols(1);
+  } else {
+    goal.q = in.joints("q");
+  }
+  goal.pose = in.pose();
+  goal.quaternion_wxyz = in.quaternion();
+  goal.tolerance_m = in.get("tolerance_m", joint ? 0.0 : pose ? 0.01 : 0.02);
+  goal.tolerance_rad = in.get("tolerance_rad", joint ? 0.05 : pose ? 0.26 : 0.0);
+  goal.speed_max = in.get("speed_max", joint ? 0.05 : std::numeric_limits<double>::infinity());
+  goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
+  return goal;
+}
+
+JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers otherwise) {
+  const Json* given = in.find(key);
+  if (given == nullptr) return otherwise;
+  JointNumbers numbers;
+  if (given->is_string()) numbers.from_robot = true;
+  if (given->is_number()) numbers.values = {given->get<double>()};
+  if (given->is_array()) numbers.values = given->get<std::vector<double>>();
+  if (numbers.values == std::vector<double>{0.0}) numbers.values.clear();
+  return numbers;
+}
+
+ModelFlags read_model(const Reader& in) {
+  ModelFlags model;
+  model.joint_damping = read_joint_numbers(in, "joint_damping", model.joint_damping);
+  model.friction = read_joint_numbers(in, "friction", model.friction);
+  model.friction_speed = in.get("friction_speed", model.friction_speed);
+  model.armature = read_joint_numbers(in, "armature", model.armature);
+  model.joint_limits = in.get("joint_limits", false);
+  model.velocity_limits = in.get("velocity_limits", false);
+  model.torque_limits = in.get("torque_limits", false);
+  model.self_collision = in.get("self_collision", false);
+  if (in.find("payload") != nullptr) {
+    const Reader body = in.child("payload");
+    Payload payload;
+    payload.mass_kg = body.get("mass_kg", 0.0);
+    payload.position_m = body.vector("position_m", Eigen::Vector3d::Zero());
+    const auto i = body.get<std::vector<double>>("inertia_kg_m2", {0, 0, 0, 0, 0, 0});
+    payload.inertia_kg_m2 << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+    model.payload = payload;
+  }
+  return model;
+}
+
+Actuation read_actuation(const Reader& in, double step_s) {
+  Actuation actuation;
+  if (in.get<std::string>("type", "ideal") == "sampled") actuation.type = ActuationType::sampled;
+  actuation.control_period_s = in.get("control_period_s", step_s);
+  actuation.delay_s = in.get("delay_s", 0.0);
+  actuation.joint_noise_rad = in.get("joint_noise_rad", 0.0);
+  actuation.planner_mass_scale = in.get("planner_mass_scale", 1.0);
+  actuation.torque_rate_max_Nm_s = in.maybe<double>("torque_rate_max_Nm_s");
+  actuation.coulomb_friction_share = in.get("coulomb_friction_share", 0.0);
+  const double steps = actuation.control_period_s / step_s;
+  if (!(std::round(steps) >= 1.0 && std::abs(steps - std::round(steps)) <= 1e-9 * steps))
+    in.fail("control_period_s", fmt::format("{} s is {} steps of {} s, expected a whole number",
+                                            actuation.control_period_s, steps, step_s));
+  if (actuation.type == ActuationType::ideal && std::round(steps) != 1.0)
+    in.fail("control_period_s", fmt::format("{} s is not allowed, ideal actuation has one tick a step ({} s)",
+                                            actuation.control_period_s, step_s));
+  if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
+    in.fail("delay_s", fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
+  if (actuation.type == ActuationType::ideal && actuation.torque_rate_max_Nm_s)
+    in.fail("torque_rate_max_Nm_s", "is not allowed, only sampled actuation has torques that change from tick to tick");
+  return actuation;
+}
+
+RobotRef read_robot_ref(const Reader& in, const std::filesystem::path& folder) {
+  const auto path = [&](const char* key) -> std::optional<std::filesystem::path> {
+    const auto text = in.maybe<std::string>(key);
+    return text ? std::optional(resolve_path(folder, *text)) : std::nullopt;
+  };
+  return {path("file").value_or(folder), in.maybe<std::string>("tip"), path("spheres"), path("srdf")};
+}
+
+MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
+  MapSpec map;
+  map.file = resolve_path(folder, in.get<std::string>("file", ""));
+  map.pose = in.pose();
+  map.quaternion_wxyz = in.quaternion();
+  map.scale = in.maybe<double>("scale");
+  map.occupancy_threshold = in.get("occupancy_threshold", 0.5);
+  const auto unknown = in.get<std::string>("unknown", "free");
+  map.unknown = unknown == "slow"    ? UnknownPolicy::slow
+                : unknown == "block" ? UnknownPolicy::block
+                                     : UnknownPolicy::free;
+  map.keep_out_radius_m = in.get("keep_out_radius_m", 0.0);
+  if (const Json* filter = in.find("self_filter"); filter != nullptr && *filter != Json(false))
+    map.self_filter_padding_m = in.child("self_filter").get("padding_m", default_self_filter_padding_m);
+  in.each("changes", [&](const Reader& change) {
+    map.changes.push_back(read_map_change(change, folder, map.changes.empty() ? 0.0 : map.changes.back().time_s));
+  });
+  return map;
+}
+
+}  // namespace
+
+Obstacle obstacle_from_json(const Json& document, const std::string& where) {
+  return read_obstacle({document, where});
+}
+
+Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir, const std::string& where) {
+  check_shipped_schema(document, "scene", where);
+  const Reader in(document, where + ": ");
+  Scene scene;
+  scene.name = where;
+  scene.robot = read_robot_ref(in.child("robot"), base_dir);
+  scene.base = in.child("base").pose();
+  scene.base_quaternion_wxyz = in.child("base").quaternion();
+  if (in.find("gravity_m_s2") != nullptr) scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
+  scene.start_q = in.child("start").joints("q");
+  scene.start_v = in.child("start").joints("v");
+  in.each("goals", [&](const Reader& goal) { scene.goals.push_back(read_goal(goal)); });
+  in.each("obstacles", [&](const Reader& obstacle) { scene.obstacles.push_back(read_obstacle(obstacle)); });
+  if (in.find("map") != nullptr) scene.map = read_map_spec(in.child("map"), base_dir);
+  scene.model = read_model(in.child("model"));
+  if (in.find("planner") != nullptr) {
+    const Reader planner = in.child("planner");
+    scene.planner = Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
+  }
+  const Reader integrator = in.child("integrator");
+  scene.integrator = {integrator.get<std::string>("name", "hamel-variational"),
+                      integrator.get<Json>("params", Json::object())};
+  if (in.find("stall") != nullptr) {
+    const Reader stall = in.child("stall");
+    scene.stall = StallRule{stall.get("speed_m_s", 0.002), stall.get("distance_m", 0.2), stall.get("hold_s", 1.0)};
+  }
+  scene.step_s = in.get("step_s", 0.001);
+  scene.duration_s = in.get("duration_s", 10.0);
+  scene.seed = in.get<std::uint64_t>("seed", 1);
+  scene.actuation = read_actuation(in.child("actuation"), scene.step_s);
+  return scene;
+}
+
+std::vector<std::filesystem::path> input_files(const Scene& scene) {
+  std::vector<std::filesystem::path> files{scene.robot.file};
+  if (scene.robot.spheres) files.push_back(*scene.robot.spheres);
+  if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
+  if (!scene.map) return files;
+  files.push_back(scene.map->file);
+  for (const MapChangeSpec& change : scene.map->changes)
+    if (change.file) files.push_back(*change.file);
+  return files;
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  return scene_from_json(read_json(file), file.parent_path(), file.string());
+}
+
+}  // namespace hamelin::scene

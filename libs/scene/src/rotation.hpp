@@ -1,0 +1,13 @@
+#pragma once
+#include <Eigen/Geometry>
+
+#include "hamelin/scene/obstacles.hpp"
+
+namespace hamelin::scene {
+
+/// The rotation of a quaternion as a file has it, whose norm is one to what its digits say.
+[[nodiscard]] inline Eigen::Matrix3d rotation_of(const Quaternion& wxyz) {
+  return Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
+}
+
+}  // namespace hamelin::scene

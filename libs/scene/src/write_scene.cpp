@@ -1,0 +1,211 @@
+#include <cmath>
+
+#include "hamelin/scene/scene.hpp"
+#include "rotation.hpp"
+
+namespace hamelin::scene {
+
+namespace {
+
+Json array(const Eigen::Ref<const Eigen::VectorXd>& v) {
+  return std::vector<double>(v.data(), v.data() + v.size());
+}
+
+Json quaternion_json(const Eigen::Matrix3d& R, const Quaternion& written) {
+  if (rotation_of(written) == R) return written;
+  Eigen::Quaterniond q(R);
+  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+template <typename T>
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json pose_json(const geometry::SE3& pose, const Quaternion& written) {
+  return {{"position_m", array(pose.p())}, {"quaternion_wxyz", quaternion_json(pose.R(), written)}};
+}
+
+Json choice_json(const Choice& choice) {
+  return {{"name", choice.name}, {"params", choice.params}};
+}
+
+Json path_or_null(const std::optional<std::filesystem::path>& path) {
+  return path ? Json(path->string()) : Json(nullptr);
+}
+
+Json goal_json(const Goal& goal) {
+  Json out{{"type", type_name(goal)}};
+  if (goal.path.size() > 0) {
+    out["q"] = Json::array();
+    for (Eigen::Index i = 0; i < goal.path.cols(); ++i) out["q"].push_back(array(goal.path.col(i)));
+  } else if (goal.type == GoalType::joint) {
+    out["q"] = array(goal.q);
+  } else {
+    out["position_m"] = array(goal.pose.p());
+    if (goal.type == GoalType::pose) out["quaternion_wxyz"] = quaternion_json(goal.pose.R(), goal.quaternion_wxyz);
+    out["tolerance_m"] = goal.tolerance_m;
+  }
+  if (goal.type != GoalType::position) out["tolerance_rad"] = goal.tolerance_rad;
+  out["speed_max"] = std::isfinite(goal.speed_max) ? Json(goal.speed_max) : Json(nullptr);
+  if (goal.type != GoalType::joint) out["tip_speed_max_m_s"] = or_null(goal.tip_speed_max_m_s);
+  return out;
+}
+
+Json change_json(const MapChangeSpec& change) {
+  const auto boxes = [](const std::vector<Box>& from) {
+    Json list = Json::array();
+    for (const Box& box : from)
+      list.push_back({box.lo.x(), box.lo.y(), box.lo.z(), box.hi.x(), box.hi.y(), box.hi.z()});
+    return list;
+  };
+  return {{"time_s", change.time_s},
+          {"file", change.file ? Json(change.file->generic_string()) : Json(nullptr)},
+          {"free_boxes_m", boxes(change.free_m)},
+          {"occupied_boxes_m", boxes(change.occupied_m)}};
+}
+
+Json map_json(const MapSpec& map) {
+  Json out{{"file", map.file.string()}};
+  out.update(pose_json(map.pose, map.quaternion_wxyz));
+  out["scale"] = or_null(map.scale);
+  out["occupancy_threshold"] = map.occupancy_threshold;
+  out["unknown"] = to_string(map.unknown);
+  out["keep_out_radius_m"] = map.keep_out_radius_m;
+  out["self_filter"] = nullptr;
+  if (map.self_filter_padding_m) out["self_filter"] = {{"padding_m", *map.self_filter_padding_m}};
+  out["changes"] = Json::array();
+  for (const MapChangeSpec& change : map.changes) out["changes"].push_back(change_json(change));
+  return out;
+}
+
+Json joint_numbers_json(const JointNumbers& numbers) {
+  if (numbers.from_robot) return "robot";
+  if (numbers.values.empty()) return 0.0;
+  return numbers.values.size() == 1 ? Json(numbers.values.front()) : Json(numbers.values);
+}
+
+Json model_json(const ModelFlags& model) {
+  Json out{{"joint_damping", joint_numbers_json(model.joint_damping)},
+           {"friction", joint_numbers_json(model.friction)},
+           {"friction_speed", model.friction_speed},
+           {"armature", joint_numbers_json(model.armature)},
+           {"joint_limits", model.joint_limits},
+           {"velocity_limits", model.velocity_limits},
+           {"torque_limits", model.torque_limits},
+           {"self_collision", model.self_collision},
+           {"payload", nullptr}};
+  if (!model.payload) return out;
+  const Eigen::Matrix3d& I = model.payload->inertia_kg_m2;
+  out["payload"] = {{"mass_kg", model.payload->mass_kg},
+                    {"position_m", array(model.payload->position_m)},
+                    {"inertia_kg_m2", {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}}};
+  return out;
+}
+
+Json actuation_json(const Actuation& actuation) {
+  return {{"type", to_string(actuation.type)},
+          {"control_period_s", actuation.control_period_s},
+          {"delay_s", actuation.delay_s},
+          {"joint_noise_rad", actuation.joint_noise_rad},
+          {"planner_mass_scale", actuation.planner_mass_scale},
+          {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
+          {"coulomb_friction_share", actuation.coulomb_friction_share}};
+}
+
+Json start_json(const Scene& scene) {
+  Json out{{"q", nullptr}, {"v", nullptr}};
+  if (scene.start_q.size() > 0) out["q"] = array(scene.start_q);
+  if (scene.start_v.size() > 0) out["v"] = array(scene.start_v);
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(GoalType type) noexcept {
+  switch (type) {
+    case GoalType::joint:
+      return "joint";
+    case GoalType::position:
+      return "position";
+    case GoalType::pose:
+      return "pose";
+  }
+  return "unknown";
+}
+
+std::string_view type_name(const Goal& goal) noexcept {
+  return goal.path.size() > 0 ? "path" : to_string(goal.type);
+}
+
+std::string_view to_string(ActuationType type) noexcept {
+  switch (type) {
+    case ActuationType::ideal:
+      return "ideal";
+    case ActuationType::sampled:
+      return "sampled";
+  }
+  return "unknown";
+}
+
+Json motion_json(const std::variant<SineMotion, LinearMotion>& motion) {
+  if (const auto* sine = std::get_if<SineMotion>(&motion))
+    return {{"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
+  const auto& line = std::get<LinearMotion>(motion);
+  return {{"type", "linear"},
+          {"velocity_m_s", array(line.velocity_m_s)},
+          {"start_s", line.start_s},
+          {"duration_s", std::isinf(line.duration_s) ? Json(nullptr) : Json(line.duration_s)}};
+}
+
+Json to_json(const Obstacle& o) {
+  Json out{{"name", o.name}, {"type", to_string(o.shape)}};
+  if (o.shape == Shape::box) {
+    out["size_m"] = array(o.size_m);
+  } else {
+    out["radius_m"] = o.radius_m;
+  }
+  if (o.shape == Shape::cylinder) out["length_m"] = o.length_m;
+  out["position_m"] = array(o.pose.p());
+  out["quaternion_wxyz"] = quaternion_json(o.pose.R(), o.quaternion_wxyz);
+  out["motion"] = nullptr;
+  if (o.motion) out["motion"] = motion_json(*o.motion);
+  out["known"] = o.known;
+  out["visible_within_m"] = or_null(o.visible_within_m);
+  out["appears_s"] = o.appears_s;
+  out["judge_only"] = o.judge_only;
+  return out;
+}
+
+Json resolved_json(const Scene& scene) {
+  Json out;
+  out["schema"] = "hamelin.scene/1";
+  out["robot"] = {{"file", scene.robot.file.string()},
+                  {"tip", or_null(scene.robot.tip)},
+                  {"spheres", path_or_null(scene.robot.spheres)},
+                  {"srdf", path_or_null(scene.robot.srdf)}};
+  out["base"] = pose_json(scene.base, scene.base_quaternion_wxyz);
+  out["gravity_m_s2"] = scene.gravity_m_s2 ? array(*scene.gravity_m_s2) : Json(nullptr);
+  out["start"] = start_json(scene);
+  out["goals"] = Json::array();
+  for (const Goal& goal : scene.goals) out["goals"].push_back(goal_json(goal));
+  out["map"] = scene.map ? map_json(*scene.map) : Json(nullptr);
+  out["obstacles"] = Json::array();
+  for (const Obstacle& obstacle : scene.obstacles) out["obstacles"].push_back(to_json(obstacle));
+  out["model"] = model_json(scene.model);
+  out["actuation"] = actuation_json(scene.actuation);
+  out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
+  out["integrator"] = choice_json(scene.integrator);
+  out["stall"] = nullptr;
+  if (scene.stall)
+    out["stall"] = {{"speed_m_s", scene.stall->speed_m_s},
+                    {"distance_m", scene.stall->distance_m},
+                    {"hold_s", scene.stall->hold_s}};
+  out["step_s"] = scene.step_s;
+  out["duration_s"] = scene.duration_s;
+  out["seed"] = scene.seed;
+  return out;
+}
+
+}  // namespace hamelin::scene

@@ -1,0 +1,363 @@
+#include "hamelin/sweep/merge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+
+#include "hamelin/core/error.hpp"
+#include "statistics.hpp"
+
+namespace hamelin::sweep {
+
+namespace {
+
+/// What a group gathers before it is summed up.
+struct Gathered {
+  Group group;
+  std::vector<double> clearances, self_clearances, shares, times, p50, p99, recovery, filter;
+};
+
+std::optional<double> number_at(const Json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_number()) return std::nullopt;
+  return object[key].get<double>();
+}
+
+void push(std::vector<double>& values, const std::optional<double>& value) {
+  if (value) values.push_back(*value);
+}
+
+std::string text_at(const Json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+}
+
+// Numbers in a cause, such as a depth or a time, differ from run to run.
+std::string without_numbers(const std::string& cause) {
+  std::string out;
+  bool word = false;
+  const char* const end = cause.data() + cause.size();
+  for (const char* at = cause.data(); at != end;) {
+    double number = 0.0;
+    const bool digit = *at >= '0' && *at <= '9';
+    if (digit && !word) {
+      at = std::from_chars(at, end, number).ptr;
+      out += 'N';
+      continue;
+    }
+    word = (*at >= 'a' && *at <= 'z') || (*at >= 'A' && *at <= 'Z') || *at == '_' || (word && digit);
+    out += *at++;
+  }
+  return out;
+}
+
+bool contact_seen(const Json& record) {
+  return record["judge"].is_object() && record["judge"].value("contact", false);
+}
+
+void take(Gathered& into, const MergedRun& merged) {
+  Group& g = into.group;
+  ++g.planned;
+  if (merged.record.is_null()) return;
+  const Json &record = merged.record, &result = record["result"], &judge = record["judge"];
+  const std::string outcome = record["outcome"];
+  const bool reached = outcome == "reached";
+  ++g.runs;
+  ++g.outcomes[outcome];
+  g.feasible += merged.feasible ? 1U : 0U;
+  g.reached += merged.feasible && reached ? 1U : 0U;
+  g.reached_all += reached ? 1U : 0U;
+  g.contacts += contact_seen(record) ? 1U : 0U;
+  if (judge.is_object()) {
+    push(into.clearances, number_at(judge.value("obstacles", Json()), "clearance_m"));
+    push(into.self_clearances, number_at(judge.value("self", Json()), "clearance_m"));
+    g.judged += judge["obstacles"].is_object() || judge["self"].is_object() ? 1U : 0U;
+  }
+  push(into.shares, number_at(result, "certified_share"));
+  push(into.recovery, number_at(result, "recovery_work_J"));
+  push(into.filter, number_at(result, "filter_work_J"));
+  if (reached) push(into.times, number_at(result, "time_s"));
+  if (result.is_object() && result.contains("timing")) {
+    const Json tick = result["timing"].value("tick_us", Json());
+    push(into.p50, number_at(tick, "p50"));
+    push(into.p99, number_at(tick, "p99"));
+  }
+  if (result.is_object() && result.contains("escape") && result["escape"].is_object())
+    for (const auto& [name, value] : result["escape"].items())
+      if (value.is_number()) g.escapes[name] += value.get<double>();
+  if (!reached) {
+    const std::string cause = text_at(record, "cause");
+    const bool as_it_is = outcome == "crashed" || outcome == "timeout";
+    ++g.causes[cause.empty() ? outcome : fmt::format("{}: {}", outcome, as_it_is ? cause : without_numbers(cause))];
+  }
+}
+
+// Who made a result: the program and its planner, each by name with its build.
+std::vector<std::pair<std::string, std::string>> makers_of(const Json& result) {
+  const Json provenance = result.value("provenance", Json::object());
+  std::vector<std::pair<std::string, std::string>> makers;
+  if (provenance.contains("build")) makers.emplace_back("the program", provenance["build"].value("id", Json()).dump());
+  if (provenance.contains("inputs"))
+    for (const Json& input : provenance["inputs"])
+      if (input.value("role", Json()) == "plugin")
+        makers.emplace_back(fmt::format("planner {}", text_at(result, "planner")), input["sha256"].dump());
+  return makers;
+}
+
+Group summed_up(Gathered&& from) {
+  Group g = std::move(from.group);
+  g.reached_interval = wilson(g.reached, g.feasible);
+  g.min_clearance_m = smallest(from.clearances);
+  g.min_self_clearance_m = smallest(from.self_clearances);
+  g.certified_share_mean = mean(from.shares);
+  g.certified_share_min = smallest(from.shares);
+  g.reached_time_s_median = median(from.times);
+  g.tick_us_p50_median = median(from.p50);
+  g.tick_us_p99_median = median(from.p99);
+  g.filter_work_J_max = largest(from.filter).value_or(0.0);
+  g.recovery_work_J_median = median(from.recovery);
+  return g;
+}
+
+}  // namespace
+
+Interval wilson(std::size_t hits, std::size_t all) {
+  if (all == 0) return {};
+  constexpr double z = 1.959963984540054;
+  const double n = static_cast<double>(all), p = static_cast<double>(hits) / n, z2 = z * z;
+  const double center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
+  const double half = z / (1.0 + z2 / n) * std::sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n));
+  return {hits == 0 ? 0.0 : center - half, hits == all ? 1.0 : center + half};
+}
+
+std::vector<MergedRun> read_sweeps(const std::vector<std::filesystem::path>& directories) {
+  std::vector<MergedRun> runs;
+  for (const auto& directory : directories) {
+    const Plan plan = read_plan(directory);
+    std::map<std::string, Json> records;
+    for (auto& line : read_records(directory, plan).lines) {
+      const std::string id = line["id"];
+      records[id] = std::move(line);
+    }
+    std::map<std::string, const PlannedScene*> scenes;
+    for (const auto& scene : plan.scenes) scenes[scene.file] = &scene;
+    for (const auto& run : plan.runs) {
+      const PlannedScene& scene = *scenes.at(run.scene);
+      const auto record = records.find(run.id);
+      runs.push_back({run, directory, scene.feasible, scene.reason, record == records.end() ? Json() : record->second});
+    }
+  }
+  return runs;
+}
+
+std::vector<Group> group(const std::vector<MergedRun>& runs, const std::vector<std::string>& by) {
+  for (const auto& label : by) {
+    const bool known =
+        std::any_of(runs.begin(), runs.end(), [&](const MergedRun& r) { return r.run.labels.contains(label); });
+    if (known || runs.empty()) continue;
+    std::vector<std::string> names;
+    for (const auto& [name, value] : runs.front().run.labels) names.push_back(name);
+    throw Error(ErrorCode::usage,
+                fmt::format("--by {}: no run has that label, expected some of {}", label, fmt::join(names, ", ")));
+  }
+  std::map<std::vector<std::string>, Gathered> gathered;
+  for (const auto& merged : runs) {
+    std::vector<std::string> key;
+    for (const auto& label : by) {
+      const auto found = merged.run.labels.find(label);
+      key.push_back(found == merged.run.labels.end() ? "" : found->second);
+    }
+    Gathered& into = gathered[key];
+    into.group.key = key;
+    take(into, merged);
+  }
+  std::vector<Group> groups;
+  groups.reserve(gathered.size());
+  for (auto& [key, from] : gathered) groups.push_back(summed_up(std::move(from)));
+  return groups;
+}
+
+std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
+  const auto set_of = [](const MergedRun& r) {
+    return std::vector{r.directory.string(), r.run.labels.at("gains"), r.run.labels.at("seed"),
+                       r.run.labels.contains("values") ? r.run.labels.at("values") : std::string()};
+  };
+  const auto is_reference = [](const MergedRun& r) { return r.run.labels.at("problem") == no_obstacle; };
+  std::set<std::vector<std::string>> references, stalled;
+  for (const auto& r : runs) {
+    if (r.run.gains.empty() || r.record.is_null()) continue;
+    if (is_reference(r)) {
+      if (r.record["outcome"] == "reached") references.insert(set_of(r));
+    } else if (r.run.labels.at("planner") == "apf" && r.record["outcome"] == "stalled") {
+      stalled.insert(set_of(r));
+    }
+  }
+  std::map<std::string, GainGroup> groups;
+  for (const auto& r : runs) {
+    if (r.run.gains.empty() || r.record.is_null() || is_reference(r)) continue;
+    GainGroup& g = groups[r.run.labels.at("planner")];
+    g.planner = r.run.labels.at("planner");
+    const bool reached = r.record["outcome"] == "reached", reference = references.contains(set_of(r)),
+               apf_stalled = stalled.contains(set_of(r));
+    ++g.sets;
+    g.reached += reached ? 1U : 0U;
+    g.contacts += contact_seen(r.record) ? 1U : 0U;
+    g.reference += reference ? 1U : 0U;
+    g.reached_of_reference += reference && reached ? 1U : 0U;
+    g.apf_stalled += apf_stalled ? 1U : 0U;
+    g.reached_of_apf_stalled += apf_stalled && reached ? 1U : 0U;
+  }
+  std::vector<GainGroup> all;
+  all.reserve(groups.size());
+  for (auto& [planner, g] : groups) {
+    g.interval = wilson(g.reached_of_reference, g.reference);
+    all.push_back(std::move(g));
+  }
+  return all;
+}
+
+Merged merge(const std::vector<std::filesystem::path>& directories, const std::vector<std::string>& by) {
+  Merged merged{read_sweeps(directories), by, {}, {}, {}};
+  merged.groups = group(merged.runs, by);
+  merged.gains = group_gains(merged.runs);
+  std::map<std::string, std::set<std::string>> builds;
+  std::size_t missing = 0;
+  for (const auto& r : merged.runs) {
+    if (r.record.is_null()) ++missing;
+    if (r.record.is_null() || r.record["result"].is_null()) continue;
+    for (const auto& [name, build] : makers_of(r.record["result"])) builds[name].insert(build);
+  }
+  if (missing > 0) merged.notes.push_back(fmt::format("{} of {} runs have no record yet", missing, merged.runs.size()));
+  for (const auto& [name, all] : builds)
+    if (all.size() > 1) merged.notes.push_back(fmt::format("the records come from {} builds of {}", all.size(), name));
+  return merged;
+}
+
+Json to_json(const Merged& merged) {
+  Json all = Json::array(), gains = Json::array();
+  for (const auto& g : merged.groups) {
+    Json labels = Json::object(), outcomes = Json::object(), causes = Json::object(), escapes = Json::object();
+    for (std::size_t i = 0; i < merged.by.size(); ++i) labels[merged.by[i]] = g.key[i];
+    for (const auto& [name, count] : g.outcomes) outcomes[name] = count;
+    for (const auto& [name, count] : g.causes) causes[name] = count;
+    for (const auto& [name, sum] : g.escapes) escapes[name] = sum;
+    all.push_back({{"labels", std::move(labels)},
+                   {"planned", g.planned},
+                   {"runs", g.runs},
+                   {"feasible", g.feasible},
+                   {"reached", g.reached},
+                   {"reached_all", g.reached_all},
+                   {"reached_share_interval", {g.reached_interval.low, g.reached_interval.high}},
+                   {"outcomes", std::move(outcomes)},
+                   {"judged", g.judged},
+                   {"contacts", g.contacts},
+                   {"min_clearance_m", or_null(g.min_clearance_m)},
+                   {"min_self_clearance_m", or_null(g.min_self_clearance_m)},
+                   {"certified_share_mean", or_null(g.certified_share_mean)},
+                   {"certified_share_min", or_null(g.certified_share_min)},
+                   {"reached_time_s_median", or_null(g.reached_time_s_median)},
+                   {"filter_work_J_max", g.filter_work_J_max},
+                   {"recovery_work_J_median", or_null(g.recovery_work_J_median)},
+                   {"escapes", g.escapes.empty() ? Json(nullptr) : std::move(escapes)},
+                   {"causes", std::move(causes)},
+                   {"timing",
+                    {{"tick_us_p50_median", or_null(g.tick_us_p50_median)},
+                     {"tick_us_p99_median", or_null(g.tick_us_p99_median)}}}});
+  }
+  for (const auto& g : merged.gains)
+    gains.push_back({{"planner", g.planner},
+                     {"sets", g.sets},
+                     {"reached", g.reached},
+                     {"contacts", g.contacts},
+                     {"reference", g.reference},
+                     {"reached_of_reference", g.reached_of_reference},
+                     {"reached_share_interval", {g.interval.low, g.interval.high}},
+                     {"apf_stalled", g.apf_stalled},
+                     {"reached_of_apf_stalled", g.reached_of_apf_stalled}});
+  return {{"schema", "hamelin.summary/1"},
+          {"by", merged.by},
+          {"groups", std::move(all)},
+          {"gains", std::move(gains)},
+          {"notes", merged.notes}};
+}
+
+namespace {
+
+std::vector<std::string> table_row(const Group& g) {
+  const auto shown = [](const std::optional<double>& value, double scale, int digits) {
+    return value ? fmt::format("{:.{}f}", scale * *value, digits) : std::string("-");
+  };
+  const auto count = [&](const char* name) {
+    const auto found = g.outcomes.find(name);
+    return found == g.outcomes.end() ? std::size_t{0} : found->second;
+  };
+  const std::size_t stalled = count("stalled"), timeout = count("timeout"), collided = count("collision");
+  std::vector<std::string> row = g.key;
+  row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs) : fmt::format("{}/{}", g.runs, g.planned));
+  row.push_back(fmt::format("{}", g.feasible));
+  row.push_back(g.feasible > 0 ? fmt::format("{} ({:.1f} %)", g.reached,
+                                             100.0 * static_cast<double>(g.reached) / static_cast<double>(g.feasible))
+                               : "-");
+  row.push_back(g.feasible > 0
+                    ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low, 100.0 * g.reached_interval.high)
+                    : "-");
+  for (const std::size_t runs :
+       {stalled, timeout, collided, g.runs - g.reached_all - stalled - timeout - collided, g.contacts})
+    row.push_back(fmt::format("{}", runs));
+  row.push_back(shown(g.min_clearance_m, 1e3, 2));
+  row.push_back(shown(g.min_self_clearance_m, 1e3, 2));
+  row.push_back(shown(g.certified_share_mean, 100.0, 3));
+  row.push_back(shown(g.certified_share_min, 100.0, 2));
+  row.push_back(shown(g.reached_time_s_median, 1.0, 2));
+  row.push_back(shown(g.tick_us_p50_median, 1.0, 1));
+  row.push_back(shown(g.tick_us_p99_median, 1.0, 1));
+  return row;
+}
+
+/// Rows as lines of columns; the first `words` of them to the left, the others to the right.
+std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t words) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i)
+      line += i < words ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+std::string causes_text(const Group& g) {
+  std::string text = fmt::format("\n{}: did not reach\n", fmt::join(g.key, ", "));
+  std::vector<std::pair<std::string, std::size_t>> causes(g.causes.begin(), g.causes.end());
+  std::stable_sort(causes.begin(), causes.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  for (const auto& [cause, count] : causes) text += fmt::format("{:>5}  {}\n", count, cause);
+  return text;
+}
+
+}  // namespace
+
+std::string to_table(const Merged& merged) {
+  std::vector<std::vector<std::string>> rows(1, merged.by);
+  for (const char* head : {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
+                           "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
+    rows.front().emplace_back(head);
+  for (const auto& g : merged.groups) rows.push_back(table_row(g));
+  std::string text = aligned(rows, merged.by.size());
+  for (const auto& g : merged.gains)
+    text += fmt::format(
+        "\n{}, gain sets: reached {} of {}; {} of {} that reach without the obstacle ({:.1f}-{:.1f} %); {} of {} with "
+        "which apf stalls; {} contacts",
+        g.planner, g.reached, g.sets, g.reached_of_reference, g.reference, 100.0 * g.interval.low,
+        100.0 * g.interval.high, g.reached_of_apf_stalled, g.apf_stalled, g.contacts);
+  if (!merged.gains.empty()) text += "\n";
+  for (const auto& g : merged.groups)
+    if (!g.causes.empty()) text += causes_text(g);
+  return text;
+}
+
+}  // namespace hamelin::sweep

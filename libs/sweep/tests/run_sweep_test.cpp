@@ -1,0 +1,392 @@
+#include "hamelin/sweep/run_sweep.hpp"
+
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "../src/directory_lock.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/sweep/make_plan.hpp"
+#include "hamelin/sweep/merge.hpp"
+#include "hamelin/sweep/plan.hpp"
+
+using namespace hamelin;
+using namespace hamelin::sweep;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A sweep of runs r0, r1, … of one scene, in a directory of its own, run by a shell script in place of the program.
+class Bench {
+ public:
+  explicit Bench(std::size_t runs) {
+    std::string name = (fs::temp_directory_path() / "hamelin-sweep-XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    root_ = name;
+    fs::create_directory(root_ / "scenes");
+    put("scenes/a.json", "a scene");
+    plan.scenes.push_back({"scenes/a.json", sha256_hex("a scene"), true, ""});
+    for (std::size_t i = 0; i < runs; ++i) {
+      PlannedRun run;
+      run.id = "r" + std::to_string(i);
+      run.scene = "scenes/a.json";
+      run.planner = "p" + std::to_string(i);
+      run.set = {"/step_s=0.002"};
+      run.seed = i;
+      run.labels = {{"planner", "p"}, {"goal", "joint"}};
+      plan.runs.push_back(run);
+    }
+    write_plan(plan, root_);
+    // $4 is the planner's name; each call leaves a line
+    script("");
+  }
+  ~Bench() {
+    std::error_code ignored;
+    fs::remove_all(root_, ignored);
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  /// What a run does before it prints its line.
+  void script(const std::string& body) {
+    put("program.sh",
+        "echo \"$*\" >> '" + (root_ / "calls").string() + "'\n" + body +
+            "\necho '{\"result\": {\"outcome\": \"reached\", \"cause\": null, \"time_s\": 2.5}, \"judge\": "
+            "{\"contact\": false, \"obstacles\": null, \"self\": null, \"configurations\": 3}}'\n");
+  }
+  void put(const fs::path& file, const std::string& text) const {
+    std::ofstream(root_ / file, std::ios::binary) << text;
+  }
+  [[nodiscard]] RunOptions options() const {
+    RunOptions options;
+    options.command = {"/bin/sh", (root_ / "program.sh").string()};
+    options.jobs = 2;
+    return options;
+  }
+  [[nodiscard]] const fs::path& root() const { return root_; }
+  [[nodiscard]] std::vector<std::string> lines(const fs::path& file) const {
+    std::ifstream in(root_ / file);
+    std::vector<std::string> all;
+    for (std::string line; std::getline(in, line);) all.push_back(line);
+    return all;
+  }
+  [[nodiscard]] std::string message(const RunOptions& with) const {
+    try {
+      (void)run_sweep(root_, with);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  Plan plan;
+
+ private:
+  fs::path root_;
+};
+
+}  // namespace
+
+TEST_CASE("a plan reads back as it was written", "[sweep][unit]") {
+  Bench bench(3);
+  const Plan read = read_plan(bench.root());
+  CHECK(to_json(read) == to_json(bench.plan));
+  CHECK(read.sha256 == bench.plan.sha256);
+  CHECK(run_arguments(read.runs[2], "dir") ==
+        std::vector<std::string>{"dir/scenes/a.json", "--planner", "p2", "--set", "/step_s=0.002", "--seed", "2"});
+}
+
+TEST_CASE("a plan that is wrong is refused with file and place", "[sweep][unit]") {
+  Bench bench(2);
+  const auto message = [&](const Json& document) {
+    bench.put("plan.json", document.dump());
+    try {
+      (void)read_plan(bench.root());
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const Json good = to_json(bench.plan);
+  Json doubled = good, elsewhere = good, unfinished = good;
+  doubled["runs"][1]["id"] = "r0";
+  elsewhere["runs"][0]["scene"] = "scenes/b.json";
+  unfinished["runs"][0].erase("seed");
+  CHECK_THAT(message(doubled),
+             Catch::EndsWith("plan.json: /runs/1/id: 'r0' is there twice, expected one run of each id"));
+  CHECK_THAT(message(elsewhere), Catch::Contains("plan.json: /runs/0/scene: 'scenes/b.json' is not among the scenes"));
+  CHECK_THAT(message(unfinished), Catch::Contains("plan.json: /runs/0"));
+  CHECK_THROWS_WITH(read_plan("/no/such/directory"), Catch::Contains("/no/such/directory: is no directory"));
+}
+
+TEST_CASE("each run of a plan is recorded once, and a second call has nothing to do", "[sweep][unit]") {
+  Bench bench(7);
+  std::size_t told = 0;
+  RunOptions options = bench.options();
+  options.on_done = [&](std::size_t done, std::size_t all) {
+    CHECK(done == ++told);
+    CHECK(all == 7);
+  };
+  const auto outcome = run_sweep(bench.root(), options);
+  CHECK(outcome.run == 7);
+  CHECK(told == 7);
+  const Records records = read_records(bench.root(), bench.plan);
+  REQUIRE(records.lines.size() == 7);
+  std::set<std::string> ids;
+  for (const auto& line : records.lines) {
+    check_shipped_schema(line, "record", "record");
+    ids.insert(line["id"]);
+    CHECK(line["outcome"] == "reached");
+    CHECK(line["result"]["time_s"] == 2.5);
+    CHECK(line["labels"] == Json{{"goal", "joint"}, {"planner", "p"}});
+  }
+  CHECK(ids.size() == 7);
+  const auto again = run_sweep(bench.root(), bench.options());
+  CHECK(again.run == 0);
+  CHECK(again.recorded == 7);
+  CHECK(bench.lines("calls").size() == 7);
+}
+
+TEST_CASE("after a kill in mid-line the cut line's run is repeated and no other", "[sweep][unit]") {
+  Bench bench(6);
+  RunOptions some = bench.options();
+  some.limit = 4;
+  some.jobs = 1;
+  CHECK(run_sweep(bench.root(), some).run == 4);
+  const fs::path file = records_file(bench.root());
+  const std::string text = read_file(file);
+  fs::resize_file(file, text.size() - 40);
+  CHECK(read_records(bench.root(), bench.plan).cut);
+  const auto outcome = run_sweep(bench.root(), bench.options());
+  CHECK(outcome.dropped_cut_line);
+  CHECK(outcome.recorded == 3);
+  CHECK(outcome.run == 3);
+  const Records records = read_records(bench.root(), bench.plan);
+  CHECK_FALSE(records.cut);
+  CHECK(records.lines.size() == 6);
+  CHECK(bench.lines("calls").size() == 7);
+  CHECK(read_file(file).substr(0, text.size() / 2) == text.substr(0, text.size() / 2));
+}
+
+TEST_CASE("a run that crashes is recorded with its signal or exit code, and the others go on", "[sweep][unit]") {
+  Bench bench(4);
+  bench.script(
+      "case \"$3\" in p1) echo torn >&2; kill -SEGV $$;; p2) echo 'hamelin: internal error: oh' >&2; exit 3;; esac");
+  const auto outcome = run_sweep(bench.root(), bench.options());
+  CHECK(outcome.run == 4);
+  CHECK(outcome.crashed == 2);
+  for (const auto& line : read_records(bench.root(), bench.plan).lines) {
+    check_shipped_schema(line, "record", "record");
+    const std::string id = line["id"];
+    CHECK(line["outcome"] == (id == "r1" || id == "r2" ? "crashed" : "reached"));
+    if (id == "r1") CHECK(line["crash"] == Json{{"signal", 11}, {"exit_code", nullptr}});
+    if (id == "r1") CHECK_THAT(line["cause"].get<std::string>(), Catch::EndsWith("torn"));
+    if (id == "r2") CHECK(line["crash"] == Json{{"signal", nullptr}, {"exit_code", 3}});
+    if (id == "r2") CHECK(line["cause"] == "exit code 3: internal error: oh");
+  }
+}
+
+TEST_CASE("bad input that a run finds ends the sweep and is no record", "[sweep][unit]") {
+  Bench bench(5);
+  bench.script(
+      "if [ \"$3\" = p2 ]; then echo 'hamelin: note: x' >&2; echo 'hamelin: a.json: /q: is bad' >&2; exit 2; fi");
+  RunOptions options = bench.options();
+  options.jobs = 1;
+  CHECK(bench.message(options) == "run 'r2': a.json: /q: is bad");
+  CHECK(read_records(bench.root(), bench.plan).lines.size() == 2);
+  CHECK(bench.lines("calls").size() == 3);
+}
+
+TEST_CASE("contact that the judge saw makes a collision of what had reached", "[sweep][unit]") {
+  Bench bench(1);
+  bench.put(
+      "program.sh",
+      "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": {\"contact\": true, \"obstacles\": "
+      "{\"clearance_m\": -0.01, \"time_s\": 1, \"sphere\": \"a/0\", \"other\": \"b\"}, \"self\": null, "
+      "\"configurations\": 3}}'\n");
+  (void)run_sweep(bench.root(), bench.options());
+  const Json record = read_records(bench.root(), bench.plan).lines.at(0);
+  CHECK(record["outcome"] == "collision");
+  CHECK(record["result"]["outcome"] == "reached");
+}
+
+TEST_CASE("a stopped sweep ends its children, records none of them, and goes on later", "[sweep][unit]") {
+  Bench bench(4);
+  bench.script("if [ \"$3\" != p0 ]; then exec sleep 60; fi");
+  std::atomic<bool> stop{false};
+  RunOptions options = bench.options();
+  options.stop = &stop;
+  options.on_done = [&](std::size_t, std::size_t) { stop = true; };
+  const auto outcome = run_sweep(bench.root(), options);
+  CHECK(outcome.stopped);
+  CHECK(outcome.run == 1);
+  CHECK(read_records(bench.root(), bench.plan).lines.size() == 1);
+  bench.script("");
+  CHECK(run_sweep(bench.root(), bench.options()).run == 3);
+}
+
+TEST_CASE("a run that takes too long is killed and recorded, and the others go on", "[sweep][unit]") {
+  Bench bench(3);
+  bench.script("if [ \"$3\" = p1 ]; then exec sleep 600; fi");
+  RunOptions options = bench.options();
+  options.timeout_s = 0.5;
+  const RunOutcome outcome = run_sweep(bench.root(), options);
+  CHECK(outcome.run == 3);
+  CHECK(outcome.crashed == 1);
+  for (const Json& record : read_records(bench.root(), bench.plan).lines) {
+    CHECK(record["outcome"] == (record["id"] == "r1" ? "crashed" : "reached"));
+    if (record["id"] != "r1") continue;
+    CHECK(record["cause"] == "killed after 0.5 s");
+    CHECK(record["crash"]["signal"] == SIGKILL);
+  }
+}
+
+TEST_CASE("a process that a run leaves behind does not keep the sweep waiting, and is ended", "[sweep][unit]") {
+  Bench bench(2);
+  // it holds standard output and error open, as what a plugin forked would
+  bench.script("sleep 600 & echo $! >> '" + (bench.root() / "left").string() + "'");
+  const auto begin = std::chrono::steady_clock::now();
+  const RunOutcome outcome = run_sweep(bench.root(), bench.options());
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(300));
+  CHECK(outcome.run == 2);
+  CHECK(outcome.crashed == 0);
+  const auto left = bench.lines("left");
+  REQUIRE(left.size() == 2);
+  for (const auto& pid : left) {
+    // killed; nobody may have reaped it yet
+    std::string state;
+    for (int i = 0; i < 500; ++i) {
+      std::ifstream status("/proc/" + pid + "/stat");
+      std::string word;
+      status >> word >> word >> state;
+      if (!status || state == "Z") break;
+      ::usleep(10'000);
+      state = "running";
+    }
+    CHECK(state != "running");
+  }
+}
+
+TEST_CASE("a run that is killed for its time takes its own processes with it", "[sweep][unit]") {
+  Bench bench(1);
+  bench.script("sleep 600 & sleep 600");
+  RunOptions options = bench.options();
+  options.timeout_s = 0.3;
+  CHECK(run_sweep(bench.root(), options).crashed == 1);
+  CHECK(read_records(bench.root(), bench.plan).lines.at(0)["cause"] == "killed after 0.3 s");
+}
+
+TEST_CASE("all that a run writes before it ends is read", "[sweep][unit]") {
+  Bench bench(3);
+  // more than a pipe holds, with the line of JSON at its end
+  bench.put("program.sh",
+            "head -c 200000 /dev/zero | tr '\\0' ' '\n"
+            "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": null}'\n");
+  CHECK(run_sweep(bench.root(), bench.options()).crashed == 0);
+}
+
+TEST_CASE("a plan is not made while a sweep runs in its directory", "[sweep][unit]") {
+  Bench bench(1);
+  PlanOptions options;
+  options.files = {std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/paper_52_apf.json"};
+  options.plugin_directories = {HAMELIN_TEST_PLUGIN_DIR};
+  const std::string before = read_file(plan_file(bench.root()));
+  const DirectoryLock lock(bench.root());
+  CHECK_THROWS_WITH(make_plan(bench.root(), options), Catch::Contains("another sweep command is using it"));
+  CHECK(read_file(plan_file(bench.root())) == before);
+}
+
+TEST_CASE("two sweeps at a time in one directory are refused", "[sweep][unit]") {
+  Bench bench(2);
+  RunOptions options = bench.options();
+  options.jobs = 1;
+  std::string second;
+  options.on_done = [&](std::size_t, std::size_t) { second = bench.message(bench.options()); };
+  CHECK(run_sweep(bench.root(), options).run == 2);
+  CHECK_THAT(second, Catch::EndsWith(
+                         "records.jsonl: another sweep command is using it, expected one at a time in a directory"));
+}
+
+TEST_CASE("runs are chosen by a part of their id", "[sweep][unit]") {
+  Bench bench(12);
+  RunOptions options = bench.options();
+  options.only = "r1";
+  CHECK(run_sweep(bench.root(), options).run == 3);  // r1, r10, r11
+  options.only = "r99";
+  CHECK_THAT(bench.message(options), Catch::Contains("no run's id holds 'r99'"));
+}
+
+TEST_CASE("records of another plan, doubled or broken ones, and changed scenes are refused with the reason",
+          "[sweep][unit]") {
+  Bench bench(3);
+  (void)run_sweep(bench.root(), bench.options());
+  const auto message = [&] { return bench.message(bench.options()); };
+  const std::string text = read_file(records_file(bench.root()));
+  bench.put("records.jsonl", text + text.substr(0, text.find('\n') + 1));
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 4: run 'r") && Catch::Contains("recorded twice"));
+  bench.put("records.jsonl", "{\"schema\": \"hamelin.record/1\"}\n" + text);
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is no record"));
+  bench.put("records.jsonl", "{\n" + text);
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1"));
+  bench.put("records.jsonl", text);
+  Plan other = bench.plan;
+  other.runs.pop_back();
+  CHECK_THROWS_WITH(write_plan(other, bench.root()), Catch::Contains("records.jsonl: holds records of another plan"));
+  bench.put("plan.json", to_json(other).dump());
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is of another plan"));
+  RunOptions fresh = bench.options();
+  fresh.fresh = true;
+  CHECK(run_sweep(bench.root(), fresh).run == 2);
+  bench.put("scenes/a.json", "another scene");
+  CHECK_THAT(bench.message(fresh), Catch::Contains("a.json: has changed since the sweep was planned: SHA-256 "));
+}
+
+TEST_CASE("a sweep is not resumed with inputs or planners that have changed", "[sweep][unit]") {
+  Bench bench(3);
+  bench.put("map.bt", "a map");
+  bench.put("quick.hamelin.so", "a planner");
+  const std::string planner = (bench.root() / "quick.hamelin.so").string();
+  bench.plan.inputs = {{"map.bt", sha256_hex("a map")}};
+  bench.plan.plugins = {{planner, sha256_hex("a planner")}};
+  write_plan(bench.plan, bench.root());
+  CHECK(to_json(read_plan(bench.root())) == to_json(bench.plan));
+  RunOptions some = bench.options();
+  some.limit = 1;
+  CHECK(run_sweep(bench.root(), some).run == 1);
+  bench.put("map.bt", "another map");
+  CHECK(bench.message(bench.options()) == (bench.root() / "map.bt").string() +
+                                              ": has changed since the sweep was planned: SHA-256 " +
+                                              sha256_hex("another map") + ", expected " + sha256_hex("a map") +
+                                              "; plan it again, in a new directory if there are records");
+  bench.put("map.bt", "a map");
+  bench.put("quick.hamelin.so", "another planner");
+  CHECK_THAT(bench.message(bench.options()), Catch::StartsWith(planner + ": has changed since the sweep was planned"));
+  bench.plan.plugins = {{"gone", sha256_hex("a planner")}};
+  bench.put("quick.hamelin.so", "a planner");
+  CHECK(run_sweep(bench.root(), bench.options()).run == 2);
+}
+
+TEST_CASE("the same plan gives the same records but for their order, whatever runs at the same time", "[sweep][unit]") {
+  std::vector<std::multiset<std::string>> found;
+  for (const std::size_t jobs : {1U, 4U}) {
+    Bench bench(9);
+    bench.script("case \"$3\" in p[0-3]) sleep 0.05;; esac");
+    RunOptions options = bench.options();
+    options.jobs = jobs;
+    (void)run_sweep(bench.root(), options);
+    const auto lines = bench.lines("records.jsonl");
+    found.emplace_back(lines.begin(), lines.end());
+  }
+  CHECK(found[0].size() == 9);
+  CHECK(found[0] == found[1]);
+}
