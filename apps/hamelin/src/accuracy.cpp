@@ -11,6 +11,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "output.hpp"
+#include "robot_notes.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
 
@@ -31,6 +32,7 @@ struct AccuracyFlags {
 int accuracy(const AccuracyFlags& flags) {
   scene::Scene scene = read_motion(flags.motion);
   const model::Model model = simulation::load_model(scene);
+  note_warnings(model.robot(), scene.robot.file);
   set_start(flags.motion, model.dof(), scene);
   scene.integrator = {};  // those of the command line are measured instead
   const auto motion = simulation::free_motion(scene, model);

@@ -90,6 +90,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
       noise_(scene.seed),
       planner_([&] {
         check_scene();
+        result_.warnings = model::warnings(plant_.robot());
         const planning::Plugin plugin = plugin_of(scene, plugin_directories);
         planner_params_ =
             in_scene(scene, "/planner/params", [&] { return planning::check_params(plugin, scene.planner->params); });
@@ -418,8 +419,9 @@ std::string ClosedLoop::where_touching() const {
   if (nearest_.sphere >= 0 && clearance_now_ <= 0.0)
     return fmt::format("{} at {} s; the way out is {}", environment_->words(nearest_, plant_), state_.time_s,
                        scene::way_out(nearest_));
-  return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s", self_->words(nearest_pair_),
-                     -1e3 * self_clearance_now_, state_.time_s);
+  const std::string where = fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s",
+                                        self_->words(nearest_pair_), -1e3 * self_clearance_now_, state_.time_s);
+  return state_.k > 0 ? where : fmt::format("{}; {}", where, scene::self_contact_remedy(scene_.robot));
 }
 
 void ClosedLoop::look_at_goals(const Watch& watch) {
