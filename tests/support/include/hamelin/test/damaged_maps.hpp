@@ -83,7 +83,7 @@ inline std::vector<MapCase> map_cases() {
   std::string crlf;
   for (const char c : ot) crlf += c == '\n' ? std::string("\r\n") : std::string(1, c);
   return {{"whole.bt", bt, "", true},
-          {"whole.ot", ot, "", true},
+          {"whole.ot", ot, "wider than", true},
           {"root_occupied.ot", occupied_root(), "wider than", true},
           {"octant_occupied.bt", occupied_octant(), "wider than", true},
           {"cut_to_header.bt", bt.substr(0, body), "byte "},
