@@ -134,7 +134,9 @@ function(hamelin_tests)
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     HAMELIN_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
     HAMELIN_TEST_PLUGIN_DIR="${HAMELIN_BUILD_PLUGIN_DIR}")
-  catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS ${arg_NAME})
+  # What a test prints whose data is not here (tests/support, scene_data.hpp): Catch2 2 knows no skipping.
+  catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS ${arg_NAME}
+    SKIP_REGULAR_EXPRESSION "skipped: no folder")
 endfunction()
 
 # Debian's Catch2 main has no benchmarking compiled in, so benchmarks bring their own.

@@ -13,6 +13,7 @@
 #include "hamelin/simulation/run.hpp"
 #include "output.hpp"
 #include "page.hpp"
+#include "robot_notes.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
 
@@ -33,6 +34,7 @@ struct AccuracyFlags {
 int run_accuracy(const AccuracyFlags& flags) {
   scene::Scene scene = read_motion(flags.motion);
   const model::Model model = simulation::load_model(scene);
+  note_warnings(model.robot(), scene.robot.file);
   set_start(flags.motion, model.dof(), scene);
   scene.integrator = {};  // those of the command line are measured instead
   const auto motion = simulation::free_motion(scene, model);

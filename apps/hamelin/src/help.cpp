@@ -148,19 +148,34 @@ std::string first_sentence(const std::string& description) {
   return description.substr(0, description.find(". "));
 }
 
+namespace {
+
+// The commands below this one, by purpose.
+std::vector<HelpSection> commands_of(const CLI::App& command) {
+  std::vector<HelpSection> sections;
+  for (const auto* sub : shown_commands(command)) {
+    const std::string title = sub->get_group() == "Subcommands" ? "Commands" : sub->get_group();
+    if (sections.empty() || sections.back().title != title) sections.push_back({title, {}});
+    sections.back().entries.push_back({sub->get_name(), first_sentence(sub->get_description())});
+  }
+  return sections;
+}
+
+std::string lines_of(const std::vector<std::string>& examples) {
+  std::string out;
+  for (const auto& example : examples) out += fmt::format("  {}\n", example);
+  return out;
+}
+
+}  // namespace
+
 HelpPage help_page(const CLI::App& command) {
   HelpPage page{
       full_name(command), usage_of(command), command.get_description(), split(command.get_footer(), '\n'), {}};
   const auto add = [&page](HelpSection section) {
     if (!section.entries.empty()) page.sections.push_back(std::move(section));
   };
-  std::vector<HelpSection> commands;
-  for (const auto* sub : shown_commands(command)) {
-    const std::string title = sub->get_group() == "Subcommands" ? "Commands" : sub->get_group();
-    if (commands.empty() || commands.back().title != title) commands.push_back({title, {}});
-    commands.back().entries.push_back({sub->get_name(), first_sentence(sub->get_description())});
-  }
-  for (auto& section : commands) add(std::move(section));
+  for (auto& section : commands_of(command)) add(std::move(section));
   add(options_of(command, "Arguments", "Options", true));
   add(options_of(command, "Options", "Options", false));
   add(options_of(root_of(command), everywhere, everywhere, false));
@@ -171,13 +186,20 @@ HelpPage help_page(const CLI::App& command) {
 
 std::string help_text(const CLI::App& command) {
   const HelpPage page = help_page(command);
-  std::string out = "Examples:\n";
-  for (const auto& example : page.examples) out += fmt::format("  {}\n", example);
+  std::string out = "Examples:\n" + lines_of(page.examples);
   out += fmt::format("\n{}\n\nUsage: {}{}\n", wrapped(page.description, 0), page.name, page.usage);
   for (const auto& section : page.sections) out += shown(section);
   if (!shown_commands(command).empty())
     out += fmt::format("\n`{} COMMAND --help` tells more of a command.\n", page.name);
   return out;
+}
+
+std::string overview_text(const CLI::App& program) {
+  std::string out = fmt::format("{} {}: {}\n", program.get_name(), version(), program.get_description());
+  for (const auto& section : commands_of(program)) out += shown(section);
+  out += "\nExamples:\n" + lines_of(split(program.get_footer(), '\n'));
+  return out + fmt::format("\n`{0} COMMAND --help` tells more of a command, `{0} help` more of the program.\n",
+                           program.get_name());
 }
 
 std::string HelpFormatter::make_help(const CLI::App* app, std::string, CLI::AppFormatMode) const {

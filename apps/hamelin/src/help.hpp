@@ -33,6 +33,9 @@ struct HelpPage {
 /// What --help prints: opens with the examples, lines of at most 100 columns.
 [[nodiscard]] std::string help_text(const CLI::App& command);
 
+/// What the program prints without arguments: what it is, its commands, where to go on.
+[[nodiscard]] std::string overview_text(const CLI::App& program);
+
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;

@@ -9,6 +9,7 @@
 #include "hamelin/simulation/run.hpp"
 #include "integrator_options.hpp"
 #include "record.hpp"
+#include "robot_notes.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
 
@@ -27,6 +28,7 @@ struct IntegrateOptions {
 int integrate(const IntegrateOptions& options) {
   scene::Scene scene = read_motion(options.motion);
   const model::Model model = simulation::load_model(scene);
+  note_warnings(model.robot(), scene.robot.file);
   set_start(options.motion, model.dof(), scene);
   scene.step_s = options.step_s.value_or(scene.step_s);
   scene.duration_s = options.duration_s.value_or(scene.duration_s);

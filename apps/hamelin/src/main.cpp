@@ -65,6 +65,10 @@ int run_command_line(int argc, char** argv) {
       add(app, exit_code);
       app.get_subcommands({}).back()->group(purpose.title);
     }
+  if (argc == 1) {
+    fmt::print("{}", overview_text(app));
+    return 0;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version

@@ -13,6 +13,7 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "robot_commands.hpp"
+#include "robot_notes.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -23,7 +24,7 @@ struct RobotInfoOptions {
   std::filesystem::path file;
   std::optional<std::string> tip;
   std::optional<std::filesystem::path> spheres, srdf;
-  bool json = false;
+  bool strict = false, json = false;
 };
 
 Json optional(const std::optional<double>& value) {
@@ -79,7 +80,8 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
           {"self_collision_parts", self.parts().size()},
           {"self_collision_pairs", self.pairs().size()},
           {"links", links},
-          {"notes", notes}};
+          {"notes", notes},
+          {"warnings", model::warnings(robot)}};
 }
 
 std::string cell(const Json& value) {
@@ -108,11 +110,12 @@ void print_table(const Json& robot) {
       robot["base_spheres"].get<std::size_t>(), robot["base_capsules"].get<std::size_t>(),
       robot["self_collision_parts"].get<std::size_t>(), robot["self_collision_pairs"].get<std::size_t>(),
       robot["self_collision_disabled"].get<std::size_t>());
-  for (const auto& note : robot["notes"]) fmt::print("note: {}\n", note.get<std::string>());
+  fmt::print("{}", notes_text(robot["notes"]));
 }
 
 void print_robot_info(const RobotInfoOptions& options) {
-  const model::Model model(description::read_robot(options.file, {options.tip, options.spheres, options.srdf}));
+  const model::Model model(
+      description::read_robot(options.file, {options.tip, options.spheres, options.srdf, options.strict}));
   const Json robot = describe(model, options.file);
   if (options.json)
     print_json(robot);
@@ -156,6 +159,7 @@ void add_robot(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   info_command->add_option("--srdf", info_options->srdf, "SRDF whose disabled pairs are not checked")
       ->type_name("FILE.srdf");
+  info_command->add_flag("--strict", info_options->strict, strict_help);
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options, &exit_code] {
     print_robot_info(*info_options);

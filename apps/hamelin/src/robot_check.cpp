@@ -11,6 +11,7 @@
 #include "hamelin/io/file.hpp"
 #include "output.hpp"
 #include "robot_commands.hpp"
+#include "robot_notes.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -54,7 +55,8 @@ Json describe(const fit::SelfCheck& check, const model::Robot& robot) {
           {"pairs", pairs},
           {"links_without_shapes", check.shapeless},
           {"odd_limits", check.odd_limits},
-          {"notes", robot.notes}};
+          {"notes", robot.notes},
+          {"warnings", model::warnings(robot)}};
 }
 
 void print(const fit::SelfCheck& check, const model::Robot& robot, const std::filesystem::path& file) {
@@ -87,7 +89,7 @@ void print(const fit::SelfCheck& check, const model::Robot& robot, const std::fi
   text += "\n";
   for (const auto& line : check.odd_limits) text += fmt::format("limits: {}\n", line);
   for (const auto& link : check.shapeless) text += fmt::format("no shapes: moving link '{}' meets nothing\n", link);
-  for (const auto& note : robot.notes) text += fmt::format("note: {}\n", note);
+  text += notes_text(robot.notes);
   const auto faults = check.faults();
   const auto checked =
       std::count_if(check.pairs.begin(), check.pairs.end(), [](const fit::PartPair& p) { return p.checked; });
@@ -161,6 +163,7 @@ void add_robot_check(CLI::App& robot, int& exit_code) {
                    "write what should be disabled: an SRDF, or a copy of the sidecar given with the list in it")
       ->type_name("FILE");
   command->add_flag("--drop-never", flags->never, "--write also lists pairs that were never in contact");
+  command->add_flag("--strict", flags->robot.strict, strict_help);
   command->add_flag("--json", flags->json, "print JSON");
   command->callback([flags, &exit_code] { exit_code = run(*flags); });
 }

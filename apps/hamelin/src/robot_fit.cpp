@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -8,6 +9,7 @@
 #include "hamelin/description/srdf.hpp"
 #include "hamelin/description/urdf_geometry.hpp"
 #include "hamelin/fit/robot_fit.hpp"
+#include "hamelin/fit/self_pairs.hpp"
 #include "hamelin/io/file.hpp"
 #include "output.hpp"
 #include "robot_commands.hpp"
@@ -20,7 +22,9 @@ namespace {
 struct RobotFitFlags {
   std::filesystem::path file;
   std::optional<std::filesystem::path> output, srdf, compare;
+  std::optional<std::string> tip;
   fit::FitOptions fit;
+  fit::SelfCheckOptions check;
   std::vector<std::string> packages;
   bool json = false;
 };
@@ -72,6 +76,81 @@ void print_table(const fit::RobotFit& fit, const std::string& title) {
   report(text);
 }
 
+// The SRDF's pairs, then those that the shapes need, each once.
+fit::SelfPairs find_pairs(const RobotFitFlags& flags, const fit::RobotFit& fitted) {
+  const Phase phase("looking for pairs that always touch");
+  fit::SelfPairs out;
+  if (flags.srdf) {
+    std::vector<std::string> links;
+    for (const auto& link : description::read_urdf_geometry(flags.file)) links.push_back(link.name);
+    out.pairs = description::read_srdf(*flags.srdf, links);
+    for (auto& pair : out.pairs) pair.reason = "SRDF";
+  }
+  const fit::SelfPairs needed =
+      fit::pairs_to_disable(flags.file, fit::sidecar_json(fitted, "", {}), flags.tip, flags.check);
+  for (const auto& pair : needed.pairs) {
+    const bool there = std::any_of(out.pairs.begin(), out.pairs.end(), [&](const auto& old) {
+      return std::minmax(old.link_a, old.link_b) == std::minmax(pair.link_a, pair.link_b);
+    });
+    if (!there) out.pairs.push_back(pair);
+  }
+  out.notes = needed.notes;
+  return out;
+}
+
+std::string describe(const fit::SelfPairs& self, int samples) {
+  const auto count = [&](const char* reason) {
+    return std::count_if(self.pairs.begin(), self.pairs.end(), [&](const auto& pair) { return pair.reason == reason; });
+  };
+  std::string text = fmt::format(
+      "self-collision: {} pairs of links never count as colliding: {} adjacent, {} in contact in at least {:.0f} % of "
+      "{} random configurations, {} at rest",
+      self.pairs.size(), count("Adjacent"), count("Always"), 100.0 * fit::always_share_min, samples, count("Default"));
+  if (const auto given = count("SRDF"); given > 0) text += fmt::format(", {} of the SRDF", given);
+  text += "\n";
+  for (const auto& pair : self.pairs) text += fmt::format("  {} - {}: {}\n", pair.link_a, pair.link_b, pair.reason);
+  for (const auto& note : self.notes) text += fmt::format("note: {}\n", note);
+  return text;
+}
+
+Json to_json(const fit::SelfPairs& self, int samples) {
+  Json pairs = Json::array();
+  for (const auto& pair : self.pairs) pairs.push_back({{"links", {pair.link_a, pair.link_b}}, {"reason", pair.reason}});
+  return {{"samples", samples}, {"pairs", pairs}, {"notes", self.notes}};
+}
+
+void compare(const RobotFitFlags& flags, Json& out) {
+  const Phase phase("measuring the shapes given");
+  const fit::RobotFit given = fit::measure_sidecar(flags.file, *flags.compare, flags.fit);
+  if (flags.json)
+    out["compare"] = fit::figures_json(given);
+  else
+    print_table(given, fmt::format("{}: {} shapes as given", flags.compare->string(), given.shapes()));
+}
+
+void make_sidecar(const RobotFitFlags& flags, const std::filesystem::path& target, Json& out) {
+  const fit::RobotFit fitted = [&] {
+    const Phase phase("fitting");
+    return fit::fit_robot(flags.file, flags.fit);
+  }();
+  const fit::SelfPairs self = find_pairs(flags, fitted);
+  std::vector<std::pair<std::string, std::string>> disabled;
+  for (const auto& pair : self.pairs) disabled.emplace_back(pair.link_a, pair.link_b);
+  const std::string note = fmt::format(
+      "{} that cover the collision geometry of {} [m, link frames]: coverage gap {:.3g} mm, excess up to {:.1f} mm",
+      flags.fit.cover.capsules ? "Capsules" : "Spheres", flags.file.filename().string(), 1e3 * fitted.gap_bound_m(),
+      1e3 * fitted.excess_max_m());
+  write_file_aside(target, fit::sidecar_json(fitted, note, disabled).dump(1) + "\n");
+  if (flags.json) {
+    out["file"] = flags.output->string();
+    out["fit"] = fit::figures_json(fitted);
+    out["self_collision"] = to_json(self, flags.check.samples);
+    return;
+  }
+  print_table(fitted, fmt::format("{}: {} shapes fitted", flags.output->string(), fitted.shapes()));
+  report(describe(self, flags.check.samples));
+}
+
 void run(RobotFitFlags& flags) {
   check_flags(flags);
   std::filesystem::path target;
@@ -81,36 +160,9 @@ void run(RobotFitFlags& flags) {
     if (flags.compare) inputs.push_back(*flags.compare);
     target = output_target(*flags.output, inputs);
   }
-  std::vector<std::pair<std::string, std::string>> disabled;
-  if (flags.srdf) {
-    std::vector<std::string> links;
-    for (const auto& link : description::read_urdf_geometry(flags.file)) links.push_back(link.name);
-    for (const auto& pair : description::read_srdf(*flags.srdf, links)) disabled.emplace_back(pair.link_a, pair.link_b);
-  }
   Json out{{"robot", flags.file.string()}};
-  if (flags.compare) {
-    const Phase phase("measuring the shapes given");
-    const fit::RobotFit given = fit::measure_sidecar(flags.file, *flags.compare, flags.fit);
-    if (flags.json)
-      out["compare"] = fit::figures_json(given);
-    else
-      print_table(given, fmt::format("{}: {} shapes as given", flags.compare->string(), given.shapes()));
-  }
-  if (flags.output) {
-    const Phase phase("fitting");
-    const fit::RobotFit fitted = fit::fit_robot(flags.file, flags.fit);
-    const std::string note = fmt::format(
-        "{} that cover the collision geometry of {} [m, link frames]: coverage gap {:.3g} mm, excess up to {:.1f} mm",
-        flags.fit.cover.capsules ? "Capsules" : "Spheres", flags.file.filename().string(), 1e3 * fitted.gap_bound_m(),
-        1e3 * fitted.excess_max_m());
-    write_file_aside(target, fit::sidecar_json(fitted, note, disabled).dump(1) + "\n");
-    if (flags.json) {
-      out["file"] = flags.output->string();
-      out["fit"] = fit::figures_json(fitted);
-    } else {
-      print_table(fitted, fmt::format("{}: {} shapes fitted", flags.output->string(), fitted.shapes()));
-    }
-  }
+  if (flags.compare) compare(flags, out);
+  if (flags.output) make_sidecar(flags, target, out);
   if (flags.json) print_json(out);
 }
 
@@ -118,7 +170,9 @@ void run(RobotFitFlags& flags) {
 
 void add_robot_fit(CLI::App& robot, int& exit_code) {
   auto* command = add_command(
-      robot, "fit", "Make collision spheres or capsules that cover a URDF's collision geometry, and measure them",
+      robot, "fit",
+      "Make collision spheres or capsules that cover a URDF's collision geometry, measure them, and list the pairs of "
+      "links that always touch",
       "hamelin robot fit arm.urdf --package arm_description=~/arm --total 50 -o arm.spheres.json\n"
       "hamelin robot fit arm.urdf --capsules --excess 0.03 --srdf arm.srdf -o arm.capsules.json\n"
       "hamelin robot fit arm.urdf --meshes meshes --compare by_hand.spheres.json --json");
@@ -151,7 +205,10 @@ void add_robot_fit(CLI::App& robot, int& exit_code) {
       ->type_name("DIR")
       ->allow_extra_args(false);
   command->add_flag("--visual", fit.visual, "take <visual> where a link has no <collision>");
-  command->add_option("--srdf", flags->srdf, "copy its <disable_collisions> into the sidecar")->type_name("FILE.srdf");
+  command->add_option("--srdf", flags->srdf, "list its <disable_collisions> in the sidecar too")
+      ->type_name("FILE.srdf");
+  command->add_option("--tip", flags->tip, "link that is the tip, for the pairs that always touch (default each leaf)")
+      ->type_name("LINK");
   command
       ->add_option("--compare", flags->compare,
                    "measure this sidecar against the geometry too; then -o may be left out")

@@ -7,6 +7,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "record.hpp"
+#include "robot_notes.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
 
@@ -48,7 +49,9 @@ int run(const RunOptions& options) {
     print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
     return 0;
   }
-  say_what_is_unused(scene, simulation::load_model(scene).robot());
+  const model::Model model = simulation::load_model(scene);
+  note_warnings(model.robot(), scene.robot.file);
+  say_what_is_unused(scene, model.robot());
   return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
     return simulation::run(scene, plugin_path(options.plugin_path), watch);
   });

@@ -14,6 +14,8 @@
 #include "hamelin/scene/make.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/plan.hpp"
+#include "robot_commands.hpp"
+#include "robot_notes.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -24,10 +26,12 @@ struct ValidateOptions {
   std::vector<std::filesystem::path> files;
   std::optional<std::string> tip;
   std::optional<double> scale;
-  bool json = false;
+  bool strict = false, json = false;
 };
 
-std::string robot_words(const model::Robot& robot) {
+std::string check_robot(const std::filesystem::path& file, const description::RobotOptions& options) {
+  const model::Robot robot = description::read_robot(file, options);
+  note_warnings(robot, file);
   return fmt::format("robot, {} joints", robot.dof());
 }
 
@@ -36,9 +40,11 @@ std::string map_words(const scene::MapData& map) {
 }
 
 // A scene is as good as the files it names.
-std::string check_scene(const std::filesystem::path& file) {
+std::string check_scene(const std::filesystem::path& file, bool strict) {
   const scene::Scene scene = scene::read_scene(file);
-  std::string words = fmt::format("scene, {}", robot_words(simulation::load_model(scene).robot()));
+  (void)simulation::load_model(scene);
+  std::string words = fmt::format(
+      "scene, {}", check_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf, strict}));
   if (scene.map)
     words += fmt::format(
         ", {}", map_words(scene::read_map(scene.map->file, {scene.map->scale, scene.map->occupancy_threshold})));
@@ -67,9 +73,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     }
     case Kind::urdf:
     case Kind::robot:
-      return robot_words(description::read_robot(file, {options.tip, {}}));
+      return check_robot(file, {options.tip, {}, {}, options.strict});
     case Kind::scene:
-      return check_scene(file);
+      return check_scene(file, options.strict);
     case Kind::result:
       check_shipped_schema(read_json(file), "result", file.string());
       return "result";
@@ -132,6 +138,7 @@ void add_validate(CLI::App& app, int& exit_code) {
   command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");
   command->add_option("--scale", options->scale, "metres per unit of a map")->type_name("S");
+  command->add_flag("--strict", options->strict, strict_help);
   command->add_flag("--json", options->json, "print JSON, an entry a file");
   command->callback([options, &exit_code] { exit_code = validate(*options); });
 }

@@ -110,7 +110,7 @@ Json json_of(const Segment& segment) {
 }
 
 Json json_of(const Link& link) {
-  const Matrix3d& I = link.inertia_kg_m2;
+  const Matrix3d I = model::symmetric_part(link.inertia_kg_m2);
   Json json{{"name", link.name}, {"parent", link.parent}, {"joint", json_of(link.joint)}};
   put_pose(json["com"], link.com);
   json["mass_kg"] = link.mass_kg;
@@ -146,8 +146,88 @@ Matrix3d rounded(Matrix3d R) {
   return R;
 }
 
-void take_spheres(Robot& robot, const std::filesystem::path& file) {
-  const detail::SphereFile given = detail::read_spheres(file);
+// A sidecar with collision shapes, read with its places for messages.
+class SidecarReader {
+ public:
+  explicit SidecarReader(const std::string& where) : where_(where) {}
+
+  detail::SphereFile read(const Json& document) const {
+    if (!document.is_object() || !document.contains("links") || !document["links"].is_object())
+      fail("expected an object whose \"links\" maps link names to lists of spheres");
+    detail::SphereFile out;
+    out.where = where_;
+    for (const auto& [name, list] : document["links"].items()) out.links[name] = spheres(list, "/links/" + name);
+    if (document.contains("capsules")) {
+      if (!document["capsules"].is_object()) fail("/capsules: expected an object that maps link names to capsules");
+      for (const auto& [name, list] : document["capsules"].items())
+        out.capsules[name] = capsules(list, "/capsules/" + name);
+    }
+    if (document.contains("self_collision_disabled"))
+      out.self_collision_disabled = pairs(document["self_collision_disabled"]);
+    return out;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where_, what));
+  }
+  [[nodiscard]] double number(const Json& value, const std::string& place) const {
+    if (!value.is_number()) fail(fmt::format("{}: expected a number", place));
+    return value.get<double>();
+  }
+  [[nodiscard]] Vector3d point(const Json& value, const std::string& place) const {
+    return {number(value[0], place), number(value[1], place), number(value[2], place)};
+  }
+  [[nodiscard]] double radius(const Json& value, const std::string& place) const {
+    const double r = number(value, place + "/radius");
+    if (!(r > 0.0)) fail(fmt::format("{}/radius: {} m, expected a positive number", place, r));
+    return r;
+  }
+  static bool has_point(const Json& shape, const char* key) {
+    return shape.contains(key) && shape[key].is_array() && shape[key].size() == 3;
+  }
+
+  [[nodiscard]] std::vector<Sphere> spheres(const Json& list, const std::string& where) const {
+    if (!list.is_array()) fail(where + ": expected a list of spheres");
+    std::vector<Sphere> out;
+    for (const Json& sphere : list) {
+      const std::string place = fmt::format("{}/{}", where, out.size());
+      if (!sphere.is_object() || sphere.size() != 2 || !has_point(sphere, "center") || !sphere.contains("radius"))
+        fail(fmt::format("{}: expected {{\"center\": [x, y, z], \"radius\": r}}", place));
+      out.push_back({point(sphere["center"], place + "/center"), radius(sphere["radius"], place)});
+    }
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Segment> capsules(const Json& list, const std::string& where) const {
+    if (!list.is_array()) fail(where + ": expected a list of capsules");
+    std::vector<Segment> out;
+    for (const Json& capsule : list) {
+      const std::string place = fmt::format("{}/{}", where, out.size());
+      if (!capsule.is_object() || capsule.size() != 3 || !has_point(capsule, "from") || !has_point(capsule, "to") ||
+          !capsule.contains("radius"))
+        fail(fmt::format("{}: expected {{\"from\": [x, y, z], \"to\": [x, y, z], \"radius\": r}}", place));
+      out.push_back({point(capsule["from"], place + "/from"), point(capsule["to"], place + "/to"),
+                     radius(capsule["radius"], place)});
+    }
+    return out;
+  }
+
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> pairs(const Json& list) const {
+    constexpr const char* expected = "/self_collision_disabled: expected a list of pairs of link names";
+    if (!list.is_array()) fail(expected);
+    std::vector<std::pair<std::string, std::string>> out;
+    for (const Json& pair : list) {
+      if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string()) fail(expected);
+      out.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
+    }
+    return out;
+  }
+
+  const std::string& where_;
+};
+
+void take_spheres(Robot& robot, const detail::SphereFile& given) {
   std::vector<std::string> names;
   for (auto& link : robot.links) {
     link.spheres.clear();
@@ -169,7 +249,7 @@ void take_spheres(Robot& robot, const std::filesystem::path& file) {
     for (auto& link : robot.links)
       if (link.name == name) return link;
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: the robot has no link '{}'{}", file.string(), name, did_you_mean(name, names)));
+                fmt::format("{}: the robot has no link '{}'{}", given.where, name, did_you_mean(name, names)));
   };
   for (const auto& [name, spheres] : given.links) link_named(name).spheres = spheres;
   for (const auto& [name, capsules] : given.capsules) {
@@ -212,6 +292,16 @@ std::string detail::join(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+void detail::judge_inertia(Robot& robot, const std::string& link, const Matrix3d& inertia, bool strict,
+                           const std::string& where) {
+  const std::string fault = model::triangle_fault(inertia);
+  if (fault.empty()) return;
+  if (strict) throw Error(ErrorCode::invalid, fmt::format("{}: link '{}': inertia {}", where, link, fault));
+  const std::string note =
+      fmt::format("{}link '{}': inertia {}; it is used as given", model::warning_prefix, link, fault);
+  if (std::find(robot.notes.begin(), robot.notes.end(), note) == robot.notes.end()) robot.notes.push_back(note);
+}
+
 void detail::round_to_quaternions(Robot& robot) {
   const auto round = [](const SE3& pose) { return SE3(rounded(pose.R()), pose.p()); };
   for (auto& link : robot.links) link.com = round(link.com);
@@ -230,74 +320,21 @@ std::string detail::normalise_screw(Joint& joint, const std::string& where) {
 }
 
 std::size_t check_spheres(const std::filesystem::path& file) {
-  const detail::SphereFile given = detail::read_spheres(file);
+  const detail::SphereFile given = detail::read_spheres(read_json(file), file.string());
   std::size_t count = 0;
   for (const auto& [name, spheres] : given.links) count += spheres.size();
   for (const auto& [name, capsules] : given.capsules) count += capsules.size();
   return count;
 }
 
-detail::SphereFile detail::read_spheres(const std::filesystem::path& file) {
-  const std::string where = file.string();
-  const Json document = read_json(file);
-  const auto fail = [&](const std::string& what) {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
-  };
-  const auto number = [&](const Json& value, const std::string& place) {
-    if (!value.is_number()) fail(fmt::format("{}: expected a number", place));
-    return value.get<double>();
-  };
-  const auto is_point = [](const Json& shape, const char* key) {
-    return shape.contains(key) && shape[key].is_array() && shape[key].size() == 3;
-  };
-  const auto point = [&](const Json& value, const std::string& place) {
-    return Vector3d(number(value[0], place), number(value[1], place), number(value[2], place));
-  };
-  const auto radius = [&](const Json& value, const std::string& place) {
-    const double r = number(value, place + "/radius");
-    if (!(r > 0.0)) fail(fmt::format("{}/radius: {} m, expected a positive number", place, r));
-    return r;
-  };
-  if (!document.is_object() || !document.contains("links") || !document["links"].is_object())
-    fail("expected an object whose \"links\" maps link names to lists of spheres");
-  SphereFile out;
-  for (const auto& [name, list] : document["links"].items()) {
-    auto& spheres = out.links[name];
-    if (!list.is_array()) fail(fmt::format("/links/{}: expected a list of spheres", name));
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      const std::string place = fmt::format("/links/{}/{}", name, i);
-      const Json& sphere = list[i];
-      if (!sphere.is_object() || sphere.size() != 2 || !is_point(sphere, "center") || !sphere.contains("radius"))
-        fail(fmt::format("{}: expected {{\"center\": [x, y, z], \"radius\": r}}", place));
-      spheres.push_back({point(sphere["center"], place + "/center"), radius(sphere["radius"], place)});
-    }
-  }
-  if (document.contains("capsules")) {
-    if (!document["capsules"].is_object()) fail("/capsules: expected an object that maps link names to capsules");
-    for (const auto& [name, list] : document["capsules"].items()) {
-      auto& capsules = out.capsules[name];
-      if (!list.is_array()) fail(fmt::format("/capsules/{}: expected a list of capsules", name));
-      for (std::size_t i = 0; i < list.size(); ++i) {
-        const std::string place = fmt::format("/capsules/{}/{}", name, i);
-        const Json& capsule = list[i];
-        if (!capsule.is_object() || capsule.size() != 3 || !is_point(capsule, "from") || !is_point(capsule, "to") ||
-            !capsule.contains("radius"))
-          fail(fmt::format("{}: expected {{\"from\": [x, y, z], \"to\": [x, y, z], \"radius\": r}}", place));
-        capsules.push_back({point(capsule["from"], place + "/from"), point(capsule["to"], place + "/to"),
-                            radius(capsule["radius"], place)});
-      }
-    }
-  }
-  if (document.contains("self_collision_disabled")) {
-    const Json& pairs = document["self_collision_disabled"];
-    if (!pairs.is_array()) fail("/self_collision_disabled: expected a list of pairs of link names");
-    for (const auto& pair : pairs) {
-      if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
-        fail("/self_collision_disabled: expected a list of pairs of link names");
-      out.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
-    }
-  }
-  return out;
+detail::SphereFile detail::read_spheres(const Json& document, const std::string& where) {
+  return SidecarReader(where).read(document);
+}
+
+std::optional<detail::SphereFile> detail::sidecar_of(const RobotOptions& options) {
+  if (options.sidecar) return read_spheres(*options.sidecar, "sidecar");
+  if (options.spheres) return read_spheres(read_json(*options.spheres), options.spheres->string());
+  return std::nullopt;
 }
 
 Robot robot_from_json(const Json& document, const std::string& where) {
@@ -340,7 +377,8 @@ Robot robot_from_json(const Json& document, const std::string& where) {
   for (const auto& pair : list_of(document, "self_collision_disabled"))
     robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
   detail::round_to_quaternions(robot);
-  check(robot, where);
+  model::check(robot, where);
+  for (const Link& link : robot.links) detail::judge_inertia(robot, link.name, link.inertia_kg_m2, false, where);
   return robot;
 }
 
@@ -375,16 +413,18 @@ Robot read_robot(const std::filesystem::path& file, const RobotOptions& options)
     throw Error(ErrorCode::usage,
                 fmt::format("{}: unknown kind of robot file '{}', expected .urdf or .json", where, extension));
   Robot robot = robot_from_json(parse_json(text, where), where);
+  if (options.strict)
+    for (const Link& link : robot.links) detail::judge_inertia(robot, link.name, link.inertia_kg_m2, true, where);
   if (options.tip && *options.tip != robot.tip.name)
     throw Error(ErrorCode::invalid, fmt::format("{}: no tip '{}': a JSON robot has the one tip it names, '{}'", where,
                                                 *options.tip, robot.tip.name));
-  if (options.spheres) {
-    take_spheres(robot, *options.spheres);
-    check(robot, options.spheres->string());
+  if (const auto sidecar = detail::sidecar_of(options)) {
+    take_spheres(robot, *sidecar);
+    model::check(robot, sidecar->where);
   }
   if (options.srdf) {
     take_srdf(robot, *options.srdf);
-    check(robot, options.srdf->string());
+    model::check(robot, options.srdf->string());
   }
   return robot;
 }

@@ -1,23 +1,49 @@
 #include "hamelin/description/srdf.hpp"
 
 #include <fmt/format.h>
-#include <tinyxml.h>
 
 #include <algorithm>
 
 #include "detail.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "xml.hpp"
 
 namespace hamelin::description {
 
 namespace {
 
-// One line, whatever the file's names hold.
-[[noreturn]] void fail(ErrorCode code, const std::string& where, int line, std::string what) {
-  std::replace_if(
-      what.begin(), what.end(), [](unsigned char c) { return c < ' '; }, ' ');
-  throw Error(code, fmt::format("{}: line {}: {}", where, std::max(1, line), what));
+using detail::fail;
+using tinyxml2::XMLElement;
+
+DisabledPair pair_of(const XMLElement& element, const std::string& where) {
+  DisabledPair pair;
+  pair.line = element.GetLineNum();
+  const auto name = [&](const char* attribute) {
+    std::string value = detail::text_of(element, attribute);
+    if (value.empty())
+      fail(ErrorCode::parse, where, pair.line, fmt::format("<disable_collisions> has no {}", attribute));
+    return value;
+  };
+  pair.link_a = name("link1");
+  pair.link_b = name("link2");
+  pair.reason = detail::text_of(element, "reason");
+  if (pair.link_a == pair.link_b)
+    fail(ErrorCode::invalid, where, pair.line,
+         fmt::format("<disable_collisions> names '{}' twice, expected two links", pair.link_a));
+  return pair;
+}
+
+void refuse_other_formats(const XMLElement& element, const std::string& where) {
+  const std::string tag = element.Name();
+  const int line = element.GetLineNum();
+  if (tag == "disable_default_collisions" || tag == "enable_collisions")
+    fail(ErrorCode::invalid, where, line,
+         fmt::format("<{}> is not taken, expected the pairs themselves as <disable_collisions>", tag));
+  if (tag == "link" || tag == "joint")
+    fail(ErrorCode::invalid, where, line, fmt::format("<{}>: that is a URDF, expected an SRDF", tag));
+  if (tag.substr(0, 6) == "xacro:")
+    fail(ErrorCode::parse, where, line, fmt::format("<{}>: the file is xacro source, expected expanded SRDF", tag));
 }
 
 }  // namespace
@@ -39,45 +65,12 @@ std::string detail::join_pairs(std::vector<std::pair<std::string, std::string>>&
 
 std::vector<DisabledPair> read_srdf(const std::filesystem::path& file) {
   const std::string where = file.string(), text = read_file(file);
-  detail::check_xml(text, where);
-  TiXmlDocument document;
-  document.Parse(text.c_str());
-  if (document.Error())
-    fail(ErrorCode::parse, where, document.ErrorRow(),
-         fmt::format("column {}: not XML: {}", document.ErrorCol(), document.ErrorDesc()));
-  const TiXmlElement* robot = document.RootElement();
-  if (robot == nullptr || robot->ValueStr() != "robot")
-    fail(ErrorCode::parse, where, robot == nullptr ? 1 : robot->Row(),
-         fmt::format("expected <robot> as the root, found {}",
-                     robot == nullptr ? "no element" : "<" + robot->ValueStr() + ">"));
+  tinyxml2::XMLDocument document;
+  const XMLElement& robot = detail::parse_robot_xml(document, text, where, "SRDF");
   std::vector<DisabledPair> pairs;
-  for (const TiXmlElement* e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
-    const std::string tag = e->ValueStr();
-    if (tag == "disable_default_collisions" || tag == "enable_collisions")
-      fail(ErrorCode::invalid, where, e->Row(),
-           fmt::format("<{}> is not taken, expected the pairs themselves as <disable_collisions>", tag));
-    if (tag == "link" || tag == "joint")
-      fail(ErrorCode::invalid, where, e->Row(), fmt::format("<{}>: that is a URDF, expected an SRDF", tag));
-    if (tag.substr(0, 6) == "xacro:")
-      fail(ErrorCode::parse, where, e->Row(),
-           fmt::format("<{}>: the file is xacro source, expected expanded SRDF", tag));
-    if (tag != "disable_collisions") continue;
-    DisabledPair pair;
-    pair.line = e->Row();
-    const auto name = [&](const char* attribute) -> std::string {
-      const char* value = e->Attribute(attribute);
-      if (value == nullptr || *value == '\0')
-        fail(ErrorCode::parse, where, e->Row(), fmt::format("<disable_collisions> has no {}", attribute));
-      return value;
-    };
-    pair.link_a = name("link1");
-    pair.link_b = name("link2");
-    if (pair.link_a == pair.link_b)
-      fail(ErrorCode::invalid, where, e->Row(),
-           fmt::format("<disable_collisions> names '{}' twice, expected two links", pair.link_a));
-    const char* reason = e->Attribute("reason");
-    if (reason != nullptr) pair.reason = reason;
-    pairs.push_back(std::move(pair));
+  for (const XMLElement* e = robot.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+    refuse_other_formats(*e, where);
+    if (std::string_view(e->Name()) == "disable_collisions") pairs.push_back(pair_of(*e, where));
   }
   return pairs;
 }

@@ -14,6 +14,7 @@
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/model/make_chain.hpp"
+#include "hamelin/test/scene_data.hpp"
 
 using namespace hamelin;
 using namespace hamelin::description;
@@ -25,7 +26,6 @@ namespace fs = std::filesystem;
 namespace {
 
 const fs::path data = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
-const fs::path shared = fs::path(HAMELIN_SOURCE_DIR "/../shared/data/robots");
 
 /// A file that lives as long as the value.
 class Scratch {
@@ -56,6 +56,12 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   const auto at = text.find(what);
   if (at == std::string::npos) throw std::logic_error("nothing to replace: " + what);
   return text.replace(at, what.size(), by);
+}
+
+std::string repeated(const std::string& what, int times) {
+  std::string text;
+  for (int i = 0; i < times; ++i) text += what;
+  return text;
 }
 
 std::string message_of(const std::string& name, const std::string& text, const RobotOptions& options = {}) {
@@ -349,6 +355,9 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[descri
     std::string text;
     const char* says;
   };
+  std::string many_attributes = "<robot";
+  for (int i = 0; i < 100000; ++i) many_attributes += " a" + std::to_string(i) + "=\"1\"";
+  many_attributes += "/>";
   const std::vector<Bad> list{
       {"empty", "", "the file is empty"},
       {"blank", " \n\n ", "the file is empty"},
@@ -361,49 +370,32 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[descri
        "xacro source"},
       {"no link", "<robot name=\"r\"/>", "the robot has no <link>"},
       {"no name", replaced(arm, "<link name=\"tool\"/>", "<link/>"), "a <link> has no name"},
-      {"deep",
-       "<robot name=\"r\">" +
-           [] {
-             std::string open;
-             for (int i = 0; i < 100000; ++i) open += "<a>";
-             return open;
-           }(),
+      {"deep", "<robot name=\"r\">" + repeated("<a>", 100000), "nest deeper than 100"},
+      {"deep behind quotes", "<robot name=\"r\">" + repeated("<a b='/>'>", 100000), "nest deeper than 100"},
+      {"deep behind ends of nothing", repeated("</a>", 1000) + repeated("<a>", 1000), "nest deeper than 100"},
+      {"deep behind a quoted end of the declaration", "<?xml version=\"><!--\"?>" + repeated("<a>", 100000),
        "nest deeper than 100"},
-      {"deep behind quotes",
-       "<robot name=\"r\">" +
-           [] {
-             std::string open;
-             for (int i = 0; i < 100000; ++i) open += "<a b='/>'>";
-             return open;
-           }(),
-       "nest deeper than 100"},
-      {"deep behind ends of nothing",
-       [] {
-         std::string text;
-         for (int i = 0; i < 1000; ++i) text += "</a>";
-         for (int i = 0; i < 1000; ++i) text += "<a>";
-         return text;
-       }(),
-       "nest deeper than 100"},
-      {"deep behind a quoted end of the declaration",
-       "<?xml version=\"><!--\"?>" +
-           [] {
-             std::string open;
-             for (int i = 0; i < 100000; ++i) open += "<a>";
-             return open;
-           }(),
-       "a quote in <? ?> is not closed"},
+      {"deep behind closing tags that open", repeated("<a></a/>", 1000), "line 1: not XML: a closing tag ends in '/>'"},
       {"a tag in a tag", "<robot name=\"r\"><link <a/></robot>", "line 1: not XML: '<' inside a tag"},
-      {"one letter", "<", "expected <robot> as the root, found no element"},
+      {"one letter", "<", "line 1: not XML"},
+      {"a comment only", "<!-- x -->\n", "expected <robot> as the root, found no element"},
+      {"two roots of XML", arm + "<robot name=\"b\"/>", "line 24: not XML: <robot> after the end of <robot>"},
+      {"a character that does not exist", replaced(arm, "name=\"tool\"", "name=\"t&#xD800;\""),
+       "<link>: name refers to a character that does not exist"},
+      {"no name of the robot", replaced(arm, "<robot name=\"arm\">", "<robot>"), "line 2: the <robot> has no name"},
+      {"another version", replaced(arm, "<robot name=\"arm\">", "<robot name=\"arm\" version=\"2.0\">"),
+       "line 2: version=\"2.0\" of URDF, expected 1.0"},
+      {"a shape of another format",
+       replaced(arm, "<sphere radius=\"0.05\"/>", "<capsule radius=\"0.05\" length=\"1\"/>"),
+       "line 9: link 'lower': <capsule> is no shape of a URDF"},
+      {"no shape", replaced(arm, "<sphere radius=\"0.05\"/>", ""), "line 9: link 'lower': <geometry> is empty"},
+      {"a mimic of nothing", replaced(arm, "<parent link=\"lower\"/>", "<parent link=\"lower\"/><mimic/>"),
+       "joint 'mount': <mimic> has no joint"},
       {"Latin-1", replaced(arm, "name=\"tool\"", "name=\"to\xf6l\""), "is not UTF-8"},
-      {"many attributes",
-       [] {
-         std::string tag = "<robot";
-         for (int i = 0; i < 100000; ++i) tag += " a" + std::to_string(i) + "=\"1\"";
-         return tag + "/>";
-       }(),
+      {"many attributes", many_attributes, "a tag has more than 100 attributes"},
+      {"many attributes behind a comment that '>' does not close", "<!--><![CDATA[-->" + many_attributes,
        "a tag has more than 100 attributes"},
-      {"large", arm + std::string(4U << 20, ' '), "expected a URDF of at most 4194304"},
+      {"large", arm + std::string(4U << 20, ' '), "expected at most 4194304"},
       {"link twice", replaced(arm, "<link name=\"tool\"/>", "<link name=\"tool\"/><link name=\"base\"/>"),
        "link 'base' is given twice, first in line 3"},
       {"joint twice", replaced(arm, "<joint name=\"slide\"", "<joint name=\"shoulder\""),
@@ -435,8 +427,6 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[descri
       {"missing mass", replaced(arm, "<mass value=\"2\"/>", ""), "link 'upper': <mass> is missing"},
       {"indefinite inertia", replaced(arm, "ixx=\"0.02\"", "ixx=\"-0.02\""),
        "link 'upper': inertia is not positive semi-definite"},
-      {"triangle", replaced(arm, "izz=\"0.01\"", "izz=\"0.05\""),
-       "link 'upper': inertia breaks the triangle inequality"},
       {"point mass",
        replaced(arm, "ixx=\"0.02\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.01\"",
                 "ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\""),
@@ -470,6 +460,39 @@ TEST_CASE("a bad URDF is refused in one line that says where and what", "[descri
     CHECK_THAT(message, Catch::Contains(bad.says));
     CHECK(message.find('\n') == std::string::npos);
   }
+}
+
+TEST_CASE("moments against the triangle inequality are taken with a warning, and refused by strict",
+          "[description][robot]") {
+  const auto refused = [](const std::string& name, const std::string& text) {
+    RobotOptions strict;
+    strict.strict = true;
+    return message_of(name, text, strict);
+  };
+  const std::string text = replaced(arm, "izz=\"0.01\"", "izz=\"0.05\"");
+  const Robot robot = read_text("arm.urdf", text);
+  CHECK(robot.links[0].inertia_kg_m2(2, 2) == 0.05);
+  const auto said = warnings(robot);
+  REQUIRE(said.size() == 1);
+  CHECK_THAT(said[0], Catch::StartsWith("link 'upper': inertia breaks the triangle inequality") &&
+                          Catch::Contains("0.02, 0.02, 0.05"));
+  CHECK_THAT(refused("arm.urdf", text), Catch::StartsWith(": line 4: link 'upper': inertia breaks the triangle"));
+  CHECK(refused("arm.urdf", arm) == "no error");
+
+  // in the robot's JSON form the warning is noted once, however often it is read
+  const std::string json = robot_to_json(robot).dump();
+  const Robot again = read_text("arm.json", json);
+  check_same(again, robot);
+  CHECK(warnings(again) == said);
+  CHECK_THAT(refused("arm.json", json), Catch::StartsWith(": link 'upper': inertia breaks the triangle inequality"));
+
+  // of a part that is lumped into a moving link, the part is named
+  const Robot lumped = read_text(
+      "arm.urdf", replaced(arm, "<link name=\"tool\"/>",
+                           "<link name=\"tool\">" + replaced(inertial, "izz=\"0.01\"", "izz=\"0.05\"") + "</link>"));
+  REQUIRE(warnings(lumped).size() == 1);
+  CHECK_THAT(warnings(lumped)[0], Catch::StartsWith("link 'tool': inertia"));
+  check_same(read_text("arm.json", robot_to_json(lumped).dump()), lumped);
 }
 
 TEST_CASE("a file that is no robot file is refused", "[description][robot]") {
@@ -506,7 +529,6 @@ TEST_CASE("a bad JSON robot is refused with its place", "[description][robot]") 
   CHECK_THAT(message("/links/0/joint/type", "prismatic"), Catch::Contains("/links/0/joint: the axis has length 0"));
   CHECK_THAT(message("/links/1/joint/type", "prismatic"),
              Catch::Contains("joint 'j2': the screw of a prismatic joint turns"));
-  CHECK_THAT(message("/links/0/inertia_kg_m2", {1, 1, 3, 0, 0, 0}), Catch::Contains("triangle inequality"));
   CHECK_THAT(message("/links/0/inertia_kg_m2", {1, 1, 1, 2, 0, 0}), Catch::Contains("not positive definite"));
   CHECK_THAT(message("/links/0/spheres/0/radius_m", 0), Catch::Contains("/links/0/spheres/0/radius_m"));
   CHECK_THAT(message("/tip/link", "link9"), Catch::Contains("/tip/link: no link 'link9'"));
@@ -716,69 +738,71 @@ TEST_CASE("make-chain builds the reference chain and refuses nonsense", "[descri
     CHECK_THROWS_AS(make_chain(bad), Error);
 }
 
-TEST_CASE("public URDFs load with their tips, and without one name the leaves", "[description][robot]") {
-  if (!fs::exists(shared)) {
-    WARN("no shared robots here: skipped");
-    return;
+namespace {
+
+std::string leaves_of(const fs::path& file) {
+  try {
+    (void)read_robot(file);
+  } catch (const Error& e) {
+    return e.what();
   }
-  const auto leaves_of = [](const fs::path& file) {
-    try {
-      (void)read_robot(file);
-    } catch (const Error& e) {
-      return std::string(e.what());
-    }
-    return std::string("no error");
-  };
-  SECTION("panda") {
-    CHECK_THAT(leaves_of(shared / "panda.urdf"),
-               Catch::Contains("name one as the tip: panda_leftfinger, panda_rightfinger, panda_grasptarget"));
-    RobotOptions options;
-    options.tip = "panda_grasptarget";
-    options.spheres = shared / "panda_spheres.json";
-    const Robot robot = read_robot(shared / "panda.urdf", options);
-    REQUIRE(robot.dof() == 7);
-    CHECK(robot.tip.name == "panda_grasptarget");
-    CHECK((robot.tip.pose.p() - Vector3d(0.088, 0, 0.333 + 0.316 + 0.384 - 0.107 - 0.105)).norm() < 1e-9);
-    CHECK(robot.links[6].mass_kg == Approx(0.2 + 0.81 + 0.1 + 0.1));
-    CHECK(robot.links[6].spheres.size() == 5 + 18 + 2 + 2);
-    CHECK(noted(robot, "lumped into link 'panda_link7': panda_link8, panda_hand"));
-    CHECK(noted(robot, "warning: link 'panda_grasptarget' has inertia but no mass"));
-    CHECK(noted(robot, "joint 'panda_finger_joint2': <mimic> ignored"));
-    CHECK(noted(robot, "1 collision spheres on the base"));
-    REQUIRE(robot.base_spheres.size() == 1);
-    CHECK(robot.base_spheres[0].part == "panda_link0");
-    CHECK(std::count_if(robot.links[6].spheres.begin(), robot.links[6].spheres.end(),
-                        [](const Sphere& sphere) { return sphere.part == "panda_hand"; }) == 18);
-    CHECK(robot.self_collision_disabled.size() == 34);
-    check_same(robot, robot_from_json(robot_to_json(robot), "again"));
-    CHECK(robot.links[0].joint.effort_max == 87.0);
-    CHECK(std::count(robot.self_collision_disabled.begin(), robot.self_collision_disabled.end(),
-                     std::make_pair(std::string("panda_link1"), std::string("panda_link2"))) == 1);
-  }
-  SECTION("ur5") {
-    CHECK_THAT(leaves_of(shared / "ur5_robot.urdf"),
-               Catch::Contains("ee_link") && Catch::Contains("tool0") && Catch::Contains("base"));
-    RobotOptions options;
-    options.tip = "tool0";
-    const Robot robot = read_robot(shared / "ur5_robot.urdf", options);
-    REQUIRE(robot.dof() == 6);
-    CHECK(noted(robot, "no collision spheres"));
-    CHECK(robot.links[2].joint.lower == Approx(-3.14159265359));
-  }
+  return "no error";
 }
 
-TEST_CASE("the example robot file's form is read", "[description][robot]") {
-  const fs::path example = fs::path(HAMELIN_SOURCE_DIR "/../shared/examples/robot.json");
-  if (!fs::exists(example)) {
-    WARN("no shared examples here: skipped");
-    return;
-  }
-  // The example is shortened to one link, so its tip and pair name links it lacks.
-  Json json = read_json(example);
-  json["tip"]["link"] = "link1";
-  json["self_collision_disabled"] = Json::array();
-  const Robot robot = robot_from_json(json, "example");
-  CHECK(robot_to_json(robot) == json);
+}  // namespace
+
+TEST_CASE("the Panda loads with its tip, and without one its leaves are named", "[description][robot]") {
+  CHECK_THAT(leaves_of(test::third_party_robots / "panda.urdf"),
+             Catch::Contains("name one as the tip: panda_leftfinger, panda_rightfinger, panda_grasptarget"));
+  RobotOptions options;
+  options.tip = "panda_grasptarget";
+  options.spheres = test::third_party_robots / "panda_spheres.json";
+  const Robot robot = read_robot(test::third_party_robots / "panda.urdf", options);
+  REQUIRE(robot.dof() == 7);
+  CHECK(robot.tip.name == "panda_grasptarget");
+  CHECK((robot.tip.pose.p() - Vector3d(0.088, 0, 0.333 + 0.316 + 0.384 - 0.107 - 0.105)).norm() < 1e-9);
+  CHECK(robot.links[6].mass_kg == Approx(0.2 + 0.81 + 0.1 + 0.1));
+  CHECK(robot.links[6].spheres.size() == 5 + 18 + 2 + 2);
+  CHECK(noted(robot, "lumped into link 'panda_link7': panda_link8, panda_hand"));
+  CHECK(noted(robot, "warning: link 'panda_grasptarget' has inertia but no mass"));
+  CHECK(noted(robot, "joint 'panda_finger_joint2': <mimic> ignored"));
+  CHECK(noted(robot, "1 collision spheres on the base"));
+  REQUIRE(robot.base_spheres.size() == 1);
+  CHECK(robot.base_spheres[0].part == "panda_link0");
+  CHECK(std::count_if(robot.links[6].spheres.begin(), robot.links[6].spheres.end(),
+                      [](const Sphere& sphere) { return sphere.part == "panda_hand"; }) == 18);
+  CHECK(robot.self_collision_disabled.size() == 34);
+  check_same(robot, robot_from_json(robot_to_json(robot), "again"));
+  CHECK(robot.links[0].joint.effort_max == 87.0);
+  CHECK(std::count(robot.self_collision_disabled.begin(), robot.self_collision_disabled.end(),
+                   std::make_pair(std::string("panda_link1"), std::string("panda_link2"))) == 1);
+}
+
+TEST_CASE("the UR5 loads with its tip, and without one its leaves are named", "[description][robot]") {
+  const auto robots = test::shared_data("robots");
+  if (!robots) return;
+  CHECK_THAT(leaves_of(*robots / "ur5_robot.urdf"),
+             Catch::Contains("ee_link") && Catch::Contains("tool0") && Catch::Contains("base"));
+  RobotOptions options;
+  options.tip = "tool0";
+  const Robot robot = read_robot(*robots / "ur5_robot.urdf", options);
+  REQUIRE(robot.dof() == 6);
+  CHECK(noted(robot, "no collision spheres"));
+  CHECK(robot.links[2].joint.lower == Approx(-3.14159265359));
+}
+
+TEST_CASE("the shortest form of a robot file is read and written as it was", "[description][robot]") {
+  const Json json = Json::parse(R"({"schema": "hamelin.robot/1", "name": "one",
+    "tip": {"link": "link1", "position_m": [0, 0.3, 0], "quaternion_wxyz": [1, 0, 0, 0]},
+    "links": [{"name": "link1", "parent": -1,
+      "joint": {"name": "j1", "type": "revolute", "screw": [1, 0, 0, 0, 0, 0], "lower": null, "upper": null,
+                "velocity_max": null, "effort_max": null, "damping": 0},
+      "com": {"position_m": [0, 0.15, 0], "quaternion_wxyz": [1, 0, 0, 0]},
+      "mass_kg": 2, "inertia_kg_m2": [0.02, 0.001, 0.02, 0, 0, 0],
+      "spheres": [{"center_m": [0, 0.1, 0], "radius_m": 0.04}],
+      "segments": [{"from_m": [0, -0.15, 0], "to_m": [0, 0.15, 0], "radius_m": 0}]}],
+    "self_collision_disabled": []})");
+  CHECK(robot_to_json(robot_from_json(json, "one")) == json);
 }
 
 TEST_CASE("arm7's spheres cover it and no two links more than a joint apart overlap at the ready pose",

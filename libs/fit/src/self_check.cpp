@@ -136,6 +136,11 @@ std::vector<PartPair> SelfCheck::faults() const {
   return out;
 }
 
+std::string contact_reason(const PartPair& pair, int samples) {
+  if (samples > 0 && pair.contacts >= always_share_min * samples) return "Always";
+  return pair.touches_at_rest() ? "Default" : "";
+}
+
 std::vector<description::DisabledPair> SelfCheck::disabled(bool never) const {
   std::vector<description::DisabledPair> out;
   for (const PartPair& pair : pairs) {
@@ -146,12 +151,10 @@ std::vector<description::DisabledPair> SelfCheck::disabled(bool never) const {
       reason = "Adjacent";
     } else if (listed) {
       reason = pair.reason;
-    } else if (samples > 0 && pair.contacts == samples) {
-      reason = "Always";
-    } else if (pair.touches_at_rest()) {
-      reason = "Default";
     } else if (never && samples > 0 && !touches) {
       reason = "Never";
+    } else {
+      reason = contact_reason(pair, samples);
     }
     if (!reason.empty()) out.push_back({pair.part_a, pair.part_b, reason, 0});
   }
@@ -165,6 +168,14 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
   const auto same = [](const std::string& a, const std::string& b, const PartPair& pair) {
     return (a == pair.part_a && b == pair.part_b) || (a == pair.part_b && b == pair.part_a);
   };
+  const auto bears_shapes = [&](int body) {
+    return std::any_of(parts.begin(), parts.end(), [&](const Part& part) { return part.body == body; });
+  };
+  const auto shapes_between = [&](int low, int high) {
+    for (int body = low + 1; body < high; ++body)
+      if (bears_shapes(body)) return true;
+    return false;
+  };
   std::vector<std::pair<std::size_t, std::size_t>> indices;
   for (std::size_t a = 0; a < parts.size(); ++a)
     for (std::size_t b = a + 1; b < parts.size(); ++b) {
@@ -172,14 +183,15 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
       PartPair pair;
       pair.part_a = parts[a].name;
       pair.part_b = parts[b].name;
-      pair.neighbours = std::abs(parts[a].body - parts[b].body) == 1;
+      const auto [low, high] = std::minmax(parts[a].body, parts[b].body);
+      pair.neighbours = !shapes_between(low, high);
       pair.checked = true;
       for (const auto& [x, y] : robot.self_collision_disabled)
         if (same(x, y, pair)) {
           pair.checked = false;
           pair.reason = "listed";
         }
-      if (robot.self_collision_disabled.empty() && pair.neighbours) {
+      if (robot.self_collision_disabled.empty() && high - low == 1) {
         pair.checked = false;
         pair.reason = "neighbours, and nothing is listed";
       }
@@ -215,8 +227,7 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
   }
 
   for (std::size_t i = 0; i < robot.links.size(); ++i)
-    if (std::none_of(parts.begin(), parts.end(), [&](const Part& p) { return p.body == static_cast<int>(i); }))
-      out.shapeless.push_back(robot.links[i].name);
+    if (!bears_shapes(static_cast<int>(i))) out.shapeless.push_back(robot.links[i].name);
   out.odd_limits = odd_limits_of(robot);
   return out;
 }

@@ -173,7 +173,7 @@ TEST_CASE("bad geometry ends in one line with its place", "[fit][unit]") {
              Catch::Contains("line 5") && Catch::Contains("finite"));
   CHECK_THAT(of(robot(collision("<sphere radius=\"-1\"/>"))), Catch::Contains("line 5") && Catch::Contains("radius"));
   CHECK_THAT(of(robot(collision("<mesh filename=\"a.stl\" scale=\"1 x 1\"/>"))),
-             Catch::Contains("line 3") && Catch::Contains("scale") && Catch::Contains("[arm]"));
+             Catch::Contains("line 5: link 'arm': <mesh>: scale=\"1 x 1\""));
   CHECK_THAT(of(robot(collision("<mesh filename=\"a.stl\" scale=\"1 0 1\"/>"))), Catch::Contains("line 5"));
   (void)scratch.put("junk.stl", "no mesh at all");
   CHECK_THAT(of(robot(collision("<mesh filename=\"junk.stl\"/>"))),

@@ -87,6 +87,35 @@ TEST_CASE("pairs fall into always, sometimes and never in contact", "[fit][unit]
                       [](const description::DisabledPair& p) { return p.reason == "Never"; }) >= 1);
 }
 
+TEST_CASE("links around a link without shapes are neighbours, though without a list they are checked", "[fit][unit]") {
+  model::Robot robot = chain();
+  robot.links[1].spheres.clear();
+  robot.links[2].spheres[0].radius_m = 1.95;  // reaches link 1's ball at rest
+  const SelfCheck check = check_self(robot, {}, {100, 1});
+  const PartPair& pair = pair_of(check, "link1", "link3");
+  CHECK(pair.neighbours);
+  CHECK(pair.checked);
+  CHECK_FALSE(pair_of(check, "link1", "link4").neighbours);
+  REQUIRE(check.faults().size() == 1);
+  const auto listed = check.disabled(false);
+  CHECK(std::any_of(listed.begin(), listed.end(), [](const description::DisabledPair& p) {
+    return p.link_a == "link1" && p.link_b == "link3" && p.reason == "Adjacent";
+  }));
+}
+
+TEST_CASE("a pair in contact in 95 of 100 samples counts as always, in 94 not", "[fit][unit]") {
+  PartPair pair;
+  pair.rest_m = 0.1;
+  pair.contacts = 95;
+  CHECK(contact_reason(pair, 100) == "Always");
+  pair.contacts = 94;
+  CHECK(contact_reason(pair, 100).empty());
+  pair.rest_m = 0.0;
+  CHECK(contact_reason(pair, 100) == "Default");
+  pair.contacts = 0;
+  CHECK(contact_reason(pair, 0) == "Default");
+}
+
 TEST_CASE("what touches at rest and is checked is a fault; listed with its reason it is none", "[fit][unit]") {
   model::Robot robot = chain();
   robot.links[0].spheres[0].radius_m = 1.95;

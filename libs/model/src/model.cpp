@@ -206,6 +206,7 @@ double reach_of(const Robot& robot, const std::vector<SE3>& frames) {
 Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     : robot_(std::move(robot)), base_(base), gravity_(gravity) {
   check(robot_, robot_.name);
+  for (Link& link : robot_.links) link.inertia_kg_m2 = symmetric_part(link.inertia_kg_m2);
   std::vector<SE3> frames;
   if (const auto normal = plane_normal(robot_)) {
     frames = planar_frames(robot_, *normal);

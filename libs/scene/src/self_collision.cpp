@@ -8,6 +8,8 @@
 #include <set>
 #include <utility>
 
+#include "hamelin/scene/scene.hpp"
+
 namespace hamelin::scene {
 
 namespace {
@@ -134,6 +136,17 @@ std::string SelfField::words(int pair) const {
   const Pair& both = pairs_[static_cast<std::size_t>(pair)];
   return fmt::format("'{}' and '{}'", parts_[static_cast<std::size_t>(both.part_a)].name,
                      parts_[static_cast<std::size_t>(both.part_b)].name);
+}
+
+std::string self_contact_remedy(const RobotRef& robot) {
+  std::string command = fmt::format("hamelin robot check {}", robot.file.string());
+  if (robot.tip) command += fmt::format(" --tip {}", *robot.tip);
+  if (robot.spheres) command += fmt::format(" --spheres {}", robot.spheres->string());
+  if (robot.srdf) command += fmt::format(" --srdf {}", robot.srdf->string());
+  std::filesystem::path target = robot.spheres.value_or(robot.file);
+  target.replace_extension(robot.spheres ? ".checked.json" : ".checked.srdf");
+  return fmt::format("if they always touch, `{} --write {}` disables the pair; then name that file as /robot/{}",
+                     command, target.string(), robot.spheres ? "spheres" : "srdf");
 }
 
 Vector3d SelfField::half_axis(int shape, const Shapes& arm) const {

@@ -80,55 +80,57 @@ TEST_CASE("distance, point and direction of one box agree with closed forms", "[
   CHECK(on.direction == Vector3d::UnitZ());
 }
 
+namespace {
+
+void check_closest(const std::filesystem::path& file, double scale, Ball region) {
+  CAPTURE(file);
+  const MapData map = read_map(file, {scale, 0.5});
+  auto cells = crop(map.occupied, map.resolution, region);
+  if (cells.size() < 500) {  // put the ball where the map is
+    region.center = to_metres(map.occupied[map.occupied.size() / 2], map.resolution).lo;
+    cells = crop(map.occupied, map.resolution, region);
+  }
+  REQUIRE(cells.size() >= 500);
+  std::vector<Box> leaves, merged;
+  for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
+  for (const VoxelBox& box : merge(cells)) merged.push_back(to_metres(box, map.resolution));
+  const BoxField field(merged, region.center);
+  double worst = 0.0;
+  std::int32_t hint = -1;
+  std::size_t missing = 0, inside = 0, wrong_point = 0;
+  for (const Vector3d& p : test::points_near(leaves, 10000, 0.5, 11)) {
+    const double truth = test::brute_force_distance(leaves, p);
+    BoxHit cold, warm;
+    if (!field.nearest(p, infinity, cold) || !field.nearest(p, infinity, warm, hint)) {
+      ++missing;
+      continue;
+    }
+    hint = warm.box;
+    worst = std::max({worst, std::abs(std::max(cold.distance, 0.0) - truth), std::abs(warm.distance - cold.distance)});
+    inside += cold.distance < 0.0 ? 1 : 0;
+    // The point is on the union's boxes, and as far away as it says.
+    const double off = test::brute_force_distance(leaves, cold.point);
+    wrong_point += off > 1e-9 || std::abs((p - cold.point).norm() - std::abs(cold.distance)) > 1e-9 ? 1 : 0;
+  }
+  CHECK(missing == 0);
+  CHECK(wrong_point == 0);
+  CHECK(inside > 0);
+  CHECK(worst <= 1e-9);
+}
+
+}  // namespace
+
+TEST_CASE("closest points equal brute force over all leaf boxes of our maps", "[scene][unit]") {
+  for (const char* name : {"shelf.bt", "clutter.bt"})
+    check_closest(test::data / "maps" / name, 1.0, {{0.4, 0.0, 0.5}, 0.8});
+}
+
 TEST_CASE("closest points equal brute force over all leaf boxes of three real maps", "[scene][unit]") {
   const auto directory = test::shared_data("maps");
   if (!directory) return;
-  struct Case {
-    std::string name;
-    double scale;
-    Ball region;
-  };
-  const std::vector<Case> cases{{"velma_hanas.bt", 1.0, {{0.5, 0.0, 1.0}, 1.35}},
-                                {"geb079.bt", 1.0, {{-1.0, 2.0, 0.5}, 3.0}},
-                                {"coal_env.bt", 0.001, {{0.0, 0.0, 0.0}, 1.0}}};
-  for (const Case& c : cases) {
-    CAPTURE(c.name);
-    const MapData map = read_map(*directory / c.name, {c.scale, 0.5});
-    auto cells = crop(map.occupied, map.resolution, c.region);
-    Ball region = c.region;
-    if (cells.size() < 500) {  // put the ball where the map is
-      const Box first = to_metres(map.occupied[map.occupied.size() / 2], map.resolution);
-      region.center = first.lo;
-      cells = crop(map.occupied, map.resolution, region);
-    }
-    REQUIRE(cells.size() >= 500);
-    std::vector<Box> leaves, merged;
-    for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
-    for (const VoxelBox& box : merge(cells)) merged.push_back(to_metres(box, map.resolution));
-    const BoxField field(merged, region.center);
-    double worst = 0.0;
-    std::int32_t hint = -1;
-    std::size_t missing = 0, inside = 0, wrong_point = 0;
-    for (const Vector3d& p : test::points_near(leaves, 10000, 0.5, 11)) {
-      const double truth = test::brute_force_distance(leaves, p);
-      BoxHit cold, warm;
-      if (!field.nearest(p, infinity, cold) || !field.nearest(p, infinity, warm, hint)) {
-        ++missing;
-        continue;
-      }
-      hint = warm.box;
-      worst =
-          std::max({worst, std::abs(std::max(cold.distance, 0.0) - truth), std::abs(warm.distance - cold.distance)});
-      inside += cold.distance < 0.0 ? 1 : 0;
-      // The point is on the union's boxes, and as far away as it says.
-      const double off = test::brute_force_distance(leaves, cold.point);
-      wrong_point += off > 1e-9 || std::abs((p - cold.point).norm() - std::abs(cold.distance)) > 1e-9 ? 1 : 0;
-    }
-    CHECK(missing == 0);
-    CHECK(wrong_point == 0);
-    CHECK(inside > 0);
-    CHECK(worst <= 1e-9);
-  }
+  check_closest(*directory / "velma_hanas.bt", 1.0, {{0.5, 0.0, 1.0}, 1.35});
+  check_closest(*directory / "geb079.bt", 1.0, {{-1.0, 2.0, 0.5}, 3.0});
+  check_closest(*directory / "coal_env.bt", 0.001, {{0.0, 0.0, 0.0}, 1.0});
 }
 
 TEST_CASE("nearest obeys its limit exactly and a hint changes nothing", "[scene][property]") {

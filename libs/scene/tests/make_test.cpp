@@ -237,55 +237,66 @@ TEST_CASE("the maps in data are those their primitives make", "[scene][unit]") {
   }
 }
 
-TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][unit]") {
-  const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
-  if (!problems || !robots) return;
+namespace {
+
+const std::filesystem::path own_problem =
+    std::filesystem::path(HAMELIN_SOURCE_DIR) / "libs/scene/tests/data/cabinet.problem.json";
+
+void check_problem(const std::filesystem::path& source) {
+  CAPTURE(source);
   const auto directory = test::temporary("hamelin_scene_problem");
   std::filesystem::create_directories(directory);
-  for (const std::string name : {"bookshelf_small_0001", "table_pick_0001", "box_0001"}) {
-    CAPTURE(name);
-    ProblemOptions options;
-    options.robot = *robots / "panda.urdf";
-    options.spheres = *robots / "panda_spheres.json";
-    options.tip = "panda_grasptarget";
-    options.resolution_m = 0.04;
-    options.output = directory / (name + ".json");
-    const auto source = *problems / (name + ".json");
-    make_scene_from_problem(source, options);
-    const Json problem = read_json(source);
-    const Scene scene = read_scene(options.output);
-    CHECK(std::filesystem::equivalent(scene.robot.file, options.robot));
-    CHECK(std::filesystem::equivalent(*scene.robot.spheres, options.spheres));
-    CHECK(scene.robot.tip == "panda_grasptarget");
-    REQUIRE(scene.goals.size() == 1);
-    CHECK(scene.goals[0].q.size() == 7);
-    CHECK(scene.goals[0].q[2] == problem["goal"][2].get<double>());
-    CHECK(scene.start_q[3] == problem["start"][3].get<double>());
-    CHECK(scene.obstacles.size() == problem["obstacles"].size());
-    REQUIRE(scene.map);
-    // The map is marked by touch, so it holds every primitive: their centres are in contact.
-    const model::Model model(description::read_robot(options.robot, {options.tip, options.spheres}));
-    const auto environment = make_environment(scene, model, 2.0);  // some stand out of the arm's reach
-    CHECK(environment.summary().warnings.empty());
-    CHECK(environment.summary().within_reach.unknown == 0.0);
-    CHECK(environment.summary().within_reach.free > 0.9);
-    for (const Obstacle& o : scene.obstacles) {
-      CHECK(o.judge_only);
-      const std::vector<Vector3d> center{o.pose.p()};
-      const std::vector<double> radius{0.0};
-      CHECK(environment.clearance({center, radius}, 0.0, 1.0, View::planner) <= 0.0);
-    }
+  ProblemOptions options;
+  options.robot = test::third_party_robots / "panda.urdf";
+  options.spheres = test::third_party_robots / "panda_spheres.json";
+  options.tip = "panda_grasptarget";
+  options.resolution_m = 0.04;
+  options.output = directory / "scene.json";
+  make_scene_from_problem(source, options);
+  const Json problem = read_json(source);
+  const Scene scene = read_scene(options.output);
+  CHECK(std::filesystem::equivalent(scene.robot.file, options.robot));
+  CHECK(std::filesystem::equivalent(*scene.robot.spheres, options.spheres));
+  CHECK(scene.robot.tip == "panda_grasptarget");
+  REQUIRE(scene.goals.size() == 1);
+  CHECK(scene.goals[0].q.size() == 7);
+  CHECK(scene.goals[0].q[2] == problem["goal"][2].get<double>());
+  CHECK(scene.start_q[3] == problem["start"][3].get<double>());
+  CHECK(scene.obstacles.size() == problem["obstacles"].size());
+  REQUIRE(scene.map);
+  // The map is marked by touch, so it holds every primitive: their centres are in contact.
+  const model::Model model(description::read_robot(options.robot, {options.tip, options.spheres}));
+  const auto environment = make_environment(scene, model, 2.0);  // some stand out of the arm's reach
+  CHECK(environment.summary().warnings.empty());
+  CHECK(environment.summary().within_reach.unknown == 0.0);
+  CHECK(environment.summary().within_reach.free > 0.9);
+  for (const Obstacle& o : scene.obstacles) {
+    CHECK(o.judge_only);
+    const std::vector<Vector3d> center{o.pose.p()};
+    const std::vector<double> radius{0.0};
+    CHECK(environment.clearance({center, radius}, 0.0, 1.0, View::planner) <= 0.0);
   }
   std::filesystem::remove_all(directory);
 }
 
+}  // namespace
+
+TEST_CASE("a motion-planning problem becomes a scene that reads back", "[scene][unit]") {
+  check_problem(own_problem);
+}
+
+TEST_CASE("problems of MotionBenchMaker become scenes that read back", "[scene][unit]") {
+  const auto problems = test::shared_data("problems");
+  if (!problems) return;
+  for (const char* name : {"bookshelf_small_0001.json", "table_pick_0001.json", "box_0001.json"})
+    check_problem(*problems / name);
+}
+
 TEST_CASE("what is no problem is refused with its place, and nothing is written", "[scene][unit]") {
-  const auto robots = test::shared_data("robots");
-  if (!robots) return;
   const auto directory = test::temporary("hamelin_scene_no_problem");
   std::filesystem::create_directories(directory);
   ProblemOptions options;
-  options.robot = *robots / "panda.urdf";
+  options.robot = test::third_party_robots / "panda.urdf";
   options.tip = "panda_grasptarget";
   options.resolution_m = 0.04;
   options.output = directory / "scene.json";
@@ -331,16 +342,14 @@ TEST_CASE("what is no problem is refused with its place, and nothing is written"
 }
 
 TEST_CASE("a problem's goal may be asked for as where the tip is then", "[scene][unit]") {
-  const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
-  if (!problems || !robots) return;
   const auto directory = test::temporary("hamelin_scene_goal");
   std::filesystem::create_directories(directory);
   ProblemOptions options;
-  options.robot = *robots / "panda.urdf";
+  options.robot = test::third_party_robots / "panda.urdf";
   options.tip = "panda_grasptarget";
   options.resolution_m = 0.04;
   options.output = directory / "scene.json";
-  const auto source = *problems / "box_0001.json";
+  const auto& source = own_problem;
   // the tip by the product of exponentials
   const auto robot = description::read_robot(options.robot, {options.tip, std::nullopt});
   const auto q = read_json(source)["goal"].get<std::vector<double>>();

@@ -12,6 +12,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/map_field.hpp"
+#include "hamelin/test/damaged_maps.hpp"
 #include "hamelin/test/scene_data.hpp"
 #include "hamelin/test/temporary.hpp"
 
@@ -93,36 +94,47 @@ TEST_CASE("inside the region a cropped map is the map, to OctoMap and in distanc
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("a crop to more than the map gives the map's own tree", "[scene][unit]") {
-  const auto directory = test::shared_data("maps");
-  if (!directory) return;
+namespace {
+
+void check_whole_crop(const std::filesystem::path& map) {
+  CAPTURE(map);
   CropOptions options;
   options.output = test::temporary("hamelin_scene_whole_crop.bt");
-  for (const std::string name : {"aurora.bt", "octomap_python_test.bt", "velma_world1.bt", "geb079.bt"}) {
-    CAPTURE(name);
-    options.map = *directory / name;
-    options.region = Ball{{0.0, 0.0, 0.0}, 1e6};
-    const CropReport report = crop_map(options);
-    const octomap::OcTree theirs(options.map.string()), ours(options.output.string());
-    octomap::OcTree pruned(theirs);
-    pruned.prune();
-    CHECK(ours.size() == pruned.size());
-    CHECK(ours == pruned);
-    CHECK(report.nodes == pruned.size());
-  }
+  options.map = map;
+  options.region = Ball{{0.0, 0.0, 0.0}, 1e6};
+  const CropReport report = crop_map(options);
+  const octomap::OcTree theirs(options.map.string()), ours(options.output.string());
+  octomap::OcTree pruned(theirs);
+  pruned.prune();
+  CHECK(ours.size() == pruned.size());
+  CHECK(ours == pruned);
+  CHECK(report.nodes == pruned.size());
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space as asked", "[scene][unit]") {
-  const auto directory = test::shared_data("bad_maps");
+}  // namespace
+
+TEST_CASE("a crop to more than the map gives the map's own tree", "[scene][unit]") {
+  for (const char* name : {"shelf.bt", "clutter.bt"}) check_whole_crop(test::data / "maps" / name);
+}
+
+TEST_CASE("a crop to more than a real map gives the map's own tree", "[scene][unit]") {
+  const auto directory = test::shared_data("maps");
   if (!directory) return;
+  for (const char* name : {"aurora.bt", "octomap_python_test.bt", "velma_world1.bt", "geb079.bt"})
+    check_whole_crop(*directory / name);
+}
+
+TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space as asked", "[scene][unit]") {
   CropOptions options;
   options.output = test::temporary("hamelin_scene_huge_crop.bt");
   options.region = Ball{{-0.3, -0.3, -0.3}, 0.1};
-  options.map = *directory / "e_rootocc.ot";
+  options.map = test::temporary("hamelin_scene_occupied_root.ot");
+  write_file_aside(options.map, test::occupied_root());
   crop_map(options);
   CHECK(read_map(options.output).occupied.size() == 8);  // a .bt has no root that is a leaf
-  options.map = *directory / "e_depth1occ.bt";
+  options.map = test::temporary("hamelin_scene_occupied_octant.bt");
+  write_file_aside(options.map, test::occupied_octant());
   options.region = Ball{{0.0, 0.0, 0.0}, 1.0};
   crop_map(options);
   const MapData kept = read_map(options.output);
@@ -132,12 +144,15 @@ TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space
   options.unknown_is_free = true;
   CHECK(crop_map(options).free_leaves == 7);
   CHECK(read_map(options.output).unknown.empty());
-  options.map = *directory / "e_mm.bt";
+  options.map = test::temporary("hamelin_scene_millimetre_map.bt");
+  write_file_aside(options.map, test::millimetre_map());
   CHECK_THROWS_WITH(crop_map(options), Catch::Contains("scale"));
   options.read.scale = 0.001;
   options.region = Ball{{0.0, 0.0, 0.0}, 10.0};
   crop_map(options);
   CHECK(read_map(options.output).resolution == 0.05);
+  for (const char* name : {"occupied_root.ot", "occupied_octant.bt", "millimetre_map.bt"})
+    std::filesystem::remove(test::temporary(std::string("hamelin_scene_") + name));
   std::filesystem::remove(options.output);
 }
 

@@ -21,6 +21,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/test/damaged_maps.hpp"
 #include "hamelin/test/scene_data.hpp"
 
 namespace {
@@ -45,7 +46,28 @@ std::filesystem::path write_temporary(const std::string& name, const std::string
 
 }  // namespace
 
-TEST_CASE("every corrupt map ends as wanted, in one line that names file and place", "[scene][unit]") {
+TEST_CASE("every damaged map is refused in one line that names file and place", "[scene][unit]") {
+  std::size_t refused = 0;
+  for (const test::MapCase& map : test::map_cases()) {
+    const auto file = write_temporary("hamelin_" + map.name, map.bytes);
+    const std::string message = refusal(file);
+    CAPTURE(map.name, message);
+    CHECK(message.empty() == map.accepted);
+    if (!map.accepted) {
+      ++refused;
+      CHECK(message.rfind(file.string() + ": ", 0) == 0);
+      CHECK(message.find('\n') == std::string::npos);
+      const bool placed = message.find("byte ") != std::string::npos || message.find("header") != std::string::npos ||
+                          message.find("resolution 50 ") != std::string::npos;
+      CHECK(placed);
+      CHECK_THAT(message, Catch::Contains(map.says));
+    }
+    std::filesystem::remove(file);
+  }
+  CHECK(refused >= 35);
+}
+
+TEST_CASE("every map of the collection of corrupt ones ends as wanted", "[scene][unit]") {
   const auto directory = test::shared_data("bad_maps");
   if (!directory) return;
   std::ifstream index(*directory / "INDEX.tsv");
@@ -77,25 +99,25 @@ TEST_CASE("every corrupt map ends as wanted, in one line that names file and pla
 }
 
 TEST_CASE("an all-occupied map is one box and a warning", "[scene][unit]") {
-  const auto directory = test::shared_data("bad_maps");
-  if (!directory) return;
-  const auto root = read_map(*directory / "e_rootocc.ot");
+  const auto root_file = write_temporary("hamelin_root_occupied.ot", test::occupied_root());
+  const auto octant_file = write_temporary("hamelin_octant_occupied.bt", test::occupied_octant());
+  const auto root = read_map(root_file);
   REQUIRE(root.occupied.size() == 1);
   CHECK(root.occupied[0].lo == std::array<std::int32_t, 3>{-32768, -32768, -32768});
   CHECK(root.occupied[0].size == 65536);
   CHECK(root.unknown.empty());
   CHECK_FALSE(root.warnings.empty());
-  const auto octant = read_map(*directory / "e_depth1occ.bt");
+  const auto octant = read_map(octant_file);
   REQUIRE(octant.occupied.size() == 1);
   CHECK(octant.occupied[0].size == 32768);
   CHECK(octant.unknown.size() == 7);
   CHECK_FALSE(octant.warnings.empty());
+  std::filesystem::remove(root_file);
+  std::filesystem::remove(octant_file);
 }
 
 TEST_CASE("a map above 0.5 m resolution is read only with an explicit scale", "[scene][unit]") {
-  const auto directory = test::shared_data("bad_maps");
-  if (!directory) return;
-  const auto file = *directory / "e_mm.bt";
+  const auto file = write_temporary("hamelin_millimetres.bt", test::millimetre_map());
   CHECK(refusal(file).find("scale") != std::string::npos);
   CHECK(read_map(file, {0.001, 0.5}).resolution == Approx(0.05));
   CHECK_FALSE(read_map(file, {1.0, 0.5}).warnings.empty());
@@ -103,6 +125,63 @@ TEST_CASE("a map above 0.5 m resolution is read only with an explicit scale", "[
   const auto tiny = read_map(file, {1e-6, 0.5});
   CHECK(std::any_of(tiny.warnings.begin(), tiny.warnings.end(),
                     [](const std::string& w) { return w.find("below 0.001") != std::string::npos; }));
+  std::filesystem::remove(file);
+}
+
+namespace {
+
+// Leaves and counts of a map against OctoMap's own reader.
+void check_against_octomap(const std::filesystem::path& file, double scale) {
+  CAPTURE(file);
+  const auto map = read_map(file, {scale, 0.5});
+  std::unique_ptr<octomap::OcTree> tree;
+  if (file.extension() == ".bt") {
+    tree = std::make_unique<octomap::OcTree>(file.string());
+  } else {
+    tree.reset(dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(file.string())));
+  }
+  REQUIRE(tree);
+  // In the same order, too: its iterator goes depth first.
+  using Key = std::tuple<int, int, int, int>;
+  std::vector<Key> theirs, ours;
+  std::size_t free_leaves = 0;
+  for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf) {
+    if (!tree->isNodeOccupied(*leaf)) {
+      ++free_leaves;
+      continue;
+    }
+    const auto key = leaf.getIndexKey();
+    theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
+  }
+  for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
+  CHECK((ours == theirs));
+  CHECK(map.free.empty());
+  CHECK(map.occupied.capacity() + map.unknown.capacity() == map.occupied.size() + map.unknown.size());
+  const auto whole = read_map(file, {scale, 0.5, true});
+  CHECK(whole.free.size() == free_leaves);
+  CHECK(whole.occupied.size() == map.occupied.size());
+  CHECK(map.free_leaves == free_leaves);
+  CHECK(map.node_count == tree->size());
+  CHECK(map.resolution == Approx(tree->getResolution() * scale));
+  // Occupied, free and unknown cells fill the cube.
+  double unknown = 0.0, known = 0.0;
+  for (const Cell& cell : map.unknown) unknown += std::pow(static_cast<double>(cell.size), 3);
+  for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf)
+    known += std::pow(2.0, 3.0 * (16 - static_cast<int>(leaf.getDepth())));
+  CHECK(unknown + known == std::pow(2.0, 48));
+}
+
+}  // namespace
+
+TEST_CASE("leaves of our maps are those of OctoMap's own reader, as .bt and as .ot", "[scene][unit]") {
+  for (const char* name : {"shelf.bt", "clutter.bt"}) {
+    const auto file = test::data / "maps" / name;
+    check_against_octomap(file, 1.0);
+    const auto written = std::filesystem::temp_directory_path() / "hamelin_scene_written.ot";
+    REQUIRE(octomap::OcTree(file.string()).write(written.string()));
+    check_against_octomap(written, 0.5);
+    std::filesystem::remove(written);
+  }
 }
 
 TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][unit]") {
@@ -112,46 +191,7 @@ TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][
       {"aurora.bt", 1.0},      {"coal_env.bt", 0.001},          {"drone_orbslam3.bt", 1.0},
       {"geb079.bt", 1.0},      {"octomap_python_test.bt", 1.0}, {"velma_hanas.bt", 1.0},
       {"velma_hanas.ot", 1.0}, {"velma_world1.bt", 1.0}};
-  for (const auto& [name, scale] : maps) {
-    CAPTURE(name);
-    const auto file = (*directory / name).string();
-    const auto map = read_map(file, {scale, 0.5});
-    std::unique_ptr<octomap::OcTree> tree;
-    if (name.ends_with(".bt")) {
-      tree = std::make_unique<octomap::OcTree>(file);
-    } else {
-      tree.reset(dynamic_cast<octomap::OcTree*>(octomap::AbstractOcTree::read(file)));
-    }
-    REQUIRE(tree);
-    // In the same order, too: its iterator goes depth first.
-    using Key = std::tuple<int, int, int, int>;
-    std::vector<Key> theirs, ours;
-    std::size_t free_leaves = 0;
-    for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf) {
-      if (!tree->isNodeOccupied(*leaf)) {
-        ++free_leaves;
-        continue;
-      }
-      const auto key = leaf.getIndexKey();
-      theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
-    }
-    for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
-    CHECK((ours == theirs));
-    CHECK(map.free.empty());
-    CHECK(map.occupied.capacity() + map.unknown.capacity() == map.occupied.size() + map.unknown.size());
-    const auto whole = read_map(file, {scale, 0.5, true});
-    CHECK(whole.free.size() == free_leaves);
-    CHECK(whole.occupied.size() == map.occupied.size());
-    CHECK(map.free_leaves == free_leaves);
-    CHECK(map.node_count == tree->size());
-    CHECK(map.resolution == Approx(tree->getResolution() * scale));
-    // Occupied, free and unknown cells fill the cube.
-    double unknown = 0.0, known = 0.0;
-    for (const Cell& cell : map.unknown) unknown += std::pow(static_cast<double>(cell.size), 3);
-    for (auto leaf = tree->begin_leafs(), end = tree->end_leafs(); leaf != end; ++leaf)
-      known += std::pow(2.0, 3.0 * (16 - static_cast<int>(leaf.getDepth())));
-    CHECK(unknown + known == std::pow(2.0, 48));
-  }
+  for (const auto& [name, scale] : maps) check_against_octomap(*directory / name, scale);
 }
 
 TEST_CASE("the occupancy threshold grades a .ot", "[scene][unit]") {

@@ -14,7 +14,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/make.hpp"
-#include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/damaged_maps.hpp"
 
 namespace {
 
@@ -231,10 +231,10 @@ TEST_CASE("a self-filter without shapes, or with voxels far too fine, is refused
   MapSpec spec = painted.spec;
   spec.self_filter_padding_m = 0.02;
   CHECK_THAT(refusal(spec, 0.8), Catch::Contains("no collision shapes"));
-  const auto directory = test::shared_data("bad_maps");
-  if (!directory) return;
-  spec.file = *directory / "e_rootocc.ot";
+  spec.file = std::filesystem::temp_directory_path() / "hamelin_scene_region_root.ot";
+  write_file_aside(spec.file, test::occupied_root());
   spec.scale = 1e-3;
   const SmallRobot robot;
   CHECK_THROWS_WITH(read_region(spec, {}, 0.8, 0.1, robot.at_start()), Catch::Contains("too fine"));
+  std::filesystem::remove(spec.file);
 }

@@ -193,15 +193,16 @@ TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
   CHECK(resolved_json(scene)["base"]["quaternion_wxyz"] == Json{1.0, 0.0, 0.0, 0.0});
 }
 
-TEST_CASE("the format's own example is read", "[scene][unit]") {
-  const auto file = std::filesystem::path(HAMELIN_SOURCE_DIR) / ".." / "shared" / "examples" / "scene.json";
-  if (!std::filesystem::exists(file)) {
-    WARN("skipped: no " << file.string());
-    return;
+TEST_CASE("the scenes of data are read", "[scene][unit]") {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(test::data / "scenes")) {
+    CAPTURE(entry.path());
+    const Scene scene = read_scene(entry.path());
+    CHECK(std::filesystem::exists(scene.robot.file));
+    if (scene.planner) CHECK_FALSE(scene.goals.empty());
+    ++count;
   }
-  const Scene scene = read_scene(file);
-  CHECK(scene.goals.size() == 3);
-  CHECK(scene.obstacles.at(0).name == "ball");
+  CHECK(count >= 6);
 }
 
 TEST_CASE("bad scenes are refused in one line that names file, place and what was expected", "[scene][unit]") {

@@ -10,6 +10,7 @@
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/self_collision.hpp"
+#include "hamelin/test/scene_data.hpp"
 
 using namespace hamelin;
 using namespace hamelin::scene;
@@ -131,11 +132,7 @@ void check_against_brute_force(const model::Robot& robot) {
 
 TEST_CASE("distances of the arm to itself are those of all sphere pairs, the Panda with its base and hand",
           "[scene][self]") {
-  const fs::path robots = fs::path(HAMELIN_SOURCE_DIR "/../shared/data/robots");
-  if (!fs::exists(robots)) {
-    WARN("no shared robots here: skipped");
-    return;
-  }
+  const fs::path robots = test::third_party_robots;
   const model::Robot robot =
       description::read_robot(robots / "panda.urdf", {"panda_grasptarget", robots / "panda_spheres.json"});
   check_against_brute_force(robot);

@@ -71,6 +71,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
       goals_(scene.goals, scene.stall, model_),
       noise_(scene.seed),
       q_measured_(VectorXd::Zero(model_.dof())) {
+  result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = find_planner(scene, plugin_directories);
   planner_params_ =
       in_scene(scene, "/planner/params", [&] { return planning::check_params(plugin, scene.planner->params); });
@@ -188,8 +189,8 @@ void ClosedLoop::decide() {
   const auto& state = arm_.state;
   if (!arm_.v.allFinite() || !state.q.allFinite())
     return finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state.k));
-  if (touching_)
-    return finish(state.k == 0 ? log::Outcome::refused : log::Outcome::collision, world_->describe_contact());
+  if (touching_ && state.k > 0) return finish(log::Outcome::collision, world_->describe_contact());
+  if (touching_) return refuse();
   if (done_) return;
   while (goals_.advance(world_->poses(), state.q, arm_.v))
     recorder_->event(state.time_s, fmt::format("goal {} of {} reached", goals_.index(), goals_.size()));
@@ -201,6 +202,12 @@ void ClosedLoop::decide() {
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(state.k))
     finish(log::Outcome::interrupted, "stopped from outside");
+}
+
+void ClosedLoop::refuse() {
+  std::string cause = world_->describe_contact();
+  if (world_->clearance_m() > 0.0) cause += fmt::format("; {}", scene::self_contact_remedy(scene_.robot));
+  finish(log::Outcome::refused, std::move(cause));
 }
 
 bool ClosedLoop::call_planner() {

@@ -36,6 +36,8 @@ class ClosedLoop {
   void change_map();
   /// Whether the run is over at this node.
   void decide();
+  /// Ends a run whose start is in contact.
+  void refuse();
   /// The planner's answer for this node. @return false if it failed
   bool call_planner();
   void ask_planner();

@@ -73,6 +73,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
 
   log::Result result;
   result.scene = motion.name;
+  result.warnings = model::warnings(model.robot());
   result.provenance = log::provenance(motion.inputs, watch.argv);
   Recorder recorder(result, watch, *integrator, motion.options);
   recorder.header({{"program", "integrate"},

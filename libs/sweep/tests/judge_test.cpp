@@ -263,14 +263,13 @@ TEST_CASE("between two nodes the judge looks at every hundredth of a radian, wit
 TEST_CASE("the judge's pairs of the arm itself and their distances are those of the other implementation",
           "[sweep][unit]") {
   std::vector<scene::Scene> scenes{scene_of({{"model", {{"self_collision", true}}}})};
-  if (const auto shared = test::shared_data("robots"))
-    scenes.push_back(scene::scene_from_json({{"schema", "hamelin.scene/1"},
-                                             {"robot",
-                                              {{"file", (*shared / "panda.urdf").string()},
-                                               {"tip", "panda_grasptarget"},
-                                               {"spheres", (*shared / "panda_spheres.json").string()}}},
-                                             {"model", {{"self_collision", true}}}},
-                                            source_dir, "panda"));
+  scenes.push_back(scene::scene_from_json({{"schema", "hamelin.scene/1"},
+                                           {"robot",
+                                            {{"file", (test::third_party_robots / "panda.urdf").string()},
+                                             {"tip", "panda_grasptarget"},
+                                             {"spheres", (test::third_party_robots / "panda_spheres.json").string()}}},
+                                           {"model", {{"self_collision", true}}}},
+                                          source_dir, "panda"));
   for (const auto& scene : scenes) {
     CAPTURE(scene.name);
     const model::Model model = simulation::load_model(scene);

@@ -145,6 +145,24 @@ TEST_CASE("each command's help opens with examples that are right, in lines of a
   }
 }
 
+TEST_CASE("without arguments the program prints what it is, its commands and where to go on", "[manners]") {
+  Bench bench;
+  const auto overview = bench.run({});
+  CHECK(overview.exit_code == 0);
+  CHECK(overview.err.empty());
+  const auto lines = lines_of(overview.out);
+  CHECK(lines.size() < 40);
+  for (const auto& line : lines) CHECK(line.size() <= 100);
+  CHECK_THAT(lines.at(0), Catch::StartsWith("hamelin ") && Catch::Contains("robot arms"));
+  for (const auto& command : commands(bench))
+    if (command.size() == 1)
+      CHECK(std::any_of(lines.begin(), lines.end(),
+                        [&](const std::string& line) { return line.starts_with("  " + command[0] + " "); }));
+  CHECK_THAT(lines.back(), Catch::Contains("hamelin COMMAND --help") && Catch::Contains("hamelin help"));
+  // options alone are no bare call
+  CHECK(bench.run({"-q"}).exit_code == 2);
+}
+
 TEST_CASE("a slip in a command, an option or a value is answered with the nearest name", "[manners]") {
   struct Slip {
     Words arguments;

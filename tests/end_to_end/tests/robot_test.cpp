@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <sstream>
 
 #include "../program.hpp"
 #include "hamelin/test/scene_data.hpp"
@@ -26,6 +28,22 @@ constexpr const char* arm = R"(<robot name="drum">
  <joint name="j3" type="revolute"><origin xyz="0 0 0.5"/><parent link="rod"/><child link="box"/><axis xyz="1 0 0"/>
   <limit lower="0.5" upper="2.5" effort="50" velocity="2"/></joint>
 </robot>)";
+
+// A sidecar as it would be without its list of pairs.
+void drop_list(Bench& bench, const std::string& sidecar) {
+  Json document = bench.json(sidecar);
+  REQUIRE(document.erase("self_collision_disabled") == 1);
+  bench.put(sidecar, document.dump());
+}
+
+// arm6 goes a little way, close to its rest pose, where the shapes over its joints overlap.
+Json arm6_scene(const std::string& spheres) {
+  return {{"schema", "hamelin.scene/1"},
+          {"robot", {{"file", "data/robots/arm6.urdf"}, {"spheres", spheres}}},
+          {"start", {{"q", {0.0, 0.3, 0.8, 0.2, 0.0, 0.0}}}},
+          {"goals", {{{"type", "joint"}, {"q", {0.1, 0.35, 0.9, 0.2, 0.0, 0.1}}}}},
+          {"model", {{"self_collision", true}}}};
+}
 
 bool one_line_error(const test::Output& output) {
   return output.exit_code == 2 && output.out.empty() && test::lines_of(output.err).size() == 1;
@@ -102,7 +120,8 @@ TEST_CASE("robot check finds overlaps at rest, and the list it writes makes it c
   Bench bench;
   bench.put("arm.urdf", arm);
   REQUIRE(bench.run({"robot", "fit", "arm.urdf", "-o", "s.json"}).exit_code == 0);
-  // an empty-handed list switches the rule for neighbours off
+  drop_list(bench, "s.json");
+  // a list that names other pairs switches the rule for neighbours off
   bench.put("one.srdf",
             "<robot name=\"drum\"><disable_collisions link1=\"base\" link2=\"box\" reason=\"Never\"/></robot>");
   const Json strict = test::run_json(
@@ -180,11 +199,98 @@ TEST_CASE("a scene's robot.srdf reaches the run: its hash is logged and the log 
   CHECK_THAT(absent.err, Catch::Contains("absent.srdf"));
 }
 
-TEST_CASE("the public Panda's SRDF and spheres are read together", "[end_to_end]") {
-  const auto robots = test::shared_data("robots");
-  if (!robots) return;
+TEST_CASE("an arm with shapes on some links only is fitted and runs: what always touches is listed", "[end_to_end]") {
   Bench bench;
-  const auto path = [&](const char* name) { return (fs::canonical(*robots) / name).string(); };
+  const Json made = test::run_json(bench, {"robot", "fit", "data/robots/arm6.urdf", "-o", "arm6.spheres.json"});
+  const auto reason_of = [&](const std::string& a, const std::string& b) {
+    for (const Json& pair : made["self_collision"]["pairs"])
+      if (pair["links"] == Json::array({a, b})) return pair["reason"].get<std::string>();
+    return std::string("none");
+  };
+  CHECK(reason_of("base", "link2") == "Adjacent");  // link1 between them has no shapes
+  CHECK(reason_of("link2", "link3") == "Adjacent");
+  CHECK(reason_of("link3", "link5") == "Adjacent");
+  CHECK(reason_of("base", "link3") == "none");
+  CHECK(reason_of("base", "link6") == "none");
+  CHECK(made["self_collision"]["samples"] == 10000);
+  CHECK(bench.json("arm6.spheres.json")["self_collision_disabled"].size() == made["self_collision"]["pairs"].size());
+  CHECK_THAT(bench.run({"robot", "fit", "data/robots/arm6.urdf", "-o", "again.json"}).out,
+             Catch::Contains("pairs of links never count as colliding") && Catch::Contains("base - link2: Adjacent"));
+  CHECK((bench.text("again.json") == bench.text("arm6.spheres.json")));
+
+  bench.put("scene.json", arm6_scene("arm6.spheres.json").dump());
+  const Json result = test::run_json(bench, {"run", "scene.json", "--planner", "hybrid", "--duration", "5"});
+  CHECK(result["outcome"] == "reached");
+  CHECK(result["min_self_clearance_m"].get<double>() > 0.0);
+}
+
+TEST_CASE("a start refused for self-contact names the command that helps, and it does", "[end_to_end]") {
+  Bench bench;
+  REQUIRE(bench.run({"robot", "fit", "data/robots/arm6.urdf", "-o", "s.json"}).exit_code == 0);
+  drop_list(bench, "s.json");
+  bench.put("scene.json", arm6_scene("s.json").dump());
+  const std::vector<std::string> command{"run", "scene.json", "--planner", "hybrid", "--duration", "0.05"};
+  const auto refused = bench.run(command);
+  CHECK(refused.exit_code == 2);
+  const std::string open = "`hamelin ", close = "`";
+  const auto begin = refused.err.find(open) + open.size();
+  CAPTURE(refused.err);
+  REQUIRE(begin != std::string::npos);
+  std::istringstream named(refused.err.substr(begin, refused.err.find(close, begin) - begin));
+  const std::vector<std::string> helps{std::istream_iterator<std::string>(named), {}};
+  REQUIRE(helps.size() > 4);
+  CHECK(helps[0] == "robot");
+  CHECK(helps[1] == "check");
+  CHECK(bench.run(helps).exit_code == 1);  // it finds the overlaps
+  CHECK(bench.has(helps.back()));
+  bench.put("scene.json", arm6_scene(helps.back()).dump());
+  CHECK(bench.run(command).exit_code == 1);  // ran, but the time is too short
+}
+
+TEST_CASE("moments against the triangle inequality warn wherever the robot is used, --strict refuses", "[end_to_end]") {
+  Bench bench;
+  std::string text = arm;
+  const std::string good = "izz=\"0.01\"";
+  text.replace(text.find(good), good.size(), "izz=\"0.03\"");
+  bench.put("arm.urdf", text);
+  const std::string warning = "link 'drum': inertia breaks the triangle inequality";
+  CHECK_THAT(bench.run({"robot", "info", "arm.urdf"}).out, Catch::Contains("\nwarning: " + warning));
+  CHECK_THAT(bench.run({"robot", "check", "arm.urdf", "--samples", "10"}).out,
+             Catch::Contains("\nwarning: " + warning));
+  const auto valid = bench.run({"validate", "arm.urdf"});
+  CHECK(valid.exit_code == 0);
+  CHECK_THAT(valid.err, Catch::Contains("note: arm.urdf: " + warning));
+  for (const auto& command : std::vector<std::vector<std::string>>{{"robot", "info", "arm.urdf", "--strict"},
+                                                                   {"robot", "check", "arm.urdf", "--strict"},
+                                                                   {"validate", "arm.urdf", "--strict"}}) {
+    const auto output = bench.run(command);
+    CAPTURE(command, output.err, output.out);
+    CHECK(one_line_error(output));
+    CHECK_THAT(output.err, Catch::Contains("arm.urdf: line 3: " + warning));
+  }
+
+  // runs carry it in their result
+  const auto fall = bench.run({"integrate", "arm.urdf", "--duration", "0.01", "--result", "fall.json"});
+  CHECK(fall.exit_code == 0);
+  CHECK_THAT(fall.err, Catch::Contains("note: arm.urdf: " + warning));
+  CHECK_THAT(bench.json("fall.json")["warnings"].dump(), Catch::Contains(warning));
+  const Json scene = {{"schema", "hamelin.scene/1"},
+                      {"robot", {{"file", "arm.urdf"}}},
+                      {"start", {{"q", {0.0, 0.3, 1.0}}}},
+                      {"goals", {{{"type", "joint"}, {"q", {0.2, 0.4, 1.1}}}}}};
+  bench.put("scene.json", scene.dump());
+  const auto run =
+      bench.run({"run", "scene.json", "--planner", "hybrid", "--duration", "0.05", "--result", "run.json"});
+  CAPTURE(run.err);
+  CHECK(run.exit_code == 1);
+  CHECK_THAT(bench.json("run.json")["warnings"].dump(), Catch::Contains(warning));
+  CHECK(bench.run({"validate", "scene.json"}).exit_code == 0);
+  CHECK(bench.run({"validate", "scene.json", "--strict"}).exit_code == 2);
+}
+
+TEST_CASE("the public Panda's SRDF and spheres are read together", "[end_to_end]") {
+  Bench bench;
+  const auto path = [&](const char* name) { return (test::third_party_robots / name).string(); };
   const Json info = test::run_json(bench, {"robot", "info", path("panda.urdf"), "--tip", "panda_grasptarget",
                                            "--spheres", path("panda_spheres.json"), "--srdf", path("panda.srdf")});
   CHECK(std::any_of(info["notes"].begin(), info["notes"].end(),

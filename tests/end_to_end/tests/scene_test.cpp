@@ -205,14 +205,13 @@ TEST_CASE("unknown space that blocks is refused in a map that knows no free spac
 }
 
 TEST_CASE("a problem becomes a scene whose arm knows free space all around", "[end_to_end]") {
-  const auto problems = test::shared_data("problems"), robots = test::shared_data("robots");
-  if (!problems || !robots) return;
+  const fs::path problem_file = fs::path(HAMELIN_SOURCE_DIR) / "libs/scene/tests/data/cabinet.problem.json";
+  const fs::path& robots = test::third_party_robots;
   Bench bench;
   for (const char* mark : {"touch", "centre"}) {
-    const auto output =
-        bench.run({"scene", "make", (*problems / "box_0001.json").string(), "--robot",
-                   (*robots / "panda.urdf").string(), "--spheres", (*robots / "panda_spheres.json").string(), "--tip",
-                   "panda_grasptarget", "--resolution", "0.01", "--mark", mark, "-o", "scene.json"});
+    const auto output = bench.run({"scene", "make", problem_file.string(), "--robot", (robots / "panda.urdf").string(),
+                                   "--spheres", (robots / "panda_spheres.json").string(), "--tip", "panda_grasptarget",
+                                   "--resolution", "0.01", "--mark", mark, "-o", "scene.json"});
     CAPTURE(output.err);
     REQUIRE(output.exit_code == 0);
     const Json info = test::run_json(bench, {"scene", "info", "scene.json"});
@@ -221,11 +220,11 @@ TEST_CASE("a problem becomes a scene whose arm knows free space all around", "[e
     CHECK_FALSE(some(info["warnings"], "free leaf"));
     CHECK(info["obstacles"] == bench.json("scene.json")["obstacles"].size());
   }
-  Json problem = read_json(*problems / "box_0001.json");
+  Json problem = read_json(problem_file);
   problem["obstacles"][2]["type"] = "mesh";
   bench.put("problem.json", problem.dump());
-  const auto refused = bench.run({"scene", "make", "problem.json", "--robot", (*robots / "panda.urdf").string(),
-                                  "--tip", "panda_grasptarget", "-o", "none.json"});
+  const auto refused = bench.run({"scene", "make", "problem.json", "--robot", (robots / "panda.urdf").string(), "--tip",
+                                  "panda_grasptarget", "-o", "none.json"});
   CHECK(refused.exit_code == 2);
   CHECK_THAT(refused.err, Catch::Contains("problem.json: /obstacles/2/type: is \"mesh\""));
   CHECK_FALSE(fs::exists(bench.path("none.bt")));

@@ -20,6 +20,10 @@ struct RobotOptions {
   /// SRDF whose disabled pairs join those of the sidecar and of the file (see srdf.hpp). URDF: each link it names must
   /// exist; of a JSON robot, which does not know all links of what it was made from, unknown pairs are passed over.
   std::optional<std::filesystem::path> srdf{};
+  /// Refuse inertias against the triangle inequality instead of noting a warning.
+  bool strict = false;
+  /// The content of such a sidecar, where it is in no file (yet); `spheres` then does not count.
+  std::optional<Json> sidecar{};
 };
 
 /// Reads a robot from a .urdf or a .json file (schema "robot") and checks it. What was lumped, locked or skipped stands

@@ -25,6 +25,7 @@ struct LinkShape {
 struct LinkGeometry {
   std::string name;
   int line = 0;
+  std::string parent;  ///< the link whose joint carries this one; empty: none, this is the root
   std::vector<LinkShape> collision, visual;
 };
 

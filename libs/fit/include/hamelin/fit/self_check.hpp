@@ -16,7 +16,7 @@ struct SelfCheckOptions {
 /// Two parts of a robot that move against each other: links, or what was lumped into one or into the base.
 struct PartPair {
   std::string part_a, part_b;
-  bool neighbours = false;  ///< on bodies that one joint connects
+  bool neighbours = false;  ///< on bodies that one joint connects, or several with no shapes between
   bool checked = false;     ///< what scene::SelfField looks at; else `reason` says why not
   std::string reason;
   double rest_m = 0.0;   ///< distance of the surfaces at rest [m]; zero or below is contact
@@ -36,10 +36,16 @@ struct SelfCheck {
   /// Pairs that are checked and touch at rest.
   [[nodiscard]] std::vector<PartPair> faults() const;
   /// What a user would list as disabled, as MoveIt's setup assistant does, with the reasons it gives: what is listed
-  /// already, neighbours that touch ("Adjacent"), what touches in all samples ("Always") or at rest ("Default"); and,
-  /// if `never`, what touched in none ("Never"), which no number of samples proves.
+  /// already, neighbours that touch ("Adjacent"), what touches in nearly all samples ("Always") or at rest ("Default");
+  /// and, if `never`, what touched in none ("Never"), which no number of samples proves.
   [[nodiscard]] std::vector<description::DisabledPair> disabled(bool never) const;
 };
+
+/// The share of samples in contact from which a pair counts as always in contact, as in MoveIt's setup assistant.
+inline constexpr double always_share_min = 0.95;
+
+/// "Always" or "Default" (at rest) if a pair's contacts say that its shapes overlap by construction; else empty.
+[[nodiscard]] std::string contact_reason(const PartPair& pair, int samples);
 
 /// Distances of all pairs of parts at rest and over random configurations, by the product of exponentials. Joints
 /// without limits turn through [−π, π] or slide through [−1, 1] m.

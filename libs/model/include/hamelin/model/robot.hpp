@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -50,7 +51,9 @@ struct Link {
   Joint joint;
   geometry::SE3 com;  ///< pose of the COM frame in the base frame at q = 0
   double mass_kg = 0.0;
-  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the COM, in the COM frame
+  /// About the COM, in the COM frame. What differs across the diagonal by no more than 1e-12 of the largest entry, as
+  /// products R I Rᵀ do, counts as symmetric; its symmetric part is used.
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
   std::vector<Sphere> spheres;
   std::vector<Segment> segments;
 };
@@ -78,12 +81,26 @@ struct Robot {
 };
 
 /// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws,
-/// inertia about its joint in whatever a joint moves, inertias positive with the triangle inequality, finite numbers,
-/// lower < upper, each part on one body only, disabled pairs of parts that are there.
+/// inertia about its joint in whatever a joint moves, symmetric inertias with positive principal moments wherever there
+/// is mass, finite numbers, lower < upper, each part on one body only, disabled pairs of parts that are there. Moments
+/// against the triangle inequality, which no body has, make a positive definite mass matrix and pass: readers warn.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 
-/// How a matrix fails to be the inertia of a body: empty if it is one. `strict`: definite, not only semi-definite.
-[[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool strict);
+/// Why no mass matrix can be made of an inertia: empty if one can. `definite`: its moments must be positive, else
+/// they may be zero.
+[[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool definite);
+
+/// How principal moments tell that no body has them: empty if one may.
+[[nodiscard]] std::string triangle_fault(const Eigen::Matrix3d& inertia);
+
+/// Begins the notes that warn.
+inline constexpr std::string_view warning_prefix = "warning: ";
+
+/// The notes that warn, without that beginning: what a reader takes though it is doubtful.
+[[nodiscard]] std::vector<std::string> warnings(const Robot& robot);
+
+/// (I + Iᵀ)/2; I itself, to the bit, if it is symmetric.
+[[nodiscard]] Eigen::Matrix3d symmetric_part(const Eigen::Matrix3d& inertia);
 
 }  // namespace hamelin::model

@@ -87,6 +87,12 @@ class SelfField {
   std::string note_;
 };
 
+struct RobotRef;
+
+/// The command that finds pairs of parts that touch by construction and lists them as disabled: what helps where a
+/// start is refused for them.
+[[nodiscard]] std::string self_contact_remedy(const RobotRef& robot);
+
 /// The nearest points of two segments, each given by its centre and half axis (zero for a point): where on the axes,
 /// −1 to 1. Parallel and degenerate segments give one pair of the nearest, always the same.
 struct AxisPair {

@@ -1,0 +1,115 @@
+#include "hamelin/fit/self_pairs.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/description/urdf_geometry.hpp"
+
+namespace hamelin::fit {
+
+namespace {
+
+using Pair = std::pair<std::size_t, std::size_t>;  // indices of links, the first below the second
+
+// The links of a URDF as a graph: who is joined to whom, and who bears shapes.
+class Links {
+ public:
+  Links(const std::filesystem::path& urdf, const Json& sidecar) {
+    const auto geometry = description::read_urdf_geometry(urdf);
+    for (const description::LinkGeometry& link : geometry) {
+      index_.emplace(link.name, names.size());
+      names.push_back(link.name);
+    }
+    joined_.resize(names.size());
+    leaf_.assign(names.size(), true);
+    for (const description::LinkGeometry& link : geometry) {
+      if (link.parent.empty()) continue;
+      const std::size_t a = index_.at(link.name), b = index_.at(link.parent);
+      joined_[a].push_back(b);
+      joined_[b].push_back(a);
+      leaf_[b] = false;
+    }
+    bears_shapes_.assign(names.size(), false);
+    for (const char* key : {"links", "capsules"})
+      if (sidecar.contains(key))
+        for (const auto& [name, list] : sidecar[key].items())
+          if (const auto at = index_.find(name); at != index_.end() && !list.empty()) bears_shapes_[at->second] = true;
+  }
+
+  [[nodiscard]] Pair pair(const std::string& a, const std::string& b) const {
+    return std::minmax({index_.at(a), index_.at(b)});
+  }
+
+  [[nodiscard]] std::vector<std::string> leaves() const {
+    std::vector<std::string> out;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (leaf_[i]) out.push_back(names[i]);
+    return out;
+  }
+
+  // Pairs with shapes that are joined directly or across links without any.
+  [[nodiscard]] std::set<Pair> adjacent() const {
+    std::set<Pair> out;
+    for (std::size_t start = 0; start < names.size(); ++start) {
+      if (!bears_shapes_[start]) continue;
+      std::set<std::size_t> seen{start};
+      std::vector<std::size_t> open{start};
+      while (!open.empty()) {
+        const std::size_t at = open.back();
+        open.pop_back();
+        for (const std::size_t next : joined_[at]) {
+          if (!seen.insert(next).second) continue;
+          if (bears_shapes_[next])
+            out.insert(std::minmax({start, next}));
+          else
+            open.push_back(next);
+        }
+      }
+    }
+    return out;
+  }
+
+  std::vector<std::string> names;
+
+ private:
+  std::map<std::string, std::size_t> index_;
+  std::vector<std::vector<std::size_t>> joined_;
+  std::vector<bool> leaf_, bears_shapes_;
+};
+
+}  // namespace
+
+SelfPairs pairs_to_disable(const std::filesystem::path& urdf, const Json& sidecar,
+                           const std::optional<std::string>& tip, const SelfCheckOptions& options) {
+  SelfPairs out;
+  const Links links(urdf, sidecar);
+  std::map<Pair, std::string> reasons;  // empty: on the way to some leaf there is none
+  for (const std::string& leaf : tip ? std::vector<std::string>{*tip} : links.leaves()) {
+    description::RobotOptions robot;
+    robot.tip = leaf;
+    robot.sidecar = sidecar;
+    try {
+      const SelfCheck check = check_self(description::read_robot(urdf, robot), {}, options);
+      for (const PartPair& parts : check.pairs) {
+        const std::string reason = contact_reason(parts, check.samples);
+        const auto [before, is_new] = reasons.emplace(links.pair(parts.part_a, parts.part_b), reason);
+        if (!is_new && reason.empty()) before->second.clear();
+      }
+    } catch (const Error& error) {
+      if (tip) throw;
+      out.notes.push_back(fmt::format("self-collision on the way to '{}' is not sampled: {}", leaf, error.what()));
+    }
+  }
+  for (const Pair& pair : links.adjacent()) reasons[pair] = "Adjacent";
+  for (const auto& [pair, reason] : reasons)
+    if (!reason.empty()) out.pairs.push_back({links.names[pair.first], links.names[pair.second], reason, 0});
+  return out;
+}
+
+}  // namespace hamelin::fit
