@@ -45,15 +45,16 @@ endif()
 set(HAMELIN_FMT_INLINE $<BUILD_INTERFACE:fmt::fmt-header-only>)
 
 # hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen] [PRIVATE_LINKS ...]
-#                 [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...])
+#                 [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD])
 #
 # PACKAGES are what find_package(hamelin COMPONENTS NAME) must find for the libraries in LINKS and PRIVATE_LINKS; tests
-# may use libraries below it, TEST_LINKS.
+# may use libraries below it, TEST_LINKS. COLD: no time is spent here that anyone waits for, so the compiler spends less
+# on it too.
 # Makes hamelin::NAME from the folder it is called in: headers in include/hamelin/NAME, tests/*_test.cpp as one
 # test program, bench/*_bench.cpp as one benchmark program. A DEP must stand above in libs/CMakeLists.txt, so the
 # order there is the dependency order and a cycle cannot be written.
 function(hamelin_library)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -62,6 +63,9 @@ function(hamelin_library)
     set(scope PUBLIC)
     add_library(${target} STATIC ${arg_SOURCES})
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:hamelin_options> ${arg_PRIVATE_LINKS})
+    if(arg_COLD)
+      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+    endif()
   else()
     set(scope INTERFACE)
     add_library(${target} INTERFACE)

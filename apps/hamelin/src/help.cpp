@@ -23,7 +23,7 @@ const std::vector<HelpSection>& about_the_program() {
        {{"0", "done; the goal was reached"},
         {"1", "ran, but the goal was not reached or a check failed"},
         {"2", "bad input or usage, a refused plugin, an output that cannot be written, a start in contact"},
-        {"3", "diverged, or a defect: unconverged state, broken certificate"},
+        {"3", "diverged, or an internal check failed: unconverged step, energy account, planner's answer"},
         {"130", "interrupted; what was recorded so far is written"}}},
       {"Environment",
        {{"HAMELIN_PLUGIN_PATH", "directories to look for planners in, separated by colons"},

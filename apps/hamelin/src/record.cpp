@@ -72,7 +72,7 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
   watch.every = options.every;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
-  watch.warn = [](const std::string& line) { note(line); };
+  watch.diagnostics = diagnostics();
   if (run_log) watch.announce = [&run_log](double ticks, int dof) { announce_size(*run_log, ticks, dof); };
   log::Result result;
   {

@@ -12,6 +12,8 @@
 #include <ctime>
 #include <memory>
 
+#include "hamelin/core/text.hpp"
+
 namespace hamelin::app {
 
 namespace {
@@ -23,20 +25,21 @@ void on_signal(int) {
   stop_requested.store(true);
 }
 
-std::string one_line(std::string_view text) {
-  std::string line(text);
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  return line;
-}
+// One line a message, whatever is in it: "hamelin: note: text".
+class MessageFormatter final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
+    const char* level = message.level == spdlog::level::warn   ? "warning: "
+                        : message.level == spdlog::level::info ? "note: "
+                                                               : "";
+    fmt::format_to(std::back_inserter(out), "hamelin: {}{}\n", level,
+                   one_line({message.payload.data(), message.payload.size()}));
+  }
+  std::unique_ptr<spdlog::formatter> clone() const override { return std::make_unique<MessageFormatter>(); }
+};
 
-// Messages go to stderr, one line each, with the program's name in front.
 spdlog::logger& messages() {
-  static const auto logger = [] {
-    auto made = std::make_shared<spdlog::logger>("hamelin", std::make_shared<spdlog::sinks::stderr_sink_st>());
-    made->set_pattern("%n: %v");
-    return made;
-  }();
-  return *logger;
+  return *diagnostics();
 }
 
 bool dumb_terminal() {
@@ -61,16 +64,25 @@ double now_s() {
 
 }  // namespace
 
+std::shared_ptr<spdlog::logger> diagnostics() {
+  static const auto logger = [] {
+    auto made = std::make_shared<spdlog::logger>("hamelin", std::make_shared<spdlog::sinks::stderr_sink_st>());
+    made->set_formatter(std::make_unique<MessageFormatter>());
+    return made;
+  }();
+  return logger;
+}
+
 void error_line(std::string_view text) {
-  messages().error("{}", one_line(text));
+  messages().error(text);
 }
 
 void note(std::string_view text) {
-  messages().info("note: {}", one_line(text));
+  messages().info(text);
 }
 
 void detail(std::string_view text) {
-  messages().debug("{}", one_line(text));
+  messages().debug(text);
 }
 
 void report(std::string_view text) {
@@ -114,7 +126,7 @@ void Progress::show(double done, double all) {
   shown_ = true;
   const std::string line = fmt::format("{:.4g} of {:.4g} {}", done, all, what_);
   if (!counting_) {
-    messages().info("{}", line);
+    fmt::print(stderr, "hamelin: {}\n", line);
     return;
   }
   fmt::print(stderr, "\r{} ", line);

@@ -1,15 +1,24 @@
 #pragma once
 #include <atomic>
+#include <memory>
 #include <string>
 #include <string_view>
 
 /// Messages, colour, progress and signals. Data goes to stdout; all of this to stderr.
+namespace spdlog {
+class logger;
+}
+
 namespace hamelin::app {
 
 /// How much is said: under `quiet` errors alone, no notes, no progress and no report; under `verbose` details too.
 /// Data that a command is asked for, --json included, is printed under each.
 enum class Loudness { quiet, normal, verbose };
 void set_loudness(Loudness loudness);
+
+/// What all of this goes through, for libraries that have something to say: errors as they are, warnings and notes with
+/// "warning: " and "note: " in front, details under verbose.
+[[nodiscard]] std::shared_ptr<spdlog::logger> diagnostics();
 
 /// "hamelin: text", one line on stderr.
 void error_line(std::string_view text);

@@ -1,6 +1,7 @@
 #include "closed_loop.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/logger.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -100,13 +101,22 @@ void ClosedLoop::make_planner(const planning::Plugin& plugin) {
 }
 
 void ClosedLoop::take_line(std::int32_t level, std::string_view line) {
-  if (level == HAMELIN_LOG_INFO && recorder_ && !recorder_->logging()) return;  // nobody reads it
+  const bool warning = level == HAMELIN_LOG_WARNING;
+  if (!warning && recorder_ && !recorder_->logging() && !diagnosed(spdlog::level::debug)) return;  // nobody reads it
   std::string text = fmt::format("{}: {}", scene_.planner->name, line);
-  if (level == HAMELIN_LOG_WARNING) result_.warnings.push_back(text);
-  if (recorder_)
-    recorder_->event(arm_.state.time_s, text);
-  else
-    early_events_.push_back(std::move(text));
+  if (warning) result_.warnings.push_back(text);
+  if (!recorder_) return early_lines_.push_back({warning, std::move(text)});
+  tell(warning, text);
+}
+
+void ClosedLoop::tell(bool warning, const std::string& text) {
+  recorder_->event(arm_.state.time_s, text);
+  if (watch_->diagnostics) watch_->diagnostics->log(warning ? spdlog::level::warn : spdlog::level::debug, text);
+}
+
+bool ClosedLoop::diagnosed(int level) const {
+  return watch_ != nullptr && watch_->diagnostics &&
+         watch_->diagnostics->should_log(static_cast<spdlog::level::level_enum>(level));
 }
 
 void ClosedLoop::start(const Watch& watch) {
@@ -117,7 +127,7 @@ void ClosedLoop::start(const Watch& watch) {
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging()) log_->header(scene_, planner_->plugin(), planner_params_, result_.provenance, steps_);
-  for (const auto& text : early_events_) recorder_->event(0.0, text);
+  for (const auto& line : early_lines_) tell(line.warning, line.text);
   min_clearance_ = world_->influence_m();
   min_self_clearance_ = world_->self_influence_m();
   warn_of_goals_in_contact(watch);
@@ -179,7 +189,7 @@ void ClosedLoop::certify() {
 void ClosedLoop::change_map() {
   const std::string change = world_->advance_map();
   if (change.empty()) return;
-  recorder_->event(arm_.state.time_s, change);
+  tell(false, change);
   world_->look(arm_.state.q, arm_.state.time_s);
   min_clearance_ = std::min(min_clearance_, world_->clearance_m());
   touching_ = touching_ || world_->clearance_m() <= 0.0;
@@ -283,7 +293,7 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
     const bool of_joints = goal.type == scene::GoalType::joint;
     const auto warn = [&](const std::string& what) {
       result_.warnings.push_back(fmt::format("goal {}: {}", i + 1, what));
-      if (watch.warn) watch.warn(result_.warnings.back());
+      if (watch.diagnostics) watch.diagnostics->info(result_.warnings.back());
     };
     if (!world_->has_obstacles() && !world_->has_self()) return;
     const scene::Shapes there = of_joints ? world_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};

@@ -26,7 +26,11 @@ class ClosedLoop {
 
  private:
   void make_planner(const planning::Plugin& plugin);
+  /// A line of the planner.
   void take_line(std::int32_t level, std::string_view line);
+  /// An event, to the log and to whoever reads diagnostics.
+  void tell(bool warning, const std::string& text);
+  [[nodiscard]] bool diagnosed(int level) const;
   void start(const Watch& watch);
   void warn_of_goals_in_contact(const Watch& watch);
 
@@ -72,8 +76,12 @@ class ClosedLoop {
   std::unique_ptr<EnergyAudit> audit_;
   std::unique_ptr<TickLog> log_;
   const Watch* watch_ = nullptr;
-  std::vector<std::string> early_events_;  ///< what the planner said before the log was open
-  bool certified_ = true;                  ///< of the step that led to this node
+  struct Line {
+    bool warning;
+    std::string text;
+  };
+  std::vector<Line> early_lines_;  ///< what the planner said before the log was open
+  bool certified_ = true;          ///< of the step that led to this node
   bool touching_ = false;
   bool done_ = false;
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;

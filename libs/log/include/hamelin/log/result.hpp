@@ -17,7 +17,7 @@ enum class Outcome : std::int32_t {
   collision,
   timeout,
   diverged,  ///< a step found no root, or numbers left the finite range
-  defect,    ///< a promise of the program's own is broken: certificate, plugin contract
+  defect,    ///< an internal check failed: an energy account, or what a plugin may answer
   refused,   ///< the start is in contact
   interrupted,
 };

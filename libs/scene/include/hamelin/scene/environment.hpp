@@ -35,8 +35,8 @@ struct Contact {
 /// Hidden: only what a planner is not shown. The judge: all that is there.
 enum class View : std::int32_t { planner, hidden, judge };
 
-/// All that the arm can hit, cropped to where it can be. Immutable and shared between threads; each thread brings a
-/// Scratch of its own.
+/// All that the arm can hit, cropped to where it can be. Queries are const and may run on several threads at once, each
+/// with a Scratch of its own. advance() changes the map: no query may run meanwhile.
 class Environment {
  public:
   /// Nearest points of the map (and of blocking unknown space) per shape.

@@ -2,6 +2,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,10 @@
 #include "hamelin/log/result.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/scene/scene.hpp"
+
+namespace spdlog {
+class logger;
+}
 
 namespace hamelin::simulation {
 
@@ -24,7 +29,9 @@ struct Watch {
   /// Called at every node of a run in closed loop, the first and the last included.
   std::function<void(double time_s, const Eigen::VectorXd& q)> at_node;
   std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
-  std::function<void(const std::string& line)> warn;  ///< called before a run begins for each goal that is in contact
+  /// Receives diagnostics: what a planner says and what comes into sight (debug), goals in contact (info), what the
+  /// planner warns of (warn). Null: none. Nothing is formatted for a level that is switched off.
+  std::shared_ptr<spdlog::logger> diagnostics;
   /// Called once before a run that is logged: tick lines to come at most, and joints.
   std::function<void(double ticks, int dof)> announce;
 };
