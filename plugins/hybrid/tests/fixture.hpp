@@ -77,6 +77,7 @@ class Scene {
       : model(task.robot, geometry::SE3{}, Eigen::Vector3d::Zero()),
         balls_(task.balls),
         ws_(model),
+        q_(Eigen::VectorXd::Zero(model.dof())),
         data_(fill(task, model)),
         raw_setup_(data_.view()),
         raw_host_{sizeof raw_host_, this, &log, &closest_points, &closest_self},
