@@ -69,7 +69,7 @@ void Roots::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way*
   }
 }
 
-void Roots::add(const Eigen::VectorXd& q, double along) {
+void Roots::add(const Eigen::Ref<const Eigen::VectorXd>& q, double along) {
   if (count_ == most) return;
   q_.col(count_++) = q;
   along_.push_back(along);

@@ -37,7 +37,7 @@ class Roots {
   [[nodiscard]] double along(int i) const { return along_[static_cast<std::size_t>(i)]; }
 
  private:
-  void add(const Eigen::VectorXd& q, double along);
+  void add(const Eigen::Ref<const Eigen::VectorXd>& q, double along);
   void solve_tip(Rng& rng);
   void follow_path();
   void finish();

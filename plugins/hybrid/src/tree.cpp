@@ -51,7 +51,7 @@ void Tree::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* 
   phase_ = Phase::roots;
 }
 
-int Tree::add(int side, const Eigen::VectorXd& q, int parent) {
+int Tree::add(int side, const Eigen::Ref<const Eigen::VectorXd>& q, int parent) {
   auto& tree = trees_[static_cast<std::size_t>(side)];
   if (tree.size() == tree.q.cols()) return parent;
   tree.q.col(tree.size()) = q;

@@ -29,7 +29,7 @@ class Tree final : public Search {
   };
   enum class Phase { roots, direct, extend, connect, straighten, over };
 
-  int add(int side, const Eigen::VectorXd& q, int parent);
+  int add(int side, const Eigen::Ref<const Eigen::VectorXd>& q, int parent);
   [[nodiscard]] int nearest(int side, const Eigen::VectorXd& q) const;
   void start_direct();
   void start_extension();

@@ -77,6 +77,7 @@ class Scene {
       : model(task.robot, geometry::SE3{}, Eigen::Vector3d::Zero()),
         balls_(task.balls),
         ws_(model),
+        q_(Eigen::VectorXd::Zero(model.dof())),
         data_(fill(task, model)),
         raw_setup_(data_.view()),
         raw_host_{sizeof raw_host_, this, &log, &closest_points, &closest_self},
@@ -149,11 +150,15 @@ class Scene {
   }
 
   static void log(void*, std::int32_t, const char*, std::size_t) {}
+  void place(const double* q) {
+    q_ = planning::ConstVectorMap(q, model.dof());
+    dynamics::forward_kinematics(model, ws_, q_);
+  }
   static std::size_t closest_points(void* context, const double* q, double influence, hamelin_contact* out,
                                     std::size_t capacity) {
     auto& self = *static_cast<Scene*>(context);
     ++self.asked_;
-    dynamics::forward_kinematics(self.model, self.ws_, planning::ConstVectorMap(q, self.model.dof()));
+    self.place(q);
     std::size_t count = 0;
     for (std::size_t s = 0; s < self.data_.spheres.size(); ++s) {
       const Eigen::Vector3d at = self.placed(s);
@@ -180,7 +185,7 @@ class Scene {
                                   std::size_t capacity) {
     auto& self = *static_cast<Scene*>(context);
     const auto& spheres = self.data_.spheres;
-    dynamics::forward_kinematics(self.model, self.ws_, planning::ConstVectorMap(q, self.model.dof()));
+    self.place(q);
     std::size_t count = 0;
     for (int b = 0; b < self.model.dof(); ++b)
       for (int a = b + 2; a < self.model.dof(); ++a) {
@@ -207,6 +212,7 @@ class Scene {
 
   std::vector<Ball> balls_;
   dynamics::Workspace ws_;
+  Eigen::VectorXd q_;
   planning::SetupData data_;
   hamelin_setup raw_setup_;
   hamelin_host raw_host_;

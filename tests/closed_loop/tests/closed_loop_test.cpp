@@ -5,6 +5,7 @@
 #include "../scratch_scene.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/chains.hpp"
 
@@ -355,11 +356,24 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][inp
   CHECK_THAT(refusal("/integrator", {{"name", "euler"}}), Catch::Contains("euler"));
 }
 
+namespace {
+
+// A planner's library, kept loaded: what the dynamic linker takes to load it again varies.
+planning::Plugin keep_loaded(const std::string& planner) {
+  for (const auto& directory : test::plugin_directories)
+    if (const auto file = directory / (planner + ".hamelin.so"); std::filesystem::exists(file))
+      return planning::Plugin::load(file);
+  throw std::runtime_error("no plugin " + planner);
+}
+
+}  // namespace
+
 TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
   const ScratchFolder folder;
   const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
   CAPTURE(planner);
+  const auto loaded = keep_loaded(planner);
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25), moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
   scene["model"] = {{"self_collision", true}};
@@ -381,6 +395,7 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   const ScratchFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
   CAPTURE(actuation);
+  const auto loaded = keep_loaded("probe");
   model::Robot robot = test::planar4();
   for (auto& link : robot.links) link.joint.effort_max = 5.0;
   Json scene = scene_52();
@@ -409,6 +424,7 @@ TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation
   if (!test::counts_allocations()) return;
   // the first link cannot turn past either ball, so no search finds a way
   const ScratchFolder folder;
+  const auto loaded = keep_loaded("hybrid");
   Json scene = scene_52();
   scene["goals"] = {{{"type", "joint"}, {"q", {std::acos(-1.0), 0.0, 0.0, 0.0}}}};
   scene["obstacles"] = {ball("above", 0.0, 0.6, 0.1), ball("below", 0.0, -0.6, 0.1),

@@ -88,13 +88,15 @@ HAMELIN_INLINE Lanes<W> abs(Lanes<W> a) noexcept {
 /// The larger number, lane by lane; NaN where either is NaN.
 template <int W>
 HAMELIN_INLINE Lanes<W> max(Lanes<W> a, Lanes<W> b) noexcept {
-  return {(a.v <= b.v) | (b.v != b.v) ? b.v : a.v};
+  const auto takes_b = (a.v <= b.v) | (b.v != b.v);
+  return {takes_b ? b.v : a.v};
 }
 /// The largest of all lanes; NaN where any is NaN.
 template <int W>
 HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
   double most = a[0];
-  for (int i = 1; i < W; ++i) most = (most <= a[i]) | (a[i] != a[i]) ? a[i] : most;
+  for (int i = 1; i < W; ++i)
+    if (most <= a[i] || a[i] != a[i]) most = a[i];
   return most;
 }
 
