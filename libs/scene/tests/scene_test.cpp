@@ -83,10 +83,11 @@ std::string set_refusal(const std::string& assignment) {
 }  // namespace
 
 TEST_CASE("a full scene is read field by field", "[scene][unit]") {
-  const Scene scene = scene_from_json(full_document(), "data/scenes", "data/scenes/full.json");
+  const std::filesystem::path data = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
+  const Scene scene = scene_from_json(full_document(), data / "scenes", "data/scenes/full.json");
   CHECK(scene.name == "data/scenes/full.json");
-  CHECK(scene.robot.file == "data/robots/arm7.urdf");
-  CHECK(scene.robot.spheres == std::filesystem::path("data/robots/arm7.spheres.json"));
+  CHECK(scene.robot.file == data / "robots/arm7.urdf");
+  CHECK(scene.robot.spheres == data / "robots/arm7.spheres.json");
   CHECK(scene.robot.tip == "flange");
   CHECK((scene.base * Vector3d(1.0, 0.0, 0.0) - Vector3d(0.1, 1.0, 0.2)).norm() < 1e-15);
   CHECK(*scene.gravity_m_s2 == Vector3d(0.0, 0.0, -9.81));
@@ -106,7 +107,7 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.goals[2].tolerance_rad == 0.26);
   CHECK(scene.goals[2].pose.R()(2, 2) == -1.0);
   REQUIRE(scene.map);
-  CHECK(scene.map->file == "data/scenes/shelf.bt");
+  CHECK(scene.map->file == data / "scenes" / "shelf.bt");
   CHECK(scene.map->pose.p().x() == 1.0);
   CHECK(scene.map->scale == 1.0);
   CHECK(scene.map->occupancy_threshold == 0.7);
