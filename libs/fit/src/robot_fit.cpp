@@ -13,6 +13,7 @@
 #include "hamelin/description/urdf_geometry.hpp"
 #include "hamelin/fit/mesh.hpp"
 #include "hamelin/fit/solid.hpp"
+#include "hamelin/io/file.hpp"
 
 namespace hamelin::fit {
 
@@ -181,7 +182,7 @@ std::optional<fs::path> find_mesh(const std::string& name, const fs::path& urdf,
                                   std::vector<fs::path>* tried) {
   std::optional<fs::path> found;
   const auto look = [&](const fs::path& path) {
-    const fs::path plain = path.lexically_normal();
+    const fs::path plain = resolve_path({}, path);
     if (tried != nullptr && std::find(tried->begin(), tried->end(), plain) == tried->end()) tried->push_back(plain);
     if (!is_file(plain)) return false;
     found = plain;
@@ -201,7 +202,7 @@ std::optional<fs::path> find_mesh(const std::string& name, const fs::path& urdf,
   if (look(rest.is_absolute() ? rest : here / rest)) return found;
   std::vector<fs::path> folders = places.folders;
   std::error_code ignored;
-  fs::path up = fs::absolute(urdf, ignored).lexically_normal().parent_path();
+  fs::path up = resolve_path({}, fs::absolute(urdf, ignored)).parent_path();
   for (int i = 0; i < 4 && up.has_relative_path(); ++i, up = up.parent_path()) folders.push_back(up);
   for (const fs::path& folder : folders)
     for (fs::path end = rest.relative_path(); !end.empty() && end != "."; end = end.lexically_relative(*end.begin()))

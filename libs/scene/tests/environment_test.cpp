@@ -14,6 +14,7 @@
 #include "hamelin/scene/make.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/scene_queries.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
@@ -49,7 +50,7 @@ struct RoomMap {
     make_map(options);
   }
   ~RoomMap() { std::filesystem::remove(file); }
-  std::filesystem::path file = std::filesystem::temp_directory_path() / "hamelin_scene_room.bt";
+  std::filesystem::path file = test::temporary("hamelin_scene_room.bt");
 };
 
 }  // namespace
