@@ -190,6 +190,15 @@ async function sliderMovesTheArm(page, { duration }) {
   assert.ok(await showsAgain(lab, page, first, true), 'time 0 looks otherwise the second time');
 }
 
+/** The other checks of the picture look at what the page draws; this one, at whether the browser shows it. */
+async function drawingIsShown(page) {
+  const first = await screenshot(page);
+  await box(page, 'arm').uncheck();
+  assert.ok(await showsAgain(lab, page, first, false), 'without the arm the window looks the same');
+  await box(page, 'arm').check();
+  assert.ok(await showsAgain(lab, page, first, true), 'the arm does not come back');
+}
+
 /** Simulated seconds a second, measured in the page itself. */
 async function pace(page, speed) {
   await setTime(page, 0);
@@ -475,6 +484,7 @@ async function axeIsContent(page, t) {
 
 const CONTROLS = [
   ['the time slider moves the arm', sliderMovesTheArm],
+  ['what is drawn is shown', drawingIsShown],
   ['keys and buttons step', keysAndButtonsStep],
   ['keys and buttons play and pause', keysAndButtonsPlay],
   ['every part of the picture can be hidden', partsAreSwitched],
