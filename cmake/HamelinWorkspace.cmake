@@ -54,7 +54,7 @@ set(HAMELIN_FMT_INLINE $<BUILD_INTERFACE:fmt::fmt-header-only>)
 # test program, bench/*_bench.cpp as one benchmark program. A DEP must stand above in libs/CMakeLists.txt, so the
 # order there is the dependency order and a cycle cannot be written.
 function(hamelin_library)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -87,7 +87,7 @@ function(hamelin_library)
   set_property(GLOBAL PROPERTY HAMELIN_DEPS_${arg_NAME} ${arg_DEPS})
   set_property(GLOBAL PROPERTY HAMELIN_PACKAGES_${arg_NAME} ${arg_PACKAGES})
   install(TARGETS ${target} EXPORT hamelin_${arg_NAME} FILE_SET HEADERS)
-  hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME} ${arg_TEST_LINKS})
+  hamelin_tests(NAME ${arg_NAME} LINKS hamelin::${arg_NAME} ${arg_TEST_LINKS} LABELS ${arg_TEST_LABELS})
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
@@ -120,10 +120,11 @@ function(hamelin_isa_sources target)
   endforeach()
 endfunction()
 
-# hamelin_tests(NAME scene LINKS hamelin::scene [TIMEOUT s]): tests/*_test.cpp of the calling folder as one program.
+# hamelin_tests(NAME scene LINKS hamelin::scene [LABELS slow]): tests/*_test.cpp of the calling folder as one program. The
+# tests carry the CTest labels NAME and LABELS: `threads` for what `./dev tsan` runs under the thread sanitizer.
 # Tests that need ../shared or data/ find the checkout by HAMELIN_SOURCE_DIR and skip what is absent, saying so.
 function(hamelin_tests)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS;LABELS")
   file(GLOB tests CONFIGURE_DEPENDS tests/*_test.cpp)
   if(NOT HAMELIN_BUILD_TESTS OR NOT tests)
     return()
@@ -138,9 +139,15 @@ function(hamelin_tests)
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     HAMELIN_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
     HAMELIN_TEST_PLUGIN_DIR="${HAMELIN_BUILD_PLUGIN_DIR}")
+  # Escaped often enough for the lists that the labels pass through on their way into CTest's file.
+  list(PREPEND arg_LABELS ${arg_NAME})
+  list(JOIN arg_LABELS "\\\\\\\\;" labels)
   # What a test prints whose data is not here (tests/support, scene_data.hpp): Catch2 2 knows no skipping.
-  catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS ${arg_NAME}
+  catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS "${labels}"
     SKIP_REGULAR_EXPRESSION "skipped: no folder")
+  if("threads" IN_LIST arg_LABELS)
+    set_property(GLOBAL APPEND PROPERTY HAMELIN_THREADS_TESTS ${target})
+  endif()
 endfunction()
 
 # Debian's Catch2 main has no benchmarking compiled in, so benchmarks bring their own.

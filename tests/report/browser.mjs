@@ -1,7 +1,7 @@
 // Starts the Chromium that the tests and the screenshots use.
 //   CHROMIUM      the browser's file; else the first of the usual places
 //   NODE_MODULES  the folder that holds playwright-core (and axe-core); else Node looks for it itself
-import { existsSync } from 'node:fs';
+import { existsSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import path from 'node:path';
 
@@ -24,4 +24,18 @@ export async function launch() {
     throw new Error('playwright-core is not installed: run "npm ci" for libs/report/page and set NODE_MODULES to its node_modules');
   }
   return playwright.chromium.launch({ executablePath, args: FLAGS });
+}
+
+/** What axe-core objects to in a page with all its details open, one line each; null if axe-core is not installed. */
+export async function objections(page) {
+  let axe;
+  try {
+    axe = readFileSync(lookUp.resolve('axe-core/axe.min.js'), 'utf8');
+  } catch {
+    return null;
+  }
+  await page.evaluate(() => document.querySelectorAll('details').forEach((details) => { details.open = true; }));
+  await page.evaluate(axe);
+  const found = await page.evaluate(() => window.axe.run(document, { resultTypes: ['violations'] }));
+  return found.violations.map(({ id, nodes }) => `${id}: ${nodes.length}× ${nodes[0].html.slice(0, 140)} ${nodes[0].failureSummary.slice(0, 200)}`);
 }

@@ -1,5 +1,5 @@
 // Made-up runs in the report's container, so that the page can be built and tested without the program.
-//   node fixture.mjs TEMPLATE.html OUT_DIR      writes one.html, two.html, three.html, four.html, planar.html
+//   node fixture.mjs TEMPLATE.html OUT_DIR      writes one.html, two.html, three.html, four.html, everything.html, planar.html
 // The shapes and motions are invented; only the format (hamelin.report/1) is the program's.
 import { readFileSync, writeFileSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
@@ -246,7 +246,10 @@ const RACK_FACE = (p) => {
   return { point, distance: Math.hypot(...point.map((c, i) => c - p[i])) };
 };
 
-/** The container of `count` runs of the six-joint arm (1 to 4), or of one planar run. */
+/**
+ * The container of one to four runs of the six-joint arm, of one planar run, or of "everything": two runs that between
+ * them have something for each control of the page.
+ */
 export function container(kind) {
   const pack = new Pack();
   if (kind === 'planar') {
@@ -270,7 +273,7 @@ export function container(kind) {
     });
     return pack.container({ format: 'hamelin.report/1', generator: 'hamelin 0.1.0', title: 'bars.json', worlds: [world], runs: [run] });
   }
-  const count = { one: 1, two: 2, three: 3, four: 4 }[kind];
+  const everything = kind === 'everything';
   const robot = arm();
   const ghost = [-0.9, -0.5, 1.4, 0.3, 0.7, 0.05];
   const world = {
@@ -280,8 +283,11 @@ export function container(kind) {
       { type: 'joint', q: ghost },
       { type: 'position', position_m: [0.44, -0.3, 0.6], tolerance_m: 0.01 },
     ],
-    map: rack(pack, 20000),
-    obstacles: [{ name: 'drifter', shape: 'sphere', radius_m: 0.07, position_m: [0.35, 0.45, 0.95], quaternion_wxyz: [1, 0, 0, 0], motion: { amplitude_m: [0, 0.3, 0], period_s: 5 }, appears_s: 0, judge_only: false }],
+    map: rack(pack, everything ? 8000 : 20000),
+    obstacles: [
+      { name: 'drifter', shape: 'sphere', radius_m: 0.07, position_m: [0.35, 0.45, 0.95], quaternion_wxyz: [1, 0, 0, 0], motion: { amplitude_m: [0, 0.3, 0], period_s: 4 }, appears_s: 0, judge_only: false },
+      ...(everything ? [{ name: 'late', shape: 'cylinder', radius_m: 0.1, length_m: 0.3, position_m: [-0.4, -0.4, 0.8], quaternion_wxyz: [1, 0, 0, 0], motion: null, appears_s: 3, judge_only: true }] : []),
+    ],
     reach_m: 1.2,
   };
   const tips = [world.goals[0].position_m, place(robot, ghost, 5, robot.skeleton[6]), world.goals[2].position_m];
@@ -290,14 +296,16 @@ export function container(kind) {
     { name: 'apf', duration: 9.5, outcome: 'stalled', channels: ['potential', 'damping'], goalsAt: [3.1], w: 0.72 },
     { name: 'gyro', duration: 7, outcome: 'timeout', channels: ['gyroscopic', 'held', 'node'], goalsAt: [2.9, 6.1], w: 1.2 },
     { name: 'hybrid, fast', duration: 5, outcome: 'collision', channels: ['potential'], goalsAt: [2], w: 1.5 },
-  ].slice(0, count).map(({ w, ...rest }) => makeRun(pack, {
+  ];
+  const chosen = everything ? [runs[0], runs[2]] : runs.slice(0, { one: 1, two: 2, three: 3, four: 4 }[kind]);
+  const made = chosen.map(({ w, ...rest }) => makeRun(pack, {
     ...rest, world, worldIndex: 0, planner: rest.name, nearest: RACK_FACE, tip: (i) => tips[i],
     bend: (s, i) => [
       0.75 * Math.sin(0.9 * w * s), 0.35 + 0.3 * Math.sin(0.7 * w * s + 0.4), 0.95 + 0.35 * Math.sin(0.8 * w * s),
       0.5 * Math.sin(0.6 * w * s), 0.45 + 0.5 * Math.sin(1.1 * w * s), 0.03 + 0.03 * Math.sin(s),
     ][i],
   }));
-  return pack.container({ format: 'hamelin.report/1', generator: 'hamelin 0.1.0', title: 'rack.json', worlds: [world], runs });
+  return pack.container({ format: 'hamelin.report/1', generator: 'hamelin 0.1.0', title: 'rack.json', worlds: [world], runs: made });
 }
 
 /** A whole page: the template with the container in it, as `hamelin report` makes it. */
@@ -308,7 +316,7 @@ export function page(template, kind) {
 }
 
 /** Writes the pages and returns their paths. */
-export function writePages(templateFile, folder, kinds = ['one', 'three', 'planar']) {
+export function writePages(templateFile, folder, kinds = ['everything', 'planar']) {
   const template = readFileSync(templateFile, 'utf8');
   mkdirSync(folder, { recursive: true });
   return kinds.map((kind) => {
@@ -324,5 +332,5 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? '').href) {
     process.stderr.write('fixture.mjs: expected TEMPLATE.html OUT_DIR\n');
     process.exit(1);
   }
-  for (const file of writePages(template, folder, ['one', 'two', 'three', 'four', 'planar'])) process.stdout.write(`${file}\n`);
+  for (const file of writePages(template, folder, ['one', 'two', 'three', 'four', 'everything', 'planar'])) process.stdout.write(`${file}\n`);
 }

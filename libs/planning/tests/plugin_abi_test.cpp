@@ -1,29 +1,119 @@
 #include "hamelin/planning/plugin_abi.h"
 
+#include <dlfcn.h>
+
 #include <catch2/catch.hpp>
 #include <cstddef>
+#include <map>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
-// The layout that ABI 3 promises on a 64-bit machine. A change here needs a new HAMELIN_PLUGIN_ABI_VERSION, unless it
-// only appends.
-static_assert(HAMELIN_PLUGIN_ABI_VERSION == 3u);
-static_assert(sizeof(hamelin_sphere) == 64 && offsetof(hamelin_sphere, center_link_m) == 8 &&
-              offsetof(hamelin_sphere, half_axis_link_m) == 40);
-static_assert(sizeof(hamelin_contact) == 112 && offsetof(hamelin_contact, distance_m) == 8 &&
-              offsetof(hamelin_contact, obstacle_velocity_world_m_s) == 88);
-static_assert(sizeof(hamelin_self_contact) == 88 && offsetof(hamelin_self_contact, direction_world) == 64);
-static_assert(sizeof(hamelin_goal) == 112 && offsetof(hamelin_goal, q) == 64 && offsetof(hamelin_goal, path) == 96);
-static_assert(sizeof(hamelin_gyroscopic_term) == 56 && offsetof(hamelin_gyroscopic_term, w_world) == 32);
-static_assert(sizeof(hamelin_setup) == 240 && offsetof(hamelin_setup, robot_json) == 16 &&
-              offsetof(hamelin_setup, spheres) == 112 && offsetof(hamelin_setup, q_lower) == 144 &&
-              offsetof(hamelin_setup, control_period_s) == 184 && offsetof(hamelin_setup, seed) == 232);
-static_assert(sizeof(hamelin_tick) == 88 && offsetof(hamelin_tick, q) == 24 &&
-              offsetof(hamelin_tick, speed_scale) == 64);
-static_assert(sizeof(hamelin_command) == 224 && offsetof(hamelin_command, potential_J) == 136 &&
-              offsetof(hamelin_command, gyroscopic) == 160 && offsetof(hamelin_command, recovery_work_J) == 216);
-static_assert(sizeof(hamelin_host) == 40 && offsetof(hamelin_host, closest_points) == 24);
-static_assert(sizeof(hamelin_plugin) == 72 && offsetof(hamelin_plugin, abi_version) == 4 &&
-              offsetof(hamelin_plugin, create) == 40 && offsetof(hamelin_plugin, influence_m) == 64);
+#include "plugins/abi_layout.h"
 
-TEST_CASE("the entry symbol's name is the one plugins export", "[planning][unit]") {
-  CHECK(std::string(HAMELIN_PLUGIN_ENTRY_NAME) == "hamelin_plugin_entry");
+namespace {
+
+struct PinnedRow {
+  layout_row pinned, seen;
+  bool same_type;
+};
+
+/// abi_layout.inc beside what this compiler makes of plugin_abi.h.
+const std::vector<PinnedRow>& rows() {
+  static const std::vector<PinnedRow> all{
+#define STRUCT(name, size) {{#name, 0, size}, {#name, 0, sizeof(name)}, std::is_standard_layout_v<name>},
+#define FIELD(name, field, offset, size, ...)                                      \
+  {{#name "." #field, offset, size},                                               \
+   {#name "." #field, offsetof(name, field), sizeof(std::declval<name&>().field)}, \
+   std::is_same_v<decltype(name::field), __VA_ARGS__>},
+#include "plugins/abi_layout.inc"
+#undef STRUCT
+#undef FIELD
+  };
+  return all;
+}
+
+struct Anything {
+  template <typename T>
+  operator T() const;  // NOLINT(google-explicit-constructor): stands for any initialiser
+};
+
+template <typename S, std::size_t... I>
+constexpr bool takes(std::index_sequence<I...>) {
+  return requires {
+    S{(static_cast<void>(I), Anything{})...};
+  };
+}
+
+/// How many numbers and pointers a struct holds, elements of arrays counted one by one.
+template <typename S, std::size_t N = 1>
+constexpr std::size_t scalars() {
+  if constexpr (takes<S>(std::make_index_sequence<N + 1>{}))
+    return scalars<S, N + 1>();
+  else
+    return N;
+}
+
+template <typename T>
+constexpr std::size_t elements = std::is_array_v<T> ? std::extent_v<T> : 1;
+
+}  // namespace
+
+TEST_CASE("plugin interface: C++ lays out every field where ABI 3 has it", "[planning][unit]") {
+  REQUIRE(HAMELIN_PLUGIN_ABI_VERSION == 3);
+  for (const auto& [pinned, seen, same_type] : rows()) {
+    INFO(pinned.name);
+    CHECK(seen.offset == pinned.offset);
+    CHECK(seen.size == pinned.size);
+    CHECK(same_type);
+  }
+}
+
+TEST_CASE("plugin interface: C lays out every field where ABI 3 has it", "[planning][unit]") {
+  REQUIRE(layout_in_c_count == rows().size());
+  for (std::size_t i = 0; i < layout_in_c_count; ++i) {
+    const auto& pinned = rows()[i].pinned;
+    INFO(pinned.name);
+    CHECK(std::string(layout_in_c[i].name) == pinned.name);
+    CHECK(layout_in_c[i].offset == pinned.offset);
+    CHECK(layout_in_c[i].size == pinned.size);
+  }
+}
+
+TEST_CASE("plugin interface: no struct has a field that is not pinned", "[planning][unit]") {
+  // A field that fits into padding changes no offset and no size, so numbers and pointers are counted too.
+  std::map<std::string, std::size_t> pinned, seen;
+#define STRUCT(name, size) seen[#name] = scalars<name>();
+#define FIELD(name, field, offset, size, ...) pinned[#name] += elements<__VA_ARGS__>;
+#include "plugins/abi_layout.inc"
+#undef STRUCT
+#undef FIELD
+  CHECK(pinned == seen);
+}
+
+TEST_CASE("plugin interface: constants keep their values", "[planning][unit]") {
+  CHECK(HAMELIN_OBSTACLE_MAP == -1);
+  CHECK(HAMELIN_OBSTACLE_UNKNOWN == -2);
+  CHECK(HAMELIN_SPHERE_OF_BASE == -1);
+  CHECK(HAMELIN_GOAL_JOINT == 0);
+  CHECK(HAMELIN_GOAL_POSITION == 1);
+  CHECK(HAMELIN_GOAL_POSE == 2);
+  CHECK(HAMELIN_PLANNER_RUNNING == 0);
+  CHECK(HAMELIN_PLANNER_GAVE_UP == 1);
+  CHECK(HAMELIN_PLANNER_OWN_STALL_RULE == 2);
+  CHECK(HAMELIN_LOG_INFO == 0);
+  CHECK(HAMELIN_LOG_WARNING == 1);
+}
+
+TEST_CASE("plugin interface: the host looks for the symbol that a plugin in C exports", "[planning][unit]") {
+  const std::string file = HAMELIN_TEST_BINARY_DIR "/lib/hamelin/test_plugins/plain_c.hamelin.so";
+  void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  REQUIRE(library != nullptr);
+  void* symbol = ::dlsym(library, HAMELIN_PLUGIN_ENTRY_NAME);
+  REQUIRE(symbol != nullptr);
+  const hamelin_plugin* plugin = reinterpret_cast<hamelin_plugin_entry_fn>(symbol)();
+  CHECK(plugin->struct_size == 72);
+  CHECK(plugin->abi_version == 3);
+  ::dlclose(library);
 }

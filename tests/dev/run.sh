@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# run.sh SOURCE BUILD: runs a copy of SOURCE/dev in a folder of its own. What would install, configure or compile is
+# replaced by programs that do nothing but note that they were called; the demo's run is the program of BUILD.
+set -u
+source=$(realpath "$1") build=$(realpath "$2")
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work/tree/tests/fuzz" "$work/tree/docs" "$work/stubs" "$work/system"
+cp "$source/dev" "$work/tree/"
+ln -s "$source/data" "$work/tree/data"
+for script in tests/fuzz/run.sh docs/make_accuracy.sh; do
+  printf '#!/bin/sh\necho fake %s >>"%s/calls"\n' "$script" "$work" >"$work/tree/$script"
+  chmod +x "$work/tree/$script"
+done
+
+# A PATH with what the script itself needs and nothing more, so that no tool of this machine is found by accident.
+for tool in bash sh env dirname cat grep sed xargs head nproc rm cp mv mkdir mktemp; do
+  ln -s "$(command -v "$tool")" "$work/system/$tool"
+done
+stub() { # NAME EXIT_CODE; notes its call
+  printf '#!/bin/sh\necho "%s $*" >>"%s/calls"\nexit %s\n' "$1" "$work" "$2" >"$work/stubs/$1"
+  chmod +x "$work/stubs/$1"
+}
+failed=0
+expect() { # WHAT CONDITION...
+  if "${@:2}"; then echo "ok      $1"; else
+    echo "failed  $1 (exit code $code)"
+    cat "$work/out" "$work/err" "$work/calls"
+    failed=1
+  fi
+}
+run() { # ARGUMENT...: ./dev ARGUMENT..., its exit code in $code
+  : >"$work/calls"
+  code=0
+  env -u CHROMIUM PATH="$work/stubs:$work/system" "$work/tree/dev" "$@" >"$work/out" 2>"$work/err" </dev/null || code=$?
+}
+said() { grep -qE -- "$1" "$work/out" "$work/err"; }
+called() { grep -qE -- "$1" "$work/calls"; }
+
+refused() { # COMMAND_THAT_INSTALLS
+  ((code == 2)) && ! called 'apt-get|cmake|ninja|fake' && (($(wc -l <"$work/err") == 1)) &&
+    said "^dev: missing: .*; install with $1\$"
+}
+no_package_task() { # NAME COMMAND_THAT_INSTALLS ARGUMENT...
+  run "${@:3}"
+  expect "$1 installs nothing and names what is missing" refused "$2"
+}
+
+# ---- Nothing is installed ----
+stub dpkg-query 1
+stub apt-get 0
+stub sudo 0
+for task in build check tsan tidy cover bench accuracy fuzz; do no_package_task "$task" './dev setup' "$task"; done
+no_package_task format './dev setup --all' format
+installs() { ((code == 0)) && called '(apt-get|sudo .*apt-get) install .*libeigen3-dev' && ! called 'clang-tidy'; }
+run setup
+expect "setup installs what builds and tests need" installs
+installs_all() { ((code == 0)) && called 'install .*libeigen3-dev' && called 'install .*clang-format.*clang-tidy.*gcovr.*libclang-rt-dev'; }
+run setup --all
+expect "setup --all installs what check, cover and fuzz need as well" installs_all
+
+# ---- All is installed; the build "makes" the program that BUILD has ----
+for tool in g++ cmake ninja ccache pkg-config git node npm clang man chromium; do stub "$tool" 0; done
+printf '#!/bin/sh\necho "install ok installed"\n' >"$work/stubs/dpkg-query"
+demo="$work/tree/build/demo"
+mkdir -p "$demo/bin" "$demo/share/hamelin"
+cp "$build/bin/hamelin" "$demo/bin/"
+ln -s "$build/lib" "$demo/lib"
+for task in check tidy; do no_package_task "$task without clang-format or clang-tidy" './dev setup --all' "$task"; done
+no_package_task "cover without gcovr" './dev setup --all' cover
+
+no_page() { ((code == 0)) && said '^outcome +reached' && said '^out/shelf.html: not made, .*run ./dev demo again' && [[ ! -e "$work/tree/out/shelf.html" ]]; }
+run demo
+expect "the demo succeeds without the page and says how to get it" no_page
+if [[ -f "$build/share/hamelin/report/page.html" ]]; then
+  ln -s "$build/share/hamelin/report" "$demo/share/hamelin/report"
+  page() { ((code == 0)) && [[ -s "$work/tree/out/shelf.html" ]] && ! called apt-get; }
+  run demo
+  expect "the demo makes the page where the template was built" page
+fi
+
+# ---- The closing line of ./dev test: what could not run has failed, what skipped itself has not ----
+cat >"$work/stubs/ctest" <<'STUB'
+#!/bin/sh
+while [ "$1" != --output-junit ]; do shift; done
+cat >"$2" <<'XML'
+<testsuite tests="5" failures="1" disabled="0" skipped="2">
+	<testcase name="a" classname="a" time="1" status="run">
+	<testcase name="b" classname="b" time="1" status="run">
+	<testcase name="c" classname="c" time="1" status="fail">
+	<testcase name="d" classname="d" time="1" status="notrun">
+		<skipped message="SKIP_RETURN_CODE=77"/>
+	<testcase name="e" classname="e" time="1" status="notrun">
+		<skipped message="Unable to find executable"/>
+XML
+exit 8
+STUB
+chmod +x "$work/stubs/ctest"
+mkdir -p "$work/tree/build/ci"
+closes() { ((code == 8)) && [[ "$(sed -n '$p' "$work/out")" == "2 passed, 2 failed, 1 skipped" ]]; }
+run test
+expect "test closes with what passed, failed and was skipped, and with ctest's exit code" closes
+exit $failed
