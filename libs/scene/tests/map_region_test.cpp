@@ -15,6 +15,7 @@
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/test/damaged_maps.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
@@ -28,7 +29,7 @@ constexpr double resolution = 0.02;
 class PaintedMap {
  public:
   explicit PaintedMap(const std::function<char(const Vector3d&)>& kind) {
-    file = std::filesystem::temp_directory_path() / "hamelin_scene_painted.bt";
+    file = test::temporary("hamelin_scene_painted.bt");
     octomap::OcTree tree(resolution);
     for (int x = -64; x < 64; ++x)
       for (int y = -64; y < 64; ++y)
@@ -231,7 +232,7 @@ TEST_CASE("a self-filter without shapes, or with voxels far too fine, is refused
   MapSpec spec = painted.spec;
   spec.self_filter_padding_m = 0.02;
   CHECK_THAT(refusal(spec, 0.8), Catch::Contains("no collision shapes"));
-  spec.file = std::filesystem::temp_directory_path() / "hamelin_scene_region_root.ot";
+  spec.file = test::temporary("hamelin_scene_region_root.ot");
   write_file_aside(spec.file, test::occupied_root());
   spec.scale = 1e-3;
   const SmallRobot robot;
