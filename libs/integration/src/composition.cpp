@@ -59,7 +59,7 @@ StepReport Composition::attempt(State& state, const Channels& channels, double h
     std::swap(inner_.history[0], history_[i]);
     if (i > 0 && inner_.history[0].empty()) inner_.history[0].restart(rate_);  // the sub-step before will do
     report = together(report, step_.advance(inner_, channels, weights_[i] * h));
-    rate_ = inner_.history[0].last() / (weights_[i] * h);
+    if (i + 1 < weights_.size() && history_[i + 1].empty()) rate_ = inner_.history[0].last() / (weights_[i] * h);
     std::swap(inner_.history[0], history_[i]);
   }
   if (!report.converged) return report;

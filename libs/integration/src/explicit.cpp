@@ -30,8 +30,8 @@ StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, do
   report.converged = all_finite(q_) && all_finite(v_);
   if (!report.converged) return report;
   forces_.add_work(report, v_, h);
-  state.q = q_;
-  state.v = v_;
+  state.q.swap(q_);
+  state.v.swap(v_);
   return report;
 }
 
@@ -57,8 +57,8 @@ StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
   }
   report.converged = all_finite(q_sum_) && all_finite(v_sum_);
   if (!report.converged) return report;
-  state.q = q_sum_;
-  state.v = v_sum_;
+  state.q.swap(q_sum_);
+  state.v.swap(v_sum_);
   return report;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -15,11 +16,12 @@ namespace hamelin::integration {
 /// ‖x‖∞, and NaN where any number is NaN (Eigen's norm may drop it).
 [[nodiscard]] inline double largest_size(const Eigen::VectorXd& x) noexcept {
   double largest = 0.0;
+  bool any_nan = false;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
-    const double size = std::abs(x[i]);
-    if (size > largest || std::isnan(size)) largest = size;
+    largest = std::max(largest, std::abs(x[i]));  // passes NaN by
+    any_nan |= std::isnan(x[i]);
   }
-  return largest;
+  return any_nan ? std::numeric_limits<double>::quiet_NaN() : largest;
 }
 
 }  // namespace hamelin::integration

@@ -11,7 +11,7 @@ State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
   State state;
   state.q = q0;
   begin(state, v0);
-  if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
+  make_room(state);
   return state;
 }
 
@@ -43,49 +43,56 @@ StepReport together(const StepReport& a, const StepReport& b) {
 
 namespace {
 
-/// What a failed step reports: its cost. It moved nothing, so it did no work.
-StepReport failed(StepReport report) {
+// What a failed step reports is its cost: it moved nothing, so it did no work. Reports are changed where they stand, so
+// that they are handed on without copies.
+void take_back(StepReport& report) {
   report.converged = false;
   report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J = 0.0;
-  return report;
 }
 
 }  // namespace
 
-StepReport Integrator::step(State& state, const Channels& channels, double h) {
+void Integrator::make_room(const State& state) {
   if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
-  const long k = state.k;
-  const double time = state.time_s;
+}
+
+StepReport Integrator::step(State& state, const Channels& channels, double h) {
+  if (adaptive()) return parts(state, channels, h);
+  return advance(state, channels, h);
+}
+
+// Exactly h ahead under step control.
+StepReport Integrator::parts(State& state, const Channels& channels, double h) {
+  make_room(state);
+  saved_[0] = state;
   StepReport report;
-  if (adaptive()) {
-    saved_[0] = state;
-    for (double left = h; left > 0.0 && report.converged;) {
-      const StepReport part = advance(state, channels, left);
-      // the last part ends at h itself, not a rounding error before it
-      left = part.step_s == left ? 0.0 : left - part.step_s;
-      report = together(report, part);
-    }
-    if (!report.converged) {
-      state = saved_[0];
-      return failed(report);
-    }
-    report.step_s = h;
-  } else {
-    report = advance(state, channels, h);
-    if (!report.converged) return report;
+  for (double left = h; left > 0.0 && report.converged;) {
+    const StepReport part = advance(state, channels, left);
+    // the last part ends at h itself, not a rounding error before it
+    left = part.step_s == left ? 0.0 : left - part.step_s;
+    report = together(report, part);
   }
-  state.k = k + 1;
-  state.time_s = time + h;
+  if (report.converged) {
+    report.step_s = h;
+    state.k = saved_[0].k + 1;
+    state.time_s = saved_[0].time_s + h;
+  } else {
+    state = saved_[0];
+    take_back(report);
+  }
   return report;
 }
 
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
-  if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
+  make_room(state);
   StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
-  if (!report.converged) return failed(report);
-  state.jumped = false;
-  ++state.k;
-  state.time_s += report.step_s;
+  if (report.converged) {
+    state.jumped = false;
+    ++state.k;
+    state.time_s += report.step_s;
+  } else {
+    take_back(report);
+  }
   return report;
 }
 
@@ -95,27 +102,30 @@ StepReport Integrator::controlled(State&, const Channels&, double) {
   return report;
 }
 
-// Halves the step where no root is found; the channels stay as they are, so the planner is not asked again.
 StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
   StepReport report = attempt(state, channels, h);
   report.step_s = h;
   if (report.converged) {
     state.jumped = false;  // for the other half
-    return report;
+  } else {
+    take_back(report);
+    if (depth < options_.max_halvings) halve(state, channels, h, depth, report);
   }
-  report = failed(report);
-  if (depth == options_.max_halvings) return report;
+  return report;
+}
+
+// The channels stay as they are, so the planner is not asked again.
+void Integrator::halve(State& state, const Channels& channels, double h, int depth, StepReport& report) {
   State& before = saved_[static_cast<std::size_t>(depth)];
   before = state;
-  StepReport total = report;
-  total.converged = true;
-  total.residual = 0.0;
-  ++total.halvings;
-  for (int half = 0; half < 2 && total.converged; ++half)
-    total = together(total, divide(state, channels, 0.5 * h, depth + 1));
-  if (total.converged) return total;
+  report.converged = true;
+  report.residual = 0.0;
+  ++report.halvings;
+  for (int half = 0; half < 2 && report.converged; ++half)
+    report = together(report, divide(state, channels, 0.5 * h, depth + 1));
+  if (report.converged) return;
   state = before;
-  return failed(total);
+  take_back(report);
 }
 
 Energy Integrator::energy(const State& state) {

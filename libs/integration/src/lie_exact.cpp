@@ -122,8 +122,8 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   plus_ += 0.5 * h * (forces_.total() - mid_) - residual_;
   report.converged = all_finite(q_next_) && all_finite(plus_);
   if (!report.converged) return report;
-  state.q = q_next_;
-  state.p = plus_;
+  state.q.swap(q_next_);
+  state.p.swap(plus_);
   state.history[0].record(h, delta_);
   return report;
 }

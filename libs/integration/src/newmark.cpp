@@ -56,7 +56,7 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
     ++report.updates;
   } while (report.residual > options_.tolerance);
   place(state, h);
-  report.converged = all_finite(q_) && all_finite(v_) && all_finite(a_new_);
+  report.converged = all_finite(q_) && all_finite(v_);
   if (!report.converged) return report;
   state.memory.head(n) = a_new_;
   state.memory.tail(n) = a_;

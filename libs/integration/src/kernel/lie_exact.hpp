@@ -16,17 +16,17 @@ using Screw = dynamics::kernel::Spatial<double>::Motion;
 using Wrench = dynamics::kernel::Spatial<double>::Force;
 using Blocks = dynamics::kernel::Spatial<double>::Blocks;
 
-[[nodiscard]] inline Mat3 product(const Mat3& a, const Mat3& b) noexcept {
+[[nodiscard]] HAMELIN_INLINE Mat3 product(const Mat3& a, const Mat3& b) noexcept {
   const auto row = [&](const Vec3& r) { return b.x * r.x + b.y * r.y + b.z * r.z; };
   return {row(a.x), row(a.y), row(a.z)};
 }
-[[nodiscard]] inline Mat3 hat(const Vec3& a) noexcept {
+[[nodiscard]] HAMELIN_INLINE Mat3 hat(const Vec3& a) noexcept {
   return {{0.0, -a.z, a.y}, {a.z, 0.0, -a.x}, {-a.y, a.x, 0.0}};
 }
-[[nodiscard]] inline Mat3 outer(const Vec3& a, const Vec3& b) noexcept {
+[[nodiscard]] HAMELIN_INLINE Mat3 outer(const Vec3& a, const Vec3& b) noexcept {
   return {b * a.x, b * a.y, b * a.z};
 }
-[[nodiscard]] inline Mat3 scaled(const Mat3& a, double k) noexcept {
+[[nodiscard]] HAMELIN_INLINE Mat3 scaled(const Mat3& a, double k) noexcept {
   return {a.x * k, a.y * k, a.z * k};
 }
 

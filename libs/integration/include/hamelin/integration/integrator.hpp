@@ -139,7 +139,11 @@ class Integrator {
   dynamics::Workspace ws_;
 
  private:
+  void make_room(const State& state);
+  StepReport parts(State& state, const Channels& channels, double h);
+  /// One step, in halves where no root is found.
   StepReport divide(State& state, const Channels& channels, double h, int depth);
+  void halve(State& state, const Channels& channels, double h, int depth, StepReport& report);
 
   std::string name_;
   std::vector<State> saved_;  ///< one a halving level

@@ -111,7 +111,10 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
   using Real = typename Lanes<W>::Real;
   using Bits = typename Lanes<W>::Bits;
   const Real x = angle.v;
-  if (__builtin_expect(!(largest(abs(angle)) <= largest_reduced_angle), 0)) {
+  const Lanes<W> size = abs(angle);
+  double most = size[0];  // without a care for NaN, which stays NaN either way
+  for (int i = 1; i < W; ++i) most = most <= size[i] ? size[i] : most;
+  if (__builtin_expect(!(most <= largest_reduced_angle), 0)) {
     for (int i = 0; i < W; ++i) {
       sine.v[i] = __builtin_sin(x[i]);
       cosine.v[i] = __builtin_cos(x[i]);
