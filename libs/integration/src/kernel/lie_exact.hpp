@@ -17,8 +17,8 @@ using Wrench = dynamics::kernel::Spatial<double>::Force;
 using Blocks = dynamics::kernel::Spatial<double>::Blocks;
 
 [[nodiscard]] HAMELIN_INLINE Mat3 product(const Mat3& a, const Mat3& b) noexcept {
-  const auto row = [&](const Vec3& r) { return b.x * r.x + b.y * r.y + b.z * r.z; };
-  return {row(a.x), row(a.y), row(a.z)};
+  return {b.x * a.x.x + b.y * a.x.y + b.z * a.x.z, b.x * a.y.x + b.y * a.y.y + b.z * a.y.z,
+          b.x * a.z.x + b.y * a.z.y + b.z * a.z.z};
 }
 [[nodiscard]] HAMELIN_INLINE Mat3 hat(const Vec3& a) noexcept {
   return {{0.0, -a.z, a.y}, {a.z, 0.0, -a.x}, {-a.y, a.x, 0.0}};
