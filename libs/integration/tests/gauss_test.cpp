@@ -218,7 +218,7 @@ TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer
   const auto gauss = make_integrator("gauss", model, test::of_order(order)),
              afresh = make_integrator("gauss", model, test::of_order(order));
   State state = gauss->start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n)), other = state;
-  Rng rng(order);
+  Rng rng(static_cast<std::uint64_t>(order));
   VectorXd v(n), dp(n);
   int sweeps = 0, sweeps_afresh = 0;
   for (int k = 0; k < 100; ++k) {

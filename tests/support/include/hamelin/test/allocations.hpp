@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>  // first: its includes declare posix_memalign once more, which clang refuses after a definition
 #include <catch2/catch.hpp>
 #include <cerrno>
 #include <cstdlib>
