@@ -192,28 +192,43 @@ async function sliderMovesTheArm(page, { duration }) {
 
 /** The other checks of the picture look at what the page draws; this one, at whether the browser shows it. */
 async function drawingIsShown(page) {
+  // Nothing but the canvas may differ.
+  const style = await page.addStyleTag({ content: '.hud, .corner { visibility: hidden; }' });
   const first = await screenshot(page);
   await box(page, 'arm').uncheck();
-  assert.ok(await showsAgain(lab, page, first, false), 'without the arm the window looks the same');
+  assert.ok(await showsAgain(lab, page, first, false, 2e-3), 'without the arm the window looks the same');
   await box(page, 'arm').check();
   assert.ok(await showsAgain(lab, page, first, true), 'the arm does not come back');
+  await style.evaluate((element) => element.remove());
 }
 
-/** Simulated seconds a second, measured in the page itself. */
-async function pace(page, speed) {
-  await setTime(page, 0);
+const setSpeed = async (page, speed) => {
   await page.getByRole('combobox', { name: 'Speed' }).selectOption(String(speed));
   await page.evaluate(() => document.activeElement.blur());
-  await page.keyboard.press('Space');
-  const rate = await page.evaluate(async () => {
-    const frame = () => new Promise((done) => requestAnimationFrame(done));
-    await frame();
-    const [clock, t] = [performance.now(), window.hamelin.time()];
-    while (window.hamelin.time() < 0.5 * window.hamelin.duration && performance.now() - clock < 700) await frame();
-    return (window.hamelin.time() - t) / ((performance.now() - clock) / 1000);
+};
+
+/** Simulated seconds a second, taken frame by frame in the page: a busy machine may delay this side by seconds. */
+async function pace(page, speed) {
+  await setTime(page, 0);
+  await setSpeed(page, speed);
+  await page.evaluate(() => {
+    const playing = [];
+    const sample = (clock) => {
+      const t = window.hamelin.time();
+      if (t > (playing.at(-1)?.[1] ?? 0)) playing.push([clock, t]);
+      if (window.playing) requestAnimationFrame(sample);
+    };
+    window.playing = playing;
+    requestAnimationFrame(sample);
   });
   await page.keyboard.press('Space');
-  return rate;
+  await page.waitForFunction(() => window.playing.length > 3 && window.playing.at(-1)[0] - window.playing[0][0] > 400);
+  await page.keyboard.press('Space');
+  return page.evaluate(() => {
+    const [[from, first], [to, last]] = [window.playing[0], window.playing.at(-1)];
+    window.playing = null;
+    return (last - first) / ((to - from) / 1000);
+  });
 }
 
 async function keysAndButtonsStep(page, { json, unpack, duration }) {
@@ -239,9 +254,10 @@ async function keysAndButtonsPlay(page) {
   await settle(page);
   assert.equal(await time(page), held, 'goes on after the pause');
   // Slowly, so that the end does not come before the click on a busy machine.
-  await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.1');
+  await setSpeed(page, 0.1);
+  await setTime(page, 0);
   await page.getByRole('button', { name: 'Play (space)' }).click();
-  await page.waitForFunction((t) => window.hamelin.time() > t, held);
+  await page.waitForFunction(() => window.hamelin.time() > 0);
   await page.getByRole('button', { name: 'Pause (space)' }).click();
 }
 

@@ -22,7 +22,7 @@ export async function screenshot(page) {
   throw new Error('the picture does not come to rest');
 }
 
-/** Pixels of one or two screenshots, decoded in the page `lab`: distinct colours of the first, and whether both are the same. */
+/** Screenshots decoded in the page `lab`: distinct colours of the first, and the share of pixels in which a second one differs. */
 export async function compare(lab, first, second = null) {
   return lab.evaluate(async (pictures) => {
     const decode = async (base64) => {
@@ -35,14 +35,16 @@ export async function compare(lab, first, second = null) {
       return new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
     };
     const [a, b] = await Promise.all(pictures.map(decode));
-    return { colors: new Set(a).size, same: !b || (a.length === b.length && a.every((pixel, i) => pixel === b[i])) };
+    const differing = !b ? 0 : a.length === b.length ? a.filter((pixel, i) => pixel !== b[i]).length / a.length : 1;
+    return { colors: new Set(a).size, differing };
   }, [first, second].filter(Boolean).map((buffer) => buffer.toString('base64')));
 }
 
-/** Whether what is shown becomes the same as an earlier screenshot, or differs from it. */
-export async function showsAgain(lab, page, other, same) {
+/** Whether what is shown becomes the same as an earlier screenshot, or differs from it in more than a share of its pixels. */
+export async function showsAgain(lab, page, other, same, share = 0) {
   for (let tries = 0; tries < 4; ++tries) {
-    if ((await compare(lab, other, await screenshot(page))).same === same) return true;
+    const { differing } = await compare(lab, other, await screenshot(page));
+    if (same ? differing === 0 : differing > share) return true;
   }
   return false;
 }
