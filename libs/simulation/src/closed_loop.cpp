@@ -121,7 +121,7 @@ bool ClosedLoop::diagnosed(int level) const {
 
 void ClosedLoop::start(const Watch& watch) {
   watch_ = &watch;
-  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator, options_);
+  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator);
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
   audit_ = std::make_unique<EnergyAudit>(*recorder_, ideal && arm_.integrator->name() == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);

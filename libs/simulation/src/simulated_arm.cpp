@@ -6,7 +6,7 @@ namespace hamelin::simulation {
 
 using Eigen::VectorXd;
 
-SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, const integration::Options& options)
+SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, const integration::Parameters& options)
     : model(arm),
       ws(arm),
       integrator(integration::make_integrator(scene.integrator.name, arm, options)),
