@@ -7,7 +7,7 @@
 namespace hamelin::integration {
 
 /// Gauss–Legendre collocation in (θ, p), order 4 … 16 by order/2 stages: the Galerkin variational integrator of that
-/// degree, symplectic and symmetric. A stage is v = M⁻¹p, ṗ_i = λ_i·ad(X_i)A_i − ∂_iU + F_i (SPEC §3); all stages of a
+/// degree, symplectic and symmetric. A stage is v = M⁻¹p, ṗ_i = λ_i·ad(X_i)A_i − ∂_iU + F_i; all stages of a
 /// sweep go through SIMD lanes together (kernel/gauss.hpp). Fixed steps iterated to rounding keep the structure; with
 /// rtol or atol the step follows an error estimate made of what the first sweep changed.
 class GaussLegendre final : public Momentum {

@@ -6,7 +6,7 @@
 
 namespace hamelin::integration {
 
-/// hamel-variational: the exact variation of L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] (SPEC §3), solved for Δ by
+/// hamel-variational: the exact variation of L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})], solved for Δ by
 /// the exact O(n) Newton step (kernel/variational.hpp) or by the paper's feedback (16).
 class Variational final : public Momentum {
  public:

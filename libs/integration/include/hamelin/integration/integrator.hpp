@@ -17,7 +17,7 @@ using dynamics::VectorRef;
 using Eigen::VectorXd;
 using model::Model;
 
-/// What acts on the arm during one step besides gravity (SPEC §4). Coefficients are kept over the step and evaluated at
+/// What acts on the arm during one step besides gravity. Coefficients are kept over the step and evaluated at
 /// the scheme's own velocity: midpoint, stage or sub-step. Empty vectors mean none and cost nothing. The nodal
 /// potential (a) and the node impulse (e) act between steps: Integrator::kick and Integrator::set_velocity.
 struct Channels {
