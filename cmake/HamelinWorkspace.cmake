@@ -97,10 +97,12 @@ endfunction()
 set(HAMELIN_KERNEL_OPTIONS -O3 -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
   $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
 
-# hamelin_isa_sources(TARGET SOURCE...): compiles each source once for every instruction set of core/isa.hpp. What such a
-# source may use is said in dynamics/kernel/lanes.hpp; a test looks at the objects. Products may be contracted: results
+# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction set of core/isa.hpp. What such a
+# source may use is said in dynamics/kernels; a test looks at the objects. Products may be contracted: results
 # are promised to the bit on one set only.
 function(hamelin_isa_sources target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LINKS")
+  set(sources ${arg_UNPARSED_ARGUMENTS})
   set(names baseline)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     list(APPEND names v3 v4)
@@ -108,10 +110,10 @@ function(hamelin_isa_sources target)
   set(flags_baseline "")
   set(flags_v3 -mavx2 -mfma)
   set(flags_v4 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq)
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "${HAMELIN_KERNEL_OPTIONS}")
+  set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS "${HAMELIN_KERNEL_OPTIONS}")
   foreach(name IN LISTS names)
-    add_library(${target}_${name} OBJECT ${ARGN})
-    target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<FILTER:$<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>,EXCLUDE,LINK_ONLY>)
+    add_library(${target}_${name} OBJECT ${sources})
+    target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<FILTER:$<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>,EXCLUDE,LINK_ONLY> ${arg_LINKS})
     target_include_directories(${target}_${name} PRIVATE include)
     target_compile_definitions(${target}_${name} PRIVATE HAMELIN_ISA_NAMESPACE=isa_${name})
     target_compile_options(${target}_${name} PRIVATE ${flags_${name}})

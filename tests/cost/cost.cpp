@@ -24,12 +24,13 @@ class Rk4Alone final : public integration::Integrator {
   }
   [[nodiscard]] std::string criterion() const override { return "none"; }
   [[nodiscard]] int order() const override { return 4; }
-  void velocity(const integration::State& state, VectorXd& v) override { v = state.v; }
 
  protected:
-  void begin(integration::State& state, const VectorXd& v0) override { state.v = v0; }
-  void add_momentum(integration::State&, const VectorXd&) override {}
-  void replace_velocity(integration::State& state, const VectorXd& v) override { state.v = v; }
+  using In = dynamics::ConstVectorRef;
+  void begin(integration::State& state, const In& v0) override { state.v = v0; }
+  void node_velocity(const integration::State& state, dynamics::VectorRef v) const override { v = state.v; }
+  void add_momentum(integration::State&, const In&) override {}
+  void replace_velocity(integration::State& state, const In& v) override { state.v = v; }
   integration::StepReport attempt(integration::State& state, const integration::Channels&, double h) override {
     static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     integration::StepReport report;
@@ -96,6 +97,7 @@ void dynamics_calls(bool forward, bool library, long count) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const char* isa = std::getenv("HAMELIN_ISA")) set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
   const std::string what = argc > 1 ? argv[1] : "list";
   if (what == "list") {
     std::puts("rk4-no-channels\nforward-no-rotors\ninverse-no-rotors");

@@ -92,7 +92,7 @@ inline Outcome run(const Motion& motion, const std::string& scheme) {
 /// Where the motion ends by dop853 at a tolerance of 1e-12, which shares neither stages nor step lengths nor, by its
 /// articulated-body sweeps, the equations of a variational step. Not for barriers.
 inline VectorXd reference_end(const Motion& motion) {
-  integration::Options options;
+  integration::Parameters options;
   options.rtol = options.atol = 1e-12;
   const auto integrator = integration::make_integrator("dop853", motion.model, options);
   auto state = integrator->start(motion.q0, motion.v0);

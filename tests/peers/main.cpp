@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <functional>
@@ -341,9 +342,9 @@ Json precision(bool quick) {
       if (orders.empty()) orders.push_back(0);
       for (const int order : orders)
         for (int digits = 2; digits <= 14; ++digits) {
-          integration::Options options;
+          integration::Parameters options;
           options.rtol = options.atol = std::pow(10.0, -digits);
-          options.order = order;
+          if (order > 0) options.order = order;
           const auto integrator = integration::make_integrator(name, model, options);
           bool good = true;
           const auto once = [&] {
@@ -356,7 +357,7 @@ Json precision(bool quick) {
           if (!good) continue;
           const double error = (q - reference).lpNorm<Eigen::Infinity>();
           points.push_back({fmt::format("hamelin, {}{} adaptive", name, order > 0 ? fmt::format(" {}", order) : ""),
-                            fmt::format("rtol = atol = {:.0e}", options.rtol), error, least_cpu_us(once, quick)});
+                            fmt::format("rtol = atol = {:.0e}", *options.rtol), error, least_cpu_us(once, quick)});
         }
     }
     for (const Point& p : points)
@@ -406,11 +407,12 @@ int run(int argc, char** argv) {
                   fmt::format("{}: expected speed, energy, precision, --quick or --json FILE", argument));
     }
   }
+  if (const char* isa = std::getenv("HAMELIN_ISA")) set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
   const auto wanted = [&](const char* part) { return parts.empty() || parts.count(part) != 0; };
   std::vector<std::string> names;
   for (const auto& peer : make_all(chain(1, "x"))) names.push_back(peer->name());
-  fmt::print("# {}; ISA {}\n", fmt::join(names, ", "), instruction_set());
-  Json out{{"peers", names}, {"isa", instruction_set()}, {"quick", quick}};
+  fmt::print("# {}; ISA {}\n", fmt::join(names, ", "), name_of(default_isa()));
+  Json out{{"peers", names}, {"isa", name_of(default_isa())}, {"quick", quick}};
   if (wanted("speed")) out["speed"] = speed(quick);
   if (wanted("energy")) out["energy"] = energy(quick);
   if (wanted("precision")) out["precision"] = precision(quick);

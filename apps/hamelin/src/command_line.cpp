@@ -8,6 +8,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/text.hpp"
+#include "hamelin/integration/options.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "help.hpp"
 #include "terminal.hpp"
@@ -64,13 +65,37 @@ CLI::App* add_command(CLI::App& parent, const std::string& name, const std::stri
   return command;
 }
 
+namespace {
+
+// What is wrong with a value that is to be one of these; empty if nothing is.
+std::string unless_one_of(const std::string& given, const std::vector<std::string>& values) {
+  if (std::find(values.begin(), values.end(), given) != values.end()) return {};
+  return fmt::format("'{}' is not known, expected one of {}{}", given, fmt::join(values, ", "),
+                     did_you_mean(given, values));
+}
+
+std::string listed(const std::vector<std::string>& values) {
+  return fmt::format("{{{}}}", fmt::join(values, ","));
+}
+
+}  // namespace
+
 CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values) {
-  const auto check = [values](const std::string& given) {
-    if (std::find(values.begin(), values.end(), given) != values.end()) return std::string();
-    return fmt::format("'{}' is not known, expected one of {}{}", given, fmt::join(values, ", "),
-                       did_you_mean(given, values));
+  const auto check = [values](const std::string& given) { return unless_one_of(given, values); };
+  return option->check(CLI::Validator(check, listed(values)));
+}
+
+CLI::Option* integrator_name(CLI::Option* option) {
+  const auto check = [](const std::string& given) -> std::string {
+    try {
+      const auto wrong = unless_one_of(integration::parse_scheme_name(given).name, integration::integrator_names());
+      if (wrong.empty()) (void)integration::make_options(given);
+      return wrong;
+    } catch (const Error& error) {
+      return error.what();
+    }
   };
-  return option->check(CLI::Validator(check, fmt::format("{{{}}}", fmt::join(values, ","))));
+  return option->check(CLI::Validator(check, listed(integration::integrator_names())))->type_name("NAME[:ORDER]");
 }
 
 std::string full_name(const CLI::App& command) {

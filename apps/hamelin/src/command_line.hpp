@@ -20,6 +20,9 @@ CLI::App* add_command(CLI::App& parent, const std::string& name, const std::stri
 /// Refuses all but these values, with the nearest one; help and completion offer them. Returns the option.
 CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values);
 
+/// Refuses all but names of integrators, which may carry an order ("gauss:8"). Returns the option.
+CLI::Option* integrator_name(CLI::Option* option);
+
 /// "hamelin scene info"
 [[nodiscard]] std::string full_name(const CLI::App& command);
 

@@ -24,10 +24,8 @@ void say_unused(const char* flag, const std::string& integrator) {
 }  // namespace
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
-  one_of(
-      command.add_option("--integrator", flags.integrator, "time stepping (default the scene's or hamel-variational)"),
-      integration::integrator_names())
-      ->type_name("NAME");
+  integrator_name(
+      command.add_option("--integrator", flags.integrator, "time stepping (default the scene's or hamel-variational)"));
   command.add_option("--alpha", flags.alpha, "hamel: where in the step velocities are taken, 0 to 1 (default 0.5)")
       ->type_name("A");
   one_of(command.add_option("--start", flags.start, "of hamel and hamel-midpoint (default consistent)"),

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 
 #include "command_line.hpp"
@@ -47,8 +48,14 @@ void add_everywhere(CLI::App& app) {
   app.add_flag_callback("--no-color", set_no_colour, "no colour")->group(everywhere);
 }
 
+// The environment is read here and nowhere else; libraries take the instruction set as an argument or a default.
+void take_environment() {
+  const char* asked = std::getenv("HAMELIN_ISA");
+  if (asked != nullptr && *asked != '\0') hamelin::set_default_isa(hamelin::isa_from_name(asked, "HAMELIN_ISA"));
+}
+
 int run_command_line(int argc, char** argv) {
-  (void)hamelin::selected_isa();  // HAMELIN_ISA may be wrong
+  take_environment();
   set_command_line(argc, argv);
   const Phase phase("in all");
   int exit_code = 0;

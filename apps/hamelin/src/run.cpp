@@ -69,10 +69,8 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
   command->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  one_of(command->add_option("--integrator", options->flags.integrator,
-                             "time stepping (default the scene's, else hamel-variational)"),
-         integration::integrator_names())
-      ->type_name("NAME");
+  integrator_name(command->add_option("--integrator", options->flags.integrator,
+                                      "time stepping (default the scene's, else hamel-variational)"));
   command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")->type_name("H");
   command->add_option("--duration", options->flags.duration_s, "longest simulated time [s] (default the scene's)")
       ->type_name("T");

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <ctime>
 
@@ -53,7 +52,7 @@ struct Job {
   std::unique_ptr<Integrator> integrator;
 };
 
-Job make_job(const model::Model& model, const Scheme& scheme, const integration::Options& options, long steps,
+Job make_job(const model::Model& model, const Scheme& scheme, const integration::Parameters& options, long steps,
              double step_s) {
   Job job;
   job.integrator = integration::make_integrator(scheme.integrator, model, options);
@@ -69,8 +68,8 @@ Job make_job(const model::Model& model, const Scheme& scheme, const integration:
     row.step_s = step_s;
   }
   if (integration::find_scheme(scheme.integrator)->iterates && !options.step_control())
-    row.tolerance = job.integrator->criterion().starts_with("|tau_e") ? options.feedback_tolerance : options.tolerance;
-  row.isa = instruction_set();
+    row.tolerance = job.integrator->tolerance();
+  row.isa = name_of(default_isa());
   row.mode = job.integrator->mode();
   return job;
 }
@@ -95,8 +94,8 @@ std::vector<Job> plan(const model::Model& model, const Options& options) {
 
   std::vector<Job> jobs;
   for (const auto& scheme : options.schemes) {
-    integration::Options base;
-    base.order = scheme.order;
+    integration::Parameters base;
+    if (scheme.order > 0) base.order = scheme.order;
     const auto* known = integration::find_scheme(scheme.integrator);
     if (known == nullptr) {
       (void)integration::make_integrator(scheme.integrator, model, base);  // says what is known
@@ -108,13 +107,13 @@ std::vector<Job> plan(const model::Model& model, const Options& options) {
     if (tolerances.empty() || !known->iterates) tolerances = {0.0};
     for (const double tolerance : tolerances)
       for (const double step_s : options.steps_s) {
-        integration::Options fixed = base;
+        integration::Parameters fixed = base;
         if (tolerance > 0.0) fixed.tolerance = fixed.feedback_tolerance = tolerance;
         jobs.push_back(make_job(model, scheme, fixed, step_count(options.duration_s, step_s), step_s));
       }
     if (!known->step_control) continue;
     for (const double rtol : options.rtols) {
-      integration::Options controlled = base;
+      integration::Parameters controlled = base;
       controlled.rtol = rtol;
       controlled.atol = options.atol.value_or(rtol);
       jobs.push_back(make_job(model, scheme, controlled, 0, 0.0));
@@ -223,17 +222,15 @@ std::vector<Scheme> read_schemes(const std::string& text) {
   for (std::size_t begin = 0; begin <= text.size();) {
     const auto end = std::min(text.find(',', begin), text.size());
     const std::string entry = text.substr(begin, end - begin);
-    const auto colon = entry.find(':');
-    Scheme scheme{entry.substr(0, colon), 0};
+    integration::SchemeName parsed;
+    try {
+      parsed = integration::parse_scheme_name(entry);
+    } catch (const Error& error) {
+      refuse(fmt::format("--integrators: {}", error.what()));
+    }
+    const Scheme scheme{parsed.name, parsed.order.value_or(0)};
     if (scheme.integrator.empty())
       refuse(fmt::format("--integrators: '{}' has an empty entry, expected a list as hamel-variational,gauss:8", text));
-    if (colon != std::string::npos) {
-      const char* const stop = entry.data() + entry.size();
-      const auto [read_to, ec] = std::from_chars(entry.data() + colon + 1, stop, scheme.order);
-      if (ec != std::errc() || read_to != stop || scheme.order < 1)
-        refuse(fmt::format("--integrators: '{}': '{}' is no order, expected a name and a number as gauss:8", entry,
-                           entry.substr(colon + 1)));
-    }
     for (const auto& other : schemes)
       if (other.integrator == scheme.integrator && other.order == scheme.order)
         refuse(fmt::format("--integrators: '{}' is there twice", entry));

@@ -85,7 +85,7 @@ class Ladder {
     return next * static_cast<double>(model_.dof()) <= options_.reference_work;
   }
 
-  End run(const integration::Options& scheme, long steps) {
+  End run(const integration::Parameters& scheme, long steps) {
     const auto integrator = integration::make_integrator(settings_.integrator, model_, scheme);
     auto state = integrator->start(options_.q0, options_.v0);
     const double h = steps > 0 ? options_.duration_s / static_cast<double>(steps) : 0.0;
@@ -108,9 +108,9 @@ class Ladder {
     return end;
   }
 
-  integration::Options scheme() const {
-    integration::Options made;
-    made.order = settings_.order;
+  integration::Parameters scheme() const {
+    integration::Parameters made;
+    if (settings_.order > 0) made.order = settings_.order;
     made.tolerance = 1e-14;
     return made;
   }

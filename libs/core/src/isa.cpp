@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstdlib>
-#include <string>
+#include <atomic>
 
 #include "hamelin/core/error.hpp"
 
@@ -18,7 +17,19 @@ constexpr std::array<std::string_view, 3> names{"x86-64", "v3", "v4"};
 constexpr std::array<std::string_view, 1> names{"generic"};
 #endif
 
-bool machine_has([[maybe_unused]] Isa isa) {
+constexpr std::int32_t none = -1;
+std::atomic<std::int32_t> chosen{none};
+
+Isa best_isa() noexcept {
+  Isa isa = Isa::baseline;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (is_available(Isa{static_cast<std::int32_t>(i)})) isa = Isa{static_cast<std::int32_t>(i)};
+  return isa;
+}
+
+}  // namespace
+
+bool is_available([[maybe_unused]] Isa isa) noexcept {
 #if defined(__x86_64__)
   __builtin_cpu_init();
   const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
@@ -30,39 +41,43 @@ bool machine_has([[maybe_unused]] Isa isa) {
   return isa == Isa::baseline;
 }
 
-Isa find(std::string_view name) {
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] != name) continue;
-    const Isa isa{static_cast<std::int32_t>(i)};
-    if (machine_has(isa)) return isa;
-    throw Error(ErrorCode::usage,
-                fmt::format("HAMELIN_ISA: '{}' is asked for, but this machine does not have it", name));
-  }
-  throw Error(ErrorCode::usage,
-              fmt::format("HAMELIN_ISA: '{}' is not known, expected one of {}", name, fmt::join(names, ", ")));
-}
-
-}  // namespace
-
-Isa selected_isa() {
-  const char* asked = std::getenv("HAMELIN_ISA");
-  if (asked != nullptr && *asked != '\0') return find(asked);
-  static const Isa best = [] {
-    Isa isa = Isa::baseline;
-    for (std::size_t i = 0; i < names.size(); ++i)
-      if (machine_has(Isa{static_cast<std::int32_t>(i)})) isa = Isa{static_cast<std::int32_t>(i)};
-    return isa;
-  }();
+Isa default_isa() noexcept {
+  const std::int32_t isa = chosen.load(std::memory_order_relaxed);
+  if (isa != none) return Isa{isa};
+  static const Isa best = best_isa();
   return best;
 }
 
-std::string_view instruction_set() {
-  return names[static_cast<std::size_t>(selected_isa())];
+void set_default_isa(Isa isa) {
+  require_available(isa);
+  chosen.store(static_cast<std::int32_t>(isa), std::memory_order_relaxed);
 }
 
-void force_instruction_set(std::string_view name) {
-  (void)find(name);
-  ::setenv("HAMELIN_ISA", std::string(name).c_str(), 1);
+bool default_isa_is_set() noexcept {
+  return chosen.load(std::memory_order_relaxed) != none;
+}
+
+std::string_view name_of(Isa isa) noexcept {
+  const auto i = static_cast<std::size_t>(isa);
+  return i < names.size() ? names[i] : "unknown";
+}
+
+Isa isa_from_name(std::string_view name, std::string_view where) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i] != name) continue;
+    const Isa isa{static_cast<std::int32_t>(i)};
+    if (is_available(isa)) return isa;
+    throw Error(ErrorCode::usage, fmt::format("{}: this machine does not have the instruction set '{}', expected {}",
+                                              where, name, name_of(best_isa())));
+  }
+  throw Error(ErrorCode::usage, fmt::format("{}: instruction set '{}' is not known, expected one of {}", where, name,
+                                            fmt::join(names, ", ")));
+}
+
+void require_available(Isa isa) {
+  if (!is_available(isa))
+    throw Error(ErrorCode::usage, fmt::format("instruction set: this machine does not have '{}', expected at most '{}'",
+                                              name_of(isa), name_of(best_isa())));
 }
 
 }  // namespace hamelin

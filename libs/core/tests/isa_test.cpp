@@ -8,20 +8,27 @@
 
 using namespace hamelin;
 
-TEST_CASE("an instruction set that is unknown or not there is refused, never ignored", "[core][unit]") {
-  ::unsetenv("HAMELIN_ISA");
-  const std::string best(instruction_set());
+TEST_CASE("an instruction set that is unknown is refused, and the default stays", "[core][unit]") {
+  const Isa before = default_isa();
+  CHECK(is_available(before));
+  CHECK_THROWS_WITH(isa_from_name("v9", "HAMELIN_ISA"),
+                    Catch::StartsWith("HAMELIN_ISA: instruction set 'v9' is not known, expected one of "));
+  CHECK_THROWS_AS(set_default_isa(Isa{9}), Error);
+  CHECK(default_isa() == before);
+  CHECK(isa_from_name(name_of(before), "test") == before);
+}
+
+TEST_CASE("the environment decides nothing in the library, set_default_isa does", "[core][unit]") {
+  const Isa before = default_isa();
   ::setenv("HAMELIN_ISA", "v9", 1);
-  CHECK_THROWS_WITH(selected_isa(), Catch::Contains("HAMELIN_ISA: 'v9' is not known, expected one of"));
-  CHECK_THROWS_AS(force_instruction_set("avx"), Error);
-  CHECK(std::string(std::getenv("HAMELIN_ISA")) == "v9");
-  force_instruction_set(best);
-  CHECK(instruction_set() == best);
-#if defined(__x86_64__)
-  force_instruction_set("x86-64");
-  CHECK(selected_isa() == Isa::baseline);
-  CHECK(instruction_set() == "x86-64");
-#endif
+  CHECK(default_isa() == before);
   ::unsetenv("HAMELIN_ISA");
-  CHECK(instruction_set() == best);
+  set_default_isa(Isa::baseline);
+  CHECK(default_isa() == Isa::baseline);
+  CHECK(default_isa_is_set());
+#if defined(__x86_64__)
+  CHECK(name_of(default_isa()) == "x86-64");
+#endif
+  set_default_isa(before);
+  CHECK(default_isa() == before);
 }

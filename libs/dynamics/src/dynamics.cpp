@@ -1,5 +1,8 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
+#include <fmt/format.h>
+
+#include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernels.hpp"
 
@@ -19,8 +22,9 @@ std::size_t batch_bytes(const Model& model, const KernelSet& set) {
 
 }  // namespace
 
-Workspace::Workspace(const Model& model)
-    : kernels(&dynamics::kernels()),
+Workspace::Workspace(const Model& model, Isa isa)
+    : owner(model),
+      kernels(&dynamics::kernels(isa)),
       sweep(sweep_bytes(model, *kernels)),
       frames(static_cast<std::size_t>(model.dof())),
       motions(static_cast<std::size_t>(model.dof())),
@@ -28,79 +32,107 @@ Workspace::Workspace(const Model& model)
       column_in(model.dof()),
       column_out(model.dof()) {}
 
-BatchWorkspace::BatchWorkspace(const Model& model)
-    : kernels(&dynamics::kernels()), sweep(batch_bytes(model, *kernels)) {}
+BatchWorkspace::BatchWorkspace(const Model& model, Isa isa)
+    : owner(model), kernels(&dynamics::kernels(isa)), sweep(batch_bytes(model, *kernels)) {}
 
-void inverse_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& a,
-                      VectorXd& tau) {
+namespace detail {
+
+void refuse_workspace(const char* function, const Model& model, const WorkspaceOwner& owner) {
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("{}: the workspace was made for another model (of {} joints), expected one made for this '{}' "
+                  "(of {} joints) or a copy of it",
+                  function, owner.dof, model.robot().name, model.dof()));
+}
+
+void refuse_size(const char* function, const char* argument, Eigen::Index given, Eigen::Index expected) {
+  throw Error(ErrorCode::usage,
+              fmt::format("{}: {}: {} given, expected {} (one per joint)", function, argument, given, expected));
+}
+
+void refuse_states(const char* function, const char* argument, Eigen::Index rows, Eigen::Index cols,
+                   Eigen::Index stride, Eigen::Index dof, Eigen::Index states, Eigen::Index expected) {
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("{}: {}: {} x {} numbers with row stride {} given, expected {} x {} (joints x states) with row "
+                  "stride {}",
+                  function, argument, rows, cols, stride, dof, states, expected));
+}
+
+void refuse_link(const char* function, int link, Eigen::Index dof) {
+  throw Error(ErrorCode::usage,
+              fmt::format("{}: link: {} given, expected an index from 0 to {}", function, link, dof - 1));
+}
+
+void refuse_count(const char* function, const char* argument, std::size_t given, std::size_t expected) {
+  throw Error(ErrorCode::usage, fmt::format("{}: {}: room for {} given, expected {} (one per collision shape)",
+                                            function, argument, given, expected));
+}
+
+void inverse_dynamics(const Model& model, Workspace& ws, const double* q, const double* v, const double* a,
+                      double* tau) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), a.data(), tau.data());
+    sweeps.inverse_dynamics(chain, ws.sweep.get(), q, v, a, tau);
   });
 }
 
-void forward_dynamics(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, const VectorXd& tau,
-                      VectorXd& a) {
+void forward_dynamics(const Model& model, Workspace& ws, const double* q, const double* v, const double* tau,
+                      double* a) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.forward_dynamics(chain, ws.sweep.get(), q.data(), v.data(), tau.data(), a.data());
+    sweeps.forward_dynamics(chain, ws.sweep.get(), q, v, tau, a);
   });
 }
 
-void bias_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& tau) {
+void gravity_torque(const Model& model, Workspace& ws, const double* q, double* tau) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.inverse_dynamics(chain, ws.sweep.get(), q.data(), v.data(), nullptr, tau.data());
+    sweeps.gravity_torque(chain, ws.sweep.get(), q, tau);
   });
 }
 
-void gravity_torque(const Model& model, Workspace& ws, const VectorXd& q, VectorXd& tau) {
+void solve_mass(const Model& model, Workspace& ws, const double* q, const double* y, double* x) {
+  kernel::with_group(model, *ws.kernels,
+                     [&](const auto& sweeps, const auto& chain) { sweeps.solve_mass(chain, ws.sweep.get(), q, y, x); });
+}
+
+void momentum(const Model& model, Workspace& ws, const double* q, const double* v, double* p) {
+  kernel::with_group(model, *ws.kernels,
+                     [&](const auto& sweeps, const auto& chain) { sweeps.momentum(chain, ws.sweep.get(), q, v, p); });
+}
+
+void mass_matrix(const Model& model, Workspace& ws, const double* q, double* M, Eigen::Index stride) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.gravity_torque(chain, ws.sweep.get(), q.data(), tau.data());
+    sweeps.mass_matrix(chain, ws.sweep.get(), q, M, static_cast<std::size_t>(stride));
   });
 }
 
-void solve_mass(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& y, VectorXd& x) {
-  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.solve_mass(chain, ws.sweep.get(), q.data(), y.data(), x.data());
-  });
-}
-
-void momentum(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v, VectorXd& p) {
-  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.momentum(chain, ws.sweep.get(), q.data(), v.data(), p.data());
-  });
-}
-
-void mass_matrix(const Model& model, Workspace& ws, const VectorXd& q, Eigen::MatrixXd& M) {
-  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.mass_matrix(chain, ws.sweep.get(), q.data(), M.data(), static_cast<std::size_t>(M.outerStride()));
-  });
-}
-
-double kinetic_energy(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v) {
+double kinetic_energy(const Model& model, Workspace& ws, const double* q, const double* v) {
   return kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    return sweeps.kinetic_energy(chain, ws.sweep.get(), q.data(), v.data());
+    return sweeps.kinetic_energy(chain, ws.sweep.get(), q, v);
   });
 }
 
-double potential_energy(const Model& model, Workspace& ws, const VectorXd& q) {
+double potential_energy(const Model& model, Workspace& ws, const double* q) {
   return kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    return sweeps.potential_energy(chain, ws.sweep.get(), q.data()) + chain.potential_constant;
+    return sweeps.potential_energy(chain, ws.sweep.get(), q) + chain.potential_constant;
   });
 }
 
-void inverse_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& a,
-                      StatesXd& tau) {
+void inverse_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states, Eigen::Index stride, const double* q,
+                      const double* v, const double* a, double* tau) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    const auto states = static_cast<std::size_t>(q.cols());
-    sweeps.inverse_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), a.data(), tau.data());
+    sweeps.inverse_dynamics_batch(chain, ws.sweep.get(), static_cast<std::size_t>(states),
+                                  static_cast<std::size_t>(stride), q, v, a, tau);
   });
 }
 
-void forward_dynamics(const Model& model, BatchWorkspace& ws, const StatesXd& q, const StatesXd& v, const StatesXd& tau,
-                      StatesXd& a) {
+void forward_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states, Eigen::Index stride, const double* q,
+                      const double* v, const double* tau, double* a) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    const auto states = static_cast<std::size_t>(q.cols());
-    sweeps.forward_dynamics_batch(chain, ws.sweep.get(), states, states, q.data(), v.data(), tau.data(), a.data());
+    sweeps.forward_dynamics_batch(chain, ws.sweep.get(), static_cast<std::size_t>(states),
+                                  static_cast<std::size_t>(stride), q, v, tau, a);
   });
 }
+
+}  // namespace detail
 
 }  // namespace hamelin::dynamics

@@ -6,8 +6,8 @@ namespace hamelin::dynamics {
 
 HAMELIN_SELECT_KERNELS(KernelSet, set)
 
-const KernelSet& kernels() {
-  return selected_set();
+const KernelSet& kernels(Isa isa) {
+  return select_set(isa);
 }
 
 }  // namespace hamelin::dynamics

@@ -37,7 +37,7 @@ struct Kernels {
 /// All kinds of chains for one instruction set.
 struct KernelSet : kernel::Groups<Kernels> {};
 
-/// The set that core's selected_isa() names.
-[[nodiscard]] const KernelSet& kernels();
+/// @throws Error usage if this machine does not have the instruction set
+[[nodiscard]] const KernelSet& kernels(Isa isa);
 
 }  // namespace hamelin::dynamics

@@ -46,8 +46,22 @@ bool slides(const Model& model, int link) {
   return model.robot().links[static_cast<std::size_t>(link)].joint.type == model::JointType::prismatic;
 }
 
+// Link indices come from outside, so each is compared once.
+void check_link(const char* function, const Model& model, const Workspace& ws, int link) {
+  const detail::Call call(function, model, ws.owner);
+  if (link < 0 || link >= ws.owner.dof) [[unlikely]]
+    detail::refuse_link(function, link, ws.owner.dof);
+}
+
 int parent(const Model& model, int link) {
   return model.robot().links[static_cast<std::size_t>(link)].parent;
+}
+
+void check_shapes(const char* function, const char* argument, const Model& model, const Workspace& ws,
+                  std::span<const Vector3d> given) {
+  const detail::Call call(function, model, ws.owner);
+  if (given.size() != model.shapes().size())
+    detail::refuse_count(function, argument, given.size(), model.shapes().size());
 }
 
 // How joint j moves a world point that it carries.
@@ -58,11 +72,72 @@ Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const V
 
 }  // namespace
 
-void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q) {
+Vector3d point_position(const Model& model, const Workspace& ws, int link, const Vector3d& point_link) {
+  check_link("point_position", model, ws, link);
+  return frame(ws, link).p + frame(ws, link).R * (model.com_in_frame(link) * point_link);
+}
+
+geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link) {
+  check_link("link_pose", model, ws, link);
+  return geometry::SE3{frame(ws, link).R, frame(ws, link).p} * model.com_in_frame(link);
+}
+
+geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
+  const detail::Call call("tip_pose", model, ws.owner);
+  const Frame& f = frame(ws, model.robot().tip.link);
+  return geometry::SE3{f.R, f.p} * model.tip_in_frame();
+}
+
+void shape_centers(const Model& model, const Workspace& ws, std::span<Vector3d> centers) {
+  check_shapes("shape_centers", "centers", model, ws, centers);
+  std::size_t i = 0;
+  for (const auto& s : model.shapes()) {
+    const Frame& f = frame(ws, s.link);
+    centers[i++] = f.p + f.R * s.center;
+  }
+}
+
+void shape_half_axes(const Model& model, const Workspace& ws, std::span<Vector3d> half_axes) {
+  check_shapes("shape_half_axes", "half_axes", model, ws, half_axes);
+  std::size_t i = 0;
+  for (const auto& s : model.shapes()) half_axes[i++] = frame(ws, s.link).R * s.half_axis;
+}
+
+void point_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
+                    Eigen::Ref<Matrix3Xd> J) {
+  check_link("point_jacobian", model, ws, link);
+  detail::Call("point_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
+  J.setZero();
+  for (int j = link; j >= 0; j = parent(model, j)) J.col(j) = velocity_column(model, ws, j, point_world);
+}
+
+void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
+                    Eigen::Ref<Matrix6Xd> J) {
+  check_link("frame_jacobian", model, ws, link);
+  detail::Call("frame_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
+  J.setZero();
+  for (int j = link; j >= 0; j = parent(model, j)) {
+    if (!slides(model, j)) J.col(j).head<3>() = frame(ws, j).axis;
+    J.col(j).tail<3>() = velocity_column(model, ws, j, point_world);
+  }
+}
+
+void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
+                              const Vector3d& direction_world, VectorRef row) {
+  check_link("point_jacobian_transpose", model, ws, link);
+  detail::Call("point_jacobian_transpose", model, ws.owner).joints("row", row);
+  row.setZero();
+  for (int j = link; j >= 0; j = parent(model, j))
+    row[j] = direction_world.dot(velocity_column(model, ws, j, point_world));
+}
+
+namespace detail {
+
+void forward_kinematics(const Model& model, Workspace& ws, const double* q) {
   const auto place = [&]<class Space>(Space, const auto& chain) {
     for (std::size_t i = 0; i < chain.links.size(); ++i) {
       const auto& l = chain.links[i];
-      const auto x = Space::place(l, q[static_cast<Eigen::Index>(i)]);
+      const auto x = Space::place(l, q[i]);
       ws.frames[i] = l.parent < 0 ? child_frame(l, x, model.root().R(), model.root().p())
                                   : child_frame(l, x, frame(ws, l.parent).R, frame(ws, l.parent).p);
     }
@@ -73,61 +148,17 @@ void forward_kinematics(const Model& model, Workspace& ws, const VectorXd& q) {
     place(kernel::Spatial<double>{}, std::get<model::SpatialChain>(model.chain()));
 }
 
-Vector3d point_position(const Model& model, const Workspace& ws, int link, const Vector3d& point_link) {
-  return frame(ws, link).p + frame(ws, link).R * (model.com_in_frame(link) * point_link);
-}
-
-geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link) {
-  return geometry::SE3{frame(ws, link).R, frame(ws, link).p} * model.com_in_frame(link);
-}
-
-geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
-  const Frame& f = frame(ws, model.robot().tip.link);
-  return geometry::SE3{f.R, f.p} * model.tip_in_frame();
-}
-
-void shape_centers(const Model& model, const Workspace& ws, std::span<Vector3d> centers) {
-  std::size_t i = 0;
-  for (const auto& s : model.shapes()) {
-    const Frame& f = frame(ws, s.link);
-    centers[i++] = f.p + f.R * s.center;
-  }
-}
-
-void shape_half_axes(const Model& model, const Workspace& ws, std::span<Vector3d> half_axes) {
-  std::size_t i = 0;
-  for (const auto& s : model.shapes()) half_axes[i++] = frame(ws, s.link).R * s.half_axis;
-}
-
-void point_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world, Matrix3Xd& J) {
-  J.setZero();
-  for (int j = link; j >= 0; j = parent(model, j)) J.col(j) = velocity_column(model, ws, j, point_world);
-}
-
-void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world, Matrix6Xd& J) {
-  J.setZero();
-  for (int j = link; j >= 0; j = parent(model, j)) {
-    if (!slides(model, j)) J.col(j).head<3>() = frame(ws, j).axis;
-    J.col(j).tail<3>() = velocity_column(model, ws, j, point_world);
-  }
-}
-
-void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
-                              const Vector3d& direction_world, VectorXd& row) {
-  row.setZero();
-  for (int j = link; j >= 0; j = parent(model, j))
-    row[j] = direction_world.dot(velocity_column(model, ws, j, point_world));
-}
-
 Vector3d point_velocity(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
-                        const VectorXd& v) {
+                        const double* v) {
+  check_link("point_velocity", model, ws, link);
   Vector3d velocity = Vector3d::Zero();
   for (int j = link; j >= 0; j = parent(model, j)) velocity += velocity_column(model, ws, j, point_world) * v[j];
   return velocity;
 }
 
-void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, const VectorXd& v,
-                       std::span<const GyroscopicTerm> terms, VectorXd& tau) {
+void gyroscopic_torque(const Model& model, Workspace& ws, const double* q, const double* v,
+                       std::span<const GyroscopicTerm> terms, double* tau) {
+  for (const auto& term : terms) check_link("gyroscopic_torque", model, ws, term.link);
   forward_kinematics(model, ws, q);
   const int n = model.dof();
   for (int i = 0; i < n; ++i) {
@@ -161,10 +192,12 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const VectorXd& q, con
   }
 }
 
-Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& q, const Matrix3Xd& J, double damping) {
+Matrix3d operational_inertia(const Model& model, Workspace& ws, const double* q, const double* columns,
+                             Eigen::Index stride, double damping) {
+  const Eigen::Map<const Matrix3Xd, 0, Eigen::OuterStride<>> J(columns, 3, ws.owner.dof, Eigen::OuterStride<>(stride));
   Matrix3d inverse;
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
-    sweeps.factor(chain, ws.sweep.get(), q.data());
+    sweeps.factor(chain, ws.sweep.get(), q);
     for (int c = 0; c < 3; ++c) {
       ws.column_in = J.row(c).transpose();
       sweeps.solve_factored(chain, ws.sweep.get(), ws.column_in.data(), ws.column_out.data());
@@ -176,5 +209,7 @@ Matrix3d operational_inertia(const Model& model, Workspace& ws, const VectorXd& 
   const Vector3d damped = d.array() / (d.array().square() + damping * damping);
   return eigen.eigenvectors() * damped.asDiagonal() * eigen.eigenvectors().transpose();
 }
+
+}  // namespace detail
 
 }  // namespace hamelin::dynamics

@@ -18,19 +18,11 @@ using Eigen::MatrixXd;
 
 namespace {
 
-// Those of this machine; HAMELIN_ISA is as before afterwards.
-std::vector<std::string> sets_here() {
-  const std::string now(instruction_set());
-  std::vector<std::string> sets;
-  for (const char* name : {"x86-64", "v3", "v4"}) {
-    try {
-      force_instruction_set(name);
-      sets.emplace_back(name);
-    } catch (const Error&) {
-      continue;
-    }
-  }
-  force_instruction_set(now);
+// Those of this machine.
+std::vector<Isa> sets_here() {
+  std::vector<Isa> sets;
+  for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4})
+    if (is_available(isa)) sets.push_back(isa);
   return sets;
 }
 
@@ -125,7 +117,7 @@ TEST_CASE("batches equal single calls, whatever the number of states", "[dynamic
   Workspace ws(model);
   VectorXd single(c.n);
   for (int i = 0; i < states; ++i) {
-    forward_dynamics(model, ws, q.col(i), v.col(i), tau.col(i), single);
+    forward_dynamics(model, ws, q.col(i).eval(), v.col(i).eval(), tau.col(i).eval(), single);
     CHECK((a.col(i) - single).norm() < 1e-11 * (1.0 + single.norm()));
   }
 }
@@ -142,13 +134,11 @@ TEST_CASE("on every instruction set the sweeps are those of dense matrices", "[d
   const test::Dense dense{model};
   const MatrixXd M_dense = dense.mass(q);
   const VectorXd gravity = dense.bias(q, VectorXd::Zero(n)), bias = dense.bias(q, v);  // by differences
-  const std::string now(instruction_set());
   const auto sets = sets_here();
   REQUIRE_FALSE(sets.empty());
   for (const auto& set : sets) {
-    force_instruction_set(set);
-    CAPTURE(set, planar, prismatic_every);
-    Workspace ws(model);
+    CAPTURE(name_of(set), planar, prismatic_every);
+    Workspace ws(model, set);
     VectorXd x(n);
     MatrixXd M(n, n);
     mass_matrix(model, ws, q, M);
@@ -165,7 +155,6 @@ TEST_CASE("on every instruction set the sweeps are those of dense matrices", "[d
     forward_dynamics(model, ws, q, v, y, x);
     CHECK((M_dense * x + bias - y).norm() < 1e-7 * bias.norm());
   }
-  force_instruction_set(now);
 }
 
 TEST_CASE("all instruction sets agree but for rounding", "[dynamics][isa]") {
@@ -175,12 +164,10 @@ TEST_CASE("all instruction sets agree but for rounding", "[dynamics][isa]") {
   const Model model(test::random_robot(31, n, prismatic_every, planar));
   Rng rng(31);
   const VectorXd q = test::random_joints(rng, n, 3.0), v = test::random_joints(rng, n), y = test::random_joints(rng, n);
-  const std::string now(instruction_set());
   std::vector<VectorXd> first;
   for (const auto& set : sets_here()) {
-    force_instruction_set(set);
-    CAPTURE(set);
-    Workspace ws(model);
+    CAPTURE(name_of(set));
+    Workspace ws(model, set);
     std::vector<VectorXd> all(6, VectorXd(n));
     forward_dynamics(model, ws, q, v, y, all[0]);
     inverse_dynamics(model, ws, q, v, y, all[1]);
@@ -193,5 +180,4 @@ TEST_CASE("all instruction sets agree but for rounding", "[dynamics][isa]") {
     if (first.empty()) first = all;
     for (std::size_t i = 0; i < all.size(); ++i) CHECK((all[i] - first[i]).norm() < 1e-11 * (1.0 + first[i].norm()));
   }
-  force_instruction_set(now);
 }

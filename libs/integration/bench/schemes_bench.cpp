@@ -53,9 +53,8 @@ TEST_CASE("what a step of each scheme costs", "[!benchmark][integration]") {
       if (name == "lie-exact") rows.push_back({name, 0, true});
     }
     for (const auto& row : rows) {
-      Options options;
-      options.order = row.order;
-      options.solver_given = row.riqn;
+      Parameters options;
+      if (row.order > 0) options.order = row.order;
       if (row.riqn) options.solver = Solver::riqn;
       const auto integrator = make_integrator(row.name, model, options);
       const State start = integrator->start(q0, rest);

@@ -21,12 +21,6 @@ constexpr std::array<double, 17> order8{0.13020248308889008088,  0.5611629817751
                                         -0.39590389413323757734, 0.15884190655515560090,  -0.38947496264484728641,
                                         0.56116298177510838456,  0.13020248308889008088};
 
-// A sub-step is not halved by itself: the composition would lose its symmetry. The whole step is.
-Options undivided(Options options) {
-  options.max_halvings = 0;
-  return options;
-}
-
 }  // namespace
 
 std::span<const double> composition_weights(int order) {
@@ -35,17 +29,17 @@ std::span<const double> composition_weights(int order) {
   return order4;
 }
 
-Composition::Composition(const Model& model, const Options& options)
-    : Momentum("composition", model, options),
-      order_(options.order == 0 ? 4 : options.order),
+Composition::Composition(const Model& model, const CompositionOptions& options)
+    : Momentum("composition", model, {options.isa, options.max_halvings, options.tolerance}),
+      order_(options.order),
       weights_(composition_weights(order_)),
-      step_(model, undivided(options)),
+      step_(model, {.tolerance = options.tolerance, .isa = options.isa}),
       history_(weights_.size(), StepHistory(model.dof())),
       rate_(VectorXd::Zero(model.dof())) {
   inner_ = step_.start(rate_, rate_);
 }
 
-void Composition::begin(State& state, const VectorXd& v0) {
+void Composition::begin(State& state, const ConstVectorRef& v0) {
   Momentum::begin(state, v0);
   state.history.assign(weights_.size(), state.history[0]);
 }
@@ -58,7 +52,8 @@ StepReport Composition::attempt(State& state, const Channels& channels, double h
   for (std::size_t i = 0; i < weights_.size() && report.converged; ++i) {
     std::swap(inner_.history[0], history_[i]);
     if (i > 0 && inner_.history[0].empty()) inner_.history[0].restart(rate_);  // the sub-step before will do
-    report = together(report, step_.advance(inner_, channels, weights_[i] * h));
+    // A sub-step is not halved by itself: the composition would lose its symmetry. The whole step is.
+    report = together(report, step_.attempt(inner_, channels, weights_[i] * h));
     if (i + 1 < weights_.size() && history_[i + 1].empty()) rate_ = inner_.history[0].last() / (weights_[i] * h);
     std::swap(inner_.history[0], history_[i]);
   }

@@ -13,13 +13,13 @@ namespace hamelin::integration {
 /// so is Φ. Some γ_i are negative: such a sub-step goes back in time, its damping feeds energy in and is booked so.
 class Composition final : public Momentum {
  public:
-  Composition(const Model& model, const Options& options);
+  Composition(const Model& model, const CompositionOptions& options);
   [[nodiscard]] std::string criterion() const override { return step_.criterion(); }
   [[nodiscard]] int order() const override { return order_; }
   [[nodiscard]] std::string mode() const override { return step_.mode(); }
 
  private:
-  void begin(State& state, const VectorXd& v0) override;
+  void begin(State& state, const ConstVectorRef& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
 
   int order_;

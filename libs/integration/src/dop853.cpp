@@ -110,14 +110,15 @@ double component(const std::array<VectorXd, 12>& k, Eigen::Index i) noexcept {
 
 }  // namespace
 
-Dop853::Dop853(const Model& model, const Options& options) : Explicit("dop853", model, options) {
+Dop853::Dop853(const Model& model, const Dop853Options& options)
+    : Explicit("dop853", model, {.isa = options.isa, .rtol = options.rtol, .atol = options.atol}) {
   for (auto* x : {&q_, &q_new_, &v_new_}) *x = VectorXd::Zero(model.dof());
   v_.fill(q_);
   a_.fill(q_);
 }
 
 std::string Dop853::criterion() const {
-  return adaptive() ? fmt::format("error <= {} + {} |(q, v)|, rms", options_.atol, options_.rtol) : "explicit";
+  return adaptive() ? fmt::format("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol) : "explicit";
 }
 
 void Dop853::first_stage(const State& state, const Channels& channels, StepReport& report) {
@@ -164,7 +165,7 @@ double Dop853::error_norm(const State& state, double h) const {
   double sum5 = 0.0, sum3 = 0.0;
   const auto add = [&](const VectorXd& before, const VectorXd& after, const std::array<VectorXd, count>& k) {
     for (Eigen::Index i = 0; i < before.size(); ++i) {
-      const double scale = 1.0 / (options_.atol + options_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
+      const double scale = 1.0 / (settings_.atol + settings_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
       const double e5 = component<fifth>(k, i) * scale, e3 = component<third>(k, i) * scale;
       sum5 += e5 * e5;
       sum3 += e3 * e3;

@@ -11,7 +11,7 @@ namespace hamelin::integration {
 /// made there, so nothing goes from step to step but State::step_next.
 class Dop853 final : public Explicit {
  public:
-  Dop853(const Model& model, const Options& options);
+  Dop853(const Model& model, const Dop853Options& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 8; }
 

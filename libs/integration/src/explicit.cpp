@@ -4,10 +4,10 @@
 
 namespace hamelin::integration {
 
-Explicit::Explicit(std::string name, const Model& model, const Options& options)
-    : Integrator(std::move(name), model, options), forces_(model), acceleration_(VectorXd::Zero(model.dof())) {}
+Explicit::Explicit(std::string name, const Model& model, const Settings& settings)
+    : Integrator(std::move(name), model, settings), forces_(model), acceleration_(VectorXd::Zero(model.dof())) {}
 
-void Explicit::add_momentum(State& state, const VectorXd& dp) {
+void Explicit::add_momentum(State& state, const ConstVectorRef& dp) {
   dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
   state.v += acceleration_;
 }
@@ -17,8 +17,8 @@ void Explicit::accelerate(const Channels& channels, const VectorXd& q, const Vec
   ++report.evaluations;
 }
 
-SemiImplicitEuler::SemiImplicitEuler(const Model& model, const Options& options)
-    : Explicit("semi-implicit-euler", model, options) {
+SemiImplicitEuler::SemiImplicitEuler(const Model& model, const SemiImplicitEulerOptions& options)
+    : Explicit("semi-implicit-euler", model, {options.isa}) {
   q_ = v_ = VectorXd::Zero(model.dof());
 }
 
@@ -35,7 +35,7 @@ StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, do
   return report;
 }
 
-Rk4::Rk4(const Model& model, const Options& options) : Explicit("rk4", model, options) {
+Rk4::Rk4(const Model& model, const Rk4Options& options) : Explicit("rk4", model, {options.isa}) {
   q_ = v_ = q_sum_ = v_sum_ = VectorXd::Zero(model.dof());
 }
 

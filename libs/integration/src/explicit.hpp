@@ -10,13 +10,13 @@ namespace hamelin::integration {
 class Explicit : public Integrator {
  public:
   [[nodiscard]] std::string criterion() const override { return "explicit"; }
-  void velocity(const State& state, VectorXd& v) override { v = state.v; }
 
  protected:
-  Explicit(std::string name, const Model& model, const Options& options);
-  void begin(State& state, const VectorXd& v0) override { state.v = v0; }
-  void add_momentum(State& state, const VectorXd& dp) override;
-  void replace_velocity(State& state, const VectorXd& v) override { state.v = v; }
+  Explicit(std::string name, const Model& model, const Settings& settings);
+  void node_velocity(const State& state, VectorRef v) const override { v = state.v; }
+  void begin(State& state, const ConstVectorRef& v0) override { state.v = v0; }
+  void add_momentum(State& state, const ConstVectorRef& dp) override;
+  void replace_velocity(State& state, const ConstVectorRef& v) override { state.v = v; }
   /// acceleration_ at (q, v) under gravity and the channels.
   void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
 
@@ -27,7 +27,7 @@ class Explicit : public Integrator {
 /// v⁺ = v + h a(q, v), q⁺ = q + h v⁺: the paper's baseline. Order 1.
 class SemiImplicitEuler final : public Explicit {
  public:
-  SemiImplicitEuler(const Model& model, const Options& options);
+  SemiImplicitEuler(const Model& model, const SemiImplicitEulerOptions& options);
   [[nodiscard]] int order() const override { return 1; }
 
  private:
@@ -39,7 +39,7 @@ class SemiImplicitEuler final : public Explicit {
 /// The classical Runge–Kutta scheme of order 4.
 class Rk4 final : public Explicit {
  public:
-  Rk4(const Model& model, const Options& options);
+  Rk4(const Model& model, const Rk4Options& options);
   [[nodiscard]] int order() const override { return 4; }
 
  private:

@@ -12,14 +12,14 @@ constexpr double gain = 10.0;  // κ [1/s]: an error fades within 0.1 s, and ste
 
 }  // namespace
 
-Feedback::Feedback(const Model& model, const Options& options) : Explicit("feedback", model, options) {
+Feedback::Feedback(const Model& model, const FeedbackOptions& options) : Explicit("feedback", model, {options.isa}) {
   for (const auto& link : model.robot().links) turns_.push_back(link.joint.type == model::JointType::revolute);
   for (auto* x : {&q_, &v_, &c_, &s_, &dc_, &ds_, &dv_, &c_sum_, &s_sum_, &v_sum_}) *x = VectorXd::Zero(model.dof());
   embedded_ = VectorXd::Zero(2 * model.dof() + 1);
 }
 
 // State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*.
-void Feedback::begin(State& state, const VectorXd& v0) {
+void Feedback::begin(State& state, const ConstVectorRef& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof() + 1);
   Explicit::begin(state, v0);
 }
@@ -35,7 +35,7 @@ void Feedback::embed(const State& state) {
     embedded_[i] = turns ? std::cos(state.q[i]) : state.q[i];
     embedded_[n + i] = turns ? std::sin(state.q[i]) : 0.0;
   }
-  embedded_[2 * n] = energy(state).total();
+  embedded_[2 * n] = node_energy(state).total();
 }
 
 StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
@@ -45,7 +45,7 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
   embed(state);
   const auto c0 = embedded_.head(n), s0 = embedded_.segment(n, n);
   // The energy's term is as small as the scheme's error, so it may be held over the step.
-  const Energy now = energy(state);
+  const Energy now = node_energy(state);
   const double excess = now.total() - embedded_[2 * n];
   const double brake = excess == 0.0 ? 0.0 : gain * excess / (2.0 * now.kinetic_J + std::abs(excess));
   // where a pair stands, as an angle counted on from the node's

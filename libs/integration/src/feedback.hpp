@@ -10,11 +10,11 @@ namespace hamelin::integration {
 ///   ċ = −s v − κ (c² + s² − 1) c,   ṡ = c v − κ (c² + s² − 1) s,   v̇ = a − κ v (E − E*)/(2K + |E − E*|).
 class Feedback final : public Explicit {
  public:
-  Feedback(const Model& model, const Options& options);
+  Feedback(const Model& model, const FeedbackOptions& options);
   [[nodiscard]] int order() const override { return 4; }
 
  private:
-  void begin(State& state, const VectorXd& v0) override;
+  void begin(State& state, const ConstVectorRef& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// embedded_ from State::memory, or where the velocity jumped from q and v: the pairs (c, s) on the circle and E* =
   /// E.

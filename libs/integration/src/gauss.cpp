@@ -21,7 +21,6 @@ HAMELIN_SELECT_KERNELS(GaussSet, gauss_set)
 
 namespace {
 
-constexpr int default_order = 8;
 constexpr int max_sweeps = 60;
 // What an iteration stopped at 1e-12 leaves has a sign, and energy drifts with it (1e-10 J in 10⁵ steps of planar3); a
 // sweep more for structure's sake.
@@ -32,10 +31,10 @@ constexpr double iteration_share = 1e-3, estimate_share = 3.0;
 
 }  // namespace
 
-GaussLegendre::GaussLegendre(const Model& model, const Options& options)
-    : Momentum("gauss", model, options),
-      tableau_(gauss_tableau(static_cast<std::size_t>((options.order == 0 ? default_order : options.order) / 2))),
-      kernels_(&kernel::selected_gauss_set()),
+GaussLegendre::GaussLegendre(const Model& model, const GaussOptions& options)
+    : Momentum("gauss", model, {options.isa, options.max_halvings, options.tolerance, options.rtol, options.atol}),
+      tableau_(gauss_tableau(static_cast<std::size_t>(options.order / 2))),
+      kernels_(&kernel::select_gauss_set(options.isa)),
       memory_(dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
         return entry.bytes(chain.links.size(), tableau_.stages);
       })) {
@@ -45,15 +44,15 @@ GaussLegendre::GaussLegendre(const Model& model, const Options& options)
 }
 
 std::string GaussLegendre::criterion() const {
-  if (adaptive()) return fmt::format("error <= {} + {} |q|, max", options_.atol, options_.rtol);
-  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+  if (adaptive()) return fmt::format("error <= {} + {} |q|, max", settings_.atol, settings_.rtol);
+  return fmt::format("|error of delta|_inf <= {}", settings_.tolerance);
 }
 
 std::string GaussLegendre::mode() const {
   return structure() ? "structure" : "accurate";
 }
 
-void GaussLegendre::begin(State& state, const VectorXd& v0) {
+void GaussLegendre::begin(State& state, const ConstVectorRef& v0) {
   state.memory = slopes_;
   state.p = VectorXd::Zero(model_.dof());
   replace_velocity(state, v0);
@@ -90,7 +89,7 @@ void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, do
 
 StepReport GaussLegendre::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
-  const double tolerance = (structure() ? to_rounding : 1.0) * options_.tolerance;
+  const double tolerance = (structure() ? to_rounding : 1.0) * settings_.tolerance;
   const auto outcome = solve(state, channels, h, tolerance, report);
   report.residual = outcome.residual;
   report.converged = outcome.converged;
@@ -106,7 +105,7 @@ StepReport GaussLegendre::controlled(State& state, const Channels& channels, dou
   StepReport report;
   report.converged = false;
   const double s = static_cast<double>(tableau_.stages);
-  const double allowed = options_.atol + options_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
+  const double allowed = settings_.atol + settings_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
   const double tolerance = std::max(iteration_share * allowed, 1e-15);
   const double target = std::pow(estimate_share * allowed, (s + 1.0) / (2.0 * s + 1.0));
   // The estimate is cautious: a step is taken as long as half of it would have met the target.

@@ -8,8 +8,21 @@
 
 namespace hamelin::integration {
 
-Hamel::Hamel(const Model& model, const Options& options, bool midpoint)
-    : Integrator(midpoint ? "hamel-midpoint" : "hamel", model, options),
+Hamel::Hamel(const Model& model, const HamelOptions& options) : Hamel(model, options, false) {}
+
+Hamel::Hamel(const Model& model, const HamelMidpointOptions& options)
+    : Hamel(model,
+            {.start = options.start,
+             .feedback_tolerance = options.feedback_tolerance,
+             .max_updates = options.max_updates,
+             .max_halvings = options.max_halvings,
+             .isa = options.isa},
+            true) {}
+
+Hamel::Hamel(const Model& model, const HamelOptions& options, bool midpoint)
+    : Integrator(midpoint ? "hamel-midpoint" : "hamel", model,
+                 {options.isa, options.max_halvings, options.feedback_tolerance}),
+      options_(options),
       midpoint_(midpoint),
       alpha_(midpoint ? 0.5 : options.alpha),
       forces_(model) {
@@ -26,18 +39,18 @@ std::string Hamel::criterion() const {
 }
 
 template <class F>
-decltype(auto) Hamel::with_links(F&& f) {
+decltype(auto) Hamel::with_links(F&& f) const {
   if (model_.planar()) return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
   return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
 }
 
-void Hamel::begin(State& state, const VectorXd& v0) {
+void Hamel::begin(State& state, const ConstVectorRef& v0) {
   state.p = state.force_previous = VectorXd::Zero(model_.dof());
   state.history.assign(1, StepHistory(model_.dof()));
   replace_velocity(state, v0);
 }
 
-void Hamel::replace_velocity(State& state, const VectorXd& v) {
+void Hamel::replace_velocity(State& state, const ConstVectorRef& v) {
   state.p.setZero();  // pending node impulse
   state.force_previous.setZero();
   state.step_previous = 0.0;
@@ -57,11 +70,11 @@ void Hamel::replace_velocity(State& state, const VectorXd& v) {
   state.memory.tail(v.size()) = v;  // joint rates of ξ', for the rotors
 }
 
-void Hamel::add_momentum(State& state, const VectorXd& dp) {
+void Hamel::add_momentum(State& state, const ConstVectorRef& dp) {
   state.p += dp;
 }
 
-void Hamel::load(const State& state, double h_before) {
+void Hamel::load(const State& state, double h_before) const {
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
     for (std::size_t i = 0; i < k.size(); ++i) {
@@ -75,7 +88,7 @@ void Hamel::load(const State& state, double h_before) {
   });
 }
 
-void Hamel::momentum_before(const State& state, VectorXd& p) {
+void Hamel::momentum_before(const State& state, VectorXd& p) const {
   load(state, state.step_previous);
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     const double* const rate_before = state.memory.data() + state.memory.size() - model_.dof();
@@ -95,12 +108,12 @@ void Hamel::momentum_before(const State& state, VectorXd& p) {
   p += state.p;
 }
 
-void Hamel::velocity(const State& state, VectorXd& v) {
+void Hamel::node_velocity(const State& state, VectorRef v) const {
   momentum_before(state, correction_);
   dynamics::solve_mass(model_, ws_, state.q, correction_, v);
 }
 
-Energy Hamel::energy(const State& state) {
+Energy Hamel::node_energy(const State& state) const {
   if (state.step_previous == 0.0) {
     rate_ = state.memory.tail(model_.dof());  // as set
     return {dynamics::kinetic_energy(model_, ws_, state.q, rate_), dynamics::potential_energy(model_, ws_, state.q)};

@@ -16,17 +16,19 @@ namespace hamelin::integration {
 /// which is h times (13) for equal steps.
 class Hamel final : public Integrator {
  public:
-  Hamel(const Model& model, const Options& options, bool midpoint);
+  Hamel(const Model& model, const HamelOptions& options);
+  Hamel(const Model& model, const HamelMidpointOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return midpoint_ ? 2 : 1; }
-  void velocity(const State& state, VectorXd& v) override;
-  /// T(θ_mid, Δ/h) + ½U(θ^k) + ½U(θ^{k+1}) of the last step.
-  [[nodiscard]] Energy energy(const State& state) override;
 
  private:
-  void begin(State& state, const VectorXd& v0) override;
-  void add_momentum(State& state, const VectorXd& dp) override;
-  void replace_velocity(State& state, const VectorXd& v) override;
+  Hamel(const Model& model, const HamelOptions& options, bool midpoint);
+  void node_velocity(const State& state, VectorRef v) const override;
+  /// T(θ_mid, Δ/h) + ½U(θ^k) + ½U(θ^{k+1}) of the last step.
+  [[nodiscard]] Energy node_energy(const State& state) const override;
+  void begin(State& state, const ConstVectorRef& v0) override;
+  void add_momentum(State& state, const ConstVectorRef& dp) override;
+  void replace_velocity(State& state, const ConstVectorRef& v) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// τ_e of the node equation at delta_, times h.
   void evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force);
@@ -41,17 +43,18 @@ class Hamel final : public Integrator {
   template <class Space>
   using Links = std::vector<Link<Space>>;
   template <class F>
-  decltype(auto) with_links(F&& f);
+  decltype(auto) with_links(F&& f) const;
   /// Node momentum as the step before left it, A_i · Σ (I ξ' + α h' adᵀ(ξ') I ξ') − ½h' ∂U + ½h' F'.
-  void momentum_before(const State& state, VectorXd& p);
+  void momentum_before(const State& state, VectorXd& p) const;
   /// Reads ξ' from the state, h' given, and places the chain at θ^k.
-  void load(const State& state, double h_before);
+  void load(const State& state, double h_before) const;
 
-  bool midpoint_;
-  double alpha_;
-  std::variant<Links<dynamics::kernel::Spatial<double>>, Links<dynamics::kernel::Planar<double>>> links_;
+  const HamelOptions options_;
+  const bool midpoint_;
+  const double alpha_;
+  mutable std::variant<Links<dynamics::kernel::Spatial<double>>, Links<dynamics::kernel::Planar<double>>> links_;
   ChannelForces forces_;
-  VectorXd delta_, correction_, mid_, rate_, residual_, gradient_;
+  mutable VectorXd delta_, correction_, mid_, rate_, residual_, gradient_;  // scratch
 };
 
 }  // namespace hamelin::integration

@@ -1,26 +1,107 @@
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "finite.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {
 
-Integrator::Integrator(std::string name, const Model& model, const Options& options)
-    : model_(model), options_(options), ws_(model), name_(std::move(name)), velocity_(VectorXd::Zero(model.dof())) {}
+Integrator::Integrator(std::string name, const Model& model, const Settings& settings)
+    : model_(model),
+      settings_(settings),
+      ws_(model, settings.isa),
+      name_(std::move(name)),
+      velocity_(VectorXd::Zero(model.dof())) {}
 
-State Integrator::start(const VectorXd& q0, const VectorXd& v0) {
+double Integrator::tolerance() const noexcept {
+  return adaptive() ? std::max(settings_.rtol, settings_.atol) : settings_.tolerance;
+}
+
+Integrator::Shape Integrator::shape_of(const State& state) noexcept {
+  return {state.q.size(),      state.v.size(), state.p.size(), state.memory.size(), state.force_previous.size(),
+          state.history.size()};
+}
+
+void Integrator::check_size(const char* function, const char* argument, Eigen::Index given) const {
+  if (given != model_.dof()) [[unlikely]]
+    throw Error(ErrorCode::usage, fmt::format("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
+                                              argument, given, model_.dof(), model_.robot().name));
+}
+
+void Integrator::check(const char* function, const State& state) const {
+  check_size(function, "state.q", state.q.size());
+  const Shape given = shape_of(state);
+  if (saved_.empty() || given == shape_) return;
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("{}: state: {} velocities, {} momenta and {} numbers of memory given, expected {}, {} and {}: a "
+                  "state that '{}' with these options makes for this model",
+                  function, given.v, given.p, given.memory, shape_.v, shape_.p, shape_.memory, name_));
+}
+
+void Integrator::check(const char* function, const State& state, const Channels& channels, double h) {
+  if (saved_.empty()) prepare();
+  check(function, state);
+  const auto sized = [&](const char* argument, const VectorXd& x) {
+    if (x.size() != 0) check_size(function, argument, x.size());
+  };
+  sized("channels.damping", channels.damping);
+  sized("channels.coulomb", channels.coulomb);
+  sized("channels.held_torque", channels.held_torque);
+  for (const auto& term : channels.gyroscopic)
+    if (term.link < 0 || term.link >= model_.dof()) [[unlikely]]
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}", function,
+                              term.link, model_.dof() - 1));
+  if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
+    throw Error(ErrorCode::usage, fmt::format("{}: a step of {} s given, expected a positive number", function, h));
+}
+
+State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
+  check_size("start", "q0", q0.size());
+  check_size("start", "v0", v0.size());
   State state;
   state.q = q0;
+  if (!all_finite(state.q) || !v0.allFinite())
+    throw Error(ErrorCode::usage, fmt::format("start: {}: a number is not finite, expected finite numbers",
+                                              all_finite(state.q) ? "v0" : "q0"));
+  if (saved_.empty()) prepare();
   begin(state, v0);
-  make_room(state);
   return state;
 }
 
-void Integrator::kick(State& state, const VectorXd& dp) {
+void Integrator::prepare() {
+  State state;
+  state.q = velocity_.setZero();
+  begin(state, velocity_);
+  shape_ = shape_of(state);
+  saved_.assign(static_cast<std::size_t>(settings_.max_halvings) + 1, state);
+}
+
+void Integrator::velocity(const State& state, VectorRef v) const {
+  check("velocity", state);
+  check_size("velocity", "v", v.size());
+  node_velocity(state, v);
+}
+
+Energy Integrator::energy(const State& state) const {
+  check("energy", state);
+  return node_energy(state);
+}
+
+void Integrator::kick(State& state, const ConstVectorRef& dp) {
+  check("kick", state);
+  check_size("kick", "dp", dp.size());
   add_momentum(state, dp);
   state.jumped = true;
 }
 
-void Integrator::set_velocity(State& state, const VectorXd& v) {
+void Integrator::set_velocity(State& state, const ConstVectorRef& v) {
+  check("set_velocity", state);
+  check_size("set_velocity", "v", v.size());
   replace_velocity(state, v);
   state.jumped = true;
 }
@@ -52,22 +133,17 @@ void take_back(StepReport& report) {
 
 }  // namespace
 
-void Integrator::make_room(const State& state) {
-  if (saved_.empty()) saved_.assign(static_cast<std::size_t>(options_.max_halvings) + 1, state);
-}
-
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
-  if (adaptive()) return parts(state, channels, h);
-  return advance(state, channels, h);
+  check("step", state, channels, h);
+  return adaptive() ? parts(state, channels, h) : go(state, channels, h);
 }
 
 // Exactly h ahead under step control.
 StepReport Integrator::parts(State& state, const Channels& channels, double h) {
-  make_room(state);
   saved_[0] = state;
   StepReport report;
   for (double left = h; left > 0.0 && report.converged;) {
-    const StepReport part = advance(state, channels, left);
+    const StepReport part = go(state, channels, left);
     // the last part ends at h itself, not a rounding error before it
     left = part.step_s == left ? 0.0 : left - part.step_s;
     report = together(report, part);
@@ -84,7 +160,11 @@ StepReport Integrator::parts(State& state, const Channels& channels, double h) {
 }
 
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
-  make_room(state);
+  check("advance", state, channels, limit);
+  return go(state, channels, limit);
+}
+
+StepReport Integrator::go(State& state, const Channels& channels, double limit) {
   StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
   if (report.converged) {
     state.jumped = false;
@@ -109,7 +189,7 @@ StepReport Integrator::divide(State& state, const Channels& channels, double h, 
     state.jumped = false;  // for the other half
   } else {
     take_back(report);
-    if (depth < options_.max_halvings) halve(state, channels, h, depth, report);
+    if (depth < settings_.max_halvings) halve(state, channels, h, depth, report);
   }
   return report;
 }
@@ -128,8 +208,8 @@ void Integrator::halve(State& state, const Channels& channels, double h, int dep
   take_back(report);
 }
 
-Energy Integrator::energy(const State& state) {
-  velocity(state, velocity_);
+Energy Integrator::node_energy(const State& state) const {
+  node_velocity(state, velocity_);
   return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_), dynamics::potential_energy(model_, ws_, state.q)};
 }
 

@@ -15,7 +15,10 @@ constexpr double largest_correction = 1.0;  // [rad or m]
 
 }  // namespace
 
-LieExact::LieExact(const Model& model, const Options& options) : Momentum("lie-exact", model, options), forces_(model) {
+LieExact::LieExact(const Model& model, const LieExactOptions& options)
+    : Momentum("lie-exact", model, {options.isa, options.max_halvings, options.tolerance}),
+      options_(options),
+      forces_(model) {
   const auto n = static_cast<std::size_t>(model.dof());
   if (model.planar())
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);

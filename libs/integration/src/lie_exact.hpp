@@ -12,7 +12,7 @@ namespace hamelin::integration {
 /// potential. Solved for Δ by an exact O(n) Newton step, or by their RIQN, Δ ← Δ − h M(θ^k)⁻¹R.
 class LieExact final : public Momentum {
  public:
-  LieExact(const Model& model, const Options& options);
+  LieExact(const Model& model, const LieExactOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 2; }
   [[nodiscard]] std::string mode() const override { return options_.tolerance <= 1e-12 ? "structure" : "accurate"; }
@@ -28,6 +28,9 @@ class LieExact final : public Momentum {
   template <class F>
   decltype(auto) with_links(F&& f);
 
+  using Solver = LieExactOptions::Solver;
+
+  const LieExactOptions options_;
   std::variant<kernel::LieScratch<dynamics::kernel::Spatial<double>>,
                kernel::LieScratch<dynamics::kernel::Planar<double>>>
       links_;

@@ -5,18 +5,18 @@ namespace hamelin::integration {
 
 /// What the schemes share that keep the node's momentum: a state (q, p), velocity as M⁻¹ p, kicks as they are.
 class Momentum : public Integrator {
- public:
-  void velocity(const State& state, VectorXd& v) override { dynamics::solve_mass(model_, ws_, state.q, state.p, v); }
-
  protected:
   using Integrator::Integrator;
-  void begin(State& state, const VectorXd& v0) override {
+  void node_velocity(const State& state, VectorRef v) const override {
+    dynamics::solve_mass(model_, ws_, state.q, state.p, v);
+  }
+  void begin(State& state, const ConstVectorRef& v0) override {
     state.history.assign(1, StepHistory(model_.dof()));
     state.p = VectorXd::Zero(model_.dof());
     replace_velocity(state, v0);
   }
-  void add_momentum(State& state, const VectorXd& dp) override { state.p += dp; }
-  void replace_velocity(State& state, const VectorXd& v) override {
+  void add_momentum(State& state, const ConstVectorRef& dp) override { state.p += dp; }
+  void replace_velocity(State& state, const ConstVectorRef& v) override {
     dynamics::momentum(model_, ws_, state.q, v, state.p);
     for (auto& steps : state.history) steps.restart(v);
   }

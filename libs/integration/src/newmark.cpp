@@ -8,7 +8,8 @@
 
 namespace hamelin::integration {
 
-Newmark::Newmark(const Model& model, const Options& options) : Explicit("newmark", model, options) {
+Newmark::Newmark(const Model& model, const NewmarkOptions& options)
+    : Explicit("newmark", model, {options.isa, options.max_halvings, options.tolerance}), options_(options) {
   for (auto* x : {&a_, &a_new_, &q_, &v_, &node_force_, &moved_}) *x = VectorXd::Zero(model.dof());
 }
 
@@ -17,7 +18,7 @@ std::string Newmark::criterion() const {
 }
 
 // State::memory holds the node's acceleration and the one before.
-void Newmark::begin(State& state, const VectorXd& v0) {
+void Newmark::begin(State& state, const ConstVectorRef& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof());
   state.force_previous = VectorXd::Zero(model_.dof());
   Explicit::begin(state, v0);

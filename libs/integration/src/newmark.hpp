@@ -8,16 +8,17 @@ namespace hamelin::integration {
 /// the last solved by iterating it. β = ¼, γ = ½ (average acceleration) is of order 2; γ > ½ damps and is of order 1.
 class Newmark final : public Explicit {
  public:
-  Newmark(const Model& model, const Options& options);
+  Newmark(const Model& model, const NewmarkOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return options_.newmark_gamma == 0.5 ? 2 : 1; }
 
  private:
-  void begin(State& state, const VectorXd& v0) override;
+  void begin(State& state, const ConstVectorRef& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   /// q_, v_ from the accelerations at both nodes.
   void place(const State& state, double h);
 
+  const NewmarkOptions options_;
   VectorXd a_, a_new_, q_, v_, node_force_, moved_;
 };
 

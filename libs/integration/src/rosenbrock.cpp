@@ -33,15 +33,20 @@ constexpr std::array<Row, 6> c{
     Row{7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160},
     Row{8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}};
 
-Options controlled_always(Options options) {
-  if (!options.step_control()) options.rtol = options.atol = default_tolerance;
+// There are no fixed steps.
+RosenbrockOptions controlled_always(RosenbrockOptions options) {
+  if (options.rtol == 0.0 && options.atol == 0.0) options.rtol = options.atol = default_tolerance;
   return options;
 }
 
 }  // namespace
 
-Rosenbrock::Rosenbrock(const Model& model, const Options& options)
-    : Explicit("rosenbrock", model, controlled_always(options)), factors_(model.dof()) {
+Rosenbrock::Rosenbrock(const Model& model, const RosenbrockOptions& asked)
+    : Rosenbrock(controlled_always(asked), model) {}
+
+Rosenbrock::Rosenbrock(const RosenbrockOptions& options, const Model& model)
+    : Explicit("rosenbrock", model, {.isa = options.isa, .rtol = options.rtol, .atol = options.atol}),
+      factors_(model.dof()) {
   const int n = model.dof();
   by_q_ = by_v_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
   works_by_q_ = works_by_v_ = Eigen::Matrix3Xd::Zero(3, n);
@@ -51,7 +56,7 @@ Rosenbrock::Rosenbrock(const Model& model, const Options& options)
 }
 
 std::string Rosenbrock::criterion() const {
-  return fmt::format("error <= {} + {} |(q, v)|, rms", options_.atol, options_.rtol);
+  return fmt::format("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol);
 }
 
 Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorXd& q, const VectorXd& v,
@@ -128,7 +133,7 @@ double Rosenbrock::error_norm(const State& state) const {
   double sum = 0.0;
   const auto add = [&](const VectorXd& before, const VectorXd& after, const VectorXd& error) {
     for (Eigen::Index i = 0; i < before.size(); ++i) {
-      const double e = error[i] / (options_.atol + options_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
+      const double e = error[i] / (settings_.atol + settings_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
       sum += e * e;
     }
   };

@@ -13,11 +13,13 @@ namespace hamelin::integration {
 /// central differences of forward dynamics, made once a step; as q̇ = v, the linear systems are of size dof only.
 class Rosenbrock final : public Explicit {
  public:
-  Rosenbrock(const Model& model, const Options& options);
+  Rosenbrock(const Model& model, const RosenbrockOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 4; }
 
  private:
+  Rosenbrock(const RosenbrockOptions& options, const Model& model);
+
   static constexpr std::size_t stages = 6;
   using Works = Eigen::Vector3d;  ///< of gyroscopic terms, dissipated, of held torques: they come along with the motion
 

@@ -4,12 +4,12 @@
 
 namespace hamelin::integration {
 
-void StepHistory::restart(const Eigen::VectorXd& v) {
+void StepHistory::restart(const dynamics::ConstVectorRef& v) {
   displacements_[0] = v;
   count_ = 0;
 }
 
-void StepHistory::record(double h, const Eigen::VectorXd& delta) {
+void StepHistory::record(double h, const dynamics::ConstVectorRef& delta) {
   const bool same_step = count_ > 0 && step_ == h;
   for (std::size_t i = displacements_.size() - 1; i > 0; --i) displacements_[i].swap(displacements_[i - 1]);
   displacements_[0] = delta;
@@ -17,7 +17,7 @@ void StepHistory::record(double h, const Eigen::VectorXd& delta) {
   step_ = h;
 }
 
-void StepHistory::guess(double h, Eigen::VectorXd& delta) const {
+void StepHistory::guess(double h, dynamics::VectorRef delta) const {
   const auto& d = displacements_;
   if (count_ == 0)
     delta = h * d[0];

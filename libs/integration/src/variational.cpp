@@ -23,9 +23,12 @@ constexpr double loosest_confirmed = 1e-10;
 
 }  // namespace
 
-Variational::Variational(const Model& model, const Options& options)
-    : Momentum("hamel-variational", model, options),
-      kernels_(&kernel::selected_variational_set()),
+Variational::Variational(const Model& model, const VariationalOptions& options)
+    : Momentum("hamel-variational", model,
+               {options.isa, options.max_halvings,
+                options.solver == Solver::feedback ? options.feedback_tolerance : options.tolerance}),
+      options_(options),
+      kernels_(&kernel::select_variational_set(options.isa)),
       memory_(dynamics::kernel::with_group(
           model, *kernels_, [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
   for (auto* x : {&delta_, &p_, &p_next_, &correction_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());

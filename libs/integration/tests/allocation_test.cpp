@@ -76,7 +76,7 @@ TEST_CASE("a step does not allocate", "[integration][allocation]") {
   for (const int order : orders) {
     CAPTURE(name, planar, prismatic, order);
     for (const Channels& channels : {Channels{}, all_channels(6)}) {
-      Options options = test::of_order(order);
+      Parameters options = test::of_order(order);
       check_tick(*make_integrator(name, model, options), channels, 1e-3);
       if (!find_scheme(name)->step_control) continue;
       options.rtol = options.atol = 1e-6;
@@ -89,8 +89,7 @@ TEST_CASE("solvers that are not the default do not allocate either, nor does a s
           "[integration][allocation]") {
   if (!test::counts_allocations()) return;
   const Model model(test::random_robot(10, 6));
-  Options options;
-  options.solver_given = true;
+  Parameters options;
   options.solver = Solver::feedback;
   check_tick(*make_integrator("hamel-variational", model, options), all_channels(6), 1e-3);
   options.solver = Solver::riqn;

@@ -48,7 +48,7 @@ TEST_CASE("compositions have their orders, with damping and gyroscopic terms too
     channels.gyroscopic = {{1, test::random_vector(rng, 0.2), test::random_vector(rng, 2.0)}};
   }
   const VectorXd q0 = VectorXd::Constant(4, 0.3);
-  Options fine;
+  Parameters fine;
   fine.rtol = fine.atol = 1e-14;
   const auto reference = make_integrator("dop853", model, fine);
   State truth = reference->start(q0, VectorXd::Zero(4));
@@ -56,7 +56,7 @@ TEST_CASE("compositions have their orders, with damping and gyroscopic terms too
   std::vector<double> errors;
   const int few = order == 8 ? 16 : 40;  // order 8 meets rounding soon
   for (const int steps : {few, 2 * few}) {
-    Options options = test::of_order(order);
+    Parameters options = test::of_order(order);
     options.tolerance = 1e-14;
     const auto integrator = make_integrator("composition", model, options);
     CHECK(integrator->order() == order);

@@ -65,7 +65,7 @@ void check_refused(Integrator& integrator, State& state, const Channels& channel
   CHECK(test::velocity(integrator, state).allFinite());
 }
 
-void check_all(const std::string& name, const Options& options) {
+void check_all(const std::string& name, const Parameters& options) {
   const int n = 5;
   for (const bool planar : {false, true})
     for (const int joint : {0, 2, n - 1}) {
@@ -103,13 +103,12 @@ TEST_CASE("so does a step under step control", "[integration][failed-step]") {
 }
 
 TEST_CASE("so do the solvers that are not the default", "[integration][failed-step]") {
-  Options options;
-  options.solver_given = true;
+  Parameters options;
   options.solver = Solver::feedback;
   check_all("hamel-variational", options);
   options.solver = Solver::riqn;
   check_all("lie-exact", options);
-  Options loose;
+  Parameters loose;
   loose.tolerance = 1e-8;  // takes unconfirmed steps
   check_all("hamel-variational", loose);
 }
@@ -131,8 +130,7 @@ TEST_CASE("a halved step reports how far it went: all of it, or not at all", "[i
   const Model model(test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
   VectorXd q0(n);
   for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
-  Options options;
-  options.solver_given = true;
+  Parameters options;
   options.solver = Solver::feedback;
   const double h = 0.02;
   for (const int halvings : {0, 1, 12}) {

@@ -14,7 +14,7 @@ using namespace hamelin::integration;
 
 namespace {
 
-State run(const Model& model, const Options& options, const VectorXd& q0, const VectorXd& v0, double h, int steps,
+State run(const Model& model, const Parameters& options, const VectorXd& q0, const VectorXd& v0, double h, int steps,
           const Channels& channels = {}) {
   const auto integrator = make_integrator("gauss", model, options);
   State state = integrator->start(q0, v0);
@@ -118,7 +118,7 @@ TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss
     double before = 1.0;
     for (const double rtol : {1e-4, 1e-6, 1e-8}) {
       CAPTURE(order, rtol);
-      Options options = test::of_order(order);
+      Parameters options = test::of_order(order);
       options.rtol = options.atol = rtol;
       const auto integrator = make_integrator("gauss", model, options);
       State state = integrator->start(q0, VectorXd::Zero(7));
@@ -191,19 +191,15 @@ TEST_CASE("all instruction sets come to the same motion but for rounding", "[int
   const Model model(test::random_robot(22, 6, 4));
   Rng rng(22);
   const VectorXd q0 = test::random_joints(rng, 6), v0 = test::random_joints(rng, 6);
-  const std::string best(instruction_set());
   for (const int order : {4, 6, 8, 10, 16}) {
     const VectorXd q = run(model, test::of_order(order), q0, v0, 0.005, 50).q;
-    for (const char* isa : {"x86-64", "v3", "v4"}) {
-      CAPTURE(order, isa);
-      try {
-        force_instruction_set(isa);
-      } catch (const std::exception&) {
-        continue;  // not on this machine
-      }
-      CHECK((run(model, test::of_order(order), q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
+    for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4}) {
+      CAPTURE(order, name_of(isa));
+      if (!is_available(isa)) continue;
+      Parameters parameters = test::of_order(order);
+      parameters.isa = isa;
+      CHECK((run(model, parameters, q0, v0, 0.005, 50).q - q).lpNorm<Eigen::Infinity>() < 1e-10);
     }
-    force_instruction_set(best);
   }
 }
 

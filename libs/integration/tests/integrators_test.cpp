@@ -71,12 +71,11 @@ TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integr
   REQUIRE(golden()["schemes"].size() == 6);
   for (const auto& scheme : golden()["schemes"]) {
     const std::string name = scheme["scheme"];
-    Options options;
+    Parameters options;
     options.start = Start::published;
     options.alpha = scheme.contains("alpha") && scheme["alpha"].is_number() ? scheme["alpha"].get<double>() : 0.5;
     for (const bool feedback : {true, false}) {
       if (name == "hamel-variational") {
-        options.solver_given = true;
         options.solver = feedback ? Solver::feedback : Solver::newton;
       } else if (!feedback) {
         continue;
@@ -128,7 +127,7 @@ TEST_CASE("observed orders against an independent RK4 reference", "[integration]
 TEST_CASE("the published start costs hamel-midpoint its second order", "[integration][order]") {
   const auto& reference = references()[0];
   const Model model(test::spatial_chain(3));
-  Options options;
+  Parameters options;
   options.start = Start::published;
   std::vector<double> errors;
   for (const int steps : {500, 1000, 2000})
@@ -423,8 +422,7 @@ TEST_CASE("a step without a root is halved, and an unconverged one is never used
   const Model model(test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
   VectorXd q0(n);
   for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
-  Options options;
-  options.solver_given = true;
+  Parameters options;
   options.solver = Solver::feedback;
   options.max_halvings = 0;
   const double h = 0.02;
@@ -518,8 +516,8 @@ TEST_CASE("steps of 0.1 s, which resolve nothing, are halved or refused: the sta
 TEST_CASE("unknown names and solvers are refused with what is known", "[integration][unit]") {
   const Model model(test::planar3());
   CHECK_THROWS_WITH(make_integrator("hamel-variatonal", model), Catch::Contains("did you mean 'hamel-variational'"));
-  Options options;
-  options.solver_given = true;
+  Parameters options;
+  options.solver = Solver::newton;
   CHECK_THROWS_WITH(make_integrator("hamel", model, options), Catch::Contains("feedback"));
   CHECK_THROWS_WITH(make_integrator("rk4", model, options), Catch::Contains("takes no solver"));
 }

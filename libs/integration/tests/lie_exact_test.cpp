@@ -141,8 +141,7 @@ TEST_CASE("RIQN and Newton find the same lie-exact motion, Newton in at most thr
   const int n = GENERATE(3, 7, 20);
   CAPTURE(n);
   const Model model(test::spatial_chain(n));
-  Options riqn;
-  riqn.solver_given = true;
+  Parameters riqn;
   riqn.solver = Solver::riqn;
   const auto a = make_integrator("lie-exact", model), b = make_integrator("lie-exact", model, riqn);
   State x = a->start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n)), y = x;
@@ -158,8 +157,7 @@ TEST_CASE("RIQN and Newton find the same lie-exact motion, Newton in at most thr
 
 TEST_CASE("an RIQN step at its iteration limit is not accepted", "[integration][lie-exact]") {
   const Model model(test::spatial_chain(20));
-  Options options;
-  options.solver_given = true;
+  Parameters options;
   options.solver = Solver::riqn;
   options.max_updates = 2;
   options.max_halvings = 0;

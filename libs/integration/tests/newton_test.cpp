@@ -33,7 +33,7 @@ void check(const Chain& chain, int n, std::uint64_t seed, bool spins) {
   const integration::kernel::VariationalCall<Chain> call{
       chain,          h,       q.data(), p.data(),     delta.data(), next.data(), damping.data(),
       coulomb.data(), nullptr, 0.5,      terms.data(), terms.size(), 1e-12,       false};
-  dynamics::Memory memory(Kernel::bytes(static_cast<std::size_t>(n)));
+  dynamics::AlignedBuffer memory(Kernel::bytes(static_cast<std::size_t>(n)));
   const auto residual = [&](const VectorXd& at) -> VectorXd {
     delta = at;
     Kernel kernel(call, memory.get());

@@ -131,7 +131,7 @@ TEST_CASE("schemes without step control refuse tolerances, and nonsense is refus
                         Catch::Contains("neither rtol nor atol"));
   }
   CHECK_THROWS_AS(make_integrator("dop853", model, test::tolerances(-1e-6, 0.0)), Error);
-  Options order;
+  Parameters order;
   order.order = 6;
   CHECK_THROWS_WITH(make_integrator("rk4", model, order), Catch::Contains("one order"));
 }

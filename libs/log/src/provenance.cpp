@@ -100,7 +100,7 @@ Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>
   const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                             std::to_string(EIGEN_MINOR_VERSION);
   return {{"host", host()},
-          {"isa", std::string(instruction_set())},
+          {"isa", std::string(name_of(default_isa()))},
           {"build",
            {{"id", known(build_id())},
             {"compiler", HAMELIN_COMPILER},

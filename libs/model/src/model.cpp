@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 
@@ -202,6 +203,11 @@ double reach_of(const Robot& robot, const std::vector<SE3>& frames) {
 }
 
 }  // namespace
+
+Model::Identity::Identity() {
+  static std::atomic<std::uint64_t> models{0};
+  value = ++models;
+}
 
 Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     : robot_(std::move(robot)), base_(base), gravity_(gravity) {

@@ -1,7 +1,10 @@
 #include "hamelin/planning/plugin.hpp"
 
 #include <Eigen/Geometry>
+#include <cstddef>
 
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/description/robot_io.hpp"
 
 namespace hamelin::planning {
@@ -26,6 +29,16 @@ void write_line(std::string_view text, char* error, std::size_t error_size) noex
 }
 
 }  // namespace
+
+void take_instruction_set(const hamelin_setup& setup) noexcept {
+  if (setup.struct_size < offsetof(hamelin_setup, instruction_set) + sizeof setup.instruction_set) return;
+  if (setup.instruction_set == nullptr) return;
+  try {
+    set_default_isa(isa_from_name(setup.instruction_set, "instruction_set"));
+  } catch (const Error&) {
+    // a name of some later host: the best there is will do
+  }
+}
 
 void write_current_exception(char* error, std::size_t error_size) noexcept {
   try {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/core/text.hpp"
 #include "hamelin/description/robot_io.hpp"
 
@@ -142,6 +143,7 @@ hamelin_setup SetupData::view() {
   raw.influence_m = influence_m;
   raw.map_resolution_m = map_resolution_m;
   raw.seed = seed;
+  raw.instruction_set = name_of(default_isa()).data();  // of a literal, which ends in a nul
   return raw;
 }
 

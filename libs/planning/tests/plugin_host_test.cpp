@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
@@ -308,4 +309,14 @@ TEST_CASE("the README's example loads a planner and gets an answer", "[planning]
   if (!planner.tick(tick, command)) throw Error(ErrorCode::plugin, std::string(planner.error()));
 
   CHECK(command.potential_gradient() == 4.0 * q);
+}
+
+TEST_CASE("a planner's own copy of the library computes with the host's instruction set", "[planning][unit]") {
+  const Isa before = default_isa();
+  for (const Isa isa : {Isa::v4, Isa::v3, Isa::baseline}) {
+    if (!is_available(isa)) continue;
+    set_default_isa(isa);
+    CHECK(Bench("instruction set").services.lines.back() == "1 " + std::string(name_of(isa)));
+  }
+  set_default_isa(before);
 }

@@ -278,7 +278,7 @@ int run(int argc, char** argv) {
   std::vector<Box> leaves;
   for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
   fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n", file, map.resolution,
-             map.occupied.size(), leaves.size(), field.boxes().boxes().size(), instruction_set());
+             map.occupied.size(), leaves.size(), field.boxes().boxes().size(), name_of(default_isa()));
   fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms, crop_ms, build_ms,
              1e-3 * static_cast<double>(field.bytes()));
 

@@ -255,7 +255,7 @@ BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin) : boxe
 }
 
 void BoxField::build_all() {
-  kernels_ = &kernel::selected_tree_kernels();
+  kernels_ = &kernel::select_tree_kernels(default_isa());
   nodes_.clear();
   first_added_ = 0;
   build_tree(boxes_, 0, origin_, nodes_, slot_of_);

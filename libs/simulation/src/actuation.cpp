@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "plant.hpp"
@@ -19,7 +20,8 @@ using Eigen::VectorXd;
 
 control::TorqueLimits torque_limits(const scene::Scene& scene, const model::Model& model) {
   return {model,
-          scene.model.torque_limits ? joint_limits(model.robot(), &model::Joint::effort_max, infinity) : VectorXd(),
+          scene.model.torque_limits ? control::joint_limits(model.robot(), &model::Joint::effort_max, infinity)
+                                    : VectorXd(),
           scene.actuation.torque_rate_max_Nm_s};
 }
 

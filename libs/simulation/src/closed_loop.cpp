@@ -8,6 +8,7 @@
 #include <array>
 #include <utility>
 
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/log/provenance.hpp"
@@ -90,8 +91,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
 void ClosedLoop::make_planner(const planning::Plugin& plugin) {
   const auto create = [&](const model::Model& nominal) {
     planner_ = std::make_unique<control::PlannerHost>(
-        plugin, planner_setup(scene_, nominal, *world_), planner_params_, *world_,
-        [this](std::int32_t level, std::string_view line) { take_line(level, line); });
+        plugin,
+        control::planner_setup(scene_, nominal, *world_, static_cast<double>(steps_per_tick(scene_)) * scene_.step_s),
+        planner_params_, *world_, [this](std::int32_t level, std::string_view line) { take_line(level, line); });
   };
   const double mass_scale = scene_.actuation.planner_mass_scale;
   if (mass_scale == 1.0)
@@ -121,7 +123,7 @@ bool ClosedLoop::diagnosed(int level) const {
 
 void ClosedLoop::start(const Watch& watch) {
   watch_ = &watch;
-  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator, options_);
+  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator);
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
   audit_ = std::make_unique<EnergyAudit>(*recorder_, ideal && arm_.integrator->name() == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);

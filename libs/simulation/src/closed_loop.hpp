@@ -58,7 +58,7 @@ class ClosedLoop {
 
   const scene::Scene& scene_;
   model::Model model_;
-  integration::Options options_;
+  integration::Parameters options_;
   long steps_ = 0;
   SimulatedArm arm_;
   Json planner_params_;

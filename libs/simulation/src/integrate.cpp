@@ -47,13 +47,13 @@ long first_steps_in(double duration_s, double step_s) {
 }
 
 // An unconverged state is never used: the result stands at the node before.
-std::string what_failed(const FreeMotion& motion, bool controlled, long step) {
-  if (controlled) return fmt::format("step {}: no length of it meets the tolerances", step);
+std::string what_failed(const FreeMotion& motion, const integration::Integrator& integrator, long step) {
+  if (integrator.adaptive()) return fmt::format("step {}: no length of it meets the tolerances", step);
   const auto* scheme = integration::find_scheme(motion.integrator);
   if (scheme->solvers.empty() && !scheme->iterates)
     return fmt::format("step {} of {} s left the finite numbers", step, motion.step_s);
   return fmt::format("step {} of {} s found no root, halved down to {:.3g} s", step, motion.step_s,
-                     motion.step_s / static_cast<double>(1 << motion.options.max_halvings));
+                     motion.step_s / static_cast<double>(1 << integrator.max_halvings()));
 }
 
 }  // namespace
@@ -75,7 +75,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   result.scene = motion.name;
   result.warnings = model::warnings(model.robot());
   result.provenance = log::provenance(motion.inputs, watch.argv);
-  Recorder recorder(result, watch, *integrator, motion.options);
+  Recorder recorder(result, watch, *integrator);
   recorder.header({{"program", "integrate"},
                    {"scene", motion.name},
                    {"config", motion.config},
@@ -127,7 +127,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
     recorder.progress(state.k, state.time_s, motion.duration_s);
     if (!report.converged) {
       result.outcome = log::Outcome::diverged;
-      result.cause = what_failed(motion, controlled, state.k + 1);
+      result.cause = what_failed(motion, *integrator, state.k + 1);
       if (recorder.logging()) log_tick();
       break;
     }

@@ -2,29 +2,36 @@
 
 namespace hamelin::simulation {
 
-using integration::Options;
 using integration::Solver;
 using integration::Start;
 
-Options integrator_options(const Json& params, const std::string& where) {
+namespace {
+
+template <class T>
+void take(const Json& params, const char* key, std::optional<T>& into) {
+  if (params.contains(key)) into = params[key].get<T>();
+}
+
+}  // namespace
+
+integration::Parameters integrator_options(const Json& params, const std::string& where) {
   check_shipped_schema(params, "integrator", where);
-  Options options;
-  options.alpha = params.value("alpha", options.alpha);
-  if (params.value("start", "consistent") == "published") options.start = Start::published;
+  integration::Parameters options;
+  take(params, "alpha", options.alpha);
+  if (params.contains("start")) options.start = params["start"] == "published" ? Start::published : Start::consistent;
   if (params.contains("solver")) {
-    options.solver_given = true;
     const std::string solver = params["solver"];
     options.solver = solver == "newton" ? Solver::newton : solver == "riqn" ? Solver::riqn : Solver::feedback;
   }
-  options.tolerance = params.value("tolerance", options.tolerance);
-  options.feedback_tolerance = params.value("feedback_tolerance", options.feedback_tolerance);
-  options.max_updates = params.value("max_updates", options.max_updates);
-  options.max_halvings = params.value("max_halvings", options.max_halvings);
-  options.order = params.value("order", options.order);
-  options.rtol = params.value("rtol", options.rtol);
-  options.atol = params.value("atol", options.atol);
-  options.newmark_beta = params.value("newmark_beta", options.newmark_beta);
-  options.newmark_gamma = params.value("newmark_gamma", options.newmark_gamma);
+  take(params, "tolerance", options.tolerance);
+  take(params, "feedback_tolerance", options.feedback_tolerance);
+  take(params, "max_updates", options.max_updates);
+  take(params, "max_halvings", options.max_halvings);
+  take(params, "order", options.order);
+  take(params, "rtol", options.rtol);
+  take(params, "atol", options.atol);
+  take(params, "newmark_beta", options.newmark_beta);
+  take(params, "newmark_gamma", options.newmark_gamma);
   return options;
 }
 

@@ -4,32 +4,11 @@
 
 #include <utility>
 
-#include "actuation.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/core/numbers.hpp"
-#include "plant.hpp"
 
 namespace hamelin::simulation {
 
 using Eigen::VectorXd;
-
-namespace {
-
-hamelin_goal to_c(const scene::Goal& goal) {
-  hamelin_goal out{};
-  out.type = goal.type == scene::GoalType::joint      ? HAMELIN_GOAL_JOINT
-             : goal.type == scene::GoalType::position ? HAMELIN_GOAL_POSITION
-                                                      : HAMELIN_GOAL_POSE;
-  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(goal.pose.R());
-  for (int i = 0; i < 3; ++i) out.position_world_m[i] = goal.pose.p()[i];
-  for (int i = 0; i < 4; ++i) out.quaternion_wxyz[i] = wxyz[i];
-  out.tolerance_m = goal.tolerance_m;
-  out.tolerance_rad = goal.tolerance_rad;
-  out.speed_max = goal.speed_max;
-  return out;
-}
-
-}  // namespace
 
 void check_numbers(const scene::Scene& scene, const model::Model& model) {
   const auto sized = [&](const VectorXd& x, const std::string& place) {
@@ -68,30 +47,6 @@ model::Model scaled_masses(const model::Model& arm, double scale) {
     link.joint.armature *= scale;
   }
   return model::Model(std::move(robot), arm.base(), arm.gravity());
-}
-
-planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
-                                  const control::WorldView& world) {
-  planning::SetupData data(nominal);
-  for (const auto& goal : scene.goals)
-    data.add_goal(to_c(goal), goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
-  const auto& robot = nominal.robot();
-  if (scene.model.joint_limits) {
-    data.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
-    data.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
-  }
-  if (scene.model.velocity_limits) data.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
-  if (scene.model.torque_limits) data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
-  if (scene.actuation.torque_rate_max_Nm_s)
-    data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
-  data.sampled = scene.actuation.type == scene::ActuationType::sampled;
-  data.delay_s = scene.actuation.delay_s;
-  data.control_period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
-  data.self_collision = scene.model.self_collision;
-  data.influence_m = world.influence_m();
-  data.map_resolution_m = world.environment().summary().resolution_m;
-  data.seed = scene.seed;
-  return data;
 }
 
 }  // namespace hamelin::simulation

@@ -2,11 +2,10 @@
 #include <filesystem>
 #include <vector>
 
-#include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
 
-/// What a planner is told before a run.
+/// What is checked and chosen before a planner is made.
 namespace hamelin::simulation {
 
 /// Checks that start, goals and limits fit the robot. @throws Error invalid, naming the place in the scene
@@ -18,9 +17,5 @@ void check_numbers(const scene::Scene& scene, const model::Model& model);
 
 /// The same arm with all masses and inertias scaled alike.
 [[nodiscard]] model::Model scaled_masses(const model::Model& arm, double scale);
-
-/// Goals, limits and timing of a scene, for a planner that believes in `nominal`.
-[[nodiscard]] planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
-                                                const control::WorldView& world);
 
 }  // namespace hamelin::simulation

@@ -71,13 +71,6 @@ Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& ro
   return joint_numbers(scene, scene.model.friction, "friction", robot, &model::Joint::friction);
 }
 
-Eigen::VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit, double unlimited) {
-  Eigen::VectorXd limits(robot.dof());
-  for (int i = 0; i < robot.dof(); ++i)
-    limits[i] = (robot.links[static_cast<std::size_t>(i)].joint.*limit).value_or(unlimited);
-  return limits;
-}
-
 std::vector<log::Input> inputs_of(const scene::Scene& scene) {
   std::vector<log::Input> inputs;
   std::error_code ec;

@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
 #include "hamelin/log/provenance.hpp"
@@ -17,10 +16,6 @@ namespace hamelin::simulation {
 /// Dry friction of each joint [Nm or N], as the scene's model asks for it; empty for none.
 /// @throws Error invalid if there is another number of them than of joints
 [[nodiscard]] Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot);
-
-/// A limit of each joint; `unlimited` where the robot gives none.
-[[nodiscard]] Eigen::VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit,
-                                           double unlimited);
 
 /// The files of scene, robot and spheres.
 [[nodiscard]] std::vector<log::Input> inputs_of(const scene::Scene& scene);

@@ -19,14 +19,11 @@ void grow(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
 
 }  // namespace
 
-Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
-                   const integration::Options& options)
+Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator)
     : result_(result), watch_(watch) {
   result_.integrator = integrator.name();
   result_.solver.criterion = integrator.criterion();
-  result_.solver.tolerance = integrator.adaptive()                          ? std::max(options.rtol, options.atol)
-                             : integrator.criterion().starts_with("|tau_e") ? options.feedback_tolerance
-                                                                            : options.tolerance;
+  result_.solver.tolerance = integrator.tolerance();
 }
 
 void Recorder::header(Json fields, const model::Robot& robot, long steps) {

@@ -38,8 +38,7 @@ struct Ledger {
 /// Gathers a run's figures and writes its log.
 class Recorder {
  public:
-  Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator,
-           const integration::Options& options);
+  Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator);
 
   /// @param ticks how many steps there can be
   void header(Json fields, const model::Robot& robot, long steps);

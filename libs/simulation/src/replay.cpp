@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
@@ -180,10 +179,9 @@ class Comparison final : public log::LineSink {
 // Bits are promised on one instruction set only, so the run is repeated on its own, where this machine has it and the
 // caller names no other.
 void take_instruction_set(const Json& header) {
-  const char* asked = std::getenv("HAMELIN_ISA");
-  if (asked != nullptr && *asked != '\0') return;
+  if (default_isa_is_set()) return;
   try {
-    force_instruction_set(text_at(header.value("provenance", Json::object()), "/isa"));
+    set_default_isa(isa_from_name(text_at(header.value("provenance", Json::object()), "/isa"), "/provenance/isa"));
   } catch (const Error&) {
     // not here: differences_of_build says so, and the comparison is within the tolerance
   }

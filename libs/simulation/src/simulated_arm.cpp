@@ -1,12 +1,13 @@
 #include "simulated_arm.hpp"
 
+#include "hamelin/control/planner_setup.hpp"
 #include "plant.hpp"
 
 namespace hamelin::simulation {
 
 using Eigen::VectorXd;
 
-SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, const integration::Options& options)
+SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, const integration::Parameters& options)
     : model(arm),
       ws(arm),
       integrator(integration::make_integrator(scene.integrator.name, arm, options)),
@@ -18,7 +19,7 @@ SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, c
   if (scene.actuation.coulomb_friction_share > 0.0) {
     if (channels.coulomb.size() == 0) channels.coulomb = zero;
     channels.coulomb +=
-        scene.actuation.coulomb_friction_share * joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
+        scene.actuation.coulomb_friction_share * control::joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
   }
   channels.held_torque = zero;
   channels.damping = own_damping.size() > 0 ? own_damping : zero;

@@ -11,7 +11,7 @@ namespace hamelin::simulation {
 struct SimulatedArm {
   /// At the scene's start. Friction and damping of the scene are among the channels.
   /// @throws Error invalid for numbers that do not fit the robot, usage for an unknown integrator
-  SimulatedArm(const scene::Scene& scene, const model::Model& model, const integration::Options& options);
+  SimulatedArm(const scene::Scene& scene, const model::Model& model, const integration::Parameters& options);
 
   /// Advances by one step. @return whether it converged; else the state is as it was
   [[nodiscard]] bool step(double step_s);

@@ -1,8 +1,10 @@
 // A planner that does on request what planners must not do, and one of each channel.
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
+#include "hamelin/core/isa.hpp"
 #include "hamelin/planning/plugin.hpp"
 
 namespace {
@@ -33,6 +35,7 @@ class Awkward : public Planner {
     if (fault_ == "throw an int") throw 42;
     if (params.at("nested").at("depth") != 3) throw std::runtime_error("nested default missing");
     host_.warning("awkward is here");
+    if (fault_ == "instruction set") host_.warning(std::string(hamelin::name_of(hamelin::default_isa())));
   }
 
   void tick(const Tick& tick, Command& command) override {

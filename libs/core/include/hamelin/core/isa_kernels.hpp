@@ -1,8 +1,9 @@
 #pragma once
 #include "hamelin/core/isa.hpp"
 
-/// `const Set& selected_NAME()`: the object NAME of the instruction set that selected_isa() names, of those that a
-/// source under hamelin_isa_sources defines. To be written in the namespace around theirs.
+/// `const Set& select_NAME(Isa)`: the object NAME of that instruction set, of those that a source under
+/// hamelin_isa_sources defines. To be written in the namespace around theirs. A set that this machine does not have is
+/// an Error.
 #if defined(__x86_64__)
 #define HAMELIN_SELECT_KERNELS(Set, name)                                                      \
   inline namespace isa_baseline {                                                              \
@@ -14,16 +15,17 @@
   namespace isa_v4 {                                                                           \
   extern const Set name;                                                                       \
   }                                                                                            \
-  static const Set& selected_##name() {                                                        \
-    const Isa isa = selected_isa();                                                            \
+  static const Set& select_##name(Isa isa) {                                                   \
+    require_available(isa);                                                                    \
     return isa == Isa::v4 ? isa_v4::name : isa == Isa::v3 ? isa_v3::name : isa_baseline::name; \
   }
 #else
-#define HAMELIN_SELECT_KERNELS(Set, name) \
-  inline namespace isa_baseline {         \
-  extern const Set name;                  \
-  }                                       \
-  static const Set& selected_##name() {   \
-    return isa_baseline::name;            \
+#define HAMELIN_SELECT_KERNELS(Set, name)    \
+  inline namespace isa_baseline {            \
+  extern const Set name;                     \
+  }                                          \
+  static const Set& select_##name(Isa isa) { \
+    require_available(isa);                  \
+    return isa_baseline::name;               \
   }
 #endif

@@ -1,10 +1,12 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <new>
 #include <vector>
 
+#include "hamelin/core/isa.hpp"
 #include "hamelin/model/model.hpp"
 
 namespace hamelin::dynamics {
@@ -12,11 +14,11 @@ namespace hamelin::dynamics {
 struct KernelSet;
 
 /// Memory for the kernels' scratch, aligned for any SIMD register.
-class Memory {
+class AlignedBuffer {
  public:
   static constexpr std::align_val_t alignment{64};
 
-  explicit Memory(std::size_t bytes) : bytes_(static_cast<std::byte*>(::operator new(bytes, alignment))) {}
+  explicit AlignedBuffer(std::size_t bytes) : bytes_(static_cast<std::byte*>(::operator new(bytes, alignment))) {}
   [[nodiscard]] void* get() noexcept { return bytes_.get(); }
 
  private:
@@ -26,11 +28,21 @@ class Memory {
   std::unique_ptr<std::byte, Free> bytes_;
 };
 
-/// All scratch of the algorithms for one model and one thread, and which instruction set they run on: core's
-/// selected_isa() when it was made. Made once; nothing allocates afterwards.
+/// What a workspace was made for: calls compare it with the model they are given.
+struct WorkspaceOwner {
+  explicit WorkspaceOwner(const model::Model& model) noexcept : id(model.id()), dof(model.dof()) {}
+  std::uint64_t id;  ///< Model::id
+  Eigen::Index dof;
+};
+
+/// All scratch of the algorithms for one model (or its copies) and one thread, and the instruction set they run on.
+/// Made once; nothing allocates afterwards. It does not keep the model: calls are given both and refuse a pair that
+/// does not belong together.
 class Workspace {
  public:
-  explicit Workspace(const model::Model& model);
+  /// @throws Error usage if this machine does not have the instruction set
+  explicit Workspace(const model::Model& model, Isa isa = default_isa());
+  explicit Workspace(const model::Model&& model, Isa isa = default_isa()) = delete;  ///< nothing could use it
 
   /// A link's joint-aligned frame in the world, as the last forward_kinematics left it.
   struct Frame {
@@ -39,8 +51,9 @@ class Workspace {
     Eigen::Vector3d axis;  ///< the joint's axis (revolute) or direction (prismatic), unit, world
   };
 
+  WorkspaceOwner owner;
   const KernelSet* kernels;
-  Memory sweep;  ///< scratch of the kernels
+  AlignedBuffer sweep;  ///< scratch of the kernels
   std::vector<Frame> frames;
   /// Angular velocity and velocity of a frame's origin, or moment about it and force; world axes.
   struct Pair {
@@ -50,13 +63,16 @@ class Workspace {
   Eigen::VectorXd column_in, column_out;  ///< joint vectors of operational_inertia
 };
 
-/// Scratch for many states at once (inverse_dynamics_batch, forward_dynamics_batch); of one thread.
+/// Scratch for many states at once (inverse_dynamics and forward_dynamics of matrices); of one thread.
 class BatchWorkspace {
  public:
-  explicit BatchWorkspace(const model::Model& model);
+  /// @throws Error usage if this machine does not have the instruction set
+  explicit BatchWorkspace(const model::Model& model, Isa isa = default_isa());
+  explicit BatchWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;  ///< nothing could use it
 
+  WorkspaceOwner owner;
   const KernelSet* kernels;
-  Memory sweep;
+  AlignedBuffer sweep;
 };
 
 }  // namespace hamelin::dynamics

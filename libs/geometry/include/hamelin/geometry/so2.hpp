@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "hamelin/geometry/eigen_alignment.hpp"
 #include "hamelin/geometry/lie_group.hpp"
 
 namespace hamelin::geometry {

@@ -6,6 +6,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/geometry/dexp_coefficients.hpp"
+#include "hamelin/geometry/eigen_alignment.hpp"
 #include "hamelin/geometry/lie_group.hpp"
 
 namespace hamelin::geometry {

@@ -6,15 +6,18 @@
 #include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/integration/options.hpp"
 #include "hamelin/integration/step_history.hpp"
 
 namespace hamelin::integration {
 
+using dynamics::ConstVectorRef;
 using dynamics::GyroscopicTerm;
+using dynamics::VectorRef;
 using Eigen::VectorXd;
 using model::Model;
 
-/// What acts on the arm during one step besides gravity (SPEC §4). Coefficients are kept over the step and evaluated at
+/// What acts on the arm during one step besides gravity. Coefficients are kept over the step and evaluated at
 /// the scheme's own velocity: midpoint, stage or sub-step. Empty vectors mean none and cost nothing. The nodal
 /// potential (a) and the node impulse (e) act between steps: Integrator::kick and Integrator::set_velocity.
 struct Channels {
@@ -68,27 +71,11 @@ struct Energy {
   [[nodiscard]] double total() const noexcept { return kinetic_J + potential_J; }
 };
 
-enum class Start : std::int32_t { consistent, published };
-enum class Solver : std::int32_t { newton, feedback, riqn };
-
-/// Settings of all integrators; each takes what concerns it and refuses what it cannot do.
-struct Options {
-  double alpha = 0.5;  ///< hamel: where in the step velocities are taken, 0 .. 1
-  Start start = Start::consistent;
-  bool solver_given = false;  ///< whether `solver` was asked for, or the scheme's own default holds
-  Solver solver = Solver::newton;
-  double tolerance = 1e-12;          ///< newton: ‖δΔ‖∞ [rad or m]
-  double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
-  int max_updates = 100;             ///< feedback; newton gives up where it does not contract
-  int max_halvings = 8;              ///< a step is cut into at most 2^max_halvings pieces
-  int order = 0;                     ///< composition, gauss: 0 takes the scheme's default
-  double rtol = 0.0, atol = 0.0;     ///< either above 0 switches step control on; the first step is the one asked for
-  double newmark_beta = 0.25, newmark_gamma = 0.5;  ///< newmark
-
-  [[nodiscard]] bool step_control() const noexcept { return rtol > 0.0 || atol > 0.0; }
-};
-
-/// A one-step scheme for a chain: θ^k → θ^{k+1}. One object a thread; State is the memory. No allocation in a step.
+/// A one-step scheme for a chain: θ^k → θ^{k+1}. One object a thread; State is the memory. No allocation in a step. The
+/// model is kept by reference and must outlive the integrator.
+///
+/// Calls check sizes, and that a state is one that this scheme makes for this model, and throw an Error (usage).
+/// start() also checks that its numbers are finite; later ones that are not come out as a step that has not converged.
 class Integrator {
  public:
   virtual ~Integrator() = default;
@@ -99,75 +86,93 @@ class Integrator {
   [[nodiscard]] const Model& model() const noexcept { return model_; }
   /// What "converged" means, for the result: e.g. "|delta|_inf <= 1e-12".
   [[nodiscard]] virtual std::string criterion() const = 0;
+  /// The number in the criterion, the larger of rtol and atol under step control; 1e-12 where nothing is iterated.
+  [[nodiscard]] double tolerance() const noexcept;
   [[nodiscard]] virtual int order() const = 0;
+  /// A step is cut into at most 2^max_halvings pieces.
+  [[nodiscard]] int max_halvings() const noexcept { return settings_.max_halvings; }
 
   /// A state at rest or in motion. q0, v0: dof numbers.
-  [[nodiscard]] State start(const VectorXd& q0, const VectorXd& v0);
+  [[nodiscard]] State start(const ConstVectorRef& q0, const ConstVectorRef& v0);
   /// Velocity at the node.
-  virtual void velocity(const State& state, VectorXd& v) = 0;
+  void velocity(const State& state, VectorRef v) const;
+  /// Energy at the node, as the scheme defines it.
+  [[nodiscard]] Energy energy(const State& state) const;
   /// Node impulse: p += dp [Nm s].
-  void kick(State& state, const VectorXd& dp);
+  void kick(State& state, const ConstVectorRef& dp);
   /// Node velocity: p = M(θ^k) v.
-  void set_velocity(State& state, const VectorXd& v);
+  void set_velocity(State& state, const ConstVectorRef& v);
   /// Exactly h > 0 ahead: one step, or under step control as many as it takes. If it reports converged = false no root
   /// was found, and the state is as it was.
   [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
   /// One step of at most `limit`: all of it for fixed steps, what step control chooses else (StepReport::step_s).
   [[nodiscard]] StepReport advance(State& state, const Channels& channels, double limit);
-  /// Whether the scheme chooses its steps itself (Options::rtol, atol).
-  [[nodiscard]] bool adaptive() const noexcept { return options_.step_control(); }
+  /// Whether the scheme chooses its steps itself (rtol, atol).
+  [[nodiscard]] bool adaptive() const noexcept { return settings_.rtol > 0.0 || settings_.atol > 0.0; }
   /// "structure": fixed steps of a structure-preserving scheme, iterated to rounding; else "accurate".
   [[nodiscard]] virtual std::string mode() const { return "accurate"; }
-  /// Energy at the node, as the scheme defines it (SPEC §3).
-  [[nodiscard]] virtual Energy energy(const State& state);
 
  protected:
-  Integrator(std::string name, const Model& model, const Options& options);
+  /// What the schemes' options have in common.
+  struct Settings {
+    Isa isa = default_isa();
+    int max_halvings = 0;      ///< 0 for explicit schemes: a shorter step finds no other root
+    double tolerance = 1e-12;  ///< the number in the criterion, for fixed steps
+    double rtol = 0.0, atol = 0.0;
+  };
+  Integrator(std::string name, const Model& model, const Settings& settings);
 
   /// Sets whatever the scheme keeps besides q, which is there.
-  virtual void begin(State& state, const VectorXd& v0) = 0;
-  virtual void add_momentum(State& state, const VectorXd& dp) = 0;
-  virtual void replace_velocity(State& state, const VectorXd& v) = 0;
+  virtual void begin(State& state, const ConstVectorRef& v0) = 0;
+  virtual void node_velocity(const State& state, VectorRef v) const = 0;
+  [[nodiscard]] virtual Energy node_energy(const State& state) const;
+  virtual void add_momentum(State& state, const ConstVectorRef& dp) = 0;
+  virtual void replace_velocity(State& state, const ConstVectorRef& v) = 0;
   /// One undivided step. Where it does not converge the state is left as it was.
   virtual StepReport attempt(State& state, const Channels& channels, double h) = 0;
   /// One step under step control, of at most `limit`, chosen by State::step_next; rejected ones are counted. Where it
-  /// fails the state is left as it was. Schemes without step control never get here: make_integrator refuses.
+  /// fails the state is left as it was. Schemes without step control never get here: make_options refuses.
   virtual StepReport controlled(State& state, const Channels& channels, double limit);
 
   const Model& model_;
-  Options options_;
-  dynamics::Workspace ws_;
+  const Settings settings_;
+  mutable dynamics::Workspace ws_;
 
  private:
-  void make_room(const State& state);
+  /// Sizes of what a scheme keeps in a state.
+  struct Shape {
+    Eigen::Index q = 0, v = 0, p = 0, memory = 0, force_previous = 0;
+    std::size_t history = 0;
+    friend bool operator==(const Shape&, const Shape&) = default;
+  };
+  static Shape shape_of(const State& state) noexcept;
+  void check(const char* function, const State& state) const;
+  void check(const char* function, const State& state, const Channels& channels, double h);
+  void check_size(const char* function, const char* argument, Eigen::Index given) const;
+  /// Makes the room that steps need; at the latest before the first.
+  void prepare();
+  StepReport go(State& state, const Channels& channels, double limit);
   StepReport parts(State& state, const Channels& channels, double h);
   /// One step, in halves where no root is found.
   StepReport divide(State& state, const Channels& channels, double h, int depth);
   void halve(State& state, const Channels& channels, double h, int depth, StepReport& report);
 
   std::string name_;
-  std::vector<State> saved_;  ///< one a halving level
-  VectorXd velocity_;         ///< scratch of energy()
+  Shape shape_;                ///< of this scheme's states, once prepared
+  std::vector<State> saved_;   ///< one a halving level
+  mutable VectorXd velocity_;  ///< scratch of node_energy()
 };
 
-/// What a scheme takes of Options.
-struct Scheme {
-  std::string name;
-  std::vector<Solver> solvers;  ///< root-finding, the default first; none where nothing is to be solved
-  std::vector<int> orders;      ///< to choose from; none where there is but one
-  bool step_control = false;    ///< whether it takes rtol and atol
-  bool iterates = false;        ///< whether it takes a tolerance of its iterations
-};
+/// @throws Error usage for numbers out of range, e.g. an order that the scheme does not have
+[[nodiscard]] std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& options);
+/// The integrator keeps a reference to the model, so a temporary would not outlive this call.
+std::unique_ptr<Integrator> make_integrator(const Model&& model, const Options& options) = delete;
 
-/// Null for an unknown name.
-[[nodiscard]] const Scheme* find_scheme(const std::string& name);
-
-/// Names that make_integrator knows.
-[[nodiscard]] const std::vector<std::string>& integrator_names();
-
-/// rtol without atol sets atol to the same number [rad or m, and per second]; atol without rtol stays absolute.
-/// @throws Error usage for an unknown name (with the nearest), or a solver, order or step control the scheme has not
-[[nodiscard]] std::unique_ptr<Integrator> make_integrator(const std::string& name, const Model& model,
-                                                          const Options& options = {});
+/// The same by name: make_integrator("gauss:8", model).
+/// @throws Error usage as make_options
+[[nodiscard]] std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model& model,
+                                                          const Parameters& parameters = {});
+std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model&& model,
+                                            const Parameters& parameters = {}) = delete;
 
 }  // namespace hamelin::integration

@@ -1,6 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -21,6 +23,9 @@ class Model {
                  const Eigen::Vector3d& gravity = Eigen::Vector3d{0.0, 0.0, -9.81});
 
   [[nodiscard]] int dof() const noexcept { return robot_.dof(); }
+  /// A number that this model shares with its copies only (they are equal), by which scratch knows what it was made
+  /// for. An address would not do: the next model may get the same one. Zero once the model was moved from.
+  [[nodiscard]] std::uint64_t id() const noexcept { return identity_.value; }
   [[nodiscard]] const Robot& robot() const noexcept { return robot_; }
   [[nodiscard]] const geometry::SE3& base() const noexcept { return base_; }
   [[nodiscard]] const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
@@ -61,6 +66,20 @@ class Model {
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
  private:
+  struct Identity {
+    Identity();
+    Identity(const Identity&) = default;
+    Identity(Identity&& other) noexcept : value(std::exchange(other.value, 0)) {}
+    Identity& operator=(const Identity&) = default;
+    Identity& operator=(Identity&& other) noexcept {
+      value = std::exchange(other.value, 0);
+      return *this;
+    }
+    ~Identity() = default;
+    std::uint64_t value;
+  };
+
+  Identity identity_;
   Robot robot_;
   geometry::SE3 base_;
   Eigen::Vector3d gravity_;

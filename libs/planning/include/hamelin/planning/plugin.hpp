@@ -215,6 +215,9 @@ class Planner {
 
 namespace detail {
 
+/// Makes the host's instruction set the default of this plugin's copy of the library.
+void take_instruction_set(const hamelin_setup& setup) noexcept;
+
 /// The line behind an exception that must not cross the border, cut to size and nul-terminated.
 void write_current_exception(char* error, std::size_t error_size) noexcept;
 
@@ -230,6 +233,7 @@ struct Glue {
   static std::int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json,
                              std::size_t params_size, void** out, char* error, std::size_t error_size) noexcept {
     try {
+      take_instruction_set(*setup);
       const Json params = parse_json({params_json, params_size}, "params");
       *out = std::make_unique<Instance>(setup->dof, Host(*host), Setup(*setup), params).release();
       return 0;

@@ -101,6 +101,9 @@ typedef struct hamelin_setup {
   double influence_m;      /* contacts are listed up to this distance, asked from the plugin */
   double map_resolution_m; /* zero without a map */
   uint64_t seed;
+  /* Appended to ABI 3; present if struct_size says so. What hamelin's kernels compute with in the host: "x86-64", "v3",
+   * "v4" or "generic". A plugin that links hamelin's libraries has a copy of them, which should do the same. */
+  const char* instruction_set;
 } hamelin_setup;
 
 /* One tick's input. */

@@ -6,9 +6,9 @@
 
 namespace hamelin::simulation {
 
-/// The options of an integrator from a scene's `/integrator/params`, docs/schema/integrator.schema.json.
+/// The parameters of an integrator from a scene's `/integrator/params`, docs/schema/integrator.schema.json.
 /// @param where file and place, with which an error message begins
 /// @throws Error invalid, naming `where` and the key
-[[nodiscard]] integration::Options integrator_options(const Json& params, const std::string& where);
+[[nodiscard]] integration::Parameters integrator_options(const Json& params, const std::string& where);
 
 }  // namespace hamelin::simulation

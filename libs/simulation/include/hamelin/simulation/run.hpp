@@ -41,8 +41,8 @@ struct FreeMotion {
   std::string name;  ///< for the result's "scene"
   Eigen::VectorXd q0, v0;
   double step_s = 1e-3, duration_s = 10.0;
-  std::string integrator = "hamel-variational";
-  integration::Options options;
+  std::string integrator = "hamel-variational";  ///< or with an order, "gauss:8"
+  integration::Parameters options;
   Eigen::VectorXd damping;  ///< empty: none
   Eigen::VectorXd coulomb;  ///< dry friction, see integration::Channels; empty: none
   double coulomb_speed = scene::default_friction_speed;

@@ -4,19 +4,19 @@
 /// What tests of integrators share.
 namespace hamelin::test {
 
-/// Options with a scheme's order (composition, gauss).
-inline integration::Options of_order(int order) {
-  integration::Options options;
-  options.order = order;
-  return options;
+/// Parameters with a scheme's order (composition, gauss); 0 leaves it to the scheme.
+inline integration::Parameters of_order(int order) {
+  integration::Parameters parameters;
+  if (order > 0) parameters.order = order;
+  return parameters;
 }
 
-/// Options that switch step control on.
-inline integration::Options tolerances(double rtol, double atol) {
-  integration::Options options;
-  options.rtol = rtol;
-  options.atol = atol;
-  return options;
+/// Parameters that switch step control on.
+inline integration::Parameters tolerances(double rtol, double atol) {
+  integration::Parameters parameters;
+  parameters.rtol = rtol;
+  parameters.atol = atol;
+  return parameters;
 }
 
 /// Names of the schemes that take rtol and atol.
@@ -27,7 +27,7 @@ inline std::vector<std::string> controlled_names() {
   return names;
 }
 
-inline Eigen::VectorXd velocity(integration::Integrator& integrator, const integration::State& state) {
+inline Eigen::VectorXd velocity(const integration::Integrator& integrator, const integration::State& state) {
   Eigen::VectorXd v(state.q.size());
   integrator.velocity(state, v);
   return v;

@@ -1,0 +1,23 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+
+#include "hamelin/control/world_view.hpp"
+#include "hamelin/model/robot.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::control {
+
+/// A limit of each joint; `unlimited` where the robot gives none.
+[[nodiscard]] Eigen::VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit,
+                                           double unlimited);
+
+/// What a planner is told before its first tick: goals, limits and timing of a scene, the shapes of the arm and how far
+/// it is shown obstacles.
+/// @param nominal the arm that the planner believes in
+/// @param control_period_s time between two ticks [s]
+[[nodiscard]] planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
+                                                const WorldView& world, double control_period_s);
+
+}  // namespace hamelin::control

@@ -1,0 +1,214 @@
+#include "hamelin/integration/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "check_options.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
+
+namespace hamelin::integration {
+
+namespace {
+
+[[noreturn]] void refuse(std::string message) {
+  throw Error(ErrorCode::usage, std::move(message));
+}
+
+struct Entry {
+  Scheme scheme;
+  Options defaults;
+};
+
+// In the order of the alternatives of Options.
+const std::vector<Entry>& table() {
+  using enum Solver;
+  static const std::vector<Entry> entries{
+      {{"hamel", {feedback}, {}, false, true}, HamelOptions{}},
+      {{"hamel-midpoint", {feedback}, {}, false, true}, HamelMidpointOptions{}},
+      {{"hamel-variational", {newton, feedback}, {}, false, true}, VariationalOptions{}},
+      {{"gauss", {}, {4, 6, 8, 10, 12, 14, 16}, true, true}, GaussOptions{}},
+      {{"lie-exact", {newton, riqn}, {}, false, true}, LieExactOptions{}},
+      {{"composition", {newton}, {4, 6, 8}, false, true}, CompositionOptions{}},
+      {{"semi-implicit-euler", {}, {}, false, false}, SemiImplicitEulerOptions{}},
+      {{"newmark", {}, {}, false, true}, NewmarkOptions{}},
+      {{"feedback", {}, {}, false, false}, FeedbackOptions{}},
+      {{"rk4", {}, {}, false, false}, Rk4Options{}},
+      {{"dop853", {}, {}, true, false}, Dop853Options{}},
+      {{"rosenbrock", {}, {}, true, false}, RosenbrockOptions{}},
+  };
+  return entries;
+}
+
+const Entry* find_entry(std::string_view name) {
+  for (const auto& entry : table())
+    if (entry.scheme.name == name) return &entry;
+  return nullptr;
+}
+
+const char* to_string(Solver solver) {
+  switch (solver) {
+    case Solver::newton:
+      return "newton";
+    case Solver::feedback:
+      return "feedback";
+    case Solver::riqn:
+      return "riqn";
+  }
+  return "";
+}
+
+void check_solver(const Scheme& scheme, Solver solver) {
+  const auto& known = scheme.solvers;
+  if (known.empty()) refuse(fmt::format("integrator '{}' takes no solver", scheme.name));
+  if (std::find(known.begin(), known.end(), solver) != known.end()) return;
+  std::vector<std::string> names;
+  for (const Solver one : known) names.push_back(fmt::format("'{}'", to_string(one)));
+  refuse(fmt::format("integrator '{}' has the solver {} only", scheme.name, fmt::join(names, " or ")));
+}
+
+void check_order(const Scheme& scheme, int order) {
+  if (scheme.orders.empty()) refuse(fmt::format("integrator '{}' has one order, it takes none", scheme.name));
+  if (std::find(scheme.orders.begin(), scheme.orders.end(), order) == scheme.orders.end())
+    refuse(fmt::format("integrator '{}' has no order {}, expected one of {}", scheme.name, order,
+                       fmt::join(scheme.orders, ", ")));
+}
+
+void check_step_control(const Scheme& scheme, double rtol, double atol) {
+  const auto valid = [](double x) { return std::isfinite(x) && x >= 0.0; };
+  if (!valid(rtol) || !valid(atol))
+    refuse(
+        fmt::format("integrator '{}': rtol {} and atol {}, expected finite numbers from 0", scheme.name, rtol, atol));
+  if (!scheme.step_control && (rtol > 0.0 || atol > 0.0))
+    refuse(fmt::format("integrator '{}' has no step control, it takes neither rtol nor atol", scheme.name));
+}
+
+// Numbers from `least` to `most`.
+void check_range(const Scheme& scheme, const char* what, double x, double least, double most) {
+  if (!(x >= least && x <= most))
+    refuse(fmt::format("integrator '{}': {} {}, expected a number from {} to {}", scheme.name, what, x, least, most));
+}
+
+constexpr double largest = std::numeric_limits<double>::max();
+
+// What all schemes that have an option of that name ask of it.
+template <class O>
+void check(const Scheme& scheme, O& o) {
+  require_available(o.isa);
+  if constexpr (requires { o.order; }) check_order(scheme, o.order);
+  if constexpr (requires { o.alpha; }) check_range(scheme, "alpha", o.alpha, 0.0, 1.0);
+  if constexpr (requires { o.tolerance; }) check_range(scheme, "tolerance", o.tolerance, 0.0, largest);
+  if constexpr (requires { o.feedback_tolerance; })
+    check_range(scheme, "feedback_tolerance", o.feedback_tolerance, 0.0, largest);
+  if constexpr (requires { o.newmark_beta; }) {
+    check_range(scheme, "newmark_beta", o.newmark_beta, 0.0, largest);
+    check_range(scheme, "newmark_gamma", o.newmark_gamma, 0.0, largest);
+  }
+  if constexpr (requires { o.max_updates; }) check_range(scheme, "max_updates", o.max_updates, 0.0, largest);
+  if constexpr (requires { o.max_halvings; }) check_range(scheme, "max_halvings", o.max_halvings, 0.0, 30.0);
+  if constexpr (requires { o.rtol; }) {
+    check_step_control(scheme, o.rtol, o.atol);
+    if (o.atol == 0.0) o.atol = o.rtol;  // alone, a relative tolerance asks for the impossible at rest
+  }
+}
+
+template <class T>
+void take(const std::optional<T>& given, T& into) {
+  if (given) into = *given;
+}
+
+void take_solver(Solver given, VariationalOptions::Solver& into) {
+  into = given == Solver::feedback ? VariationalOptions::Solver::feedback : VariationalOptions::Solver::newton;
+}
+void take_solver(Solver given, LieExactOptions::Solver& into) {
+  into = given == Solver::riqn ? LieExactOptions::Solver::riqn : LieExactOptions::Solver::newton;
+}
+
+template <class O>
+void take_all(const Parameters& p, O& o) {
+  take(p.isa, o.isa);
+  if constexpr (requires { o.order; }) take(p.order, o.order);
+  if constexpr (requires { o.solver; })
+    if (p.solver) take_solver(*p.solver, o.solver);
+  if constexpr (requires { o.rtol; }) {
+    take(p.rtol, o.rtol);
+    take(p.atol, o.atol);
+  }
+  if constexpr (requires { o.alpha; }) take(p.alpha, o.alpha);
+  if constexpr (requires { o.start; }) take(p.start, o.start);
+  if constexpr (requires { o.tolerance; }) take(p.tolerance, o.tolerance);
+  if constexpr (requires { o.feedback_tolerance; }) take(p.feedback_tolerance, o.feedback_tolerance);
+  if constexpr (requires { o.newmark_beta; }) {
+    take(p.newmark_beta, o.newmark_beta);
+    take(p.newmark_gamma, o.newmark_gamma);
+  }
+  if constexpr (requires { o.max_updates; }) take(p.max_updates, o.max_updates);
+  if constexpr (requires { o.max_halvings; }) take(p.max_halvings, o.max_halvings);
+}
+
+}  // namespace
+
+Options checked(Options options) {
+  const Scheme& scheme = table()[options.index()].scheme;
+  std::visit([&](auto& o) { check(scheme, o); }, options);
+  return options;
+}
+
+const std::vector<std::string>& integrator_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const auto& entry : table()) all.push_back(entry.scheme.name);
+    return all;
+  }();
+  return names;
+}
+
+const Scheme* find_scheme(std::string_view name) {
+  const Entry* const entry = find_entry(name.substr(0, name.find(':')));
+  return entry != nullptr ? &entry->scheme : nullptr;
+}
+
+SchemeName parse_scheme_name(std::string_view text) {
+  const auto colon = text.find(':');
+  SchemeName parsed{std::string(text.substr(0, colon)), {}};
+  if (colon == std::string_view::npos) return parsed;
+  const std::string_view digits = text.substr(colon + 1);
+  int order = 0;
+  const auto [read_to, ec] = std::from_chars(digits.data(), digits.data() + digits.size(), order);
+  if (ec != std::errc() || read_to != digits.data() + digits.size() || order < 1)
+    refuse(fmt::format("'{}': '{}' is no order, expected a name and a number as gauss:8", text, digits));
+  parsed.order = order;
+  return parsed;
+}
+
+Options make_options(std::string_view name, const Parameters& given) {
+  const SchemeName asked = parse_scheme_name(name);
+  const Entry* const entry = find_entry(asked.name);
+  if (entry == nullptr)
+    refuse(fmt::format("integrator '{}' is not known, expected one of {}{}", asked.name,
+                       fmt::join(integrator_names(), ", "), did_you_mean(asked.name, integrator_names())));
+  Parameters parameters = given;
+  if (asked.order) {
+    if (given.order && *given.order != *asked.order)
+      refuse(fmt::format("integrator '{}': order {} is given as well, expected one of the two", name, *given.order));
+    parameters.order = asked.order;
+  }
+  const Scheme& scheme = entry->scheme;
+  if (parameters.order) check_order(scheme, *parameters.order);
+  if (parameters.solver) check_solver(scheme, *parameters.solver);
+  check_step_control(scheme, parameters.rtol.value_or(0.0), parameters.atol.value_or(0.0));
+  Options options = entry->defaults;
+  std::visit(
+      [&](auto& o) {
+        o.isa = default_isa();
+        take_all(parameters, o);
+      },
+      options);
+  return checked(std::move(options));
+}
+
+}  // namespace hamelin::integration
