@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "hamelin/accuracy/accuracy.hpp"
+#include "hamelin/core/error.hpp"
 
 namespace hamelin::accuracy {
 

@@ -1,8 +1,7 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
-#include <fmt/format.h>
-
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernels.hpp"
 
@@ -38,35 +37,33 @@ BatchWorkspace::BatchWorkspace(const Model& model, Isa isa)
 namespace detail {
 
 void refuse_workspace(const char* function, const Model& model, const WorkspaceOwner& owner) {
-  throw Error(
-      ErrorCode::usage,
-      fmt::format("{}: the workspace was made for another model (of {} joints), expected one made for this '{}' "
-                  "(of {} joints) or a copy of it",
-                  function, owner.dof, model.robot().name, model.dof()));
+  throw Error(ErrorCode::usage,
+              formatted("{}: the workspace was made for another model (of {} joints), expected one made for this '{}' "
+                        "(of {} joints) or a copy of it",
+                        function, owner.dof, model.robot().name, model.dof()));
 }
 
 void refuse_size(const char* function, const char* argument, Eigen::Index given, Eigen::Index expected) {
   throw Error(ErrorCode::usage,
-              fmt::format("{}: {}: {} given, expected {} (one per joint)", function, argument, given, expected));
+              formatted("{}: {}: {} given, expected {} (one per joint)", function, argument, given, expected));
 }
 
 void refuse_states(const char* function, const char* argument, Eigen::Index rows, Eigen::Index cols,
                    Eigen::Index stride, Eigen::Index dof, Eigen::Index states, Eigen::Index expected) {
-  throw Error(
-      ErrorCode::usage,
-      fmt::format("{}: {}: {} x {} numbers with row stride {} given, expected {} x {} (joints x states) with row "
-                  "stride {}",
-                  function, argument, rows, cols, stride, dof, states, expected));
+  throw Error(ErrorCode::usage,
+              formatted("{}: {}: {} x {} numbers with row stride {} given, expected {} x {} (joints x states) with row "
+                        "stride {}",
+                        function, argument, rows, cols, stride, dof, states, expected));
 }
 
 void refuse_link(const char* function, int link, Eigen::Index dof) {
   throw Error(ErrorCode::usage,
-              fmt::format("{}: link: {} given, expected an index from 0 to {}", function, link, dof - 1));
+              formatted("{}: link: {} given, expected an index from 0 to {}", function, link, dof - 1));
 }
 
 void refuse_count(const char* function, const char* argument, std::size_t given, std::size_t expected) {
-  throw Error(ErrorCode::usage, fmt::format("{}: {}: room for {} given, expected {} (one per collision shape)",
-                                            function, argument, given, expected));
+  throw Error(ErrorCode::usage, formatted("{}: {}: room for {} given, expected {} (one per collision shape)", function,
+                                          argument, given, expected));
 }
 
 void inverse_dynamics(const Model& model, Workspace& ws, const double* q, const double* v, const double* a,

@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -5,6 +6,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/geometry/se2.hpp"
 #include "hamelin/geometry/se3.hpp"

@@ -1,12 +1,11 @@
 #include "dop853.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "step_controller.hpp"
 
 namespace hamelin::integration {
@@ -118,7 +117,7 @@ Dop853::Dop853(const Model& model, const Dop853Options& options)
 }
 
 std::string Dop853::criterion() const {
-  return adaptive() ? fmt::format("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol) : "explicit";
+  return adaptive() ? formatted("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol) : "explicit";
 }
 
 void Dop853::first_stage(const State& state, const Channels& channels, StepReport& report) {

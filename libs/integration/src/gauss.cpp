@@ -1,12 +1,11 @@
 #include "gauss.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "finite.hpp"
 #include "gauss_tableau.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
 #include "step_controller.hpp"
@@ -44,8 +43,8 @@ GaussLegendre::GaussLegendre(const Model& model, const GaussOptions& options)
 }
 
 std::string GaussLegendre::criterion() const {
-  if (adaptive()) return fmt::format("error <= {} + {} |q|, max", settings_.atol, settings_.rtol);
-  return fmt::format("|error of delta|_inf <= {}", settings_.tolerance);
+  if (adaptive()) return formatted("error <= {} + {} |q|, max", settings_.atol, settings_.rtol);
+  return formatted("|error of delta|_inf <= {}", settings_.tolerance);
 }
 
 std::string GaussLegendre::mode() const {

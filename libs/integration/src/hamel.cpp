@@ -1,10 +1,9 @@
 #include "hamel.hpp"
 
-#include <fmt/format.h>
-
 #include <cstring>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 
 namespace hamelin::integration {
 
@@ -35,7 +34,7 @@ Hamel::Hamel(const Model& model, const HamelOptions& options, bool midpoint)
 }
 
 std::string Hamel::criterion() const {
-  return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
+  return formatted("|tau_e|_2 < {}", options_.feedback_tolerance);
 }
 
 template <class F>

@@ -1,10 +1,9 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "finite.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::integration {
@@ -27,8 +26,8 @@ Integrator::Shape Integrator::shape_of(const State& state) noexcept {
 
 void Integrator::check_size(const char* function, const char* argument, Eigen::Index given) const {
   if (given != model_.dof()) [[unlikely]]
-    throw Error(ErrorCode::usage, fmt::format("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
-                                              argument, given, model_.dof(), model_.robot().name));
+    throw Error(ErrorCode::usage, formatted("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
+                                            argument, given, model_.dof(), model_.robot().name));
 }
 
 void Integrator::check(const char* function, const State& state) const {
@@ -37,9 +36,9 @@ void Integrator::check(const char* function, const State& state) const {
   if (saved_.empty() || given == shape_) return;
   throw Error(
       ErrorCode::usage,
-      fmt::format("{}: state: {} velocities, {} momenta and {} numbers of memory given, expected {}, {} and {}: a "
-                  "state that '{}' with these options makes for this model",
-                  function, given.v, given.p, given.memory, shape_.v, shape_.p, shape_.memory, name_));
+      formatted("{}: state: {} velocities, {} momenta and {} numbers of memory given, expected {}, {} and {}: a "
+                "state that '{}' with these options makes for this model",
+                function, given.v, given.p, given.memory, shape_.v, shape_.p, shape_.memory, name_));
 }
 
 void Integrator::check(const char* function, const State& state, const Channels& channels, double h) {
@@ -53,11 +52,10 @@ void Integrator::check(const char* function, const State& state, const Channels&
   sized("channels.held_torque", channels.held_torque);
   for (const auto& term : channels.gyroscopic)
     if (term.link < 0 || term.link >= model_.dof()) [[unlikely]]
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}", function,
-                              term.link, model_.dof() - 1));
+      throw Error(ErrorCode::usage, formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
+                                              function, term.link, model_.dof() - 1));
   if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
-    throw Error(ErrorCode::usage, fmt::format("{}: a step of {} s given, expected a positive number", function, h));
+    throw Error(ErrorCode::usage, formatted("{}: a step of {} s given, expected a positive number", function, h));
 }
 
 State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
@@ -66,8 +64,8 @@ State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
   State state;
   state.q = q0;
   if (!all_finite(state.q) || !v0.allFinite())
-    throw Error(ErrorCode::usage, fmt::format("start: {}: a number is not finite, expected finite numbers",
-                                              all_finite(state.q) ? "v0" : "q0"));
+    throw Error(ErrorCode::usage, formatted("start: {}: a number is not finite, expected finite numbers",
+                                            all_finite(state.q) ? "v0" : "q0"));
   if (saved_.empty()) prepare();
   begin(state, v0);
   return state;

@@ -1,10 +1,9 @@
 #include "lie_exact.hpp"
 
-#include <fmt/format.h>
-
 #include <limits>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "kernel/corrections.hpp"
 
 namespace hamelin::integration {
@@ -35,7 +34,7 @@ decltype(auto) LieExact::with_links(F&& f) {
 }
 
 std::string LieExact::criterion() const {
-  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+  return formatted("|error of delta|_inf <= {}", options_.tolerance);
 }
 
 bool LieExact::evaluate(const State& state, const Channels& channels, double h) {

@@ -1,10 +1,9 @@
 #include "newmark.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 
 namespace hamelin::integration {
 
@@ -14,7 +13,7 @@ Newmark::Newmark(const Model& model, const NewmarkOptions& options)
 }
 
 std::string Newmark::criterion() const {
-  return fmt::format("h^2 |change of the acceleration|_inf <= {}", options_.tolerance);
+  return formatted("h^2 |change of the acceleration|_inf <= {}", options_.tolerance);
 }
 
 // State::memory holds the node's acceleration and the one before.

@@ -1,7 +1,5 @@
 #include "hamelin/integration/options.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -9,6 +7,7 @@
 
 #include "check_options.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/core/text.hpp"
 
 namespace hamelin::integration {
@@ -64,33 +63,32 @@ const char* to_string(Solver solver) {
 
 void check_solver(const Scheme& scheme, Solver solver) {
   const auto& known = scheme.solvers;
-  if (known.empty()) refuse(fmt::format("integrator '{}' takes no solver", scheme.name));
+  if (known.empty()) refuse(formatted("integrator '{}' takes no solver", scheme.name));
   if (std::find(known.begin(), known.end(), solver) != known.end()) return;
   std::vector<std::string> names;
-  for (const Solver one : known) names.push_back(fmt::format("'{}'", to_string(one)));
-  refuse(fmt::format("integrator '{}' has the solver {} only", scheme.name, fmt::join(names, " or ")));
+  for (const Solver one : known) names.push_back(formatted("'{}'", to_string(one)));
+  refuse(formatted("integrator '{}' has the solver {} only", scheme.name, joined(names, " or ")));
 }
 
 void check_order(const Scheme& scheme, int order) {
-  if (scheme.orders.empty()) refuse(fmt::format("integrator '{}' has one order, it takes none", scheme.name));
+  if (scheme.orders.empty()) refuse(formatted("integrator '{}' has one order, it takes none", scheme.name));
   if (std::find(scheme.orders.begin(), scheme.orders.end(), order) == scheme.orders.end())
-    refuse(fmt::format("integrator '{}' has no order {}, expected one of {}", scheme.name, order,
-                       fmt::join(scheme.orders, ", ")));
+    refuse(formatted("integrator '{}' has no order {}, expected one of {}", scheme.name, order,
+                     joined(scheme.orders, ", ")));
 }
 
 void check_step_control(const Scheme& scheme, double rtol, double atol) {
   const auto valid = [](double x) { return std::isfinite(x) && x >= 0.0; };
   if (!valid(rtol) || !valid(atol))
-    refuse(
-        fmt::format("integrator '{}': rtol {} and atol {}, expected finite numbers from 0", scheme.name, rtol, atol));
+    refuse(formatted("integrator '{}': rtol {} and atol {}, expected finite numbers from 0", scheme.name, rtol, atol));
   if (!scheme.step_control && (rtol > 0.0 || atol > 0.0))
-    refuse(fmt::format("integrator '{}' has no step control, it takes neither rtol nor atol", scheme.name));
+    refuse(formatted("integrator '{}' has no step control, it takes neither rtol nor atol", scheme.name));
 }
 
 // Numbers from `least` to `most`.
 void check_range(const Scheme& scheme, const char* what, double x, double least, double most) {
   if (!(x >= least && x <= most))
-    refuse(fmt::format("integrator '{}': {} {}, expected a number from {} to {}", scheme.name, what, x, least, most));
+    refuse(formatted("integrator '{}': {} {}, expected a number from {} to {}", scheme.name, what, x, least, most));
 }
 
 constexpr double largest = std::numeric_limits<double>::max();
@@ -180,7 +178,7 @@ SchemeName parse_scheme_name(std::string_view text) {
   int order = 0;
   const auto [read_to, ec] = std::from_chars(digits.data(), digits.data() + digits.size(), order);
   if (ec != std::errc() || read_to != digits.data() + digits.size() || order < 1)
-    refuse(fmt::format("'{}': '{}' is no order, expected a name and a number as gauss:8", text, digits));
+    refuse(formatted("'{}': '{}' is no order, expected a name and a number as gauss:8", text, digits));
   parsed.order = order;
   return parsed;
 }
@@ -189,12 +187,12 @@ Options make_options(std::string_view name, const Parameters& given) {
   const SchemeName asked = parse_scheme_name(name);
   const Entry* const entry = find_entry(asked.name);
   if (entry == nullptr)
-    refuse(fmt::format("integrator '{}' is not known, expected one of {}{}", asked.name,
-                       fmt::join(integrator_names(), ", "), did_you_mean(asked.name, integrator_names())));
+    refuse(formatted("integrator '{}' is not known, expected one of {}{}", asked.name, joined(integrator_names(), ", "),
+                     did_you_mean(asked.name, integrator_names())));
   Parameters parameters = given;
   if (asked.order) {
     if (given.order && *given.order != *asked.order)
-      refuse(fmt::format("integrator '{}': order {} is given as well, expected one of the two", name, *given.order));
+      refuse(formatted("integrator '{}': order {} is given as well, expected one of the two", name, *given.order));
     parameters.order = asked.order;
   }
   const Scheme& scheme = entry->scheme;

@@ -1,10 +1,9 @@
 #include "rosenbrock.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 
 namespace hamelin::integration {
 
@@ -56,7 +55,7 @@ Rosenbrock::Rosenbrock(const RosenbrockOptions& options, const Model& model)
 }
 
 std::string Rosenbrock::criterion() const {
-  return fmt::format("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol);
+  return formatted("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol);
 }
 
 Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorXd& q, const VectorXd& v,

@@ -1,10 +1,9 @@
 #include "variational.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "finite.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
 
@@ -41,10 +40,10 @@ bool Variational::trusts_quadratic() const noexcept {
 }
 
 std::string Variational::criterion() const {
-  if (options_.solver == Solver::feedback) return fmt::format("|tau_e|_2 < {}", options_.feedback_tolerance);
+  if (options_.solver == Solver::feedback) return formatted("|tau_e|_2 < {}", options_.feedback_tolerance);
   if (trusts_quadratic())
-    return fmt::format("|error of delta|_inf <= {}, or 10 |first correction|^2 <= it, unconfirmed", options_.tolerance);
-  return fmt::format("|error of delta|_inf <= {}", options_.tolerance);
+    return formatted("|error of delta|_inf <= {}, or 10 |first correction|^2 <= it, unconfirmed", options_.tolerance);
+  return formatted("|error of delta|_inf <= {}", options_.tolerance);
 }
 
 std::string Variational::mode() const {

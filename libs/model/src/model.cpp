@@ -1,12 +1,12 @@
 #include "hamelin/model/model.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <optional>
+
+#include "hamelin/core/formatted.hpp"
 
 namespace hamelin::model {
 
@@ -245,8 +245,8 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
 }
 
 std::string Model::words(const Shape& shape) const {
-  return fmt::format("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere", shape.index_in_link,
-                     robot_.links[static_cast<std::size_t>(shape.link)].name);
+  return formatted("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere", shape.index_in_link,
+                   robot_.links[static_cast<std::size_t>(shape.link)].name);
 }
 
 }  // namespace hamelin::model

@@ -1,12 +1,12 @@
-#include <fmt/format.h>
-
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/formatted.hpp"
 #include "hamelin/core/text.hpp"
 #include "hamelin/model/robot.hpp"
 
@@ -33,7 +33,7 @@ constexpr double inertia_share_min = 1e-14;
 constexpr double asymmetry_max = 1e-12;
 
 [[noreturn]] void fail(const std::string& where, const std::string& what) {
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
+  throw Error(ErrorCode::invalid, formatted("{}: {}", where, what));
 }
 
 // In ascending order.
@@ -43,20 +43,20 @@ Vector3d principal_moments(const Matrix3d& inertia) {
 }
 
 std::string describe(const Vector3d& moments) {
-  return fmt::format("(principal moments {:.6g}, {:.6g}, {:.6g})", moments[0], moments[1], moments[2]);
+  return formatted("(principal moments {:.6g}, {:.6g}, {:.6g})", moments[0], moments[1], moments[2]);
 }
 
 void check_length(const Vector3d& p, const std::string& where, const char* what) {
   if (!p.allFinite() || p.cwiseAbs().maxCoeff() > length_max_m)
-    fail(where, fmt::format("{} is ({}, {}, {}), expected finite numbers up to {} m", what, p.x(), p.y(), p.z(),
-                            length_max_m));
+    fail(where,
+         formatted("{} is ({}, {}, {}), expected finite numbers up to {} m", what, p.x(), p.y(), p.z(), length_max_m));
 }
 
 void check_pose(const SE3& g, const std::string& where, const char* what) {
   check_length(g.p(), where, what);
   const double off = (g.R() * g.R().transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= unit_tolerance) || g.R().determinant() < 0.0)
-    fail(where, fmt::format("the rotation of {} is no rotation", what));
+    fail(where, formatted("the rotation of {} is no rotation", what));
 }
 
 void check_joint(const Joint& joint, const std::string& where) {
@@ -64,35 +64,35 @@ void check_joint(const Joint& joint, const std::string& where) {
   check_length(v, where, "the screw's v");
   if (joint.type == JointType::revolute) {
     if (!(std::abs(omega.norm() - 1.0) <= unit_tolerance))
-      fail(where, fmt::format("the axis has length {}, expected 1", omega.norm()));
+      fail(where, formatted("the axis has length {}, expected 1", omega.norm()));
     if (!(std::abs(omega.dot(v)) <= unit_tolerance * (1.0 + v.norm())))
-      fail(where, fmt::format("the screw has pitch {} m/rad, expected 0 for a revolute joint", omega.dot(v)));
+      fail(where, formatted("the screw has pitch {} m/rad, expected 0 for a revolute joint", omega.dot(v)));
   } else {
     if (!omega.isZero(0.0)) fail(where, "the screw of a prismatic joint turns, expected omega = 0");
     if (!(std::abs(v.norm() - 1.0) <= unit_tolerance))
-      fail(where, fmt::format("the axis has length {}, expected 1", v.norm()));
+      fail(where, formatted("the axis has length {}, expected 1", v.norm()));
   }
   for (const auto& limit : {joint.lower, joint.upper})
     if (limit && !std::isfinite(*limit))
-      fail(where, fmt::format("a position limit is {}, expected a finite number", *limit));
+      fail(where, formatted("a position limit is {}, expected a finite number", *limit));
   if (joint.lower && joint.upper && !(*joint.lower < *joint.upper))
-    fail(where, fmt::format("lower limit {} is not below upper limit {}", *joint.lower, *joint.upper));
+    fail(where, formatted("lower limit {} is not below upper limit {}", *joint.lower, *joint.upper));
   if (joint.velocity_max && !(*joint.velocity_max > 0.0 && std::isfinite(*joint.velocity_max)))
-    fail(where, fmt::format("velocity limit {}, expected a positive number", *joint.velocity_max));
+    fail(where, formatted("velocity limit {}, expected a positive number", *joint.velocity_max));
   if (joint.effort_max && !(*joint.effort_max > 0.0 && std::isfinite(*joint.effort_max)))
-    fail(where, fmt::format("effort limit {}, expected a positive number", *joint.effort_max));
+    fail(where, formatted("effort limit {}, expected a positive number", *joint.effort_max));
   if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
-    fail(where, fmt::format("damping {}, expected a number of at least 0", joint.damping));
+    fail(where, formatted("damping {}, expected a number of at least 0", joint.damping));
   if (!(joint.friction >= 0.0 && std::isfinite(joint.friction)))
-    fail(where, fmt::format("friction {}, expected a number of at least 0", joint.friction));
+    fail(where, formatted("friction {}, expected a number of at least 0", joint.friction));
   if (!(joint.armature >= 0.0 && joint.armature <= inertia_max_kg_m2))
-    fail(where, fmt::format("armature {}, expected 0 to {}", joint.armature, inertia_max_kg_m2));
+    fail(where, formatted("armature {}, expected 0 to {}", joint.armature, inertia_max_kg_m2));
 }
 
 void check_body(const Link& link, const std::string& where) {
   check_pose(link.com, where, "the COM frame");
   if (!(link.mass_kg >= 0.0 && link.mass_kg <= mass_max_kg))
-    fail(where, fmt::format("mass {} kg, expected 0 to {}", link.mass_kg, mass_max_kg));
+    fail(where, formatted("mass {} kg, expected 0 to {}", link.mass_kg, mass_max_kg));
   if (link.mass_kg > 0.0 || !link.inertia_kg_m2.isZero(0.0)) {
     const std::string fault = inertia_fault(link.inertia_kg_m2, true);
     if (!fault.empty()) fail(where, "inertia " + fault);
@@ -100,13 +100,13 @@ void check_body(const Link& link, const std::string& where) {
   for (const auto& sphere : link.spheres) {
     check_length(sphere.center_m, where, "a sphere's centre");
     if (!(sphere.radius_m > 0.0 && sphere.radius_m <= length_max_m))
-      fail(where, fmt::format("a sphere's radius is {} m, expected a positive number", sphere.radius_m));
+      fail(where, formatted("a sphere's radius is {} m, expected a positive number", sphere.radius_m));
   }
   for (const auto& segment : link.segments) {
     check_length(segment.from_m, where, "a segment's start");
     check_length(segment.to_m, where, "a segment's end");
     if (!(segment.radius_m >= 0.0 && segment.radius_m <= length_max_m))
-      fail(where, fmt::format("a segment's radius is {} m, expected a number of at least 0", segment.radius_m));
+      fail(where, formatted("a segment's radius is {} m, expected a number of at least 0", segment.radius_m));
   }
 }
 
@@ -137,8 +137,8 @@ void check_joint_inertia(const Robot& robot, const std::string& where) {
     const double free = screws[i].dot(push) + rotor;
     if (!(locked > 0.0) || !(free > inertia_share_min * locked))
       fail(where,
-           fmt::format("link '{}': nothing it moves has inertia about joint '{}', expected a positive mass or inertia",
-                       robot.links[i].name, robot.links[i].joint.name));
+           formatted("link '{}': nothing it moves has inertia about joint '{}', expected a positive mass or inertia",
+                     robot.links[i].name, robot.links[i].joint.name));
     articulated -= push * push.transpose() / free;
   }
 }
@@ -151,20 +151,20 @@ void check_parts(const Robot& robot, const std::string& where) {
     if (std::any_of(part.begin(), part.end(), [](unsigned char c) { return c < ' '; }))
       fail(where, owner + ": a shape's part has a name with control characters");
     if (body_of.emplace(part, body).first->second != body)
-      fail(where, fmt::format("{}: part '{}' is on another link as well, expected it on one", owner, part));
+      fail(where, formatted("{}: part '{}' is on another link as well, expected it on one", owner, part));
   };
   for (int i = 0; i < robot.dof(); ++i) {
     const Link& link = robot.links[static_cast<std::size_t>(i)];
     for (const Sphere& sphere : link.spheres)
-      if (!sphere.part.empty()) place(sphere.part, i, fmt::format("link '{}'", link.name));
+      if (!sphere.part.empty()) place(sphere.part, i, formatted("link '{}'", link.name));
     for (const Segment& segment : link.segments)
-      if (!segment.part.empty()) place(segment.part, i, fmt::format("link '{}'", link.name));
+      if (!segment.part.empty()) place(segment.part, i, formatted("link '{}'", link.name));
   }
   for (const Sphere& sphere : robot.base_spheres) {
     if (sphere.part.empty()) fail(where, "base_spheres: a sphere names no part, expected the link that bears it");
     check_length(sphere.center_m, where + ": base_spheres", "a sphere's centre");
     if (!(sphere.radius_m > 0.0 && sphere.radius_m <= length_max_m))
-      fail(where, fmt::format("base_spheres: a radius is {} m, expected a positive number", sphere.radius_m));
+      fail(where, formatted("base_spheres: a radius is {} m, expected a positive number", sphere.radius_m));
     place(sphere.part, -1, "base_spheres");
   }
   for (const Segment& segment : robot.base_segments) {
@@ -172,7 +172,7 @@ void check_parts(const Robot& robot, const std::string& where) {
     check_length(segment.from_m, where + ": base_segments", "a capsule's start");
     check_length(segment.to_m, where + ": base_segments", "a capsule's end");
     if (!(segment.radius_m > 0.0 && segment.radius_m <= length_max_m))
-      fail(where, fmt::format("base_segments: a radius is {} m, expected a positive number", segment.radius_m));
+      fail(where, formatted("base_segments: a radius is {} m, expected a positive number", segment.radius_m));
     place(segment.part, -1, "base_segments");
   }
   std::vector<std::string> names;
@@ -180,7 +180,7 @@ void check_parts(const Robot& robot, const std::string& where) {
   for (const auto& [a, b] : robot.self_collision_disabled)
     for (const auto& name : {a, b})
       if (body_of.count(name) == 0)
-        fail(where, fmt::format("self_collision_disabled: no link '{}'{}", name, did_you_mean(name, names)));
+        fail(where, formatted("self_collision_disabled: no link '{}'{}", name, did_you_mean(name, names)));
 }
 
 }  // namespace
@@ -188,14 +188,14 @@ void check_parts(const Robot& robot, const std::string& where) {
 std::string inertia_fault(const Matrix3d& inertia, bool definite) {
   constexpr double definite_tolerance = 1e-12;
   if (!inertia.allFinite() || inertia.cwiseAbs().maxCoeff() > inertia_max_kg_m2)
-    return fmt::format("has an entry that is not a finite number up to {} kg m2", inertia_max_kg_m2);
+    return formatted("has an entry that is not a finite number up to {} kg m2", inertia_max_kg_m2);
   const double asymmetry = (inertia - inertia.transpose()).cwiseAbs().maxCoeff();
   if (asymmetry > asymmetry_max * inertia.cwiseAbs().maxCoeff())
-    return fmt::format("is not symmetric: entries differ by {:.6g} kg m2 from those across the diagonal", asymmetry);
+    return formatted("is not symmetric: entries differ by {:.6g} kg m2 from those across the diagonal", asymmetry);
   const Vector3d moments = principal_moments(inertia);
   const double least = moments[0], largest = moments[2];
   if (definite ? !(least > definite_tolerance * largest) : least < -definite_tolerance * std::abs(largest))
-    return fmt::format("is not positive {} {}", definite ? "definite" : "semi-definite", describe(moments));
+    return formatted("is not positive {} {}", definite ? "definite" : "semi-definite", describe(moments));
   return {};
 }
 
@@ -204,7 +204,7 @@ std::string triangle_fault(const Matrix3d& inertia) {
   constexpr double tolerance = 1e-4;
   const Vector3d moments = principal_moments(inertia);
   if (moments[0] + moments[1] >= (1.0 - tolerance) * moments[2]) return {};
-  return fmt::format("breaks the triangle inequality {}: no body has it", describe(moments));
+  return formatted("breaks the triangle inequality {}: no body has it", describe(moments));
 }
 
 Matrix3d symmetric_part(const Matrix3d& inertia) {
@@ -227,19 +227,19 @@ void check(const Robot& robot, const std::string& where) {
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link& link = robot.links[i];
     if (!printable(link.name) || !printable(link.joint.name))
-      fail(where, fmt::format("link {}: it or its joint has no name, or one with control characters", i));
-    const std::string place = fmt::format("{}: link '{}'", where, link.name);
+      fail(where, formatted("link {}: it or its joint has no name, or one with control characters", i));
+    const std::string place = formatted("{}: link '{}'", where, link.name);
     if (!links.insert(link.name).second) fail(place, "the name is given twice");
     if (link.parent != static_cast<int>(i) - 1)
       fail(place,
-           fmt::format("parent is {}, expected {}: links in order, no branches", link.parent, static_cast<int>(i) - 1));
-    const std::string joint_place = fmt::format("{}: joint '{}'", place, link.joint.name);
+           formatted("parent is {}, expected {}: links in order, no branches", link.parent, static_cast<int>(i) - 1));
+    const std::string joint_place = formatted("{}: joint '{}'", place, link.joint.name);
     if (!joints.insert(link.joint.name).second) fail(joint_place, "the name is given twice");
     check_joint(link.joint, joint_place);
     check_body(link, place);
   }
   if (robot.tip.link < 0 || robot.tip.link >= robot.dof())
-    fail(where, fmt::format("tip: moves with link {}, expected 0 to {}", robot.tip.link, robot.dof() - 1));
+    fail(where, formatted("tip: moves with link {}, expected 0 to {}", robot.tip.link, robot.dof() - 1));
   check_pose(robot.tip.pose, where + ": tip", "the pose");
   check_parts(robot, where);
   check_joint_inertia(robot, where);

@@ -1,6 +1,8 @@
 #include "world.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <bit>

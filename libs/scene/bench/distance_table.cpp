@@ -3,6 +3,7 @@
 // over the voxels around inside. Same points, same run. `--points 100000 --capsules 10000` is the long comparison.
 #include <fmt/format.h>
 #include <octomap/OcTree.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,7 @@
 #include "hamelin/scene/self_collision.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "hamelin/sweep/judge.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

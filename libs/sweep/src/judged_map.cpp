@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <octomap/ColorOcTree.h>
 #include <octomap/OcTree.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,6 @@
 #include "hamelin/test/allocations.hpp"
 
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 
 #include "../src/memory.hpp"

@@ -1,5 +1,6 @@
 #include "../src/safety_filter.hpp"
 
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <limits>
 

@@ -1,7 +1,6 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "hamelin/geometry/dexp_coefficients.hpp"
 #include "hamelin/geometry/lie_group.hpp"
 #include "hamelin/geometry/so3.hpp"
 
@@ -27,99 +26,42 @@ class SE3 {
   [[nodiscard]] const Eigen::Matrix3d& R() const noexcept { return R_; }
   [[nodiscard]] const Eigen::Vector3d& p() const noexcept { return p_; }
   /// 4 × 4 homogeneous matrix.
-  [[nodiscard]] Matrix matrix() const {
-    Matrix m = Matrix::Identity();
-    m.topLeftCorner<3, 3>() = R_;
-    m.topRightCorner<3, 1>() = p_;
-    return m;
-  }
+  [[nodiscard]] Matrix matrix() const;
 
   [[nodiscard]] SE3 operator*(const SE3& other) const { return {R_ * other.R_, R_ * other.p_ + p_}; }
   [[nodiscard]] Point operator*(const Point& point) const { return R_ * point + p_; }
   [[nodiscard]] Point act(const Point& point) const { return R_ * point + p_; }
-  [[nodiscard]] SE3 inverse() const { return {R_.transpose(), -(R_.transpose() * p_)}; }
-  [[nodiscard]] bool operator==(const SE3& other) const { return R_ == other.R_ && p_ == other.p_; }
+  [[nodiscard]] SE3 inverse() const;
+  [[nodiscard]] bool operator==(const SE3& other) const;
 
   /// R = exp ω̂ and p = dexp_ω v (dexp of SO(3)).
-  [[nodiscard]] static SE3 exp(const Tangent& x) {
-    const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>();
-    const ExpCoefficients c = exp_coefficients(omega.squaredNorm());
-    const Eigen::Matrix3d W = geometry::hat(omega);
-    const Eigen::Vector3d w_v = omega.cross(v);
-    return {Eigen::Matrix3d::Identity() + c.sinc * W + c.a * (W * W), v + c.a * w_v + c.b * omega.cross(w_v)};
-  }
+  [[nodiscard]] static SE3 exp(const Tangent& x);
   /// ω = log R, |ω| ≤ π, as SO3::log; v = dexp_ω⁻¹ p.
-  [[nodiscard]] Tangent log() const {
-    const Eigen::Vector3d omega = SO3(R_).log();
-    const Eigen::Vector3d w_p = omega.cross(p_);
-    const double e = inverse_exp_coefficients(omega.squaredNorm()).e;
-    return (Tangent() << omega, p_ - 0.5 * w_p + e * omega.cross(w_p)).finished();
-  }
+  [[nodiscard]] Tangent log() const;
 
   /// [R 0; p̂R R]: moves a twist from the moved frame to the frame it moved from.
-  [[nodiscard]] Adjoint Ad() const { return blocks(R_, geometry::hat(p_) * R_); }
+  [[nodiscard]] Adjoint Ad() const;
   /// Ad() x without the matrix.
-  [[nodiscard]] Tangent Ad(const Tangent& x) const {
-    const Eigen::Vector3d omega = R_ * x.head<3>();
-    return (Tangent() << omega, R_ * x.tail<3>() + p_.cross(omega)).finished();
-  }
+  [[nodiscard]] Tangent Ad(const Tangent& x) const;
   /// Ad()ᵀ y: wrenches the other way, so that y · Ad x = Adᵀy · x [W].
-  [[nodiscard]] Tangent Ad_T(const Tangent& y) const {
-    const Eigen::Vector3d f = y.tail<3>();
-    return (Tangent() << R_.transpose() * (y.head<3>() - p_.cross(f)), R_.transpose() * f).finished();
-  }
+  [[nodiscard]] Tangent Ad_T(const Tangent& y) const;
   /// [ω̂ 0; v̂ ω̂]: ad(x) y is the bracket [x, y].
-  [[nodiscard]] static Adjoint ad(const Tangent& x) {
-    return blocks(geometry::hat(x.head<3>()), geometry::hat(x.tail<3>()));
-  }
+  [[nodiscard]] static Adjoint ad(const Tangent& x);
   /// ad(x) y without the matrix.
-  [[nodiscard]] static Tangent ad(const Tangent& x, const Tangent& y) {
-    const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>(), omega_y = y.head<3>(), v_y = y.tail<3>();
-    return (Tangent() << omega.cross(omega_y), v.cross(omega_y) + omega.cross(v_y)).finished();
-  }
+  [[nodiscard]] static Tangent ad(const Tangent& x, const Tangent& y);
   /// ad(x)ᵀ y.
-  [[nodiscard]] static Tangent ad_T(const Tangent& x, const Tangent& y) {
-    const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>(), m = y.head<3>(), f = y.tail<3>();
-    return (Tangent() << m.cross(omega) + f.cross(v), f.cross(omega)).finished();
-  }
+  [[nodiscard]] static Tangent ad_T(const Tangent& x, const Tangent& y);
 
   /// [J 0; Q J] with J = dexp_ω of SO(3) and Q its derivative along v: twists are rotation vectors over the dual
   /// numbers, ω + εv, so Q = a v̂ + b(ω̂v̂ + v̂ω̂) + (ω·v)(a'/θ ω̂ + b'/θ ω̂²).
-  [[nodiscard]] static Adjoint dexp(const Tangent& x) {
-    const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>();
-    const ExpCoefficients c = exp_coefficients(omega.squaredNorm());
-    const Eigen::Matrix3d W = geometry::hat(omega), V = geometry::hat(v), WW = W * W, WV = W * V;
-    const double along = omega.dot(v);
-    return blocks(Eigen::Matrix3d::Identity() + c.a * W + c.b * WW,
-                  c.a * V + c.b * (WV + WV.transpose()) + along * (c.da * W + c.db * WW));
-  }
+  [[nodiscard]] static Adjoint dexp(const Tangent& x);
   /// [J⁻¹ 0; Q' J⁻¹] with Q' = −v̂/2 + e(ω̂v̂ + v̂ω̂) + (ω·v) e'/θ ω̂²; singular at |ω| = 2π.
-  [[nodiscard]] static Adjoint dexp_inv(const Tangent& x) {
-    const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>();
-    const InverseExpCoefficients c = inverse_exp_coefficients(omega.squaredNorm());
-    const Eigen::Matrix3d W = geometry::hat(omega), V = geometry::hat(v), WW = W * W, WV = W * V;
-    return blocks(Eigen::Matrix3d::Identity() - 0.5 * W + c.e * WW,
-                  -0.5 * V + c.e * (WV + WV.transpose()) + omega.dot(v) * c.de * WW);
-  }
+  [[nodiscard]] static Adjoint dexp_inv(const Tangent& x);
 
-  [[nodiscard]] static Matrix hat(const Tangent& x) {
-    Matrix m = Matrix::Zero();
-    m.topLeftCorner<3, 3>() = geometry::hat(x.head<3>());
-    m.topRightCorner<3, 1>() = x.tail<3>();
-    return m;
-  }
-  [[nodiscard]] static Tangent vee(const Matrix& m) {
-    return (Tangent() << geometry::vee(m.topLeftCorner<3, 3>()), m.topRightCorner<3, 1>()).finished();
-  }
+  [[nodiscard]] static Matrix hat(const Tangent& x);
+  [[nodiscard]] static Tangent vee(const Matrix& m);
 
  private:
-  /// [diagonal 0; lower diagonal]
-  [[nodiscard]] static Adjoint blocks(const Eigen::Matrix3d& diagonal, const Eigen::Matrix3d& lower) {
-    Adjoint m;
-    m << diagonal, Eigen::Matrix3d::Zero(), lower, diagonal;
-    return m;
-  }
-
   Eigen::Matrix3d R_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_ = Eigen::Vector3d::Zero();
 };
