@@ -11,6 +11,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "build_info.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
 #include "hamelin/io/file.hpp"
@@ -97,21 +98,22 @@ Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>
   for (const auto& [role, file] : inputs)
     hashed.push_back({{"role", role}, {"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
   std::error_code ec;
+  const BuildInfo& build = build_info();
   const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                             std::to_string(EIGEN_MINOR_VERSION);
   return {{"host", host()},
           {"isa", std::string(name_of(default_isa()))},
           {"build",
            {{"id", known(build_id())},
-            {"compiler", HAMELIN_COMPILER},
-            {"flags", HAMELIN_BUILD_FLAGS},
-            {"type", known(HAMELIN_BUILD_TYPE)},
-            {"sanitizers", known(HAMELIN_SANITIZERS)}}},
+            {"compiler", build.compiler},
+            {"flags", build.flags},
+            {"type", known(build.type)},
+            {"sanitizers", known(build.sanitizers)}}},
           {"versions",
            {{"hamelin", std::string(version())},
-            {"git_commit", known(HAMELIN_GIT_COMMIT)},
+            {"git_commit", known(build.git_commit)},
             {"eigen", eigen},
-            {"octomap", known(HAMELIN_OCTOMAP_VERSION)},
+            {"octomap", known(build.octomap_version)},
             {"libc", gnu_get_libc_version()}}},
           {"cwd", known(std::filesystem::current_path(ec).string())},
           {"argv", argv},
