@@ -88,7 +88,7 @@ CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values)
 CLI::Option* integrator_name(CLI::Option* option) {
   const auto check = [](const std::string& given) -> std::string {
     try {
-      const auto wrong = unless_one_of(integration::parse_scheme_name(given).name, integration::integrator_names());
+      auto wrong = unless_one_of(integration::parse_scheme_name(given).name, integration::integrator_names());
       if (wrong.empty()) (void)integration::make_options(given);
       return wrong;
     } catch (const Error& error) {

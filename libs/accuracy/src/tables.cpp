@@ -250,6 +250,7 @@ std::string cheaper_peers(const Measurement& measurement) {
       if (theirs[i] && (!ours[i] || *theirs[i] < *ours[i])) at.push_back(i);
     if (at.empty()) continue;
     std::vector<std::string> errors;
+    errors.reserve(at.size());
     for (const std::size_t i : at) errors.push_back(fmt::format("{:.0e}", error_targets()[i]));
     const bool range = at.size() > 2 && at.back() - at.front() + 1 == at.size();
     text += fmt::format("{}{}: cheaper than ours for {}.", text.empty() ? "" : " ", peer,

@@ -58,7 +58,7 @@ class Reader {
 
   // The name of a link or joint, which must be new.
   std::string new_name(const XMLElement& element, std::map<std::string, int>& lines) const {
-    const std::string name = text_of(element, "name");
+    std::string name = text_of(element, "name");
     if (name.empty()) refuse(element, fmt::format("a <{}> has no name", element.Name()));
     const auto [before, is_new] = lines.emplace(name, element.GetLineNum());
     if (!is_new)

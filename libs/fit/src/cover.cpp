@@ -152,9 +152,10 @@ class Coverer {
 
   // Points of the inside, spread evenly.
   [[nodiscard]] std::vector<Vector3d> inner(std::size_t count) const {
-    const auto all = solid_.inner_points();
+    auto all = solid_.inner_points();
     if (all.size() <= count) return all;
     std::vector<Vector3d> some;
+    some.reserve(count);
     for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
     return some;
   }

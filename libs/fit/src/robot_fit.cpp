@@ -260,6 +260,7 @@ RobotFit fit_robot(const fs::path& urdf, const FitOptions& options) {
     CoverOptions cover_options = options.cover;
     cover_options.excess_m = excess_m;
     std::vector<std::vector<Shape>> all;
+    all.reserve(solids.size());
     for (const LinkSolid& link : solids) all.push_back(shapes_for(link, cover_options));
     return all;
   };

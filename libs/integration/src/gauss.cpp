@@ -39,7 +39,7 @@ GaussLegendre::GaussLegendre(const Model& model, const GaussOptions& options)
       })) {
   spins_.reserve(most_spins);
   q_next_ = p_next_ = VectorXd::Zero(model.dof());
-  slopes_ = VectorXd::Zero(2 * model.dof() * static_cast<Eigen::Index>(tableau_.stages));
+  slopes_ = VectorXd::Zero(2 * static_cast<Eigen::Index>(tableau_.stages) * model.dof());
 }
 
 std::string GaussLegendre::criterion() const {

@@ -18,7 +18,7 @@ std::string Newmark::criterion() const {
 
 // State::memory holds the node's acceleration and the one before.
 void Newmark::begin(State& state, const ConstVectorRef& v0) {
-  state.memory = VectorXd::Zero(2 * model_.dof());
+  state.memory = VectorXd::Zero(Eigen::Index{2} * model_.dof());
   state.force_previous = VectorXd::Zero(model_.dof());
   Explicit::begin(state, v0);
 }

@@ -14,8 +14,8 @@ namespace hamelin::integration {
 
 namespace {
 
-[[noreturn]] void refuse(std::string message) {
-  throw Error(ErrorCode::usage, std::move(message));
+[[noreturn]] void refuse(const std::string& message) {
+  throw Error(ErrorCode::usage, message);
 }
 
 struct Entry {
@@ -66,6 +66,7 @@ void check_solver(const Scheme& scheme, Solver solver) {
   if (known.empty()) refuse(formatted("integrator '{}' takes no solver", scheme.name));
   if (std::find(known.begin(), known.end(), solver) != known.end()) return;
   std::vector<std::string> names;
+  names.reserve(known.size());
   for (const Solver one : known) names.push_back(formatted("'{}'", to_string(one)));
   refuse(formatted("integrator '{}' has the solver {} only", scheme.name, joined(names, " or ")));
 }
@@ -206,7 +207,7 @@ Options make_options(std::string_view name, const Parameters& given) {
         take_all(parameters, o);
       },
       options);
-  return checked(std::move(options));
+  return checked(options);
 }
 
 }  // namespace hamelin::integration

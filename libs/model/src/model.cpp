@@ -52,7 +52,7 @@ double angle_about(const Vector3d& axis, const Vector3d& from, const Vector3d& t
 // Inertia about the origin of `frame` in its axes, of a link whose COM pose is in the same base frame.
 Matrix3d inertia_in(const SE3& frame, const Link& link) {
   const SE3 com = frame.inverse() * link.com;
-  const Vector3d c = com.p();
+  const Vector3d& c = com.p();
   return com.R() * link.inertia_kg_m2 * com.R().transpose() +
          link.mass_kg * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
 }

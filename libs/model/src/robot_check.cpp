@@ -176,6 +176,7 @@ void check_parts(const Robot& robot, const std::string& where) {
     place(segment.part, -1, "base_segments");
   }
   std::vector<std::string> names;
+  names.reserve(body_of.size());
   for (const auto& [name, body] : body_of) names.push_back(name);
   for (const auto& [a, b] : robot.self_collision_disabled)
     for (const auto& name : {a, b})

@@ -90,7 +90,7 @@ Eigen::Vector3d vector_from(const Json& value) {
 }
 
 Box box_from(const Json& value, const std::string& where) {
-  const Box box{vector_from(value.at("min_m")), vector_from(value.at("max_m"))};
+  Box box{vector_from(value.at("min_m")), vector_from(value.at("max_m"))};
   if (!(box.lo.array() < box.hi.array()).all())
     throw Error(ErrorCode::invalid, fmt::format("{}: min_m must be below max_m on each axis", where));
   return box;

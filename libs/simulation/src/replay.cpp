@@ -138,11 +138,11 @@ class Comparison final : public log::LineSink {
     if (a.is_object() && b.is_object()) {
       for (const auto& [key, value] : a.items())
         if (b.contains(key))
-          compare(at + "/" + key, value, b[key], line);
+          compare(fmt::format("{}/{}", at, key), value, b[key], line);
         else
-          differ(at + "/" + key, value, Json("missing"), line);
+          differ(fmt::format("{}/{}", at, key), value, Json("missing"), line);
       for (const auto& [key, value] : b.items())
-        if (!a.contains(key)) differ(at + "/" + key, Json("missing"), value, line);
+        if (!a.contains(key)) differ(fmt::format("{}/{}", at, key), Json("missing"), value, line);
     } else if (a.is_array() && b.is_array() && a.size() == b.size()) {
       for (std::size_t i = 0; i < a.size(); ++i) compare(fmt::format("{}/{}", at, i), a[i], b[i], line);
     } else if (a.is_number_float() && b.is_number_float()) {

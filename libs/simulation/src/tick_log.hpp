@@ -19,8 +19,8 @@ class TickLog {
   }
 
   /// @param params the planner's, with defaults
-  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-              const Json& provenance, long steps);
+  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params, const Json& provenance,
+              long steps);
   /// The line of this node. @param answer the planner's, which acts from here on; null at a last node
   void tick(bool certified, const planning::CommandBuffers* answer);
 

@@ -42,7 +42,7 @@ double distance_from_block(const Vector& outside) {
 }
 
 Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
-  const Vector3d rest = obstacle.pose.p();
+  Vector3d rest = obstacle.pose.p();
   if (!obstacle.motion) return rest;
   if (const auto* sine = std::get_if<scene::SineMotion>(&*obstacle.motion))
     return rest + sine->amplitude_m * std::sin(2.0 * std::numbers::pi * time_s / sine->period_s);

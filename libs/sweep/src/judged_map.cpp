@@ -76,7 +76,7 @@ struct Cube {
     for (std::size_t axis = 0; axis < 3; ++axis) c.at[axis] = 2 * at[axis] + static_cast<int>(part >> axis & 1U);
     return c;
   }
-  auto operator<=>(const Cube&) const = default;
+  auto operator<=>(const Cube&) const = default;  // NOLINT(modernize-use-nullptr): clang-tidy 14 sees a 0 in it
 };
 
 enum class Share { none, part, all };

@@ -121,7 +121,7 @@ class Hybrid final : public planning::Planner {
     const int n = setup.dof();
     for (auto* x : {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_})
       *x = VectorXd::Zero(n);
-    M_ = Minv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
+    M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
     terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // takes its memory now
   }
@@ -147,7 +147,7 @@ class Hybrid final : public planning::Planner {
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
       // steering turns faster than the law follows: near a target it would make the arm circle
       if (!observer_)
-        law_.steer(model_, ws_, obstacles_.points(), Minv_, v_, std::min(1.0, distance / steering_fade), command);
+        law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_, std::min(1.0, distance / steering_fade), command);
     }
     bound_steering(command);
 
@@ -205,8 +205,8 @@ class Hybrid final : public planning::Planner {
   void prepare(const planning::Tick& tick) {
     dynamics::mass_matrix(model_, ws_, q_, M_);
     llt_.compute(M_);
-    Minv_ = identity_;
-    llt_.solveInPlace(Minv_);
+    M_inv_ = identity_;
+    llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
     if (observer_) observer_->update(v_);
     dynamics::forward_kinematics(model_, ws_, q_);
@@ -245,7 +245,7 @@ class Hybrid final : public planning::Planner {
     torque_.noalias() = M_ * scratch_;
     torque_ += bias_;
     if (const auto effort = setup_.effort_max()) torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
-    observer_->issue(torque_, v_, Minv_, bias_);
+    observer_->issue(torque_, v_, M_inv_, bias_);
     command.held_torque() = torque_;
   }
 
@@ -274,7 +274,7 @@ class Hybrid final : public planning::Planner {
 
   void project(planning::Command& command) {
     const double dt = horizon_s_;
-    filter_.begin(M_, Minv_);
+    filter_.begin(M_, M_inv_);
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
       double over = 1.0;
@@ -446,7 +446,7 @@ class Hybrid final : public planning::Planner {
   Way path_;
   VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
-  Eigen::MatrixXd M_, Minv_, identity_;
+  Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   const hamelin_goal* goal_ = nullptr;
   Mode mode_ = Mode::goal;

@@ -29,8 +29,8 @@ class Observer {
     if (ready_) disturbance_ += gain_ / period_s_ * (v - predicted_);
   }
   /// The torque asked for at this tick, before the first one all that were: `bias`.
-  /// @param Minv, bias of the nominal model at this tick's state
-  void issue(const Eigen::VectorXd& torque, const Eigen::VectorXd& v, const Eigen::MatrixXd& Minv,
+  /// @param M_inv, bias of the nominal model at this tick's state
+  void issue(const Eigen::VectorXd& torque, const Eigen::VectorXd& v, const Eigen::MatrixXd& M_inv,
              const Eigen::VectorXd& bias) {
     if (!ready_)
       for (auto& old : issued_) old = bias;
@@ -38,7 +38,7 @@ class Observer {
     next_ = (next_ + 1) % issued_.size();
     // the oldest is the one that acts now
     scratch_ = issued_[next_ % issued_.size()] - bias;
-    predicted_.noalias() = Minv * scratch_;
+    predicted_.noalias() = M_inv * scratch_;
     predicted_ = v + period_s_ * (predicted_ + disturbance_);
     ready_ = true;
   }

@@ -20,7 +20,7 @@ std::vector<VectorXd> observe(int ticks, int late, const VectorXd& missed, Torqu
                               double velocity_noise = 0.0) {
   Rng rng(4);
   const auto n = missed.size();
-  const MatrixXd M = test::random_mass(rng, static_cast<int>(n)), Minv = M.inverse();
+  const MatrixXd M = test::random_mass(rng, static_cast<int>(n)), M_inv = M.inverse();
   const VectorXd bias = test::random_numbers(rng, static_cast<int>(n), 5.0);
   Observer observer(n, period, late);
   std::vector<VectorXd> asked, seen;
@@ -31,11 +31,11 @@ std::vector<VectorXd> observe(int ticks, int late, const VectorXd& missed, Torqu
     observer.update(measured);
     seen.push_back(observer.disturbance());
     asked.push_back(bias + torque(k));
-    observer.issue(asked.back(), measured, Minv, bias);
+    observer.issue(asked.back(), measured, M_inv, bias);
     REQUIRE(observer.ready());
     REQUIRE(observer.last() == asked.back());
     const VectorXd acts = k < late ? bias : asked[static_cast<std::size_t>(k - late)];
-    v += period * (Minv * (acts - bias) + missed);
+    v += period * (M_inv * (acts - bias) + missed);
   }
   return seen;
 }

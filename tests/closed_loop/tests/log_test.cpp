@@ -63,7 +63,8 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
     std::map<std::string, int> seen;
     double largest = 0.0, scale = 0.0;
     for (std::size_t i = 0; i + 2 < ticks.size(); ++i) {
-      const auto q = test::vector_of(ticks[i]["q"]), v = test::vector_of(ticks[i]["v"]), tau = test::vector_of(ticks[i]["tau"]);
+      const auto q = test::vector_of(ticks[i]["q"]), v = test::vector_of(ticks[i]["v"]),
+                 tau = test::vector_of(ticks[i]["tau"]);
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(4), expected(4);
       for (const auto& [channel, torque] : ticks[i]["channels"].items()) {
         sum += test::vector_of(torque);

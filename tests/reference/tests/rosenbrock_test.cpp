@@ -87,5 +87,6 @@ TEST_CASE("a step of rosenbrock is that of Boost.odeint's rosenbrock4, and so is
   CHECK((state.q - next.head(n)).norm() < 1e-9 * (next.head(n) - q0).norm() + rounding);
   CHECK((state.v - next.segment(n, n)).norm() < 1e-9 * (next.segment(n, n) - v0).norm() + rounding);
   CHECK(report.held_work_J == Approx(next[2 * n]).epsilon(1e-9).margin(rounding));
-  CHECK(report.residual * tolerance == Approx(std::sqrt(error.head(2 * n).squaredNorm() / (2 * n))).epsilon(1e-6).margin(rounding));
+  CHECK(report.residual * tolerance ==
+        Approx(std::sqrt(error.head(2 * n).squaredNorm() / (2 * n))).epsilon(1e-6).margin(rounding));
 }

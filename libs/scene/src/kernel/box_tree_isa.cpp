@@ -13,7 +13,7 @@ constexpr int lanes = 8;
 #else
 constexpr int lanes = 4;
 #endif
-typedef float Lanes __attribute__((vector_size(4 * lanes)));
+using Lanes [[gnu::vector_size(4 * lanes)]] = float;
 constexpr int width = TreeNode::width;
 
 HAMELIN_INLINE Lanes splat(float x) {

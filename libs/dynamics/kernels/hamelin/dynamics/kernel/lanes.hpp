@@ -28,18 +28,18 @@ template <int W>
 struct NativeVector;
 template <>
 struct NativeVector<2> {
-  typedef double Real __attribute__((vector_size(16)));
-  typedef std::int64_t Bits __attribute__((vector_size(16)));
+  using Real [[gnu::vector_size(16)]] = double;
+  using Bits [[gnu::vector_size(16)]] = std::int64_t;
 };
 template <>
 struct NativeVector<4> {
-  typedef double Real __attribute__((vector_size(32)));
-  typedef std::int64_t Bits __attribute__((vector_size(32)));
+  using Real [[gnu::vector_size(32)]] = double;
+  using Bits [[gnu::vector_size(32)]] = std::int64_t;
 };
 template <>
 struct NativeVector<8> {
-  typedef double Real __attribute__((vector_size(64)));
-  typedef std::int64_t Bits __attribute__((vector_size(64)));
+  using Real [[gnu::vector_size(64)]] = double;
+  using Bits [[gnu::vector_size(64)]] = std::int64_t;
 };
 
 /// W independent numbers in one register: a scalar to the sweeps, which then treat W states at once. W must not exceed

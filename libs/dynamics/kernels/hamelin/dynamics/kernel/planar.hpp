@@ -335,8 +335,8 @@ struct PlanarParallel : Planar<S, false> {
   /// needs, nᵀ(M − h hᵀ/d)n with n = (−p_y, p_x), is written so that only one product waits for 1/d.
   HAMELIN_INLINE static void carry(const Link&, const Placement& x, Inertia& P, const Force&, S inv_d) noexcept {
     const S nh = x.px * P.wy - x.py * P.wx;
-    const S nMn = x.px * (x.px * P.yy - x.py * P.xy) - x.py * (x.px * P.xy - x.py * P.xx);
-    P.ww = nMn - (nh * nh) * inv_d;
+    const S n_mn = x.px * (x.px * P.yy - x.py * P.xy) - x.py * (x.px * P.xy - x.py * P.xx);
+    P.ww = n_mn - (nh * nh) * inv_d;
     const S kx = P.wx * inv_d, ky = P.wy * inv_d;
     P.xx -= kx * P.wx;
     P.xy -= kx * P.wy;
