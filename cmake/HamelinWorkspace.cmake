@@ -96,9 +96,9 @@ function(hamelin_library)
 endfunction()
 
 # How kernels are compiled, on top of all else (a source's own options come last). Optimised in every build, so that
-# nothing stays out of line. GCC would copy value types of many lanes through memory, and make vectors of single numbers
+# nothing stays out of line; with sanitizers, whose checks multiply the code, only lightly. GCC would copy value types of many lanes through memory, and make vectors of single numbers
 # at a loss.
-set(HAMELIN_KERNEL_OPTIONS -O3 -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
+set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3> -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
   $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
 
 # hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction set of core/isa.hpp. What such a

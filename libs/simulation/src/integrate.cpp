@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <memory>
+#include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
 #include "plant.hpp"
 #include "recorder.hpp"
