@@ -8,34 +8,15 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace hamelin::test {
-
-/// A folder of this process's own, gone with the object.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "hamelin_closed_loop.XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline const std::vector<std::filesystem::path> plugin_directories{HAMELIN_TEST_PLUGIN_DIR,
                                                                    HAMELIN_TEST_ONLY_PLUGIN_DIR};
 
 /// Writes robot and scene as files, reads them as the program does, and runs.
-inline log::Result run_scene(const ScratchFolder& folder, const Json& document, const simulation::Watch& watch = {},
+inline log::Result run_scene(const TemporaryFolder& folder, const Json& document, const simulation::Watch& watch = {},
                              const model::Robot& robot = planar4()) {
   write_file_aside(folder.path() / "robot.json", description::robot_to_json(robot).dump(1));
   write_file_aside(folder.path() / "scene.json", document.dump(1));

@@ -14,6 +14,7 @@
 
 #include "hamelin/io/file.hpp"
 #include "hamelin/io/json.hpp"
+#include "hamelin/test/temporary.hpp"
 
 /// Running the built program in a directory of its own.
 namespace hamelin::test {
@@ -27,20 +28,9 @@ struct Output {
 class Bench {
  public:
   Bench() {
-    std::string name = (std::filesystem::temp_directory_path() / "hamelin-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
-    root_ = name;
-    work_ = root_ / "work";
     std::filesystem::create_directory(work_);
     std::filesystem::create_directory_symlink(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data", work_ / "data");
   }
-  ~Bench() {
-    std::error_code ignored;
-    std::filesystem::remove_all(root_, ignored);
-  }
-  Bench(const Bench&) = delete;
-  Bench& operator=(const Bench&) = delete;
-
   /// Begins `hamelin arguments...` and returns its process id.
   pid_t start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), HAMELIN_PROGRAM);
@@ -90,7 +80,8 @@ class Bench {
   }
 
  private:
-  std::filesystem::path root_, work_;
+  TemporaryFolder folder_;
+  std::filesystem::path root_ = folder_.path(), work_ = root_ / "work";
 };
 
 /// Whether the templates of the pages are there, which need Node.js when hamelin is built; says so if not.

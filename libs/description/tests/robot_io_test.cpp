@@ -15,6 +15,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 using namespace hamelin::description;
@@ -30,26 +31,12 @@ const fs::path data = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
 /// A file that lives as long as the value.
 class Scratch {
  public:
-  Scratch(const std::string& name, const std::string& text)
-      : folder_(fs::temp_directory_path() / unique()), file_(folder_ / name) {
-    fs::create_directories(folder_);
-    write_file_aside(file_, text);
-  }
-  ~Scratch() { fs::remove_all(folder_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
+  Scratch(const std::string& name, const std::string& text) : file_(folder_.put(name, text)) {}
   const fs::path& file() const { return file_; }
 
  private:
-  static std::string unique() {
-    std::string name = (fs::temp_directory_path() / "hamelin-robot-XXXXXX").string();
-    const int made = ::mkstemp(name.data());
-    if (made < 0) throw std::runtime_error("no temporary file");
-    ::close(made);
-    fs::remove(name);
-    return fs::path(name).filename().string();
-  }
-  fs::path folder_, file_;
+  test::TemporaryFolder folder_;
+  fs::path file_;
 };
 
 std::string replaced(std::string text, const std::string& what, const std::string& by) {

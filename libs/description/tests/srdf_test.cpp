@@ -8,33 +8,12 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 namespace fs = std::filesystem;
 
 namespace {
-
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "hamelin-srdf-XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    root_ = name;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(root_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] fs::path put(const std::string& name, const std::string& text) const {
-    std::ofstream(root_ / name, std::ios::binary) << text;
-    return root_ / name;
-  }
-
- private:
-  fs::path root_;
-};
 
 template <class Call>
 std::string error_of(const Call& call) {
@@ -51,7 +30,7 @@ const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
 }  // namespace
 
 TEST_CASE("disabled pairs are read with their reasons and lines, all else is passed over", "[description][unit]") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const auto file = folder.put("a.srdf", R"(<?xml version="1.0"?>
 <!-- a comment -->
 <robot name="r">
@@ -71,7 +50,7 @@ TEST_CASE("disabled pairs are read with their reasons and lines, all else is pas
 }
 
 TEST_CASE("a broken SRDF ends in one line with file, line and what was expected", "[description][unit]") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const auto of = [&](const std::string& text) {
     return error_of([&] { (void)description::read_srdf(folder.put("x.srdf", text)); });
   };
@@ -90,7 +69,7 @@ TEST_CASE("a broken SRDF ends in one line with file, line and what was expected"
 }
 
 TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note says so", "[description][unit]") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const auto srdf = folder.put("x.srdf",
                                "<robot name=\"arm7\"><disable_collisions link1=\"link2\" link2=\"link1\"/>"
                                "<disable_collisions link1=\"link2\" link2=\"link3\" reason=\"Adjacent\"/></robot>");
@@ -106,7 +85,7 @@ TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note sa
 }
 
 TEST_CASE("a link that the URDF has not is an error with the nearest name", "[description][unit]") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const auto srdf = folder.put("x.srdf", "<robot>\n<disable_collisions link1=\"link1\" link2=\"linc2\"/></robot>");
   const std::string said = error_of([&] { (void)description::read_robot(robots / "arm7.urdf", {{}, {}, srdf}); });
   CHECK_THAT(said, Catch::Contains("x.srdf: line 2") && Catch::Contains("no link 'linc2'") &&
@@ -114,7 +93,7 @@ TEST_CASE("a link that the URDF has not is an error with the nearest name", "[de
 }
 
 TEST_CASE("a JSON robot takes the pairs of links it has and notes the others", "[description][unit]") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const auto urdf = description::read_robot(robots / "arm7.urdf", {{}, robots / "arm7.spheres.json"});
   const auto json = folder.put("r.json", description::robot_to_json(urdf).dump());
   const auto srdf = folder.put("x.srdf",

@@ -35,7 +35,7 @@ std::string mesh_error(const std::filesystem::path& file) {
 }  // namespace
 
 TEST_CASE("binary STL, ASCII STL and OBJ give the box they were written from, scaled", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const Mesh box = test::boxes({{Vector3d(-0.1, 0.0, 0.2), Vector3d(0.3, 0.5, 0.25)}});
   const std::vector<std::filesystem::path> files = {scratch.put("b.stl", test::binary_stl(box)),
                                                     scratch.put("a.stl", test::ascii_stl(box)),
@@ -51,7 +51,7 @@ TEST_CASE("binary STL, ASCII STL and OBJ give the box they were written from, sc
 }
 
 TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto file = scratch.put("t.dae", R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
  <asset><unit name="millimeter" meter="0.001"/><up_axis>Y_UP</up_axis></asset>
@@ -70,9 +70,10 @@ TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]"
 }
 
 TEST_CASE("files that are no mesh end in one line with their name", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   Mesh bad = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
-  CHECK_THAT(mesh_error(scratch.path("absent.stl")), Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
+  CHECK_THAT(mesh_error((scratch.path() / "absent.stl")),
+             Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
   CHECK_THAT(mesh_error(scratch.put("junk.stl", "this is no mesh")), Catch::Contains("junk.stl: not a mesh"));
   CHECK_THAT(mesh_error(scratch.put("empty.obj", "")), Catch::Contains("empty.obj: not a mesh"));
   CHECK_THAT(mesh_error(scratch.put("kind.xyzzy", "1")), Catch::Contains("kind.xyzzy: not a mesh"));

@@ -13,6 +13,7 @@
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/fit/mesh.hpp"
+#include "hamelin/test/temporary.hpp"
 
 /// Meshes and files for the tests, made here and not by the library.
 namespace hamelin::test {
@@ -20,31 +21,6 @@ namespace hamelin::test {
 using fit::Mesh;
 
 using Eigen::Vector3d;
-
-/// A directory that goes away.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = (std::filesystem::temp_directory_path() / "hamelin-fit-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
-    root_ = name;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    std::filesystem::remove_all(root_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  [[nodiscard]] std::filesystem::path path(const std::string& name) const { return root_ / name; }
-  std::filesystem::path put(const std::string& name, const std::string& bytes) const {
-    std::filesystem::create_directories(path(name).parent_path());
-    std::ofstream(path(name), std::ios::binary) << bytes;
-    return path(name);
-  }
-
- private:
-  std::filesystem::path root_;
-};
 
 /// Stacks of boxes, each with its own closed surface.
 inline Mesh boxes(const std::vector<std::array<Vector3d, 2>>& low_high) {

@@ -52,7 +52,7 @@ double least_distance(const LinkFit& of, const Vector3d& p) {
 }  // namespace
 
 TEST_CASE("box, cylinder and sphere of a link are covered where its origins put them", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", robot(collision("<box size=\"0.2 0.1 0.1\"/>",
                                                           "<origin xyz=\"0.5 0 0\" rpy=\"0 0 1.5707963267948966\"/>") +
                                                 collision("<cylinder radius=\"0.05\" length=\"0.3\"/>",
@@ -90,7 +90,7 @@ TEST_CASE("box, cylinder and sphere of a link are covered where its origins put 
 }
 
 TEST_CASE("the sidecar is what read_robot takes, and measures as it did", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", robot(collision("<cylinder radius=\"0.05\" length=\"0.4\"/>")));
   for (const bool capsules : {false, true}) {
     FitOptions options;
@@ -112,7 +112,7 @@ TEST_CASE("the sidecar is what read_robot takes, and measures as it did", "[fit]
 }
 
 TEST_CASE("shapes that miss the geometry are measured as such", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", robot(collision("<box size=\"0.2 0.2 0.2\"/>") +
                                                 collision("<sphere radius=\"0.1\"/>", "<origin xyz=\"1 0 0\"/>")));
   const auto file = scratch.put("s.json", R"({"links": {"arm": [{"center": [0, 0, 0], "radius": 0.12},
@@ -125,7 +125,7 @@ TEST_CASE("shapes that miss the geometry are measured as such", "[fit][unit]") {
 }
 
 TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and origin count", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const Mesh box = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(100.0, 50.0, 50.0)}});
   (void)scratch.put("pkg/meshes/box.stl", test::binary_stl(box));
   (void)scratch.put("robots/near.stl", test::binary_stl(box));
@@ -133,8 +133,8 @@ TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and
     return robot(collision("<mesh filename=\"" + file + "\" scale=\"0.001 0.001 0.001\"/>", "<origin xyz=\"1 0 0\"/>"));
   };
   FitOptions by_package, by_folder;
-  by_package.meshes.packages = {{"some_package", scratch.path("pkg")}};
-  by_folder.meshes.folders = {scratch.path("pkg")};
+  by_package.meshes.packages = {{"some_package", (scratch.path() / "pkg")}};
+  by_folder.meshes.folders = {(scratch.path() / "pkg")};
   struct Way {
     std::string name;
     FitOptions options;
@@ -143,7 +143,7 @@ TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and
                                  {"package://other/deep/down/meshes/box.stl", by_folder},
                                  {"near.stl", {}},
                                  {"package://whatever/near.stl", {}},
-                                 {"file://" + scratch.path("pkg/meshes/box.stl").string(), {}},
+                                 {"file://" + (scratch.path() / "pkg/meshes/box.stl").string(), {}},
                                  {"../pkg/meshes/box.stl", {}}};
   for (const Way& way : ways) {
     CAPTURE(way.name);
@@ -159,12 +159,12 @@ TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and
   const std::string missing = error_of(scratch.put("robots/r.urdf", mesh("package://gone/meshes/gone.stl")), by_folder);
   CHECK_THAT(missing, Catch::Contains("r.urdf: line 5: link 'arm'") &&
                           Catch::Contains("'package://gone/meshes/gone.stl'") &&
-                          Catch::Contains((scratch.path("robots") / "gone/meshes/gone.stl").string()));
+                          Catch::Contains(((scratch.path() / "robots") / "gone/meshes/gone.stl").string()));
   CHECK(missing.find('\n') == std::string::npos);
 }
 
 TEST_CASE("bad geometry ends in one line with its place", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto of = [&](const std::string& text) { return error_of(scratch.put("r.urdf", text)); };
   CHECK_THAT(of(robot("")), Catch::Contains("r.urdf: no link has a <collision>"));
   CHECK_THAT(of(robot(collision("<box size=\"0.2 0 0.1\"/>"))),
@@ -187,7 +187,7 @@ TEST_CASE("bad geometry ends in one line with its place", "[fit][unit]") {
 }
 
 TEST_CASE("<visual> is taken only where asked and where <collision> is absent", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", robot(collision("<box size=\"0.1 0.1 0.1\"/>", "", "visual")));
   CHECK_THAT(error_of(urdf), Catch::Contains("--visual"));
   FitOptions options;
@@ -198,7 +198,7 @@ TEST_CASE("<visual> is taken only where asked and where <collision> is absent", 
 }
 
 TEST_CASE("a total is kept, and more shapes stick out less", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", robot(collision("<box size=\"0.5 0.1 0.1\"/>")));
   double before = 1e300;
   for (const int total : {2, 5, 9}) {

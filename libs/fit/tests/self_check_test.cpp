@@ -148,7 +148,7 @@ TEST_CASE("capsules are measured by their segments", "[fit][unit]") {
 }
 
 TEST_CASE("an SRDF written reads back", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const std::vector<description::DisabledPair> pairs = {{"a<b", "c&d", "Adjacent", 0}, {"e", "f\"g", "Never", 0}};
   const auto read = description::read_srdf(scratch.put("x.srdf", srdf_text("r", pairs)));
   REQUIRE(read.size() == 2);

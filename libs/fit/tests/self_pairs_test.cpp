@@ -46,7 +46,7 @@ std::string reason_of(const SelfPairs& self, const std::string& a, const std::st
 }  // namespace
 
 TEST_CASE("links with shapes are adjacent across links without, and far ones are not listed", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", row_arm());
   // nothing touches ever; a and d have no shapes
   const Json sidecar = {
@@ -65,7 +65,7 @@ TEST_CASE("links with shapes are adjacent across links without, and far ones are
 }
 
 TEST_CASE("what touches always or at rest is listed, what touches sometimes is not", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", row_arm());
   const auto with = [&](const Json& of_a, const Json& of_c, const std::optional<std::string>& tip) {
     const Json sidecar = {{"links", {{"a", of_a}, {"b", row_ball(0.5, 0.1)}, {"c", of_c}}}};
@@ -81,7 +81,7 @@ TEST_CASE("what touches always or at rest is listed, what touches sometimes is n
 }
 
 TEST_CASE("ways to leaves that no robot has are noted, a tip asked for is refused", "[fit][unit]") {
-  const test::Scratch scratch;
+  const test::TemporaryFolder scratch;
   std::string text = row_arm();
   const std::string mimicking = "<child link=\"right\"/>";
   text.replace(text.find(mimicking), mimicking.size(), mimicking + "<mimic joint=\"to_left\"/>");

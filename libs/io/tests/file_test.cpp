@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 namespace fs = std::filesystem;
@@ -14,20 +15,11 @@ namespace fs = std::filesystem;
 namespace {
 
 struct Folder {
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "hamelin_core.XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::permissions(path, fs::perms::owner_all, ignored);
-    fs::remove_all(path, ignored);
-  }
   [[nodiscard]] std::ptrdiff_t files() const {
     return std::distance(fs::directory_iterator(path), fs::directory_iterator());
   }
-  fs::path path;
+  test::TemporaryFolder folder;
+  const fs::path& path = folder.path();
 };
 
 }  // namespace

@@ -3,8 +3,8 @@
 // over the voxels around inside. Same points, same run. `--points 100000 --capsules 10000` is the long comparison.
 #include <fmt/format.h>
 #include <octomap/OcTree.h>
-#include <Eigen/Geometry>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 #ifdef HAMELIN_WITH_FCL
@@ -242,104 +243,111 @@ void print_changes(const MapField& made, const std::vector<Cell>& cells, double 
   });
 }
 
-int run(int argc, char** argv) {
-  std::vector<std::string> words;
+struct Command {
+  std::string file;
+  Ball region;
   double scale = 1.0;
-  std::size_t point_count = 4000, capsule_count = 1000;
+  std::size_t points = 4000, capsules = 1000;
+};
+
+std::optional<Command> command_of(int argc, char** argv) {
+  std::vector<std::string> words;
+  Command command;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const auto value = [&] { return i + 1 < argc ? std::atof(argv[++i]) : 0.0; };
     if (word == "--scale")
-      scale = value();
+      command.scale = value();
     else if (word == "--points")
-      point_count = static_cast<std::size_t>(value());
+      command.points = static_cast<std::size_t>(value());
     else if (word == "--capsules")
-      capsule_count = static_cast<std::size_t>(value());
+      command.capsules = static_cast<std::size_t>(value());
     else
       words.push_back(word);
   }
-  if (words.size() != 5) {
-    fmt::print(stderr,
-               "usage: {} MAP X Y Z RADIUS [--scale S] [--points N] [--capsules N]   (crop in the map's frame, m)\n"
-               "example: {} map.bt 0.5 0 1 1.35\n",
-               argv[0], argv[0]);
-    return 2;
-  }
-  const std::string& file = words[0];
-  const Ball region{{std::stod(words[1]), std::stod(words[2]), std::stod(words[3])}, std::stod(words[4])};
+  if (words.size() != 5) return std::nullopt;
+  command.file = words[0];
+  command.region = {{std::stod(words[1]), std::stod(words[2]), std::stod(words[3])}, std::stod(words[4])};
+  return command;
+}
 
-  const auto start_of_read = Clock::now();
-  const MapData map = read_map(file, {scale, 0.5});
-  const double read_ms = 1e3 * seconds_since(start_of_read);
+// The part of the map that is asked, and what making it cost.
+struct Part {
+  explicit Part(const Command& command) : region(command.region) {
+    const auto start = Clock::now();
+    map = read_map(command.file, {command.scale, 0.5});
+    const double read_ms = 1e3 * seconds_since(start);
+    crop_ms = least_ms([&] { cells = crop(map.occupied, map.resolution, region); });
+    build_ms = least_ms([&] { field = MapField(cells, map.resolution, region); });
+    if (field.empty()) throw Error(ErrorCode::invalid, fmt::format("{}: no occupied leaf in that ball", command.file));
+    for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
+    fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n", command.file,
+               map.resolution, map.occupied.size(), leaves.size(), field.boxes().boxes().size(),
+               name_of(default_isa()));
+    fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms, crop_ms, build_ms,
+               1e-3 * static_cast<double>(field.bytes()));
+  }
+
+  Ball region;
+  MapData map;
   std::vector<Cell> cells;
   MapField field;
-  const double crop_ms = least_ms([&] { cells = crop(map.occupied, map.resolution, region); });
-  const double build_ms = least_ms([&] { field = MapField(cells, map.resolution, region); });
-  if (field.empty()) throw Error(ErrorCode::invalid, fmt::format("{}: no occupied leaf in that ball", file));
   std::vector<Box> leaves;
-  for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
-  fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n", file, map.resolution,
-             map.occupied.size(), leaves.size(), field.boxes().boxes().size(), name_of(default_isa()));
-  fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms, crop_ms, build_ms,
-             1e-3 * static_cast<double>(field.bytes()));
+  double crop_ms = 0.0, build_ms = 0.0;
+};
 
-  std::vector<Vector3d> points, inside;
-  for (const Vector3d& p : test::points_near(leaves, 6000, 0.5, 1))
-    (test::brute_force_distance(leaves, p) > 0.0 ? points : inside).push_back(p);
-  std::vector<double> truth, truth_moved;
-  std::vector<Vector3d> moved;  // each point again, 2 mm on
-  std::vector<Capsule> capsules, capsules_moved, capsules_inside;
-  Rng rng(2);
-  for (const Vector3d& p : points) {
-    truth.push_back(test::brute_force_distance(leaves, p));
-    const Vector3d way = 0.002 * test::random_direction(rng);
-    moved.push_back(p + way);
-    truth_moved.push_back(test::brute_force_distance(leaves, moved.back()));
-    const Vector3d end = p + rng.uniform(0.05, 0.4) * test::random_direction(rng);
-    SegmentHit hit;
-    const bool entered = field.nearest(p, end, infinity, hit) && hit.distance <= 0.0;
-    (entered ? capsules_inside : capsules).push_back({p, end});
-    if (!entered) capsules_moved.push_back({p + way, end + way});
+// What is asked, with the truth for points; each once more 2 mm on.
+struct Questions {
+  explicit Questions(const Part& part) {
+    for (const Vector3d& p : test::points_near(part.leaves, 6000, 0.5, 1))
+      (test::brute_force_distance(part.leaves, p) > 0.0 ? points : inside).push_back(p);
+    Rng rng(2);
+    for (const Vector3d& p : points) {
+      truth.push_back(test::brute_force_distance(part.leaves, p));
+      const Vector3d way = 0.002 * test::random_direction(rng);
+      moved.push_back(p + way);
+      truth_moved.push_back(test::brute_force_distance(part.leaves, moved.back()));
+      const Vector3d end = p + rng.uniform(0.05, 0.4) * test::random_direction(rng);
+      SegmentHit hit;
+      const bool entered = part.field.nearest(p, end, infinity, hit) && hit.distance <= 0.0;
+      (entered ? capsules_inside : capsules).push_back({p, end});
+      if (!entered) capsules_moved.push_back({p + way, end + way});
+    }
   }
 
-  fmt::print("{:<34} {:>10} {:>12} {:>12} {:>12}\n", "method", "build ms", "ns a query", "over mm", "under mm");
+  std::vector<Vector3d> points, moved, inside;
+  std::vector<double> truth, truth_moved;
+  std::vector<Capsule> capsules, capsules_moved, capsules_inside;
+};
+
+void line(const char* what, double ns) {
+  fmt::print("{:<34} {:>10} {:>12.0f}\n", what, "", ns);
+}
+
+void print_points(const Part& part, const Questions& asked) {
+  const MapField& field = part.field;
+  const auto& points = asked.points;
+  const double made_ms = part.crop_ms + part.build_ms;
   BoxHit hit;
   (void)least_ns(points.size(),
                  [&](std::size_t i) { (void)field.nearest(points[i], infinity, hit); });  // fills the table
-  row("hamelin, cold", crop_ms + build_ms, points, truth,
+  row("hamelin, cold", made_ms, points, asked.truth,
       [&](std::size_t i) { return field.nearest(points[i], infinity, hit) ? hit.distance : infinity; });
-  row("hamelin, cold, without the table", crop_ms + build_ms, points, truth,
+  row("hamelin, cold, without the table", made_ms, points, asked.truth,
       [&](std::size_t i) { return field.boxes().nearest(points[i], infinity, hit) ? hit.distance : infinity; });
   std::vector<std::int32_t> hints;
   for (const Vector3d& p : points) hints.push_back(field.nearest(p, infinity, hit) ? hit.box : -1);
-  row("hamelin, warm (2 mm on)", crop_ms + build_ms, moved, truth_moved,
+  const auto& moved = asked.moved;
+  row("hamelin, warm (2 mm on)", made_ms, moved, asked.truth_moved,
       [&](std::size_t i) { return field.nearest(moved[i], infinity, hit, hints[i]) ? hit.distance : infinity; });
   MapField::Scratch scratch(field);
   std::array<BoxHit, MapField::points_max> hits;
-  std::array<SegmentHit, MapField::points_max> segment_hits;
-  SegmentHit segment;
-  const auto line = [](const char* what, double ns) { fmt::print("{:<34} {:>10} {:>12.0f}\n", what, "", ns); };
   line("hamelin, 3 points within 0.1 m",
        least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.1, scratch, hits); }));
   line("hamelin, 3 points within 0.25 m",
        least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.25, scratch, hits); }));
-  std::vector<std::int32_t> segment_hints;
-  for (const Capsule& c : capsules)
-    segment_hints.push_back(field.nearest(c.a, c.b, infinity, segment) ? segment.box : -1);
-  line("hamelin, capsule, cold", least_ns(capsules.size(), [&](std::size_t i) {
-         (void)field.nearest(capsules[i].a, capsules[i].b, infinity, segment);
-       }));
-  line("hamelin, capsule, warm", least_ns(capsules.size(), [&](std::size_t i) {
-         (void)field.nearest(capsules_moved[i].a, capsules_moved[i].b, infinity, segment, segment_hints[i]);
-       }));
-  line("hamelin, capsule, 3 within 0.1 m", least_ns(capsules.size(), [&](std::size_t i) {
-         (void)field.several(capsules[i].a, capsules[i].b, 0.1, scratch, segment_hits);
-       }));
   line("hamelin, depth of a point",
-       least_ns(inside.size(), [&](std::size_t i) { (void)field.nearest(inside[i], infinity, hit); }));
-  line("hamelin, depth of a capsule", least_ns(capsules_inside.size(), [&](std::size_t i) {
-         (void)field.nearest(capsules_inside[i].a, capsules_inside[i].b, infinity, segment);
-       }));
+       least_ns(asked.inside.size(), [&](std::size_t i) { (void)field.nearest(asked.inside[i], infinity, hit); }));
   // 40 spheres at a time, each 2 mm on from where its hint is from
   std::vector<double> ticks;
   for (int pass = 0; pass < passes; ++pass)
@@ -351,49 +359,81 @@ int run(int argc, char** argv) {
   std::sort(ticks.begin(), ticks.end());
   fmt::print("{:<34} {:>10} p50 {:.1f} us, p99 {:.1f} us\n", "hamelin, 40 spheres, warm", "", ticks[ticks.size() / 2],
              ticks[ticks.size() * 99 / 100]);
-  print_changes(field, cells, map.resolution, region);
+}
 
-  const auto tree = std::make_shared<octomap::OcTree>(map.resolution);
-  for (const Cell& cell : cells)
-    // The crop as a tree of its own, at the finest depth.
+void print_capsules(const MapField& field, const Questions& asked) {
+  const auto& capsules = asked.capsules;
+  SegmentHit hit;
+  std::vector<std::int32_t> hints;
+  for (const Capsule& c : capsules) hints.push_back(field.nearest(c.a, c.b, infinity, hit) ? hit.box : -1);
+  line("hamelin, capsule, cold", least_ns(capsules.size(), [&](std::size_t i) {
+         (void)field.nearest(capsules[i].a, capsules[i].b, infinity, hit);
+       }));
+  const auto& moved = asked.capsules_moved;
+  line("hamelin, capsule, warm", least_ns(moved.size(), [&](std::size_t i) {
+         (void)field.nearest(moved[i].a, moved[i].b, infinity, hit, hints[i]);
+       }));
+  MapField::Scratch scratch(field);
+  std::array<SegmentHit, MapField::points_max> hits;
+  line("hamelin, capsule, 3 within 0.1 m", least_ns(capsules.size(), [&](std::size_t i) {
+         (void)field.several(capsules[i].a, capsules[i].b, 0.1, scratch, hits);
+       }));
+  const auto& inside = asked.capsules_inside;
+  line("hamelin, depth of a capsule",
+       least_ns(inside.size(), [&](std::size_t i) { (void)field.nearest(inside[i].a, inside[i].b, infinity, hit); }));
+}
+
+// The part as a tree of its own, at the finest depth.
+std::shared_ptr<octomap::OcTree> tree_of(const Part& part) {
+  auto tree = std::make_shared<octomap::OcTree>(part.map.resolution);
+  const auto key = [](std::int32_t i) { return static_cast<octomap::key_type>(i + (1 << 15)); };
+  for (const Cell& cell : part.cells)
     for (std::int32_t x = 0; x < cell.size; ++x)
       for (std::int32_t y = 0; y < cell.size; ++y)
-        for (std::int32_t z = 0; z < cell.size; ++z) {
-          const auto key = [](std::int32_t i) { return static_cast<octomap::key_type>(i + (1 << 15)); };
+        for (std::int32_t z = 0; z < cell.size; ++z)
           tree->setNodeValue(octomap::OcTreeKey(key(cell.lo[0] + x), key(cell.lo[1] + y), key(cell.lo[2] + z)), 3.5F,
                              true);
-        }
   tree->updateInnerOccupancy();
   tree->prune();
+  return tree;
+}
+
 #ifdef HAMELIN_WITH_FCL
+void print_fcl(const std::shared_ptr<octomap::OcTree>& tree, const Questions& asked) {
   const fcl::OcTreed octree(tree);
   const double radius = 1e-3;
   const fcl::Sphered sphere(radius);
-  const std::vector<Vector3d> few(points.begin(), points.begin() + 100);
-  const std::vector<double> few_truth(truth.begin(), truth.begin() + 100);
-  const auto fcl_distance = [&](const auto& shape, const fcl::Transform3d& pose) {
+  const auto distance = [&](const auto& shape, const fcl::Transform3d& pose) {
     const fcl::DistanceRequestd request;
     fcl::DistanceResultd result;
     fcl::distance(&octree, fcl::Transform3d::Identity(), &shape, pose, request, result);
     return result.min_distance > 0.0 ? result.min_distance + radius : 0.0;
   };
-  row("FCL octree and sphere of 1 mm", 0.0, few, few_truth, [&](std::size_t i) {
+  const std::vector<Vector3d> few(asked.points.begin(), asked.points.begin() + 100);
+  const std::vector<double> truth(asked.truth.begin(), asked.truth.begin() + 100);
+  row("FCL octree and sphere of 1 mm", 0.0, few, truth, [&](std::size_t i) {
     fcl::Transform3d pose = fcl::Transform3d::Identity();
-    pose.translation() = points[i];
-    return fcl_distance(sphere, pose);
+    pose.translation() = few[i];
+    return distance(sphere, pose);
   });
   line("FCL octree and capsule", least_ns(20, [&](std::size_t i) {
-         const Vector3d way = capsules[i].b - capsules[i].a;
+         const Capsule& c = asked.capsules[i];
+         const Vector3d way = c.b - c.a;
          fcl::Transform3d pose = fcl::Transform3d::Identity();
-         pose.translation() = 0.5 * (capsules[i].a + capsules[i].b);
+         pose.translation() = 0.5 * (c.a + c.b);
          pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix();
-         (void)fcl_distance(fcl::Capsuled(radius, way.norm()), pose);
+         (void)distance(fcl::Capsuled(radius, way.norm()), pose);
        }));
+}
 #else
+void print_fcl(const std::shared_ptr<octomap::OcTree>&, const Questions&) {
   fmt::print("FCL was not found when this was built\n");
+}
 #endif
+
 #ifdef HAMELIN_WITH_EDT
-  const auto start_of_edt = Clock::now();
+void print_edt(const std::shared_ptr<octomap::OcTree>& tree, const Ball& region, const Questions& asked) {
+  const auto start = Clock::now();
   const Vector3d lo = region.center.array() - region.radius - 0.5, hi = region.center.array() + region.radius + 0.5;
   const auto point = [](const Vector3d& p) {
     return octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
@@ -401,23 +441,49 @@ int run(int argc, char** argv) {
   DynamicEDTOctomap edt(1.0F, tree.get(), point(lo), point(hi), false);
   edt.update();
   // Beyond its largest distance it answers that distance; a metre covers the points.
-  row("dynamicEDT3D", 1e3 * seconds_since(start_of_edt), points, truth,
-      [&](std::size_t i) { return static_cast<double>(edt.getDistance(point(points[i]))); });
+  row("dynamicEDT3D", 1e3 * seconds_since(start), asked.points, asked.truth,
+      [&](std::size_t i) { return static_cast<double>(edt.getDistance(point(asked.points[i]))); });
+}
 #else
+void print_edt(const std::shared_ptr<octomap::OcTree>&, const Ball&, const Questions&) {
   fmt::print("dynamicEDT3D was not found when this was built\n");
+}
 #endif
 
-  const Voxels voxels(cells, map.resolution);
-  const auto print_errors = [](const char* what, const Errors& errors) {
+void print_errors(const Part& part, const Command& command) {
+  const auto print = [](const char* what, const Errors& errors) {
     fmt::print("{:<34} largest error outside {:.2g} m ({}), inside {:.2g} m ({})\n", what, errors.outside,
                errors.n_outside, errors.inside, errors.n_inside);
   };
-  print_errors("brute force, points",
-               point_errors(field, leaves, voxels, test::points_near(leaves, point_count, 0.5, 3)));
-  std::vector<Capsule> many;
-  for (const Vector3d& p : test::points_near(leaves, capsule_count, 0.5, 4))
-    many.push_back({p, p + rng.uniform(0.05, 0.4) * test::random_direction(rng)});
-  print_errors("brute force, capsules", capsule_errors(field, leaves, voxels, many));
+  const Voxels voxels(part.cells, part.map.resolution);
+  print("brute force, points",
+        point_errors(part.field, part.leaves, voxels, test::points_near(part.leaves, command.points, 0.5, 3)));
+  Rng rng(2);
+  std::vector<Capsule> capsules;
+  for (const Vector3d& p : test::points_near(part.leaves, command.capsules, 0.5, 4))
+    capsules.push_back({p, p + rng.uniform(0.05, 0.4) * test::random_direction(rng)});
+  print("brute force, capsules", capsule_errors(part.field, part.leaves, voxels, capsules));
+}
+
+int run(int argc, char** argv) {
+  const auto command = command_of(argc, argv);
+  if (!command) {
+    fmt::print(stderr,
+               "usage: {} MAP X Y Z RADIUS [--scale S] [--points N] [--capsules N]   (crop in the map's frame, m)\n"
+               "example: {} map.bt 0.5 0 1 1.35\n",
+               argv[0], argv[0]);
+    return 2;
+  }
+  const Part part(*command);
+  const Questions asked(part);
+  fmt::print("{:<34} {:>10} {:>12} {:>12} {:>12}\n", "method", "build ms", "ns a query", "over mm", "under mm");
+  print_points(part, asked);
+  print_capsules(part.field, asked);
+  print_changes(part.field, part.cells, part.map.resolution, part.region);
+  const auto tree = tree_of(part);
+  print_fcl(tree, asked);
+  print_edt(tree, part.region, asked);
+  print_errors(part, *command);
   return 0;
 }
 

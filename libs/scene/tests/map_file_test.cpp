@@ -23,6 +23,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/test/damaged_maps.hpp"
 #include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
@@ -39,7 +40,7 @@ std::string refusal(const std::filesystem::path& file, const ReadMapOptions& opt
 }
 
 std::filesystem::path write_temporary(const std::string& name, const std::string& bytes) {
-  const auto file = std::filesystem::temp_directory_path() / name;
+  const auto file = test::temporary(name);
   write_file_aside(file, bytes);
   return file;
 }
@@ -177,7 +178,7 @@ TEST_CASE("leaves of our maps are those of OctoMap's own reader, as .bt and as .
   for (const char* name : {"shelf.bt", "clutter.bt"}) {
     const auto file = test::data / "maps" / name;
     check_against_octomap(file, 1.0);
-    const auto written = std::filesystem::temp_directory_path() / "hamelin_scene_written.ot";
+    const auto written = test::temporary("written.ot");
     REQUIRE(octomap::OcTree(file.string()).write(written.string()));
     check_against_octomap(written, 0.5);
     std::filesystem::remove(written);

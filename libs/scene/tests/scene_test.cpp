@@ -12,6 +12,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/test/scene_data.hpp"
+#include "hamelin/test/temporary.hpp"
 
 namespace {
 
@@ -156,9 +157,8 @@ TEST_CASE("what a scene does not name is not modelled, and null says the same", 
 }
 
 TEST_CASE("paths of a scene lead through links as the system follows them", "[scene][unit]") {
-  std::string name = (std::filesystem::temp_directory_path() / "hamelin_scene.XXXXXX").string();
-  REQUIRE(::mkdtemp(name.data()) != nullptr);
-  const std::filesystem::path root = name;
+  const test::TemporaryFolder folder;
+  const std::filesystem::path& root = folder.path();
   std::filesystem::create_directories(root / "project" / "scenes");
   std::filesystem::create_directory(root / "mine");
   // mine/scenes links to project/scenes, so mine/scenes/../robots is project/robots
@@ -177,7 +177,6 @@ TEST_CASE("paths of a scene lead through links as the system follows them", "[sc
   }
   CHECK(input_files(scene).size() == 4);
   CHECK(scene_from_json(document, root / "project" / "scenes", "x.json").map->file == root / "project/maps/m.bt");
-  std::filesystem::remove_all(root);
 }
 
 TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {

@@ -17,6 +17,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/judge.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 using namespace hamelin::sweep;
@@ -32,9 +33,6 @@ const std::vector<fs::path> plugin_directories{HAMELIN_TEST_PLUGIN_DIR};
 class Bench {
  public:
   Bench() {
-    std::string name = (fs::temp_directory_path() / "hamelin-plan-XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    root_ = name;
     const Json home{0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785}, away{1.2, -0.4, 0.0, -2.0, 0.0, 1.571, 0.785};
     const auto box = [](const Json& at) {
       return Json{{"name", "wall"},
@@ -54,13 +52,6 @@ class Bench {
                          {"goal", away},
                          {"obstacles", {box({0.12, 0.31, 0.55}), box({0.2, 0.5, 0.5})}}});
   }
-  ~Bench() {
-    std::error_code ignored;
-    fs::remove_all(root_, ignored);
-  }
-  Bench(const Bench&) = delete;
-  Bench& operator=(const Bench&) = delete;
-
   void put(const std::string& file, const Json& document) const { std::ofstream(root_ / file) << document.dump(); }
   [[nodiscard]] PlanOptions problems() const {
     PlanOptions options;
@@ -75,7 +66,8 @@ class Bench {
   [[nodiscard]] fs::path dir(const std::string& name) const { return root_ / name; }
 
  private:
-  fs::path root_;
+  test::TemporaryFolder folder_;
+  fs::path root_ = folder_.path();
 };
 
 /// All files below a directory with their bytes.

@@ -11,6 +11,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 using namespace hamelin::sweep;
@@ -210,9 +211,8 @@ TEST_CASE("the page's JSON tells of failures that were not feasible, and has the
 }
 
 TEST_CASE("a merge tells of runs that are missing and of records from several builds", "[sweep][unit]") {
-  std::string name = (std::filesystem::temp_directory_path() / "hamelin-merge-XXXXXX").string();
-  REQUIRE(::mkdtemp(name.data()) != nullptr);
-  const std::filesystem::path directory = name;
+  const test::TemporaryFolder folder;
+  const std::filesystem::path& directory = folder.path();
   Plan plan;
   plan.scenes.push_back({"a.json", std::string(64, '0'), true, ""});
   for (const char* id : {"1", "2", "3"}) {
@@ -234,7 +234,6 @@ TEST_CASE("a merge tells of runs that are missing and of records from several bu
   }
   out.close();
   const Merged merged = merge({directory}, {"planner"});
-  std::filesystem::remove_all(directory);
   CHECK(merged.groups.at(0).planned == 3);
   CHECK(merged.groups.at(0).reached == 2);
   CHECK(merged.notes ==

@@ -18,6 +18,7 @@
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/merge.hpp"
 #include "hamelin/sweep/plan.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 using namespace hamelin::sweep;
@@ -30,9 +31,6 @@ namespace fs = std::filesystem;
 class Bench {
  public:
   explicit Bench(std::size_t runs) {
-    std::string name = (fs::temp_directory_path() / "hamelin-sweep-XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    root_ = name;
     fs::create_directory(root_ / "scenes");
     put("scenes/a.json", "a scene");
     plan.scenes.push_back({"scenes/a.json", sha256_hex("a scene"), true, ""});
@@ -50,13 +48,6 @@ class Bench {
     // $4 is the planner's name; each call leaves a line
     script("");
   }
-  ~Bench() {
-    std::error_code ignored;
-    fs::remove_all(root_, ignored);
-  }
-  Bench(const Bench&) = delete;
-  Bench& operator=(const Bench&) = delete;
-
   /// What a run does before it prints its line.
   void script(const std::string& body) {
     put("program.sh",
@@ -64,9 +55,7 @@ class Bench {
             "\necho '{\"result\": {\"outcome\": \"reached\", \"cause\": null, \"time_s\": 2.5}, \"judge\": "
             "{\"contact\": false, \"obstacles\": null, \"self\": null, \"configurations\": 3}}'\n");
   }
-  void put(const fs::path& file, const std::string& text) const {
-    std::ofstream(root_ / file, std::ios::binary) << text;
-  }
+  void put(const fs::path& file, const std::string& text) const { folder_.put(file, text); }
   [[nodiscard]] RunOptions options() const {
     RunOptions options;
     options.command = {"/bin/sh", (root_ / "program.sh").string()};
@@ -92,7 +81,8 @@ class Bench {
   Plan plan;
 
  private:
-  fs::path root_;
+  test::TemporaryFolder folder_;
+  fs::path root_ = folder_.path();
 };
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace hamelin::hybrid {
 namespace {
 
 constexpr int most_vias = 64, most_targets = 3, most_legs = 4, via_steps = 25, target_steps = 60;
-constexpr Eigen::Index most_points = most_legs * (via_steps + target_steps + 4);
+constexpr Eigen::Index most_points = Eigen::Index{most_legs} * (via_steps + target_steps + 4);
 constexpr double target_tolerance = 0.04;
 constexpr double via_global_share = 0.25;
 constexpr double worth = 0.05;  // nearer to the goal by this much, a way that does not arrive is taken

@@ -10,7 +10,7 @@ using namespace hamelin;
 using log::Outcome;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 using test::vector_of;
 
 namespace {
@@ -36,7 +36,7 @@ struct Logged {
   std::vector<Json> ticks, events;
 };
 
-Logged logged_run(const ScratchFolder& folder, const Json& scene, const model::Robot& robot = test::planar4()) {
+Logged logged_run(const TemporaryFolder& folder, const Json& scene, const model::Robot& robot = test::planar4()) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -53,7 +53,7 @@ Logged logged_run(const ScratchFolder& folder, const Json& scene, const model::R
 }  // namespace
 
 TEST_CASE("a planner is told how its answer is carried out, and of a goal's path", "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_of(Json::object(), "sampled");
   scene["goals"] = {{{"type", "path"}, {"q", {{0.5, 0.0, 0.0, 0.0}, {0.2, 0.1, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}}}}};
   scene["actuation"] = {
@@ -71,7 +71,7 @@ TEST_CASE("a planner is told how its answer is carried out, and of a goal's path
 }
 
 TEST_CASE("a held torque changes no faster than its rate limit, and that is counted", "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {10.0, -3.0, 0.0, 0.5}}}, "sampled");
   scene["actuation"]["torque_rate_max_Nm_s"] = 1000.0;
   const auto run = logged_run(folder, scene);
@@ -91,7 +91,7 @@ TEST_CASE("a held torque changes no faster than its rate limit, and that is coun
 
 TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes energy out only",
           "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
   CAPTURE(actuation);
   Json scene = scene_of({{"torque", {4.0, -4.0, 4.0, -4.0}}}, actuation);
@@ -117,7 +117,7 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes en
 
 TEST_CASE("the model's dry friction is the same to the arm as one that actuation names, and both add up",
           "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {9.0, -4.0, 12.0, 1.0}}}, "ideal");
   scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
   scene["duration_s"] = 0.5;
@@ -138,7 +138,7 @@ TEST_CASE("the model's dry friction is the same to the arm as one that actuation
 
 TEST_CASE("under sampled actuation a node velocity is made a torque by the planner's masses, not the true ones",
           "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const double scale : {0.9, 1.0, 1.1}) {
     Json scene = scene_of({{"velocity", {0.02, -0.01, 0.03, 0.01}}}, "sampled");
     scene["actuation"]["planner_mass_scale"] = scale;
@@ -152,7 +152,7 @@ TEST_CASE("under sampled actuation a node velocity is made a torque by the plann
 
 TEST_CASE("torque limits hold for a node velocity too: its change is cut as a whole, and counted",
           "[simulation][actuation]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const model::Robot robot = strong(10.0);
   const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
@@ -181,7 +181,7 @@ TEST_CASE("torque limits hold for a node velocity too: its change is cut as a wh
 
 TEST_CASE("accounts that no filter may have are a defect under ideal actuation, and only reported elsewhere",
           "[simulation][certificate]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto [key, value, text] =
       GENERATE(table<std::string, double, std::string>({{"filter_work_J", 1e-3, "its filter added 0.001 J"},
                                                         {"recovery_work_J", -1e-3, "its recovery took out 0.001 J"}}));
@@ -208,7 +208,7 @@ TEST_CASE("accounts that no filter may have are a defect under ideal actuation, 
 }
 
 TEST_CASE("an energy account that does not close is a defect that names the step", "[simulation][certificate]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_of(Json::object());
   scene["start"] = {{"v", {6.0, -14.0, 10.0, -12.0}}};
   scene["duration_s"] = 2.0;
@@ -224,7 +224,7 @@ TEST_CASE("an energy account that does not close is a defect that names the step
 }
 
 TEST_CASE("the largest acceleration and jerk are those of the logged velocities", "[simulation][log]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {3.0, -2.0, 1.0, 0.5}}, {"torque_until_s", 0.05}});
   const auto run = logged_run(folder, scene);
   Eigen::VectorXd a = Eigen::VectorXd::Zero(4), jerk = a, last;

@@ -17,7 +17,7 @@ using log::Outcome;
 using test::ball;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -36,7 +36,7 @@ model::Robot capsule_arm() {
 
 TEST_CASE("with every planner an arm of capsules arrives where one of spheres does, and touches nothing",
           "[simulation][capsule]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (const std::string planner : {"apf", "gyro", "hybrid"}) {
     CAPTURE(planner);
     Json scene =
@@ -54,7 +54,7 @@ TEST_CASE("with every planner an arm of capsules arrives where one of spheres do
 
 TEST_CASE("a capsule at an obstacle is named with link, depth and way out, at start and goals",
           "[simulation][capsule]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   // the arm lies along x; its second link's capsule is 20 mm thick
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
@@ -87,7 +87,7 @@ TEST_CASE("a capsule at an obstacle is named with link, depth and way out, at st
 }
 
 TEST_CASE("the log's closest shape is counted link by link, spheres before capsules", "[simulation][capsule]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
   scene["obstacles"] = {ball("post", 1.5, 0.2, 0.1)};
@@ -110,7 +110,7 @@ TEST_CASE("the log's closest shape is counted link by link, spheres before capsu
 }
 
 TEST_CASE("an arm of capsules is kept off itself", "[simulation][capsule]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   model::Robot robot = capsule_arm();
   robot.self_collision_disabled.clear();
   Json scene = scene_52();

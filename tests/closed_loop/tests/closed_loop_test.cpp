@@ -14,7 +14,7 @@ using log::Outcome;
 using test::ball;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -57,7 +57,7 @@ std::string fixed_part(const std::filesystem::path& file) {
 }  // namespace
 
 TEST_CASE("the energy account of a control potential closes with the square of the step", "[simulation][energy]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   std::vector<double> errors;
   for (const double h : {0.001, 0.002, 0.004}) {
     const auto kicks = run_scene(folder, spring(h, "ideal"));
@@ -78,7 +78,7 @@ TEST_CASE("the energy account of a control potential closes with the square of t
 
 TEST_CASE("energy-neutral steering does no work at any step, and brings the arm of example 5.2 to its goal",
           "[simulation][energy]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" / "paper_52_gyro.json");
   scene["robot"]["file"] = "robot.json";
   for (const double h : {0.001, 0.004, 0.01}) {
@@ -94,7 +94,7 @@ TEST_CASE("energy-neutral steering does no work at any step, and brings the arm 
 }
 
 TEST_CASE("a start in contact is refused before the first step", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("post", 2.5, 0.1, 0.2)};
   const auto result = run_scene(folder, scene);
@@ -104,7 +104,7 @@ TEST_CASE("a start in contact is refused before the first step", "[simulation][o
 }
 
 TEST_CASE("a goal inside an obstacle is never reached and never touched off the record", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("over the goal", 2.0, 3.0, 0.3)};
   scene["stall"] = Json::object();
@@ -118,7 +118,7 @@ TEST_CASE("a goal inside an obstacle is never reached and never touched off the 
 }
 
 TEST_CASE("too little time ends as timeout at the last step", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["duration_s"] = 0.4;
   const auto result = run_scene(folder, scene);
@@ -129,7 +129,7 @@ TEST_CASE("too little time ends as timeout at the last step", "[simulation][outc
 }
 
 TEST_CASE("a planner that breaks its promises ends the run as a defect that names the step", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   for (const std::string how : {"throw", "nan"}) {
     scene["planner"] = {{"name", "breaking"}, {"params", {{"at_tick", 10}, {"how", how}}}};
@@ -147,7 +147,7 @@ TEST_CASE("a planner that breaks its promises ends the run as a defect that name
 }
 
 TEST_CASE("an obstacle that appears on the arm is a collision that names both", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["planner"] = {{"name", "breaking"}};  // the arm rests
   scene["obstacles"] = {ball("ghost", 3.5, 0.05, 0.2)};
@@ -160,7 +160,7 @@ TEST_CASE("an obstacle that appears on the arm is a collision that names both", 
 }
 
 TEST_CASE("goals of every type are judged by their own measure", "[simulation][goal]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   const auto position = run_scene(folder, scene);
   REQUIRE(position.outcome == Outcome::reached);
@@ -241,7 +241,7 @@ TEST_CASE("goals of every type are judged by their own measure", "[simulation][g
 
 TEST_CASE("the same seed gives the same bytes but for clock and machine, another seed others",
           "[simulation][determinism]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
   scene["actuation"] = {
@@ -264,7 +264,7 @@ TEST_CASE("the same seed gives the same bytes but for clock and machine, another
 }
 
 TEST_CASE("a run's log fits its schemas, first line to last", "[simulation][log]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
   scene["duration_s"] = 0.4;
@@ -279,7 +279,7 @@ TEST_CASE("a run's log fits its schemas, first line to last", "[simulation][log]
 }
 
 TEST_CASE("the largest number of steps needs no memory for each of them", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["duration_s"] = 4e7;  // 10^10 steps of 4 ms
   simulation::Watch watch;
@@ -294,7 +294,7 @@ TEST_CASE("the largest number of steps needs no memory for each of them", "[simu
 }
 
 TEST_CASE("a stop from outside ends the run as interrupted, with its record whole", "[simulation][outcome]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   std::atomic<bool> stop = false;
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
@@ -311,7 +311,7 @@ TEST_CASE("a stop from outside ends the run as interrupted, with its record whol
 
 TEST_CASE("an arm in space with gravity, integrated by each scheme, comes to the same place",
           "[simulation][integrator]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = scene_52();
   scene["gravity_m_s2"] = {0.0, 0.0, -9.81};
   scene["start"] = {{"q", {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6}}};
@@ -332,7 +332,7 @@ TEST_CASE("an arm in space with gravity, integrated by each scheme, comes to the
 }
 
 TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][input]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto refusal = [&](const std::string& pointer, const Json& value) -> std::string {
     Json scene = scene_52();
     scene[Json::json_pointer(pointer)] = value;
@@ -370,7 +370,7 @@ planning::Plugin keep_loaded(const std::string& planner) {
 
 TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
   CAPTURE(planner);
   const auto loaded = keep_loaded(planner);
@@ -392,7 +392,7 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
 
 TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
   CAPTURE(actuation);
   const auto loaded = keep_loaded("probe");
@@ -423,7 +423,7 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
 TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
   // the first link cannot turn past either ball, so no search finds a way
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto loaded = keep_loaded("hybrid");
   Json scene = scene_52();
   scene["goals"] = {{{"type", "joint"}, {"q", {std::acos(-1.0), 0.0, 0.0, 0.0}}}};

@@ -10,7 +10,7 @@ using namespace hamelin;
 using test::ball;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -23,7 +23,7 @@ Json logged_scene(const Json& planner) {
   return scene;
 }
 
-std::vector<Json> ticks_of(const ScratchFolder& folder, const Json& scene, long every, Json* result = nullptr) {
+std::vector<Json> ticks_of(const TemporaryFolder& folder, const Json& scene, long every, Json* result = nullptr) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -48,7 +48,7 @@ double balance(const Json& tick) {
 }  // namespace
 
 TEST_CASE("the logged torques are those that move the arm, in every channel", "[simulation][log]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
   const std::vector<std::pair<Json, std::vector<std::string>>> planners = {
@@ -84,7 +84,7 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
 }
 
 TEST_CASE("the energies in a log balance at every tick, the last too, in every channel", "[simulation][log]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json potential = {{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
   for (const Json& planner : {potential, Json{{"name", "gyro"}}, Json{{"name", "hybrid"}}}) {
     CAPTURE(planner);
@@ -101,7 +101,7 @@ TEST_CASE("the energies in a log balance at every tick, the last too, in every c
 }
 
 TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation][log]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const Json scene = logged_scene({{"name", "gyro"}});
   Json result;
   const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37, &result);

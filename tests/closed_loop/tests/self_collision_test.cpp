@@ -11,7 +11,7 @@ using log::Outcome;
 using test::ball;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -50,7 +50,7 @@ double self_distance(const Eigen::VectorXd& q, double radius = 0.02) {
 }  // namespace
 
 TEST_CASE("an arm that swings into itself ends in collision, and the cause names both parts", "[simulation][self]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = closing_square(0.5);
   double last_apart = 0.0;
   simulation::Watch watch;
@@ -76,7 +76,7 @@ TEST_CASE("an arm that swings into itself ends in collision, and the cause names
 }
 
 TEST_CASE("a start in which the arm touches itself is refused", "[simulation][self]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = closing_square(0.0);
   scene["start"]["q"][3] = 0.5 * std::acos(-1.0);
   const auto result = run_scene(folder, scene);
@@ -86,7 +86,7 @@ TEST_CASE("a start in which the arm touches itself is refused", "[simulation][se
 }
 
 TEST_CASE("a self-contact between two nodes is found, and motion that stays apart is certified", "[simulation][self]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   // A ball at the tip, one where the first link begins, and 0.6 rad a step: before and behind it at the nodes.
   model::Robot balls = test::planar4(0);
   balls.links[0].spheres = {{Eigen::Vector3d(-1.0, 0.0, 0.0), 0.05}};
@@ -111,7 +111,7 @@ TEST_CASE("a self-contact between two nodes is found, and motion that stays apar
 }
 
 TEST_CASE("obstacles are told from the arm itself, each with its own clearance", "[simulation][self]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = closing_square(0.5);
   scene["duration_s"] = 0.5;
   scene["obstacles"] = {ball("post", 0.5, -0.2, 0.1)};
@@ -123,7 +123,7 @@ TEST_CASE("obstacles are told from the arm itself, each with its own clearance",
 }
 
 TEST_CASE("self-collision needs spheres", "[simulation][self]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   CHECK_THROWS_WITH(run_scene(folder, closing_square(0.5), {}, test::planar4(0)),
                     Catch::Contains("/model/self_collision: 'planar4' has no collision spheres"));
 }

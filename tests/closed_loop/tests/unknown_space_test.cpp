@@ -10,7 +10,7 @@
 using namespace hamelin;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -28,7 +28,7 @@ void make_map(const std::filesystem::path& file) {
   (void)scene::make_map(options);
 }
 
-std::vector<std::string> events_of(const ScratchFolder& folder, const std::string& unknown) {
+std::vector<std::string> events_of(const TemporaryFolder& folder, const std::string& unknown) {
   make_map(folder.path() / "map.bt");
   Json document = scene_52();
   document["map"] = {{"file", "map.bt"}, {"unknown", unknown}, {"keep_out_radius_m", 1.0}};
@@ -51,7 +51,7 @@ TEST_CASE("a planner is told by name whether a contact is with the map, unknown 
           "[simulation][unit]") {
   STATIC_REQUIRE(HAMELIN_OBSTACLE_MAP == scene::Contact::map);
   STATIC_REQUIRE(HAMELIN_OBSTACLE_UNKNOWN == scene::Contact::unknown);
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const auto found = [&](const std::string& unknown, const std::string& line) {
     const auto events = events_of(folder, unknown);
     CAPTURE(unknown, events);

@@ -9,11 +9,11 @@ using namespace hamelin;
 using test::ball;
 using test::run_scene;
 using test::scene_52;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
-std::vector<std::string> events_of(const ScratchFolder& folder, const Json& scene) {
+std::vector<std::string> events_of(const TemporaryFolder& folder, const Json& scene) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -45,7 +45,7 @@ Json turning_past_a_post() {
 }  // namespace
 
 TEST_CASE("to think of a place does not show what is hidden there", "[simulation][visibility]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = turning_past_a_post();
   scene["planner"]["params"]["think_of"] = {0.5, 0.0, 0.0, 0.0};  // right beside the post
   scene["duration_s"] = 0.2;                                      // the arm itself stays away
@@ -59,7 +59,7 @@ TEST_CASE("to think of a place does not show what is hidden there", "[simulation
 }
 
 TEST_CASE("what came into sight is remembered when the arm has passed", "[simulation][visibility]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   Json scene = turning_past_a_post();
   scene["planner"]["params"]["think_of"] = {0.5, 0.0, 0.0, 0.0};
   const auto events = events_of(folder, scene);

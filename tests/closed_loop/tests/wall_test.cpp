@@ -10,7 +10,7 @@
 
 using namespace hamelin;
 using test::plugin_directories;
-using test::ScratchFolder;
+using test::TemporaryFolder;
 
 namespace {
 
@@ -25,7 +25,7 @@ scene::Obstacle wall() {
 }
 
 // Two maps of the same grid: the wall and nothing else known, and free space without it.
-void make_maps(const ScratchFolder& folder) {
+void make_maps(const TemporaryFolder& folder) {
   scene::MakeMapOptions options;
   options.resolution_m = 0.05;
   options.primitives = {wall()};
@@ -52,7 +52,7 @@ struct Run {
   bool changed = false;
 };
 
-Run run(const ScratchFolder& folder, const Json& document) {
+Run run(const TemporaryFolder& folder, const Json& document) {
   const auto file = folder.path() / "scene.json";
   write_file_aside(file, document.dump(1));
   const scene::Scene scene = scene::read_scene(file);
@@ -83,7 +83,7 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
           "[simulation][map]") {
   const std::string planner = GENERATE("apf", "gyro", "hybrid");
   CAPTURE(planner);
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   make_maps(folder);
   Json scene = wall_scene(planner);
 
@@ -113,7 +113,7 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
 }
 
 TEST_CASE("a wall that is taken away is no longer there", "[simulation][map]") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   make_maps(folder);
   Json scene = wall_scene("apf");
   scene["map"] = {{"file", "wall.bt"}};
