@@ -202,7 +202,8 @@ class Variational {
       const double along = Space::along_axis(l, PB);
       double d = along - Space::pair(f.b, PB) + Space::pair(f.b, z);
       if constexpr (Space::mixed) d += l.armature;
-      d += half_ * joint_force_slope(call_.forces, i, rate_[i]);
+      if (call_.forces.damping != nullptr || call_.forces.coulomb != nullptr)
+        d += half_ * joint_force_slope(call_.forces, i, rate_[i]);
       double right = -residual_[i] - along_a(i, s);
       if constexpr (Spins) {
         for (std::size_t j = 0; j < call_.forces.spin_count; ++j)
@@ -253,7 +254,7 @@ class Variational {
       const double correction = sigma_[i] * call_.h;
       call_.delta[i] += correction;
       const double size = __builtin_fabs(correction);
-      if (size > most || size != size) most = size;  // NaN stays to the end
+      most = most >= size ? most : size;  // a NaN passes down the chain, so the last joint has it
       step = Space::sum(y, Space::scaled(f.b, sigma_[i]));
       Space::add_along_axis(l, step, sigma_[i]);
     }
