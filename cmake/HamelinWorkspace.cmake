@@ -27,7 +27,7 @@ else()
   target_compile_options(hamelin_options INTERFACE -w)
 endif()
 target_compile_options(hamelin_options INTERFACE
-  # GCC would tidy its memory often, to win little: a tenth of the time for a quarter more memory.
+  # GCC collects garbage less often: a tenth of the time for a quarter more memory.
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>
   # Debug keeps its checks but is run by people too: light optimisation makes Eigen bearable.
   $<$<CONFIG:Debug>:-Og>
@@ -96,14 +96,15 @@ function(hamelin_library)
 endfunction()
 
 # How kernels are compiled, on top of all else (a source's own options come last). Optimised in every build, so that
-# nothing stays out of line; with sanitizers, whose checks multiply the code, only lightly. GCC would copy value types of many lanes through memory, and make vectors of single numbers
-# at a loss.
-set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3> -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
+# nothing stays out of line; less so with sanitizers, whose checks multiply the code. Left to itself, GCC would copy
+# value types of many lanes through memory, and vectorise single numbers at a loss.
+set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3>
+  -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
   $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
 
-# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction set of core/isa.hpp. What such a
-# source may use is said in dynamics/kernels; a test looks at the objects. Products may be contracted: results
-# are promised to the bit on one set only.
+# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction set of
+# core/isa.hpp. What such a source may use is said in dynamics/kernels; a test looks at the objects. Products may be
+# contracted: results are promised to the bit on one set only.
 function(hamelin_isa_sources target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LINKS")
   set(sources ${arg_UNPARSED_ARGUMENTS})

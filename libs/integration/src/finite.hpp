@@ -4,7 +4,7 @@
 
 namespace hamelin::integration {
 
-/// Whether all numbers are finite. It runs in every step, so in vectors of the machine: 0 x is NaN where x is not finite.
+/// Whether all numbers are finite: 0 x is NaN where x is not. A sum, which is vectorised, since every step calls this.
 [[nodiscard]] inline bool all_finite(const Eigen::VectorXd& x) noexcept {
   return (0.0 * x).sum() == 0.0;
 }

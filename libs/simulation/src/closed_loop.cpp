@@ -13,8 +13,8 @@
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
-#include "planner_setup.hpp"
 #include "plant.hpp"
+#include "preparation.hpp"
 
 namespace hamelin::simulation {
 

@@ -1,4 +1,4 @@
-#include "planner_setup.hpp"
+#include "preparation.hpp"
 
 #include <fmt/format.h>
 
