@@ -13,7 +13,9 @@ void Explicit::add_momentum(State& state, const ConstVectorRef& dp) {
 }
 
 void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
-  dynamics::forward_dynamics(model_, ws_, q, v, forces_.evaluate(channels, ws_, q, v), acceleration_);
+  // sizes were compared when the step began
+  dynamics::detail::forward_dynamics(model_, ws_, q.data(), v.data(), forces_.evaluate(channels, ws_, q, v).data(),
+                                     acceleration_.data());
   ++report.evaluations;
 }
 
@@ -27,7 +29,7 @@ StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, do
   accelerate(channels, state.q, state.v, report);
   v_ = state.v + h * acceleration_;
   q_ = state.q + h * v_;
-  report.converged = all_finite(q_) && all_finite(v_);
+  report.converged = all_finite(q_);  // and so is v_
   if (!report.converged) return report;
   forces_.add_work(report, v_, h);
   state.q.swap(q_);

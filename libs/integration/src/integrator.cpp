@@ -13,6 +13,7 @@ Integrator::Integrator(std::string name, const Model& model, const Settings& set
       settings_(settings),
       ws_(model, settings.isa),
       name_(std::move(name)),
+      shape_{.q = model.dof()},
       velocity_(VectorXd::Zero(model.dof())) {}
 
 double Integrator::tolerance() const noexcept {
@@ -31,9 +32,14 @@ void Integrator::check_size(const char* function, const char* argument, Eigen::I
 }
 
 void Integrator::check(const char* function, const State& state) const {
+  if (shape_of(state) != shape_) [[unlikely]]
+    refuse_shape(function, state);
+}
+
+void Integrator::refuse_shape(const char* function, const State& state) const {
   check_size(function, "state.q", state.q.size());
+  if (saved_.empty()) return;  // no state was made yet to compare with
   const Shape given = shape_of(state);
-  if (saved_.empty() || given == shape_) return;
   throw Error(
       ErrorCode::usage,
       formatted("{}: state: {} velocities, {} momenta and {} numbers of memory given, expected {}, {} and {}: a "
@@ -44,6 +50,12 @@ void Integrator::check(const char* function, const State& state) const {
 void Integrator::check(const char* function, const State& state, const Channels& channels, double h) {
   if (saved_.empty()) prepare();
   check(function, state);
+  if (!channels.none()) check_channels(function, channels);
+  if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
+    throw Error(ErrorCode::usage, formatted("{}: a step of {} s given, expected a positive number", function, h));
+}
+
+void Integrator::check_channels(const char* function, const Channels& channels) const {
   const auto sized = [&](const char* argument, const VectorXd& x) {
     if (x.size() != 0) check_size(function, argument, x.size());
   };
@@ -54,8 +66,6 @@ void Integrator::check(const char* function, const State& state, const Channels&
     if (term.link < 0 || term.link >= model_.dof()) [[unlikely]]
       throw Error(ErrorCode::usage, formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
                                               function, term.link, model_.dof() - 1));
-  if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
-    throw Error(ErrorCode::usage, formatted("{}: a step of {} s given, expected a positive number", function, h));
 }
 
 State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {

@@ -9,7 +9,7 @@ namespace hamelin::integration {
 
 Newmark::Newmark(const Model& model, const NewmarkOptions& options)
     : Explicit("newmark", model, {options.isa, options.max_halvings, options.tolerance}), options_(options) {
-  for (auto* x : {&a_, &a_new_, &q_, &v_, &node_force_, &moved_}) *x = VectorXd::Zero(model.dof());
+  for (auto* x : {&a_, &a_new_, &q_, &v_, &moved_}) *x = VectorXd::Zero(model.dof());
 }
 
 std::string Newmark::criterion() const {
@@ -33,15 +33,13 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   const Eigen::Index n = model_.dof();
   StepReport report;
   report.converged = false;
-  forces_.evaluate(channels, ws_, state.q, state.v);
-  node_force_ = forces_.total();
   // the acceleration carried over belongs to the forces it was made with
-  const bool stands = !state.jumped && state.force_previous == node_force_;
+  const bool stands = !state.jumped && state.force_previous == forces_.evaluate(channels, ws_, state.q, state.v);
   if (stands) {
     a_ = state.memory.head(n);
   } else {
     accelerate(channels, state.q, state.v, report);
-    a_ = acceleration_;
+    a_.swap(acceleration_);
   }
   a_new_ = a_;
   if (stands && state.step_previous == h) a_new_ += a_ - state.memory.tail(n);
@@ -49,10 +47,10 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
     if (report.updates == options_.max_updates) return report;
     place(state, h);
     accelerate(channels, q_, v_, report);
-    moved_ = acceleration_ - a_new_;
-    report.residual = h * h * largest_size(moved_);
+    // Eigen's norm may drop a NaN: it is then found in q_ below
+    report.residual = h * h * (acceleration_ - a_new_).lpNorm<Eigen::Infinity>();
     if (!std::isfinite(report.residual)) return report;
-    a_new_ = acceleration_;
+    a_new_.swap(acceleration_);
     ++report.updates;
   } while (report.residual > options_.tolerance);
   place(state, h);
@@ -66,8 +64,8 @@ StepReport Newmark::attempt(State& state, const Channels& channels, double h) {
   forces_.add_work(report, moved_, 0.5);
   forces_.evaluate(channels, ws_, state.q, state.v);
   forces_.add_work(report, moved_, 0.5);
-  state.q = q_;
-  state.v = v_;
+  state.q.swap(q_);
+  state.v.swap(v_);
   state.step_previous = h;
   return report;
 }

@@ -19,7 +19,7 @@ class Newmark final : public Explicit {
   void place(const State& state, double h);
 
   const NewmarkOptions options_;
-  VectorXd a_, a_new_, q_, v_, node_force_, moved_;
+  VectorXd a_, a_new_, q_, v_, moved_;
 };
 
 }  // namespace hamelin::integration
