@@ -13,7 +13,7 @@ set(HAMELIN_BUILD_PLUGIN_DIR "${PROJECT_BINARY_DIR}/lib/hamelin/plugins")
 # read once. The dev preset compiles each by itself, so that a change compiles little and a missing include is seen.
 option(HAMELIN_UNITY "Compile several sources of a target as one: a full build takes a third of the time" ON)
 set(CMAKE_UNITY_BUILD ${HAMELIN_UNITY})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 14)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 20)
 
 # Linked as $<BUILD_INTERFACE:...> only, so that no flag of ours reaches a user of the installed package.
 add_library(hamelin_options INTERFACE)

@@ -100,6 +100,33 @@ class Surroundings {
   scene::PlacedShapes arm_;
 };
 
+// What is known of a scene's map.
+Json map_part(const scene::Environment& environment, double reach_m) {
+  const auto& summary = environment.summary();
+  Json map{{"file", summary.map_file},
+           {"sha256", summary.map_sha256},
+           {"resolution_m", summary.resolution_m},
+           {"nodes", summary.nodes},
+           {"occupied_leaves", summary.leaves},
+           {"free_leaves", summary.free_leaves},
+           {"unknown", scene::to_string(summary.unknown)},
+           {"self_filter", nullptr}};
+  map["within_reach"] = {{"reach_m", reach_m},
+                         {"occupied_share", summary.within_reach.occupied},
+                         {"free_share", summary.within_reach.free},
+                         {"unknown_share", summary.within_reach.unknown},
+                         {"occupied_leaves", summary.leaves_cropped},
+                         {"boxes", summary.boxes},
+                         {"unknown_boxes", summary.unknown_boxes},
+                         {"structure_bytes", environment.map_field().bytes()}};
+  if (summary.self_filter_padding_m)
+    map["self_filter"] = {{"padding_m", *summary.self_filter_padding_m},
+                          {"occupied_voxels", summary.self_filter_voxels},
+                          {"occupied_leaves", summary.self_filter_leaves},
+                          {"unknown_voxels", summary.self_filter_unknown_voxels}};
+  return map;
+}
+
 Json scene_info(const std::filesystem::path& file) {
   const scene::Scene scene = scene::read_scene(file);
   const model::Model model = simulation::load_model(scene);
@@ -124,29 +151,7 @@ Json scene_info(const std::filesystem::path& file) {
             {"self_clearance_at_start_m", nullptr},
             {"timing", {{"build_ms", build_ms}}},
             {"warnings", summary.warnings}};
-  if (summary.has_map) {
-    info["map"] = {{"file", summary.map_file},
-                   {"sha256", summary.map_sha256},
-                   {"resolution_m", summary.resolution_m},
-                   {"nodes", summary.nodes},
-                   {"occupied_leaves", summary.leaves},
-                   {"free_leaves", summary.free_leaves},
-                   {"unknown", scene::to_string(summary.unknown)},
-                   {"self_filter", nullptr}};
-    info["map"]["within_reach"] = {{"reach_m", model.reach()},
-                                   {"occupied_share", summary.within_reach.occupied},
-                                   {"free_share", summary.within_reach.free},
-                                   {"unknown_share", summary.within_reach.unknown},
-                                   {"occupied_leaves", summary.leaves_cropped},
-                                   {"boxes", summary.boxes},
-                                   {"unknown_boxes", summary.unknown_boxes},
-                                   {"structure_bytes", environment.map_field().bytes()}};
-    if (summary.self_filter_padding_m)
-      info["map"]["self_filter"] = {{"padding_m", *summary.self_filter_padding_m},
-                                    {"occupied_voxels", summary.self_filter_voxels},
-                                    {"occupied_leaves", summary.self_filter_leaves},
-                                    {"unknown_voxels", summary.self_filter_unknown_voxels}};
-  }
+  if (summary.has_map) info["map"] = map_part(environment, model.reach());
   if (model.shapes().empty()) return info;
   const auto sized = [&](const Eigen::VectorXd& q, const std::string& place) {
     if (q.size() != model.dof())
@@ -296,16 +301,8 @@ void make(const MakeOptions& options) {
                        made.bytes, made.sha256));
 }
 
-}  // namespace
-
-void add_scene(CLI::App& app, int&) {
-  auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them",
-                            "hamelin scene info data/maps/shelf.bt\n"
-                            "hamelin scene crop --scene data/scenes/shelf.json -o near.bt\n"
-                            "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
-  scene->require_subcommand(1);
-
-  auto* info_command = add_command(*scene, "info", "What a map or a scene holds",
+void add_scene_info(CLI::App& scene) {
+  auto* info_command = add_command(scene, "info", "What a map or a scene holds",
                                    "hamelin scene info data/scenes/shelf.json\n"
                                    "hamelin scene info data/maps/clutter.bt --base 0,0,0.3 --reach 0.9\n"
                                    "hamelin scene info data/maps/clutter.bt --json");
@@ -327,11 +324,11 @@ void add_scene(CLI::App& app, int&) {
       ->type_name("R");
   info_command->add_flag("--json", info_options->json, "print JSON");
   info_command->callback([info_options] { print_scene_info(*info_options); });
+}
 
-  add_scene_crop(*scene);
-
+void add_scene_make(CLI::App& scene) {
   auto* make_command =
-      add_command(*scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
+      add_command(scene, "make", "An OctoMap from primitives or random clutter, or a scene from a problem",
                   "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt\n"
                   "hamelin scene make --clutter 30 --seed 4 --keep-out 0,0,0.3,0.4 -o clutter.bt\n"
                   "hamelin scene make problem.json --robot arm.urdf --spheres s.json --goal pose -o scene.json");
@@ -371,6 +368,20 @@ void add_scene(CLI::App& app, int&) {
       ->type_name("FILE");
   make_command->add_flag("--json", options->json, "print what was written as JSON");
   make_command->callback([options] { make(*options); });
+}
+
+}  // namespace
+
+void add_scene(CLI::App& app, int&) {
+  auto* scene = add_command(app, "scene", "Look at scenes and maps, and make them",
+                            "hamelin scene info data/maps/shelf.bt\n"
+                            "hamelin scene crop --scene data/scenes/shelf.json -o near.bt\n"
+                            "hamelin scene make --primitives data/maps/shelf.primitives.json -o shelf.bt");
+  scene->require_subcommand(1);
+
+  add_scene_info(*scene);
+  add_scene_crop(*scene);
+  add_scene_make(*scene);
 }
 
 }  // namespace hamelin::app

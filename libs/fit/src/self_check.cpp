@@ -161,51 +161,69 @@ std::vector<description::DisabledPair> SelfCheck::disabled(bool never) const {
   return out;
 }
 
-SelfCheck check_self(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
-                     const SelfCheckOptions& options) {
-  SelfCheck out;
-  const std::vector<Part> parts = parts_of(robot);
-  const auto same = [](const std::string& a, const std::string& b, const PartPair& pair) {
-    return (a == pair.part_a && b == pair.part_b) || (a == pair.part_b && b == pair.part_a);
-  };
-  const auto bears_shapes = [&](int body) {
-    return std::any_of(parts.begin(), parts.end(), [&](const Part& part) { return part.body == body; });
-  };
-  const auto shapes_between = [&](int low, int high) {
-    for (int body = low + 1; body < high; ++body)
-      if (bears_shapes(body)) return true;
-    return false;
-  };
-  std::vector<std::pair<std::size_t, std::size_t>> indices;
-  for (std::size_t a = 0; a < parts.size(); ++a)
-    for (std::size_t b = a + 1; b < parts.size(); ++b) {
-      if (parts[a].body == parts[b].body) continue;
-      PartPair pair;
-      pair.part_a = parts[a].name;
-      pair.part_b = parts[b].name;
-      const auto [low, high] = std::minmax(parts[a].body, parts[b].body);
-      pair.neighbours = !shapes_between(low, high);
-      pair.checked = true;
-      for (const auto& [x, y] : robot.self_collision_disabled)
-        if (same(x, y, pair)) {
-          pair.checked = false;
-          pair.reason = "listed";
-        }
-      if (robot.self_collision_disabled.empty() && high - low == 1) {
-        pair.checked = false;
-        pair.reason = "neighbours, and nothing is listed";
-      }
-      for (const description::DisabledPair& why : listed)
-        if (!pair.checked && same(why.link_a, why.link_b, pair) && !why.reason.empty()) pair.reason = why.reason;
-      out.pairs.push_back(std::move(pair));
-      indices.emplace_back(a, b);
-    }
+namespace {
 
+bool bears_shapes(const std::vector<Part>& parts, int body) {
+  return std::any_of(parts.begin(), parts.end(), [body](const Part& part) { return part.body == body; });
+}
+
+bool shapes_between(const std::vector<Part>& parts, int low, int high) {
+  for (int body = low + 1; body < high; ++body)
+    if (bears_shapes(parts, body)) return true;
+  return false;
+}
+
+// Whether the pair is looked at in a run, and why not.
+PartPair pair_of(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
+                 const std::vector<Part>& parts, const Part& a, const Part& b) {
+  PartPair pair;
+  pair.part_a = a.name;
+  pair.part_b = b.name;
+  const auto is_pair = [&pair](const std::string& x, const std::string& y) {
+    return (x == pair.part_a && y == pair.part_b) || (x == pair.part_b && y == pair.part_a);
+  };
+  const auto [low, high] = std::minmax(a.body, b.body);
+  pair.neighbours = !shapes_between(parts, low, high);
+  pair.checked = true;
+  for (const auto& [x, y] : robot.self_collision_disabled)
+    if (is_pair(x, y)) {
+      pair.checked = false;
+      pair.reason = "listed";
+    }
+  if (robot.self_collision_disabled.empty() && high - low == 1) {
+    pair.checked = false;
+    pair.reason = "neighbours, and nothing is listed";
+  }
+  for (const description::DisabledPair& why : listed)
+    if (!pair.checked && is_pair(why.link_a, why.link_b) && !why.reason.empty()) pair.reason = why.reason;
+  return pair;
+}
+
+// A joint's rest: 0, or the middle of a range without it.
+std::vector<double> rest_of(const model::Robot& robot) {
   std::vector<double> q;
   for (const model::Link& link : robot.links) {
     const auto [low, high] = range_of(link.joint);
     q.push_back(low <= 0.0 && high >= 0.0 ? 0.0 : 0.5 * (low + high));
   }
+  return q;
+}
+
+}  // namespace
+
+SelfCheck check_self(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
+                     const SelfCheckOptions& options) {
+  SelfCheck out;
+  const std::vector<Part> parts = parts_of(robot);
+  std::vector<std::pair<std::size_t, std::size_t>> indices;
+  for (std::size_t a = 0; a < parts.size(); ++a)
+    for (std::size_t b = a + 1; b < parts.size(); ++b) {
+      if (parts[a].body == parts[b].body) continue;
+      out.pairs.push_back(pair_of(robot, listed, parts, parts[a], parts[b]));
+      indices.emplace_back(a, b);
+    }
+
+  std::vector<double> q = rest_of(robot);
   out.rest_q = q;
   out.samples = options.samples;
   std::vector<std::vector<Shape>> placed;
@@ -227,7 +245,7 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
   }
 
   for (std::size_t i = 0; i < robot.links.size(); ++i)
-    if (!bears_shapes(static_cast<int>(i))) out.shapeless.push_back(robot.links[i].name);
+    if (!bears_shapes(parts, static_cast<int>(i))) out.shapeless.push_back(robot.links[i].name);
   out.odd_limits = odd_limits_of(robot);
   return out;
 }

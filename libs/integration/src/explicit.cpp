@@ -13,7 +13,7 @@ void Explicit::add_momentum(State& state, const ConstVectorRef& dp) {
 }
 
 void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
-  // sizes were compared when the step began
+  // model and sizes were compared when the step began
   dynamics::detail::forward_dynamics(model_, ws_, q.data(), v.data(), forces_.evaluate(channels, ws_, q, v).data(),
                                      acceleration_.data());
   ++report.evaluations;

@@ -32,6 +32,7 @@ void Integrator::check_size(const char* function, const char* argument, Eigen::I
 }
 
 void Integrator::check(const char* function, const State& state) const {
+  const dynamics::detail::Call call(function, model_, ws_.owner);  // no other model has taken its place
   if (shape_of(state) != shape_) [[unlikely]]
     refuse_shape(function, state);
 }

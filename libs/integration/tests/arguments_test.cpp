@@ -123,11 +123,15 @@ TEST_CASE("a state of gauss of another order is refused", "[integration][gauss][
 }
 
 TEST_CASE("an integrator whose model was replaced at its address is refused", "[integration][unit]") {
-  std::optional<Model> place(std::in_place, test::random_robot(1, n));
-  const auto integrator = make_integrator("rk4", *place);
-  State state = integrator->start(VectorXd::Zero(n), VectorXd::Zero(n));
-  place.emplace(test::random_robot(2, n));
-  CHECK_THROWS_WITH(integrator->step(state, {}, 1e-3), Contains("made for another model"));
+  for (const std::string& name : integrator_names()) {
+    CAPTURE(name);
+    std::optional<Model> place(std::in_place, test::random_robot(1, n));
+    const auto integrator = make_integrator(name, *place);
+    State state = integrator->start(VectorXd::Zero(n), VectorXd::Zero(n));
+    place.emplace(test::random_robot(2, n));
+    CHECK_THROWS_WITH(integrator->step(state, {}, 1e-3), Contains("made for another model"));
+    CHECK_THROWS_WITH(integrator->energy(state), Contains("made for another model"));
+  }
 }
 
 TEST_CASE("a name may carry the order", "[integration][unit]") {

@@ -15,7 +15,6 @@ namespace hamelin::report {
 
 namespace {
 
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -294,89 +293,12 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["config"] = std::move(config_);
   run["provenance"] = std::move(provenance_);
   run["notes"] = notes_;
-  run["frames"] = frames_json(frames, container);
+  Frames columns(world_);
+  for (const Frame& frame : frames) columns.take(frame);
+  run["frames"] = columns.json(container, recorded_.scene.step_s);
   run["events"] = std::move(events_);
   run["plots"] = plots_json(container);
   return run;
-}
-
-Json Run::frames_json(const std::vector<Frame>& frames, Container& container) {
-  constexpr double angle_step = 1e-6, clearance_step = 1e-4, deepest = -0.5, point_step = 1e-4;
-  constexpr int force_bits = 10;
-  constexpr std::size_t contacts_max = 6;
-  const model::Model& model = world_.model;
-  const std::size_t shapes = model.shapes().size();
-
-  std::vector<double> t, q;
-  std::vector<std::uint16_t> goal_index;
-  scene::PlacedShapes arm(model);
-  scene::Environment::Scratch scratch(world_.environment, shapes);
-  std::vector<scene::Contact> found(world_.environment.contacts_max(shapes));
-  std::vector<double> clearances, points;
-  std::vector<std::uint8_t> counts;
-  std::array<std::vector<double>, channel_names.size()> forces;
-  std::array<bool, channel_names.size()> acts{};
-  dynamics::Matrix3Xd J(3, model.dof());
-  VectorXd pushed(model.dof());
-
-  for (const Frame& frame : frames) {
-    t.push_back(frame.time_s);
-    q.insert(q.end(), frame.q.begin(), frame.q.end());
-    goal_index.push_back(static_cast<std::uint16_t>(frame.goal_index));
-    dynamics::forward_kinematics(model, ws_, frame.q);
-    if (world_.judged) {
-      arm.place(model, ws_);
-      const std::size_t count = std::min(
-          found.size(),
-          world_.environment.closest(arm.view(), world_.influence_m, frame.time_s, scratch, found, scene::View::judge));
-      std::vector<const scene::Contact*> nearest(shapes, nullptr);
-      for (std::size_t i = 0; i < count; ++i) {
-        auto& known = nearest[static_cast<std::size_t>(found[i].sphere)];
-        if (known == nullptr || found[i].distance < known->distance) known = &found[i];
-      }
-      for (const auto* contact : nearest) clearances.push_back(contact != nullptr ? contact->distance : unknown);
-      nearest.erase(std::remove(nearest.begin(), nearest.end(), nullptr), nearest.end());
-      std::stable_sort(nearest.begin(), nearest.end(),
-                       [](const auto* a, const auto* b) { return a->distance < b->distance; });
-      if (nearest.size() > contacts_max) nearest.resize(contacts_max);
-      counts.push_back(static_cast<std::uint8_t>(nearest.size()));
-      for (const auto* contact : nearest)
-        for (const auto* point : {&contact->arm_point, &contact->obstacle_point})
-          points.insert(points.end(), point->begin(), point->end());
-    }
-    const bool any =
-        std::any_of(frame.channels.begin(), frame.channels.end(), [](const auto& x) { return x.size() > 0; });
-    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-    if (any) {
-      dynamics::point_jacobian(model, ws_, model.robot().tip.link, dynamics::tip_pose(model, ws_).p(), J);
-      inertia = dynamics::operational_inertia(model, ws_, frame.q, J);
-    }
-    for (std::size_t i = 0; i < channel_names.size(); ++i) {
-      Vector3d force = Vector3d::Zero();
-      if (frame.channels[i].size() > 0) {
-        dynamics::solve_mass(model, ws_, frame.q, frame.channels[i], pushed);
-        force = inertia * (J * pushed);
-        acts[i] = acts[i] || !force.isZero(0.0);
-      }
-      forces[i].insert(forces[i].end(), force.begin(), force.end());
-    }
-  }
-
-  Json json{{"t", container.stepped(t, recorded_.scene.step_s)},
-            {"q", container.stepped(q, angle_step)},
-            {"goal_index", container.exact(goal_index)},
-            {"clearance", nullptr},
-            {"influence_m", world_.influence_m},
-            {"contacts", nullptr}};
-  if (world_.judged) {
-    json["clearance"] = container.bounded(clearances, clearance_step, deepest);
-    json["contacts"] = {{"count", container.exact(counts)}, {"points", container.centred(points, point_step)}};
-  }
-  json["forces"] = Json::array();
-  for (std::size_t i = 0; i < channel_names.size(); ++i)
-    if (acts[i])
-      json["forces"].push_back({{"channel", channel_names[i]}, {"f", container.relative(forces[i], force_bits)}});
-  return json;
 }
 
 Json Run::marks(const Plot& plot) const {

@@ -1,12 +1,11 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "bins.hpp"
 #include "container.hpp"
+#include "frames.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
@@ -15,17 +14,6 @@
 #include "world.hpp"
 
 namespace hamelin::report {
-
-/// Channels of a tick, in the order of Frame::channels.
-inline constexpr std::array<const char*, 5> channel_names{"potential", "damping", "gyroscopic", "held", "node"};
-
-/// A tick that becomes a pose of the replayed arm.
-struct Frame {
-  double time_s = 0.0;
-  Eigen::VectorXd q;
-  std::size_t goal_index = 0;
-  std::array<Eigen::VectorXd, channel_names.size()> channels;  ///< joint torques; empty where the channel is not used
-};
 
 /// Takes a log's lines behind the header and makes a run of them.
 class Run {
@@ -50,8 +38,6 @@ class Run {
   };
   void take_tick(const Json& line, const log::LogReader& reader);
   void goal_distance(const Frame& frame);
-  /// With what the log does not say: clearances, closest points, forces at the tip.
-  [[nodiscard]] Json frames_json(const std::vector<Frame>& frames, Container& container);
   [[nodiscard]] Json plots_json(Container& container) const;
   [[nodiscard]] Json marks(const Plot& plot) const;
 

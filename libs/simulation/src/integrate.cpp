@@ -58,6 +58,127 @@ std::string what_failed(const FreeMotion& motion, const integration::Integrator&
                      motion.step_s / static_cast<double>(1 << integrator.max_halvings()));
 }
 
+/// One free motion from its first node to its last: a look at every node, then a step.
+class FreeRun {
+ public:
+  FreeRun(const model::Model& model, const FreeMotion& motion, const Watch& watch);
+  log::Result run();
+
+ private:
+  void write_header(const Watch& watch);
+  [[nodiscard]] bool arrived() const { return controlled_ ? state_.time_s == motion_.duration_s : state_.k == steps_; }
+  /// The node's energy, and its line in the log; `last` ones are always written.
+  void look(bool last);
+  void log_tick();
+  /// One step. If it found no root the state stays, and the result says what failed.
+  bool step();
+  void close();
+
+  const model::Model& model_;
+  const FreeMotion& motion_;
+  const std::unique_ptr<integration::Integrator> integrator_;
+  const bool controlled_;  ///< step control takes what steps it likes, so any duration will do
+  const long steps_;
+  log::Result result_;
+  Recorder recorder_;
+  integration::Channels channels_;
+  integration::State state_;
+  integration::StepReport report_;
+  Eigen::VectorXd v_;
+  Ledger ledger_;
+};
+
+FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watch& watch)
+    : model_(model),
+      motion_(motion),
+      integrator_(integration::make_integrator(motion.integrator, model, motion.options)),
+      controlled_(integrator_->adaptive()),
+      steps_(controlled_ ? first_steps_in(motion.duration_s, motion.step_s)
+                         : step_count(motion.duration_s, motion.step_s)),
+      recorder_(result_, watch, *integrator_),
+      state_(integrator_->start(motion.q0, motion.v0)),
+      v_(model.dof()) {
+  channels_.damping = motion.damping;
+  channels_.coulomb = motion.coulomb;
+  channels_.coulomb_speed = motion.coulomb_speed;
+  if (controlled_) state_.step_next = motion.step_s;
+  report_.step_s = motion.step_s;
+  write_header(watch);
+}
+
+void FreeRun::write_header(const Watch& watch) {
+  result_.scene = motion_.name;
+  result_.warnings = model::warnings(model_.robot());
+  result_.provenance = log::provenance(motion_.inputs, watch.argv);
+  recorder_.header({{"program", "integrate"},
+                    {"scene", motion_.name},
+                    {"config", motion_.config},
+                    {"robot_notes", model_.robot().notes},
+                    {"provenance", result_.provenance}},
+                   model_.robot(), steps_);
+}
+
+log::Result FreeRun::run() {
+  for (;;) {
+    const bool last = arrived() || recorder_.stopped(state_.k);
+    look(last);
+    if (last || !step()) break;
+  }
+  close();
+  return std::move(result_);
+}
+
+void FreeRun::look(bool last) {
+  const auto energy = integrator_->energy(state_);
+  ledger_.kinetic = energy.kinetic_J;
+  ledger_.potential = energy.potential_J;
+  recorder_.node(ledger_);
+  if (!recorder_.logging()) return;  // the velocity costs a sweep, and nothing else here asks for it
+  integrator_->velocity(state_, v_);
+  recorder_.observe(std::numeric_limits<double>::infinity(), true, v_, report_.step_s);
+  if (recorder_.wants_tick(state_.k) || last) log_tick();
+}
+
+void FreeRun::log_tick() {
+  recorder_.tick(state_.k, {{"k", state_.k},
+                            {"time_s", state_.time_s},
+                            {"q", to_json(state_.q)},
+                            {"v", to_json(v_)},
+                            {"energy", energy_json(ledger_)},
+                            {"solver", solver_json(report_)}});
+  recorder_.write_waiting_tick();
+}
+
+bool FreeRun::step() {
+  const double left = motion_.duration_s - state_.time_s;
+  report_ = controlled_ ? integrator_->advance(state_, channels_, left)
+                        : integrator_->step(state_, channels_, motion_.step_s);
+  if (!controlled_)
+    state_.time_s = static_cast<double>(state_.k) * motion_.step_s;
+  else if (report_.step_s == left)
+    state_.time_s = motion_.duration_s;
+  recorder_.step(report_);
+  ledger_.book(report_);
+  recorder_.progress(state_.k, state_.time_s, motion_.duration_s);
+  if (report_.converged) return true;
+  result_.outcome = log::Outcome::diverged;
+  result_.cause = what_failed(motion_, *integrator_, state_.k + 1);
+  if (recorder_.logging()) log_tick();
+  return false;
+}
+
+void FreeRun::close() {
+  if (result_.outcome == log::Outcome::completed && !arrived()) result_.outcome = log::Outcome::interrupted;
+  result_.time_s = state_.time_s;
+  result_.steps = state_.k;
+  result_.q = state_.q;
+  integrator_->velocity(state_, v_);
+  result_.v = v_;
+  // not looked at without a log, so not with one either
+  for (auto* largest : {&result_.v_abs_max, &result_.a_abs_max, &result_.jerk_abs_max}) largest->resize(0);
+  recorder_.close(ledger_);
+}
+
 }  // namespace
 
 log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch) {
@@ -68,82 +189,7 @@ log::Result integrate(const model::Model& model, const FreeMotion& motion, const
   };
   sized(motion.q0, "q0");
   sized(motion.v0, "v0");
-  const auto integrator = integration::make_integrator(motion.integrator, model, motion.options);
-  const bool controlled = integrator->adaptive();  // then any duration will do
-  const long steps =
-      controlled ? first_steps_in(motion.duration_s, motion.step_s) : step_count(motion.duration_s, motion.step_s);
-
-  log::Result result;
-  result.scene = motion.name;
-  result.warnings = model::warnings(model.robot());
-  result.provenance = log::provenance(motion.inputs, watch.argv);
-  Recorder recorder(result, watch, *integrator);
-  recorder.header({{"program", "integrate"},
-                   {"scene", motion.name},
-                   {"config", motion.config},
-                   {"robot_notes", model.robot().notes},
-                   {"provenance", result.provenance}},
-                  model.robot(), steps);
-
-  integration::Channels channels;
-  channels.damping = motion.damping;
-  channels.coulomb = motion.coulomb;
-  channels.coulomb_speed = motion.coulomb_speed;
-  integration::State state = integrator->start(motion.q0, motion.v0);
-  if (controlled) state.step_next = motion.step_s;
-  integration::StepReport report;
-  Eigen::VectorXd v(model.dof());
-  Ledger ledger;
-  bool finished = false;
-  const auto log_tick = [&] {
-    recorder.tick(state.k, {{"k", state.k},
-                            {"time_s", state.time_s},
-                            {"q", to_json(state.q)},
-                            {"v", to_json(v)},
-                            {"energy", energy_json(ledger)},
-                            {"solver", solver_json(report)}});
-    recorder.write_waiting_tick();
-  };
-  for (;;) {
-    const auto energy = integrator->energy(state);
-    ledger.kinetic = energy.kinetic_J;
-    ledger.potential = energy.potential_J;
-    recorder.node(ledger);
-    const bool arrived = controlled ? state.time_s == motion.duration_s : state.k == steps;
-    const bool over = arrived || recorder.stopped(state.k);
-    if (recorder.logging()) {  // the velocity costs a sweep, and nothing else here asks for it
-      integrator->velocity(state, v);
-      recorder.observe(std::numeric_limits<double>::infinity(), true, v, state.k > 0 ? report.step_s : motion.step_s);
-      if (recorder.wants_tick(state.k) || over) log_tick();
-    }
-    finished = arrived;
-    if (over) break;
-    const double left = motion.duration_s - state.time_s;
-    report = controlled ? integrator->advance(state, channels, left) : integrator->step(state, channels, motion.step_s);
-    if (!controlled)
-      state.time_s = static_cast<double>(state.k) * motion.step_s;
-    else if (report.step_s == left)
-      state.time_s = motion.duration_s;
-    recorder.step(report);
-    ledger.book(report);
-    recorder.progress(state.k, state.time_s, motion.duration_s);
-    if (!report.converged) {
-      result.outcome = log::Outcome::diverged;
-      result.cause = what_failed(motion, *integrator, state.k + 1);
-      if (recorder.logging()) log_tick();
-      break;
-    }
-  }
-  if (result.outcome == log::Outcome::completed && !finished) result.outcome = log::Outcome::interrupted;
-  result.time_s = state.time_s;
-  result.steps = state.k;
-  result.q = state.q;
-  integrator->velocity(state, v);
-  result.v = v;
-  // not looked at without a log, so not with one either
-  for (auto* largest : {&result.v_abs_max, &result.a_abs_max, &result.jerk_abs_max}) largest->resize(0);
-  recorder.close(ledger);
-  return result;
+  return FreeRun(model, motion, watch).run();
 }
 
 }  // namespace hamelin::simulation
