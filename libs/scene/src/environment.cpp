@@ -17,6 +17,35 @@ namespace {
 // Points of a capsule's axis this share of its length apart are different places.
 constexpr double elsewhere_share = 1.0 / 3.0;
 
+// `at`: a sphere's centre, a capsule's nearest axis point; `distance` is from there.
+Contact contact_of(const Shapes& arm, std::size_t shape, int obstacle, const Eigen::Vector3d& at, double distance,
+                   const Eigen::Vector3d& point, const Eigen::Vector3d& direction, const Eigen::Vector3d& velocity) {
+  return {static_cast<int>(shape),
+          obstacle,
+          distance - arm.radii[shape],
+          at - arm.radii[shape] * direction,
+          point,
+          direction,
+          velocity};
+}
+
+// The nearest of those found, as many as there is room for, by shape and distance.
+void hand_out(const std::vector<Contact>& found, std::vector<std::size_t>& order, std::span<Contact> out) {
+  const auto nearer = [&](std::size_t a, std::size_t b) {
+    return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
+  };
+  order.resize(found.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (out.size() < found.size()) {
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()), order.end(), nearer);
+    order.resize(out.size());
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return found[a].sphere != found[b].sphere ? found[a].sphere < found[b].sphere : nearer(a, b);
+  });
+  for (std::size_t i = 0; i < order.size(); ++i) out[i] = found[order[i]];
+}
+
 }  // namespace
 
 Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
@@ -120,81 +149,65 @@ int Environment::see(const Shapes& arm, double time_s, std::span<std::uint8_t> s
 
 std::size_t Environment::closest(const Shapes& arm, double influence, double time_s, Scratch& scratch,
                                  std::span<Contact> out, View view, std::span<const std::uint8_t> seen) const {
-  auto& found = scratch.found_;
-  found.clear();
+  scratch.found_.clear();
+  if (view != View::hidden) {
+    find_in(map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
+    if (summary_.unknown == UnknownPolicy::block)
+      find_in(unknown_, Contact::unknown, arm, influence, scratch.unknown_, scratch.found_);
+  }
+  for (std::size_t k = 0; k < obstacles_.size(); ++k)
+    if (shown(k, time_s, view, seen)) find_on(k, arm, influence, time_s, scratch.found_);
+  hand_out(scratch.found_, scratch.order_, out);
+  return scratch.found_.size();
+}
+
+void Environment::find_in(const MapField& field, int id, const Shapes& arm, double influence, MapField::Scratch& room,
+                          std::vector<Contact>& found) const {
+  if (field.empty()) return;
   std::array<BoxHit, points_per_sphere> hits;
   std::array<SegmentHit, points_per_sphere> axis_hits;
-  // `at`: a sphere's centre, a capsule's nearest axis point
-  const auto add = [&](std::size_t shape, int obstacle, const Eigen::Vector3d& at, double distance,
-                       const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
-                       const Eigen::Vector3d& velocity) {
-    found.push_back({static_cast<int>(shape), obstacle, distance - arm.radii[shape], at - arm.radii[shape] * direction,
-                     point, direction, velocity});
-  };
-  const auto add_boxes = [&](const MapField& field, MapField::Scratch& room, int id, std::size_t shape) {
-    if (field.empty()) return;
+  for (std::size_t shape = 0; shape < arm.size(); ++shape) {
     const double limit = influence + arm.radii[shape];
-    const auto add_hit = [&](const BoxHit& hit, const Eigen::Vector3d& at) {
-      add(shape, id, at, hit.distance, map_pose_ * hit.point, map_pose_.R() * hit.direction, Eigen::Vector3d::Zero());
-    };
-    if (arm.is_capsule(shape)) {
-      const std::size_t count =
-          field.several(map_pose_inverse_ * arm.from(shape), map_pose_inverse_ * arm.to(shape), limit, room, axis_hits);
-      for (std::size_t i = 0; i < count; ++i) add_hit(axis_hits[i], map_pose_ * axis_hits[i].axis_point);
-    } else {
-      const std::size_t count = field.several(map_pose_inverse_ * arm.centers[shape], limit, room, hits);
-      for (std::size_t i = 0; i < count; ++i) add_hit(hits[i], arm.centers[shape]);
-    }
-  };
-  for (std::size_t shape = 0; view != View::hidden && shape < arm.size(); ++shape) {
-    add_boxes(map_, scratch.map_, Contact::map, shape);
-    if (summary_.unknown == UnknownPolicy::block) add_boxes(unknown_, scratch.unknown_, Contact::unknown, shape);
-  }
-  for (std::size_t k = 0; k < obstacles_.size(); ++k) {
-    if (!shown(k, time_s, view, seen)) continue;
-    const Obstacle& obstacle = obstacles_[k];
-    const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
-    const double ball = bounding_radius(obstacle);
-    for (std::size_t shape = 0; shape < arm.size(); ++shape) {
-      const bool capsule = arm.is_capsule(shape);
-      const double limit = influence + arm.radii[shape];
-      const double near = limit + ball + (capsule ? arm.half_axes[shape].norm() : 0.0);
-      if ((arm.centers[shape] - at).squaredNorm() > near * near) continue;
-      const auto add_hit = [&](const SurfacePoint& hit, const Eigen::Vector3d& from) {
-        if (hit.distance <= limit)
-          add(shape, static_cast<int>(k), from, hit.distance, hit.point, hit.direction, velocity);
-      };
-      if (!capsule) {
-        add_hit(closest_on(obstacle, at, arm.centers[shape]), arm.centers[shape]);
-        continue;
-      }
-      // a capsule that lies along an obstacle is near it at its ends, too
-      const Eigen::Vector3d from = arm.from(shape), to = arm.to(shape);
-      const AxisPoint nearest = closest_on(obstacle, at, from, to);
-      add_hit(nearest, nearest.axis_point);
-      const double elsewhere = elsewhere_share * 2.0 * arm.half_axes[shape].norm();
-      for (const Eigen::Vector3d& end : {from, to})
-        if ((end - nearest.axis_point).squaredNorm() > elsewhere * elsewhere)
-          add_hit(closest_on(obstacle, at, end), end);
+    const bool capsule = arm.is_capsule(shape);
+    const std::size_t count = capsule ? field.several(map_pose_inverse_ * arm.from(shape),
+                                                      map_pose_inverse_ * arm.to(shape), limit, room, axis_hits)
+                                      : field.several(map_pose_inverse_ * arm.centers[shape], limit, room, hits);
+    for (std::size_t i = 0; i < count; ++i) {
+      const BoxHit& hit = capsule ? axis_hits[i] : hits[i];
+      const Eigen::Vector3d at = capsule ? map_pose_ * axis_hits[i].axis_point : arm.centers[shape];
+      found.push_back(contact_of(arm, shape, id, at, hit.distance, map_pose_ * hit.point, map_pose_.R() * hit.direction,
+                                 Eigen::Vector3d::Zero()));
     }
   }
+}
 
-  auto& order = scratch.order_;
-  order.resize(found.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  if (out.size() < found.size()) {
-    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()), order.end(),
-                     [&](std::size_t a, std::size_t b) {
-                       return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
-                     });
-    order.resize(out.size());
+void Environment::find_on(std::size_t k, const Shapes& arm, double influence, double time_s,
+                          std::vector<Contact>& found) const {
+  const Obstacle& obstacle = obstacles_[k];
+  const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
+  const double ball = bounding_radius(obstacle);
+  for (std::size_t shape = 0; shape < arm.size(); ++shape) {
+    const bool capsule = arm.is_capsule(shape);
+    const double limit = influence + arm.radii[shape];
+    const double near = limit + ball + (capsule ? arm.half_axes[shape].norm() : 0.0);
+    if ((arm.centers[shape] - at).squaredNorm() > near * near) continue;
+    const auto add = [&](const SurfacePoint& hit, const Eigen::Vector3d& from) {
+      if (hit.distance <= limit)
+        found.push_back(
+            contact_of(arm, shape, static_cast<int>(k), from, hit.distance, hit.point, hit.direction, velocity));
+    };
+    if (!capsule) {
+      add(closest_on(obstacle, at, arm.centers[shape]), arm.centers[shape]);
+      continue;
+    }
+    // a capsule that lies along an obstacle is near it at its ends, too
+    const Eigen::Vector3d from = arm.from(shape), to = arm.to(shape);
+    const AxisPoint nearest = closest_on(obstacle, at, from, to);
+    add(nearest, nearest.axis_point);
+    const double elsewhere = elsewhere_share * 2.0 * arm.half_axes[shape].norm();
+    for (const Eigen::Vector3d& end : {from, to})
+      if ((end - nearest.axis_point).squaredNorm() > elsewhere * elsewhere) add(closest_on(obstacle, at, end), end);
   }
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    if (found[a].sphere != found[b].sphere) return found[a].sphere < found[b].sphere;
-    return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
-  });
-  for (std::size_t i = 0; i < order.size(); ++i) out[i] = found[order[i]];
-  return found.size();
 }
 
 double Environment::clearance(const Shapes& arm, double time_s, double limit, View view,

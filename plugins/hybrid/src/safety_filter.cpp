@@ -11,6 +11,14 @@ namespace {
 // A pass that moves x by less than this in the metric changes nothing that matters [√J].
 constexpr double settled = 1e-6;
 
+// Raises or lowers one multiplier by what its row lacks; returns the change.
+double relax(double& lambda, double lack, double weight) {
+  const double next = std::max(0.0, lambda + lack * weight);
+  const double change = next - lambda;
+  lambda = next;
+  return change;
+}
+
 }  // namespace
 
 SafetyFilter::SafetyFilter(int dof, int max_rows)
@@ -80,74 +88,90 @@ double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from)
 
 SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
   Report report;
-  const auto n = x.size();
   Mx_.noalias() = *M_ * x;
   report.energy_before_J = 0.5 * x.dot(Mx_);
   for (auto* lambda : {&box_lambda_low_, &box_lambda_high_, &momentum_lambda_low_, &momentum_lambda_high_})
     lambda->setZero();
   for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
 
-  // Raises or lowers one multiplier by what its row lacks; returns the change.
-  const auto relax = [](double& lambda, double lack, double weight) {
-    const double next = std::max(0.0, lambda + lack * weight);
-    const double change = next - lambda;
-    lambda = next;
-    return change;
-  };
   for (report.passes = 1; report.passes <= max_passes; ++report.passes) {
-    double moved = 0.0;  // squared, in the metric
-    for (int i = 0; i < count_; ++i) {
-      auto& row = rows_[static_cast<std::size_t>(i)];
-      const double change = relax(row.lambda, row.b - a_.col(i).dot(x), row.weight);
-      if (change == 0.0) continue;
-      x.noalias() += change * Wa_.col(i);
-      moved = std::max(moved, change * change / row.weight);
-    }
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const double weight = 1.0 / (*W_)(k, k);
-      for (const bool low : {true, false}) {
-        const double lack = low ? lower_[k] - x[k] : x[k] - upper_[k];
-        if (!std::isfinite(lack)) continue;
-        const double change = relax(low ? box_lambda_low_[k] : box_lambda_high_[k], lack, weight);
-        if (change == 0.0) continue;
-        x.noalias() += (low ? change : -change) * W_->col(k);
-        moved = std::max(moved, change * change / weight);
-      }
-    }
-    for (Eigen::Index k = 0; has_momentum_box_ && k < n; ++k) {
-      const double weight = 1.0 / (*M_)(k, k);
-      for (const bool low : {true, false}) {
-        const double p = M_->col(k).dot(x);
-        const double lack = low ? momentum_lower_[k] - p : p - momentum_upper_[k];
-        if (!std::isfinite(lack)) continue;
-        const double change = relax(low ? momentum_lambda_low_[k] : momentum_lambda_high_[k], lack, weight);
-        if (change == 0.0) continue;
-        x[k] += low ? change : -change;  // M⁻¹ (M e_k)
-        moved = std::max(moved, change * change / weight);
-      }
-    }
+    double moved = pass_rows(x);
+    moved = std::max(moved, pass_box(x));
+    if (has_momentum_box_) moved = std::max(moved, pass_momentum_box(x));
     if (moved < settled * settled) break;
   }
   report.passes = std::min(report.passes, max_passes);
 
   for (int i = 0; i < count_; ++i) {
     const auto& row = rows_[static_cast<std::size_t>(i)];
-    if (row.b > 0.0) report.recovery_J += row.lambda * row.b;
     const double along = a_.col(i).dot(x);
     if (row.floor <= 0.0 && along < row.floor) report.scale = std::min(report.scale, row.floor / along);
   }
-  for (Eigen::Index k = 0; k < n; ++k) {
-    report.recovery_J += std::max(0.0, box_lambda_low_[k] > 0.0 ? box_lambda_low_[k] * lower_[k] : 0.0) +
-                         std::max(0.0, box_lambda_high_[k] > 0.0 ? -box_lambda_high_[k] * upper_[k] : 0.0);
-    if (has_momentum_box_)
-      report.recovery_J +=
-          std::max(0.0, momentum_lambda_low_[k] > 0.0 ? momentum_lambda_low_[k] * momentum_lower_[k] : 0.0) +
-          std::max(0.0, momentum_lambda_high_[k] > 0.0 ? -momentum_lambda_high_[k] * momentum_upper_[k] : 0.0);
-  }
+  report.recovery_J = recovery();
   if (report.scale < 1.0) x *= report.scale;
   Mx_.noalias() = *M_ * x;
   report.energy_after_J = 0.5 * x.dot(Mx_);
   return report;
+}
+
+double SafetyFilter::pass_rows(Eigen::VectorXd& x) {
+  double moved = 0.0;
+  for (int i = 0; i < count_; ++i) {
+    auto& row = rows_[static_cast<std::size_t>(i)];
+    const double change = relax(row.lambda, row.b - a_.col(i).dot(x), row.weight);
+    if (change == 0.0) continue;
+    x.noalias() += change * Wa_.col(i);
+    moved = std::max(moved, change * change / row.weight);
+  }
+  return moved;
+}
+
+double SafetyFilter::pass_box(Eigen::VectorXd& x) {
+  double moved = 0.0;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double weight = 1.0 / (*W_)(k, k);
+    for (const bool low : {true, false}) {
+      const double lack = low ? lower_[k] - x[k] : x[k] - upper_[k];
+      if (!std::isfinite(lack)) continue;
+      const double change = relax(low ? box_lambda_low_[k] : box_lambda_high_[k], lack, weight);
+      if (change == 0.0) continue;
+      x.noalias() += (low ? change : -change) * W_->col(k);
+      moved = std::max(moved, change * change / weight);
+    }
+  }
+  return moved;
+}
+
+double SafetyFilter::pass_momentum_box(Eigen::VectorXd& x) {
+  double moved = 0.0;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double weight = 1.0 / (*M_)(k, k);
+    for (const bool low : {true, false}) {
+      const double p = M_->col(k).dot(x);
+      const double lack = low ? momentum_lower_[k] - p : p - momentum_upper_[k];
+      if (!std::isfinite(lack)) continue;
+      const double change = relax(low ? momentum_lambda_low_[k] : momentum_lambda_high_[k], lack, weight);
+      if (change == 0.0) continue;
+      x[k] += low ? change : -change;  // M⁻¹ (M e_k)
+      moved = std::max(moved, change * change / weight);
+    }
+  }
+  return moved;
+}
+
+double SafetyFilter::recovery() const {
+  const auto given = [](double lambda, double bound) { return std::max(0.0, lambda > 0.0 ? lambda * bound : 0.0); };
+  double sum = 0.0;
+  for (int i = 0; i < count_; ++i) {
+    const auto& row = rows_[static_cast<std::size_t>(i)];
+    if (row.b > 0.0) sum += row.lambda * row.b;
+  }
+  for (Eigen::Index k = 0; k < lower_.size(); ++k) {
+    sum += given(box_lambda_low_[k], lower_[k]) + given(box_lambda_high_[k], -upper_[k]);
+    if (has_momentum_box_)
+      sum += given(momentum_lambda_low_[k], momentum_lower_[k]) + given(momentum_lambda_high_[k], -momentum_upper_[k]);
+  }
+  return sum;
 }
 
 }  // namespace hamelin::hybrid

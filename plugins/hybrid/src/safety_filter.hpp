@@ -48,6 +48,12 @@ class SafetyFilter {
   struct Row {
     double b = 0.0, floor = 0.0, weight = 0.0, lambda = 0.0;
   };
+  /// One pass over rows, box or momentum box; the largest square of a move of x in the metric.
+  double pass_rows(Eigen::VectorXd& x);
+  double pass_box(Eigen::VectorXd& x);
+  double pass_momentum_box(Eigen::VectorXd& x);
+  /// Σ λ_i b_i over what has b_i > 0.
+  [[nodiscard]] double recovery() const;
 
   const Eigen::MatrixXd* M_ = nullptr;
   const Eigen::MatrixXd* W_ = nullptr;

@@ -120,6 +120,10 @@ class Environment {
 
  private:
   [[nodiscard]] bool shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const;
+  /// Adds the points of a field, or of obstacle k, that are within `influence` of the arm.
+  void find_in(const MapField& field, int id, const Shapes& arm, double influence, MapField::Scratch& room,
+               std::vector<Contact>& found) const;
+  void find_on(std::size_t k, const Shapes& arm, double influence, double time_s, std::vector<Contact>& found) const;
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s, double limit);
 
   geometry::SE3 map_pose_, map_pose_inverse_;
