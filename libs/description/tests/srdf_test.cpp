@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"

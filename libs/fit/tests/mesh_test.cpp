@@ -72,7 +72,7 @@ TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]"
 TEST_CASE("files that are no mesh end in one line with their name", "[fit][unit]") {
   const test::TemporaryFolder scratch;
   Mesh bad = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
-  CHECK_THAT(mesh_error((scratch.path() / "absent.stl")),
+  CHECK_THAT(mesh_error(scratch.path() / "absent.stl"),
              Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
   CHECK_THAT(mesh_error(scratch.put("junk.stl", "this is no mesh")), Catch::Contains("junk.stl: not a mesh"));
   CHECK_THAT(mesh_error(scratch.put("empty.obj", "")), Catch::Contains("empty.obj: not a mesh"));

@@ -133,8 +133,8 @@ TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and
     return robot(collision("<mesh filename=\"" + file + "\" scale=\"0.001 0.001 0.001\"/>", "<origin xyz=\"1 0 0\"/>"));
   };
   FitOptions by_package, by_folder;
-  by_package.meshes.packages = {{"some_package", (scratch.path() / "pkg")}};
-  by_folder.meshes.folders = {(scratch.path() / "pkg")};
+  by_package.meshes.packages = {{"some_package", scratch.path() / "pkg"}};
+  by_folder.meshes.folders = {scratch.path() / "pkg"};
   struct Way {
     std::string name;
     FitOptions options;
@@ -159,7 +159,7 @@ TEST_CASE("meshes are found by package, by folder and beside the URDF; scale and
   const std::string missing = error_of(scratch.put("robots/r.urdf", mesh("package://gone/meshes/gone.stl")), by_folder);
   CHECK_THAT(missing, Catch::Contains("r.urdf: line 5: link 'arm'") &&
                           Catch::Contains("'package://gone/meshes/gone.stl'") &&
-                          Catch::Contains(((scratch.path() / "robots") / "gone/meshes/gone.stl").string()));
+                          Catch::Contains((scratch.path() / "robots/gone/meshes/gone.stl").string()));
   CHECK(missing.find('\n') == std::string::npos);
 }
 

@@ -4,7 +4,8 @@
 
 namespace hamelin::integration {
 
-/// Whether all numbers are finite: 0 x is NaN where x is not. A sum, which is vectorised, since every step calls this.
+/// Whether all numbers are finite: 0 x is 0 for a finite x and NaN for any other. Every step calls this, so it is
+/// written as a sum, which the compiler vectorises.
 [[nodiscard]] inline bool all_finite(const Eigen::VectorXd& x) noexcept {
   return (0.0 * x).sum() == 0.0;
 }

@@ -10,7 +10,9 @@ Frames::Frames(const World& world)
       ws_(world.model),
       arm_(world.model),
       scratch_(world.environment, world.model.shapes().size()),
-      found_(world.environment.contacts_max(world.model.shapes().size())) {}
+      found_(world.environment.contacts_max(world.model.shapes().size())),
+      J_(3, world.model.dof()),
+      acceleration_(world.model.dof()) {}
 
 void Frames::take(const Frame& frame) {
   t_.push_back(frame.time_s);
@@ -46,18 +48,16 @@ void Frames::take_contacts(const Frame& frame) {
 
 void Frames::take_forces(const Frame& frame) {
   const model::Model& model = world_.model;
-  dynamics::Matrix3Xd J(3, model.dof());
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   if (std::any_of(frame.channels.begin(), frame.channels.end(), [](const auto& x) { return x.size() > 0; })) {
-    dynamics::point_jacobian(model, ws_, model.robot().tip.link, dynamics::tip_pose(model, ws_).p(), J);
-    inertia = dynamics::operational_inertia(model, ws_, frame.q, J);
+    dynamics::point_jacobian(model, ws_, model.robot().tip.link, dynamics::tip_pose(model, ws_).p(), J_);
+    inertia = dynamics::operational_inertia(model, ws_, frame.q, J_);
   }
-  Eigen::VectorXd acceleration(model.dof());
   for (std::size_t i = 0; i < channel_names.size(); ++i) {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     if (frame.channels[i].size() > 0) {
-      dynamics::solve_mass(model, ws_, frame.q, frame.channels[i], acceleration);
-      force = inertia * (J * acceleration);
+      dynamics::solve_mass(model, ws_, frame.q, frame.channels[i], acceleration_);
+      force = inertia * (J_ * acceleration_);
       acts_[i] = acts_[i] || !force.isZero(0.0);
     }
     forces_[i].insert(forces_[i].end(), force.begin(), force.end());

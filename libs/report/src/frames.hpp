@@ -41,6 +41,8 @@ class Frames {
   scene::PlacedShapes arm_;
   scene::Environment::Scratch scratch_;
   std::vector<scene::Contact> found_;
+  dynamics::Matrix3Xd J_;
+  Eigen::VectorXd acceleration_;
   std::vector<double> t_, q_, clearances_, points_;
   std::vector<std::uint16_t> goal_index_;
   std::vector<std::uint8_t> counts_;

@@ -102,7 +102,7 @@ FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watc
   channels_.coulomb = motion.coulomb;
   channels_.coulomb_speed = motion.coulomb_speed;
   if (controlled_) state_.step_next = motion.step_s;
-  report_.step_s = motion.step_s;
+  report_.step_s = motion.step_s;  // for the look at the first node
   write_header(watch);
 }
 
@@ -135,7 +135,7 @@ void FreeRun::look(bool last) {
   recorder_.node(ledger_);
   if (!recorder_.logging()) return;  // the velocity costs a sweep, and nothing else here asks for it
   integrator_->velocity(state_, v_);
-  recorder_.observe(std::numeric_limits<double>::infinity(), true, v_, report_.step_s);
+  recorder_.observe(infinity, true, v_, report_.step_s);
   if (recorder_.wants_tick(state_.k) || last) log_tick();
 }
 

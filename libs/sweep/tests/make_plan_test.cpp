@@ -52,7 +52,7 @@ class Bench {
                          {"goal", away},
                          {"obstacles", {box({0.12, 0.31, 0.55}), box({0.2, 0.5, 0.5})}}});
   }
-  void put(const std::string& file, const Json& document) const { std::ofstream(root_ / file) << document.dump(); }
+  void put(const std::string& file, const Json& document) const { folder_.put(file, document.dump()); }
   [[nodiscard]] PlanOptions problems() const {
     PlanOptions options;
     options.files = {root_ / "free.json", root_ / "blocked.json"};

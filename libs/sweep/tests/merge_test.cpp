@@ -1,7 +1,5 @@
 #include "hamelin/sweep/merge.hpp"
 
-#include <unistd.h>
-
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>

@@ -19,13 +19,31 @@ double relax(double& lambda, double lack, double weight) {
   return change;
 }
 
+// One pass over a box: `number` is what bound k holds, `move` changes it along its row. metric(k, k) is the row's size.
+template <class Number, class Move>
+double pass(SafetyFilter::Box& box, const Eigen::MatrixXd& metric, Number number, Move move) {
+  double moved = 0.0;
+  for (Eigen::Index k = 0; k < box.lower.size(); ++k) {
+    const double weight = 1.0 / metric(k, k);
+    for (const bool low : {true, false}) {
+      const double lack = low ? box.lower[k] - number(k) : number(k) - box.upper[k];
+      if (!std::isfinite(lack)) continue;
+      const double change = relax(low ? box.lambda_low[k] : box.lambda_high[k], lack, weight);
+      if (change == 0.0) continue;
+      move(k, low ? change : -change);
+      moved = std::max(moved, change * change / weight);
+    }
+  }
+  return moved;
+}
+
 }  // namespace
 
 SafetyFilter::SafetyFilter(int dof, int max_rows)
     : a_(dof, max_rows), Wa_(dof, max_rows), rows_(static_cast<std::size_t>(max_rows)) {
-  for (auto* x : {&lower_, &upper_, &momentum_lower_, &momentum_upper_, &box_lambda_low_, &box_lambda_high_,
-                  &momentum_lambda_low_, &momentum_lambda_high_, &Mx_, &step_, &Mfrom_})
-    *x = Eigen::VectorXd::Zero(dof);
+  for (Box* box : {&box_, &momentum_box_})
+    for (auto* x : {&box->lower, &box->upper, &box->lambda_low, &box->lambda_high}) *x = Eigen::VectorXd::Zero(dof);
+  for (auto* x : {&Mx_, &step_, &Mfrom_}) *x = Eigen::VectorXd::Zero(dof);
 }
 
 void SafetyFilter::begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W) {
@@ -34,8 +52,8 @@ void SafetyFilter::begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W) {
   count_ = 0;
   has_momentum_box_ = false;
   constexpr double none = std::numeric_limits<double>::infinity();
-  lower_.setConstant(-none);
-  upper_.setConstant(none);
+  box_.lower.setConstant(-none);
+  box_.upper.setConstant(none);
 }
 
 bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
@@ -49,13 +67,13 @@ bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
 }
 
 void SafetyFilter::set_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
-  lower_ = lower;
-  upper_ = upper;
+  box_.lower = lower;
+  box_.upper = upper;
 }
 
 void SafetyFilter::set_momentum_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
-  momentum_lower_ = lower;
-  momentum_upper_ = upper;
+  momentum_box_.lower = lower;
+  momentum_box_.upper = upper;
   has_momentum_box_ = true;
 }
 
@@ -72,17 +90,21 @@ double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from)
   step_.noalias() = *W_ * a;
   double along = std::numeric_limits<double>::infinity();
   for (Eigen::Index k = 0; k < n; ++k) {
-    along = std::min(along, share(from[k], step_[k], lower_[k], upper_[k]));
-    if (has_momentum_box_) along = std::min(along, share(Mfrom_[k], a[k], momentum_lower_[k], momentum_upper_[k]));
+    along = std::min(along, share(from[k], step_[k], box_.lower[k], box_.upper[k]));
+    if (has_momentum_box_)
+      along = std::min(along, share(Mfrom_[k], a[k], momentum_box_.lower[k], momentum_box_.upper[k]));
   }
   const double size = a.dot(step_), by_row = size > 0.0 ? along * size : 0.0;
 
   for (Eigen::Index k = 0; k < n; ++k)
-    step_[k] = a[k] > 0.0 ? std::max(0.0, upper_[k] - from[k]) : a[k] < 0.0 ? std::min(0.0, lower_[k] - from[k]) : 0.0;
+    step_[k] = a[k] > 0.0   ? std::max(0.0, box_.upper[k] - from[k])
+               : a[k] < 0.0 ? std::min(0.0, box_.lower[k] - from[k])
+                            : 0.0;
   if (!step_.allFinite()) return by_row;
   double to_corner = 1.0;
   for (Eigen::Index k = 0; has_momentum_box_ && k < n; ++k)
-    to_corner = std::min(to_corner, share(Mfrom_[k], M_->col(k).dot(step_), momentum_lower_[k], momentum_upper_[k]));
+    to_corner =
+        std::min(to_corner, share(Mfrom_[k], M_->col(k).dot(step_), momentum_box_.lower[k], momentum_box_.upper[k]));
   return std::max(by_row, to_corner * a.dot(step_));
 }
 
@@ -90,7 +112,7 @@ SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
   Report report;
   Mx_.noalias() = *M_ * x;
   report.energy_before_J = 0.5 * x.dot(Mx_);
-  for (auto* lambda : {&box_lambda_low_, &box_lambda_high_, &momentum_lambda_low_, &momentum_lambda_high_})
+  for (auto* lambda : {&box_.lambda_low, &box_.lambda_high, &momentum_box_.lambda_low, &momentum_box_.lambda_high})
     lambda->setZero();
   for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
 
@@ -127,49 +149,26 @@ double SafetyFilter::pass_rows(Eigen::VectorXd& x) {
 }
 
 double SafetyFilter::pass_box(Eigen::VectorXd& x) {
-  double moved = 0.0;
-  for (Eigen::Index k = 0; k < x.size(); ++k) {
-    const double weight = 1.0 / (*W_)(k, k);
-    for (const bool low : {true, false}) {
-      const double lack = low ? lower_[k] - x[k] : x[k] - upper_[k];
-      if (!std::isfinite(lack)) continue;
-      const double change = relax(low ? box_lambda_low_[k] : box_lambda_high_[k], lack, weight);
-      if (change == 0.0) continue;
-      x.noalias() += (low ? change : -change) * W_->col(k);
-      moved = std::max(moved, change * change / weight);
-    }
-  }
-  return moved;
+  return pass(
+      box_, *W_, [&](Eigen::Index k) { return x[k]; },
+      [&](Eigen::Index k, double change) { x.noalias() += change * W_->col(k); });
 }
 
 double SafetyFilter::pass_momentum_box(Eigen::VectorXd& x) {
-  double moved = 0.0;
-  for (Eigen::Index k = 0; k < x.size(); ++k) {
-    const double weight = 1.0 / (*M_)(k, k);
-    for (const bool low : {true, false}) {
-      const double p = M_->col(k).dot(x);
-      const double lack = low ? momentum_lower_[k] - p : p - momentum_upper_[k];
-      if (!std::isfinite(lack)) continue;
-      const double change = relax(low ? momentum_lambda_low_[k] : momentum_lambda_high_[k], lack, weight);
-      if (change == 0.0) continue;
-      x[k] += low ? change : -change;  // M⁻¹ (M e_k)
-      moved = std::max(moved, change * change / weight);
-    }
-  }
-  return moved;
+  return pass(
+      momentum_box_, *M_, [&](Eigen::Index k) { return M_->col(k).dot(x); },
+      [&](Eigen::Index k, double change) { x[k] += change; });  // M⁻¹ (M e_k)
 }
 
 double SafetyFilter::recovery() const {
-  const auto given = [](double lambda, double bound) { return std::max(0.0, lambda > 0.0 ? lambda * bound : 0.0); };
   double sum = 0.0;
   for (int i = 0; i < count_; ++i) {
     const auto& row = rows_[static_cast<std::size_t>(i)];
     if (row.b > 0.0) sum += row.lambda * row.b;
   }
-  for (Eigen::Index k = 0; k < lower_.size(); ++k) {
-    sum += given(box_lambda_low_[k], lower_[k]) + given(box_lambda_high_[k], -upper_[k]);
-    if (has_momentum_box_)
-      sum += given(momentum_lambda_low_[k], momentum_lower_[k]) + given(momentum_lambda_high_[k], -momentum_upper_[k]);
+  for (Eigen::Index k = 0; k < box_.lower.size(); ++k) {
+    sum += box_.recovery(k);
+    if (has_momentum_box_) sum += momentum_box_.recovery(k);
   }
   return sum;
 }

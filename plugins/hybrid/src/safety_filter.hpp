@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 namespace hamelin::hybrid {
@@ -29,6 +30,16 @@ class SafetyFilter {
   /// towards the box's far corner. Never below zero.
   [[nodiscard]] double room(const Eigen::VectorXd& a, const Eigen::VectorXd& from);
 
+  /// Bounds joint by joint, each with its multiplier.
+  struct Box {
+    Eigen::VectorXd lower, upper, lambda_low, lambda_high;
+    /// Σ λ b over joint k's bounds with b > 0.
+    [[nodiscard]] double recovery(Eigen::Index k) const {
+      return std::max(0.0, lambda_low[k] > 0.0 ? lambda_low[k] * lower[k] : 0.0) +
+             std::max(0.0, lambda_high[k] > 0.0 ? -lambda_high[k] * upper[k] : 0.0);
+    }
+  };
+
   struct Report {
     int passes = 0;
     double energy_before_J = 0.0, energy_after_J = 0.0;  ///< ½ ũᵀMũ, ½ xᵀMx
@@ -40,8 +51,10 @@ class SafetyFilter {
 
   /// What holds x back after project(): the multiplier of row i, of joint k's box, of joint k's momentum box.
   [[nodiscard]] double row_multiplier(int i) const { return rows_[static_cast<std::size_t>(i)].lambda; }
-  [[nodiscard]] double box_multiplier(int k) const { return box_lambda_low_[k] + box_lambda_high_[k]; }
-  [[nodiscard]] double momentum_multiplier(int k) const { return momentum_lambda_low_[k] + momentum_lambda_high_[k]; }
+  [[nodiscard]] double box_multiplier(int k) const { return box_.lambda_low[k] + box_.lambda_high[k]; }
+  [[nodiscard]] double momentum_multiplier(int k) const {
+    return momentum_box_.lambda_low[k] + momentum_box_.lambda_high[k];
+  }
   [[nodiscard]] int row_count() const noexcept { return count_; }
 
  private:
@@ -61,8 +74,8 @@ class SafetyFilter {
   std::vector<Row> rows_;
   int count_ = 0;
   bool has_momentum_box_ = false;
-  Eigen::VectorXd lower_, upper_, momentum_lower_, momentum_upper_;
-  Eigen::VectorXd box_lambda_low_, box_lambda_high_, momentum_lambda_low_, momentum_lambda_high_, Mx_, step_, Mfrom_;
+  Box box_, momentum_box_;
+  Eigen::VectorXd Mx_, step_, Mfrom_;
 };
 
 }  // namespace hamelin::hybrid
