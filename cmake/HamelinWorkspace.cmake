@@ -1,64 +1,69 @@
-# What holds for every target of the workspace, set once: compiler settings, the shape of a library, installing.
+# Settings and functions for all targets of the workspace: compiler options, libraries, tests,
+# benchmarks and the installed package.
 include(CMakePackageConfigHelpers)
 
 set(CMAKE_CXX_EXTENSIONS OFF)
-set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # libraries go into plugins
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # libraries are linked into plugins
 set(CMAKE_CXX_VISIBILITY_PRESET hidden)
 set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
 set(HAMELIN_PLUGIN_DIR "${CMAKE_INSTALL_LIBDIR}/hamelin/plugins")
 set(HAMELIN_BUILD_PLUGIN_DIR "${PROJECT_BINARY_DIR}/lib/hamelin/plugins")
 
-# Sources of a target are compiled a few at a time as one ("unity"): most of the time goes into headers, which are then
-# read once. The dev preset compiles each by itself, so that a change compiles little and a missing include is seen.
-option(HAMELIN_UNITY "Compile several sources of a target as one: a full build takes a third of the time" ON)
+# A unity build compiles several sources of a target as one. Most of the time is spent on headers,
+# which are then parsed once. The dev preset compiles each source alone, so that a change recompiles
+# little and a missing include is found.
+option(HAMELIN_UNITY "Compile several sources of a target as one, in a third of the time" ON)
 set(CMAKE_UNITY_BUILD ${HAMELIN_UNITY})
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 20)
 
-# Linked as $<BUILD_INTERFACE:...> only, so that no flag of ours reaches a user of the installed package.
+# Linked as $<BUILD_INTERFACE:...> only, so that users of the package do not inherit its flags.
 add_library(hamelin_options INTERFACE)
 target_compile_features(hamelin_options INTERFACE cxx_std_20)
 if(HAMELIN_WARNINGS)
   target_compile_options(hamelin_options INTERFACE
     -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast
-    # In a unity build a local name "shadows" a global one of another file.
+    # In a unity build a local name may shadow a global name of another file.
     $<$<NOT:$<BOOL:${HAMELIN_UNITY}>>:-Wshadow>)
 else()
   target_compile_options(hamelin_options INTERFACE -w)
 endif()
 target_compile_options(hamelin_options INTERFACE
-  # GCC collects garbage less often: this saves a tenth of the time for a quarter more memory.
+  # GCC frees memory less often: this saves a tenth of the time and takes a quarter more memory.
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>
-  # Debug keeps its checks but is run by people too: light optimisation makes Eigen bearable.
+  # Debug builds keep all checks. Without light optimisation Eigen would be too slow to use.
   $<$<CONFIG:Debug>:-Og>
-  # GCC 12 sees overlapping copies where strings are joined and there are none.
+  # GCC 12 warns wrongly of overlapping copies where strings are concatenated.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<NOT:$<CONFIG:Release>>>:-Wno-restrict>
-  # Same bytes with and without FMA hardware: contraction is opt-in, per kernel.
+  # Results are the same with and without FMA hardware; kernels enable contraction one by one.
   -ffp-contract=off
   $<$<BOOL:${HAMELIN_WERROR}>:-Werror>
   $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
-# The build-id in the program is how a replay knows that it is the same build.
+# A replay recognises the same build by the build-id of the program.
 target_link_options(hamelin_options INTERFACE LINKER:--build-id=sha1 $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
 if(HAMELIN_SANITIZE)
   list(JOIN HAMELIN_SANITIZE "," _sanitizers)
-  target_compile_options(hamelin_options INTERFACE -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all
-    # GCC takes what a sanitizer adds for uses of what is not set.
+  target_compile_options(hamelin_options INTERFACE
+    -fsanitize=${_sanitizers} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    # GCC warns wrongly of uninitialised values in code that a sanitizer adds.
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(hamelin_options INTERFACE -fsanitize=${_sanitizers})
   target_compile_definitions(hamelin_options INTERFACE HAMELIN_SANITIZED)
 endif()
 
-# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen] [PRIVATE_LINKS ...]
-#                 [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD])
+# hamelin_library(NAME model [DEPS geometry ...] [SOURCES src/a.cpp ...] [LINKS Eigen3::Eigen]
+#                 [PRIVATE_LINKS ...] [PACKAGES Eigen3 ...] [TEST_LINKS hamelin::io ...] [COLD])
 #
-# PACKAGES are what find_package(hamelin COMPONENTS NAME) must find for the libraries in LINKS and PRIVATE_LINKS; tests
-# may use libraries below it, TEST_LINKS. COLD: no time is spent here that anyone waits for, so the compiler spends less
-# on it too.
-# Makes hamelin::NAME from the folder it is called in: headers in include/hamelin/NAME, tests/*_test.cpp as one
-# test program, bench/*_bench.cpp as one benchmark program. A DEP must stand above in libs/CMakeLists.txt, so the
-# order there is the dependency order and a cycle cannot be written.
+# Defines hamelin::NAME in the calling folder: headers in include/hamelin/NAME, tests/*_test.cpp as
+# one test program, bench/*_bench.cpp as one benchmark program. A DEP must precede NAME in
+# libs/CMakeLists.txt, so the order there is the dependency order and cycles are impossible.
+# PACKAGES are the packages that find_package(hamelin COMPONENTS NAME) must find for the libraries
+# in LINKS and PRIVATE_LINKS. TEST_LINKS are libraries that only the tests need; they may come later
+# than NAME. COLD marks a library that is not performance-critical and is compiled with less
+# optimisation.
 function(hamelin_library)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME" "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "COLD" "NAME"
+    "DEPS;SOURCES;LINKS;PRIVATE_LINKS;PACKAGES;TEST_LINKS;TEST_LABELS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "hamelin_library(${arg_NAME}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -79,7 +84,8 @@ function(hamelin_library)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${arg_NAME})
   foreach(dep IN LISTS arg_DEPS)
     if(NOT TARGET hamelin::${dep})
-      message(FATAL_ERROR "libs/${arg_NAME} depends on '${dep}', which does not stand above it in libs/CMakeLists.txt")
+      message(FATAL_ERROR
+        "libs/${arg_NAME} depends on '${dep}', expected it to precede ${arg_NAME} in libs/CMakeLists.txt")
     endif()
     target_link_libraries(${target} ${scope} hamelin::${dep})
   endforeach()
@@ -95,16 +101,18 @@ function(hamelin_library)
   hamelin_benchmarks(NAME ${arg_NAME} LINKS hamelin::${arg_NAME})
 endfunction()
 
-# How kernels are compiled, on top of all else (a source's own options come last). Optimised in every build, so that
-# nothing stays out of line; less so with sanitizers, whose checks multiply the code. Left to itself, GCC would copy
-# value types of many lanes through memory, and vectorise single numbers at a loss.
+# Additional compiler options of kernels; a source's own options come last. Kernels are optimised in
+# every build, so that all calls are inlined, but less with sanitizers, whose checks multiply the
+# code. With its defaults, GCC would copy value types with many lanes through memory, and vectorise
+# scalar code at a loss.
 set(HAMELIN_KERNEL_OPTIONS $<IF:$<BOOL:${HAMELIN_SANITIZE}>,-O1,-O3>
   -ffp-contract=fast -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize
   $<$<CXX_COMPILER_ID:GNU>:--param=sra-max-scalarization-size-Ospeed=4096>)
 
-# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction set of
-# core/isa.hpp. What such a source may use is said in dynamics/kernels; a test looks at the objects. Products may be
-# contracted: results are promised to the bit on one set only.
+# hamelin_isa_sources(TARGET SOURCE... [LINKS ...]): compiles each source once for every instruction
+# set of core/isa.hpp. docs/decisions/0006-instruction-sets.md says what such a source may use, and
+# a test checks the objects. Products may be contracted to FMA, because results are bit-identical on
+# one instruction set only.
 function(hamelin_isa_sources target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LINKS")
   set(sources ${arg_UNPARSED_ARGUMENTS})
@@ -118,7 +126,8 @@ function(hamelin_isa_sources target)
   set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS "${HAMELIN_KERNEL_OPTIONS}")
   foreach(name IN LISTS names)
     add_library(${target}_${name} OBJECT ${sources})
-    target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options> $<FILTER:$<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>,EXCLUDE,LINK_ONLY> ${arg_LINKS})
+    target_link_libraries(${target}_${name} PRIVATE $<BUILD_INTERFACE:hamelin_options>
+      $<FILTER:$<TARGET_PROPERTY:${target},INTERFACE_LINK_LIBRARIES>,EXCLUDE,LINK_ONLY> ${arg_LINKS})
     target_include_directories(${target}_${name} PRIVATE include)
     target_compile_definitions(${target}_${name} PRIVATE HAMELIN_ISA_NAMESPACE=isa_${name})
     target_compile_options(${target}_${name} PRIVATE ${flags_${name}})
@@ -127,9 +136,10 @@ function(hamelin_isa_sources target)
   endforeach()
 endfunction()
 
-# hamelin_tests(NAME scene LINKS hamelin::scene [LABELS slow]): tests/*_test.cpp of the calling folder as one program. The
-# tests carry the CTest labels NAME and LABELS: `threads` for what `./dev tsan` runs under the thread sanitizer.
-# Tests that need ../shared or data/ find the checkout by HAMELIN_SOURCE_DIR and skip what is absent, saying so.
+# hamelin_tests(NAME scene LINKS hamelin::scene [LABELS slow]): builds tests/*_test.cpp of the
+# calling folder as one program. The tests have the CTest labels NAME and LABELS; `./dev tsan` runs
+# the label `threads` under the thread sanitizer. HAMELIN_SOURCE_DIR tells tests where the checkout
+# is. Tests whose optional data is missing are skipped.
 function(hamelin_tests)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS;LABELS")
   file(GLOB tests CONFIGURE_DEPENDS tests/*_test.cpp)
@@ -138,7 +148,8 @@ function(hamelin_tests)
   endif()
   set(target hamelin_${arg_NAME}_tests)
   add_executable(${target} ${tests})
-  # Compiling tests takes longer than running them. At -O1 GCC takes the unset part of an optional for one that is used.
+  # Compiling tests takes longer than running them. At -O1 GCC warns wrongly of uninitialised values
+  # in std::optional.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin::io hamelin_options Catch2::Catch2WithMain)
@@ -147,10 +158,11 @@ function(hamelin_tests)
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     HAMELIN_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
     HAMELIN_TEST_PLUGIN_DIR="${HAMELIN_BUILD_PLUGIN_DIR}")
-  # Escaped often enough for the lists that the labels pass through on their way into CTest's file.
+  # The separators are escaped for each list that the labels pass through before CTest reads them.
   list(PREPEND arg_LABELS ${arg_NAME})
   list(JOIN arg_LABELS "\\\\\\\\;" labels)
-  # What a test prints whose data is not here (tests/support, scene_data.hpp): Catch2 2 knows no skipping.
+  # Catch2 2 cannot skip tests, so tests without their data print this line (tests/support,
+  # scene_data.hpp).
   catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS "${labels}"
     SKIP_REGULAR_EXPRESSION "skipped: no folder")
   if("threads" IN_LIST arg_LABELS)
@@ -158,7 +170,7 @@ function(hamelin_tests)
   endif()
 endfunction()
 
-# Debian's Catch2 main has no benchmarking compiled in, so benchmarks bring their own.
+# The Catch2 main function of Debian is compiled without benchmarking, so benchmarks have their own.
 function(hamelin_benchmarks)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS")
   file(GLOB benches CONFIGURE_DEPENDS bench/*_bench.cpp)
@@ -169,16 +181,19 @@ function(hamelin_benchmarks)
   set(target hamelin_${arg_NAME}_bench)
   add_executable(${target} ${benches} "${PROJECT_SOURCE_DIR}/cmake/bench_main.cpp")
   target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin_options Catch2::Catch2)
-  target_compile_definitions(${target} PRIVATE CATCH_CONFIG_ENABLE_BENCHMARKING HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_compile_definitions(${target} PRIVATE CATCH_CONFIG_ENABLE_BENCHMARKING
+    HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   set_property(GLOBAL APPEND PROPERTY HAMELIN_BENCHES ${target})
 endfunction()
 
-# hamelin_embed(TARGET hamelin_core FILES ${schemas}): each file's text as a string, looked up by its name.
+# hamelin_embed(TARGET hamelin_io FUNCTION name NAMESPACE namespace FILES ...): adds a function to
+# TARGET that returns the text of a file by its name.
 function(hamelin_embed)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "TARGET;FUNCTION;NAMESPACE" "FILES")
   set(source "${CMAKE_CURRENT_BINARY_DIR}/${arg_FUNCTION}.cpp")
   set(text "// Made at configure time from ${arg_FUNCTION}'s files; do not edit.\n#include <string_view>\n\n")
-  string(APPEND text "namespace ${arg_NAMESPACE} {\nstd::string_view ${arg_FUNCTION}(std::string_view name) noexcept;\n")
+  string(APPEND text "namespace ${arg_NAMESPACE} {\n"
+    "std::string_view ${arg_FUNCTION}(std::string_view name) noexcept;\n")
   string(APPEND text "std::string_view ${arg_FUNCTION}(std::string_view name) noexcept {\n")
   foreach(file IN LISTS arg_FILES)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
@@ -191,7 +206,8 @@ function(hamelin_embed)
   target_sources(${arg_TARGET} PRIVATE "${source}")
 endfunction()
 
-# One export a library, so that find_package(hamelin COMPONENTS dynamics) loads no more than what dynamics needs.
+# There is one export per library, so that find_package(hamelin COMPONENTS dynamics) loads only the
+# dependencies of dynamics.
 function(hamelin_install_package)
   get_property(HAMELIN_LIBS GLOBAL PROPERTY HAMELIN_LIBS)
   set(HAMELIN_COMPONENTS "")
@@ -207,7 +223,8 @@ function(hamelin_install_package)
   configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/hamelinConfig.cmake.in" hamelinConfig.cmake
     INSTALL_DESTINATION ${dest} PATH_VARS HAMELIN_PLUGIN_DIR)
   write_basic_package_version_file(hamelinConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake" "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake"
+    "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
     "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" DESTINATION ${dest})
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/schema" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")

@@ -1,4 +1,4 @@
-// A planner that does nothing, and at a given tick what must end a run.
+// A planner that does nothing until a given tick, where it breaks a rule that must end the run.
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -21,13 +21,14 @@ constexpr const char* schema = R"({
 class Breaking : public Planner {
  public:
   Breaking(const Host&, const Setup&, const hamelin::Json& params)
-      : at_tick_(params.at("at_tick").get<std::uint64_t>()), how_(params.at("how").get<std::string>()) {}
+      : at_tick_(params.at("at_tick").get<std::uint64_t>()),
+        how_(params.at("how").get<std::string>()) {}
 
   void tick(const Tick& tick, Command& command) override {
     if (tick.k() != at_tick_) return;
     if (how_ == "throw") throw std::runtime_error("out of ideas");
     if (how_ == "nan") command.held_torque()[0] = std::numeric_limits<double>::quiet_NaN();
-    if (how_ == "give up") command.give_up("no way on");
+    if (how_ == "give up") command.give_up("no path to the goal");
   }
 
  private:

@@ -1,4 +1,5 @@
-// A planner that moves as it is told, books what it is told, and checks what the host shows and answers.
+// A planner that commands torques, velocities and accounts given by parameters, and checks the
+// host's contacts and answers.
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -28,7 +29,9 @@ constexpr const char* schema = R"({
 
 class Probe : public Planner {
  public:
-  static double influence_m(const hamelin::Json& params) { return params.at("influence_m").get<double>(); }
+  static double influence_m(const hamelin::Json& params) {
+    return params.at("influence_m").get<double>();
+  }
 
   Probe(const Host& host, const Setup& setup, const hamelin::Json& params)
       : host_(host),
@@ -44,8 +47,9 @@ class Probe : public Planner {
         self_(100) {
     std::string rates = "none";
     if (const auto rate = setup.effort_rate_max()) rates = std::to_string((*rate)[0]);
-    host.info("sampled " + std::to_string(setup.sampled() ? 1 : 0) + ", delay " + std::to_string(setup.delay_s()) +
-              ", rate " + rates + ", path " + std::to_string(setup.path(setup.goal(0)).cols()));
+    host.info("sampled " + std::to_string(setup.sampled() ? 1 : 0) + ", delay " +
+              std::to_string(setup.delay_s()) + ", rate " + rates + ", path " +
+              std::to_string(setup.path(setup.goal(0)).cols()));
   }
 
   void tick(const Tick& tick, Command& command) override {
@@ -55,24 +59,27 @@ class Probe : public Planner {
       if (thought != thought_) host_.info("thought of " + std::to_string(thought) + " contacts");
       thought_ = thought;
     }
-    say_kinds(tick);
-    if (tick.contacts().size() != shown_) host_.info("shown " + std::to_string(tick.contacts().size()) + " contacts");
+    log_contact_kinds(tick);
+    if (tick.contacts().size() != shown_)
+      host_.info("shown " + std::to_string(tick.contacts().size()) + " contacts");
     shown_ = tick.contacts().size();
     const auto found = host_.closest_self({tick.q().data(), dof}, setup_.influence_m(), self_);
     const auto shown = tick.self_contacts();
-    if (found != shown.size()) throw std::runtime_error("closest_self finds another number of contacts than the tick");
+    if (found != shown.size())
+      throw std::runtime_error("closest_self and the tick have different numbers of contacts");
     for (std::size_t i = 0; i < found; ++i)
       if (std::memcmp(&self_[i], &shown[i], sizeof self_[i]) != 0)
         throw std::runtime_error("closest_self differs from the tick");
     if (torque_.size() == dof && tick.time_s() < torque_until_s_)
       command.held_torque() = ConstVectorMap(torque_.data(), setup_.dof());
-    if (velocity_.size() == dof) command.node_velocity() = ConstVectorMap(velocity_.data(), setup_.dof());
+    if (velocity_.size() == dof)
+      command.node_velocity() = ConstVectorMap(velocity_.data(), setup_.dof());
     if (tick.k() == books_at_) command.set_accounts(filter_, recovery_);
   }
 
  private:
-  /// What the contacts of the first tick are with, in one line.
-  void say_kinds(const Tick& tick) const {
+  /// Logs in one line what the contacts of the first tick are with.
+  void log_contact_kinds(const Tick& tick) const {
     if (tick.k() > 0) return;
     std::size_t map = 0, unknown = 0, obstacles = 0;
     for (const auto& contact : tick.contacts()) {
@@ -82,7 +89,8 @@ class Probe : public Planner {
         throw std::runtime_error("kind_of() and the contact disagree");
     }
     host_.info("contacts with the map " + std::to_string(map > 0 ? 1 : 0) + ", unknown space " +
-               std::to_string(unknown > 0 ? 1 : 0) + ", obstacles " + std::to_string(obstacles > 0 ? 1 : 0));
+               std::to_string(unknown > 0 ? 1 : 0) + ", obstacles " +
+               std::to_string(obstacles > 0 ? 1 : 0));
   }
 
   Host host_;
@@ -97,4 +105,5 @@ class Probe : public Planner {
 
 }  // namespace
 
-HAMELIN_PLANNER_PLUGIN(Probe, "probe", "0.0.1", "moves as it is told and checks the host", schema);
+HAMELIN_PLANNER_PLUGIN(Probe, "probe", "0.0.1", "moves as its parameters say and checks the host",
+                       schema);

@@ -15,20 +15,23 @@ inline const std::vector<std::filesystem::path> plugin_directories{HAMELIN_TEST_
                                                                    HAMELIN_TEST_ONLY_PLUGIN_DIR};
 
 /// Writes robot and scene as files, reads them as the program does, and runs.
-inline log::Result run_scene(const TemporaryFolder& folder, const Json& document, const simulation::Watch& watch = {},
+inline log::Result run_scene(const TemporaryFolder& folder, const Json& document,
+                             const simulation::Watch& watch = {},
                              const model::Robot& robot = planar4()) {
-  write_file_aside(folder.path() / "robot.json", description::robot_to_json(robot).dump(1));
-  write_file_aside(folder.path() / "scene.json", document.dump(1));
-  return simulation::run(scene::read_scene(folder.path() / "scene.json"), plugin_directories, watch);
+  write_file_atomically(folder.path() / "robot.json", description::robot_to_json(robot).dump(1));
+  write_file_atomically(folder.path() / "scene.json", document.dump(1));
+  return simulation::run(scene::read_scene(folder.path() / "scene.json"), plugin_directories,
+                         watch);
 }
 
-/// Example 5.2's arm with its tip's goal and nothing else, by apf.
+/// Example 5.2's arm and goal without obstacles, with planner apf.
 inline Json scene_52() {
   return {{"schema", "hamelin.scene/1"},
           {"robot", {{"file", "robot.json"}}},
           {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}}}},
           {"obstacles", Json::array()},
-          {"planner", {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
+          {"planner",
+           {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
           {"step_s", 0.004},
           {"duration_s", 40.0}};
 }
@@ -39,7 +42,8 @@ inline Json ball(const std::string& name, double x, double y, double radius) {
 
 inline Eigen::VectorXd vector_of(const Json& numbers) {
   Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
   return x;
 }
 

@@ -1,4 +1,5 @@
-// hamelin_cost list | CASE library|without COUNT: does one thing COUNT times, for run.sh to count instructions.
+// hamelin_cost list | CASE library|without COUNT: executes a case COUNT times; run.sh counts the
+// instructions.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -16,10 +17,10 @@ namespace {
 
 constexpr int links = 20;
 
-/// rk4 that was never told of channels; what surrounds a step is the library's.
-class Rk4Alone final : public integration::Integrator {
+/// rk4 without support for channels; the code around a step is that of the library.
+class PlainRk4 final : public integration::Integrator {
  public:
-  explicit Rk4Alone(const model::Model& model) : Integrator("rk4", model, {}) {
+  explicit PlainRk4(const model::Model& model) : Integrator("rk4", model, {}) {
     q_ = v_ = q_sum_ = v_sum_ = acceleration_ = none_ = VectorXd::Zero(model.dof());
   }
   [[nodiscard]] std::string criterion() const override { return "none"; }
@@ -28,11 +29,15 @@ class Rk4Alone final : public integration::Integrator {
  protected:
   using In = dynamics::ConstVectorRef;
   void begin(integration::State& state, const In& v0) override { state.v = v0; }
-  void node_velocity(const integration::State& state, dynamics::VectorRef v) const override { v = state.v; }
+  void node_velocity(const integration::State& state, dynamics::VectorRef v) const override {
+    v = state.v;
+  }
   void add_momentum(integration::State&, const In&) override {}
   void replace_velocity(integration::State& state, const In& v) override { state.v = v; }
-  integration::StepReport attempt(integration::State& state, const integration::Channels&, double h) override {
-    static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  integration::StepReport attempt(integration::State& state, const integration::Channels&,
+                                  double h) override {
+    static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0},
+        b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     integration::StepReport report;
     q_sum_ = state.q;
     v_sum_ = state.v;
@@ -57,28 +62,29 @@ class Rk4Alone final : public integration::Integrator {
   VectorXd q_, v_, q_sum_, v_sum_, acceleration_, none_;
 };
 
-/// Damping, friction, gyroscopic terms, held torque: a step with none of them.
+/// Steps without damping, friction, gyroscopic terms and held torque.
 void steps(bool library, long count) {
   const model::Model model(model::make_chain({links, "x,z,x", 0.2, 1.0, 0.03}));
   std::unique_ptr<integration::Integrator> integrator;
   if (library)
     integrator = integration::make_integrator("rk4", model);
   else
-    integrator = std::make_unique<Rk4Alone>(model);
+    integrator = std::make_unique<PlainRk4>(model);
   auto state = integrator->start(VectorXd::Zero(links), VectorXd::Zero(links));
   const integration::Channels nothing;
   for (long k = 0; k < count; ++k)
     if (!integrator->step(state, nothing, 1e-4).converged) std::abort();
 }
 
-/// Rotor inertia: forward or inverse dynamics of a chain without.
+/// Forward or inverse dynamics of a chain without rotor inertia.
 void dynamics_calls(bool forward, bool library, long count) {
   const model::Model model(model::make_chain({links, "x,z,x", 0.2, 1.0, 0.03}));
   dynamics::Workspace ws(model);
   const auto& chain = std::get<model::SpatialChain>(model.chain());
   const std::unique_ptr<void, decltype(&std::free)> memory(
       std::aligned_alloc(64, (cost::memory_bytes(links) + 63) / 64 * 64), std::free);
-  const VectorXd q = VectorXd::LinSpaced(links, -1.0, 1.0), v = VectorXd::LinSpaced(links, 0.5, -0.7);
+  const VectorXd q = VectorXd::LinSpaced(links, -1.0, 1.0),
+                 v = VectorXd::LinSpaced(links, 0.5, -0.7);
   const VectorXd x = VectorXd::LinSpaced(links, -2.0, 3.0);
   VectorXd y(links);
   for (long k = 0; k < count; ++k) {
@@ -97,16 +103,17 @@ void dynamics_calls(bool forward, bool library, long count) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const char* isa = std::getenv("HAMELIN_ISA")) set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
-  const std::string what = argc > 1 ? argv[1] : "list";
-  if (what == "list") {
+  if (const char* isa = std::getenv("HAMELIN_ISA"))
+    set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
+  const std::string name = argc > 1 ? argv[1] : "list";
+  if (name == "list") {
     std::puts("rk4-no-channels\nforward-no-rotors\ninverse-no-rotors");
     return 0;
   }
   const bool library = argc > 2 && std::string(argv[2]) == "library";
   const long count = argc > 3 ? std::atol(argv[3]) : 1;
-  if (what == "rk4-no-channels")
+  if (name == "rk4-no-channels")
     steps(library, count);
   else
-    dynamics_calls(what == "forward-no-rotors", library, count);
+    dynamics_calls(name == "forward-no-rotors", library, count);
 }

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# run.sh HAMELIN_COST: counts instructions a call, with and without what is not named; fails above 0.5 %.
-# The difference of two runs leaves the start of the program out.
+# run.sh HAMELIN_COST: counts the instructions per call of the library with unused features and of
+# code without them; fails if the library needs more than 0.5 % more. The difference of two runs
+# excludes the start of the program.
 set -euo pipefail
 program=$1
 few=200 many=1200
 command -v valgrind >/dev/null || { echo "valgrind not found: skipped"; exit 77; }
-export HAMELIN_ISA=x86-64 # valgrind knows no AVX-512
+export HAMELIN_ISA=x86-64 # valgrind does not support AVX-512
 
 instructions() {
   valgrind --tool=cachegrind --cache-sim=no --cachegrind-out-file=/dev/null "$program" "$@" 2>&1 |
@@ -14,7 +15,7 @@ instructions() {
 each() { echo $((($(instructions "$1" "$2" $many) - $(instructions "$1" "$2" $few)) / (many - few))); }
 
 status=0
-printf '%-20s %12s %12s %9s\n' "instructions a call" library without ratio
+printf '%-20s %12s %12s %9s\n' "instructions/call" library without ratio
 for case in $("$program" list); do
   with=$(each "$case" library)
   without=$(each "$case" without)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# run.sh SOURCE BUILD: runs a copy of SOURCE/dev in a folder of its own. What would install, configure or compile is
-# replaced by programs that do nothing but note that they were called; the demo's run is the program of BUILD.
+# run.sh SOURCE BUILD: runs a copy of SOURCE/dev in a temporary folder. Programs that install,
+# configure or compile are replaced by stubs that only record their calls. The demo runs the program
+# of BUILD.
 set -u
 source=$(realpath "$1") build=$(realpath "$2")
 work=$(mktemp -d) || exit 1
@@ -13,33 +14,34 @@ for script in tests/fuzz/run.sh docs/make_accuracy.sh; do
   chmod +x "$work/tree/$script"
 done
 
-# A PATH with what the script itself needs and nothing more, so that no tool of this machine is found by accident.
+# A PATH with only the tools that the script itself needs, so that no installed program is found by
+# accident.
 for tool in bash sh env dirname cat grep sed xargs head nproc rm cp mv mkdir mktemp; do
   ln -s "$(command -v "$tool")" "$work/system/$tool"
 done
-stub() { # NAME EXIT_CODE; notes its call
+stub() { # NAME EXIT_CODE: makes a program that records its call
   printf '#!/bin/sh\necho "%s $*" >>"%s/calls"\nexit %s\n' "$1" "$work" "$2" >"$work/stubs/$1"
   chmod +x "$work/stubs/$1"
 }
 failed=0
-expect() { # WHAT CONDITION...
+expect() { # NAME CONDITION...
   if "${@:2}"; then echo "ok      $1"; else
     echo "failed  $1 (exit code $code)"
     cat "$work/out" "$work/err" "$work/calls"
     failed=1
   fi
 }
-run() { # ARGUMENT...: ./dev ARGUMENT..., its exit code in $code
+run() { # ARGUMENT...: runs ./dev ARGUMENT... and sets $code to its exit code
   : >"$work/calls"
   code=0
   env -u CHROMIUM PATH="$work/stubs:$work/system" "$work/tree/dev" "$@" >"$work/out" 2>"$work/err" </dev/null || code=$?
 }
-said() { grep -qE -- "$1" "$work/out" "$work/err"; }
+printed() { grep -qE -- "$1" "$work/out" "$work/err"; }
 called() { grep -qE -- "$1" "$work/calls"; }
 
 refused() { # COMMAND_THAT_INSTALLS
   ((code == 2)) && ! called 'apt-get|cmake|ninja|fake' && (($(wc -l <"$work/err") == 1)) &&
-    said "^dev: missing: .*; install with $1\$"
+    printed "^dev: missing: .*; install with $1\$"
 }
 no_package_task() { # NAME COMMAND_THAT_INSTALLS ARGUMENT...
   run "${@:3}"
@@ -55,11 +57,14 @@ no_package_task format './dev setup --all' format
 installs() { ((code == 0)) && called '(apt-get|sudo .*apt-get) install .*libeigen3-dev' && ! called 'clang-tidy'; }
 run setup
 expect "setup installs what builds and tests need" installs
-installs_all() { ((code == 0)) && called 'install .*libeigen3-dev' && called 'install .*clang-format.*clang-tidy.*gcovr.*libclang-rt-dev'; }
+installs_all() {
+  ((code == 0)) && called 'install .*libeigen3-dev' &&
+    called 'install .*clang-format.*clang-tidy.*gcovr.*libclang-rt-dev'
+}
 run setup --all
 expect "setup --all installs what check, cover and fuzz need as well" installs_all
 
-# ---- All is installed; the build "makes" the program that BUILD has ----
+# ---- Everything is installed; the stubbed build provides the program of BUILD ----
 for tool in g++ cmake ninja ccache pkg-config git node npm clang man chromium; do stub "$tool" 0; done
 printf '#!/bin/sh\necho "install ok installed"\n' >"$work/stubs/dpkg-query"
 demo="$work/tree/build/demo"
@@ -69,17 +74,20 @@ ln -s "$build/lib" "$demo/lib"
 for task in check tidy; do no_package_task "$task without clang-format or clang-tidy" './dev setup --all' "$task"; done
 no_package_task "cover without gcovr" './dev setup --all' cover
 
-no_page() { ((code == 0)) && said '^outcome +reached' && said '^out/shelf.html: not made, .*run ./dev demo again' && [[ ! -e "$work/tree/out/shelf.html" ]]; }
+no_page() {
+  ((code == 0)) && printed '^outcome +reached' && [[ ! -e "$work/tree/out/shelf.html" ]] &&
+    printed '^out/shelf.html: not made, .*run ./dev demo again'
+}
 run demo
-expect "the demo succeeds without the page and says how to get it" no_page
+expect "the demo succeeds without the page and prints how to get it" no_page
 if [[ -f "$build/share/hamelin/report/page.html" ]]; then
   ln -s "$build/share/hamelin/report" "$demo/share/hamelin/report"
   page() { ((code == 0)) && [[ -s "$work/tree/out/shelf.html" ]] && ! called apt-get; }
   run demo
-  expect "the demo makes the page where the template was built" page
+  expect "the demo makes the page if its template was built" page
 fi
 
-# ---- The closing line of ./dev test: what could not run has failed, what skipped itself has not ----
+# ---- The last line of ./dev test: tests that could not run count as failed, skipped ones do not ----
 cat >"$work/stubs/ctest" <<'STUB'
 #!/bin/sh
 while [ "$1" != --output-junit ]; do shift; done
@@ -97,7 +105,8 @@ exit 8
 STUB
 chmod +x "$work/stubs/ctest"
 mkdir -p "$work/tree/build/ci"
-closes() { ((code == 8)) && [[ "$(sed -n '$p' "$work/out")" == "2 passed, 2 failed, 1 skipped" ]]; }
+prints_counts() { ((code == 8)) && [[ "$(sed -n '$p' "$work/out")" == "2 passed, 2 failed, 1 skipped" ]]; }
 run test
-expect "test closes with what passed, failed and was skipped, and with ctest's exit code" closes
+expect "test prints the counts of passed, failed and skipped tests, and returns ctest's exit code" \
+  prints_counts
 exit $failed

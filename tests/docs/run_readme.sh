@@ -1,16 +1,25 @@
 #!/bin/bash
-# run_readme.sh SOURCE_DIR PROGRAM_DIR: runs every line of README.md's ```console blocks that begins with `hamelin`, in
-# order, in one fresh folder in which data/ is the checkout's. Each must exit with 0, or the N of a comment "exit code N". Of the outputs that ```text blocks show,
-# outcomes and goals must still be printed; other figures may differ from machine to machine in their last digits.
+# run_readme.sh SOURCE_DIR PROGRAM_DIR: runs every command in README.md's ```console blocks that begins with `hamelin`,
+# in order, in a fresh folder in which data/ is the checkout's. A ```json block after "Save … as `NAME`:" is written to
+# that file first. Each command must exit with 0, or with the N of a comment "exit code N". Of the outputs that ```text
+# blocks show, outcomes and goals must be printed by some command; other figures may differ between machines.
 set -u
 source_dir=$1
+readme=$source_dir/README.md
 export PATH="$2:$PATH"
 unset HAMELIN_PLUGIN_PATH
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 ln -s "$source_dir/data" "$work/data"
 cd "$work" || exit 1
-mapfile -t commands < <(awk '/^```console/ {shown = 1; next} /^```/ {shown = 0} shown && /^hamelin / {print}' "$source_dir/README.md")
+
+awk '/^Save .* as `[^`]+`:$/ {split($0, part, "`"); file = part[2]}
+  /^```/ {json = ($0 == "```json" && file != ""); if ($0 == "```") file = ""; next}
+  json {print > file}' "$readme"
+
+# A line that ends in a backslash is continued on the next one.
+mapfile -t commands < <(sed -e ':more' -e '/\\$/{N;s/ *\\\n */ /;b more' -e '}' "$readme" |
+  awk '/^```console/ {shown = 1; next} /^```/ {shown = 0} shown && /^hamelin /')
 if [ "${#commands[@]}" -eq 0 ]; then
   echo "README.md shows no command of hamelin in a console block"
   exit 1
@@ -45,6 +54,6 @@ while IFS= read -r shown; do
     echo "failed  README.md shows '$shown', which no command printed"
     failed=1
   fi
-done < <(awk '/^```text/ {text = 1; next} /^```/ {text = 0} text' "$source_dir/README.md" |
+done < <(awk '/^```text/ {text = 1; next} /^```/ {text = 0} text' "$readme" |
   sed -nE 's/^(outcome .*|goal .* reached).*/\1/p')
 exit $failed

@@ -16,7 +16,7 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/test/temporary.hpp"
 
-/// Running the built program in a directory of its own.
+/// Runs the built program in a temporary directory.
 namespace hamelin::test {
 
 struct Output {
@@ -24,14 +24,16 @@ struct Output {
   std::string out, err;
 };
 
-/// An empty directory in which `data` is the checkout's; removed at the end.
-class Bench {
+/// A temporary working directory in which `data` links to the checkout's data; removed by the
+/// destructor.
+class Sandbox {
  public:
-  Bench() {
+  Sandbox() {
     std::filesystem::create_directory(work_);
-    std::filesystem::create_directory_symlink(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data", work_ / "data");
+    std::filesystem::create_directory_symlink(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data",
+                                              work_ / "data");
   }
-  /// Begins `hamelin arguments...` and returns its process id.
+  /// Starts `hamelin arguments...` and returns its process id.
   pid_t start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), HAMELIN_PROGRAM);
     std::vector<char*> argv;
@@ -42,7 +44,9 @@ class Bench {
       const int in = ::open("/dev/null", O_RDONLY);
       const int out = ::open((root_ / "stdout").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
       const int err = ::open((root_ / "stderr").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-      if (::dup2(in, 0) < 0 || ::dup2(out, 1) < 0 || ::dup2(err, 2) < 0 || ::chdir(work_.c_str()) != 0) ::_exit(126);
+      if (::dup2(in, 0) < 0 || ::dup2(out, 1) < 0 || ::dup2(err, 2) < 0 ||
+          ::chdir(work_.c_str()) != 0)
+        ::_exit(126);
       ::unsetenv("HAMELIN_PLUGIN_PATH");
       ::execv(HAMELIN_PROGRAM, argv.data());
       ::_exit(127);
@@ -50,12 +54,13 @@ class Bench {
     return child;
   }
 
-  /// Waits for a child; a death by signal gives −signal.
+  /// Waits for a child process. The exit code of a process ended by a signal is −signal.
   Output finish(pid_t child) {
     int status = 0;
-    if (child < 0 || ::waitpid(child, &status, 0) != child) throw std::runtime_error("no child to wait for");
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(root_ / "stdout"),
-            read_file(root_ / "stderr")};
+    if (child < 0 || ::waitpid(child, &status, 0) != child)
+      throw std::runtime_error("no child to wait for");
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
+            read_file(root_ / "stdout"), read_file(root_ / "stderr")};
   }
 
   Output run(const std::vector<std::string>& arguments) { return finish(start(arguments)); }
@@ -65,12 +70,20 @@ class Bench {
     std::filesystem::create_directories((work_ / file).parent_path());
     std::ofstream(work_ / file, std::ios::binary) << text;
   }
-  [[nodiscard]] std::filesystem::path path(const std::filesystem::path& file) const { return work_ / file; }
-  [[nodiscard]] std::string text(const std::filesystem::path& file) const { return read_file(work_ / file); }
-  [[nodiscard]] Json json(const std::filesystem::path& file) const { return read_json(work_ / file); }
-  [[nodiscard]] bool has(const std::filesystem::path& file) const { return std::filesystem::exists(work_ / file); }
+  [[nodiscard]] std::filesystem::path path(const std::filesystem::path& file) const {
+    return work_ / file;
+  }
+  [[nodiscard]] std::string text(const std::filesystem::path& file) const {
+    return read_file(work_ / file);
+  }
+  [[nodiscard]] Json json(const std::filesystem::path& file) const {
+    return read_json(work_ / file);
+  }
+  [[nodiscard]] bool has(const std::filesystem::path& file) const {
+    return std::filesystem::exists(work_ / file);
+  }
 
-  /// Names in the working directory, to see what was left behind.
+  /// The sorted paths of all files in the working directory, to find files left behind.
   [[nodiscard]] std::vector<std::string> files() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(work_))
@@ -84,9 +97,10 @@ class Bench {
   std::filesystem::path root_ = folder_.path(), work_ = root_ / "work";
 };
 
-/// Whether the templates of the pages are there, which need Node.js when hamelin is built; says so if not.
+/// Whether the templates of the pages were built, which takes Node.js; warns if not.
 inline bool pages_were_built() {
-  const auto folder = std::filesystem::path(HAMELIN_PROGRAM).parent_path().parent_path() / "share/hamelin/report";
+  const auto folder =
+      std::filesystem::path(HAMELIN_PROGRAM).parent_path().parent_path() / "share/hamelin/report";
   if (std::filesystem::exists(folder / "page.html")) return true;
   WARN("the pages were not built: skipped");
   return false;
@@ -103,10 +117,11 @@ inline std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Runs with --json, checks that standard output is one JSON document and that the exit code is as expected.
-inline Json run_json(Bench& bench, std::vector<std::string> arguments, int exit_code = 0) {
+/// Runs with --json and checks that standard output is one JSON document and the exit code is as
+/// expected.
+inline Json run_json(Sandbox& sandbox, std::vector<std::string> arguments, int exit_code = 0) {
   arguments.emplace_back("--json");
-  const Output output = bench.run(arguments);
+  const Output output = sandbox.run(arguments);
   CAPTURE(output.err);
   REQUIRE(output.exit_code == exit_code);
   return parse_json(output.out, "standard output");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes seeds with our own program and data: make_corpus.sh HAMELIN FOLDER fills FOLDER/<target>/.
-# What runs found beyond these is in corpus/, minimised.
+# make_corpus.sh HAMELIN FOLDER: fills FOLDER/<target>/ with seeds, made by the program HAMELIN and
+# from data/. The inputs that fuzzing found beyond these seeds are in corpus/, minimised.
 set -euo pipefail
 hamelin=$(realpath "$1")
 out=$2
@@ -30,10 +30,10 @@ XML
 "$hamelin" -q robot make-chain --links 3 --axes x,z,x -o "$out/robot/chain3.json"
 "$hamelin" -q robot make-chain --links 12 -o "$out/robot/chain12.json"
 for seed in 1 2 3; do
-  "$hamelin" -q scene make --clutter "$seed" --seed "$seed" --sizes 0.05,0.1 --bounds=-0.2,-0.2,0,0.2,0.2,0.2 \
-    --resolution 0.05 -o "$out/maps/clutter$seed.bt"
+  "$hamelin" -q scene make --clutter "$seed" --seed "$seed" --sizes 0.05,0.1 \
+    --bounds=-0.2,-0.2,0,0.2,0.2,0.2 --resolution 0.05 -o "$out/maps/clutter$seed.bt"
 done
-# The body of a full tree: 4 bytes of log-odds and a byte of children each.
+# The nodes of a .ot file: 4 bytes of log-odds and 1 byte of children flags each.
 printf '# Octomap OcTree file\nid OcTree\nsize 4\nres 0.1\ndata\n' >"$out/maps/small.ot"
 printf '\0\0\0\0\x01\0\0\0\0\x03\0\0\x80\x3f\0\0\0\x80\xbf\0' >>"$out/maps/small.ot"
 printf '# Octomap OcTree file\nid OcTree\nsize 1\nres 0.1\ndata\n\0\0\x80\x3f\0' >"$out/maps/one_leaf.ot"
@@ -42,6 +42,9 @@ printf '# Octomap OcTree binary file\nid ColorOcTree\nsize 2\nres 0.1\ndata\n\x0
 printf '# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n\x56\xaa' >"$out/maps/one_node.bt"
 
 "$hamelin" -q robot make-chain --links 2 -o two_link.json
-"$hamelin" -q integrate two_link.json --integrator hamel-variational --step 0.001 --duration 0.003 --log "$out/log/free.jsonl"
-"$hamelin" -q integrate two_link.json --integrator rk4 --step 0.001 --duration 0.002 --log "$out/log/rk4.jsonl.zst"
-"$hamelin" -q run "$source/data/scenes/paper_52_apf.json" --set /duration_s=0.012 --log "$out/log/run.jsonl" || true
+"$hamelin" -q integrate two_link.json --integrator hamel-variational --step 0.001 --duration 0.003 \
+  --log "$out/log/free.jsonl"
+"$hamelin" -q integrate two_link.json --integrator rk4 --step 0.001 --duration 0.002 \
+  --log "$out/log/rk4.jsonl.zst"
+"$hamelin" -q run "$source/data/scenes/paper_52_apf.json" --set /duration_s=0.012 \
+  --log "$out/log/run.jsonl" || true

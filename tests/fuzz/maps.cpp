@@ -9,15 +9,15 @@ namespace hamelin::fuzz {
 
 namespace {
 
-constexpr double whole = 281474976710656.0;  // voxels of an octree of 16 levels: 2^48
+constexpr double tree_volume = 281474976710656.0;  // voxels of an octree of 16 levels: 2^48
 
 double volume(const std::vector<scene::Cell>& cells) {
   double sum = 0.0;
   for (const scene::Cell& cell : cells) {
-    promise(cell.size > 0 && (cell.size & (cell.size - 1)) == 0, "a cell's size is a power of two");
+    require(cell.size > 0 && (cell.size & (cell.size - 1)) == 0, "a cell's size is a power of two");
     for (const auto lo : cell.lo) {
-      promise(lo >= -32768 && lo + cell.size <= 32768, "a cell lies in the tree");
-      promise((lo + 32768) % cell.size == 0, "a cell lies on its level's grid");
+      require(lo >= -32768 && lo + cell.size <= 32768, "a cell lies within the tree");
+      require((lo + 32768) % cell.size == 0, "a cell lies on its level's grid");
     }
     sum += std::pow(static_cast<double>(cell.size), 3);
   }
@@ -36,28 +36,30 @@ void maps(std::string_view bytes) {
   if (checked && header.resolution > 0.5) options.scale = 0.001;
   if (checked && header.resolution < 0.001) options.scale = 1000.0;
   const bool read = accepts(file, [&] { map = scene::map_from_bytes(bytes, file, options); });
-  promise(read == checked, "a map is read if and only if its bytes are good");
+  require(read == checked, "a map is read if and only if its bytes pass the check");
   if (!read) {
-    promise(map.occupied.empty() && map.unknown.empty() && map.file.empty(), "a refused map leaves nothing");
+    require(map.occupied.empty() && map.unknown.empty() && map.file.empty(),
+            "a refused map leaves no data behind");
     return;
   }
-  // A name's ending must agree with the format, so one of these is good.
+  // The extension of the file name must match the format.
   const bool bt = accepts("map.bt", [&] { (void)scene::check_map_bytes(bytes, "map.bt"); });
-  promise(bt == (header.format == scene::MapFormat::bt), "a .bt file holds the binary format");
-  promise(map.node_count == header.node_count, "the node count is the header's");
-  promise(map.free.size() == map.free_leaves, "the free leaves are counted");
-  promise(map.occupied.size() + map.free_leaves <= map.node_count, "there are no more leaves than nodes");
-  promise(map.resolution > 0.0 && map.resolution <= 1e4, "the resolution is sane");
-  // Volumes are whole numbers below 2^53, so sums are exact.
-  promise(volume(map.occupied) + volume(map.unknown) + volume(map.free) == whole,
+  require(bt == (header.format == scene::MapFormat::bt), "a .bt file has the binary format");
+  require(map.node_count == header.node_count, "the node count equals that of the header");
+  require(map.free.size() == map.free_leaves, "the free leaves are counted");
+  require(map.occupied.size() + map.free_leaves <= map.node_count,
+          "there are no more leaves than nodes");
+  require(map.resolution > 0.0 && map.resolution <= 1e4, "the resolution is in its range");
+  // Volumes are integers below 2^53, so that their sum is exact.
+  require(volume(map.occupied) + volume(map.unknown) + volume(map.free) == tree_volume,
           "occupied, free and unknown cells fill the tree");
   std::vector<scene::Cell> all = map.occupied;
   all.insert(all.end(), map.unknown.begin(), map.unknown.end());
   all.insert(all.end(), map.free.begin(), map.free.end());
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.lo < b.lo; });
-  const auto twice =
-      std::adjacent_find(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.lo == b.lo; });
-  promise(twice == all.end(), "no two cells begin at one corner");
+  const auto duplicate = std::adjacent_find(
+      all.begin(), all.end(), [](const auto& a, const auto& b) { return a.lo == b.lo; });
+  require(duplicate == all.end(), "no two cells have the same lower corner");
 }
 
 }  // namespace hamelin::fuzz

@@ -9,9 +9,9 @@ void robot(std::string_view bytes) {
   const std::string file = "robot.json";
   model::Robot robot;
   if (accepts(file, [&] { robot = description::robot_from_json(parse_json(bytes, file), file); }))
-    promise_round_trip(robot);
+    require_round_trip(robot);
   else
-    promise(robot.links.empty(), "a refused robot leaves nothing");
+    require(robot.links.empty(), "a refused robot leaves no data behind");
 }
 
 }  // namespace hamelin::fuzz

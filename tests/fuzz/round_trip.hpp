@@ -3,7 +3,8 @@
 
 namespace hamelin::fuzz {
 
-/// That an accepted robot makes a Model, and survives its JSON form unchanged.
-void promise_round_trip(const model::Robot& robot);
+/// Aborts unless an accepted robot gives a Model and is unchanged after writing it to JSON and
+/// reading it back.
+void require_round_trip(const model::Robot& robot);
 
 }  // namespace hamelin::fuzz

@@ -16,10 +16,12 @@ void spheres(std::string_view bytes) {
   const MemoryFile file(bytes);
   std::size_t count = 0;
   if (!accepts(file.path(), [&] { count = description::check_spheres(file.path()); })) return;
-  // The links may not be this arm's: then that is said.
+  // Links that the arm does not have are reported as an error.
   (void)accepts("", [&] {
-    const model::Robot robot = description::detail::read_urdf(arm, "arm.urdf", {std::nullopt, file.path()});
-    promise(robot.links[0].spheres.size() + robot.base_spheres.size() == count, "all spheres are on the robot");
+    const model::Robot robot =
+        description::detail::read_urdf(arm, "arm.urdf", {std::nullopt, file.path()});
+    require(robot.links[0].spheres.size() + robot.base_spheres.size() == count,
+            "all spheres are on the robot");
   });
 }
 

@@ -23,26 +23,28 @@ bool is_utf8(std::string_view text) {
 
 }  // namespace
 
-void promise(bool kept, const std::string& what) {
-  if (kept) return;
-  fmt::print(stderr, "broken promise: {}\n", what);
+void require(bool holds, const std::string& condition) {
+  if (holds) return;
+  fmt::print(stderr, "check failed: {}\n", condition);
   std::abort();
 }
 
-void promise_message(const Error& error, std::string_view file) {
+void require_message(const Error& error, std::string_view file) {
   const std::string_view text = error.what();
-  promise(text.substr(0, file.size()) == file, fmt::format("an error opens with '{}': {}", file, text));
+  require(text.substr(0, file.size()) == file,
+          fmt::format("an error begins with '{}': {}", file, text));
   for (const char c : text)
-    promise(static_cast<unsigned char>(c) >= ' ' && c != '\x7f', fmt::format("an error is one line: {}", text));
-  promise(is_utf8(text), "an error is UTF-8");
+    require(static_cast<unsigned char>(c) >= ' ' && c != '\x7f',
+            fmt::format("an error is one line: {}", text));
+  require(is_utf8(text), "an error is UTF-8");
 }
 
 MemoryFile::MemoryFile(std::string_view bytes) : fd_(::memfd_create("hamelin_fuzz", MFD_CLOEXEC)) {
-  promise(fd_ >= 0, "a file in memory can be made");
+  require(fd_ >= 0, "a file in memory can be made");
   path_ = fmt::format("/proc/self/fd/{}", fd_);
   for (std::size_t done = 0; done < bytes.size();) {
     const ::ssize_t n = ::write(fd_, bytes.data() + done, bytes.size() - done);
-    promise(n > 0, "a file in memory can be written");
+    require(n > 0, "a file in memory can be written");
     done += static_cast<std::size_t>(n);
   }
 }

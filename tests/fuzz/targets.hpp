@@ -5,9 +5,10 @@
 
 #include "hamelin/core/error.hpp"
 
-/// One function a reader. It takes any bytes at all and aborts, with a line on stderr, unless the reader keeps its
-/// contract: a value whose invariants hold, or a hamelin::Error of one line that opens with the file's name. Any other
-/// exception goes through, which counts as a crash.
+/// One function per reader. It takes arbitrary bytes and aborts with a line on stderr if the reader
+/// violates its contract: the reader returns a value whose invariants hold, or throws a
+/// hamelin::Error whose text is one line that begins with the file's name. Any other exception is a
+/// crash.
 namespace hamelin::fuzz {
 
 void maps(std::string_view bytes);
@@ -19,26 +20,26 @@ void srdf(std::string_view bytes);
 void log(std::string_view bytes);
 void primitives(std::string_view bytes);
 
-/// Aborts unless `kept`. `what` says what was promised.
-void promise(bool kept, const std::string& what);
+/// Aborts unless `holds`, and prints the condition.
+void require(bool holds, const std::string& condition);
 
-/// That an error's text is one line of printable UTF-8 and opens with the file's name.
-void promise_message(const Error& error, std::string_view file);
+/// Aborts unless an error's text is one line of printable UTF-8 and begins with the file's name.
+void require_message(const Error& error, std::string_view file);
 
 /// Runs `read`.
-/// @return whether it accepted its input; else it threw an Error, whose text is checked
+/// @return whether it accepted its input. If not, it threw an Error, whose text is checked
 template <typename Read>
 bool accepts(std::string_view file, const Read& read) {
   try {
     read();
     return true;
   } catch (const Error& error) {
-    promise_message(error, file);
+    require_message(error, file);
     return false;
   }
 }
 
-/// Bytes as a file that has a path and lives in memory, for readers that take a path.
+/// A file in memory that has a path, for readers that take a path.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view bytes);

@@ -8,9 +8,9 @@ void urdf(std::string_view bytes) {
   const std::string file = "arm.urdf";
   model::Robot robot;
   if (accepts(file, [&] { robot = description::detail::read_urdf(std::string(bytes), file, {}); }))
-    promise_round_trip(robot);
+    require_round_trip(robot);
   else
-    promise(robot.links.empty(), "a refused robot leaves nothing");
+    require(robot.links.empty(), "a refused robot leaves no data behind");
 }
 
 }  // namespace hamelin::fuzz

@@ -8,26 +8,29 @@
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/model/make_chain.hpp"
 
-/// Motions that integrators find hard (SPEC §7), set up once for the tests and for the table of their figures.
+/// Motions that are hard for integrators (docs/hard_cases.md), shared by the tests and by the table
+/// of their figures.
 namespace hamelin::hard_cases {
 
 using Eigen::VectorXd;
 
-/// What came of a motion.
+/// The result of a motion.
 struct Outcome {
-  bool completed = true;  ///< else a step found no root and the motion ended there, as it should
+  bool completed = true;  ///< if not, a step found no root and the motion ended there
   long steps = 0;
-  double energy_error_J = 0.0;   ///< largest |E − E₀|
-  double energy_scale_J = 0.0;   ///< largest kinetic energy
-  double late_over_early = 0.0;  ///< largest error of the second half over that of the first: 1 where nothing drifts
+  double energy_error_J = 0.0;  ///< largest |E − E₀|
+  double energy_scale_J = 0.0;  ///< largest kinetic energy
+  /// Largest error of the second half over that of the first; about 1 without drift.
+  double late_over_early = 0.0;
   double updates_mean = 0.0, factorizations_mean = 0.0;
   int updates_max = 0;
   long halvings = 0;
-  double deepest = 0.0;  ///< how far a barrier was entered [rad]
+  double deepest = 0.0;  ///< largest depth inside a barrier [rad]
   VectorXd q;            ///< at the end
 };
 
-/// A potential of the joints that acts as half-kicks at both nodes of a step, as a planner's does.
+/// A potential of the joints that acts as half-kicks at both nodes of a step, as that of a planner
+/// does.
 struct Barrier {
   std::function<double(const VectorXd& q, VectorXd& gradient)> potential;
   std::function<double(const VectorXd& q)> depth;
@@ -39,7 +42,7 @@ struct Motion {
   VectorXd q0, v0;
   double step_s = 1e-3;
   long steps = 1000;
-  long look_every = 1;  ///< energy is looked at every so many steps
+  long energy_every = 1;  ///< steps between energy samples
   Barrier barrier{};
 };
 
@@ -73,7 +76,7 @@ inline Outcome run(const Motion& motion, const std::string& scheme) {
       if (!gradient.isZero(0.0)) half_kick();
       out.deepest = std::max(out.deepest, motion.barrier.depth(state.q));
     }
-    if (out.steps % motion.look_every != 0) continue;
+    if (out.steps % motion.energy_every != 0) continue;
     const auto energy = integrator->energy(state);
     const double error = std::abs(energy.total() + value - first);
     out.energy_scale_J = std::max(out.energy_scale_J, energy.kinetic_J);
@@ -89,14 +92,16 @@ inline Outcome run(const Motion& motion, const std::string& scheme) {
   return out;
 }
 
-/// Where the motion ends by dop853 at a tolerance of 1e-12, which shares neither stages nor step lengths nor, by its
-/// articulated-body sweeps, the equations of a variational step. Not for barriers.
+/// The end of the motion by dop853 at a tolerance of 1e-12. It shares neither stages nor step
+/// lengths with a variational step, nor its equations, because it uses the articulated-body
+/// algorithm. Not for barriers.
 inline VectorXd reference_end(const Motion& motion) {
   integration::Parameters options;
   options.rtol = options.atol = 1e-12;
   const auto integrator = integration::make_integrator("dop853", motion.model, options);
   auto state = integrator->start(motion.q0, motion.v0);
-  const auto report = integrator->step(state, {}, motion.step_s * static_cast<double>(motion.steps));
+  const auto report =
+      integrator->step(state, {}, motion.step_s * static_cast<double>(motion.steps));
   return report.converged ? state.q : VectorXd::Constant(state.q.size(), std::nan(""));
 }
 
@@ -104,22 +109,24 @@ inline model::Robot chain(int links, const std::string& axes = "x,z,x") {
   return model::make_chain({links, axes, 0.2, 1.0, 0.03});
 }
 
-/// A stretched arm let go: all axes of bending meet it straight, and it falls out of that.
+/// A stretched arm is released from this singular pose.
 inline Motion stretched(int links, double step_s, long steps) {
-  return {"stretched", model::Model(chain(links)), VectorXd::Zero(links), VectorXd::Zero(links), step_s, steps};
+  return {
+      "stretched", model::Model(chain(links)), VectorXd::Zero(links), VectorXd::Zero(links), step_s,
+      steps};
 }
 
-/// No gravity: every joint turns past π, again and again.
+/// No gravity: every joint turns past π again and again.
 inline Motion turning(double step_s, long steps) {
   return {"turning",
           model::Model(chain(3, "x,y,z"), geometry::SE3{}, Eigen::Vector3d::Zero()),
-          VectorXd::Constant(3, 3.0),  // π is near
+          VectorXd::Constant(3, 3.0),  // near π
           (VectorXd(3) << 6.0, -4.0, 5.0).finished(),
           step_s,
           steps};
 }
 
-/// A 7-link arm, one link of which weighs a million times the others.
+/// A 7-link arm with one link that is a million times as heavy as the others.
 inline Motion mass_ratio(std::size_t heavy_link, double step_s, long steps) {
   model::Robot robot = chain(7);
   robot.links[heavy_link].mass_kg *= 1e6;
@@ -131,12 +138,13 @@ inline Motion mass_ratio(std::size_t heavy_link, double step_s, long steps) {
 /// Example 5.1's arm falls on a spring that begins at q₁ = −0.5 rad: ½ stiffness (q₁ + 0.5)².
 inline Motion falling_on_barrier(double stiffness, double step_s, long steps) {
   const auto depth = [](const VectorXd& q) { return std::max(0.0, -0.5 - q[0]); };
-  Motion motion{"barrier",
-                model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
-                VectorXd::Zero(3),
-                VectorXd::Zero(3),
-                step_s,
-                steps};
+  Motion motion{
+      "barrier",
+      model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+      VectorXd::Zero(3),
+      VectorXd::Zero(3),
+      step_s,
+      steps};
   motion.barrier.depth = depth;
   motion.barrier.potential = [depth, stiffness](const VectorXd& q, VectorXd& gradient) {
     const double d = depth(q);
@@ -149,13 +157,14 @@ inline Motion falling_on_barrier(double stiffness, double step_s, long steps) {
 
 /// Example 5.1 of the paper, 10⁶ steps of 10 ms.
 inline Motion million_steps() {
-  Motion motion{"10^6 steps",
-                model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
-                VectorXd::Zero(3),
-                VectorXd::Zero(3),
-                0.01,
-                1000000};
-  motion.look_every = 7;  // no divisor of any period in sight
+  Motion motion{
+      "10^6 steps",
+      model::Model(description::read_robot(HAMELIN_SOURCE_DIR "/data/robots/planar3.json")),
+      VectorXd::Zero(3),
+      VectorXd::Zero(3),
+      0.01,
+      1000000};
+  motion.energy_every = 7;  // unrelated to any period of the motion
   return motion;
 }
 

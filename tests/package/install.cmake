@@ -1,3 +1,4 @@
-# A fresh stage each time, so that a file no longer installed is missed.
+# The staging folder is emptied first, so that files which are no longer installed are missing.
 file(REMOVE_RECURSE "${stage}")
-execute_process(COMMAND "${CMAKE_COMMAND}" --install "${build}" --prefix "${stage}" OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND "${CMAKE_COMMAND}" --install "${build}" --prefix "${stage}"
+  OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)

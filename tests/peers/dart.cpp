@@ -1,4 +1,4 @@
-// Not <dart/dart.hpp>, which needs more packages than these.
+// These headers need fewer packages than <dart/dart.hpp>.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wshadow"
@@ -21,7 +21,8 @@ using dart::dynamics::BodyNode;
 using dart::dynamics::SkeletonPtr;
 
 template <class JointType>
-BodyNode* add_link(const SkeletonPtr& skeleton, BodyNode* parent, const model::Robot& robot, int i) {
+BodyNode* add_link(const SkeletonPtr& skeleton, BodyNode* parent, const model::Robot& robot,
+                   int i) {
   const auto& link = robot.links[static_cast<std::size_t>(i)];
   typename JointType::Properties joint;
   joint.mName = link.joint.name;
@@ -29,8 +30,8 @@ BodyNode* add_link(const SkeletonPtr& skeleton, BodyNode* parent, const model::R
   joint.mT_ParentBodyToJoint.translation() = joint_origin(robot, i) - joint_origin(robot, i - 1);
   BodyNode::Properties body;
   body.mName = link.name;
-  body.mInertia =
-      dart::dynamics::Inertia(link.mass_kg, link.com.p() - joint_origin(robot, i), inertia_in_base_axes(link));
+  body.mInertia = dart::dynamics::Inertia(link.mass_kg, link.com.p() - joint_origin(robot, i),
+                                          inertia_in_base_axes(link));
   return skeleton->createJointAndBodyNodePair<JointType>(parent, joint, body).second;
 }
 
@@ -45,7 +46,7 @@ SkeletonPtr make_skeleton(const model::Robot& robot) {
   return skeleton;
 }
 
-// What World::step does with a skeleton that touches nothing.
+// Does what World::step does with a skeleton that has no contacts.
 class DartStepper final : public Stepper {
  public:
   explicit DartStepper(const model::Robot& robot) : skeleton_(make_skeleton(robot)) {}
@@ -57,10 +58,10 @@ class DartStepper final : public Stepper {
     skeleton_->setTimeStep(h);
     skeleton_->computeForwardDynamics();
     skeleton_->integrateVelocities(h);
-    // what it cannot follow any more ends in an assertion of its own
-    constexpr double fastest = 1e6;
+    // with larger velocities an assertion inside DART fails
+    constexpr double velocity_max = 1e6;
     for (std::size_t i = 0; i < skeleton_->getNumDofs(); ++i)
-      if (!(std::abs(skeleton_->getVelocity(i)) < fastest)) return false;
+      if (!(std::abs(skeleton_->getVelocity(i)) < velocity_max)) return false;
     skeleton_->integratePositions(h);
     return true;
   }
@@ -77,14 +78,16 @@ class Dart final : public Peer {
  public:
   explicit Dart(const model::Robot& robot) : robot_(robot), skeleton_(make_skeleton(robot)) {}
   [[nodiscard]] std::string name() const override { return "DART " DART_VERSION; }
-  void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a, VectorXd& tau) override {
+  void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a,
+                        VectorXd& tau) override {
     skeleton_->setPositions(q);
     skeleton_->setVelocities(v);
     skeleton_->setAccelerations(a);
     skeleton_->computeInverseDynamics();
     tau = skeleton_->getForces();
   }
-  void forward_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& tau, VectorXd& a) override {
+  void forward_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& tau,
+                        VectorXd& a) override {
     skeleton_->setPositions(q);
     skeleton_->setVelocities(v);
     skeleton_->setForces(tau);

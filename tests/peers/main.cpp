@@ -1,5 +1,6 @@
 // hamelin_peers [--json FILE] [speed] [energy] [precision] [--quick]
-// Speed, energy and work-precision of hamelin and of other programs on the same robots, in one process and one run.
+// Measures speed, energy and work-precision of hamelin and of other programs on the same robots, in
+// one process and one run.
 #include <fmt/format.h>
 
 #include <Eigen/Core>
@@ -49,7 +50,8 @@ struct Named {
 model::Robot chain(int links, const std::string& axes) {
   return model::make_chain({links, axes, 0.2, 1.0, 0.03});
 }
-/// Example 5.1's links, unit masses and inertias 0.1 m apart, about axes x, y, z: a chain that tumbles in space.
+/// A spatial chain with the links of example 5.1 of the paper (unit masses and inertias, 0.1 m
+/// apart) and joint axes x, y, z.
 model::Robot unit_chain_xyz() {
   model::Robot robot = model::make_chain({3, "x,y,z", 0.1, 1.0, 0.03});
   for (auto& link : robot.links) link.inertia_kg_m2.setIdentity();
@@ -67,11 +69,13 @@ std::vector<VectorXd> random_states(std::uint64_t seed, int n, double size) {
   return all;
 }
 
-/// Whether a peer's robot is ours: the largest difference of inverse and forward dynamics over random states, relative
-/// to the largest torque or acceleration.
+/// Checks that a peer's model equals hamelin's. Prints the largest relative differences of inverse
+/// and forward dynamics over random states. @throws Error invalid if the inverse dynamics differs
+/// by more than 1e-9
 void validate(const model::Robot& robot, Peer& ours, Peer& peer) {
   const int n = robot.dof();
-  const auto q = random_states(1, n, 3.0), v = random_states(2, n, 2.0), a = random_states(3, n, 5.0);
+  const auto q = random_states(1, n, 3.0), v = random_states(2, n, 2.0),
+             a = random_states(3, n, 5.0);
   VectorXd tau(n), theirs(n), back(n);
   double inverse = 0.0, forward = 0.0;
   for (std::size_t k = 0; k < states; ++k) {
@@ -81,24 +85,28 @@ void validate(const model::Robot& robot, Peer& ours, Peer& peer) {
     peer.forward_dynamics(q[k], v[k], tau, back);
     forward = std::max(forward, (back - a[k]).norm() / a[k].norm());
   }
-  fmt::print("# {}, {}: inverse dynamics differs by {:.1e}, forward dynamics gives back by {:.1e} (relative)\n",
-             robot.name, peer.name(), inverse, forward);
+  fmt::print(
+      "# {}, {}: relative difference of inverse dynamics {:.1e}, of forward dynamics {:.1e}\n",
+      robot.name, peer.name(), inverse, forward);
   if (!(inverse <= 1e-9))
-    throw Error(ErrorCode::invalid, fmt::format("{}: the model of {} is not ours: inverse dynamics differs by {:.3g}, "
-                                                "expected 1e-9 at most",
-                                                robot.name, peer.name(), inverse));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: the model of {} differs: relative difference of inverse dynamics {:.3g}, "
+                    "expected at most 1e-9",
+                    robot.name, peer.name(), inverse));
 }
 
-/// Something to be timed: one block does `calls` calls.
-struct Timed {
-  std::string what, who;
+/// A measurement of time: one block makes `calls` calls.
+struct Timing {
+  std::string task, program;
   int calls;
   std::function<void()> block;
   double best_ns = std::numeric_limits<double>::infinity();
 };
 
-/// The minimum over many short blocks, all in turn so that a change of the clock meets all.
-void run_timings(std::vector<Timed>& all, bool quick) {
+/// Takes the minimum over many short blocks. The blocks of all measurements are interleaved, so a
+/// change of the clock frequency affects all of them.
+void run_timings(std::vector<Timing>& all, bool quick) {
   using Clock = std::chrono::steady_clock;
   for (int round = 0; round < (quick ? 4 : 40); ++round)
     for (auto& timed : all) {
@@ -113,25 +121,29 @@ void run_timings(std::vector<Timed>& all, bool quick) {
 }
 
 Json speed(bool quick) {
-  std::vector<Named> robots{{"arm7", data_robot("arm7.urdf")}, {"planar3", data_robot("planar3.json")},
-                            {"chain7", chain(7, "x,z,x")},     {"planar7", chain(7, "x")},
-                            {"chain20", chain(20, "x,z,x")},   {"chain100", chain(100, "x,z,x")},
-                            {"chain200", chain(200, "x,z,x")}};
+  std::vector<Named> robots{
+      {"arm7", data_robot("arm7.urdf")}, {"planar3", data_robot("planar3.json")},
+      {"chain7", chain(7, "x,z,x")},     {"planar7", chain(7, "x")},
+      {"chain20", chain(20, "x,z,x")},   {"chain100", chain(100, "x,z,x")},
+      {"chain200", chain(200, "x,z,x")}};
   Json rows = Json::array();
   for (auto& [label, robot] : robots) {
     robot.name = label;
     const int n = robot.dof();
-    const auto q = random_states(1, n, 3.0), v = random_states(2, n, 2.0), x = random_states(3, n, 5.0);
+    const auto q = random_states(1, n, 3.0), v = random_states(2, n, 2.0),
+               x = random_states(3, n, 5.0);
     auto peers = make_all(robot);
     for (std::size_t i = 1; i < peers.size(); ++i) validate(robot, *peers[0], *peers[i]);
     VectorXd out(n);
-    std::vector<Timed> all;
+    std::vector<Timing> all;
     for (auto& peer : peers) {
       all.push_back({"forward dynamics", peer->name(), states, [&, p = peer.get()] {
-                       for (std::size_t k = 0; k < states; ++k) p->forward_dynamics(q[k], v[k], x[k], out);
+                       for (std::size_t k = 0; k < states; ++k)
+                         p->forward_dynamics(q[k], v[k], x[k], out);
                      }});
       all.push_back({"inverse dynamics", peer->name(), states, [&, p = peer.get()] {
-                       for (std::size_t k = 0; k < states; ++k) p->inverse_dynamics(q[k], v[k], x[k], out);
+                       for (std::size_t k = 0; k < states; ++k)
+                         p->inverse_dynamics(q[k], v[k], x[k], out);
                      }});
     }
     const model::Model model(robot);
@@ -142,18 +154,18 @@ Json speed(bool quick) {
       V.col(k) = v[static_cast<std::size_t>(k)];
       X.col(k) = x[static_cast<std::size_t>(k)];
     }
-    all.push_back(
-        {"forward dynamics", "hamelin, batch", states, [&] { dynamics::forward_dynamics(model, batch, Q, V, X, Y); }});
-    all.push_back(
-        {"inverse dynamics", "hamelin, batch", states, [&] { dynamics::inverse_dynamics(model, batch, Q, V, X, Y); }});
+    all.push_back({"forward dynamics", "hamelin, batch", states,
+                   [&] { dynamics::forward_dynamics(model, batch, Q, V, X, Y); }});
+    all.push_back({"inverse dynamics", "hamelin, batch", states,
+                   [&] { dynamics::inverse_dynamics(model, batch, Q, V, X, Y); }});
     run_timings(all, quick);
 
-    // Steps of 1 ms along a motion, for each from the same start and warm.
+    // Steps of 1 ms along a motion, from the same start for each stepper, after 8 steps of warm-up.
     std::vector<std::unique_ptr<Stepper>> steppers;
-    std::vector<Timed> steps;
+    std::vector<Timing> steps;
     const VectorXd q0 = VectorXd::Constant(n, 0.3), v0 = VectorXd::Constant(n, 0.1);
     const int calls = n > 50 ? 8 : 32;
-    const long span = n > 50 ? 64 : 1000;  // some diverge later
+    const long span = n > 50 ? 64 : 1000;  // some steppers diverge later
     for (auto& peer : peers)
       for (const auto& name : peer->steppers()) {
         auto stepper = peer->stepper(name);
@@ -164,10 +176,12 @@ Json speed(bool quick) {
         constexpr double longest_s = 2e-3;
         if (!moves || cpu_s() - before > 8 * longest_s) {
           fmt::print("# {}, {}: left out, {}\n", peer->name(), name,
-                     moves ? fmt::format("a step takes more than {} s", longest_s) : "it fails at once");
+                     moves ? fmt::format("a step takes more than {} s", longest_s)
+                           : "its first steps fail");
           continue;
         }
-        // it goes on from where it is, so that multi-step guesses stay warm, and starts over where it leads too far
+        // the motion continues, which keeps multi-step guesses valid, and restarts after `span`
+        // steps
         steps.push_back({"step of 1 ms", peer->name() + ", " + name, calls,
                          [s = stepper.get(), q0, v0, calls, span, at = 0L]() mutable {
                            for (int k = 0; k < calls; ++k) (void)s->step(1e-3);
@@ -180,19 +194,21 @@ Json speed(bool quick) {
     run_timings(steps, quick);
     all.insert(all.end(), steps.begin(), steps.end());
 
-    std::stable_sort(all.begin(), all.end(), [](const Timed& a, const Timed& b) { return a.what < b.what; });
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Timing& a, const Timing& b) { return a.task < b.task; });
     double own_forward = 0.0, own = 0.0;
-    for (const Timed& t : all)
-      if (t.what == "forward dynamics" && t.who == "hamelin") own_forward = t.best_ns;
-    fmt::print("\n{:<18} {:<36} {:>11} {:>16} {:>14}\n", label, "", "ns a call", "of our forward", "ours of it");
-    for (const Timed& t : all) {
-      if (t.who == "hamelin") own = t.best_ns;
-      const bool step = t.what[0] == 's';
-      fmt::print("{:<18} {:<36} {:>11.0f} {:>16.2f} {:>14}\n", t.what, t.who, t.best_ns, t.best_ns / own_forward,
-                 step ? "" : fmt::format("{:.2f}", own / t.best_ns));
+    for (const Timing& t : all)
+      if (t.task == "forward dynamics" && t.program == "hamelin") own_forward = t.best_ns;
+    fmt::print("\n{:<18} {:<36} {:>11} {:>16} {:>14}\n", label, "", "ns per call", "/ own forward",
+               "hamelin / it");
+    for (const Timing& t : all) {
+      if (t.program == "hamelin") own = t.best_ns;
+      const bool step = t.task[0] == 's';
+      fmt::print("{:<18} {:<36} {:>11.0f} {:>16.2f} {:>14}\n", t.task, t.program, t.best_ns,
+                 t.best_ns / own_forward, step ? "" : fmt::format("{:.2f}", own / t.best_ns));
       rows.push_back({{"robot", label},
-                      {"what", t.what},
-                      {"who", t.who},
+                      {"what", t.task},
+                      {"who", t.program},
                       {"ns", t.best_ns},
                       {"ratio_to_our_forward_dynamics", t.best_ns / own_forward}});
     }
@@ -212,8 +228,9 @@ VectorXd vector(std::initializer_list<double> x) {
   return Eigen::Map<const VectorXd>(x.begin(), static_cast<Eigen::Index>(x.size()));
 }
 
-/// Energy of all at the states they give, by our own sweeps: what a program says of its own energy may be wrong (DART's
-/// potential energy forgets the COM's offset) or old (MuJoCo's belongs to the last mj_forward).
+/// Measures energy errors. hamelin computes all energies at the states of the programs, because the
+/// programs' own values may be wrong (DART's potential energy omits the offset of the COM) or old
+/// (MuJoCo's belongs to the last mj_forward).
 Json energy(bool quick) {
   std::vector<Case> cases{
       {"planar example 5.1", data_robot("planar3.json"), VectorXd::Zero(3), 0.01, 100.0},
@@ -230,24 +247,28 @@ Json energy(bool quick) {
     for (std::size_t i = 1; i < peers.size(); ++i) validate(c.robot, *peers[0], *peers[i]);
     const model::Model model(c.robot);
     dynamics::Workspace ws(model);
-    fmt::print("\n{}: {} steps of {} s\n{:<36} {:>12} {:>12} {:>16} {:>12}\n", c.name, steps, c.step_s, "",
-               "max |dE| J", "end dE J", "drift J/s", "us a step");
+    fmt::print("\n{}: {} steps of {} s\n{:<36} {:>12} {:>12} {:>16} {:>12}\n", c.name, steps,
+               c.step_s, "", "max |dE| J", "end dE J", "drift J/s", "us per step");
     for (auto& peer : peers)
       for (const auto& name : peer->steppers()) {
         const auto stepper = peer->stepper(name);
         VectorXd q = c.q0, v = VectorXd::Zero(n);
         stepper->set(q, v);
-        const double first = dynamics::kinetic_energy(model, ws, q, v) + dynamics::potential_energy(model, ws, q);
-        double largest = 0.0, last = 0.0, sum_t = 0.0, sum_e = 0.0, sum_tt = 0.0, sum_te = 0.0, spent = 0.0;
+        const double first =
+            dynamics::kinetic_energy(model, ws, q, v) + dynamics::potential_energy(model, ws, q);
+        double largest = 0.0, last = 0.0, sum_t = 0.0, sum_e = 0.0, sum_tt = 0.0, sum_te = 0.0,
+               spent = 0.0;
         bool good = true;
         long k = 0;
-        constexpr long block = 100;  // timed in blocks: reading a clock costs as much as a step
+        // One step of each block is timed, because reading the clock costs as much as a step.
+        constexpr long block = 100;
         for (; k < steps && good; ++k) {
           const double before = k % block == 0 ? cpu_s() : 0.0;
           good = stepper->step(c.step_s);
           if (k % block == 0) spent += cpu_s() - before;
           stepper->get(q, v);
-          last = dynamics::kinetic_energy(model, ws, q, v) + dynamics::potential_energy(model, ws, q) - first;
+          last = dynamics::kinetic_energy(model, ws, q, v) +
+                 dynamics::potential_energy(model, ws, q) - first;
           good = good && std::isfinite(last);
           const double t = static_cast<double>(k + 1) * c.step_s;
           largest = std::max(largest, std::abs(last));
@@ -256,8 +277,9 @@ Json energy(bool quick) {
         const auto m = static_cast<double>(k);
         const double drift = (m * sum_te - sum_t * sum_e) / (m * sum_tt - sum_t * sum_t);
         const double us = 1e6 * spent / std::ceil(m / block);
-        fmt::print("{:<36} {:>12} {:>12} {:>16} {:>12.2f}{}\n", peer->name() + ", " + name, text_of(largest),
-                   text_of(last), text_of(drift), us, good ? "" : fmt::format("  stopped at step {}", k));
+        fmt::print("{:<36} {:>12} {:>12} {:>16} {:>12.2f}{}\n", peer->name() + ", " + name,
+                   text_of(largest), text_of(last), text_of(drift), us,
+                   good ? "" : fmt::format("  stopped at step {}", k));
         std::fflush(stdout);
         rows.push_back({{"case", c.name},
                         {"who", peer->name() + ", " + name},
@@ -273,12 +295,13 @@ Json energy(bool quick) {
   return rows;
 }
 
+/// A point of the work-precision diagram.
 struct Point {
-  std::string who, setting;
+  std::string scheme, setting;
   double error = 0.0, cpu_us = 0.0;
 };
 
-/// End of the motion, and the least CPU time of some repetitions.
+/// The least CPU time of several calls [µs].
 template <class F>
 double least_cpu_us(F&& once, bool quick) {
   double best = std::numeric_limits<double>::infinity(), spent = 0.0;
@@ -318,9 +341,9 @@ Json precision(bool quick) {
     const long fine = std::lround(c.duration_s / (quick ? 5e-5 : 1e-5));
     const auto rk4 = peers[0]->stepper("rk4");
     if (!end_of(*rk4, fine, reference, v) || !end_of(*rk4, fine / 2, coarse, v))
-      throw Error(ErrorCode::invalid, c.name + ": no reference");
+      throw Error(ErrorCode::invalid, c.name + ": the reference solution diverges");
     const double own_error = (reference - coarse).lpNorm<Eigen::Infinity>();
-    fmt::print("\n{}: reference rk4 with {} steps, known to {:.1e}\n", c.name, fine, own_error);
+    fmt::print("\n{}: reference rk4 with {} steps, accurate to {:.1e}\n", c.name, fine, own_error);
 
     std::vector<Point> points;
     for (auto& peer : peers)
@@ -356,31 +379,35 @@ Json precision(bool quick) {
           once();
           if (!good) continue;
           const double error = (q - reference).lpNorm<Eigen::Infinity>();
-          points.push_back({fmt::format("hamelin, {}{} adaptive", name, order > 0 ? fmt::format(" {}", order) : ""),
-                            fmt::format("rtol = atol = {:.0e}", *options.rtol), error, least_cpu_us(once, quick)});
+          points.push_back({fmt::format("hamelin, {}{} adaptive", name,
+                                        order > 0 ? fmt::format(" {}", order) : ""),
+                            fmt::format("rtol = atol = {:.0e}", *options.rtol), error,
+                            least_cpu_us(once, quick)});
         }
     }
     for (const Point& p : points)
       rows.push_back({{"case", c.name},
-                      {"who", p.who},
+                      {"who", p.scheme},
                       {"setting", p.setting},
                       {"error_q", number(p.error)},
                       {"reference_error", own_error},
                       {"cpu_us", p.cpu_us}});
 
-    // The cheapest of each way that stays below an error.
-    std::vector<std::string> ways;
+    // The cheapest setting of each scheme whose error stays below a bound.
+    std::vector<std::string> schemes;
     for (const Point& p : points)
-      if (std::find(ways.begin(), ways.end(), p.who) == ways.end()) ways.push_back(p.who);
+      if (std::find(schemes.begin(), schemes.end(), p.scheme) == schemes.end())
+        schemes.push_back(p.scheme);
     fmt::print("{:<36}", "least CPU us for an error below");
     for (int digits = 2; digits <= 10; ++digits) fmt::print(" {:>9}", fmt::format("1e-{}", digits));
     fmt::print("\n");
-    for (const auto& way : ways) {
-      fmt::print("{:<36}", way);
+    for (const auto& scheme : schemes) {
+      fmt::print("{:<36}", scheme);
       for (int digits = 2; digits <= 10; ++digits) {
         double best = std::numeric_limits<double>::infinity();
         for (const Point& p : points)
-          if (p.who == way && p.error <= std::pow(10.0, -digits)) best = std::min(best, p.cpu_us);
+          if (p.scheme == scheme && p.error <= std::pow(10.0, -digits))
+            best = std::min(best, p.cpu_us);
         fmt::print(" {:>9}", std::isfinite(best) ? fmt::format("{:.0f}", best) : "-");
       }
       fmt::print("\n");
@@ -403,11 +430,13 @@ int run(int argc, char** argv) {
     } else if (argument == "speed" || argument == "energy" || argument == "precision") {
       parts.insert(argument);
     } else {
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: expected speed, energy, precision, --quick or --json FILE", argument));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: expected speed, energy, precision, --quick or --json FILE", argument));
     }
   }
-  if (const char* isa = std::getenv("HAMELIN_ISA")) set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
+  if (const char* isa = std::getenv("HAMELIN_ISA"))
+    set_default_isa(isa_from_name(isa, "HAMELIN_ISA"));
   const auto wanted = [&](const char* part) { return parts.empty() || parts.count(part) != 0; };
   std::vector<std::string> names;
   for (const auto& peer : make_all(chain(1, "x"))) names.push_back(peer->name());

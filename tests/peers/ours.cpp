@@ -25,13 +25,17 @@ class Ours final : public Peer {
  public:
   explicit Ours(const model::Robot& robot) : model_(robot), ws_(model_) {}
   [[nodiscard]] std::string name() const override { return "hamelin"; }
-  void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a, VectorXd& tau) override {
+  void inverse_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& a,
+                        VectorXd& tau) override {
     dynamics::inverse_dynamics(model_, ws_, q, v, a, tau);
   }
-  void forward_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& tau, VectorXd& a) override {
+  void forward_dynamics(const VectorXd& q, const VectorXd& v, const VectorXd& tau,
+                        VectorXd& a) override {
     dynamics::forward_dynamics(model_, ws_, q, v, tau, a);
   }
-  [[nodiscard]] std::vector<std::string> steppers() const override { return integration::integrator_names(); }
+  [[nodiscard]] std::vector<std::string> steppers() const override {
+    return integration::integrator_names();
+  }
   [[nodiscard]] std::unique_ptr<Stepper> stepper(const std::string& name) override {
     return std::make_unique<OurStepper>(model_, name);
   }

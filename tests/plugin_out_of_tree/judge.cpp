@@ -1,4 +1,4 @@
-// Loads the plugin of the given path and lets its planner answer one tick.
+// Loads the plugin at the given path and lets its planner answer one tick.
 #include <iostream>
 
 #include "hamelin/core/error.hpp"
@@ -8,7 +8,9 @@ namespace {
 
 struct Services : hamelin::planning::HostServices {
   void log(std::int32_t, std::string_view line) override { std::cout << line << '\n'; }
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+    return 0;
+  }
 };
 
 hamelin::model::Model pendulum() {
@@ -50,7 +52,8 @@ int main(int argc, char** argv) try {
     std::cerr << planner.error() << '\n';
     return 1;
   }
-  std::cout << plugin.name() << ' ' << plugin.version() << ": torque " << out.held_torque()[0] << '\n';
+  std::cout << plugin.name() << ' ' << plugin.version() << ": torque " << out.held_torque()[0]
+            << '\n';
   return 0;
 } catch (const hamelin::Error& e) {
   std::cerr << e.what() << '\n';

@@ -1,6 +1,7 @@
 #include "odeint_rosenbrock.hpp"
 
-// odeint's checks of its linear algebra throw where a matrix is near singular; the error estimate sees to that.
+// The linear algebra of odeint throws an exception if a matrix is nearly singular. The checks are
+// off because the error estimate covers this case.
 #define BOOST_UBLAS_NDEBUG 1
 #include <algorithm>
 #include <boost/numeric/odeint/stepper/rosenbrock4.hpp>
@@ -21,7 +22,8 @@ struct OdeintRosenbrock::Implementation {
 };
 
 OdeintRosenbrock::OdeintRosenbrock(std::size_t size, Derivative derivative, Jacobian jacobian)
-    : implementation_(std::make_unique<Implementation>(size, std::move(derivative), std::move(jacobian))) {}
+    : implementation_(
+          std::make_unique<Implementation>(size, std::move(derivative), std::move(jacobian))) {}
 
 OdeintRosenbrock::~OdeintRosenbrock() = default;
 

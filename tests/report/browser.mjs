@@ -1,6 +1,6 @@
 // Starts the Chromium that the tests and the screenshots use.
-//   CHROMIUM      the browser's file; else the first of the usual places
-//   NODE_MODULES  the folder that holds playwright-core (and axe-core); else Node looks for it itself
+//   CHROMIUM      file of the browser; by default the first one found in PLACES
+//   NODE_MODULES  folder of playwright-core (and axe-core); by default Node's own search
 import { existsSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import path from 'node:path';
@@ -11,26 +11,29 @@ const FLAGS = [
   '--disable-background-networking', '--disable-component-update', '--disable-sync', '--disable-quic',
 ];
 
-export const lookUp = process.env.NODE_MODULES ? createRequire(path.join(path.resolve(process.env.NODE_MODULES), 'x.js')) : createRequire(import.meta.url);
+export const requireModule = process.env.NODE_MODULES ? createRequire(path.join(path.resolve(process.env.NODE_MODULES), 'x.js')) : createRequire(import.meta.url);
 
-/** Launches the browser; throws with one line if there is none. */
+/** Launches the browser; throws an error of one line if there is none. */
 export async function launch() {
   const executablePath = process.env.CHROMIUM || PLACES.find((place) => existsSync(place));
   if (!executablePath) throw new Error(`no browser: set CHROMIUM, or install one of ${PLACES.join(', ')}`);
   let playwright;
   try {
-    playwright = lookUp('playwright-core');
+    playwright = requireModule('playwright-core');
   } catch {
     throw new Error('playwright-core is not installed: run "npm ci" for libs/report/page and set NODE_MODULES to its node_modules');
   }
   return playwright.chromium.launch({ executablePath, args: FLAGS });
 }
 
-/** What axe-core objects to in a page with all its details open, one line each; null if axe-core is not installed. */
-export async function objections(page) {
+/**
+ * Violations that axe-core finds in a page with all its details open, one line each; null if
+ * axe-core is missing.
+ */
+export async function violations(page) {
   let axe;
   try {
-    axe = readFileSync(lookUp.resolve('axe-core/axe.min.js'), 'utf8');
+    axe = readFileSync(requireModule.resolve('axe-core/axe.min.js'), 'utf8');
   } catch {
     return null;
   }

@@ -1,7 +1,7 @@
-// Drives the pages of sweeps and of accuracy in a headless Chromium.
-//   HAMELIN_SWEEP_PAGE      made by `hamelin sweep merge --page`
-//   HAMELIN_ACCURACY_PAGE   made by `hamelin accuracy --page`
-//   HAMELIN_TEMPLATES       the folder of the built templates; filled with made-up data they make two more pages
+// Tests the pages of sweeps and of accuracy in a headless Chromium.
+//   HAMELIN_SWEEP_PAGE      page of `hamelin sweep merge --page`
+//   HAMELIN_ACCURACY_PAGE   page of `hamelin accuracy --page`
+//   HAMELIN_TEMPLATES       folder of the built templates, for two pages of made-up data
 //   CHROMIUM, NODE_MODULES  see browser.mjs
 import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -10,7 +10,7 @@ import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { gzipSync } from 'node:zlib';
-import { launch, objections } from './browser.mjs';
+import { launch, violations } from './browser.mjs';
 import { readContainer } from './report_data.mjs';
 
 const folder = mkdtempSync(path.join(os.tmpdir(), 'hamelin-documents-'));
@@ -27,9 +27,10 @@ function fill(template, data, name) {
   return file;
 }
 
-// ---- What no short measurement or sweep has: hollow marks, all outcomes, text that looks like HTML ----
+// ---- Made-up data with what a short measurement or sweep lacks ----
+// These are hollow marks, all outcomes, and text that looks like HTML.
 
-const EVIL = '<img src=x onerror=alert(1)> & \'co\'';
+const MARKUP = '<img src=x onerror=alert(1)> & \'co\'';
 const LONG = '/a/folder/whose/path/has/no/blank'.repeat(3);
 
 function madeUpAccuracy() {
@@ -46,8 +47,8 @@ function madeUpAccuracy() {
   return {
     format: 'hamelin.accuracy-page/1', generator: 'hamelin test',
     measurements: [{
-      name: EVIL, about: 'about it', notes: [EVIL], reference_error: 1e-12, rows, cheaper_peers: 'none is cheaper',
-      costs: { head: ['CPU', '1e-02'], words: 1, rows: [['gauss:8', '1'], ['best of ours over dop853', '0.5']], comparisons_from: 1 },
+      name: MARKUP, about: 'about it', notes: [MARKUP], reference_error: 1e-12, rows, cheaper_peers: 'none is cheaper',
+      costs: { head: ['CPU', '1e-02'], words: 1, rows: [['gauss:8', '1'], ['best of hamelin over dop853', '0.5']], comparisons_from: 1 },
       table: { head: ['integrator', 'mode', 'order'], words: 2, rows: rows.map((r) => [r.label, 'accurate', String(r.order)]) },
     }],
   };
@@ -56,18 +57,18 @@ function madeUpAccuracy() {
 function madeUpSweep() {
   const outcomes = ['reached', 'collision', 'refused', 'stalled', 'timeout', 'gave_up', 'crashed'];
   const group = {
-    labels: { goal: EVIL, planner: 'hybrid' }, planned: 8, runs: 7, feasible: 6, reached: 3, reached_all: 4, reached_share_interval: [0.19, 0.81], outcomes: { reached: 4, stalled: 1, collision: 1, crashed: 1 },
+    labels: { goal: MARKUP, planner: 'hybrid' }, planned: 8, runs: 7, feasible: 6, reached: 3, reached_all: 4, reached_share_interval: [0.19, 0.81], outcomes: { reached: 4, stalled: 1, collision: 1, crashed: 1 },
     judged: 7, contacts: 1, min_clearance_m: -0.00123, min_self_clearance_m: null, certified_share_mean: 0.99991, certified_share_min: 0.995, reached_time_s_median: 4.5, recovery_work_J_median: null,
-    causes: { [EVIL]: 1, 'stalled: joint limit': 2 }, timing: { tick_us_p50_median: 5.25, tick_us_p99_median: 10.5 },
+    causes: { [MARKUP]: 1, 'stalled: joint limit': 2 }, timing: { tick_us_p50_median: 5.25, tick_us_p99_median: 10.5 },
   };
   return {
-    format: 'hamelin.sweep-page/1', generator: 'hamelin test', directories: [EVIL, LONG], planned: 8, recorded: 7,
+    format: 'hamelin.sweep-page/1', generator: 'hamelin test', directories: [MARKUP, LONG], planned: 8, recorded: 7,
     summary: {
-      by: ['goal', 'planner'], notes: [EVIL], groups: [group, { ...group, feasible: 0, reached: 0, judged: 0, contacts: 0 }],
+      by: ['goal', 'planner'], notes: [MARKUP], groups: [group, { ...group, feasible: 0, reached: 0, judged: 0, contacts: 0 }],
       gains: [{ planner: 'apf', sets: 7, reached: 1, contacts: 2, reference: 0, reached_of_reference: 0, reached_share_interval: [0, 1], apf_stalled: 1, reached_of_apf_stalled: 0 }],
     },
-    gain_sets: ['apf', 'gyro'].flatMap((planner) => outcomes.map((outcome, i) => ({ planner, run: `${planner}/${i}`, outcome, cause: i ? EVIL : null, gains: { k_p: 1 + i, eta: 0.1 * (1 + i), k_obs: 10 * (1 + i) } }))),
-    failures: outcomes.slice(1).map((outcome, i) => ({ run: `run ${i}`, outcome, cause: EVIL, command: `hamelin run ${EVIL}` })),
+    gain_sets: ['apf', 'gyro'].flatMap((planner) => outcomes.map((outcome, i) => ({ planner, run: `${planner}/${i}`, outcome, cause: i ? MARKUP : null, gains: { k_p: 1 + i, eta: 0.1 * (1 + i), k_obs: 10 * (1 + i) } }))),
+    failures: outcomes.slice(1).map((outcome, i) => ({ run: `run ${i}`, outcome, cause: MARKUP, command: `hamelin run ${MARKUP}` })),
   };
 }
 
@@ -86,20 +87,20 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-/** Opens a page; it must be silent and ask for nothing but itself. */
+/** Opens a page, which must print no errors or warnings and request nothing but itself. */
 async function open(file, options = {}) {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 }, ...options });
-  const heard = [];
-  page.on('pageerror', (error) => heard.push(`page: ${error.message}`));
-  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && heard.push(`console: ${message.text()}`));
-  page.on('request', (request) => request.url() !== pathToFileURL(path.resolve(file)).href && heard.push(`asks for ${request.url()}`));
+  const problems = [];
+  page.on('pageerror', (error) => problems.push(`page: ${error.message}`));
+  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && problems.push(`console: ${message.text()}`));
+  page.on('request', (request) => request.url() !== pathToFileURL(path.resolve(file)).href && problems.push(`requests ${request.url()}`));
   await page.goto(pathToFileURL(path.resolve(file)).href);
   await page.evaluate(() => window.hamelin.ready);
-  assert.deepEqual(heard, []);
+  assert.deepEqual(problems, []);
   return page;
 }
 
-/** Texts of a table's rows, its head first; found by its caption. */
+/** The texts of the rows of a table, header first; the table is found by its caption. */
 const tableOf = (page, caption) => page.getByRole('region', { name: caption, exact: true }).locator('tr').evaluateAll((rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent)));
 
 const marksOf = (page) => page.locator('figure g[data-series] > g').count();
@@ -108,7 +109,7 @@ for (const file of accuracies) {
   const name = path.basename(file);
   const data = readContainer(file).json;
 
-  test(`${name}: every row is a mark in each plot that can show it, and a line of the table`, async () => {
+  test(`${name}: every row of the data is a mark in each plot that can show it, and a row of the table`, async () => {
     const page = await open(file);
     const rows = data.measurements.flatMap((measurement) => measurement.rows);
     const known = (keys) => rows.filter((row) => keys.every((key) => row[key] !== null)).length;
@@ -120,13 +121,13 @@ for (const file of accuracies) {
       assert.ok(await page.getByRole('heading', { name: measurement.name }).count() > 0);
       if (measurement.cheaper_peers) assert.ok(await page.getByText(measurement.cheaper_peers).isVisible());
     }
-    // lines and marks stay inside their drawings, and no coordinate is lost
+    // every coordinate is a number
     const drawn = await page.locator('figure svg').evaluateAll((all) => all.map((svg) => svg.outerHTML).join(''));
     assert.doesNotMatch(drawn, /NaN|Infinity|undefined/);
     await page.close();
   });
 
-  test(`${name}: the legend hides and shows the lines of its integrator in all plots`, async () => {
+  test(`${name}: the legend hides and shows the lines of an integrator in all plots`, async () => {
     const page = await open(file);
     const labels = [...new Set(data.measurements.flatMap((measurement) => measurement.rows.map((row) => row.label)))];
     const boxes = page.getByRole('group', { name: 'Integrators' }).getByRole('checkbox');
@@ -145,7 +146,7 @@ for (const file of sweeps) {
   const name = path.basename(file);
   const data = readContainer(file).json;
 
-  test(`${name}: groups, gain sets, causes and failures are all there`, async () => {
+  test(`${name}: groups, gain sets, causes and failures are complete`, async () => {
     const page = await open(file);
     const { by, groups, gains } = data.summary;
     const success = await tableOf(page, 'Success by group');
@@ -155,13 +156,13 @@ for (const file of sweeps) {
     assert.deepEqual(column('%'), groups.map((group) => (group.feasible ? ((100 * group.reached) / group.feasible).toFixed(1) : '–')));
     assert.deepEqual(column('stalled'), groups.map((group) => String(group.outcomes.stalled ?? 0)));
     assert.deepEqual(column('contactsjudged'), groups.map((group) => (group.judged ? String(group.contacts) : '–')));
-    assert.deepEqual(column('least clearance[mm]').map((text) => text.replace('−', '-')), groups.map((group) => (group.min_clearance_m === null ? '–' : (1e3 * group.min_clearance_m).toFixed(2))));
+    assert.deepEqual(column('smallest clearance[mm]').map((text) => text.replace('−', '-')), groups.map((group) => (group.min_clearance_m === null ? '–' : (1e3 * group.min_clearance_m).toFixed(2))));
     assert.equal(await marksOf(page), data.gain_sets.length);
     assert.equal(await page.locator('figure').count(), new Set(data.gain_sets.map((set) => set.planner)).size);
     assert.equal((await page.getByRole('region', { name: 'Gain sets by planner' }).locator('tbody tr').count()), data.gain_sets.length ? gains.length : 0);
     assert.equal(await page.getByRole('region', { name: 'Causes by group' }).locator('tbody tr').count(), groups.reduce((sum, group) => sum + Object.keys(group.causes).length, 0));
     if (data.failures.length) {
-      assert.deepEqual((await tableOf(page, 'Commands that repeat them')).slice(1), data.failures.map(({ run, outcome, cause, command }) => [run, outcome, cause, command]));
+      assert.deepEqual((await tableOf(page, 'Commands that repeat the runs')).slice(1), data.failures.map(({ run, outcome, cause, command }) => [run, outcome, cause, command]));
     }
     await page.close();
   });
@@ -183,17 +184,17 @@ for (const file of [...accuracies, ...sweeps]) {
     await page.close();
   });
 
-  test(`${name}: nothing is wider than a narrow screen but tables, which scroll`, async () => {
+  test(`${name}: only tables are wider than a narrow screen, and they scroll`, async () => {
     const page = await open(file, { viewport: { width: 420, height: 800 } });
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth) <= 420);
     await page.close();
   });
 
-  test(`${name}: axe finds nothing to object to`, async (t) => {
+  test(`${name}: axe reports no violations`, async (t) => {
     const page = await open(file);
     for (const colorScheme of ['light', 'dark']) {
       await page.emulateMedia({ colorScheme });
-      const found = await objections(page);
+      const found = await violations(page);
       if (!found) return t.skip('axe-core is not installed');
       assert.deepEqual(found, [], colorScheme);
     }
@@ -203,13 +204,13 @@ for (const file of [...accuracies, ...sweeps]) {
 
 if (templates) {
   for (const name of ['sweep', 'accuracy']) {
-    test(`${name}: an empty template, and data of another format, say what is wrong`, async () => {
+    test(`${name}: an empty template, or data of another format, shows an error`, async () => {
       const template = path.join(templates, `${name}.html`);
-      for (const [file, words] of [[template, /empty template/], [fill(template, { format: 'hamelin.other/1' }, 'other.html'), /format "hamelin.other\/1" found, hamelin\.\w+-page\/1 expected/]]) {
+      for (const [file, expected] of [[template, /empty template/], [fill(template, { format: 'hamelin.other/1' }, 'other.html'), /format "hamelin.other\/1" found, hamelin\.\w+-page\/1 expected/]]) {
         const page = await browser.newPage();
         await page.goto(pathToFileURL(file).href);
         await page.getByRole('alert').waitFor();
-        assert.match(await page.getByRole('alert').textContent(), words);
+        assert.match(await page.getByRole('alert').textContent(), expected);
         await page.close();
       }
     });

@@ -1,6 +1,7 @@
-// Made-up runs in the report's container, so that the page can be built and tested without the program.
-//   node fixture.mjs TEMPLATE.html OUT_DIR      writes one.html, two.html, three.html, four.html, everything.html, planar.html
-// The shapes and motions are invented; only the format (hamelin.report/1) is the program's.
+// Made-up runs in the report's container, for building and testing the page without the program.
+//   node fixture.mjs TEMPLATE.html OUT_DIR
+// writes one.html, two.html, three.html, four.html, everything.html and planar.html.
+// The shapes and motions are invented; only the format (hamelin.report/1) is that of the program.
 import { readFileSync, writeFileSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -9,12 +10,14 @@ import { gzipSync } from 'node:zlib';
 const TOKEN = '__HAMELIN_REPORT_DATA__';
 const KINDS = { f64: Float64Array, f32: Float32Array, i32: Int32Array, u32: Uint32Array, i16: Int16Array, u16: Uint16Array, u8: Uint8Array };
 
-/** Collects arrays and writes the container. */
+/** Collects arrays and makes the container. */
 class Pack {
   parts = [];
   size = 0;
 
-  /** values → the array's description; raw = (value − offset) / scale, NaN → none. */
+  /**
+   * Adds an array and returns its description; raw = (value − offset) / scale, NaN becomes none.
+   */
   add(values, type, { scale = 1, offset = 0, none } = {}) {
     const raw = KINDS[type].from(values, (v) => (none !== undefined && Number.isNaN(v) ? none : type[0] === 'f' ? (v - offset) / scale : Math.round((v - offset) / scale)));
     const at = this.size;
@@ -37,7 +40,7 @@ class Pack {
   }
 }
 
-/** Repeatable numbers in [0, 1). */
+/** A generator of reproducible numbers in [0, 1). */
 function random(seed) {
   let s = seed >>> 0;
   return () => {
@@ -49,7 +52,7 @@ function random(seed) {
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const revolute = (name, axis, point, link) => ({ name, type: 'revolute', screw: [...axis, ...cross(point, axis)], link });
 
-/** A six-joint arm with one slide, 1.2 m long, upright at q = 0. */
+/** An arm with six joints, one of them prismatic, 1.2 m long, upright at q = 0. */
 function arm() {
   const skeleton = [[0, 0, 0.3], [0, 0, 0.34], [0, 0, 0.7], [0.06, 0, 0.72], [0.06, 0, 1.05], [0.06, 0, 1.05], [0.06, 0, 1.22]];
   const joints = [
@@ -80,7 +83,7 @@ function arm() {
   };
 }
 
-/** Three bars of 1 m in the plane of x and y. */
+/** A planar arm of three bars of 1 m in the x-y plane. */
 function bars() {
   const skeleton = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]];
   const joints = [0, 1, 2].map((i) => revolute(`joint${i + 1}`, [0, 0, 1], skeleton[i], `link${i + 1}`));
@@ -97,7 +100,7 @@ function bars() {
   };
 }
 
-/** Rotation and position of exp(S q), for the fixture's own figures. */
+/** Rotation and position of exp(S q), computed without the page's code. */
 function displacement(S, q) {
   const w = S.slice(0, 3);
   const v = S.slice(3);
@@ -120,7 +123,7 @@ function place(robot, q, link, point) {
   return p;
 }
 
-/** A rack and scattered bricks, `count` cells of 2 cm, some of them doubled. */
+/** A map of a rack and scattered bricks: `count` cells of 2 cm, and two of 8 cm. */
 function rack(pack, count) {
   const cells = new Map();
   const put = (x, y, z) => cells.size < count && cells.set(`${x},${y},${z}`, [x, y, z]);
@@ -153,7 +156,10 @@ function rack(pack, count) {
 
 const series = (pack, label, values) => ({ label, y: pack.add(values, 'f32') });
 
-/** One run along invented joint paths. `bend` tells the runs apart. */
+/**
+ * One run along invented joint paths. `bend` gives the joint values at a time and differs between
+ * the runs.
+ */
 function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, bend, channels, nearest, goalsAt, tip }) {
   const robot = world.robot;
   const n = robot.joints.length;
@@ -203,9 +209,9 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
     { id: 'tau', title: 'joint torques', unit: 'N m', t: T, series: robot.joints.map((j, i) => series(pack, j.name, fine.map((s) => 12 * Math.cos(s * (1 + 0.2 * i)) / (1 + i)))), marks: [] },
     { id: 'clearance', title: 'clearance', unit: 'm', t: pack.add(t, 'f64'), series: [series(pack, 'smallest clearance', least)], marks: [{ y: 0.02, label: 'margin' }] },
     { id: 'goal', title: 'distance to the goal', unit: 'm', t: pack.add(t, 'f64'), series: [series(pack, 'tip to goal', goalDistance)], marks: [{ y: 0.01, label: 'tolerance' }] },
-    { id: 'energy', title: 'energy ledger', unit: 'J', t: T, series: [
+    { id: 'energy', title: 'energy account', unit: 'J', t: T, series: [
       series(pack, 'kinetic', fine.map((s) => 2.1 * Math.sin(s) ** 2)), series(pack, 'potential', fine.map((s) => 35 + 6 * Math.cos(0.6 * s))),
-      series(pack, 'damping, taken out', fine.map((s) => 1.4 * s)), series(pack, 'gyroscopic work', fine.map((s) => 1e-14 * Math.sin(9 * s))),
+      series(pack, 'dissipated', fine.map((s) => 1.4 * s)), series(pack, 'gyroscopic work', fine.map((s) => 1e-14 * Math.sin(9 * s))),
     ], marks: [] },
     { id: 'energy_error', title: 'energy error', unit: 'J', t: T, series: [series(pack, 'energy error', fine.map((s) => 1.3e-16 * s * Math.sin(7 * s)))], marks: [] },
     { id: 'solver', title: 'solver updates per step', unit: '1', t: T, series: [series(pack, 'updates', fine.map((s) => 2 + Math.floor(2.2 * noise())))], marks: [] },
@@ -230,7 +236,7 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
     name, log: `${name}.jsonl`, world: worldIndex, scene: 'data/scenes/rack.json', planner, integrator: 'hamel-variational', outcome, cause: result.cause, result,
     config: { step_s: 0.001, planner: { name: planner, params: { margin_m: 0.02, cruise_speed_rad_s: 0.8 } }, gravity_m_s2: [0, 0, -9.81] },
     provenance: { hamelin: { version: '0.1.0', git_commit: '0123456789abcdef', git_dirty: false }, build: { compiler: 'g++ 12', type: 'Release' }, argv: ['hamelin', 'run', 'rack.json'] },
-    notes: name === 'gyro' ? ['every tenth tick was logged; extrema are over all'] : [],
+    notes: name === 'gyro' ? ['every tenth tick was logged; extrema are over all ticks'] : [],
     frames: {
       t: pack.add(t, 'f64'), q: pack.add(q, 'f32'), goal_index: pack.add(goalIndex, 'u8'),
       clearance: pack.add(clearance.flat(), 'u16', { scale: 1e-5, offset: 0, none: 65535 }), influence_m: influence,
@@ -247,8 +253,8 @@ const RACK_FACE = (p) => {
 };
 
 /**
- * The container of one to four runs of the six-joint arm, of one planar run, or of "everything": two runs that between
- * them have something for each control of the page.
+ * The container of one to four runs of the six-joint arm, of one planar run, or of "everything":
+ * two runs that together have something for each control of the page.
  */
 export function container(kind) {
   const pack = new Pack();
@@ -308,10 +314,10 @@ export function container(kind) {
   return pack.container({ format: 'hamelin.report/1', generator: 'hamelin 0.1.0', title: 'rack.json', worlds: [world], runs: made });
 }
 
-/** A whole page: the template with the container in it, as `hamelin report` makes it. */
+/** A complete page: the template filled with the container, as `hamelin report` makes it. */
 export function page(template, kind) {
   const pieces = template.split(TOKEN);
-  if (pieces.length !== 2) throw new Error(`the template holds the token ${pieces.length - 1} times, expected once`);
+  if (pieces.length !== 2) throw new Error(`the template contains the token ${pieces.length - 1} times, expected once`);
   return pieces.join(gzipSync(container(kind)).toString('base64'));
 }
 

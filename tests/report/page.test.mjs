@@ -1,19 +1,20 @@
-// Drives report pages in a headless Chromium.
-//   HAMELIN_PAGES      pages made by `hamelin report`, separated as in PATH
-//   HAMELIN_TEMPLATE   the built template; filled with the runs of fixture.mjs it makes more pages
-//   CHROMIUM, NODE_MODULES   see browser.mjs
+// Tests report pages in a headless Chromium.
+//   HAMELIN_PAGES           pages made by `hamelin report`, separated as in PATH
+//   HAMELIN_TEMPLATE        the built template, for pages with the runs of fixture.mjs
+//   CHROMIUM, NODE_MODULES  see browser.mjs
 //
-// Every page is opened once and compared with its data. The controls are tried on one page that has something for each of
-// them, all in one tab: with WebGL done in software it takes a second to open a page and to compile its shaders.
+// Every page is opened once and compared with its data. The controls are tested on one page that
+// has something for each of them, in one tab, because with WebGL in software it takes a second to
+// open a page and to compile its shaders.
 import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { launch, objections } from './browser.mjs';
+import { launch, violations } from './browser.mjs';
 import { writePages } from './fixture.mjs';
-import { changes, compare, drawsAgain, keepDrawing, screenshot, settle, showsAgain, watchDrawing } from './picture.mjs';
+import { becomesEqual, changes, compare, drawingBecomes, keepDrawing, screenshot, settle, watchDrawing } from './picture.mjs';
 import { cellsWithin, jointsAt, readData, tipOf } from './report_data.mjs';
 
 const template = process.env.HAMELIN_TEMPLATE;
@@ -23,30 +24,30 @@ if (!given.length && !template) throw new Error('set HAMELIN_PAGES to pages or H
 const [everything, planar] = template ? writePages(template, folder, ['everything', 'planar']) : [];
 
 let browser;
-let lab;
+let helper;
 before(async () => {
   browser = await launch();
-  lab = await browser.newPage();
+  helper = await browser.newPage();
 });
 after(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true, force: true });
 });
 
-/** Opens a page and listens to all that it says and asks for. */
+/** Opens a page and records its errors, warnings and requests. */
 async function open(file, { viewport = { width: 1200, height: 700 }, init, ...options } = {}) {
   const page = await browser.newPage({ viewport, ...options });
-  const heard = { errors: [], requests: [] };
-  page.on('pageerror', (error) => heard.errors.push(`page: ${error.message}`));
-  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && heard.errors.push(`console: ${message.text()}`));
-  page.on('request', (request) => heard.requests.push(request.url().slice(0, 200)));
+  const observed = { errors: [], requests: [] };
+  page.on('pageerror', (error) => observed.errors.push(`page: ${error.message}`));
+  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && observed.errors.push(`console: ${message.text()}`));
+  page.on('request', (request) => observed.requests.push(request.url().slice(0, 200)));
   if (init) await page.addInitScript(init);
   const began = performance.now();
   await page.goto(pathToFileURL(path.resolve(file)).href);
   await page.evaluate(() => window.hamelin.ready);
-  heard.ready = performance.now() - began;
+  observed.ready = performance.now() - began;
   await settle(page);
-  return { page, heard };
+  return { page, observed };
 }
 
 const time = (page) => page.evaluate(() => window.hamelin.time());
@@ -58,13 +59,13 @@ const box = (page, name) => settings(page).getByRole('checkbox', { name, exact: 
 const views = (page) => page.getByRole('group', { name: 'View', exact: true });
 const near = (a, b, slack) => Math.abs(a - b) < slack;
 
-/** Sets a slider as a user's drag does. */
+/** Sets a slider as dragging it does. */
 const drag = (locator, value) => locator.evaluate((input, v) => {
   input.value = v;
   input.dispatchEvent(new Event('input', { bubbles: true }));
 }, value);
 
-/** Distinct colours of each plot's canvas. */
+/** The number of distinct colours on the canvas of each plot. */
 const plotColors = (page) => page.locator('.uplot canvas').evaluateAll((all) => all.map((canvas) => {
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
   return new Set(new Uint32Array(data.buffer)).size;
@@ -77,7 +78,7 @@ const camera = (page) => page.evaluate(() => {
 });
 const towards = (d, axis) => d.reduce((sum, c, i) => sum + c * axis[i], 0) > 0.999;
 
-// ---- Of every page: it opens quietly and shows what is in its data ----
+// ---- Every page: it opens without errors and shows its data ----
 
 async function showsItsData(page, { json, worldOf }) {
   assert.ok((await page.title()).includes(json.title));
@@ -101,7 +102,7 @@ async function tipsAreRight(page, { json, unpack, worldOf }) {
     }), [moments, i]);
     moments.forEach((at, m) => {
       const right = tipOf(robot, jointsAt(run, unpack, robot.joints.length, at));
-      right.forEach((c, axis) => assert.ok(near(c, seen[m][axis], 1e-9 * reach), `run ${i}, t = ${at}: ${seen[m][axis]} for ${c}`));
+      right.forEach((c, axis) => assert.ok(near(c, seen[m][axis], 1e-9 * reach), `run ${i}, t = ${at}: ${seen[m][axis]}, expected ${c}`));
     });
   }
 }
@@ -114,9 +115,9 @@ async function nearCellsAreRight(page, { json, unpack, worldOf, middle }) {
   for (const [i, run] of json.runs.entries()) {
     const world = worldOf(run);
     if (!world.map || !world.robot.spheres.length) continue;
-    assert.deepEqual([world.map.position_m, world.map.quaternion_wxyz], [[0, 0, 0], [1, 0, 0, 0]], 'this test counts in the world frame');
+    assert.deepEqual([world.map.position_m, world.map.quaternion_wxyz], [[0, 0, 0], [1, 0, 0, 0]], 'this test assumes that the map has the pose of the world');
     const { least, most } = cellsWithin(world, unpack, jointsAt(run, unpack, world.robot.joints.length, middle), distance);
-    assert.ok(shown[i] >= least && shown[i] <= most, `run ${i}: ${shown[i]} cells for ${least} to ${most}`);
+    assert.ok(shown[i] >= least && shown[i] <= most, `run ${i}: ${shown[i]} cells, expected ${least} to ${most}`);
   }
 }
 
@@ -136,7 +137,7 @@ async function plotsAreDrawn(page, { json }) {
   ink.forEach((colors, i) => assert.ok(colors > 8, `plot ${i} has ${colors} colours`));
 }
 
-async function panelsAndTablesAreThere(page, { json, has }) {
+async function panelsAndTablesAreComplete(page, { json, has }) {
   assert.equal(await page.locator('.panel').count(), json.runs.length);
   assert.equal(await page.locator('.comparison tbody tr').count(), json.runs.length);
   for (const [i, run] of json.runs.entries()) {
@@ -156,25 +157,25 @@ for (const file of [...given, everything, planar].filter(Boolean)) {
   const data = readData(file);
 
   test(`${name}: opens without an error, a warning or a request, and shows its runs`, async (t) => {
-    const { page, heard } = await open(file, { viewport: { width: 1440, height: 900 } });
-    t.diagnostic(`${name}: ready after ${(heard.ready / 1000).toFixed(2)} s, ${(readFileSync(file).length / 1e6).toFixed(2)} MB`);
+    const { page, observed } = await open(file, { viewport: { width: 1440, height: 900 } });
+    t.diagnostic(`${name}: ready after ${(observed.ready / 1000).toFixed(2)} s, ${(readFileSync(file).length / 1e6).toFixed(2)} MB`);
     await t.test('the counts of the data', () => showsItsData(page, data));
     await t.test('the picture has depth', async () => {
-      const { colors } = await compare(lab, await screenshot(page));
+      const { colors } = await compare(helper, await screenshot(page));
       assert.ok(colors > 60, `only ${colors} colours`);
     });
     await t.test('the first view', () => firstViewIsRight(page, data));
     await t.test('all plots', () => plotsAreDrawn(page, data));
-    await t.test('panels, comparison, event ticks', () => panelsAndTablesAreThere(page, data));
-    await t.test('the tip is where the matrix exponential puts it, at frames and between', () => tipsAreRight(page, data));
-    if (data.has.map) await t.test('"only near the arm" keeps exactly the cells within the distance', () => nearCellsAreRight(page, data));
-    assert.deepEqual(heard.errors, []);
-    assert.deepEqual(heard.requests, [pathToFileURL(path.resolve(file)).href.slice(0, 200)]);
+    await t.test('panels, comparison, event ticks', () => panelsAndTablesAreComplete(page, data));
+    await t.test('the tip is at the position given by the matrix exponential, at frames and between', () => tipsAreRight(page, data));
+    if (data.has.map) await t.test('"only near the arm" shows exactly the cells within the distance', () => nearCellsAreRight(page, data));
+    assert.deepEqual(observed.errors, []);
+    assert.deepEqual(observed.requests, [pathToFileURL(path.resolve(file)).href.slice(0, 200)]);
     await page.close();
   });
 }
 
-// ---- The controls, on the page that has something for each ----
+// ---- The controls, on a page that has something for each of them ----
 
 async function sliderMovesTheArm(page, { duration }) {
   const first = await screenshot(page);
@@ -183,22 +184,22 @@ async function sliderMovesTheArm(page, { duration }) {
   await page.mouse.click(area.x + 0.6 * area.width, area.y + area.height / 2);
   assert.ok(near(await time(page), 0.6 * duration, 0.02 * duration));
   const moved = await page.evaluate(() => window.hamelin.pose(0));
-  assert.ok(Math.hypot(...moved.map((c, i) => c - pose[i])) > 1e-3, 'the tip stays');
-  assert.ok(await showsAgain(lab, page, first, false), 'the picture stays');
+  assert.ok(Math.hypot(...moved.map((c, i) => c - pose[i])) > 1e-3, 'the tip does not move');
+  assert.ok(await becomesEqual(helper, page, first, false), 'the picture does not change');
   assert.match(await page.locator('.readout').textContent(), /^\d+\.\d{3} \/ \d+\.\d{3} s$/);
   await setTime(page, 0);
-  assert.ok(await showsAgain(lab, page, first, true), 'time 0 looks otherwise the second time');
+  assert.ok(await becomesEqual(helper, page, first, true), 'time 0 looks different the second time');
 }
 
-/** The other checks of the picture look at what the page draws; this one, at whether the browser shows it. */
+/** The other checks compare what the page draws; this one checks that the browser shows it. */
 async function drawingIsShown(page) {
   // Nothing but the canvas may differ.
   const style = await page.addStyleTag({ content: '.hud, .corner { visibility: hidden; }' });
   const first = await screenshot(page);
   await box(page, 'arm').uncheck();
-  assert.ok(await showsAgain(lab, page, first, false, 2e-3), 'without the arm the window looks the same');
+  assert.ok(await becomesEqual(helper, page, first, false, 2e-3), 'without the arm the window looks the same');
   await box(page, 'arm').check();
-  assert.ok(await showsAgain(lab, page, first, true), 'the arm does not come back');
+  assert.ok(await becomesEqual(helper, page, first, true), 'the arm is not shown again');
   await style.evaluate((element) => element.remove());
 }
 
@@ -207,7 +208,10 @@ const setSpeed = async (page, speed) => {
   await page.evaluate(() => document.activeElement.blur());
 };
 
-/** Simulated seconds a second, taken frame by frame in the page: a busy machine may delay this side by seconds. */
+/**
+ * Simulated seconds per second, measured frame by frame in the page, because a busy machine may
+ * delay this process.
+ */
 async function pace(page, speed) {
   await setTime(page, 0);
   await setSpeed(page, speed);
@@ -235,9 +239,9 @@ async function keysAndButtonsStep(page, { json, unpack, duration }) {
   const steps = [...new Set(json.runs.flatMap((run) => unpack(run.frames.t)))].sort((a, b) => a - b).filter((t, i, all) => i === 0 || t - all[i - 1] > 1e-9);
   await page.keyboard.press('ArrowRight');
   assert.ok(near(await time(page), steps[1], 1e-9));
-  await page.getByRole('button', { name: 'One frame on (right arrow)' }).click();
+  await page.getByRole('button', { name: 'Next frame (right arrow)' }).click();
   assert.ok(near(await time(page), steps[2], 1e-9));
-  await page.getByRole('button', { name: 'One frame back (left arrow)' }).click();
+  await page.getByRole('button', { name: 'Previous frame (left arrow)' }).click();
   await page.keyboard.press('ArrowLeft');
   assert.equal(await time(page), 0);
   await page.keyboard.press('End');
@@ -252,8 +256,8 @@ async function keysAndButtonsPlay(page) {
   assert.ok(slow > 0 && fast > 8 * slow, `pace ${slow} at 0.1×, ${fast} at 4×`);
   const held = await time(page);
   await settle(page);
-  assert.equal(await time(page), held, 'goes on after the pause');
-  // Slowly, so that the end does not come before the click on a busy machine.
+  assert.equal(await time(page), held, 'the time changes after the pause');
+  // Slow, because on a busy machine the replay might end before the click.
   await setSpeed(page, 0.1);
   await setTime(page, 0);
   await page.getByRole('button', { name: 'Play (space)' }).click();
@@ -261,7 +265,10 @@ async function keysAndButtonsPlay(page) {
   await page.getByRole('button', { name: 'Pause (space)' }).click();
 }
 
-/** Switches a checkbox off and on again. */
+/**
+ * Checks that a checkbox changes the picture when it is switched off, and restores it when it is
+ * switched on.
+ */
 const flip = (page, label) => changes(page, label, () => box(page, label).uncheck(), () => box(page, label).check());
 
 async function partsAreSwitched(page, { json, unpack, middle }) {
@@ -273,7 +280,7 @@ async function partsAreSwitched(page, { json, unpack, middle }) {
 }
 
 async function arrowsAreSwitched(page, { json, unpack }) {
-  // A moment at which a force is large.
+  // A time at which a force is large.
   const { frames } = json.runs[0];
   const forces = frames.forces.map((force) => unpack(force.f));
   const most = Math.max(...forces.flat().map(Math.abs));
@@ -307,7 +314,7 @@ async function mapIsSwitched(page, { middle }) {
     some.forEach((count, i) => assert.ok(count < all[i] || all[i] === 0));
     await drag(within, Number(await within.getAttribute('max')));
     const more = (await counts(page)).voxelsShown;
-    assert.ok(more.reduce((a, b) => a + b) > some.reduce((a, b) => a + b), 'a larger distance keeps no more cells');
+    assert.ok(more.reduce((a, b) => a + b) > some.reduce((a, b) => a + b), 'a larger distance does not show more cells');
   }, () => onlyNear.uncheck());
   assert.deepEqual((await counts(page)).voxelsShown, all);
 }
@@ -332,14 +339,14 @@ async function obstaclesMoveAndAppear(page, { json, worldOf, duration }) {
   const { period_s: period } = obstacles.find((o) => o.motion).motion;
   const start = await keepDrawing(page);
   await setTime(page, Math.min(period / 4, duration));
-  assert.ok(await drawsAgain(page, start, false), 'nothing moves');
+  assert.ok(await drawingBecomes(page, start, false), 'no obstacle moves');
   const late = obstacles.find((o) => o.appears_s > 0 && o.appears_s < duration);
-  // Half a period later the moving ones stand where they stood; what appeared since is new.
+  // Half a period later the moving obstacles are at the same place; only the new obstacle differs.
   const later = Math.ceil(late.appears_s / (period / 2)) * (period / 2);
   await setTime(page, later - period / 2);
-  assert.ok(await drawsAgain(page, start, true), `${late.name} is there too early`);
+  assert.ok(await drawingBecomes(page, start, true), `${late.name} appears too early`);
   await setTime(page, later);
-  assert.ok(await drawsAgain(page, start, false), `${late.name} does not appear`);
+  assert.ok(await drawingBecomes(page, start, false), `${late.name} does not appear`);
   for (const label of others) await box(page, label).check();
 }
 
@@ -362,7 +369,10 @@ async function viewsTurnTheCamera(page) {
   await changes(page, 'the wheel', () => page.mouse.wheel(0, -300));
 }
 
-/** The first plot: its row, and where in the window a share of its time axis is. */
+/**
+ * The first plot: its row, the position in the window of a share of its time axis, and a drag
+ * between two shares.
+ */
 async function firstPlot(page) {
   const row = page.locator('.plot-row:not([data-plot^=overlay])').first();
   const over = row.locator('.u-over').first();
@@ -383,14 +393,14 @@ async function plotsSetTheTime(page, { json, unpack, duration }) {
   await page.mouse.click(...point(0.4));
   assert.ok(near(await time(page), 0.4 * duration, 0.01 * duration), `click at 0.4 set ${await time(page)} of ${duration}`);
   const lines = await page.locator('.now').evaluateAll((all) => all.map((line) => (new DOMMatrix(getComputedStyle(line).transform).e / line.parentElement.clientWidth)));
-  lines.forEach((share) => assert.ok(near(share, 0.4, 0.01), `a time line stands at ${share}`));
+  lines.forEach((share) => assert.ok(near(share, 0.4, 0.01), `a time line is at ${share}`));
 
   // Dragging the time line moves the time and does not zoom.
   await pull(0.4, 0.7);
   assert.ok(near(await time(page), 0.7 * duration, 0.01 * duration));
   assert.deepEqual(await zoomOf(page), [0, duration]);
 
-  // Values under the cursor come from the run.
+  // Values under the cursor are those of the run.
   await page.mouse.move(...point(0.25));
   await settle(page);
   const id = await row.getAttribute('data-plot');
@@ -400,7 +410,7 @@ async function plotsSetTheTime(page, { json, unpack, duration }) {
   const around = y.slice(Math.max(0, k - Math.ceil(0.01 * t.length) - 2), k + Math.ceil(0.01 * t.length) + 2);
   const shown = Number((await row.locator('.legend .value').first().textContent()).replaceAll('−', '-'));
   const slack = 1e-3 * Math.max(...around.map(Math.abs));
-  assert.ok(shown >= Math.min(...around) - slack && shown <= Math.max(...around) + slack, `value ${shown} where the run has ${Math.min(...around)} to ${Math.max(...around)}`);
+  assert.ok(shown >= Math.min(...around) - slack && shown <= Math.max(...around) + slack, `value ${shown}, expected ${Math.min(...around)} to ${Math.max(...around)}`);
 }
 
 async function plotsZoom(page, { duration }) {
@@ -458,7 +468,7 @@ async function coloursSwitch(page) {
   assert.notEqual(await paper(), dark);
 }
 
-async function eventsLead(page, { json }) {
+async function eventsSetTheTime(page, { json }) {
   const timed = json.runs.flatMap((run) => run.events.filter((event) => event.t !== null));
   const ticks = page.locator('.event-ticks button');
   const list = page.locator('details.section', { hasText: 'Events' }).first();
@@ -472,7 +482,7 @@ async function eventsLead(page, { json }) {
   await setTime(page, 0);
   await ticks.nth(index).click();
   assert.ok(near(await time(page), last, 1e-9));
-  for (const title of ['Configuration', 'Where it comes from']) {
+  for (const title of ['Configuration', 'Provenance']) {
     await page.locator('summary', { hasText: title }).click();
     assert.ok(await page.locator('details.section', { hasText: title }).locator('td').first().isVisible());
   }
@@ -489,11 +499,11 @@ async function fitsWindows(page) {
   }
 }
 
-async function axeIsContent(page, t) {
+async function axeReportsNoViolations(page, t) {
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({ colorScheme });
     await settle(page);
-    const found = await objections(page);
+    const found = await violations(page);
     if (!found) return t.skip('axe-core is not installed');
     assert.deepEqual(found, [], colorScheme);
   }
@@ -502,20 +512,20 @@ async function axeIsContent(page, t) {
 
 const CONTROLS = [
   ['the time slider moves the arm', sliderMovesTheArm],
-  ['what is drawn is shown', drawingIsShown],
+  ['the browser shows what the page draws', drawingIsShown],
   ['keys and buttons step', keysAndButtonsStep],
   ['keys and buttons play and pause', keysAndButtonsPlay],
   ['every part of the picture can be hidden', partsAreSwitched],
   ['arrows, their length and channels', arrowsAreSwitched],
-  ['the map, its opacity, and only what is near', mapIsSwitched],
+  ['the map, its opacity, and the cells near the arm', mapIsSwitched],
   ['the map is cut', mapIsCut],
-  ['obstacles move and appear in their time', obstaclesMoveAndAppear],
+  ['obstacles move and appear at their times', obstaclesMoveAndAppear],
   ['views, dragging and the wheel turn the camera', viewsTurnTheCamera],
   ['a click in a plot sets the time, and its values are the run\'s', plotsSetTheTime],
   ['plots zoom together', plotsZoom],
-  ['lines are hidden, and a plot takes a log scale', linesAreHidden],
+  ['lines are hidden, and a plot gets a log scale', linesAreHidden],
   ['light and dark', coloursSwitch],
-  ['events, configuration, provenance', eventsLead],
+  ['events, configuration, provenance', eventsSetTheTime],
   ['it fits windows of 800 to 1920 pixels', fitsWindows],
 ];
 
@@ -524,23 +534,23 @@ if (template) {
 
   test('everything: every control has its effect', async (t) => {
     assert.deepEqual(Object.entries(data.has).filter(([, there]) => !there), [], 'the page has something for each control');
-    const { page, heard } = await open(everything);
+    const { page, observed } = await open(everything);
     await watchDrawing(page);
-    for (const [what, check] of CONTROLS) {
-      await t.test(what, async () => {
+    for (const [name, check] of CONTROLS) {
+      await t.test(name, async () => {
         await setTime(page, 0);
         await check(page, data);
-        assert.deepEqual(heard.errors, []);
+        assert.deepEqual(observed.errors, []);
       });
     }
-    await t.test('axe finds nothing to object to', (part) => axeIsContent(page, part));
+    await t.test('axe reports no violations', (part) => axeReportsNoViolations(page, part));
     await page.close();
   });
 
-  test('planar: the plane, the way out of it, small numbers, window widths of a single run, axe', async (t) => {
-    const { page, heard } = await open(planar, {
+  test('planar: the plane and 3D, small numbers, window widths of a single run, axe', async (t) => {
+    const { page, observed } = await open(planar, {
       init: () => {
-        // What the plots write on their canvases.
+        // The texts that the plots write on their canvases.
         window.written = [];
         const write = CanvasRenderingContext2D.prototype.fillText;
         CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
@@ -550,7 +560,7 @@ if (template) {
       },
     });
     await watchDrawing(page);
-    await t.test('small numbers keep their digits: no axis of the energy error reads only 0', async () => {
+    await t.test('small numbers keep their digits: the axis of the energy error has labels other than 0', async () => {
       const written = await page.evaluate(() => window.written);
       assert.ok(written.some((text) => /^−?\d\.\d\de−16$/.test(text)), written.filter((text) => text.includes('e')).join(' '));
     });
@@ -562,13 +572,13 @@ if (template) {
       assert.equal((await camera(page)).flat, false);
     });
     await t.test('it fits windows of 800 to 1920 pixels', () => fitsWindows(page));
-    await t.test('axe finds nothing to object to', (part) => axeIsContent(page, part));
-    assert.deepEqual(heard.errors, []);
+    await t.test('axe reports no violations', (part) => axeReportsNoViolations(page, part));
+    assert.deepEqual(observed.errors, []);
     await page.close();
   });
 
-  test('without WebGL the page says so, and the plots are there', async () => {
-    const { page, heard } = await open(everything, {
+  test('without WebGL the page says so and shows the plots', async () => {
+    const { page, observed } = await open(everything, {
       init: () => {
         const get = HTMLCanvasElement.prototype.getContext;
         HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -577,7 +587,7 @@ if (template) {
       },
     });
     assert.ok(await page.getByText('needs WebGL').isVisible());
-    assert.deepEqual(heard.errors.filter((text) => text.startsWith('page:')), []);
+    assert.deepEqual(observed.errors.filter((text) => text.startsWith('page:')), []);
     const ink = await plotColors(page);
     assert.ok(ink.length > 0 && ink.every((colors) => colors > 8));
     const pose = await page.evaluate(() => window.hamelin.pose(0));
@@ -591,11 +601,11 @@ if (template) {
     await page.close();
   });
 
-  test('an empty template says what is wrong', async () => {
+  test('an empty template shows an error', async () => {
     const page = await browser.newPage();
     await page.goto(pathToFileURL(path.resolve(template)).href);
     await page.getByRole('alert').waitFor();
-    assert.match(await page.getByRole('alert').textContent(), /hamelin puts the data into it/);
+    assert.match(await page.getByRole('alert').textContent(), /hamelin inserts the data into it/);
     await page.close();
   });
 }

@@ -1,17 +1,21 @@
-// Pictures of a report page: what the browser shows of it, and what the page draws in its canvas.
+// Pictures of a report page: screenshots of the browser, and the pixels that the page draws on its
+// canvas.
 import assert from 'node:assert/strict';
 
-/** Three frames: what was asked for is drawn and shown by then, unless the machine is busy. */
+/** Waits for three frames, after which requested changes are usually drawn and shown. */
 export const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
 
-// ---- What the browser shows. A screenshot costs many times what a drawing costs, so there are few. ----
+// ---- Screenshots. They cost many times as much as drawings, so there are few. ----
 
 const shot = async (page) => {
   await settle(page);
   return page.locator('.panels').screenshot();
 };
 
-/** The panels as shown, once two screenshots in a row are the same: on a busy machine what was drawn is shown a little later. */
+/**
+ * A screenshot of the panels, taken until two in a row are equal: a busy machine shows a drawing a
+ * little later.
+ */
 export async function screenshot(page) {
   let last = await shot(page);
   for (let tries = 0; tries < 8; ++tries) {
@@ -19,12 +23,15 @@ export async function screenshot(page) {
     if (next.equals(last)) return next;
     last = next;
   }
-  throw new Error('the picture does not come to rest');
+  throw new Error('the picture keeps changing');
 }
 
-/** Screenshots decoded in the page `lab`: distinct colours of the first, and the share of pixels in which a second one differs. */
-export async function compare(lab, first, second = null) {
-  return lab.evaluate(async (pictures) => {
+/**
+ * Decodes screenshots in the page `helper`. Returns the number of distinct colours of the first
+ * one, and the share of pixels in which the second one differs.
+ */
+export async function compare(helper, first, second = null) {
+  return helper.evaluate(async (pictures) => {
     const decode = async (base64) => {
       const image = new Image();
       image.src = `data:image/png;base64,${base64}`;
@@ -40,18 +47,21 @@ export async function compare(lab, first, second = null) {
   }, [first, second].filter(Boolean).map((buffer) => buffer.toString('base64')));
 }
 
-/** Whether what is shown becomes the same as an earlier screenshot, or differs from it in more than a share of its pixels. */
-export async function showsAgain(lab, page, other, same, share = 0) {
+/**
+ * Whether the page becomes equal to an earlier screenshot, or differs from it in more than a share
+ * of the pixels.
+ */
+export async function becomesEqual(helper, page, other, same, share = 0) {
   for (let tries = 0; tries < 4; ++tries) {
-    const { differing } = await compare(lab, other, await screenshot(page));
+    const { differing } = await compare(helper, other, await screenshot(page));
     if (same ? differing === 0 : differing > share) return true;
   }
   return false;
 }
 
-// ---- What the page draws. It must draw by itself: only the pixels of its own drawings are looked at. ----
+// ---- Drawings. The page must draw by itself: only its own drawings are compared. ----
 
-/** From now on the pixels of each drawing are read at its end, before the browser takes them away. */
+/** Starts reading the pixels at the end of each drawing, before the browser discards them. */
 export const watchDrawing = (page) => page.evaluate(() => {
   const { view } = window.hamelin;
   const gl = view.renderer.getContext();
@@ -64,12 +74,12 @@ export const watchDrawing = (page) => page.evaluate(() => {
     gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(last.buffer));
   };
   const frame = () => new Promise((done) => requestAnimationFrame(done));
-  // The second frame is for what the layout of the first one asks for.
+  // The second frame is for drawings that the layout of the first one requests.
   const rest = async () => {
     do {
       await frame();
       await frame();
-    } while (view.wanted || !last);
+    } while (view.drawRequested || !last);
   };
   const same = (a, b) => a.length === b.length && a.every((pixel, i) => pixel === b[i]);
   window.drawing = {
@@ -88,18 +98,18 @@ export const watchDrawing = (page) => page.evaluate(() => {
   view.request();
 });
 
-/** Keeps the present drawing, once the page draws no more, and returns its number. */
+/** Keeps the present drawing, once the page has stopped drawing, and returns its number. */
 export const keepDrawing = (page) => page.evaluate(() => window.drawing.keep());
 
-/** Whether the drawing becomes the same as a kept one, or differs from it. */
-export const drawsAgain = (page, index, same) => page.evaluate(([i, wanted]) => window.drawing.becomes(i, wanted), [index, same]);
+/** Whether the drawing becomes equal to a kept one, or differs from it. */
+export const drawingBecomes = (page, index, same) => page.evaluate(([i, wanted]) => window.drawing.becomes(i, wanted), [index, same]);
 
-/** Fails unless the drawing changes by the action, and comes back by the undoing. */
-export async function changes(page, what, act, undo) {
+/** Fails unless the action changes the drawing and `undo` restores it. */
+export async function changes(page, name, act, undo) {
   const start = await keepDrawing(page);
   await act();
-  assert.ok(await drawsAgain(page, start, false), `${what}: the picture does not change`);
+  assert.ok(await drawingBecomes(page, start, false), `${name}: the picture does not change`);
   if (!undo) return;
   await undo();
-  assert.ok(await drawsAgain(page, start, true), `${what}: the picture does not come back`);
+  assert.ok(await drawingBecomes(page, start, true), `${name}: the picture is not restored`);
 }

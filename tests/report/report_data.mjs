@@ -1,4 +1,4 @@
-// What a report's page shows, read and computed without the page's code.
+// The data of a report's page, read and evaluated without the page's code.
 import { readFileSync } from 'node:fs';
 import { gunzipSync } from 'node:zlib';
 
@@ -6,7 +6,7 @@ const READ = {
   f64: [8, 'readDoubleLE'], f32: [4, 'readFloatLE'], i32: [4, 'readInt32LE'], u32: [4, 'readUInt32LE'], i16: [2, 'readInt16LE'], u16: [2, 'readUInt16LE'], u8: [1, 'readUInt8'],
 };
 
-/** The container in a page of any kind: its JSON, and the bytes of its arrays. */
+/** The container in a page: its JSON and the bytes of its arrays. */
 export function readContainer(file) {
   const text = /<script id="hamelin-data"[^>]*>([^<]*)<\/script>/.exec(readFileSync(file, 'utf8'))[1];
   const bytes = gunzipSync(Buffer.from(text, 'base64'));
@@ -14,7 +14,9 @@ export function readContainer(file) {
   return { json: JSON.parse(bytes.subarray(4, 4 + length).toString('utf8')), blob: bytes.subarray(Math.ceil((4 + length) / 8) * 8) };
 }
 
-/** The data of a report: its JSON, its arrays unpacked on demand, and what there is to see in it. */
+/**
+ * The data of a report: its JSON, a function that unpacks its arrays, and a list of its contents.
+ */
 export function readData(file) {
   const { json, blob } = readContainer(file);
   const unpack = ({ at, n, type, scale = 1, offset = 0, none }) => {
@@ -29,7 +31,7 @@ export function readData(file) {
   return { json, unpack, worldOf, duration, middle: 0.45 * duration, has: contents(json, unpack, worldOf) };
 }
 
-/** Which of the things that a page can show these runs have. */
+/** Which of the objects that a page can show the runs have. */
 function contents(json, unpack, worldOf) {
   return {
     map: json.runs.some((run) => worldOf(run).map?.level.n > 0),
@@ -44,7 +46,7 @@ function contents(json, unpack, worldOf) {
   };
 }
 
-// ---- Kinematics by another road: the matrix exponential as a power series, with scaling and squaring ----
+// ---- Independent kinematics: matrix exponential by power series, with scaling and squaring ----
 
 const times = (A, B) => A.map((row) => B[0].map((_, c) => row.reduce((sum, a, k) => sum + a * B[k][c], 0)));
 
@@ -63,7 +65,7 @@ function exponential(A) {
 
 export function tipOf(robot, q) {
   const [w, x, y, z] = robot.base.quaternion_wxyz;
-  // v → q v q* column by column
+  // v → q v q*, applied to the columns of the identity
   const turned = ([a, b, c]) => {
     const t = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
     return [a + w * t[0] + y * t[2] - z * t[1], b + w * t[1] + z * t[0] - x * t[2], c + w * t[2] + x * t[1] - y * t[0]];
@@ -77,7 +79,7 @@ export function tipOf(robot, q) {
   return times(T, [...robot.skeleton.at(-1), 1].map((v) => [v])).slice(0, 3).map(([v]) => v);
 }
 
-/** A run's joints at a time, joined straight between its frames. */
+/** The joints of a run at a time, interpolated linearly between its frames. */
 export function jointsAt(run, unpack, n, time) {
   const t = unpack(run.frames.t);
   const q = unpack(run.frames.q);
@@ -86,7 +88,10 @@ export function jointsAt(run, unpack, n, time) {
   return Array.from({ length: n }, (_, j) => q[k * n + j] + (a > 0 ? a * (q[(k + 1) * n + j] - q[k * n + j]) : 0));
 }
 
-/** How many cells of a world's map lie within a distance of the arm: at least, and at most (the page counts in single precision). */
+/**
+ * The number of cells of a world's map within a distance of the arm, as lower and upper bound,
+ * because the page computes in single precision.
+ */
 export function cellsWithin({ robot, map }, unpack, joints, distance) {
   const balls = robot.spheres.map((s) => ({ c: tipOf({ ...robot, tip_link: s.link, skeleton: [s.center_m] }, joints), r: s.radius_m }));
   const lo = unpack(map.lo);

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# run.sh PROGRAM TEMPLATES MODULES WORK: makes pages of runs, of a sweep and of an accuracy measurement, and drives them in
-# a headless Chromium. TEMPLATES holds the pages that the build made, MODULES the npm packages that it fetched.
-# Exit code 77, with the reason, if Node.js, Chromium, the packages or the pages are missing: the test is skipped.
+# run.sh PROGRAM TEMPLATES MODULES WORK: makes pages of runs, of a sweep and of an accuracy
+# measurement, and tests them in a headless Chromium. TEMPLATES is the folder of the built pages,
+# MODULES that of the npm packages of the build. Prints the reason and exits with 77, which skips
+# the test, if Node.js, Chromium, the packages or the pages are missing.
 set -euo pipefail
 program=$1 templates=$2 modules=$3 work=$4
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -19,7 +20,7 @@ command -v node >/dev/null || skip "node: not found"
 rm -rf "$work"
 mkdir -p "$work"
 cd "$here/../.."
-run() { # SCENE PLANNER LOG [OPTION...]; a run that does not reach its goal is no failure here
+run() { # SCENE PLANNER LOG [OPTION...]; a run that does not reach its goal is not a failure here
   local code=0
   "$program" run "$1" --planner "$2" --log "$work/$3" --quiet "${@:4}" || code=$?
   ((code <= 1)) || exit "$code"
@@ -38,5 +39,6 @@ done
 
 export NODE_MODULES=$modules HAMELIN_TEMPLATES=$templates
 HAMELIN_SWEEP_PAGE="$work/tries.html" HAMELIN_ACCURACY_PAGE="$work/accuracy.html" node --test "$here/documents.test.mjs"
-# Real runs; page.test.mjs makes up what no scene in data/ has: obstacles that move or come late, a prismatic joint.
+# Real runs. page.test.mjs adds made-up runs with what no scene in data/ has: obstacles that move or
+# appear later, a prismatic joint.
 HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"

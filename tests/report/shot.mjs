@@ -1,5 +1,6 @@
-// A picture of a report page.
-//   node shot.mjs PAGE.html OUT.png [--time T] [--size WxH] [--scale N] [--dark] [--full] [--run "JavaScript in the page"]
+// Takes a screenshot of a report page.
+//   node shot.mjs PAGE.html OUT.png [--time T] [--size WxH] [--scale N] [--dark] [--full]
+//     [--run "JavaScript in the page"]
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { parseArgs } from 'node:util';
@@ -24,7 +25,7 @@ try {
   await page.evaluate(() => window.hamelin.ready);
   if (values.time !== undefined) await page.evaluate((t) => window.hamelin.setTime(t), Number(values.time));
   if (values.run) await page.evaluate(values.run);
-  // Plots and picture follow within two frames.
+  // Plots and picture are updated within two frames.
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
   await page.screenshot({ path: out, fullPage: values.full ?? false });
 } finally {

@@ -36,7 +36,7 @@ int run_accuracy(const AccuracyFlags& flags) {
   const model::Model model = simulation::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
   set_start(flags.motion, model.dof(), scene);
-  scene.integrator = {};  // those of the command line are measured instead
+  scene.integrator = {};  // the integrators of the command line are measured instead
   const auto motion = simulation::free_motion(scene, model);
 
   accuracy::Options options;
@@ -57,64 +57,86 @@ int run_accuracy(const AccuracyFlags& flags) {
   std::optional<std::filesystem::path> output, page, template_file;
   if (flags.output) output = output_target(*flags.output, files_of(scene));
   if (flags.page) page = output_target(*flags.page, files_of(scene));
-  if (page) template_file = page_template("accuracy");  // before the work, which may take long
+  if (page) template_file = page_template("accuracy");  // before the long measurement
 
   const auto progress = std::make_shared<Progress>("rows measured");
   options.progress = [progress](std::size_t done, std::size_t all) {
     progress->show(static_cast<double>(done), static_cast<double>(all));
   };
-  const accuracy::Measurement found = accuracy::measure(model, options);
-  const Json document = accuracy::to_json(found);
-  if (output) write_file_aside(*output, document.dump(2) + "\n");
-  if (page) write_page(*template_file, report::pack(accuracy::page_json({found})), *page);
-  for (const auto& text : found.notes) note(text);
+  const accuracy::Measurement measurement = accuracy::measure(model, options);
+  const Json document = accuracy::to_json(measurement);
+  if (output) write_file_atomically(*output, document.dump(2) + "\n");
+  if (page) write_page(*template_file, report::pack(accuracy::page_json({measurement})), *page);
+  for (const auto& text : measurement.notes) note(text);
   if (flags.json)
     print_json(document);
   else
-    report(flags.markdown ? accuracy::to_markdown(found) : accuracy::to_table(found));
+    report(flags.markdown ? accuracy::to_markdown(measurement) : accuracy::to_table(measurement));
   return 0;
 }
 
 }  // namespace
 
 void add_accuracy(CLI::App& app, int& exit_code) {
-  auto* command = add_command(
-      app, "accuracy",
-      "Measure integrators: speed against error. Each lets the robot move freely with each of the steps (fixed) and "
-      "relative tolerances (step control) it takes; errors are those at the end, against a reference made by two "
-      "schemes whose difference is its own error",
-      "hamelin accuracy data/robots/planar3.json --integrators gauss:8,rk4 --steps 0.05,0.02 --duration 1\n"
-      "hamelin accuracy arm.urdf --integrators gauss,dop853 --rtol 1e-4,1e-8 --duration 1 --page p.html\n"
-      "hamelin accuracy scene.json --integrators rk4 --steps 1e-3 --duration 100 --no-reference --json");
+  auto* command = add_command(app, "accuracy",
+                              "Measure speed against error of integrators on a robot. Every "
+                              "integrator computes the same free motion with each "
+                              "fixed step and, if it has step control, with each relative "
+                              "tolerance. The error is the difference at the end "
+                              "from a reference. Two independent schemes compute the reference, "
+                              "and their difference estimates its own error",
+                              "hamelin accuracy data/robots/planar3.json --integrators gauss:8,rk4 "
+                              "--steps 0.05,0.02 --duration 1\n"
+                              "hamelin accuracy arm.urdf --integrators gauss,dop853 --rtol "
+                              "1e-4,1e-8 --duration 1 --page p.html\n"
+                              "hamelin accuracy scene.json --integrators rk4 --steps 1e-3 "
+                              "--duration 100 --no-reference --json");
   const auto flags = std::make_shared<AccuracyFlags>();
   add_motion_flags(*command, flags->motion);
   command
-      ->add_option("--integrators", flags->integrators,
-                   fmt::format("a list as gauss:8,rk4, an order behind the colon; known are {}",
-                               fmt::join(integration::integrator_names(), ", ")))
+      ->add_option(
+          "--integrators", flags->integrators,
+          fmt::format(
+              "comma-separated list such as gauss:8,rk4, with the order after a colon; one of {}",
+              fmt::join(integration::integrator_names(), ", ")))
       ->required()
       ->type_name("a,b,..");
-  command->add_option("--steps", flags->steps, "fixed steps [s], each a whole number of times in the duration")
+  command
+      ->add_option("--steps", flags->steps,
+                   "fixed steps [s]; the duration is an integer multiple of each")
       ->type_name("H,H,..");
-  command->add_option("--rtol", flags->rtols, "relative tolerances, for integrators with step control")
+  command
+      ->add_option("--rtol", flags->rtols, "relative tolerances of integrators with step control")
       ->type_name("E,E,..");
-  command->add_option("--atol", flags->atol, "absolute tolerance of step control (default equal to --rtol)")
+  command
+      ->add_option("--atol", flags->atol,
+                   "absolute tolerance of step control (default equal to --rtol)")
       ->type_name("E");
   command
       ->add_option("--tolerance", flags->tolerances,
-                   "of root-finding with fixed steps, see `hamelin integrate` (default the integrator's own)")
+                   "tolerance of root-finding with fixed steps, see `hamelin integrate` (default "
+                   "depends on the integrator)")
       ->type_name("E,E,..");
-  command->add_option("--duration", flags->duration_s, "[s] (default the scene's, else 10)")->type_name("T");
+  command
+      ->add_option("--duration", flags->duration_s,
+                   "simulated time [s] (default the scene's, or 10)")
+      ->type_name("T");
   command
       ->add_option("--every", flags->every,
-                   "look at the energy after every K fixed steps (default: so that it is at most 131072 times)")
+                   "sample the energy every K fixed steps (default: the smallest K that gives at "
+                   "most 131072 samples)")
       ->type_name("K")
       ->check(CLI::Range(1L, 1000000000L));
-  command->add_flag("--no-reference", flags->no_reference, "energy and time alone, for long motions");
+  command->add_flag("--no-reference", flags->no_reference,
+                    "measure energy and time only, without a reference, for long motions");
   command->add_flag("--json", flags->json, "print JSON (hamelin.accuracy/1)");
   command->add_flag("--markdown", flags->markdown, "print tables in Markdown")->excludes("--json");
-  command->add_option("-o,--output", flags->output, "write the JSON")->type_name("ACCURACY.json");
-  command->add_option("--page", flags->page, "write a page with plots and tables; `hamelin report` joins several")
+  command->add_option("-o,--output", flags->output, "write the JSON document to a file")
+      ->type_name("ACCURACY.json");
+  command
+      ->add_option("--page", flags->page,
+                   "write an HTML page with plots and tables; `hamelin report` combines several "
+                   "measurements")
       ->type_name("PAGE.html");
   command->callback([flags, &exit_code] { exit_code = run_accuracy(*flags); });
 }

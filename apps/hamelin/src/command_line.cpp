@@ -22,7 +22,7 @@ std::vector<std::string>& stored_command_line() {
   return arguments;
 }
 
-// The subcommand that was being read.
+// The deepest subcommand that the parser has reached.
 const CLI::App* innermost(const CLI::App* app) {
   while (!app->get_subcommands().empty()) app = app->get_subcommands().back();
   return app;
@@ -39,7 +39,7 @@ std::string did_you_mean(const std::string& name, const std::vector<std::string>
   return near.empty() ? "" : fmt::format(", did you mean '{}'?", near);
 }
 
-std::string unknown(const CLI::App& app, const std::string& argument) {
+std::string unknown_argument_message(const CLI::App& app, const std::string& argument) {
   const bool option = argument.starts_with("-");
   std::vector<std::string> names;
   if (option) {
@@ -49,10 +49,14 @@ std::string unknown(const CLI::App& app, const std::string& argument) {
   } else {
     names = command_names(app);
   }
-  if (option && std::find(names.begin(), names.end(), argument.substr(0, argument.find('='))) != names.end())
+  if (option &&
+      std::find(names.begin(), names.end(), argument.substr(0, argument.find('='))) != names.end())
     return fmt::format("option '{}' belongs after the command", argument);
-  const char* what = option ? "unknown option" : names.empty() ? "unexpected argument" : "unknown command";
-  return fmt::format("{} '{}'{}", what, argument, did_you_mean(argument.substr(0, argument.find('=')), names));
+  const char* problem = option          ? "unknown option"
+                        : names.empty() ? "unexpected argument"
+                                        : "unknown command";
+  return fmt::format("{} '{}'{}", problem, argument,
+                     did_you_mean(argument.substr(0, argument.find('=')), names));
 }
 
 }  // namespace
@@ -67,64 +71,70 @@ CLI::App* add_command(CLI::App& parent, const std::string& name, const std::stri
 
 namespace {
 
-// What is wrong with a value that is to be one of these; empty if nothing is.
-std::string unless_one_of(const std::string& given, const std::vector<std::string>& values) {
+// Why `given` is refused if it is not one of `values`; empty if it is one of them.
+std::string value_error(const std::string& given, const std::vector<std::string>& values) {
   if (std::find(values.begin(), values.end(), given) != values.end()) return {};
   return fmt::format("'{}' is not known, expected one of {}{}", given, fmt::join(values, ", "),
                      did_you_mean(given, values));
 }
 
-std::string listed(const std::vector<std::string>& values) {
+std::string in_braces(const std::vector<std::string>& values) {
   return fmt::format("{{{}}}", fmt::join(values, ","));
 }
 
 }  // namespace
 
-CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values) {
-  const auto check = [values](const std::string& given) { return unless_one_of(given, values); };
-  return option->check(CLI::Validator(check, listed(values)));
+CLI::Option* restrict_values(CLI::Option* option, const std::vector<std::string>& values) {
+  const auto check = [values](const std::string& given) { return value_error(given, values); };
+  return option->check(CLI::Validator(check, in_braces(values)));
 }
 
-CLI::Option* integrator_name(CLI::Option* option) {
+CLI::Option* restrict_to_integrators(CLI::Option* option) {
   const auto check = [](const std::string& given) -> std::string {
     try {
-      auto wrong = unless_one_of(integration::parse_scheme_name(given).name, integration::integrator_names());
-      if (wrong.empty()) (void)integration::make_options(given);
-      return wrong;
+      auto refusal =
+          value_error(integration::parse_scheme_name(given).name, integration::integrator_names());
+      if (refusal.empty()) (void)integration::make_options(given);
+      return refusal;
     } catch (const Error& error) {
       return error.what();
     }
   };
-  return option->check(CLI::Validator(check, listed(integration::integrator_names())))->type_name("NAME[:ORDER]");
+  return option->check(CLI::Validator(check, in_braces(integration::integrator_names())))
+      ->type_name("NAME[:ORDER]");
 }
 
 std::string full_name(const CLI::App& command) {
-  return command.get_parent() == nullptr ? command.get_name()
-                                         : full_name(*command.get_parent()) + " " + command.get_name();
+  return command.get_parent() == nullptr
+             ? command.get_name()
+             : full_name(*command.get_parent()) + " " + command.get_name();
 }
 
 const CLI::App* find_command(const CLI::App& parent, const std::string& name) {
   for (const auto* command : shown_commands(parent))
     if (command->get_name() == name) return command;
-  throw Error(ErrorCode::usage, unknown(parent, name));
+  throw Error(ErrorCode::usage, unknown_argument_message(parent, name));
 }
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = innermost(&app);
   std::string text;
   if (const auto rest = app.remaining(true); !rest.empty()) {
-    text = unknown(*at, rest.front());
-  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !command_names(*at).empty()) {
-    text = fmt::format("a command is missing, expected one of {}", fmt::join(command_names(*at), ", "));
+    text = unknown_argument_message(*at, rest.front());
+  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
+             !command_names(*at).empty()) {
+    text = fmt::format("a command is missing, expected one of {}",
+                       fmt::join(command_names(*at), ", "));
   } else {
     text = error.what();
     std::replace(text.begin(), text.end(), '\n', ' ');
   }
-  const std::string place = at == &app ? "" : full_name(*at).substr(app.get_name().size() + 1) + ": ";
+  const std::string place =
+      at == &app ? "" : full_name(*at).substr(app.get_name().size() + 1) + ": ";
   return fmt::format("{}{} (see {} --help)", place, text, full_name(*at));
 }
 
-CLI::Range whole_number() {
+CLI::Range unsigned_range() {
   return {0L, (1L << 53) - 1L};
 }
 
@@ -132,7 +142,8 @@ void print_json(const Json& document) {
   fmt::print("{}\n", document.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
-std::vector<double> number_list(const std::string& option, const std::string& text, std::optional<std::size_t> count) {
+std::vector<double> number_list(const std::string& option, const std::string& text,
+                                std::optional<std::size_t> count) {
   std::vector<double> numbers;
   for (std::size_t begin = 0; begin <= text.size();) {
     const auto end = std::min(text.find(',', begin), text.size());
@@ -140,13 +151,15 @@ std::vector<double> number_list(const std::string& option, const std::string& te
     const char* const stop = text.data() + end;
     const auto [read_to, ec] = std::from_chars(text.data() + begin, stop, number);
     if (ec != std::errc() || read_to != stop || !std::isfinite(number))
-      throw Error(ErrorCode::usage, fmt::format("{}: '{}' is no number, expected a list as 0.1,-0.2", option,
-                                                text.substr(begin, end - begin)));
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: '{}' is not a number, expected a list such as 0.1,-0.2", option,
+                              text.substr(begin, end - begin)));
     numbers.push_back(number);
     begin = end + 1;
   }
   if (count && numbers.size() != *count)
-    throw Error(ErrorCode::usage, fmt::format("{}: {} numbers given, expected {}", option, numbers.size(), *count));
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: {} values given, expected {}", option, numbers.size(), *count));
   return numbers;
 }
 
@@ -169,12 +182,13 @@ std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem
   std::vector<std::filesystem::path> own;
   if (const auto base = prefix()) {
     own.push_back(*base / "lib" / "hamelin" / "plugins");
-    if (std::string(HAMELIN_LIBDIR) != "lib") own.push_back(*base / HAMELIN_LIBDIR / "hamelin" / "plugins");
+    if (std::string(HAMELIN_LIBDIR) != "lib")
+      own.push_back(*base / HAMELIN_LIBDIR / "hamelin" / "plugins");
   }
   auto directories = planning::plugin_directories(given, own);
   std::string list;
   for (const auto& directory : directories) list += (list.empty() ? "" : ", ") + directory.string();
-  detail(fmt::format("planners are looked for in {}", list));
+  detail(fmt::format("searching for planners in {}", list));
   return directories;
 }
 

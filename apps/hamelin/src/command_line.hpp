@@ -7,21 +7,23 @@
 
 #include "hamelin/io/json.hpp"
 
-/// What the subcommands share in reading the command line.
+/// Reading the command line: shared by all subcommands.
 namespace hamelin::app {
 
-/// The group of the options that each command takes, before and after its name.
-inline constexpr const char* everywhere = "Everywhere";
+/// The group of the options that every command takes, before and after its name.
+inline constexpr const char* global_options = "Global options";
 
-/// A subcommand whose help opens with `examples`, one a line.
+/// Adds a subcommand whose help begins with `examples`, one per line.
 CLI::App* add_command(CLI::App& parent, const std::string& name, const std::string& description,
                       const std::string& examples);
 
-/// Refuses all but these values, with the nearest one; help and completion offer them. Returns the option.
-CLI::Option* one_of(CLI::Option* option, const std::vector<std::string>& values);
+/// Makes the option refuse all but these values, with a hint at the nearest one. Help and
+/// completion list the values. Returns the option.
+CLI::Option* restrict_values(CLI::Option* option, const std::vector<std::string>& values);
 
-/// Refuses all but names of integrators, which may carry an order ("gauss:8"). Returns the option.
-CLI::Option* integrator_name(CLI::Option* option);
+/// Makes the option refuse all but names of integrators, which may carry an order ("gauss:8").
+/// Returns the option.
+CLI::Option* restrict_to_integrators(CLI::Option* option);
 
 /// "hamelin scene info"
 [[nodiscard]] std::string full_name(const CLI::App& command);
@@ -29,27 +31,31 @@ CLI::Option* integrator_name(CLI::Option* option);
 /// The subcommand of that name. @throws Error usage with the nearest name
 [[nodiscard]] const CLI::App* find_command(const CLI::App& parent, const std::string& name);
 
-/// One line that says what is wrong with a command line, with the nearest known name for an unknown one.
+/// One line that says what is wrong with a command line; for an unknown name with a hint at the
+/// nearest known one.
 [[nodiscard]] std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
-/// A check for unsigned options: 0 to 2^53 - 1, what a scene's seed may be. CLI11 reads -1 as the largest number.
-[[nodiscard]] CLI::Range whole_number();
+/// A check for unsigned options: 0 to 2^53 - 1, the range of a scene's seed. Without it CLI11 would
+/// read -1 as the largest unsigned number.
+[[nodiscard]] CLI::Range unsigned_range();
 
 /// Prints a document on stdout, for --json.
 void print_json(const Json& document);
 
-/// The numbers of a comma list. @throws Error usage naming the option, if it is no such list or has not `count` numbers
+/// The numbers of a comma-separated list.
+/// @throws Error usage naming the option, for anything else or if there are not `count` values
 [[nodiscard]] std::vector<double> number_list(const std::string& option, const std::string& text,
                                               std::optional<std::size_t> count = {});
 
-/// The command line as given.
+/// The command line as given, for logs.
 [[nodiscard]] std::vector<std::string> command_line();
 void set_command_line(int argc, char** argv);
 
-/// The folder that holds this program's bin/ and what came with it; none if the system does not tell.
+/// The installation prefix, which holds this program's bin/; none if the system does not reveal it.
 [[nodiscard]] std::optional<std::filesystem::path> prefix();
 
-/// Where planners are looked for: `given`, HAMELIN_PLUGIN_PATH, then beside this program.
-[[nodiscard]] std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given);
+/// The directories searched for planners: `given`, HAMELIN_PLUGIN_PATH, then this program's prefix.
+[[nodiscard]] std::vector<std::filesystem::path> plugin_path(
+    const std::vector<std::filesystem::path>& given);
 
 }  // namespace hamelin::app

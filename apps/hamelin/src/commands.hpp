@@ -1,7 +1,8 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
-/// The subcommands: each function adds one. Its action runs once the command line is read, and leaves the exit code.
+/// The subcommands: each function adds one. Its action runs after the command line is parsed and
+/// sets the exit code.
 namespace hamelin::app {
 
 void add_run(CLI::App& app, int& exit_code);
@@ -18,7 +19,7 @@ void add_validate(CLI::App& app, int& exit_code);
 void add_schema(CLI::App& app, int& exit_code);
 void add_help(CLI::App& app, int& exit_code);
 void add_completion(CLI::App& app, int& exit_code);
-/// Hidden: the build writes the manual pages with it.
+/// Hidden from help: the build uses it to write the manual pages.
 void add_man(CLI::App& app, int& exit_code);
 
 }  // namespace hamelin::app

@@ -12,25 +12,26 @@ namespace hamelin::app {
 
 namespace {
 
-// In front of what is generated: how each kind of word is completed. $cur is the word so far.
+// The fixed part of the script, before the generated cases: how each kind of word is completed.
+// $cur is the word that is being typed.
 constexpr const char* beginning =
-    R"bash(# Completion of hamelin in bash, made by `hamelin completion bash`; needs nothing but bash.
+    R"bash(# Completion of hamelin in bash, written by `hamelin completion bash`; requires only bash.
 
 _hamelin_words() {
   mapfile -t COMPREPLY < <(compgen -W "$*" -- "$cur")
 }
 
-# Directories, and files that end in one of the arguments; without any, all files.
+# Directories, and files whose extension is one of the arguments; without arguments, all files.
 _hamelin_files() {
-  local file ending
+  local file extension
   compopt -o filenames 2>/dev/null
   while IFS= read -r file; do
     if [[ -d $file || $# -eq 0 ]]; then
       COMPREPLY+=("$file")
       continue
     fi
-    for ending; do
-      if [[ $file == *."$ending" ]]; then COMPREPLY+=("$file"); fi
+    for extension; do
+      if [[ $file == *."$extension" ]]; then COMPREPLY+=("$file"); fi
     done
   done < <(compgen -f -- "$cur")
 }
@@ -40,7 +41,7 @@ _hamelin_directories() {
   mapfile -t COMPREPLY < <(compgen -d -- "$cur")
 }
 
-# Names of the plugins found, or a path to one.
+# Names of the plugins found, or the path of one.
 _hamelin_planners() {
   if [[ $cur == */* ]]; then
     _hamelin_files so
@@ -59,46 +60,50 @@ _hamelin() {
     case "$at ${COMP_WORDS[i]}" in
 )bash";
 
-// The function that offers values in place of a placeholder; empty: numbers and names nobody can guess.
-std::string values_by(const CLI::Option& option) {
-  static const std::map<std::string, const char*> known{{"DIR", "_hamelin_directories"},
-                                                        {"NAME|PATH", "_hamelin_planners"},
-                                                        {"FILE", "_hamelin_files"},
-                                                        {"LOG", "_hamelin_files jsonl zst"},
-                                                        {"SCENE_OR_ROBOT", "_hamelin_files json urdf"},
-                                                        {"MAP_OR_SCENE", "_hamelin_files bt ot json"}};
+// The shell function that offers values for an option; empty for numbers and free names.
+std::string completer_of(const CLI::Option& option) {
+  static const std::map<std::string, const char*> known{
+      {"DIR", "_hamelin_directories"},
+      {"NAME|PATH", "_hamelin_planners"},
+      {"FILE", "_hamelin_files"},
+      {"LOG", "_hamelin_files jsonl zst"},
+      {"SCENE_OR_ROBOT", "_hamelin_files json urdf"},
+      {"MAP_OR_SCENE", "_hamelin_files bt ot json"}};
   if (const auto values = values_of(option); !values.empty())
     return fmt::format("_hamelin_words {}", fmt::join(values, " "));
   std::string name = placeholder(option);
   if (name.ends_with("...")) name.resize(name.size() - 3);
   if (const auto at = known.find(name); at != known.end()) return at->second;
   const auto dot = name.find('.');
-  const bool file = dot != std::string::npos &&
-                    name.find_first_not_of("abcdefghijklmnopqrstuvwxyz", dot + 1) == std::string::npos &&
-                    dot + 1 < name.size();
+  const bool file =
+      dot != std::string::npos &&
+      name.find_first_not_of("abcdefghijklmnopqrstuvwxyz", dot + 1) == std::string::npos &&
+      dot + 1 < name.size();
   return file ? "_hamelin_files " + name.substr(dot + 1) : "";
 }
 
-// " scene info": the words that lead to a command.
+// The path to a command, e.g. " scene info".
 std::string path_to(const CLI::App& command) {
-  return command.get_parent() == nullptr ? "" : path_to(*command.get_parent()) + " " + command.get_name();
+  return command.get_parent() == nullptr
+             ? ""
+             : path_to(*command.get_parent()) + " " + command.get_name();
 }
 
-// Calls `visit` for each shown command, and for the program itself first.
+// Calls `visit` for the program itself, then for each command that help shows.
 template <typename Visit>
 void walk(const CLI::App& command, const Visit& visit) {
   visit(command);
   for (const auto* sub : shown_commands(command)) walk(*sub, visit);
 }
 
-// The lines of the innermost command's words, options and operands.
+// The generated `case` lines: paths of commands, values of options, options and operands.
 struct Cases {
   std::string paths, values, options, operands;
 };
 
 void add_cases(const CLI::App& command, const CLI::App& root, Cases& cases) {
   const std::string path = path_to(command);
-  if (path == " help") {  // after it come the same words as without it
+  if (path == " help") {  // the words after it are completed as if it were absent
     cases.paths += "      \" help\") at=\"\" ;;\n";
     return;
   }
@@ -108,19 +113,24 @@ void add_cases(const CLI::App& command, const CLI::App& root, Cases& cases) {
   for (const CLI::App* owner : {&command, &root})
     for (const auto* option : owner->get_options())
       for (const auto& name : names_of(*option))
-        if (std::find(options.begin(), options.end(), name) == options.end()) options.push_back(name);
-  cases.options += fmt::format("      \"{}\") _hamelin_words {} ;;\n", path, fmt::join(options, " "));
+        if (std::find(options.begin(), options.end(), name) == options.end())
+          options.push_back(name);
+  cases.options +=
+      fmt::format("      \"{}\") _hamelin_words {} ;;\n", path, fmt::join(options, " "));
 
   for (const auto* sub : shown_commands(command)) words.push_back(sub->get_name());
-  std::string operand = words.empty() ? "" : fmt::format("_hamelin_words {}", fmt::join(words, " "));
+  std::string operand =
+      words.empty() ? "" : fmt::format("_hamelin_words {}", fmt::join(words, " "));
   for (const auto* option : command.get_options()) {
-    const std::string by = values_by(*option);
+    const std::string completer = completer_of(*option);
     if (option->get_positional()) {
-      if (operand.empty()) operand = by;
+      if (operand.empty()) operand = completer;
     } else if (!placeholder(*option).empty()) {
       std::vector<std::string> patterns;
-      for (const auto& name : names_of(*option)) patterns.push_back(fmt::format("\"{} {}\"", path, name));
-      cases.values += fmt::format("    {}) {}return ;;\n", fmt::join(patterns, " | "), by.empty() ? "" : by + "; ");
+      for (const auto& name : names_of(*option))
+        patterns.push_back(fmt::format("\"{} {}\"", path, name));
+      cases.values += fmt::format("    {}) {}return ;;\n", fmt::join(patterns, " | "),
+                                  completer.empty() ? "" : completer + "; ");
     }
   }
   if (!operand.empty()) cases.operands += fmt::format("      \"{}\") {} ;;\n", path, operand);
@@ -141,11 +151,14 @@ std::string bash_script(const CLI::App& root) {
 }  // namespace
 
 void add_completion(CLI::App& app, int& exit_code) {
-  auto* completion = add_command(app, "completion", "Print a script that completes commands, options and files",
-                                 "source <(hamelin completion bash)\n"
-                                 "hamelin completion bash > ~/.local/share/bash-completion/completions/hamelin");
+  auto* completion = add_command(
+      app, "completion", "Print a shell completion script for commands, options and file names",
+      "source <(hamelin completion bash)\n"
+      "hamelin completion bash > ~/.local/share/bash-completion/completions/hamelin");
   const auto shell = std::make_shared<std::string>();
-  one_of(completion->add_option("shell", *shell, "whose completion"), {"bash"})->required()->type_name("SHELL");
+  restrict_values(completion->add_option("shell", *shell, "shell to complete for"), {"bash"})
+      ->required()
+      ->type_name("SHELL");
   completion->callback([&app, shell, &exit_code] {  // the option writes to `shell`
     fmt::print("{}", bash_script(app));
     exit_code = 0;

@@ -50,22 +50,25 @@ bool holds_records(const std::filesystem::path& file) {
   return first.is_object() && first.value("schema", Json()) == "hamelin.record/1";
 }
 
-Kind recognized(const std::filesystem::path& file) {
-  const auto ending = file.extension();
-  if (ending == ".bt" || ending == ".ot") return Kind::map;
-  if (ending == ".jsonl" && holds_records(file)) return Kind::records;
-  if (ending == ".jsonl" || ending == ".zst") return Kind::log;
-  if (ending == ".urdf") return Kind::urdf;
+Kind recognise(const std::filesystem::path& file) {
+  const auto extension = file.extension();
+  if (extension == ".bt" || extension == ".ot") return Kind::map;
+  if (extension == ".jsonl" && holds_records(file)) return Kind::records;
+  if (extension == ".jsonl" || extension == ".zst") return Kind::log;
+  if (extension == ".urdf") return Kind::urdf;
   const std::string text = read_file(file);
   if (text.starts_with("# Octomap")) return Kind::map;
   const auto first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string::npos) throw Error(ErrorCode::parse, fmt::format("{}: is empty", file.string()));
+  if (first == std::string::npos)
+    throw Error(ErrorCode::parse, fmt::format("{}: is empty", file.string()));
   if (text[first] == '<') return Kind::urdf;
   if (text[first] != '{')
-    throw Error(ErrorCode::parse, fmt::format("{}: is no map, XML or JSON object", file.string()));
-  // A log is the only format with one object a line.
+    throw Error(ErrorCode::parse,
+                fmt::format("{}: is not a map, XML or a JSON object", file.string()));
+  // A log is the only format with one JSON object per line.
   const std::string line = text.substr(0, text.find('\n'));
-  if (const Json head = Json::parse(line, nullptr, false); head.is_object() && head.value("type", Json()) == "header")
+  if (const Json head = Json::parse(line, nullptr, false);
+      head.is_object() && head.value("type", Json()) == "header")
     return Kind::log;
   const Json document = parse_json(text, file.string());
   const Json schema = document.value("schema", Json(nullptr));
@@ -76,17 +79,20 @@ Kind recognized(const std::filesystem::path& file) {
   if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema == "hamelin.summary/1") return Kind::summary;
   if (schema == "hamelin.accuracy/1") return Kind::accuracy;
-  if (schema.is_null() && document.contains("links") && document["links"].is_object()) return Kind::spheres;
-  throw Error(ErrorCode::invalid,
-              fmt::format("{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
-                          "hamelin.primitives/1, hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
-                          file.string(), schema.is_null() ? "missing" : schema.dump()));
+  if (schema.is_null() && document.contains("links") && document["links"].is_object())
+    return Kind::spheres;
+  throw Error(
+      ErrorCode::invalid,
+      fmt::format(
+          "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
+          "hamelin.primitives/1, hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
+          file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 
 }  // namespace
 
 Kind kind_of(const std::filesystem::path& file) {
-  const Kind kind = recognized(file);
+  const Kind kind = recognise(file);
   detail(fmt::format("reading {}: a {}", file.string(), to_string(kind)));
   return kind;
 }

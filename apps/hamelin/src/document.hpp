@@ -6,11 +6,25 @@
 
 namespace hamelin::app {
 
-/// What a file is, by its content.
-enum class Kind { map, urdf, robot, scene, result, primitives, spheres, log, sweep, records, summary, accuracy };
+/// The kinds of files that hamelin reads or writes.
+enum class Kind {
+  map,
+  urdf,
+  robot,
+  scene,
+  result,
+  primitives,
+  spheres,
+  log,
+  sweep,
+  records,
+  summary,
+  accuracy
+};
 
 [[nodiscard]] std::string_view to_string(Kind kind) noexcept;
 
+/// The kind of a file, recognised by its content.
 /// @throws Error io, parse (neither map, XML nor JSON) or invalid (JSON of another schema)
 [[nodiscard]] Kind kind_of(const std::filesystem::path& file);
 

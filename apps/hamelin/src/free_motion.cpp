@@ -11,16 +11,19 @@ namespace hamelin::app {
 
 namespace {
 
-void say_what_is_ignored(const scene::Scene& scene) {
+void note_ignored_parts(const scene::Scene& scene) {
   std::vector<std::string> ignored;
   if (scene.planner) ignored.push_back(fmt::format("planner '{}'", scene.planner->name));
   if (scene.map) ignored.push_back("the map");
-  if (!scene.obstacles.empty()) ignored.push_back(fmt::format("{} obstacle(s)", scene.obstacles.size()));
+  if (!scene.obstacles.empty())
+    ignored.push_back(fmt::format("{} obstacle(s)", scene.obstacles.size()));
   if (!scene.goals.empty()) ignored.push_back(fmt::format("{} goal(s)", scene.goals.size()));
-  if (!ignored.empty()) note(fmt::format("{}: free motion, ignored: {}", scene.name, fmt::join(ignored, ", ")));
+  if (!ignored.empty())
+    note(fmt::format("{}: free motion ignores {}", scene.name, fmt::join(ignored, ", ")));
 }
 
-void set_joints(const char* option, const std::optional<std::string>& given, int dof, Eigen::VectorXd& joints) {
+void set_joints(const char* option, const std::optional<std::string>& given, int dof,
+                Eigen::VectorXd& joints) {
   if (!given) return;
   const auto numbers = number_list(option, *given, static_cast<std::size_t>(dof));
   joints = Eigen::Map<const Eigen::VectorXd>(numbers.data(), dof);
@@ -29,13 +32,18 @@ void set_joints(const char* option, const std::optional<std::string>& given, int
 }  // namespace
 
 void add_motion_flags(CLI::App& command, MotionFlags& flags) {
-  command.add_option("file", flags.file, "a scene, or a robot (.urdf or JSON)")
+  command.add_option("file", flags.file, "scene file, or robot file (.urdf or JSON)")
       ->required()
       ->type_name("SCENE_OR_ROBOT");
-  command.add_option("--tip", flags.tip, "link that is the tip (URDF: default the only leaf)")->type_name("LINK");
-  command.add_option("--q0", flags.q0, "joints at the start [rad or m] (default the scene's, else 0)")
+  command.add_option("--tip", flags.tip, "tip link (default for a URDF: its only leaf)")
+      ->type_name("LINK");
+  command
+      .add_option("--q0", flags.q0,
+                  "joint positions at the start [rad or m] (default the scene's, or 0)")
       ->type_name("a,b,..");
-  command.add_option("--v0", flags.v0, "joint velocities at the start (default the scene's, else 0)")
+  command
+      .add_option("--v0", flags.v0,
+                  "joint velocities at the start [rad/s or m/s] (default the scene's, or 0)")
       ->type_name("a,b,..");
 }
 
@@ -44,14 +52,14 @@ scene::Scene read_motion(const MotionFlags& flags) {
   scene::Scene scene;
   if (kind == Kind::scene) {
     scene = scene::read_scene(flags.file);
-    say_what_is_ignored(scene);
+    note_ignored_parts(scene);
   } else if (kind == Kind::urdf || kind == Kind::robot) {
     scene.name = flags.file.string();
     scene.robot.file = flags.file;
     scene.gravity_m_s2 = Eigen::Vector3d{0.0, 0.0, -9.81};
   } else {
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: is a {}, expected a robot or a scene", flags.file.string(), to_string(kind)));
+    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a robot or a scene",
+                                                flags.file.string(), to_string(kind)));
   }
   if (flags.tip) scene.robot.tip = flags.tip;
   return scene;

@@ -6,7 +6,7 @@
 
 #include "hamelin/scene/scene.hpp"
 
-/// What `hamelin integrate` and `hamelin accuracy` share: which arm falls, and from where.
+/// Shared by `hamelin integrate` and `hamelin accuracy`: the robot in free motion and its start.
 namespace hamelin::app {
 
 struct MotionFlags {
@@ -16,11 +16,12 @@ struct MotionFlags {
 
 void add_motion_flags(CLI::App& command, MotionFlags& flags);
 
-/// The scene, saying what of it is ignored; for a bare robot one with all defaults, gravity -9.81 m/s^2 along z.
+/// Reads a scene and notes which parts of it free motion ignores. A robot file gives a scene with
+/// all defaults and gravity -9.81 m/s^2 along z.
 /// @throws Error invalid for a file that is neither
 [[nodiscard]] scene::Scene read_motion(const MotionFlags& flags);
 
-/// Puts --q0 and --v0 into the scene. @throws Error usage if there are not `dof` numbers
+/// Writes --q0 and --v0 into the scene. @throws Error usage if there are not `dof` values
 void set_start(const MotionFlags& flags, int dof, scene::Scene& scene);
 
 }  // namespace hamelin::app

@@ -14,21 +14,27 @@ namespace hamelin::app {
 namespace {
 
 constexpr std::size_t width = 100, indent = 30;
-// A list of values longer than this goes to the text.
+// A longer list of values is moved from the placeholder to the text.
 constexpr std::size_t longest_value_list = 24;
 
-const std::vector<HelpSection>& about_the_program() {
+const std::vector<HelpSection>& program_sections() {
   static const std::vector<HelpSection> sections{
       {"Exit codes",
-       {{"0", "done; the goal was reached"},
+       {{"0", "success; the goal was reached"},
         {"1", "ran, but the goal was not reached or a check failed"},
-        {"2", "bad input or usage, a refused plugin, an output that cannot be written, a start in contact"},
-        {"3", "diverged, or an internal check failed: unconverged step, energy account, planner's answer"},
-        {"130", "interrupted; what was recorded so far is written"}}},
+        {"2",
+         "bad input or usage, a refused plugin, an output that cannot be written, a start in "
+         "contact"},
+        {"3",
+         "diverged, or an internal check failed: unconverged step, energy account, planner's "
+         "answer"},
+        {"130", "interrupted; log and result up to then are written"}}},
       {"Environment",
-       {{"HAMELIN_PLUGIN_PATH", "directories to look for planners in, separated by colons"},
-        {"HAMELIN_ISA", "x86-64, v3 (AVX2) or v4 (AVX-512): the instruction set to compute with (default the best)"},
-        {"NO_COLOR, TERM=dumb", "no colour, as --no-color; a dumb terminal gets no counting line either"}}}};
+       {{"HAMELIN_PLUGIN_PATH", "colon-separated list of directories to search for planners"},
+        {"HAMELIN_ISA",
+         "instruction set to use: x86-64, v3 (AVX2) or v4 (AVX-512) (default the best available)"},
+        {"NO_COLOR, TERM=dumb",
+         "disable colour, like --no-color; TERM=dumb also disables the progress line"}}}};
   return sections;
 }
 
@@ -55,8 +61,10 @@ HelpEntry entry_of(const CLI::Option& option) {
     if (!value.empty()) entry.name += " " + value;
   }
   entry.text = option.get_description();
-  if (!values.empty() && !in_place) entry.text += fmt::format("; one of {}", fmt::join(values, ", "));
-  if (!option.get_default_str().empty()) entry.text += fmt::format(" (default {})", option.get_default_str());
+  if (!values.empty() && !in_place)
+    entry.text += fmt::format("; one of {}", fmt::join(values, ", "));
+  if (!option.get_default_str().empty())
+    entry.text += fmt::format(" (default {})", option.get_default_str());
   if (option.get_required() && !option.get_positional()) entry.text += " (required)";
   return entry;
 }
@@ -66,28 +74,31 @@ std::string usage_of(const CLI::App& command) {
   if (!command.get_subcommands({}).empty()) usage += " COMMAND";
   for (const auto* option : command.get_options()) {
     if (option->get_positional())
-      usage += option->get_required() ? " " + entry_of(*option).name : fmt::format(" [{}]", entry_of(*option).name);
+      usage += option->get_required() ? " " + entry_of(*option).name
+                                      : fmt::format(" [{}]", entry_of(*option).name);
     else if (option->get_required())
       usage += fmt::format(" {} {}", names_of(*option).front(), placeholder(*option));
   }
   return usage + " [OPTIONS]";
 }
 
-// Each command has a --help of its own; the program's stands for all.
+// Each command has its own --help option; help shows only that of the program.
 bool is_inherited_help(const CLI::Option& option, const CLI::App& command) {
   return command.get_parent() != nullptr && &option == command.get_help_ptr();
 }
 
-// Options of one kind; hidden ones are in no group.
-HelpSection options_of(const CLI::App& command, const std::string& title, const std::string& group, bool positional) {
+// The options of one group; hidden options have no group.
+HelpSection options_of(const CLI::App& command, const std::string& title, const std::string& group,
+                       bool positional) {
   HelpSection section{title, {}};
   for (const auto* option : command.get_options())
-    if (option->get_group() == group && option->get_positional() == positional && !is_inherited_help(*option, command))
+    if (option->get_group() == group && option->get_positional() == positional &&
+        !is_inherited_help(*option, command))
       section.entries.push_back(entry_of(*option));
   return section;
 }
 
-// Words in lines that begin after `left` columns; the first line's beginning is written already.
+// Wraps text into lines indented by `left` columns; the caller has written the first indentation.
 std::string wrapped(const std::string& text, std::size_t left) {
   std::string out;
   std::size_t column = left;
@@ -105,11 +116,12 @@ std::string wrapped(const std::string& text, std::size_t left) {
   return out;
 }
 
-std::string shown(const HelpSection& section) {
+std::string section_text(const HelpSection& section) {
   std::string out = fmt::format("\n{}:\n", section.title);
   for (const auto& entry : section.entries) {
     const std::string name = "  " + entry.name;
-    out += name.size() + 2 <= indent ? fmt::format("{:<{}}", name, indent) : name + "\n" + std::string(indent, ' ');
+    out += name.size() + 2 <= indent ? fmt::format("{:<{}}", name, indent)
+                                     : name + "\n" + std::string(indent, ' ');
     out += wrapped(entry.text, indent) + "\n";
   }
   return out;
@@ -150,7 +162,7 @@ std::string first_sentence(const std::string& description) {
 
 namespace {
 
-// The commands below this one, by purpose.
+// The subcommands of a command, in their groups.
 std::vector<HelpSection> commands_of(const CLI::App& command) {
   std::vector<HelpSection> sections;
   for (const auto* sub : shown_commands(command)) {
@@ -170,17 +182,20 @@ std::string lines_of(const std::vector<std::string>& examples) {
 }  // namespace
 
 HelpPage help_page(const CLI::App& command) {
-  HelpPage page{
-      full_name(command), usage_of(command), command.get_description(), split(command.get_footer(), '\n'), {}};
+  HelpPage page{full_name(command),
+                usage_of(command),
+                command.get_description(),
+                split(command.get_footer(), '\n'),
+                {}};
   const auto add = [&page](HelpSection section) {
     if (!section.entries.empty()) page.sections.push_back(std::move(section));
   };
   for (auto& section : commands_of(command)) add(std::move(section));
   add(options_of(command, "Arguments", "Options", true));
   add(options_of(command, "Options", "Options", false));
-  add(options_of(root_of(command), everywhere, everywhere, false));
+  add(options_of(root_of(command), global_options, global_options, false));
   if (command.get_parent() == nullptr)
-    for (const auto& section : about_the_program()) add(section);
+    for (const auto& section : program_sections()) add(section);
   return page;
 }
 
@@ -188,18 +203,21 @@ std::string help_text(const CLI::App& command) {
   const HelpPage page = help_page(command);
   std::string out = "Examples:\n" + lines_of(page.examples);
   out += fmt::format("\n{}\n\nUsage: {}{}\n", wrapped(page.description, 0), page.name, page.usage);
-  for (const auto& section : page.sections) out += shown(section);
+  for (const auto& section : page.sections) out += section_text(section);
   if (!shown_commands(command).empty())
-    out += fmt::format("\n`{} COMMAND --help` tells more of a command.\n", page.name);
+    out += fmt::format("\nRun `{} COMMAND --help` for help on a command.\n", page.name);
   return out;
 }
 
 std::string overview_text(const CLI::App& program) {
-  std::string out = fmt::format("{} {}: {}\n", program.get_name(), version(), program.get_description());
-  for (const auto& section : commands_of(program)) out += shown(section);
+  std::string out =
+      fmt::format("{} {}: {}\n", program.get_name(), version(), program.get_description());
+  for (const auto& section : commands_of(program)) out += section_text(section);
   out += "\nExamples:\n" + lines_of(split(program.get_footer(), '\n'));
-  return out + fmt::format("\n`{0} COMMAND --help` tells more of a command, `{0} help` more of the program.\n",
-                           program.get_name());
+  return out + fmt::format(
+                   "\nRun `{0} COMMAND --help` for help on a command, or `{0} help` for help on "
+                   "the program.\n",
+                   program.get_name());
 }
 
 std::string HelpFormatter::make_help(const CLI::App* app, std::string, CLI::AppFormatMode) const {
@@ -207,11 +225,12 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string, CLI::AppF
 }
 
 void add_help(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "help", "Help on a command",
+  auto* command = add_command(app, "help", "Print help on a command, or on the program",
                               "hamelin help run\n"
                               "hamelin help scene make");
   const auto path = std::make_shared<std::vector<std::string>>();
-  command->add_option("command", *path, "a command's name; none: what there is")->type_name("COMMAND...");
+  command->add_option("command", *path, "command to explain (default: the program)")
+      ->type_name("COMMAND...");
   command->callback([&app, path, &exit_code] {
     const CLI::App* at = &app;
     for (const auto& name : *path) at = find_command(*at, name);

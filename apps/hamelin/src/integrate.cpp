@@ -33,7 +33,7 @@ int integrate(const IntegrateOptions& options) {
   scene.step_s = options.step_s.value_or(scene.step_s);
   scene.duration_s = options.duration_s.value_or(scene.duration_s);
   const std::string name = options.integrator.integrator.value_or(scene.integrator.name);
-  // another integrator does not know the parameters of the scene's
+  // The scene's parameters belong to the scene's integrator only.
   if (name != scene.integrator.name) scene.integrator = {name, Json::object()};
   scene.integrator.params = integrator_params(options.integrator, name, scene.integrator.params);
   const auto motion = simulation::free_motion(scene, model);
@@ -41,8 +41,9 @@ int integrate(const IntegrateOptions& options) {
     print_json(motion.config);
     return 0;
   }
-  return record(options.record, files_of(scene),
-                [&](const simulation::Watch& watch) { return simulation::integrate(model, motion, watch); });
+  return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
+    return simulation::integrate(model, motion, watch);
+  });
 }
 
 }  // namespace
@@ -50,24 +51,27 @@ int integrate(const IntegrateOptions& options) {
 void add_integrate(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "integrate",
-      "Let a robot move freely: no planner, no obstacles. A bare robot falls under -9.81 m/s^2 along z; of a scene, "
-      "robot, base, gravity, damping and start are used",
+      "Integrate the free motion of a robot, without planner and obstacles. A robot file falls "
+      "under gravity, "
+      "-9.81 m/s^2 along z. Of a scene file, robot, base, gravity, damping and start are used",
       "hamelin integrate data/robots/planar3.json --step 0.01 --duration 100\n"
-      "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 1 --step 0.01 --log f.jsonl");
+      "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 1 --step 0.01 --log "
+      "f.jsonl");
   const auto options = std::make_shared<IntegrateOptions>();
   add_motion_flags(*command, options->motion);
   add_integrator_flags(*command, options->integrator);
   command
       ->add_option("--step", options->step_s,
-                   "time step [s], under step control the first (default the scene's, else 1e-3)")
+                   "time step [s], under step control the first one (default the scene's, or 1e-3)")
       ->type_name("H");
   command
-      ->add_option("--duration", options->duration_s,
-                   "[s], a whole number of fixed steps (default the scene's, else 10)")
+      ->add_option(
+          "--duration", options->duration_s,
+          "simulated time [s], an integer multiple of a fixed step (default the scene's, or 10)")
       ->type_name("T");
-  command->add_flag(
-      "--print-config", options->print_config,
-      "print what would be integrated as a scene with every default, and leave; paths are as seen from here");
+  command->add_flag("--print-config", options->print_config,
+                    "print the resolved scene, with all defaults and with paths from the working "
+                    "directory, and exit");
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = integrate(*options); });
 }

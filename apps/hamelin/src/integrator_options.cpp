@@ -12,57 +12,77 @@ namespace hamelin::app {
 
 namespace {
 
-void require(bool takes, const char* flag, const std::string& integrator) {
-  if (!takes) throw Error(ErrorCode::usage, fmt::format("{}: integrator '{}' does not take it", flag, integrator));
+void require(bool accepted, const char* flag, const std::string& integrator) {
+  if (!accepted)
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: integrator '{}' does not take this option", flag, integrator));
 }
 
-// Schemes are compared by changing their name alone, so what belongs to the published ones is no error elsewhere.
-void say_unused(const char* flag, const std::string& integrator) {
-  note(fmt::format("{}: means nothing to integrator '{}', ignored", flag, integrator));
+// Users compare schemes by changing the name only, so the options of the published schemes are no
+// error with other schemes.
+void note_unused(const char* flag, const std::string& integrator) {
+  note(fmt::format("{}: has no effect with integrator '{}', ignored", flag, integrator));
 }
 
 }  // namespace
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags) {
-  integrator_name(
-      command.add_option("--integrator", flags.integrator, "time stepping (default the scene's or hamel-variational)"));
-  command.add_option("--alpha", flags.alpha, "hamel: where in the step velocities are taken, 0 to 1 (default 0.5)")
+  restrict_to_integrators(command.add_option(
+      "--integrator", flags.integrator,
+      "time integrator (default the scene's, or hamel-variational). lie-exact: Lee and others "
+      "2016, "
+      "with momenta at nodes and closed-form dexp. feedback: Chang and others 2016, attracts joint "
+      "circles and energy, rk4"));
+  command
+      .add_option("--alpha", flags.alpha,
+                  "hamel: point of the step at which velocities are taken, 0 to 1 (default 0.5)")
       ->type_name("A");
-  one_of(command.add_option("--start", flags.start, "of hamel and hamel-midpoint (default consistent)"),
-         {"published", "consistent"});
-  one_of(command.add_option("--solver", flags.solver, "root-finding (default the integrator's own)"),
-         {"newton", "feedback", "riqn"});
+  restrict_values(
+      command.add_option(
+          "--start", flags.start,
+          "hamel, hamel-midpoint: apply all forces of the first node (published) or half "
+          "of them (consistent) (default consistent)"),
+      {"published", "consistent"});
+  restrict_values(command.add_option("--solver", flags.solver,
+                                     "root-finding method (default depends on the integrator)"),
+                  {"newton", "feedback", "riqn"});
   command
       .add_option("--tolerance", flags.tolerance,
-                  "of root-finding: newton, riqn, gauss |delta|_inf [rad or m] (1e-12), feedback |tau_e| [Nm] (1e-8)")
+                  "tolerance of the iteration: |delta|_inf [rad or m] for newton, riqn, gauss and "
+                  "newmark (default "
+                  "1e-12), |tau_e| [Nm] for feedback (default 1e-8)")
       ->type_name("E");
-  command.add_option("--order", flags.order, "composition: 4, 6 or 8 (default 4); gauss: even, 4 to 16 (default 8)")
+  command
+      .add_option("--order", flags.order,
+                  "composition: 4, 6 or 8 (default 4); gauss: even, 4 to 16 (default 8)")
       ->type_name("P");
   command
-      .add_option(
-          "--rtol", flags.rtol,
-          "step control (dop853, gauss, rosenbrock): relative error allowed in a step; --step is then the first "
-          "step. Alone it sets --atol to the same number")
+      .add_option("--rtol", flags.rtol,
+                  "switch on step control (dop853, gauss, rosenbrock) with this relative error per "
+                  "step; --step is then "
+                  "the first step, and --atol is the same number unless given")
       ->type_name("E");
-  command.add_option("--atol", flags.atol, "absolute error allowed in a step [rad or m, and per second]")
+  command
+      .add_option("--atol", flags.atol,
+                  "absolute error per step [rad or m; rad/s or m/s], with step control")
       ->type_name("E");
 }
 
 Json integrator_params(const IntegratorFlags& flags, const std::string& integrator, Json params) {
   const bool hamel = integrator == "hamel", midpoint = integrator == "hamel-midpoint";
   const auto* scheme = integration::find_scheme(integrator);
-  if (scheme == nullptr) return params;  // make_integrator says what is known
+  if (scheme == nullptr) return params;  // make_integrator reports the unknown name
   if (flags.alpha) params["alpha"] = *flags.alpha;
-  if (flags.alpha && !hamel) say_unused("--alpha", integrator);
+  if (flags.alpha && !hamel) note_unused("--alpha", integrator);
   if (flags.start) params["start"] = *flags.start;
-  if (flags.start && !hamel && !midpoint) say_unused("--start", integrator);
+  if (flags.start && !hamel && !midpoint) note_unused("--start", integrator);
   if (flags.solver) {
     require(!scheme->solvers.empty(), "--solver", integrator);
     params["solver"] = *flags.solver;
   }
   if (flags.tolerance) {
     require(scheme->iterates, "--tolerance", integrator);
-    // each solver reads its own
+    // Each solver reads its own key.
     params["tolerance"] = *flags.tolerance;
     params["feedback_tolerance"] = *flags.tolerance;
   }

@@ -5,7 +5,7 @@
 
 #include "hamelin/integration/integrator.hpp"
 
-/// --integrator and what belongs to it.
+/// --integrator and the options of integrators.
 namespace hamelin::app {
 
 struct IntegratorFlags {
@@ -16,8 +16,9 @@ struct IntegratorFlags {
 
 void add_integrator_flags(CLI::App& command, IntegratorFlags& flags);
 
-/// The integrator's parameters: those of the scene where it keeps its integrator, overridden by the flags.
-/// @throws Error usage for a flag the integrator does not know
-[[nodiscard]] Json integrator_params(const IntegratorFlags& flags, const std::string& integrator, Json params);
+/// The integrator's parameters: `params` of the scene, overridden by the flags.
+/// @throws Error usage for a flag that the integrator does not take
+[[nodiscard]] Json integrator_params(const IntegratorFlags& flags, const std::string& integrator,
+                                     Json params);
 
 }  // namespace hamelin::app

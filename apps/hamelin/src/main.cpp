@@ -17,16 +17,16 @@ constexpr int bad_input = 2, defect = 3;
 
 using namespace hamelin::app;
 
-// The commands by purpose, in the order in which help shows them.
-struct Purpose {
+// A group of commands, in the order in which help shows them.
+struct CommandGroup {
   const char* title;
   std::vector<void (*)(CLI::App&, int&)> add;
 };
 
-const std::vector<Purpose>& commands() {
-  static const std::vector<Purpose> all{
-      {"Run things", {add_run, add_integrate, add_accuracy, add_replay, add_sweep}},
-      {"Look at things", {add_report, add_robot, add_scene, add_plugins}},
+const std::vector<CommandGroup>& command_groups() {
+  static const std::vector<CommandGroup> all{
+      {"Run", {add_run, add_integrate, add_accuracy, add_replay, add_sweep}},
+      {"Inspect", {add_report, add_robot, add_scene, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},
       {"Help", {add_help, add_completion}},
       {"", {add_man}},
@@ -34,43 +34,48 @@ const std::vector<Purpose>& commands() {
   return all;
 }
 
-void add_everywhere(CLI::App& app) {
-  app.set_help_flag("-h,--help", "print this help")->group(everywhere);
-  app.set_version_flag("--version", std::string(hamelin::version()), "print the version")->group(everywhere);
+void add_global_options(CLI::App& app) {
+  app.set_help_flag("-h,--help", "print this help")->group(global_options);
+  app.set_version_flag("--version", std::string(hamelin::version()), "print the version")
+      ->group(global_options);
   auto* quiet = app.add_flag_callback(
-      "-q,--quiet", [] { set_loudness(Loudness::quiet); },
-      "errors only: no notes, progress or report of what was done");
+      "-q,--quiet", [] { set_verbosity(Verbosity::quiet); },
+      "print errors and requested data only: no notes, progress or reports");
   auto* verbose = app.add_flag_callback(
-      "-v,--verbose", [] { set_loudness(Loudness::verbose); },
-      "also say what is read, where planners are looked for and what takes how long");
-  quiet->group(everywhere);
-  verbose->group(everywhere)->excludes(quiet);
-  app.add_flag_callback("--no-color", set_no_colour, "no colour")->group(everywhere);
+      "-v,--verbose", [] { set_verbosity(Verbosity::verbose); },
+      "also print which files are read, where planners are searched for and how long each phase "
+      "takes");
+  quiet->group(global_options);
+  verbose->group(global_options)->excludes(quiet);
+  app.add_flag_callback("--no-color", set_no_colour, "disable colour")->group(global_options);
 }
 
-// The environment is read here and nowhere else; libraries take the instruction set as an argument or a default.
-void take_environment() {
-  const char* asked = std::getenv("HAMELIN_ISA");
-  if (asked != nullptr && *asked != '\0') hamelin::set_default_isa(hamelin::isa_from_name(asked, "HAMELIN_ISA"));
+// HAMELIN_ISA is read only here. Libraries take the instruction set as an argument or use the
+// default.
+void apply_environment() {
+  const char* name = std::getenv("HAMELIN_ISA");
+  if (name != nullptr && *name != '\0')
+    hamelin::set_default_isa(hamelin::isa_from_name(name, "HAMELIN_ISA"));
 }
 
 int run_command_line(int argc, char** argv) {
-  take_environment();
+  apply_environment();
   set_command_line(argc, argv);
-  const Phase phase("in all");
+  const Phase phase("total");
   int exit_code = 0;
-  CLI::App app("Moves robot arms through cluttered OctoMap scenes and integrates their motion", "hamelin");
+  CLI::App app("Move robot arms through cluttered OctoMap scenes and integrate their motion",
+               "hamelin");
   app.formatter(std::make_shared<HelpFormatter>());
   app.footer(
       "hamelin run data/scenes/shelf.json\n"
       "hamelin scene info data/scenes/shelf.json\n"
       "hamelin help run");
-  add_everywhere(app);
+  add_global_options(app);
   app.require_subcommand(1);
-  for (const auto& purpose : commands())
-    for (const auto add : purpose.add) {
+  for (const auto& group : command_groups())
+    for (const auto add : group.add) {
       add(app, exit_code);
-      app.get_subcommands({}).back()->group(purpose.title);
+      app.get_subcommands({}).back()->group(group.title);
     }
   if (argc == 1) {
     fmt::print("{}", overview_text(app));
@@ -78,8 +83,8 @@ int run_command_line(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
-    return app.exit(asked);
+  } catch (const CLI::Success& request) {  // --help, --version
+    return app.exit(request);
   } catch (const CLI::ParseError& error) {
     error_line(usage_message(app, error));
     return bad_input;

@@ -14,7 +14,7 @@ namespace hamelin::app {
 
 namespace {
 
-// Text as roff takes it: nothing in it is a request, and what is to be typed stays as typed.
+// Escapes text for roff, so that no line is a request and characters to be typed stay ASCII.
 std::string roff(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -50,9 +50,10 @@ std::string page_name(const CLI::App& command) {
 
 std::string manual_page(const CLI::App& command) {
   const HelpPage page = help_page(command);
-  std::string out =
-      fmt::format(".TH {} 1 \"\" \"hamelin {}\" \"hamelin manual\"\n", roff(upper(page_name(command))), version());
-  out += fmt::format(".SH NAME\n{} \\- {}\n", roff(page_name(command)), roff(first_sentence(page.description)));
+  std::string out = fmt::format(".TH {} 1 \"\" \"hamelin {}\" \"hamelin manual\"\n",
+                                roff(upper(page_name(command))), version());
+  out += fmt::format(".SH NAME\n{} \\- {}\n", roff(page_name(command)),
+                     roff(first_sentence(page.description)));
   out += fmt::format(".SH SYNOPSIS\n.B {}\n{}\n", roff(page.name), roff(page.usage.substr(1)));
   out += fmt::format(".SH DESCRIPTION\n{}\n", roff(page.description));
   out += ".SH EXAMPLES\n.nf\n";
@@ -73,19 +74,24 @@ std::string manual_page(const CLI::App& command) {
 }
 
 void write_pages(const CLI::App& command, const std::filesystem::path& directory) {
-  write_file_aside(directory / (page_name(command) + ".1"), manual_page(command));
+  write_file_atomically(directory / (page_name(command) + ".1"), manual_page(command));
   for (const auto* sub : shown_commands(command)) write_pages(*sub, directory);
 }
 
 }  // namespace
 
 void add_man(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "man", "Write the manual pages of all commands", "hamelin man share/man/man1");
+  auto* command = add_command(app, "man", "Write the manual pages of all commands",
+                              "hamelin man share/man/man1");
   const auto directory = std::make_shared<std::filesystem::path>();
-  command->add_option("directory", *directory, "where to, made if it is not there")->required()->type_name("DIR");
+  command
+      ->add_option("directory", *directory, "directory to write to, created if it does not exist")
+      ->required()
+      ->type_name("DIR");
   command->callback([&app, directory, &exit_code] {
     std::error_code ec;
-    std::filesystem::create_directories(*directory, ec);  // the first page says it if this failed
+    // A failure is reported by write_pages.
+    std::filesystem::create_directories(*directory, ec);
     write_pages(app, *directory);
     exit_code = 0;
   });

@@ -17,8 +17,9 @@ bool same_file(const fs::path& a, const fs::path& b) {
 void check_output(const fs::path& file, const std::vector<fs::path>& inputs) {
   for (const auto& input : inputs)
     if (same_file(file, input))
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: is an input, expected another path for the output", file.string()));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: is an input, expected another path for the output", file.string()));
   log::check_writable(file);
 }
 
@@ -26,7 +27,9 @@ fs::path output_target(const fs::path& file, const std::vector<fs::path>& inputs
   std::error_code ec;
   fs::path target = fs::is_symlink(file, ec) ? fs::weakly_canonical(file, ec) : file;
   if (fs::exists(target, ec) && !fs::is_regular_file(target, ec))
-    throw Error(ErrorCode::io, fmt::format("{}: is no regular file, expected a path for the output", file.string()));
+    throw Error(
+        ErrorCode::io,
+        fmt::format("{}: is not a regular file, expected a path for the output", file.string()));
   check_output(target, inputs);
   return target;
 }

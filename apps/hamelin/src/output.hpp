@@ -2,18 +2,19 @@
 #include <filesystem>
 #include <vector>
 
-/// Files that commands make.
+/// Paths of the files that commands write.
 namespace hamelin::app {
 
-/// Whether both names are one file, links followed.
+/// Whether both paths lead to the same file; links are followed.
 [[nodiscard]] bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Checks, before long work begins, that a file can be written and is none of the inputs.
+/// Checks, before long work begins, that a file can be written and is not one of the inputs.
 /// @throws Error usage or io
-void check_output(const std::filesystem::path& file, const std::vector<std::filesystem::path>& inputs);
+void check_output(const std::filesystem::path& file,
+                  const std::vector<std::filesystem::path>& inputs);
 
-/// The same for a file that will be renamed into place: only a regular file may stand there.
-/// @return where to write it: a link is followed
+/// The same for a file that is renamed into place, which may replace a regular file only.
+/// @return the path to write to; links are followed
 [[nodiscard]] std::filesystem::path output_target(const std::filesystem::path& file,
                                                   const std::vector<std::filesystem::path>& inputs);
 

@@ -16,20 +16,21 @@ fs::path page_template(const std::string& name) {
   std::error_code ec;
   auto file = prefix().value_or("/") / "share" / "hamelin" / "report" / (name + ".html");
   if (!fs::is_regular_file(file, ec))
-    throw Error(
-        ErrorCode::io,
-        fmt::format(
-            "{}: is missing: the page was not built because Node.js, npm or its registry was missing when hamelin "
-            "was built (or HAMELIN_BUILD_REPORT was OFF); install them (Debian: apt install nodejs npm) "
-            "and build hamelin again",
-            file.string()));
+    throw Error(ErrorCode::io, fmt::format("{}: is missing: the page was not built, because "
+                                           "Node.js, npm or access to its registry was missing "
+                                           "when hamelin was built (or HAMELIN_BUILD_REPORT was "
+                                           "OFF); install them (Debian: apt install nodejs npm) "
+                                           "and build hamelin again",
+                                           file.string()));
   return file;
 }
 
-std::size_t write_page(const fs::path& page_template, const std::string& data, const fs::path& target) {
+std::size_t write_page(const fs::path& page_template, const std::string& data,
+                       const fs::path& target) {
   const Phase phase("packing the page");
-  const std::string page = report::make_page(read_file(page_template), data, page_template.string());
-  write_file_aside(target, page);
+  const std::string page =
+      report::make_page(read_file(page_template), data, page_template.string());
+  write_file_atomically(target, page);
   return page.size();
 }
 

@@ -2,15 +2,16 @@
 #include <filesystem>
 #include <string>
 
-/// Pages that open offline, made from the templates that the build bundles where it finds Node.js.
+/// HTML pages that open offline. Their templates are built if Node.js was found.
 namespace hamelin::app {
 
-/// The template of that name beside this program: "page" (of `hamelin report`), "sweep" or "accuracy".
-/// @throws Error io, one line that says what was missing when hamelin was built
+/// The installed template of that name: "page" (of `hamelin report`), "sweep" or "accuracy".
+/// @throws Error io with what was missing when hamelin was built
 [[nodiscard]] std::filesystem::path page_template(const std::string& name);
 
-/// Fills a template, replaces the target by the page, and gives its size.
-/// @param data as report::make_data() or report::pack() made it
+/// Fills a template with data and replaces the target by the page.
+/// @param data from report::make_data() or report::pack()
+/// @return the size of the page in bytes
 std::size_t write_page(const std::filesystem::path& page_template, const std::string& data,
                        const std::filesystem::path& target);
 

@@ -11,11 +11,13 @@ namespace hamelin::app {
 
 namespace {
 
-// A host with nothing around the arm and nobody listening.
+// A host without obstacles, which discards messages.
 class EmptyHost final : public planning::HostServices {
  public:
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+    return 0;
+  }
 };
 
 planning::SetupData setup_for(const model::Model& arm, std::int32_t goal_type) {
@@ -27,24 +29,27 @@ planning::SetupData setup_for(const model::Model& arm, std::int32_t goal_type) {
   goal.tolerance_m = 0.01;
   goal.tolerance_rad = 0.05;
   goal.speed_max = 0.05;
-  data.add_goal(goal, goal_type == HAMELIN_GOAL_JOINT ? Eigen::VectorXd::Constant(arm.dof(), 0.2) : Eigen::VectorXd());
+  data.add_goal(goal, goal_type == HAMELIN_GOAL_JOINT ? Eigen::VectorXd::Constant(arm.dof(), 0.2)
+                                                      : Eigen::VectorXd());
   data.control_period_s = 1e-3;
   data.influence_m = 0.2;
   data.seed = 1;
   return data;
 }
 
-// All numbers of the answer, to be compared.
-std::vector<double> answer(const planning::CommandBuffers& out) {
+// All numbers of an answer, for comparison.
+std::vector<double> numbers_of(const planning::CommandBuffers& out) {
   std::vector<double> numbers{out.raw().potential_J, static_cast<double>(out.raw().state)};
-  for (const auto* x : {&out.potential_gradient(), &out.damping(), &out.held_torque(), &out.node_velocity()})
+  for (const auto* x :
+       {&out.potential_gradient(), &out.damping(), &out.held_torque(), &out.node_velocity()})
     numbers.insert(numbers.end(), x->begin(), x->end());
-  for (const auto& term : out.gyroscopic()) numbers.insert(numbers.end(), term.w_world, term.w_world + 3);
+  for (const auto& term : out.gyroscopic())
+    numbers.insert(numbers.end(), term.w_world, term.w_world + 3);
   return numbers;
 }
 
-std::vector<double> answers_of(const planning::Plugin& plugin, const Json& params, const model::Model& arm,
-                               std::int32_t goal_type) {
+std::vector<double> answers_of(const planning::Plugin& plugin, const Json& params,
+                               const model::Model& arm, std::int32_t goal_type) {
   EmptyHost host;
   auto planner = plugin.create(setup_for(arm, goal_type), host, params);
   planning::CommandBuffers out(static_cast<std::size_t>(arm.dof()), 8);
@@ -66,8 +71,9 @@ std::vector<double> answers_of(const planning::Plugin& plugin, const Json& param
                             1.0,
                             nullptr,
                             0};
-    if (!planner.tick(tick, out)) throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
-    const auto numbers = answer(out);
+    if (!planner.tick(tick, out))
+      throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
+    const auto numbers = numbers_of(out);
     all.insert(all.end(), numbers.begin(), numbers.end());
   }
   return all;
@@ -77,29 +83,36 @@ std::vector<double> answers_of(const planning::Plugin& plugin, const Json& param
 
 std::vector<PluginCheck> check_plugin(const planning::Plugin& plugin) {
   std::vector<PluginCheck> checks;
-  const auto attempt = [&](std::string what, auto&& action) {
+  const auto attempt = [&](std::string name, auto&& action) {
     try {
       action();
-      checks.push_back({std::move(what), ""});
+      checks.push_back({std::move(name), ""});
     } catch (const Error& e) {
-      checks.push_back({std::move(what), e.what()});
+      checks.push_back({std::move(name), e.what()});
     }
   };
-  checks.push_back({fmt::format("{} {} loads from {}", plugin.name(), plugin.version(), plugin.file().string()), ""});
+  checks.push_back(
+      {fmt::format("{} {} loads from {}", plugin.name(), plugin.version(), plugin.file().string()),
+       ""});
   Json params;
-  attempt("default parameters fit the schema", [&] { params = planning::check_params(plugin, Json()); });
+  attempt("default parameters fit the schema",
+          [&] { params = planning::check_params(plugin, Json()); });
   if (!checks.back().failure.empty()) return checks;
 
   model::ChainOptions chain;
   chain.links = 2;
   const model::Model arm(model::make_chain(chain));
   const std::array<std::pair<std::int32_t, const char*>, 3> goals{
-      {{HAMELIN_GOAL_JOINT, "joint"}, {HAMELIN_GOAL_POSITION, "position"}, {HAMELIN_GOAL_POSE, "pose"}}};
+      {{HAMELIN_GOAL_JOINT, "joint"},
+       {HAMELIN_GOAL_POSITION, "position"},
+       {HAMELIN_GOAL_POSE, "pose"}}};
   for (const auto& goal : goals)
-    attempt(fmt::format("answers ticks towards a {} goal, the same twice", goal.second), [&] {
-      if (answers_of(plugin, params, arm, goal.first) != answers_of(plugin, params, arm, goal.first))
-        throw Error(ErrorCode::plugin, "two runs from the same seed gave different answers");
-    });
+    attempt(
+        fmt::format("answers ticks towards a {} goal, identically in two runs", goal.second), [&] {
+          if (answers_of(plugin, params, arm, goal.first) !=
+              answers_of(plugin, params, arm, goal.first))
+            throw Error(ErrorCode::plugin, "two runs with the same seed gave different answers");
+        });
   return checks;
 }
 

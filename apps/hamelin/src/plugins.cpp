@@ -46,29 +46,36 @@ void list(const ListOptions& options) {
       fmt::print("refused: {}\n", entry["refused"].get<std::string>());
       continue;
     }
-    fmt::print("{} {}: {}\n  {}\n", entry["name"].get<std::string>(), entry["version"].get<std::string>(),
-               entry["description"].get<std::string>(), entry["file"].get<std::string>());
+    fmt::print("{} {}: {}\n  {}\n", entry["name"].get<std::string>(),
+               entry["version"].get<std::string>(), entry["description"].get<std::string>(),
+               entry["file"].get<std::string>());
     const Json properties = entry["params_schema"].value("properties", Json::object());
     for (const auto& [key, rule] : properties.items())
-      fmt::print("    {:<22} {:<14} {}\n", key, rule.contains("default") ? rule["default"].dump() : "",
+      fmt::print("    {:<22} {:<14} {}\n", key,
+                 rule.contains("default") ? rule["default"].dump() : "",
                  rule.value("description", ""));
   }
   if (all.empty()) {
-    fmt::print("no plugins; searched:\n");
+    fmt::print("no plugins found; searched:\n");
     for (const auto& directory : directories) fmt::print("  {}\n", directory.string());
   }
 }
 
 int check(const CheckOptions& options) {
-  const planning::Plugin plugin = planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
+  const planning::Plugin plugin =
+      planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
   const auto results = check_plugin(plugin);
   Json all = Json::array();
   bool failed = false;
   for (const auto& result : results) {
     const bool ok = result.failure.empty();
     failed = failed || !ok;
-    all.push_back({{"check", result.what}, {"ok", ok}, {"failure", ok ? Json(nullptr) : Json(result.failure)}});
-    if (!options.json) fmt::print("{:<7} {}{}{}\n", ok ? "ok" : "failed", result.what, ok ? "" : ": ", result.failure);
+    all.push_back({{"check", result.name},
+                   {"ok", ok},
+                   {"failure", ok ? Json(nullptr) : Json(result.failure)}});
+    if (!options.json)
+      fmt::print("{:<7} {}{}{}\n", ok ? "ok" : "failed", result.name, ok ? "" : ": ",
+                 result.failure);
   }
   if (options.json) print_json(all);
   return failed ? 1 : 0;
@@ -82,24 +89,31 @@ void add_plugins(CLI::App& app, int& exit_code) {
                               "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
   plugins->require_subcommand(1);
 
-  auto* list_command = add_command(*plugins, "list", "All planners found, with their parameters",
-                                   "hamelin plugins list\n"
-                                   "hamelin plugins list --plugin-path build/lib/hamelin/plugins --json");
+  auto* list_command =
+      add_command(*plugins, "list", "List all planners found, with their parameters",
+                  "hamelin plugins list\n"
+                  "hamelin plugins list --plugin-path build/lib/hamelin/plugins --json");
   const auto list_options = std::make_shared<ListOptions>();
-  list_command->add_option("--plugin-path", list_options->plugin_path, "look here first; may be repeated")
+  list_command
+      ->add_option("--plugin-path", list_options->plugin_path,
+                   "directory to search first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
-  list_command->add_flag("--json", list_options->json, "print JSON, parameter schemas included");
+  list_command->add_flag("--json", list_options->json,
+                         "print JSON, including the parameter schemas");
   list_command->callback([list_options] { list(*list_options); });
 
-  auto* check_command = add_command(*plugins, "check", "Load a planner and try it on a small arm",
-                                    "hamelin plugins check gyro\n"
-                                    "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
+  auto* check_command =
+      add_command(*plugins, "check", "Load a planner and test it on a two-link arm",
+                  "hamelin plugins check gyro\n"
+                  "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
   const auto check_options = std::make_shared<CheckOptions>();
-  check_command->add_option("plugin", check_options->plugin, "a plugin's name or path")
+  check_command->add_option("plugin", check_options->plugin, "planner plugin, by name or path")
       ->required()
       ->type_name("NAME|PATH");
-  check_command->add_option("--plugin-path", check_options->plugin_path, "look here first; may be repeated")
+  check_command
+      ->add_option("--plugin-path", check_options->plugin_path,
+                   "directory to search first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   check_command->add_flag("--json", check_options->json, "print JSON");

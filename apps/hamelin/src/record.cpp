@@ -17,40 +17,48 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Above this a log's size is worth a word before the run begins.
+// A log that may grow larger than this is announced before the run begins.
 constexpr double large_log_bytes = 50e6;
 
 std::string bytes(double count) {
-  return count >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * count) : fmt::format("{:.0f} MB", std::max(1.0, 1e-6 * count));
+  return count >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * count)
+                      : fmt::format("{:.0f} MB", std::max(1.0, 1e-6 * count));
 }
 
-// How large the log may become, if that is much, or more than there is room for.
+// Notes the expected size of the log if it is large or exceeds the free space.
 void announce_size(const log::RunLog& run_log, double ticks, int dof) {
   const double size = log::estimated_bytes(dof, ticks, run_log.compressed());
   std::error_code ec;
   const auto space = fs::space(fs::absolute(run_log.file(), ec).parent_path(), ec);
   const double room = ec ? size : static_cast<double>(space.available);
-  const std::string foretold = fmt::format("{}: may grow to about {}", run_log.file().string(), bytes(size));
-  const char* remedy =
-      run_log.compressed() ? "--every K makes it smaller" : "--every K or a name that ends in .zst makes it smaller";
+  const std::string estimate =
+      fmt::format("{}: may grow to about {}", run_log.file().string(), bytes(size));
+  const char* remedy = run_log.compressed()
+                           ? "--every K makes it smaller"
+                           : "--every K or a name that ends in .zst makes it smaller";
   if (size > room)
-    note(fmt::format("{}, but only {} are free; {}", foretold, bytes(room), remedy));
+    note(fmt::format("{}, but only {} are free; {}", estimate, bytes(room), remedy));
   else if (size > large_log_bytes)
-    note(fmt::format("{}; {}", foretold, remedy));
+    note(fmt::format("{}; {}", estimate, remedy));
   else
-    detail(foretold);
+    detail(estimate);
 }
 
 }  // namespace
 
 void add_record_options(CLI::App& command, RecordOptions& options) {
-  command.add_option("--every", options.every, "log a tick every K steps; the first and the last always")
+  command
+      .add_option("--every", options.every,
+                  "log one tick every K steps, and always the first and the last")
       ->type_name("K")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1'000'000'000L));
-  command.add_option("--log", options.log, "write the run to a JSON Lines file; compressed if its name ends in .zst")
+  command
+      .add_option("--log", options.log,
+                  "write the run to a JSON Lines file; compressed if its name ends in .zst")
       ->type_name("OUT.jsonl");
-  command.add_option("--result", options.result, "write the result to a JSON file")->type_name("OUT.json");
+  command.add_option("--result", options.result, "write the result to a JSON file")
+      ->type_name("OUT.json");
   command.add_flag("--json", options.json, "print the result as JSON instead of a summary");
 }
 
@@ -58,7 +66,8 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
            const std::function<log::Result(const simulation::Watch&)>& simulate) {
   if (options.log && options.result && same_file(*options.log, *options.result))
     throw Error(ErrorCode::usage,
-                fmt::format("--log and --result are both {}, expected two paths", options.log->string()));
+                fmt::format("--log and --result are both {}, expected different paths",
+                            options.log->string()));
   std::optional<fs::path> result_file;
   if (options.result) result_file = output_target(*options.result, inputs);
   std::optional<log::RunLog> run_log;
@@ -73,17 +82,20 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
   watch.diagnostics = diagnostics();
-  if (run_log) watch.announce = [&run_log](double ticks, int dof) { announce_size(*run_log, ticks, dof); };
+  if (run_log)
+    watch.announce = [&run_log](double ticks, int dof) { announce_size(*run_log, ticks, dof); };
   log::Result result;
   {
     const Phase phase("running");
     Progress progress;
-    watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
+    watch.progress = [&progress](double time_s, double duration_s) {
+      progress.show(time_s, duration_s);
+    };
     result = simulate(watch);
   }
   const Json document = log::to_json(result);
   const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  if (result_file) write_file_aside(*result_file, text);
+  if (result_file) write_file_atomically(*result_file, text);
   if (options.json) {
     fmt::print("{}", text);
   } else {
@@ -94,7 +106,8 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
   }
   const int code = log::exit_code(result.outcome);
   if (code == 2 || code == 3)
-    error_line(fmt::format("{}: {}: {}", result.scene, log::to_string(result.outcome), result.cause));
+    error_line(
+        fmt::format("{}: {}: {}", result.scene, log::to_string(result.outcome), result.cause));
   return code;
 }
 

@@ -6,7 +6,7 @@
 
 #include "hamelin/simulation/run.hpp"
 
-/// What `run` and `integrate` have in common: --every, --log, --result, --json.
+/// Shared by `run`, `integrate` and `replay`: --every, --log, --result, --json.
 namespace hamelin::app {
 
 struct RecordOptions {
@@ -17,10 +17,11 @@ struct RecordOptions {
 
 void add_record_options(CLI::App& command, RecordOptions& options);
 
-/// Tries the output paths, runs, writes the result and shows it.
-/// @param inputs the files the run depends on; outputs may not replace them
+/// Checks the output paths, runs the simulation, writes the result and prints it.
+/// @param inputs the files that the run depends on; outputs must not replace them
 /// @return the exit code of the outcome
-[[nodiscard]] int record(const RecordOptions& options, const std::vector<std::filesystem::path>& inputs,
+[[nodiscard]] int record(const RecordOptions& options,
+                         const std::vector<std::filesystem::path>& inputs,
                          const std::function<log::Result(const simulation::Watch&)>& simulate);
 
 }  // namespace hamelin::app

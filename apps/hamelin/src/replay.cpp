@@ -16,9 +16,9 @@ namespace hamelin::app {
 
 namespace {
 
-// Where a run is repeated by another build or processor, rounding differs from the first step on; smooth motion
-// carries that along, and a planner's decisions may fall the other way.
-constexpr double tolerance_elsewhere = 1e-6;
+// With another build or processor, rounding differs from the first step on. Smooth motion carries
+// the difference along, and a planner may decide differently.
+constexpr double tolerance_other_build = 1e-6;
 
 struct ReplayOptions {
   std::filesystem::path file;
@@ -42,51 +42,59 @@ Json difference_json(const std::optional<simulation::Verdict::Difference>& diffe
   return json;
 }
 
-std::string words(const simulation::Verdict::Difference& d) {
+std::string describe(const simulation::Verdict::Difference& d) {
   std::string place = fmt::format("line {}", d.line);
   if (d.k) place = fmt::format("tick {} ({:.6g} s), {}", *d.k, d.time_s.value_or(0.0), place);
   if (d.type != "tick") place += fmt::format(", {}", d.type);
-  return fmt::format("{}{}: logged {}, replayed {}", place, d.field.empty() ? "" : ", " + d.field, d.logged,
-                     d.replayed);
+  return fmt::format("{}{}: logged {}, replayed {}", place, d.field.empty() ? "" : ", " + d.field,
+                     d.logged, d.replayed);
 }
 
 int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
-  const double tolerance = options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_elsewhere);
-  for (const auto& line : recorded.other_build) note(fmt::format("{}: {}", options.file.string(), line));
+  const double tolerance =
+      options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_other_build);
+  for (const auto& line : recorded.other_build)
+    note(fmt::format("{}: {}", options.file.string(), line));
   if (!recorded.other_build.empty() && !options.tolerance)
-    note(fmt::format("another build or machine: compared within {:g} of max(1, |logged|), not to the bit", tolerance));
+    note(fmt::format(
+        "another build or machine: compared within {:g} times max(1, |logged|), not bit for bit",
+        tolerance));
   simulation::Watch watch;
   watch.stop = &stop_on_signals();
   simulation::Verdict verdict;
   {
     Progress progress;
-    watch.progress = [&progress](double time_s, double duration_s) { progress.show(time_s, duration_s); };
-    verdict = simulation::verify(recorded, options.file, tolerance, plugin_path(options.plugin_path), watch);
+    watch.progress = [&progress](double time_s, double duration_s) {
+      progress.show(time_s, duration_s);
+    };
+    verdict = simulation::verify(recorded, options.file, tolerance,
+                                 plugin_path(options.plugin_path), watch);
   }
-  const bool equal = !verdict.beyond && !verdict.stopped;
+  const bool equal = !verdict.beyond_tolerance && !verdict.stopped;
   if (options.record.json) {
     print_json({{"log", options.file.string()},
                 {"equal", equal},
-                {"to_the_bit", !verdict.to_the_bit && !verdict.stopped},
+                {"to_the_bit", !verdict.first_difference && !verdict.stopped},
                 {"tolerance", tolerance},
                 {"finished", verdict.finished},
                 {"lines", verdict.lines},
                 {"ticks", verdict.ticks},
                 {"largest_difference", verdict.largest},
-                {"first_difference", difference_json(verdict.to_the_bit)},
-                {"beyond_tolerance", difference_json(verdict.beyond)},
+                {"first_difference", difference_json(verdict.first_difference)},
+                {"beyond_tolerance", difference_json(verdict.beyond_tolerance)},
                 {"other_build", recorded.other_build}});
   } else {
-    const std::string extent = fmt::format("{} lines, {} ticks{}", verdict.lines, verdict.ticks,
-                                           verdict.finished ? "" : ", as far as this unfinished log goes");
+    const std::string extent =
+        fmt::format("{} lines, {} ticks{}", verdict.lines, verdict.ticks,
+                    verdict.finished ? "" : ", up to the end of the unfinished log");
     std::string text;
     if (verdict.stopped)
-      text = fmt::format("stopped; up to there, {}, no difference found", extent);
-    else if (verdict.beyond)
-      text = fmt::format("differs: {}", words(*verdict.beyond));
-    else if (verdict.to_the_bit)
-      text = fmt::format("equal within {:g} ({}); largest difference {:.2g}, the first at {}", tolerance, extent,
-                         verdict.largest, words(*verdict.to_the_bit));
+      text = fmt::format("interrupted; no difference found in {}", extent);
+    else if (verdict.beyond_tolerance)
+      text = fmt::format("differs: {}", describe(*verdict.beyond_tolerance));
+    else if (verdict.first_difference)
+      text = fmt::format("equal within {:g} ({}); largest difference {:.2g}, the first at {}",
+                         tolerance, extent, verdict.largest, describe(*verdict.first_difference));
     else
       text = fmt::format("equal to the bit ({})", extent);
     const Colour colour = equal ? Colour::good : verdict.stopped ? Colour::fair : Colour::bad;
@@ -97,13 +105,16 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
 
 int replay(const ReplayOptions& options) {
   if (const Kind kind = kind_of(options.file); kind != Kind::log)
-    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a log", options.file.string(), to_string(kind)));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is a {}, expected a log", options.file.string(), to_string(kind)));
   if (options.verify) {
     if (options.record.log || options.record.result)
-      throw Error(ErrorCode::usage, "--verify: writes nothing, expected neither --log nor --result with it");
+      throw Error(ErrorCode::usage,
+                  "--verify: writes no files, expected neither --log nor --result with it");
     return verify(options, simulation::read_header(options.file, plugin_path(options.plugin_path)));
   }
-  if (options.tolerance) throw Error(ErrorCode::usage, "--tolerance: means nothing without --verify");
+  if (options.tolerance)
+    throw Error(ErrorCode::usage, "--tolerance: has no effect without --verify");
   const auto recorded = simulation::read_header(options.file, plugin_path(options.plugin_path));
   std::vector<std::filesystem::path> inputs = files_of(recorded.scene);
   inputs.push_back(options.file);
@@ -115,20 +126,27 @@ int replay(const ReplayOptions& options) {
 }  // namespace
 
 void add_replay(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "replay", "Run again what a log says was run, and compare",
-                              "hamelin replay shelf.jsonl --verify\n"
-                              "hamelin replay shelf.jsonl --result again.json");
+  auto* command = add_command(
+      app, "replay", "Repeat the run that a log records, or verify the log against a repeated run",
+      "hamelin replay shelf.jsonl --verify\n"
+      "hamelin replay shelf.jsonl --result again.json");
   const auto options = std::make_shared<ReplayOptions>();
-  command->add_option("log", options->file, "a log, plain or zstd")->required()->type_name("LOG");
+  command->add_option("log", options->file, "log file, plain or zstd")
+      ->required()
+      ->type_name("LOG");
   command->add_flag("--verify", options->verify,
-                    "compare every line with the log: to the bit on the same build and instruction set, else within "
-                    "1e-6; exit code 1 where they differ");
+                    "compare every line with the log: bit for bit on the same build and "
+                    "instruction set, otherwise "
+                    "within 1e-6; the exit code is 1 if they differ");
   command
-      ->add_option("--tolerance", options->tolerance,
-                   "with --verify: numbers may differ by this times max(1, |logged|); 0 means to the bit")
+      ->add_option(
+          "--tolerance", options->tolerance,
+          "with --verify: numbers may differ by E times max(1, |logged|); 0 means bit for bit")
       ->type_name("E")
       ->check(CLI::Range(0.0, 1e300));
-  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   add_record_options(*command, options->record);

@@ -27,36 +27,39 @@ struct ReportOptions {
 };
 
 Json json_of(const report::RunSummary& run) {
-  return {{"name", run.name},   {"log", run.log.string()}, {"outcome", run.outcome}, {"time_s", run.time_s},
-          {"ticks", run.ticks}, {"frames", run.frames},    {"notes", run.notes}};
+  return {{"name", run.name},     {"log", run.log.string()}, {"outcome", run.outcome},
+          {"time_s", run.time_s}, {"ticks", run.ticks},      {"frames", run.frames},
+          {"notes", run.notes}};
 }
 
-// Measurements of `hamelin accuracy` make a page of another kind.
+// Measurements of `hamelin accuracy` have a page template of their own.
 int make_accuracy_page(const ReportOptions& options, const fs::path& target) {
   const fs::path template_file = page_template("accuracy");
   std::vector<accuracy::Measurement> all;
   for (const auto& file : options.logs) {
     if (kind_of(file) != Kind::accuracy)
-      throw Error(
-          ErrorCode::invalid,
-          fmt::format("{}: is no measurement of accuracy, expected either those alone or logs alone", file.string()));
+      throw Error(ErrorCode::invalid, fmt::format("{}: is not a measurement of accuracy, expected "
+                                                  "either measurements only or logs only",
+                                                  file.string()));
     all.push_back(accuracy::measurement_from_json(read_json(file), file.string()));
   }
-  const std::size_t size = write_page(template_file, report::pack(accuracy::page_json(all)), target);
+  const std::size_t size =
+      write_page(template_file, report::pack(accuracy::page_json(all)), target);
   if (options.json)
     print_json({{"page", options.output.string()}, {"bytes", size}, {"measurements", all.size()}});
   else
-    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(size)));
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(),
+                       1e-6 * static_cast<double>(size)));
   return 0;
 }
 
-bool measurement(const fs::path& file) {
+bool is_measurement(const fs::path& file) {
   return file.extension() == ".json" && kind_of(file) == Kind::accuracy;
 }
 
 int make_report(const ReportOptions& options) {
   const fs::path target = output_target(options.output, options.logs);
-  if (measurement(options.logs.front())) return make_accuracy_page(options, target);
+  if (is_measurement(options.logs.front())) return make_accuracy_page(options, target);
   const fs::path template_file = page_template("page");
   report::Data data;
   {
@@ -69,13 +72,14 @@ int make_report(const ReportOptions& options) {
     summary["runs"].push_back(json_of(run));
     for (const auto& text : run.notes) note(fmt::format("{}: {}", run.log.string(), text));
     if (!options.json)
-      report(fmt::format("{}: {} at {:.6g} s, {} ticks, drawn at {}\n", run.name, run.outcome, run.time_s, run.ticks,
-                         run.frames));
+      report(fmt::format("{}: {} at {:.6g} s, {} ticks, drawn at {}\n", run.name, run.outcome,
+                         run.time_s, run.ticks, run.frames));
   }
   if (options.json)
     print_json(summary);
   else
-    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(), 1e-6 * static_cast<double>(size)));
+    report(fmt::format("wrote {} ({:.2f} MB)\n", options.output.string(),
+                       1e-6 * static_cast<double>(size)));
   return 0;
 }
 
@@ -84,23 +88,27 @@ int make_report(const ReportOptions& options) {
 void add_report(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "report",
-                  "Make one HTML page of logs: the arm replayed in its map, plots; opens offline. Measurements of "
-                  "`hamelin accuracy` make a page of speed against error",
+                  "Make an HTML page of logs that replays the arm in its map, with plots. The page "
+                  "opens offline. "
+                  "Measurements of `hamelin accuracy` give a page that plots speed against error",
                   "hamelin report shelf.jsonl -o shelf.html\n"
                   "hamelin report apf.jsonl gyro.jsonl hybrid.jsonl -o compared.html\n"
                   "hamelin report accuracy.json -o accuracy.html");
   const auto options = std::make_shared<ReportOptions>();
   command
-      ->add_option("logs", options->logs,
-                   "logs, plain or zstd, several are shown side by side; or files of `hamelin accuracy`")
+      ->add_option(
+          "logs", options->logs,
+          "log files, plain or zstd, shown side by side; or measurements of `hamelin accuracy`")
       ->required()
       ->type_name("LOG...");
-  command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("PAGE.html");
-  command->add_option("--frames", options->page.frames_max, "poses of the arm per run at most")
+  command->add_option("-o,--output", options->output, "HTML page to write")
+      ->required()
+      ->type_name("PAGE.html");
+  command->add_option("--frames", options->page.frames_max, "largest number of arm poses per run")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(2L, 100000L));
-  command->add_flag("--json", options->json, "print what was made as JSON");
+  command->add_flag("--json", options->json, "print a summary of the page as JSON");
   command->callback([options, &exit_code] { exit_code = make_report(*options); });
 }
 

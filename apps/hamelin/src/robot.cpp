@@ -32,14 +32,15 @@ Json optional(const std::optional<double>& value) {
 }
 
 std::size_t capsules_of(const model::Link& link) {
-  return static_cast<std::size_t>(std::count_if(link.segments.begin(), link.segments.end(),
-                                                [](const model::Segment& segment) { return segment.is_capsule(); }));
+  return static_cast<std::size_t>(
+      std::count_if(link.segments.begin(), link.segments.end(),
+                    [](const model::Segment& segment) { return segment.is_capsule(); }));
 }
 
 std::size_t count_shapes(const model::Model& model, bool capsules) {
-  return static_cast<std::size_t>(
-      std::count_if(model.shapes().begin(), model.shapes().end(),
-                    [capsules](const model::Model::Shape& shape) { return shape.is_capsule == capsules; }));
+  return static_cast<std::size_t>(std::count_if(
+      model.shapes().begin(), model.shapes().end(),
+      [capsules](const model::Model::Shape& shape) { return shape.is_capsule == capsules; }));
 }
 
 Json describe(const model::Model& model, const std::filesystem::path& file) {
@@ -48,18 +49,19 @@ Json describe(const model::Model& model, const std::filesystem::path& file) {
   double mass = 0.0;
   for (const auto& link : robot.links) {
     mass += link.mass_kg;
-    links.push_back({{"name", link.name},
-                     {"joint", link.joint.name},
-                     {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
-                     {"lower", optional(link.joint.lower)},
-                     {"upper", optional(link.joint.upper)},
-                     {"velocity_max", optional(link.joint.velocity_max)},
-                     {"effort_max", optional(link.joint.effort_max)},
-                     {"damping", link.joint.damping},
-                     {"mass_kg", link.mass_kg},
-                     {"spheres", link.spheres.size()},
-                     {"capsules", capsules_of(link)},
-                     {"lines", link.segments.size() - capsules_of(link)}});
+    links.push_back(
+        {{"name", link.name},
+         {"joint", link.joint.name},
+         {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
+         {"lower", optional(link.joint.lower)},
+         {"upper", optional(link.joint.upper)},
+         {"velocity_max", optional(link.joint.velocity_max)},
+         {"effort_max", optional(link.joint.effort_max)},
+         {"damping", link.joint.damping},
+         {"mass_kg", link.mass_kg},
+         {"spheres", link.spheres.size()},
+         {"capsules", capsules_of(link)},
+         {"lines", link.segments.size() - capsules_of(link)}});
   }
   const scene::SelfField self(model);
   Json notes = robot.notes;
@@ -90,32 +92,39 @@ std::string cell(const Json& value) {
 
 void print_table(const Json& robot) {
   fmt::print("{}: {}, {} joints, {}, {:.4g} kg, tip '{}' on link '{}', reach at most {:.3g} m\n",
-             robot["file"].get<std::string>(), robot["name"].get<std::string>(), robot["dof"].get<int>(),
+             robot["file"].get<std::string>(), robot["name"].get<std::string>(),
+             robot["dof"].get<int>(),
              robot["planar"].get<bool>() ? "planar: runs in SE(2)" : "spatial: runs in SE(3)",
-             robot["mass_kg"].get<double>(), robot["tip"].get<std::string>(), robot["tip_link"].get<std::string>(),
-             robot["reach_m"].get<double>());
-  constexpr const char* row = "{:<20} {:<20} {:<9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8}\n";
-  fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass", "spheres",
-             "capsules");
+             robot["mass_kg"].get<double>(), robot["tip"].get<std::string>(),
+             robot["tip_link"].get<std::string>(), robot["reach_m"].get<double>());
+  constexpr const char* row =
+      "{:<20} {:<20} {:<9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8}\n";
+  fmt::print(row, "joint", "link", "type", "lower", "upper", "speed", "effort", "damping", "mass",
+             "spheres", "capsules");
   for (const auto& link : robot["links"])
-    fmt::print(row, link["joint"].get<std::string>(), link["name"].get<std::string>(), link["type"].get<std::string>(),
-               cell(link["lower"]), cell(link["upper"]), cell(link["velocity_max"]), cell(link["effort_max"]),
-               cell(link["damping"]), cell(link["mass_kg"]), link["spheres"].get<std::size_t>(),
+    fmt::print(row, link["joint"].get<std::string>(), link["name"].get<std::string>(),
+               link["type"].get<std::string>(), cell(link["lower"]), cell(link["upper"]),
+               cell(link["velocity_max"]), cell(link["effort_max"]), cell(link["damping"]),
+               cell(link["mass_kg"]), link["spheres"].get<std::size_t>(),
                link["capsules"].get<std::size_t>());
   fmt::print("units: rad, m, kg, s, N, Nm; a dash means none\n");
   if (robot["spheres"] == 0 && robot["capsules"] == 0)
-    fmt::print("no collision spheres or capsules: obstacles need some, as <collision><sphere> or by --spheres\n");
+    fmt::print(
+        "no collision spheres or capsules: collisions are not checked; add <collision><sphere> or "
+        "use --spheres\n");
   fmt::print(
-      "base: {} spheres, {} capsules; self-collision: {} parts, {} pairs that may not touch, {} listed as disabled\n",
+      "base: {} spheres, {} capsules; self-collision: {} parts, {} pairs that may not touch, {} "
+      "listed as disabled\n",
       robot["base_spheres"].get<std::size_t>(), robot["base_capsules"].get<std::size_t>(),
-      robot["self_collision_parts"].get<std::size_t>(), robot["self_collision_pairs"].get<std::size_t>(),
+      robot["self_collision_parts"].get<std::size_t>(),
+      robot["self_collision_pairs"].get<std::size_t>(),
       robot["self_collision_disabled"].get<std::size_t>());
   fmt::print("{}", notes_text(robot["notes"]));
 }
 
 void print_robot_info(const RobotInfoOptions& options) {
-  const model::Model model(
-      description::read_robot(options.file, {options.tip, options.spheres, options.srdf, options.strict}));
+  const model::Model model(description::read_robot(
+      options.file, {options.tip, options.spheres, options.srdf, options.strict}));
   const Json robot = describe(model, options.file);
   if (options.json)
     print_json(robot);
@@ -131,7 +140,7 @@ struct ChainFlags {
 
 void make_chain(const ChainFlags& flags) {
   const model::Robot robot = model::make_chain(flags.chain);
-  write_file_aside(flags.output, description::robot_to_json(robot).dump(1) + "\n");
+  write_file_atomically(flags.output, description::robot_to_json(robot).dump(1) + "\n");
   if (flags.json)
     print_json({{"file", flags.output.string()}, {"dof", robot.dof()}});
   else
@@ -141,23 +150,32 @@ void make_chain(const ChainFlags& flags) {
 }  // namespace
 
 void add_robot(CLI::App& app, int& exit_code) {
-  auto* robot = add_command(app, "robot", "Look at robots and make them",
+  auto* robot = add_command(app, "robot", "Inspect, check and make robots",
                             "hamelin robot fit arm.urdf -o arm.spheres.json\n"
                             "hamelin robot check arm.urdf --spheres arm.spheres.json\n"
                             "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json");
   robot->require_subcommand(1);
 
   auto* info_command = add_command(
-      *robot, "info", "Joints, limits, masses and spheres of a robot, and what its reader lumped, locked or skipped",
+      *robot, "info",
+      "Print the joints, limits, masses and collision shapes of a robot. Notes say what its reader "
+      "lumped, locked or "
+      "skipped",
       "hamelin robot info data/robots/arm7.urdf\n"
       "hamelin robot info data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json --json");
   const auto info_options = std::make_shared<RobotInfoOptions>();
-  info_command->add_option("file", info_options->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
-  info_command->add_option("--tip", info_options->tip, "link that is the tip (URDF: default the only leaf)")
-      ->type_name("LINK");
-  info_command->add_option("--spheres", info_options->spheres, "sidecar file with collision spheres")
+  info_command->add_option("file", info_options->file, "robot file, .urdf or JSON")
+      ->required()
       ->type_name("FILE");
-  info_command->add_option("--srdf", info_options->srdf, "SRDF whose disabled pairs are not checked")
+  info_command
+      ->add_option("--tip", info_options->tip, "tip link (default for a URDF: its only leaf)")
+      ->type_name("LINK");
+  info_command
+      ->add_option("--spheres", info_options->spheres,
+                   "sidecar file with collision spheres or capsules")
+      ->type_name("FILE");
+  info_command
+      ->add_option("--srdf", info_options->srdf, "SRDF file with pairs of links that may touch")
       ->type_name("FILE.srdf");
   info_command->add_flag("--strict", info_options->strict, strict_help);
   info_command->add_flag("--json", info_options->json, "print JSON");
@@ -170,20 +188,31 @@ void add_robot(CLI::App& app, int& exit_code) {
   add_robot_check(*robot, exit_code);
 
   auto* chain_command =
-      add_command(*robot, "make-chain", "Write a chain of equal links along +y",
+      add_command(*robot, "make-chain", "Make a robot file of a chain of equal links along +y",
                   "hamelin robot make-chain --links 7 --axes x,z,x -o chain7.json\n"
-                  "hamelin robot make-chain --links 3 --axes z --length 0.3 --mass 2 --radius 0.05 -o planar.json");
+                  "hamelin robot make-chain --links 3 --axes z --length 0.3 --mass 2 --radius 0.05 "
+                  "-o planar.json");
   const auto chain_flags = std::make_shared<ChainFlags>();
   auto& chain = chain_flags->chain;
-  chain_command->add_option("--links", chain.links, "how many")->type_name("N")->capture_default_str();
-  chain_command->add_option("--axes", chain.axes, "joint axes, link by link, starting over at the end")
+  chain_command->add_option("--links", chain.links, "number of links")
+      ->type_name("N")
+      ->capture_default_str();
+  chain_command->add_option("--axes", chain.axes, "joint axes, one per link, repeated cyclically")
       ->type_name("x,y,z")
       ->capture_default_str();
-  chain_command->add_option("--length", chain.length_m, "of each link [m]")->type_name("L")->capture_default_str();
-  chain_command->add_option("--mass", chain.mass_kg, "of each link [kg]")->type_name("M")->capture_default_str();
-  chain_command->add_option("--radius", chain.radius_m, "of each link [m]")->type_name("R")->capture_default_str();
-  chain_command->add_option("-o,--output", chain_flags->output, "where to write it")->required()->type_name("FILE");
-  chain_command->add_flag("--json", chain_flags->json, "print what was written as JSON");
+  chain_command->add_option("--length", chain.length_m, "length of each link [m]")
+      ->type_name("L")
+      ->capture_default_str();
+  chain_command->add_option("--mass", chain.mass_kg, "mass of each link [kg]")
+      ->type_name("M")
+      ->capture_default_str();
+  chain_command->add_option("--radius", chain.radius_m, "radius of each link [m]")
+      ->type_name("R")
+      ->capture_default_str();
+  chain_command->add_option("-o,--output", chain_flags->output, "robot file to write")
+      ->required()
+      ->type_name("FILE");
+  chain_command->add_flag("--json", chain_flags->json, "print a summary of the file as JSON");
   chain_command->callback([chain_flags, &exit_code] {
     make_chain(*chain_flags);
     exit_code = 0;

@@ -27,8 +27,8 @@ struct RobotCheckFlags {
   bool json = false;
 };
 
-// What the sampling says of a pair.
-std::string contact_words(const fit::PartPair& pair, int samples) {
+// How often a pair was in contact in the sampled configurations.
+std::string contact_frequency(const fit::PartPair& pair, int samples) {
   if (samples == 0) return "not sampled";
   if (pair.contacts == samples) return "always in contact";
   if (pair.contacts == 0) return "never in contact";
@@ -46,71 +46,86 @@ Json describe(const fit::SelfCheck& check, const model::Robot& robot) {
                      {"least_m", pair.least_m},
                      {"contacts", pair.contacts}});
   Json faults = Json::array();
-  for (const auto& pair : check.faults())
+  for (const auto& pair : check.contacts_at_rest())
     faults.push_back({{"parts", {pair.part_a, pair.part_b}}, {"rest_m", pair.rest_m}});
   return {{"name", robot.name},
           {"rest_q", check.rest_q},
           {"samples", check.samples},
           {"overlaps_at_rest", faults},
           {"pairs", pairs},
-          {"links_without_shapes", check.shapeless},
-          {"odd_limits", check.odd_limits},
+          {"links_without_shapes", check.links_without_shapes},
+          {"odd_limits", check.suspicious_limits},
           {"notes", robot.notes},
           {"warnings", model::warnings(robot)}};
 }
 
-void print(const fit::SelfCheck& check, const model::Robot& robot, const std::filesystem::path& file) {
-  std::string text = fmt::format("{}: {}, at rest where q = [{:.4g}], {} random configurations within the limits\n",
-                                 file.string(), robot.name, fmt::join(check.rest_q, ", "), check.samples);
+void print(const fit::SelfCheck& check, const model::Robot& robot,
+           const std::filesystem::path& file) {
+  std::string text =
+      fmt::format("{}: {}, rest pose q = [{:.4g}], {} random configurations within the limits\n",
+                  file.string(), robot.name, fmt::join(check.rest_q, ", "), check.samples);
   constexpr const char* row = "{:<42} {:>9} {:>9}  {}\n";
-  const auto list = [&](const std::string& title, const auto& take, const auto& words) {
+  const auto list = [&](const std::string& title, const auto& belongs, const auto& remark) {
     bool any = false;
     for (const auto& pair : check.pairs) {
-      if (!take(pair)) continue;
+      if (!belongs(pair)) continue;
       if (!any) text += "\n" + fmt::format(row, title, "rest mm", "least mm", "");
       any = true;
-      text += fmt::format(row, pair.part_a + " - " + pair.part_b, fmt::format("{:.1f}", 1e3 * pair.rest_m),
-                          fmt::format("{:.1f}", 1e3 * pair.least_m), words(pair));
+      text += fmt::format(row, pair.part_a + " - " + pair.part_b,
+                          fmt::format("{:.1f}", 1e3 * pair.rest_m),
+                          fmt::format("{:.1f}", 1e3 * pair.least_m), remark(pair));
     }
   };
-  const auto sampled = [&](const fit::PartPair& pair) { return contact_words(pair, check.samples); };
+  const auto sampled = [&](const fit::PartPair& pair) {
+    return contact_frequency(pair, check.samples);
+  };
   list(
-      "OVERLAP at rest, and checked:", [](const fit::PartPair& p) { return p.checked && p.touches_at_rest(); },
+      "OVERLAP at rest, checked:",
+      [](const fit::PartPair& p) { return p.checked && p.touches_at_rest(); }, sampled);
+  list(
+      "checked:",
+      [](const fit::PartPair& p) { return p.checked && !p.touches_at_rest() && p.contacts > 0; },
       sampled);
-  list(
-      "checked:", [](const fit::PartPair& p) { return p.checked && !p.touches_at_rest() && p.contacts > 0; }, sampled);
   list(
       "checked, never in contact:",
       [](const fit::PartPair& p) { return p.checked && !p.touches_at_rest() && p.contacts == 0; },
       [](const fit::PartPair&) { return std::string(); });
   list(
-      "dropped:", [](const fit::PartPair& p) { return !p.checked; },
-      [&](const fit::PartPair& p) { return fmt::format("{}; {}", p.reason, contact_words(p, check.samples)); });
+      "not checked:", [](const fit::PartPair& p) { return !p.checked; },
+      [&](const fit::PartPair& p) {
+        return fmt::format("{}; {}", p.reason, contact_frequency(p, check.samples));
+      });
   text += "\n";
-  for (const auto& line : check.odd_limits) text += fmt::format("limits: {}\n", line);
-  for (const auto& link : check.shapeless) text += fmt::format("no shapes: moving link '{}' meets nothing\n", link);
+  for (const auto& line : check.suspicious_limits) text += fmt::format("limits: {}\n", line);
+  for (const auto& link : check.links_without_shapes)
+    text += fmt::format("no shapes: collisions of moving link '{}' are not checked\n", link);
   text += notes_text(robot.notes);
-  const auto faults = check.faults();
-  const auto checked =
-      std::count_if(check.pairs.begin(), check.pairs.end(), [](const fit::PartPair& p) { return p.checked; });
-  text +=
-      fmt::format("{} of {} pairs are checked, {} of them overlap at rest: {}\n", checked, check.pairs.size(),
-                  faults.size(), faults.empty() ? coloured("clean", Colour::good) : coloured("not clean", Colour::bad));
+  const auto faults = check.contacts_at_rest();
+  const auto checked = std::count_if(check.pairs.begin(), check.pairs.end(),
+                                     [](const fit::PartPair& p) { return p.checked; });
+  text += fmt::format(
+      "{} of {} pairs are checked, {} of them overlap at rest: {}\n", checked, check.pairs.size(),
+      faults.size(),
+      faults.empty() ? coloured("clean", Colour::good) : coloured("not clean", Colour::bad));
   report(text);
 }
 
-// The list as an SRDF, or in a copy of the sidecar given.
-std::string list_text(const RobotCheckFlags& flags, const fit::SelfCheck& check, const model::Robot& robot) {
+// The list of disabled pairs as an SRDF, or in a copy of the given sidecar.
+std::string list_text(const RobotCheckFlags& flags, const fit::SelfCheck& check,
+                      const model::Robot& robot) {
   const auto pairs = check.disabled(flags.never);
   if (flags.output->extension() == ".srdf") return fit::srdf_text(robot.name, pairs);
   if (!flags.robot.spheres)
-    throw Error(ErrorCode::usage,
-                fmt::format("--write {}: a sidecar is written as a copy of the one given by --spheres, and none was "
-                            "given; expected --spheres FILE or a name that ends in .srdf",
-                            flags.output->string()));
+    throw Error(
+        ErrorCode::usage,
+        fmt::format(
+            "--write {}: a sidecar is written as a copy of that of --spheres, which is not given; "
+            "expected --spheres FILE or a name that ends in .srdf",
+            flags.output->string()));
   Json document = read_json(*flags.robot.spheres);
   document["self_collision_disabled"] = Json::array();
-  for (const auto& pair : pairs) document["self_collision_disabled"].push_back(Json::array({pair.link_a, pair.link_b}));
+  for (const auto& pair : pairs)
+    document["self_collision_disabled"].push_back(Json::array({pair.link_a, pair.link_b}));
   return document.dump(1) + "\n";
 }
 
@@ -126,43 +141,53 @@ int run(const RobotCheckFlags& flags) {
   std::vector<description::DisabledPair> listed;
   if (flags.robot.srdf) listed = description::read_srdf(*flags.robot.srdf);
   const fit::SelfCheck check = fit::check_self(robot, listed, flags.check);
-  if (flags.output) write_file_aside(target, list_text(flags, check, robot));
+  if (flags.output) write_file_atomically(target, list_text(flags, check, robot));
   if (flags.json)
     print_json(describe(check, robot));
   else
     print(check, robot, flags.file);
-  return check.faults().empty() ? 0 : 1;
+  return check.contacts_at_rest().empty() ? 0 : 1;
 }
 
 }  // namespace
 
 void add_robot_check(CLI::App& robot, int& exit_code) {
-  auto* command =
-      add_command(robot, "check",
-                  "Overlaps at rest, pairs that self-collision drops and why, odd limits; exit code 1 for an overlap",
-                  "hamelin robot check data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json\n"
-                  "hamelin robot check arm.urdf --spheres arm.spheres.json --srdf arm.srdf --samples 100000\n"
-                  "hamelin robot check arm.urdf --spheres arm.spheres.json --write arm.checked.spheres.json");
+  auto* command = add_command(
+      robot, "check",
+      "Check a robot for self-collision and unusual limits. Lists overlaps at rest, and the pairs "
+      "of "
+      "links that are not checked with the reason; the exit code is 1 if shapes overlap at rest",
+      "hamelin robot check data/robots/arm7.urdf --spheres data/robots/arm7.spheres.json\n"
+      "hamelin robot check arm.urdf --spheres arm.spheres.json --srdf arm.srdf --samples 100000\n"
+      "hamelin robot check arm.urdf --spheres arm.spheres.json --write arm.checked.spheres.json");
   const auto flags = std::make_shared<RobotCheckFlags>();
-  command->add_option("file", flags->file, "a robot, .urdf or JSON")->required()->type_name("FILE");
-  command->add_option("--tip", flags->robot.tip, "link that is the tip (URDF: default the only leaf)")
+  command->add_option("file", flags->file, "robot file, .urdf or JSON")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--tip", flags->robot.tip, "tip link (default for a URDF: its only leaf)")
       ->type_name("LINK");
-  command->add_option("--spheres", flags->robot.spheres, "sidecar file with collision spheres or capsules")
+  command
+      ->add_option("--spheres", flags->robot.spheres,
+                   "sidecar file with collision spheres or capsules")
       ->type_name("FILE.json");
-  command->add_option("--srdf", flags->robot.srdf, "SRDF whose disabled pairs count as listed")->type_name("FILE.srdf");
-  command->add_option("--samples", flags->check.samples, "random configurations")
+  command->add_option("--srdf", flags->robot.srdf, "SRDF file with pairs of links that may touch")
+      ->type_name("FILE.srdf");
+  command->add_option("--samples", flags->check.samples, "number of random configurations")
       ->type_name("N")
       ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
-  command->add_option("--seed", flags->check.seed, "of the random configurations")
+  command->add_option("--seed", flags->check.seed, "seed of the random configurations")
       ->type_name("N")
-      ->check(whole_number())
+      ->check(unsigned_range())
       ->capture_default_str();
   command
       ->add_option("--write", flags->output,
-                   "write what should be disabled: an SRDF, or a copy of the sidecar given with the list in it")
+                   "write the pairs to disable: an SRDF file if the name ends in .srdf, otherwise "
+                   "a copy of the "
+                   "--spheres file with the list")
       ->type_name("FILE");
-  command->add_flag("--drop-never", flags->never, "--write also lists pairs that were never in contact");
+  command->add_flag("--drop-never", flags->never,
+                    "with --write: also list pairs that were never in contact");
   command->add_flag("--strict", flags->robot.strict, strict_help);
   command->add_flag("--json", flags->json, "print JSON");
   command->callback([flags, &exit_code] { exit_code = run(*flags); });

@@ -1,11 +1,12 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
-/// Subcommands of `hamelin robot` that have a file of their own.
+/// Subcommands of `hamelin robot` that are defined in separate source files.
 namespace hamelin::app {
 
-/// What --strict does, wherever a robot is checked.
-inline constexpr const char* strict_help = "refuse inertias against the triangle inequality instead of warning";
+/// The help text of --strict in every command that checks a robot.
+inline constexpr const char* strict_help =
+    "refuse inertias that violate the triangle inequality instead of warning";
 
 void add_robot_fit(CLI::App& robot, int& exit_code);
 void add_robot_check(CLI::App& robot, int& exit_code);

@@ -5,10 +5,10 @@
 
 #include "hamelin/model/robot.hpp"
 
-/// What a robot's reader has to say.
+/// Notes and warnings of a robot's reader.
 namespace hamelin::app {
 
-/// Each warning as a note on stderr.
+/// Prints each warning as a note on stderr.
 void note_warnings(const model::Robot& robot, const std::filesystem::path& file);
 
 /// All notes as lines of a report: "note: ..." and "warning: ...".

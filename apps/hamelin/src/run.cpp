@@ -23,24 +23,33 @@ struct RunOptions {
   RecordOptions record;
 };
 
-// What the robot file knows and the scene does not ask for (SPEC §5).
-void say_what_is_unused(const scene::Scene& scene, const model::Robot& robot) {
-  const auto any = [&](auto&& has) { return std::any_of(robot.links.begin(), robot.links.end(), has); };
+// Notes the properties of the robot file that the scene does not model.
+void note_unmodelled(const scene::Scene& scene, const model::Robot& robot) {
+  const auto any = [&](auto&& has) {
+    return std::any_of(robot.links.begin(), robot.links.end(), has);
+  };
   std::vector<const char*> unused;
-  if (!scene.model.joint_limits && any([](const model::Link& l) { return l.joint.lower || l.joint.upper; }))
+  if (!scene.model.joint_limits &&
+      any([](const model::Link& l) { return l.joint.lower || l.joint.upper; }))
     unused.push_back("joint limits");
-  if (!scene.model.velocity_limits && any([](const model::Link& l) { return l.joint.velocity_max.has_value(); }))
+  if (!scene.model.velocity_limits &&
+      any([](const model::Link& l) { return l.joint.velocity_max.has_value(); }))
     unused.push_back("velocity limits");
-  if (!scene.model.torque_limits && any([](const model::Link& l) { return l.joint.effort_max.has_value(); }))
+  if (!scene.model.torque_limits &&
+      any([](const model::Link& l) { return l.joint.effort_max.has_value(); }))
     unused.push_back("effort limits");
-  if (!scene.model.joint_damping.from_robot && any([](const model::Link& l) { return l.joint.damping != 0.0; }))
+  if (!scene.model.joint_damping.from_robot &&
+      any([](const model::Link& l) { return l.joint.damping != 0.0; }))
     unused.push_back("damping");
-  if (!scene.model.friction.from_robot && any([](const model::Link& l) { return l.joint.friction != 0.0; }))
+  if (!scene.model.friction.from_robot &&
+      any([](const model::Link& l) { return l.joint.friction != 0.0; }))
     unused.push_back("friction");
-  if (!scene.model.armature.from_robot && any([](const model::Link& l) { return l.joint.armature != 0.0; }))
+  if (!scene.model.armature.from_robot &&
+      any([](const model::Link& l) { return l.joint.armature != 0.0; }))
     unused.push_back("armature");
   if (!unused.empty())
-    note(fmt::format("{}: not modelled by the scene: {}", scene.robot.file.string(), fmt::join(unused, ", ")));
+    note(fmt::format("{}: the scene does not model {}", scene.robot.file.string(),
+                     fmt::join(unused, ", ")));
 }
 
 int run(const RunOptions& options) {
@@ -51,7 +60,7 @@ int run(const RunOptions& options) {
   }
   const model::Model model = simulation::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
-  say_what_is_unused(scene, model.robot());
+  note_unmodelled(scene, model.robot());
   return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
     return simulation::run(scene, plugin_path(options.plugin_path), watch);
   });
@@ -61,32 +70,44 @@ int run(const RunOptions& options) {
 
 void add_run(CLI::App& app, int& exit_code) {
   auto* command =
-      add_command(app, "run", "Move a scene's arm to its goal with a planner, in closed loop",
+      add_command(app, "run", "Move the arm of a scene to its goals with a planner, in closed loop",
                   "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json\n"
                   "hamelin run data/scenes/clutter.json --planner apf --duration 5\n"
-                  "hamelin run data/scenes/shelf.json --set /planner/params/cruise_speed=1 --log slow.jsonl.zst");
+                  "hamelin run data/scenes/shelf.json --set /planner/params/cruise_speed=1 --log "
+                  "slow.jsonl.zst");
   const auto options = std::make_shared<RunOptions>();
-  command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
-  command->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
+  command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
+  command
+      ->add_option("--planner", options->flags.planner,
+                   "planner plugin, by name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  integrator_name(command->add_option("--integrator", options->flags.integrator,
-                                      "time stepping (default the scene's, else hamel-variational)"));
-  command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")->type_name("H");
-  command->add_option("--duration", options->flags.duration_s, "longest simulated time [s] (default the scene's)")
+  restrict_to_integrators(
+      command->add_option("--integrator", options->flags.integrator,
+                          "time integrator (default the scene's, or hamel-variational)"));
+  command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")
+      ->type_name("H");
+  command
+      ->add_option("--duration", options->flags.duration_s,
+                   "longest simulated time [s] (default the scene's)")
       ->type_name("T");
-  command->add_option("--seed", options->flags.seed, "of all random numbers (default the scene's)")
+  command
+      ->add_option("--seed", options->flags.seed,
+                   "seed of all random numbers (default the scene's)")
       ->type_name("S")
-      ->check(whole_number());
+      ->check(unsigned_range());
   command
       ->add_option("--set", options->flags.set,
                    "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   command->add_flag("--print-config", options->print_config,
-                    "print the scene with every default as it would be run, and leave; paths are as seen from here");
+                    "print the resolved scene, with all defaults and with paths from the working "
+                    "directory, and exit");
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

@@ -9,11 +9,13 @@ namespace hamelin::app {
 
 scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags) {
   if (const Kind kind = kind_of(file); kind != Kind::scene)
-    throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a scene", file.string(), to_string(kind)));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is a {}, expected a scene", file.string(), to_string(kind)));
   Json document = read_json(file);
   const auto choose = [&](const char* key, const std::string& name) {
-    // another planner or integrator does not know the parameters of the scene's
-    if (!document.contains(key) || !document[key].is_object() || document[key].value("name", Json()) != name)
+    // The scene's parameters belong to the scene's planner or integrator only.
+    if (!document.contains(key) || !document[key].is_object() ||
+        document[key].value("name", Json()) != name)
       document[key] = {{"name", name}};
   };
   if (flags.planner) choose("planner", *flags.planner);

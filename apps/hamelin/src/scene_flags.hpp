@@ -9,7 +9,7 @@
 
 namespace hamelin::app {
 
-/// What a command line may change in a scene file.
+/// Values of a scene file that the command line overrides.
 struct SceneFlags {
   std::optional<std::string> planner, integrator;
   std::optional<double> step_s, duration_s;
@@ -17,11 +17,11 @@ struct SceneFlags {
   std::vector<std::string> set;  ///< "/json/pointer=VALUE", applied last
 };
 
-/// The scene with the flags written into its document, so that its own checks speak for them.
-/// @throws Error as scene::scene_from_json does, and for a file that is no scene
+/// Reads a scene after writing the flags into its JSON document, whose checks then cover them.
+/// @throws Error like scene::scene_from_json, and for a file that is not a scene
 [[nodiscard]] scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags);
 
-/// The files that a scene is made of.
+/// The scene file and the files that it names.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const scene::Scene& scene);
 
 }  // namespace hamelin::app

@@ -6,7 +6,7 @@
 
 #include "hamelin/io/json.hpp"
 
-/// `hamelin scene info` of a bare map, and `hamelin scene crop`.
+/// `hamelin scene info` of a map file, and `hamelin scene crop`.
 namespace hamelin::app {
 
 struct MapInfoOptions {
@@ -14,14 +14,14 @@ struct MapInfoOptions {
   std::string base;  ///< "X,Y,Z"; empty: none given
 };
 
-/// What a map holds within a ball: around `base` of radius `reach` in the map's own frame; if neither is given the one
-/// that holds all that is occupied.
+/// Describes a map within the ball of radius `reach` around `base`, in the map's frame. If neither
+/// is given, the ball contains all occupied leaves and is centred on them.
 [[nodiscard]] Json map_info(const std::filesystem::path& file, const MapInfoOptions& options);
 
-/// The same for a reader.
+/// The description as text.
 [[nodiscard]] std::string map_text(const Json& info);
 
-/// Lines "  label   text" under each other.
+/// A line "  label   text", with texts aligned under each other.
 [[nodiscard]] std::string info_line(std::string_view label, const std::string& text);
 [[nodiscard]] std::string percent(const Json& share);
 [[nodiscard]] std::string bytes_text(std::size_t bytes);

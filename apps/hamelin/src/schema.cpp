@@ -25,17 +25,19 @@ void print_schema(const std::string& name, bool json) {
 }  // namespace
 
 void add_schema(CLI::App& app, int& exit_code) {
-  auto* schema = add_command(app, "schema", "The JSON Schemas of all file formats",
+  auto* schema = add_command(app, "schema", "Print the JSON Schemas of the file formats",
                              "hamelin schema print\n"
                              "hamelin schema print scene");
   schema->require_subcommand(1);
-  auto* print = add_command(*schema, "print", "Print a schema (draft-07); without a name, their names",
-                            "hamelin schema print\n"
-                            "hamelin schema print scene");
+  auto* print = add_command(
+      *schema, "print", "Print the JSON Schema (draft-07) of a file format, or the names of all",
+      "hamelin schema print\n"
+      "hamelin schema print scene");
   const auto name = std::make_shared<std::string>();
-  one_of(print->add_option("name", *name, "of the file format"), names)->type_name("NAME");
+  restrict_values(print->add_option("name", *name, "name of the file format"), names)
+      ->type_name("NAME");
   const auto json = std::make_shared<bool>(false);
-  print->add_flag("--json", *json, "print the names as JSON; a schema is JSON anyhow");
+  print->add_flag("--json", *json, "print the names as JSON (a schema is always JSON)");
   print->callback([name, json, &exit_code] {
     print_schema(*name, *json);
     exit_code = 0;

@@ -15,7 +15,8 @@ std::string number(const Json& value, int digits = 4) {
 std::string joints(const Json& q) {
   constexpr std::size_t shown = 10;
   std::string text;
-  for (std::size_t i = 0; i < std::min(q.size(), shown); ++i) text += (i > 0 ? ", " : "") + number(q[i], 6);
+  for (std::size_t i = 0; i < std::min(q.size(), shown); ++i)
+    text += (i > 0 ? ", " : "") + number(q[i], 6);
   if (q.size() > shown) text += fmt::format(", ... ({} joints)", q.size());
   return text;
 }
@@ -29,9 +30,11 @@ Colour colour_of(const std::string& outcome) {
 std::string goal_line(const Json& goal) {
   std::string text = goal["type"].get<std::string>();
   if (goal["count"].get<std::size_t>() > 1)
-    text += fmt::format(", {} of {} reached", goal["index"].get<std::size_t>(), goal["count"].get<std::size_t>());
+    text += fmt::format(", {} of {} reached", goal["index"].get<std::size_t>(),
+                        goal["count"].get<std::size_t>());
   if (!goal["error_m"].is_null()) text += fmt::format(", error {} m", number(goal["error_m"]));
-  if (!goal["error_rad"].is_null()) text += fmt::format(", error {} rad", number(goal["error_rad"]));
+  if (!goal["error_rad"].is_null())
+    text += fmt::format(", error {} rad", number(goal["error_rad"]));
   return text;
 }
 
@@ -39,13 +42,18 @@ std::string goal_line(const Json& goal) {
 
 std::string summary(const Json& r, const std::vector<std::filesystem::path>& written) {
   std::string text;
-  const auto line = [&](const char* name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
+  const auto line = [&](const char* name, const std::string& value) {
+    text += fmt::format("{:<12}{}\n", name, value);
+  };
   const auto outcome = r["outcome"].get<std::string>();
-  line("outcome", coloured(outcome, colour_of(outcome)) +
-                      (r["cause"].is_null() ? "" : fmt::format(": {}", r["cause"].get<std::string>())));
-  line("time", fmt::format("{} s, {} steps with {}{}", number(r["time_s"], 6), r["steps"].get<long>(),
-                           r["integrator"].get<std::string>(),
-                           r["planner"].is_null() ? "" : fmt::format(", planner {}", r["planner"].get<std::string>())));
+  line("outcome",
+       coloured(outcome, colour_of(outcome)) +
+           (r["cause"].is_null() ? "" : fmt::format(": {}", r["cause"].get<std::string>())));
+  line("time", fmt::format("{} s, {} steps with {}{}", number(r["time_s"], 6),
+                           r["steps"].get<long>(), r["integrator"].get<std::string>(),
+                           r["planner"].is_null()
+                               ? ""
+                               : fmt::format(", planner {}", r["planner"].get<std::string>())));
   if (!r["goal"].is_null()) line("goal", goal_line(r["goal"]));
   if (!r["min_clearance_m"].is_null())
     line("clearance",
@@ -53,24 +61,30 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                      r["certified_share"].is_null()
                          ? ""
                          : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
-                                       100.0 * r["certified_share"].get<double>(), number(r["tightest_step_m"]))));
+                                       100.0 * r["certified_share"].get<double>(),
+                                       number(r["tightest_step_m"]))));
   line("q", joints(r["q"]));
-  line("energy", fmt::format("{} J at first, {} J at last, largest error {} J", number(r["energy_initial_J"]),
-                             number(r["energy_final_J"]), number(r["energy_error_max_J"], 3)));
+  line("energy", fmt::format("{} J at the start, {} J at the end, largest error {} J",
+                             number(r["energy_initial_J"]), number(r["energy_final_J"]),
+                             number(r["energy_error_max_J"], 3)));
   if (!r["planner"].is_null())
-    line("work", fmt::format("dissipated {} J, held torque {} J, gyroscopic {} J, node {} J (filter {}, recovery {})",
-                             number(r["dissipated_J"]), number(r["held_work_J"]), number(r["gyroscopic_work_J"], 2),
-                             number(r["node_work_J"]), number(r["filter_work_J"], 3), number(r["recovery_work_J"], 3)));
+    line("work", fmt::format("dissipated {} J, held torque {} J, gyroscopic {} J, node velocity {} "
+                             "J (filter {}, recovery {})",
+                             number(r["dissipated_J"]), number(r["held_work_J"]),
+                             number(r["gyroscopic_work_J"], 2), number(r["node_work_J"]),
+                             number(r["filter_work_J"], 3), number(r["recovery_work_J"], 3)));
   const auto& solver = r["solver"];
-  line("solver", fmt::format("{} updates a step, {} at most; residual {} at most ({}); {} halvings",
-                             solver["updates_mean"].is_null() ? "no" : number(solver["updates_mean"], 3),
-                             solver["updates_max"].get<long>(), number(solver["residual_max"], 2),
-                             solver["criterion"].get<std::string>(), solver["halvings"].get<long>()));
+  line("solver",
+       fmt::format("{} updates per step, {} at most; residual {} at most ({}); {} halvings",
+                   solver["updates_mean"].is_null() ? "no" : number(solver["updates_mean"], 3),
+                   solver["updates_max"].get<long>(), number(solver["residual_max"], 2),
+                   solver["criterion"].get<std::string>(), solver["halvings"].get<long>()));
   const auto& timing = r["timing"];
-  line("cpu", timing["tick_us"].is_null()
-                  ? fmt::format("{} s", number(timing["cpu_s"], 3))
-                  : fmt::format("{} s; a tick takes {} us (p50), {} us (p99)", number(timing["cpu_s"], 3),
-                                number(timing["tick_us"]["p50"], 3), number(timing["tick_us"]["p99"], 3)));
+  line("cpu",
+       timing["tick_us"].is_null()
+           ? fmt::format("{} s", number(timing["cpu_s"], 3))
+           : fmt::format("{} s; a tick takes {} us (p50), {} us (p99)", number(timing["cpu_s"], 3),
+                         number(timing["tick_us"]["p50"], 3), number(timing["tick_us"]["p99"], 3)));
   for (const auto& warning : r["warnings"]) line("warning", warning.get<std::string>());
   for (const auto& file : written) line("written", file.string());
   return text;

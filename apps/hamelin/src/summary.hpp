@@ -7,8 +7,9 @@
 
 namespace hamelin::app {
 
-/// A result (schema hamelin.result/1) for people: a few lines of text.
-/// @param written the files it and its log were written to
-[[nodiscard]] std::string summary(const Json& result, const std::vector<std::filesystem::path>& written);
+/// A result (schema hamelin.result/1) as a few lines of text.
+/// @param written the files that were written: log and result
+[[nodiscard]] std::string summary(const Json& result,
+                                  const std::vector<std::filesystem::path>& written);
 
 }  // namespace hamelin::app

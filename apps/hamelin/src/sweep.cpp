@@ -6,10 +6,11 @@
 namespace hamelin::app {
 
 void add_sweep(CLI::App& app, int& exit_code) {
-  auto* sweep = add_command(app, "sweep", "Run many problems",
-                            "hamelin sweep plan data/scenes/shelf.json --planner hybrid --planner apf -o tries\n"
-                            "hamelin sweep run tries\n"
-                            "hamelin sweep merge tries --page tries.html");
+  auto* sweep = add_command(
+      app, "sweep", "Plan and run many scenes, and summarise the results",
+      "hamelin sweep plan data/scenes/shelf.json --planner hybrid --planner apf -o tries\n"
+      "hamelin sweep run tries\n"
+      "hamelin sweep merge tries --page tries.html");
   sweep->require_subcommand(1);
   add_sweep_plan(*sweep, exit_code);
   add_sweep_run(*sweep, exit_code);

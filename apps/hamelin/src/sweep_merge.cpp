@@ -36,7 +36,7 @@ int sweep_merge(const MergeOptions& options) {
   if (page) template_file = page_template("sweep");
   const sweep::Merged merged = sweep::merge(options.directories, options.by);
   const Json summary = sweep::to_json(merged);
-  if (output) write_file_aside(*output, summary.dump(2) + "\n");
+  if (output) write_file_atomically(*output, summary.dump(2) + "\n");
   if (page) write_page(*template_file, report::pack(sweep::page_json(merged)), *page);
   for (const auto& text : merged.notes) note(text);
   if (options.json)
@@ -50,21 +50,29 @@ int sweep_merge(const MergeOptions& options) {
 
 void add_sweep_merge(CLI::App& sweep, int& exit_code) {
   auto* command =
-      add_command(sweep, "merge", "Sum up the records of sweeps: success with 95 % intervals, contacts, times",
+      add_command(sweep, "merge",
+                  "Summarise the records of sweeps: success with 95 % intervals, contacts, times",
                   "hamelin sweep merge tries\n"
                   "hamelin sweep merge tries more --by family,goal,planner -o summary.json\n"
                   "hamelin sweep merge tries --page tries.html --json");
   const auto options = std::make_shared<MergeOptions>();
-  command->add_option("directories", options->directories, "plans with their records")->required()->type_name("DIR...");
   command
-      ->add_option("--by", options->by,
-                   "labels to group by: family, problem, goal, map, planner, values, seed, gains, sphere")
+      ->add_option("directories", options->directories, "sweep directories, with plan and records")
+      ->required()
+      ->type_name("DIR...");
+  command
+      ->add_option(
+          "--by", options->by,
+          "labels to group by: family, problem, goal, map, planner, values, seed, gains, sphere")
       ->type_name("LABEL,LABEL")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->default_str("goal,planner");
-  command->add_option("-o,--output", options->output, "write the summary as JSON")->type_name("SUMMARY.json");
-  command->add_option("--page", options->page, "write a page with table, gain map and all failed runs")
+  command->add_option("-o,--output", options->output, "write the summary as JSON")
+      ->type_name("SUMMARY.json");
+  command
+      ->add_option("--page", options->page,
+                   "write an HTML page with table, gain map and all failed runs")
       ->type_name("PAGE.html");
   command->add_flag("--json", options->json, "print the summary as JSON");
   command->callback([options, &exit_code] { exit_code = sweep_merge(*options); });

@@ -28,15 +28,16 @@ struct PairsOptions {
   std::optional<fs::path> output;
 };
 
-/// One JSON line a run, flushed, so that a kill loses at most one.
-class Records {
+/// Writes one JSON line per run and flushes it, so that a killed program loses at most one line.
+class PairRecords {
  public:
-  Records(const std::optional<fs::path>& file, const fs::path& input) {
+  PairRecords(const std::optional<fs::path>& file, const fs::path& input) {
     if (!file) return;
     std::error_code ec;
     if (fs::equivalent(*file, input, ec))
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: is the input, expected another path for the output", file->string()));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: is the input, expected another path for the output", file->string()));
     log::check_writable(*file);
     file_ = *file;
   }
@@ -64,9 +65,13 @@ std::string number(const std::optional<double>& value, const char* unit, int dig
 
 std::string table(const sweep::Summary& s, const sweep::DrawnPairs& drawn, double wall_s) {
   std::string text;
-  const auto line = [&](const char* name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
-  line("pairs", fmt::format("{} run; {} of {} draws too near to something, {} goals too near to their start", s.runs,
-                            drawn.near_draws, drawn.draws, drawn.close_goals));
+  const auto line = [&](const char* name, const std::string& value) {
+    text += fmt::format("{:<12}{}\n", name, value);
+  };
+  line("pairs",
+       fmt::format(
+           "{} run; {} of {} draws too close to an obstacle, {} goals too close to their start",
+           s.runs, drawn.near_draws, drawn.draws, drawn.close_goals));
   for (std::size_t i = 0; i < s.outcomes.size(); ++i)
     if (s.outcomes[i] > 0)
       line(std::string(log::to_string(static_cast<log::Outcome>(i))).c_str(),
@@ -75,20 +80,22 @@ std::string table(const sweep::Summary& s, const sweep::DrawnPairs& drawn, doubl
   line("collisions", fmt::format("{}", s.count(log::Outcome::collision)));
   line("clearance", number(s.min_clearance_m, "m at least"));
   if (s.certified_share_mean)
-    line("certified", fmt::format("{:.4f} % of the steps on the mean, {:.4f} % at least",
+    line("certified", fmt::format("{:.4f} % of the steps (mean), {:.4f} % at least",
                                   100.0 * *s.certified_share_mean, 100.0 * *s.certified_share_min));
   line("arrival", fmt::format("{} (median), {} (latest)", number(s.reached_time_s_median, "s"),
                               number(s.reached_time_s_max, "s")));
-  line("tick", fmt::format("{} (median p50), {} (median p99), {} (largest p99)", number(s.tick_us_p50_median, "us"),
-                           number(s.tick_us_p99_median, "us"), number(s.tick_us_p99_max, "us")));
-  line("time", fmt::format("{:.4g} s simulated, {:.3g} s cpu, {:.3g} s wall", s.time_s, s.cpu_s, wall_s));
+  line("tick", fmt::format("{} (median p50), {} (median p99), {} (largest p99)",
+                           number(s.tick_us_p50_median, "us"), number(s.tick_us_p99_median, "us"),
+                           number(s.tick_us_p99_max, "us")));
+  line("time",
+       fmt::format("{:.4g} s simulated, {:.3g} s cpu, {:.3g} s wall", s.time_s, s.cpu_s, wall_s));
   return text;
 }
 
 int sweep_pairs(const PairsOptions& options) {
   using clock = std::chrono::steady_clock;
   const scene::Scene scene = read_scene(options.file, options.flags);
-  Records records(options.output, options.file);
+  PairRecords records(options.output, options.file);
   const sweep::DrawnPairs drawn = [&] {
     const Phase phase("drawing pairs");
     return sweep::draw_pairs(scene, options.pairs);
@@ -111,7 +118,8 @@ int sweep_pairs(const PairsOptions& options) {
   const sweep::Summary summary = sweep::summarize(results);
   if (options.json) {
     Json document = sweep::to_json(summary);
-    document["draws"] = {{"all", drawn.draws}, {"near", drawn.near_draws}, {"close_goals", drawn.close_goals}};
+    document["draws"] = {
+        {"all", drawn.draws}, {"near", drawn.near_draws}, {"close_goals", drawn.close_goals}};
     document["timing"]["wall_s"] = wall_s;
     print_json(document);
   } else {
@@ -128,46 +136,58 @@ int sweep_pairs(const PairsOptions& options) {
 }  // namespace
 
 void add_sweep_pairs(CLI::App& sweep, int& exit_code) {
-  auto* pairs = add_command(sweep, "pairs", "Run a scene between random clear joint configurations",
-                            "hamelin sweep pairs data/scenes/shelf.json --count 20\n"
-                            "hamelin sweep pairs data/scenes/shelf.json --count 20 --jobs 2 -o shelf.jsonl\n"
-                            "hamelin sweep pairs data/scenes/shelf.json --planner apf --json");
+  auto* pairs = add_command(
+      sweep, "pairs", "Run a scene between random pairs of collision-free configurations",
+      "hamelin sweep pairs data/scenes/shelf.json --count 20\n"
+      "hamelin sweep pairs data/scenes/shelf.json --count 20 --jobs 2 -o shelf.jsonl\n"
+      "hamelin sweep pairs data/scenes/shelf.json --planner apf --json");
   const auto options = std::make_shared<PairsOptions>();
-  pairs->add_option("scene", options->file, "a scene file; its own start and goals are not used")
+  pairs->add_option("scene", options->file, "scene file, whose start and goals are not used")
       ->required()
       ->type_name("SCENE.json");
-  pairs->add_option("--count", options->pairs.count, "pairs of start and goal")
+  pairs->add_option("--count", options->pairs.count, "number of pairs of start and goal")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1'000'000L));
-  pairs->add_option("--seed", options->pairs.seed, "of the pairs")
+  pairs->add_option("--seed", options->pairs.seed, "seed of the pairs")
       ->type_name("S")
       ->capture_default_str()
-      ->check(whole_number());
-  pairs->add_option("--min-clearance", options->pairs.min_clearance_m, "of start and goal [m]")
+      ->check(unsigned_range());
+  pairs
+      ->add_option("--min-clearance", options->pairs.min_clearance_m,
+                   "smallest clearance of start and goal [m]")
       ->type_name("D")
       ->capture_default_str();
-  pairs->add_option("--min-distance", options->pairs.min_distance_rad, "between start and goal, Euclidean [rad]")
+  pairs
+      ->add_option("--min-distance", options->pairs.min_distance_rad,
+                   "smallest Euclidean joint distance of start and goal [rad]")
       ->type_name("D")
       ->capture_default_str();
   options->flags.duration_s = 20.0;
   pairs->add_option("--duration", options->flags.duration_s, "longest simulated time of a run [s]")
       ->type_name("T")
       ->capture_default_str();
-  pairs->add_option("--jobs", options->jobs, "runs at the same time")
+  pairs->add_option("--jobs", options->jobs, "number of runs in parallel")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1L, 1024L));
-  pairs->add_option("--planner", options->flags.planner, "a plugin's name or path (default the scene's)")
+  pairs
+      ->add_option("--planner", options->flags.planner,
+                   "planner plugin, by name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  pairs->add_option("--set", options->flags.set, "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
+  pairs
+      ->add_option("--set", options->flags.set,
+                   "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  pairs->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+  pairs
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   pairs->add_flag("--json", options->json, "print the summary as JSON");
-  pairs->add_option("-o,--output", options->output, "write one JSON line a run")->type_name("RECORDS.jsonl");
+  pairs->add_option("-o,--output", options->output, "write one JSON line per run")
+      ->type_name("RECORDS.jsonl");
   pairs->callback([options, &exit_code] { exit_code = sweep_pairs(*options); });
 }
 

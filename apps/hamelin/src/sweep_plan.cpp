@@ -38,7 +38,8 @@ int sweep_plan(const PlanFlags& flags) {
   scene::Clutter& clutter = options.clutter.clutter;
   clutter.count = flags.primitives;
   clutter.seed = options.clutter.draw.seed = options.gains.seed = flags.clutter_seed;
-  const auto sizes = number_list("--sizes", flags.sizes, 2), b = number_list("--bounds", flags.bounds, 6);
+  const auto sizes = number_list("--sizes", flags.sizes, 2),
+             b = number_list("--bounds", flags.bounds, 6);
   clutter.size_min_m = sizes[0];
   clutter.size_max_m = sizes[1];
   clutter.bounds = {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
@@ -51,7 +52,7 @@ int sweep_plan(const PlanFlags& flags) {
   options.on_scene = [&progress](std::size_t done, std::size_t all) {
     progress->show(static_cast<double>(done), static_cast<double>(all));
   };
-  std::vector<std::string> notes;  // for when the bar is gone
+  std::vector<std::string> notes;  // printed after the progress line
   options.on_note = [&notes](const std::string& text) { notes.push_back(text); };
   if (flags.sphere_m) {
     sweep::SphereOnPath& sphere = options.sphere_on_path.emplace();
@@ -63,8 +64,8 @@ int sweep_plan(const PlanFlags& flags) {
   const sweep::Plan plan = sweep::make_plan(flags.output, options);
   progress.reset();
   for (const auto& text : notes) note(text);
-  const auto feasible = static_cast<std::size_t>(
-      std::count_if(plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return scene.feasible; }));
+  const auto feasible = static_cast<std::size_t>(std::count_if(
+      plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return scene.feasible; }));
   if (flags.json)
     print_json({{"file", sweep::plan_file(flags.output).string()},
                 {"scenes", plan.scenes.size()},
@@ -72,110 +73,134 @@ int sweep_plan(const PlanFlags& flags) {
                 {"runs", plan.runs.size()},
                 {"sha256", plan.sha256}});
   else
-    report(fmt::format("{}: {} runs of {} scenes, {} of them feasible\n", sweep::plan_file(flags.output).string(),
-                       plan.runs.size(), plan.scenes.size(), feasible));
+    report(fmt::format("{}: {} runs of {} scenes, {} of them feasible\n",
+                       sweep::plan_file(flags.output).string(), plan.runs.size(),
+                       plan.scenes.size(), feasible));
   return 0;
 }
 
-void add_made_scenes(CLI::App& command, PlanFlags& flags) {
+void add_generated_scenes(CLI::App& command, PlanFlags& flags) {
   auto& plan = flags.plan;
-  command.add_option("--base", plan.base, "the scene whose arm clutter and gains are drawn for")
+  command.add_option("--base", plan.base, "scene whose arm --clutter and --gain-sets use")
       ->type_name("SCENE.json");
-  command.add_option("--clutter", plan.clutter.maps, "so many maps of random clutter")
+  command.add_option("--clutter", plan.clutter.maps, "number of maps with random clutter")
       ->type_name("N")
       ->check(CLI::Range(1L, 100'000L));
-  command.add_option("--pairs", plan.clutter.pairs, "start/goal pairs in each clutter")
+  command.add_option("--pairs", plan.clutter.pairs, "pairs of start and goal per clutter map")
       ->type_name("K")
       ->capture_default_str()
       ->check(CLI::Range(1L, 100'000L));
-  command.add_option("--primitives", flags.primitives, "obstacles in each clutter")
+  command.add_option("--primitives", flags.primitives, "obstacles per clutter map")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1L, 10'000L));
-  command.add_option("--sizes", flags.sizes, "smallest and largest edge of clutter [m]")
+  command.add_option("--sizes", flags.sizes, "smallest and largest edge of a random primitive [m]")
       ->type_name("A,B")
       ->capture_default_str();
-  command.add_option("--bounds", flags.bounds, "where clutter goes [m]")
+  command.add_option("--bounds", flags.bounds, "lower and upper corner of the clutter [m]")
       ->type_name("X,Y,Z,X,Y,Z")
       ->capture_default_str();
   command
       .add_option("--keep-out", flags.keep_out,
-                  "no clutter reaches into this ball [m]; may be repeated (default 0,0,0.2,0.35)")
+                  "centre and radius of a ball that stays free of clutter [m]; may be repeated "
+                  "(default 0,0,0.2,0.35)")
       ->type_name("X,Y,Z,R")
       ->allow_extra_args(false);
-  command.add_option("--gain-sets", plan.gains.sets, "so many random gain sets for example 5.2")
+  command.add_option("--gain-sets", plan.gains.sets, "number of random gain sets for example 5.2")
       ->type_name("N")
       ->check(CLI::Range(1L, 1'000'000L));
-  command.add_option("--draw-seed", flags.clutter_seed, "of clutter (the first map's), pairs, gains and spheres")
+  command
+      .add_option("--draw-seed", flags.clutter_seed,
+                  "seed of clutter (of the first map), pairs, gains and spheres")
       ->type_name("S")
       ->capture_default_str()
-      ->check(whole_number());
+      ->check(unsigned_range());
 }
 
 }  // namespace
 
 void add_sweep_plan(CLI::App& sweep, int& exit_code) {
-  auto* command =
-      add_command(sweep, "plan", "Plan runs: problems, scenes, clutter or gain sets, times planners, values and seeds",
-                  "hamelin sweep plan problems/*.json --robot arm.urdf --resolution 0.01 --goal pose -o tries\n"
-                  "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
-                  "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
+  auto* command = add_command(
+      sweep, "plan",
+      "Plan a sweep: a run per combination of scene, planner, value and seed. Scenes come from "
+      "files, "
+      "MotionBenchMaker problems, random clutter or random gain sets",
+      "hamelin sweep plan problems/*.json --robot arm.urdf --resolution 0.01 --goal pose -o tries\n"
+      "hamelin sweep plan --clutter 20 --pairs 5 --base data/scenes/clutter.json -o tries\n"
+      "hamelin sweep plan --gain-sets 50 --base data/scenes/paper_52_apf.json -o gains");
   const auto flags = std::make_shared<PlanFlags>();
   auto& plan = flags->plan;
-  command->add_option("files", plan.files, "MotionBenchMaker problems and scenes, told apart by content")
+  command->add_option("files", plan.files, "MotionBenchMaker problems and scene files")
       ->type_name("FILE...");
-  command->add_option("-o,--output", flags->output, "the directory to write the plan and its scenes to")
+  command->add_option("-o,--output", flags->output, "directory to write the plan and its scenes to")
       ->required()
       ->type_name("DIR");
   command
-      ->add_option(
-          "--planner", plan.planners,
-          "a planner, with parameters as hybrid:escape=tree,margin_m=0.01; may be repeated (default the scene's)")
+      ->add_option("--planner", plan.planners,
+                   "planner, with parameters as in hybrid:escape=tree,margin_m=0.01; may be "
+                   "repeated (default the scene's)")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  command->add_option("--set", plan.set, "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
+  command
+      ->add_option("--set", plan.set,
+                   "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--vary", plan.vary, "a run for each of these values; repeated: for each combination")
+  command
+      ->add_option("--vary", plan.vary,
+                   "plan a run for each of these values; if repeated, for each combination")
       ->type_name("/json/pointer=V,V")
       ->allow_extra_args(false);
-  command->add_option("--seeds", plan.seeds, "a run for each of these seeds")
+  command->add_option("--seeds", plan.seeds, "plan a run for each of these seeds")
       ->type_name("S,S")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->default_str("1")
-      ->check(whole_number());
-  command->add_option("--duration", plan.duration_s, "longest simulated time of a run [s] (default the scene's)")
+      ->check(unsigned_range());
+  command
+      ->add_option("--duration", plan.duration_s,
+                   "longest simulated time of a run [s] (default the scene's)")
       ->type_name("T")
       ->check(CLI::PositiveNumber);
-  auto* goal =
-      one_of(command->add_option("--goal", flags->goals, "kinds of a problem's goal; may be repeated (default joint)"),
-             {"joint", "position", "pose"});
+  auto* goal = restrict_values(
+      command->add_option("--goal", flags->goals,
+                          "kind of goal that problems get; may be repeated (default joint)"),
+      {"joint", "position", "pose"});
   goal->type_name("KIND")->allow_extra_args(false);
-  auto* sphere = command->add_option("--sphere-on-path", flags->sphere_m,
-                                     "take hybrid's path for a problem's goal, and put a sphere of this radius on it "
-                                     "[m]; problems where it finds none are left out");
+  auto* sphere = command->add_option(
+      "--sphere-on-path", flags->sphere_m,
+      "take the path that hybrid finds as the goal of a problem, and place a sphere "
+      "of this radius on it [m]; problems without a path are left out");
   sphere->type_name("R")->check(CLI::PositiveNumber)->excludes(goal);
   command
-      ->add_option("--visible-within", flags->visible_m,
-                   "that sphere is seen once the arm is this near [m] (default from the start)")
+      ->add_option(
+          "--visible-within", flags->visible_m,
+          "distance from the arm at which the planner first sees that sphere [m] (default any)")
       ->type_name("D")
       ->check(CLI::PositiveNumber)
       ->needs(sphere);
-  command->add_option("--robot", plan.problem.robot, "the problems' robot")->type_name("FILE");
-  command->add_option("--spheres", plan.problem.spheres, "its collision spheres")->type_name("FILE.json");
-  command->add_option("--tip", plan.problem.tip, "its tip")->type_name("LINK");
-  command->add_option("--resolution", plan.problem.resolution_m, "edge of a voxel in maps that are made [m]")
+  command->add_option("--robot", plan.problem.robot, "robot file of the problems")
+      ->type_name("FILE");
+  command->add_option("--spheres", plan.problem.spheres, "collision spheres of the robot")
+      ->type_name("FILE.json");
+  command->add_option("--tip", plan.problem.tip, "tip link of the robot")->type_name("LINK");
+  command
+      ->add_option("--resolution", plan.problem.resolution_m,
+                   "edge of a voxel in generated maps [m]")
       ->type_name("R")
       ->capture_default_str();
-  one_of(command->add_option("--mark", flags->mark,
-                             "voxels that primitives touch, or whose centre they hold (default touch)"),
-         {"touch", "centre"});
-  add_made_scenes(*command, *flags);
-  command->add_option("--plugin-path", flags->plugin_path, "look for planners here first; may be repeated")
+  restrict_values(
+      command->add_option("--mark", flags->mark,
+                          "mark voxels that a primitive touches, or whose centre it contains "
+                          "(default touch)"),
+      {"touch", "centre"});
+  add_generated_scenes(*command, *flags);
+  command
+      ->add_option("--plugin-path", flags->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
-  command->add_flag("--json", flags->json, "print what was planned as JSON");
+  command->add_flag("--json", flags->json, "print a summary of the plan as JSON");
   command->callback([flags, &exit_code] { exit_code = sweep_plan(*flags); });
 }
 

@@ -34,7 +34,7 @@ struct OneOptions {
 
 int sweep_run(const SweepRunOptions& options) {
   sweep::RunOptions sweep = options.sweep;
-  // this very program, also if another was built in its place meanwhile
+  // The running program itself, even if its file has been rebuilt since it was started.
   sweep.command = {"/proc/self/exe", "sweep", "one"};
   for (const auto& directory : options.plugin_path) {
     sweep.command.emplace_back("--plugin-path");
@@ -51,24 +51,25 @@ int sweep_run(const SweepRunOptions& options) {
     };
     outcome = sweep::run_sweep(options.directory, sweep);
   }
-  if (outcome.dropped_cut_line)
-    note(
-        fmt::format("{}: the last line was cut; its run is repeated", sweep::records_file(options.directory).string()));
+  if (outcome.dropped_truncated_line)
+    note(fmt::format("{}: the last line was cut; its run is repeated",
+                     sweep::records_file(options.directory).string()));
   const std::size_t left = outcome.planned - outcome.recorded - outcome.run;
-  report(fmt::format("{}: {} runs recorded now, {} before, {} left{}\n", options.directory.string(), outcome.run,
-                     outcome.recorded, left,
-                     outcome.crashed > 0 ? fmt::format("; {} crashed", outcome.crashed) : std::string()));
+  report(fmt::format(
+      "{}: {} runs recorded now, {} before, {} left{}\n", options.directory.string(), outcome.run,
+      outcome.recorded, left,
+      outcome.crashed > 0 ? fmt::format("; {} crashed", outcome.crashed) : std::string()));
   return outcome.stopped ? log::exit_code(log::Outcome::interrupted) : 0;
 }
 
 int sweep_one(const OneOptions& options) {
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // a sweep that is killed leaves nothing running
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // if the sweep is killed, its runs end too
   const scene::Scene scene = read_scene(options.file, options.flags);
   sweep::Judge judge(scene);
   simulation::Watch watch;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
-  watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.node(time_s, q); };
+  watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.add_node(time_s, q); };
   const log::Result result = simulation::run(scene, plugin_path(options.plugin_path), watch);
   const Json line{{"result", log::to_json(result)}, {"judge", sweep::to_json(judge.verdict())}};
   fmt::print("{}\n", line.dump(-1, ' ', false, Json::error_handler_t::replace));
@@ -78,48 +79,62 @@ int sweep_one(const OneOptions& options) {
 }  // namespace
 
 void add_sweep_run(CLI::App& sweep, int& exit_code) {
-  auto* command = add_command(sweep, "run",
-                              "Run what a plan holds and has no record yet, one process per run. Resumes where "
-                              "it stopped if it was stopped or killed",
-                              "hamelin sweep run tries\n"
-                              "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
+  auto* command = add_command(
+      sweep, "run",
+      "Execute the plan of a sweep, one process per run, and record the results. Resumes where "
+      "it stopped if it was interrupted or killed",
+      "hamelin sweep run tries\n"
+      "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
   const auto options = std::make_shared<SweepRunOptions>();
   options->sweep.timeout_s = 600.0;
   options->sweep.jobs = std::max(1U, std::thread::hardware_concurrency());
-  command->add_option("directory", options->directory, "made by `hamelin sweep plan`")->required()->type_name("DIR");
-  command->add_option("--jobs", options->sweep.jobs, "processes at the same time (default one a core)")
+  command->add_option("directory", options->directory, "directory written by `hamelin sweep plan`")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--jobs", options->sweep.jobs,
+                   "number of parallel processes (default one per core)")
       ->type_name("N")
       ->check(CLI::Range(1L, 1024L));
-  command->add_option("--only", options->sweep.only, "only runs whose id holds this")->type_name("TEXT");
-  command->add_option("--limit", options->sweep.limit, "at most so many runs now")
+  command
+      ->add_option("--only", options->sweep.only, "execute only runs whose id contains this text")
+      ->type_name("TEXT");
+  command->add_option("--limit", options->sweep.limit, "largest number of runs to execute now")
       ->type_name("N")
-      ->check(whole_number());
+      ->check(unsigned_range());
   command
       ->add_option("--timeout", options->sweep.timeout_s,
-                   "a run that takes longer is killed and recorded as crashed [s of wall clock]")
+                   "wall-clock time after which a run is killed and recorded as crashed [s]")
       ->type_name("SECONDS")
       ->default_str("600")
       ->check(CLI::PositiveNumber);
-  command->add_flag("--fresh", options->sweep.fresh, "drop the records that are there, and begin anew");
-  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+  command->add_flag("--fresh", options->sweep.fresh, "delete the existing records and start again");
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   command->callback([options, &exit_code] { exit_code = sweep_run(*options); });
 }
 
 void add_sweep_one(CLI::App& sweep, int& exit_code) {
-  auto* command = add_command(sweep, "one", "One run with a judge, as a line of JSON",
+  auto* command = add_command(sweep, "one", "Run a scene under the judge and print a line of JSON",
                               "hamelin sweep one data/scenes/shelf.json\n"
                               "hamelin sweep one data/scenes/shelf.json --planner apf --seed 2");
   command->group("");
   const auto options = std::make_shared<OneOptions>();
-  command->add_option("scene", options->file, "a scene file")->required()->type_name("SCENE.json");
-  command->add_option("--planner", options->flags.planner, "a plugin's name or path")->type_name("NAME|PATH");
+  command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
+  command->add_option("--planner", options->flags.planner, "planner plugin, by name or path")
+      ->type_name("NAME|PATH");
   command->add_option("--set", options->flags.set, "set one value of the scene; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--seed", options->flags.seed, "of all random numbers")->type_name("S")->check(whole_number());
-  command->add_option("--plugin-path", options->plugin_path, "look for planners here first; may be repeated")
+  command->add_option("--seed", options->flags.seed, "seed of all random numbers")
+      ->type_name("S")
+      ->check(unsigned_range());
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
   command->callback([options, &exit_code] { exit_code = sweep_one(*options); });

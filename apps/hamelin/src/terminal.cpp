@@ -25,7 +25,7 @@ void on_signal(int) {
   stop_requested.store(true);
 }
 
-// One line a message, whatever is in it: "hamelin: note: text".
+// One line per message, even if its text has line breaks: "hamelin: note: text".
 class MessageFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
@@ -35,7 +35,9 @@ class MessageFormatter final : public spdlog::formatter {
     fmt::format_to(std::back_inserter(out), "hamelin: {}{}\n", level,
                    one_line({message.payload.data(), message.payload.size()}));
   }
-  std::unique_ptr<spdlog::formatter> clone() const override { return std::make_unique<MessageFormatter>(); }
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<MessageFormatter>();
+  }
 };
 
 spdlog::logger& messages() {
@@ -48,14 +50,15 @@ bool dumb_terminal() {
 }
 
 bool& no_colour() {
-  static bool wanted = [] {
+  static bool disabled = [] {
     const char* variable = std::getenv("NO_COLOR");
-    return ::isatty(STDOUT_FILENO) == 0 || dumb_terminal() || (variable != nullptr && *variable != '\0');
+    return ::isatty(STDOUT_FILENO) == 0 || dumb_terminal() ||
+           (variable != nullptr && *variable != '\0');
   }();
-  return wanted;
+  return disabled;
 }
 
-// Only for what is told of progress and phases; no result depends on it.
+// Wall clock, for progress and phases only; no result depends on it.
 double now_s() {
   std::timespec t{};
   ::clock_gettime(CLOCK_MONOTONIC, &t);
@@ -66,9 +69,10 @@ double now_s() {
 
 std::shared_ptr<spdlog::logger> diagnostics() {
   static const auto logger = [] {
-    auto made = std::make_shared<spdlog::logger>("hamelin", std::make_shared<spdlog::sinks::stderr_sink_st>());
-    made->set_formatter(std::make_unique<MessageFormatter>());
-    return made;
+    auto created = std::make_shared<spdlog::logger>(
+        "hamelin", std::make_shared<spdlog::sinks::stderr_sink_st>());
+    created->set_formatter(std::make_unique<MessageFormatter>());
+    return created;
   }();
   return logger;
 }
@@ -89,16 +93,16 @@ void report(std::string_view text) {
   if (messages().should_log(spdlog::level::info)) fmt::print("{}", text);
 }
 
-void set_loudness(Loudness loudness) {
-  messages().set_level(loudness == Loudness::quiet     ? spdlog::level::err
-                       : loudness == Loudness::verbose ? spdlog::level::debug
-                                                       : spdlog::level::info);
+void set_verbosity(Verbosity verbosity) {
+  messages().set_level(verbosity == Verbosity::quiet     ? spdlog::level::err
+                       : verbosity == Verbosity::verbose ? spdlog::level::debug
+                                                         : spdlog::level::info);
 }
 
-Phase::Phase(std::string_view what) : what_(what), begin_s_(now_s()) {}
+Phase::Phase(std::string_view name) : name_(name), begin_s_(now_s()) {}
 
 Phase::~Phase() {
-  detail(fmt::format("{}: {:.3f} s", what_, now_s() - begin_s_));
+  detail(fmt::format("{}: {:.3f} s", name_, now_s() - begin_s_));
 }
 
 void set_no_colour() {
@@ -111,21 +115,23 @@ std::string coloured(std::string_view text, Colour colour) {
   return fmt::format("\033[{}m{}\033[0m", code, text);
 }
 
-Progress::Progress(std::string what)
-    : what_(std::move(what)), counting_(::isatty(STDERR_FILENO) != 0 && !dumb_terminal()), last_shown_s_(now_s()) {}
+Progress::Progress(std::string unit)
+    : unit_(std::move(unit)),
+      in_place_(::isatty(STDERR_FILENO) != 0 && !dumb_terminal()),
+      last_shown_s_(now_s()) {}
 
 Progress::~Progress() {
-  if (counting_ && shown_) fmt::print(stderr, "\r{:60}\r", "");
+  if (in_place_ && shown_) fmt::print(stderr, "\r{:60}\r", "");
 }
 
 void Progress::show(double done, double all) {
   if (!messages().should_log(spdlog::level::info)) return;
   const double now = now_s();
-  if (now - last_shown_s_ < (counting_ ? 0.1 : 10.0)) return;
+  if (now - last_shown_s_ < (in_place_ ? 0.1 : 10.0)) return;
   last_shown_s_ = now;
   shown_ = true;
-  const std::string line = fmt::format("{:.4g} of {:.4g} {}", done, all, what_);
-  if (!counting_) {
+  const std::string line = fmt::format("{:.4g} of {:.4g} {}", done, all, unit_);
+  if (!in_place_) {
     fmt::print(stderr, "hamelin: {}\n", line);
     return;
   }

@@ -4,70 +4,71 @@
 #include <string>
 #include <string_view>
 
-/// Messages, colour, progress and signals. Data goes to stdout; all of this to stderr.
+/// Messages, colour, progress and signals. Data goes to stdout, messages and progress go to stderr.
 namespace spdlog {
 class logger;
 }
 
 namespace hamelin::app {
 
-/// How much is said: under `quiet` errors alone, no notes, no progress and no report; under `verbose` details too.
-/// Data that a command is asked for, --json included, is printed under each.
-enum class Loudness { quiet, normal, verbose };
-void set_loudness(Loudness loudness);
+/// How much is printed: `quiet` prints errors but no notes, progress or reports; `verbose` also
+/// prints details. Requested data, such as the output of --json, is always printed.
+enum class Verbosity { quiet, normal, verbose };
+void set_verbosity(Verbosity verbosity);
 
-/// What all of this goes through, for libraries that have something to say: errors as they are, warnings and notes with
-/// "warning: " and "note: " in front, details under verbose.
+/// The logger behind all messages, to be handed to libraries. Errors are printed as they are,
+/// warnings and notes with the prefix "warning: " or "note: ", details only if verbose.
 [[nodiscard]] std::shared_ptr<spdlog::logger> diagnostics();
 
 /// "hamelin: text", one line on stderr.
 void error_line(std::string_view text);
-/// "hamelin: note: text", one line on stderr; not under quiet.
+/// "hamelin: note: text", one line on stderr, unless quiet.
 void note(std::string_view text);
-/// "hamelin: text", one line on stderr under verbose: what is read, where is looked, what takes how long.
+/// "hamelin: text", one line on stderr if verbose: files read, directories searched, times taken.
 void detail(std::string_view text);
-/// What a command did, for a reader, on stdout as it is; not under quiet.
+/// Prints the readable report of a command on stdout, unless quiet.
 void report(std::string_view text);
 
-/// Tells under verbose how long it lived (wall clock; no result depends on it).
+/// Measures the wall-clock time of its lifetime and prints it if verbose. No result depends on it.
 class Phase {
  public:
-  /// @param what e.g. "reading the map"
-  explicit Phase(std::string_view what);
+  /// @param name e.g. "reading the map"
+  explicit Phase(std::string_view name);
   ~Phase();
   Phase(const Phase&) = delete;
   Phase& operator=(const Phase&) = delete;
 
  private:
-  std::string what_;
+  std::string name_;
   double begin_s_;
 };
 
 enum class Colour { none, good, fair, bad };
-/// No colour from now on.
+/// Disables colour.
 void set_no_colour();
-/// The text, coloured if stdout is a terminal that wants it (--no-color, NO_COLOR, TERM=dumb).
+/// The text, coloured if stdout is a terminal and --no-color, NO_COLOR and TERM=dumb are not set.
 [[nodiscard]] std::string coloured(std::string_view text, Colour colour);
 
-/// How far something is. On a terminal a line on stderr that counts up while this lives; elsewhere (and on a dumb
-/// terminal) a line each 10 s. Nothing under quiet.
+/// Progress of a long command on stderr: a line that is updated in place on a terminal, and a new
+/// line every 10 s elsewhere and on a dumb terminal. Prints nothing if quiet.
 class Progress {
  public:
-  /// @param what follows the numbers, e.g. "s simulated"
-  explicit Progress(std::string what = "s simulated");
+  /// @param unit text after the numbers, e.g. "s simulated"
+  explicit Progress(std::string unit = "s simulated");
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   void show(double done, double all);
 
  private:
-  std::string what_;
-  bool counting_;  ///< on one line, over and over
+  std::string unit_;
+  bool in_place_;  ///< whether one line is updated
   bool shown_ = false;
   double last_shown_s_;
 };
 
-/// From now on SIGINT and SIGTERM set the flag returned, so that a record ends properly; a second one ends the program.
+/// Makes SIGINT and SIGTERM set the returned flag, so that logs are closed properly. A second
+/// signal ends the program.
 [[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
 }  // namespace hamelin::app

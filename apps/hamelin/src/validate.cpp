@@ -29,29 +29,33 @@ struct ValidateOptions {
   bool strict = false, json = false;
 };
 
-std::string check_robot(const std::filesystem::path& file, const description::RobotOptions& options) {
+std::string check_robot(const std::filesystem::path& file,
+                        const description::RobotOptions& options) {
   const model::Robot robot = description::read_robot(file, options);
   note_warnings(robot, file);
   return fmt::format("robot, {} joints", robot.dof());
 }
 
-std::string map_words(const scene::MapData& map) {
-  return fmt::format("map, resolution {:.4g} m, {} occupied leaves", map.resolution, map.occupied.size());
+std::string describe_map(const scene::MapData& map) {
+  return fmt::format("map, resolution {:.4g} m, {} occupied leaves", map.resolution,
+                     map.occupied.size());
 }
 
-// A scene is as good as the files it names.
+// A scene is valid only if the files that it names are.
 std::string check_scene(const std::filesystem::path& file, bool strict) {
   const scene::Scene scene = scene::read_scene(file);
   (void)simulation::load_model(scene);
-  std::string words = fmt::format(
-      "scene, {}", check_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf, strict}));
+  std::string description = fmt::format(
+      "scene, {}", check_robot(scene.robot.file,
+                               {scene.robot.tip, scene.robot.spheres, scene.robot.srdf, strict}));
   if (scene.map)
-    words += fmt::format(
-        ", {}", map_words(scene::read_map(scene.map->file, {scene.map->scale, scene.map->occupancy_threshold})));
-  return words;
+    description += fmt::format(
+        ", {}", describe_map(scene::read_map(scene.map->file,
+                                             {scene.map->scale, scene.map->occupancy_threshold})));
+  return description;
 }
 
-// Each line by itself; that it belongs to its plan is for `hamelin sweep merge` to say.
+// Checks each line alone; `hamelin sweep merge` checks that the records belong to their plan.
 std::string check_records(const std::filesystem::path& file) {
   std::istringstream in(read_file(file));
   std::size_t count = 0;
@@ -59,7 +63,8 @@ std::string check_records(const std::filesystem::path& file) {
     const std::string where = fmt::format("{}: line {}", file.string(), ++count);
     const Json record = parse_json(line, where);
     check_shipped_schema(record, "record", where);
-    if (!record["result"].is_null()) check_shipped_schema(record["result"], "result", where + ": /result");
+    if (!record["result"].is_null())
+      check_shipped_schema(record["result"], "result", where + ": /result");
   }
   return fmt::format("sweep records, {}", count);
 }
@@ -69,7 +74,7 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::map: {
       const auto map = scene::read_map(file, {options.scale, 0.5});
       for (const auto& warning : map.warnings) note(fmt::format("{}: {}", file.string(), warning));
-      return map_words(map);
+      return describe_map(map);
     }
     case Kind::urdf:
     case Kind::robot:
@@ -80,8 +85,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       check_shipped_schema(read_json(file), "result", file.string());
       return "result";
     case Kind::primitives:
-      return fmt::format("primitives, {} obstacles",
-                         scene::make_options_from_json(read_json(file), file.string()).primitives.size());
+      return fmt::format(
+          "primitives, {} obstacles",
+          scene::make_options_from_json(read_json(file), file.string()).primitives.size());
     case Kind::spheres:
       return fmt::format("collision spheres, {}", description::check_spheres(file));
     case Kind::sweep: {
@@ -94,12 +100,14 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       check_shipped_schema(read_json(file), "summary", file.string());
       return "sweep summary";
     case Kind::accuracy:
-      return fmt::format("measurement of accuracy, {} rows",
-                         accuracy::measurement_from_json(read_json(file), file.string()).rows.size());
+      return fmt::format(
+          "measurement of accuracy, {} rows",
+          accuracy::measurement_from_json(read_json(file), file.string()).rows.size());
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,
-                         log.has_result ? "" : ", no result: unfinished", log.cut ? ", last line cut" : "");
+                         log.has_result ? "" : ", no result: unfinished",
+                         log.cut ? ", last line cut" : "");
     }
   }
   return "";
@@ -111,9 +119,9 @@ int validate(const ValidateOptions& options) {
   for (const auto& file : options.files) {
     Json entry{{"file", file.string()}, {"ok", true}, {"holds", nullptr}, {"error", nullptr}};
     try {
-      const std::string words = check_file(file, options);
-      entry["holds"] = words;
-      if (!options.json) report(fmt::format("{}: ok ({})\n", file.string(), words));
+      const std::string description = check_file(file, options);
+      entry["holds"] = description;
+      if (!options.json) report(fmt::format("{}: ok ({})\n", file.string(), description));
     } catch (const Error& e) {
       error_line(e.what());
       entry["ok"] = false;
@@ -129,17 +137,20 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(
-      app, "validate", "Check robots, collision spheres, scenes, maps, logs, results and sweeps, told apart by content",
-      "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
-      "hamelin validate arm.urdf --tip tool0\n"
-      "hamelin validate run.jsonl --json");
+  auto* command = add_command(app, "validate",
+                              "Check robots, collision spheres, scenes, maps, logs, results and "
+                              "sweeps against their formats. The kind of "
+                              "each file is recognised by its content",
+                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
+                              "hamelin validate arm.urdf --tip tool0\n"
+                              "hamelin validate run.jsonl --json");
   const auto options = std::make_shared<ValidateOptions>();
-  command->add_option("files", options->files, "what to check")->required()->type_name("FILE...");
-  command->add_option("--tip", options->tip, "link that is a URDF's tip (default the only leaf)")->type_name("LINK");
+  command->add_option("files", options->files, "files to check")->required()->type_name("FILE...");
+  command->add_option("--tip", options->tip, "tip link (default for a URDF: its only leaf)")
+      ->type_name("LINK");
   command->add_option("--scale", options->scale, "metres per unit of a map")->type_name("S");
   command->add_flag("--strict", options->strict, strict_help);
-  command->add_flag("--json", options->json, "print JSON, an entry a file");
+  command->add_flag("--json", options->json, "print JSON, one entry per file");
   command->callback([options, &exit_code] { exit_code = validate(*options); });
 }
 

@@ -54,7 +54,8 @@ Row read_row(const Json& from) {
   row.reference_limited = from["reference_limited"];
   row.isa = from["isa"];
   row.mode = from["mode"];
-  for (const auto& [key, value] : std::initializer_list<std::pair<const char*, std::optional<double>*>>{
+  for (const auto& [key, value] :
+       std::initializer_list<std::pair<const char*, std::optional<double>*>>{
            {"step_s", &row.step_s},
            {"rtol", &row.rtol},
            {"atol", &row.atol},
@@ -104,7 +105,8 @@ Measurement measurement_from_json(const Json& document, const std::string& where
   check_shipped_schema(document, "accuracy", where);
   const auto vector = [](const Json& value) {
     const auto numbers = value.get<std::vector<double>>();
-    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<long>(numbers.size())));
+    return Eigen::VectorXd(
+        Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<long>(numbers.size())));
   };
   Measurement measurement;
   measurement.name = document["name"];

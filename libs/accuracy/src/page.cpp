@@ -7,7 +7,7 @@ namespace hamelin::accuracy {
 namespace {
 
 Json table_json(const Table& table) {
-  return {{"head", table.head}, {"words", table.words}, {"rows", table.rows}};
+  return {{"head", table.head}, {"words", table.text_columns}, {"rows", table.rows}};
 }
 
 Json rows_json(const Measurement& measurement, Json rows) {
@@ -30,7 +30,8 @@ Json measurement_json(const Measurement& measurement) {
   return {{"name", measurement.name},
           {"about", about(measurement)},
           {"notes", measurement.notes},
-          {"reference_error", measurement.reference ? Json(measurement.reference->error_q) : Json(nullptr)},
+          {"reference_error",
+           measurement.reference ? Json(measurement.reference->error_q) : Json(nullptr)},
           {"rows", rows_json(measurement, document["rows"])},
           {"costs", std::move(costs)},
           {"cheaper_peers", cheaper_peers(measurement)},

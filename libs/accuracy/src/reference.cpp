@@ -15,17 +15,17 @@ namespace {
 
 constexpr double coarsest_step_s = 0.01;
 constexpr int halvings_max = 20;
-// Rounding of the motion itself: no finer run brings more.
+// Rounding of the motion itself: a finer run is not more accurate.
 constexpr double rounding = 1e-14;
 
 struct Settings {
   const char* integrator;
-  int order;        // 0: its only one
-  bool controlled;  // by rtol, else by halving a fixed step
+  int order;        // 0: the scheme has one order only
+  bool controlled;  // refined by rtol, else by halving a fixed step
 };
 
-// Best first; the first two that are there make the reference. They share the equations of motion, but neither stages
-// nor step lengths.
+// In order of preference: the first two that reach the end make the reference. They share the
+// equations of motion, but neither stages nor step lengths.
 constexpr std::array<Settings, 5> preferred{{{"dop853", 0, true},
                                              {"gauss", 16, false},
                                              {"composition", 8, false},
@@ -35,14 +35,14 @@ constexpr std::array<Settings, 5> preferred{{{"dop853", 0, true},
 // The end of the motion by one scheme.
 struct End {
   VectorXd q, v;
-  bool there = false;
+  bool reached = false;
 };
 
-// A scheme's finest run, and how far it is from the one before.
+// A scheme's finest run, and its distance from the run before, docs/theory.md (13.2).
 struct Refined {
   End end;
   double error = std::numeric_limits<double>::infinity();
-  std::string words;
+  std::string description;
   long evaluations = 0;
 };
 
@@ -50,34 +50,37 @@ double distance(const VectorXd& a, const VectorXd& b) {
   return (a - b).lpNorm<Eigen::Infinity>();
 }
 
-class Ladder {
+class Refinement {
  public:
-  Ladder(const model::Model& model, const Options& options, const Settings& settings)
+  Refinement(const model::Model& model, const Options& options, const Settings& settings)
       : model_(model), options_(options), settings_(settings) {
     if (settings.controlled)
-      climb_tolerances();
+      refine_tolerances();
     else
-      climb_steps();
+      refine_steps();
   }
   [[nodiscard]] const Refined& best() const noexcept { return best_; }
 
  private:
-  // Whether a finer run is worth its cost.
-  bool take(const End& end, std::string words) {
-    if (!end.there) return true;
-    if (best_.end.there) {
-      const double scale = 1.0 + std::max(end.q.lpNorm<Eigen::Infinity>(), end.v.lpNorm<Eigen::Infinity>());
+  // Records a run. Returns whether a finer run may be more accurate.
+  bool accept(const End& end, std::string description) {
+    if (!end.reached) return true;
+    if (best_.end.reached) {
+      const double scale =
+          1.0 + std::max(end.q.lpNorm<Eigen::Infinity>(), end.v.lpNorm<Eigen::Infinity>());
       const double moved = std::max(distance(end.q, best_.end.q), distance(end.v, best_.end.v));
-      const bool floor = moved <= rounding * scale || (moved > 0.5 * best_.error && best_.error < 1e-8 * scale);
-      // where rounding rules the run before is as good
+      // docs/theory.md (13.3)
+      const bool floor =
+          moved <= rounding * scale || (moved > 0.5 * best_.error && best_.error < 1e-8 * scale);
+      // Where rounding dominates, the run before is as good.
       if (floor && moved > best_.error) return false;
       best_.error = moved;
       best_.end = end;
-      best_.words = std::move(words);
+      best_.description = std::move(description);
       return !floor;
     }
     best_.end = end;
-    best_.words = std::move(words);
+    best_.description = std::move(description);
     return true;
   }
 
@@ -95,8 +98,10 @@ class Ladder {
     for (long k = 0; left > 0.0; ++k) {
       const auto report = integrator->advance(state, options_.channels, steps > 0 ? h : left);
       last_ += report.evaluations;
-      // a step that was halved where it had to be is a step of the next run already: the two would agree for nothing
-      if (!report.converged || report.halvings > 0 || !affordable(static_cast<double>(last_))) return {};
+      // A step that was halved to find a root is already a step of the next run, so the two runs
+      // would agree too well.
+      if (!report.converged || report.halvings > 0 || !affordable(static_cast<double>(last_)))
+        return {};
       if (steps > 0)
         left = k + 1 == steps ? 0.0 : left;
       else
@@ -104,7 +109,7 @@ class Ladder {
     }
     End end{state.q, VectorXd(state.q.size()), true};
     integrator->velocity(state, end.v);
-    end.there = end.q.allFinite() && end.v.allFinite();
+    end.reached = end.q.allFinite() && end.v.allFinite();
     return end;
   }
 
@@ -116,26 +121,29 @@ class Ladder {
   }
 
   [[nodiscard]] std::string name() const {
-    return settings_.order > 0 ? fmt::format("{}:{}", settings_.integrator, settings_.order) : settings_.integrator;
+    return settings_.order > 0 ? fmt::format("{}:{}", settings_.integrator, settings_.order)
+                               : settings_.integrator;
   }
 
-  void climb_tolerances() {
+  void refine_tolerances() {
     for (const double rtol : {1e-10, 1e-11, 1e-12, 1e-13}) {
       auto made = scheme();
       made.rtol = made.atol = rtol;
       const End end = run(made, 0);
       best_.evaluations += last_;
-      if (!end.there || !take(end, fmt::format("{} at rtol {}", name(), rtol))) return;
+      if (!end.reached || !accept(end, fmt::format("{} at rtol {}", name(), rtol))) return;
     }
   }
 
-  void climb_steps() {
+  void refine_steps() {
     long steps = static_cast<long>(std::ceil(options_.duration_s / coarsest_step_s));
     for (int i = 0; i < halvings_max; ++i, steps *= 2) {
       const End end = run(scheme(), steps);
       best_.evaluations += last_;
       const double h = options_.duration_s / static_cast<double>(steps);
-      if (!take(end, fmt::format("{} at {:.3g} s", name(), h)) || !affordable(2.0 * static_cast<double>(last_))) return;
+      if (!accept(end, fmt::format("{} at {:.3g} s", name(), h)) ||
+          !affordable(2.0 * static_cast<double>(last_)))
+        return;
     }
   }
 
@@ -154,22 +162,22 @@ Reference find_reference(const model::Model& model, const Options& options) {
   for (const auto& settings : preferred) {
     if (found.size() == 2) break;
     if (integration::find_scheme(settings.integrator) == nullptr) continue;
-    const Ladder ladder(model, options, settings);
-    reference.evaluations += ladder.best().evaluations;
-    if (ladder.best().end.there) found.push_back(ladder.best());
+    const Refinement refinement(model, options, settings);
+    reference.evaluations += refinement.best().evaluations;
+    if (refinement.best().end.reached) found.push_back(refinement.best());
   }
   if (found.size() < 2)
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{}: no two schemes reach {} s within the cost of a reference, expected a shorter duration or "
-                    "--no-reference",
-                    options.name, options.duration_s));
+    throw Error(ErrorCode::usage, fmt::format("{}: no two schemes reach {} s within the cost limit "
+                                              "of a reference, expected a shorter duration or "
+                                              "--no-reference",
+                                              options.name, options.duration_s));
   const bool first_is_finer = found[0].error <= found[1].error;
   const Refined &finer = found[first_is_finer ? 0 : 1], &other = found[first_is_finer ? 1 : 0];
   reference.q = finer.end.q;
   reference.v = finer.end.v;
-  reference.scheme = finer.words;
-  reference.check = other.words;
+  reference.scheme = finer.description;
+  reference.check = other.description;
+  // docs/theory.md (13.4)
   reference.error_q = distance(finer.end.q, other.end.q);
   reference.error_v = distance(finer.end.v, other.end.v);
   return reference;

@@ -11,19 +11,20 @@ namespace hamelin::accuracy {
 
 namespace {
 
-using Places = std::vector<std::optional<std::size_t>>;  // of rows
+using RowIndices = std::vector<std::optional<std::size_t>>;
 using Times = std::vector<std::optional<double>>;
 
-// What is recommended here, and what it is judged against.
+// The schemes that hamelin recommends, and those that they are compared with.
 constexpr std::array<const char*, 3> own_schemes{"hamel-variational", "composition", "gauss"};
-constexpr std::array<const char*, 5> peers{"dop853, controlled", "dop853", "rk4", "semi-implicit-euler", "lie-exact"};
+constexpr std::array<const char*, 5> peers{"dop853, controlled", "dop853", "rk4",
+                                           "semi-implicit-euler", "lie-exact"};
 
-std::string shown(const std::optional<double>& value, const char* format) {
+std::string formatted(const std::optional<double>& value, const char* format) {
   return value ? fmt::format(fmt::runtime(format), *value) : std::string("-");
 }
 
-// 7 200 µs as "7200", 0.95 µs as "0.95": three figures at least, none behind the point where there are four before it.
-std::string shown_us(const std::optional<double>& value) {
+// Two decimals below 10 µs, one below 100 µs, else none.
+std::string formatted_us(const std::optional<double>& value) {
   if (!value) return "-";
   return fmt::format("{:.{}f}", *value, *value < 10.0 ? 2 : *value < 100.0 ? 1 : 0);
 }
@@ -32,7 +33,7 @@ bool own(const Row& row) {
   return std::find(own_schemes.begin(), own_schemes.end(), row.integrator) != own_schemes.end();
 }
 
-// The least time of these rows, an error at a time.
+// The least time of the selected rows for each error, docs/theory.md (13.6).
 template <class Takes>
 Times least_times(const Measurement& measurement, const Takes& takes) {
   Times best(error_targets().size());
@@ -40,12 +41,13 @@ Times least_times(const Measurement& measurement, const Takes& takes) {
     const auto bound = row.error_bound();
     if (!takes(row) || !bound || !row.cpu_us) continue;
     for (std::size_t i = 0; i < best.size(); ++i)
-      if (*bound <= error_targets()[i]) best[i] = std::min(best[i].value_or(*row.cpu_us), *row.cpu_us);
+      if (*bound <= error_targets()[i])
+        best[i] = std::min(best[i].value_or(*row.cpu_us), *row.cpu_us);
   }
   return best;
 }
 
-/// The best of ours beside a peer.
+/// The best times of hamelin's own schemes and of a peer, docs/theory.md (13.7).
 struct Comparison {
   std::string peer;
   Times ours, theirs;
@@ -58,21 +60,24 @@ std::vector<Comparison> comparisons(const Measurement& measurement) {
   const Times ours = least_times(measurement, own);
   for (const std::string peer : peers) {
     const auto takes = [&](const Row& row) { return row.label() == peer; };
-    if (std::any_of(rows.begin(), rows.end(), takes)) all.push_back({peer, ours, least_times(measurement, takes)});
+    if (std::any_of(rows.begin(), rows.end(), takes))
+      all.push_back({peer, ours, least_times(measurement, takes)});
   }
   return all;
 }
 
-// What the peer's dearest row took: it does not reach errors that none of its rows reaches for less.
-double dearest_of(const Measurement& measurement, const std::string& peer) {
+// The longest time of a peer's rows. An error that none of its rows reaches is assumed to take
+// longer.
+double longest_time_of(const Measurement& measurement, const std::string& peer) {
   double most = 0.0;
   for (const auto& row : measurement.rows)
     if (row.label() == peer) most = std::max(most, row.cpu_us.value_or(0.0));
   return most;
 }
 
-// The rows that the comparisons are made of: for each error the cheapest of ours and of each peer.
-std::set<std::size_t> rows_behind(const Measurement& measurement) {
+// The rows that enter comparisons: for each error the cheapest own row and the cheapest of each
+// peer.
+std::set<std::size_t> compared_rows(const Measurement& measurement) {
   std::set<std::size_t> rows;
   const auto all = comparisons(measurement);
   const auto add = [&](const Times& times, const auto& takes) {
@@ -94,7 +99,8 @@ std::string markdown(const Table& table) {
     return fmt::format("| {} |\n", fmt::join(cells, " | "));
   };
   std::vector<std::string> rule;
-  for (std::size_t i = 0; i < table.head.size(); ++i) rule.emplace_back(i < table.words ? "---" : "--:");
+  for (std::size_t i = 0; i < table.head.size(); ++i)
+    rule.emplace_back(i < table.text_columns ? "---" : "--:");
   std::string text = line(table.head) + line(rule);
   for (const auto& row : table.rows) text += line(row);
   return text;
@@ -109,7 +115,8 @@ std::string plain(const Table& table) {
   const auto add = [&](const std::vector<std::string>& row) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i)
-      line += i < table.words ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+      line += i < table.text_columns ? fmt::format("{:<{}}  ", row[i], widths[i])
+                                     : fmt::format("{:>{}}  ", row[i], widths[i]);
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + "\n";
   };
@@ -145,8 +152,10 @@ std::vector<Cheapest> cheapest(const Measurement& measurement) {
   for (std::size_t r = 0; r < measurement.rows.size(); ++r) {
     const auto& row = measurement.rows[r];
     const std::string settings = row.settings();
-    auto at = std::find_if(all.begin(), all.end(), [&](const Cheapest& c) { return c.settings == settings; });
-    if (at == all.end()) at = all.insert(all.end(), Cheapest{settings, Places(error_targets().size())});
+    auto at = std::find_if(all.begin(), all.end(),
+                           [&](const Cheapest& c) { return c.settings == settings; });
+    if (at == all.end())
+      at = all.insert(all.end(), Cheapest{settings, RowIndices(error_targets().size())});
     const auto bound = row.error_bound();
     if (!bound || !row.cpu_us) continue;
     for (std::size_t i = 0; i < at->rows.size(); ++i) {
@@ -158,7 +167,7 @@ std::vector<Cheapest> cheapest(const Measurement& measurement) {
   return all;
 }
 
-Table rows_table(const Measurement& measurement, const Signs& signs) {
+Table rows_table(const Measurement& measurement, const Symbols& symbols) {
   Table table;
   table.head = {"integrator",
                 "mode",
@@ -170,57 +179,60 @@ Table rows_table(const Measurement& measurement, const Signs& signs) {
                 "error v",
                 "energy J",
                 "drift J/s",
-                fmt::format("95 % {}", signs.plus_minus),
-                fmt::format("CPU {}", signs.micro),
+                fmt::format("95 % {}", symbols.plus_minus),
+                fmt::format("CPU {}", symbols.micro),
                 "steps",
                 "evaluations",
                 "factor.",
                 "rejected",
                 "halvings"};
-  table.words = 2;
+  table.text_columns = 2;
   for (const auto& row : measurement.rows) {
     std::vector<std::string> cells{row.label(),
                                    row.mode,
                                    fmt::format("{}", row.order),
-                                   shown(row.step_s, "{:.6g}"),
-                                   shown(row.rtol, "{:.0e}"),
-                                   shown(row.tolerance, "{:.0e}")};
+                                   formatted(row.step_s, "{:.6g}"),
+                                   formatted(row.rtol, "{:.0e}"),
+                                   formatted(row.tolerance, "{:.0e}")};
     if (row.completed) {
-      cells.push_back(row.reference_limited ? signs.at_most + shown(row.error_bound(), "{:.1e}")
-                                            : shown(row.error_q, "{:.1e}"));
-      cells.push_back(shown(row.error_v, "{:.1e}"));
-      cells.push_back(shown(row.energy_error_max_J, "{:.1e}"));
-      cells.push_back(shown(row.drift_J_per_s, "{:.1e}"));
-      cells.push_back(shown(row.drift_ci_J_per_s, "{:.0e}"));
-      cells.push_back(shown_us(row.cpu_us));
+      cells.push_back(row.reference_limited
+                          ? symbols.at_most + formatted(row.error_bound(), "{:.1e}")
+                          : formatted(row.error_q, "{:.1e}"));
+      cells.push_back(formatted(row.error_v, "{:.1e}"));
+      cells.push_back(formatted(row.energy_error_max_J, "{:.1e}"));
+      cells.push_back(formatted(row.drift_J_per_s, "{:.1e}"));
+      cells.push_back(formatted(row.drift_ci_J_per_s, "{:.0e}"));
+      cells.push_back(formatted_us(row.cpu_us));
     } else {
       cells.emplace_back("diverged");
       cells.resize(12, "-");
     }
-    for (const long count : {row.steps, row.evaluations, row.factorizations, row.rejected, row.halvings})
+    for (const long count :
+         {row.steps, row.evaluations, row.factorizations, row.rejected, row.halvings})
       cells.push_back(fmt::format("{}", count));
     table.rows.push_back(std::move(cells));
   }
   return table;
 }
 
-Table cheapest_table(const Measurement& measurement, const Signs& signs) {
+Table cheapest_table(const Measurement& measurement, const Symbols& symbols) {
   Table table;
-  table.head = {fmt::format("CPU {} for an error {}", signs.micro, signs.at_most)};
+  table.head = {fmt::format("CPU {} for an error {}", symbols.micro, symbols.at_most)};
   for (const double target : error_targets()) table.head.push_back(fmt::format("{:.0e}", target));
   for (const auto& entry : cheapest(measurement)) {
     std::vector<std::string> cells{entry.settings};
-    for (const auto& row : entry.rows) cells.push_back(shown_us(row ? measurement.rows[*row].cpu_us : std::nullopt));
+    for (const auto& row : entry.rows)
+      cells.push_back(formatted_us(row ? measurement.rows[*row].cpu_us : std::nullopt));
     table.rows.push_back(std::move(cells));
   }
   table.comparisons_from = table.rows.size();
   for (const auto& [peer, ours, theirs] : comparisons(measurement)) {
-    std::vector<std::string> cells{fmt::format("best of ours over {}", peer)};
-    const double dearest = dearest_of(measurement, peer);
+    std::vector<std::string> cells{fmt::format("best of hamelin over {}", peer)};
+    const double longest = longest_time_of(measurement, peer);
     for (std::size_t i = 0; i < ours.size(); ++i)
       cells.push_back(!ours[i]             ? "-"
                       : theirs[i]          ? fmt::format("{:.2f}", *ours[i] / *theirs[i])
-                      : dearest > *ours[i] ? fmt::format("<{:.2g}", *ours[i] / dearest)
+                      : longest > *ours[i] ? fmt::format("<{:.2g}", *ours[i] / longest)
                                            : "-");
     table.rows.push_back(std::move(cells));
   }
@@ -228,15 +240,17 @@ Table cheapest_table(const Measurement& measurement, const Signs& signs) {
 }
 
 std::string about(const Measurement& measurement) {
-  std::string text = fmt::format("{} joint{}{}, {} s of free motion.", measurement.dof, measurement.dof == 1 ? "" : "s",
+  std::string text = fmt::format("{} joint{}{}, {} s of free motion.", measurement.dof,
+                                 measurement.dof == 1 ? "" : "s",
                                  measurement.planar ? " in the plane" : "", measurement.duration_s);
   if (measurement.reference)
-    text += fmt::format(" Reference: {}, which differs from {} by {:.1e} in q and {:.1e} in v.",
-                        measurement.reference->scheme, measurement.reference->check, measurement.reference->error_q,
-                        measurement.reference->error_v);
+    text += fmt::format("\nReference: {}. Difference from {}: {:.1e} in q, {:.1e} in v.",
+                        measurement.reference->scheme, measurement.reference->check,
+                        measurement.reference->error_q, measurement.reference->error_v);
   else
-    text += " No reference: errors in q and v are not known.";
-  if (!measurement.rows.empty()) text += fmt::format(" Instruction set: {}.", measurement.rows.front().isa);
+    text += "\nNo reference: errors in q and v are not known.";
+  if (!measurement.rows.empty())
+    text += fmt::format("\nInstruction set: {}.", measurement.rows.front().isa);
   return text;
 }
 
@@ -253,18 +267,19 @@ std::string cheaper_peers(const Measurement& measurement) {
     errors.reserve(at.size());
     for (const std::size_t i : at) errors.push_back(fmt::format("{:.0e}", error_targets()[i]));
     const bool range = at.size() > 2 && at.back() - at.front() + 1 == at.size();
-    text += fmt::format("{}{}: cheaper than ours for {}.", text.empty() ? "" : " ", peer,
+    text += fmt::format("{}{} takes less time for {}.", text.empty() ? "" : " ", peer,
                         range ? fmt::format("errors from {} to {}", errors.front(), errors.back())
                               : fmt::format("an error of {}", fmt::join(errors, ", ")));
   }
-  return text.empty() ? "No peer is cheaper than ours for any of these errors." : text;
+  return text.empty() ? "No peer takes less time for any of these errors." : text;
 }
 
 std::string to_table(const Measurement& measurement) {
-  std::string text =
-      fmt::format("{}: {}\n\n{}", measurement.name, about(measurement), plain(rows_table(measurement, ascii)));
+  std::string text = fmt::format("{}: {}\n\n{}", measurement.name, about(measurement),
+                                 plain(rows_table(measurement, ascii)));
   if (measurement.reference) text += fmt::format("\n{}", plain(cheapest_table(measurement, ascii)));
-  if (const auto sentence = cheaper_peers(measurement); !sentence.empty()) text += fmt::format("\n{}\n", sentence);
+  if (const auto sentence = cheaper_peers(measurement); !sentence.empty())
+    text += fmt::format("\n{}\n", sentence);
   for (const auto& row : measurement.rows)
     if (row.cause) text += fmt::format("\n{}: diverged: {}", row.label(), *row.cause);
   return text + (text.ends_with('\n') ? "" : "\n");
@@ -272,17 +287,21 @@ std::string to_table(const Measurement& measurement) {
 
 std::string to_markdown(const Measurement& measurement) {
   std::string text = fmt::format("{}: {}\n", measurement.name, about(measurement));
-  if (!measurement.reference) return text + fmt::format("\n{}", markdown(rows_table(measurement, typographic)));
+  if (!measurement.reference)
+    return text + fmt::format("\n{}", markdown(rows_table(measurement, typographic)));
   text += fmt::format("\n{}", markdown(cheapest_table(measurement, typographic)));
-  if (const auto sentence = cheaper_peers(measurement); !sentence.empty()) text += fmt::format("\n{}\n", sentence);
-  const auto behind = rows_behind(measurement);
+  if (const auto sentence = cheaper_peers(measurement); !sentence.empty())
+    text += fmt::format("\n{}\n", sentence);
+  const auto compared = compared_rows(measurement);
   Measurement best = measurement;
   best.rows.clear();
-  for (const std::size_t i : behind) best.rows.push_back(measurement.rows[i]);
+  for (const std::size_t i : compared) best.rows.push_back(measurement.rows[i]);
   return text + fmt::format(
-                    "\n<details><summary>The cheapest of ours and of each peer for each error, {} of {} rows "
+                    "\n<details><summary>The cheapest rows of hamelin and of each peer, {} "
+                    "of {} rows "
                     "measured</summary>\n\n{}\n</details>\n",
-                    best.rows.size(), measurement.rows.size(), markdown(rows_table(best, typographic)));
+                    best.rows.size(), measurement.rows.size(),
+                    markdown(rows_table(best, typographic)));
 }
 
 }  // namespace hamelin::accuracy

@@ -6,29 +6,31 @@
 
 namespace hamelin::accuracy {
 
-/// A table as text, whatever it is shown in. The first `words` columns are words, the others figures.
+/// A table as text, independent of the output format. The first `text_columns` columns are text,
+/// the others numbers.
 struct Table {
   std::vector<std::string> head;
   std::vector<std::vector<std::string>> rows;
-  std::size_t words = 1;
-  std::size_t comparisons_from = std::string::npos;  ///< rows from here on compare with peers
+  std::size_t text_columns = 1;
+  std::size_t comparisons_from = std::string::npos;  ///< rows from this one on compare with peers
 };
 
-/// How units and relations are written.
-struct Signs {
+/// The symbols for units and relations in an output format.
+struct Symbols {
   const char *micro, *at_most, *plus_minus;
 };
-inline constexpr Signs ascii{"us", "<=", "+-"}, typographic{"µs", "≤ ", "±"};
+inline constexpr Symbols ascii{"us", "<=", "+-"}, typographic{"µs", "≤ ", "±"};
 
 /// All rows of a measurement.
-[[nodiscard]] Table rows_table(const Measurement& measurement, const Signs& signs);
-/// What each scheme needs for an error, then the cheapest of hamelin's own schemes over each peer.
-[[nodiscard]] Table cheapest_table(const Measurement& measurement, const Signs& signs);
-/// Joints, duration, and what the reference is.
+[[nodiscard]] Table rows_table(const Measurement& measurement, const Symbols& symbols);
+/// The time that each scheme needs for an error, docs/theory.md (13.6), then the cheapest of
+/// hamelin's own schemes over each peer, (13.7).
+[[nodiscard]] Table cheapest_table(const Measurement& measurement, const Symbols& symbols);
+/// A sentence on joints, duration and reference.
 [[nodiscard]] std::string about(const Measurement& measurement);
 
-/// Sentences on the errors for which a peer needs less time than the best of ours; empty where none of ours, or no
-/// reference, is there.
+/// Sentences on the errors for which a peer needs less time than the best of hamelin's own schemes.
+/// Empty if no own scheme was measured or there is no reference.
 [[nodiscard]] std::string cheaper_peers(const Measurement& measurement);
 
 }  // namespace hamelin::accuracy

@@ -12,11 +12,12 @@ using Eigen::VectorXd;
 namespace {
 
 bool slides(const model::Model& model, Index joint) {
-  return model.robot().links[static_cast<std::size_t>(joint)].joint.type == model::JointType::prismatic;
+  return model.robot().links[static_cast<std::size_t>(joint)].joint.type ==
+         model::JointType::prismatic;
 }
 
-// How far the ends of a shape's axis are moved between two placements: no point of it moves farther.
-double way(const scene::Shapes& before, const scene::Shapes& after, std::size_t shape) {
+// Largest chord of any point of a shape's axis, attained at an end: docs/theory.md (12.8).
+double chord(const scene::Shapes& before, const scene::Shapes& after, std::size_t shape) {
   const Vector3d center = after.centers[shape] - before.centers[shape];
   if (!after.is_capsule(shape)) return center.norm();
   const Vector3d half = after.half_axes[shape] - before.half_axes[shape];
@@ -25,41 +26,44 @@ double way(const scene::Shapes& before, const scene::Shapes& after, std::size_t 
 
 }  // namespace
 
-Certificate::Certificate(const model::Model& model, const scene::Environment& environment, double limit,
-                         const scene::SelfField* self, double self_limit)
+Certificate::Certificate(const model::Model& model, const scene::Environment& environment,
+                         double limit, const scene::SelfField* self, double self_limit)
     : model_(model),
       environment_(environment),
       limit_(limit),
       self_(self),
       self_limit_(self_limit),
-      hop_(VectorXd::Zero(model.dof())),
+      frame_distance_(VectorXd::Zero(model.dof())),
       travel_(VectorXd::Zero(model.dof())),
       lever_(Eigen::MatrixXd::Zero(static_cast<Index>(model.shapes().size()), model.dof())),
-      pair_lever_(Eigen::MatrixXd::Zero(self != nullptr ? static_cast<Index>(self->pairs().size()) : 0, model.dof())),
+      pair_lever_(Eigen::MatrixXd::Zero(
+          self != nullptr ? static_cast<Index>(self->pairs().size()) : 0, model.dof())),
       arm_(model) {
   const Index n = model.dof();
-  for (auto* x : {&q_, &dq_, &stray_, &bend_, &rest_, &between_, &turning_}) x->setZero(n);
+  for (auto* x : {&q_, &dq_, &stray_, &curvature_, &rest_, &q_middle_, &rate_}) x->setZero(n);
   appearing_.reserve(environment.obstacles().size());
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q_);
   for (Index j = 0; j < n; ++j) {
     const auto at = static_cast<std::size_t>(j);
-    if (j > 0) hop_[j] = (ws.frames[at].p - ws.frames[at - 1].p).norm();
+    if (j > 0) frame_distance_[j] = (ws.frames[at].p - ws.frames[at - 1].p).norm();
     const auto& joint = model.robot().links[at].joint;
     if (slides(model, j))
-      travel_[j] = std::max(std::abs(joint.lower.value_or(0.0)), std::abs(joint.upper.value_or(0.0)));
+      travel_[j] =
+          std::max(std::abs(joint.lower.value_or(0.0)), std::abs(joint.upper.value_or(0.0)));
   }
   set_levers();
 }
 
-// Successive joint frames keep their distance (but for prismatic travel), so sums of them bound every lever.
+// docs/theory.md (12.3), (12.11)
 void Certificate::set_levers() {
   for (std::size_t s = 0; s < model_.shapes().size(); ++s) {
     const auto& shape = model_.shapes()[s];
-    double length = std::max((shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm());
+    double length =
+        std::max((shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm());
     for (Index j = shape.link; j >= 0; --j) {
       lever_(static_cast<Index>(s), j) = slides(model_, j) ? 1.0 : length;
-      length += hop_[j] + travel_[j];
+      length += frame_distance_[j] + travel_[j];
     }
   }
   for (Index k = 0; k < pair_lever_.rows(); ++k) {
@@ -68,18 +72,19 @@ void Certificate::set_levers() {
     const auto* outer = &self_->parts()[static_cast<std::size_t>(pair.part_b)];
     if (inner->body > outer->body) std::swap(inner, outer);
     for (int j = inner->body + 1; j <= outer->body; ++j)
-      for (const int s : outer->shapes) pair_lever_(k, j) = std::max(pair_lever_(k, j), lever_(s, j));
+      for (const int s : outer->shapes)
+        pair_lever_(k, j) = std::max(pair_lever_(k, j), lever_(s, j));
   }
 }
 
-void Certificate::follow_travel(const VectorXd& q) {
-  bool farther = false;
+void Certificate::extend_travel(const VectorXd& q) {
+  bool extended = false;
   for (Index j = 0; j < q.size(); ++j)
     if (slides(model_, j) && std::abs(q[j]) + stray_[j] > travel_[j]) {
       travel_[j] = 2.0 * (std::abs(q[j]) + stray_[j]);
-      farther = true;
+      extended = true;
     }
-  if (farther) set_levers();
+  if (extended) set_levers();
 }
 
 Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& from, const Node& to) {
@@ -87,30 +92,30 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& fro
   dq_ = to.q - from.q;
   time_s_ = from.time_s;
   h_ = to.time_s - from.time_s;
-  stray_ = 0.25 * h_ * (to.v - from.v).cwiseAbs();
-  follow_travel(from.q);
-  follow_travel(to.q);
-  double turned = 0.0;
+  stray_ = 0.25 * h_ * (to.v - from.v).cwiseAbs();  // docs/theory.md (12.2)
+  extend_travel(from.q);
+  extend_travel(to.q);
+  double rotation = 0.0;  // Σ |Δq_i| of the revolute joints i < j
   for (Index j = 0; j < dq_.size(); ++j) {
-    const double own = std::abs(dq_[j]), turns = slides(model_, j) ? 0.0 : own;
-    bend_[j] = own * (turns + 2.0 * turned);
-    turned += turns;
+    const double own = std::abs(dq_[j]), own_rotation = slides(model_, j) ? 0.0 : own;
+    curvature_[j] = own * (own_rotation + 2.0 * rotation);  // docs/theory.md (12.5)
+    rotation += own_rotation;
   }
-  rest_ = 0.125 * bend_ + stray_;
-  obstacle_way_ = 0.0;
+  rest_ = 0.125 * curvature_ + stray_;
+  obstacle_travel_ = 0.0;
   appearing_.clear();
   for (std::size_t k = 0; k < environment_.obstacles().size(); ++k) {
     const auto& obstacle = environment_.obstacles()[k];
     if (!scene::exists(obstacle, to.time_s)) continue;
-    obstacle_way_ = std::max(obstacle_way_, h_ * scene::max_speed(obstacle));
+    obstacle_travel_ = std::max(obstacle_travel_, h_ * scene::max_speed(obstacle));
     if (!scene::exists(obstacle, from.time_s)) appearing_.push_back(k);
   }
   contact_ = false;
-  looks_ = 0;
+  pieces_ = 0;
 
   Verdict verdict;
   verdict.margin_m = from.clearance.empty() ? self_limit_ : limit_;
-  const auto settle = [&](Subject subject, double bound, double d, double d_next) {
+  const auto include = [&](Subject subject, double bound, double d, double d_next) {
     if (bound <= 0.0) bound = prove(ws, subject, {0.0, 1.0, d, d_next});
     verdict.margin_m = std::min(verdict.margin_m, bound);
     if (!(bound > 0.0)) verdict.certified = false;
@@ -118,23 +123,28 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& fro
   for (std::size_t s = 0; s < from.clearance.size(); ++s) {
     const Subject subject{s, false};
     const double d = appearing_.empty() ? from.clearance[s]
-                                        : clearance_of_appearing(from.arm.only(s), from.time_s, from.clearance[s]);
+                                        : clearance_of_appearing(from.arm.single(s), from.time_s,
+                                                                 from.clearance[s]);
     const double rest = lever(subject).dot(rest_);
-    settle(subject, 0.5 * (d + to.clearance[s] - way(from.arm, to.arm, s) - obstacle_way_) - rest, d, to.clearance[s]);
+    const double bound =
+        0.5 * (d + to.clearance[s] - chord(from.arm, to.arm, s) - obstacle_travel_) - rest;
+    include(subject, bound, d, to.clearance[s]);  // docs/theory.md (12.7)
   }
   for (std::size_t k = 0; k < from.pairs.size(); ++k) {
     const Subject subject{k, true};
     const bool touched = contact_;
-    // first with the longest way there can be: mostly that is enough
+    // docs/theory.md (12.12): the bound that needs no posture usually suffices
     const double longest = lever(subject).dot(dq_.cwiseAbs()), rest = lever(subject).dot(stray_);
-    settle(subject, 0.5 * (from.pairs[k] + to.pairs[k] - longest) - rest, from.pairs[k], to.pairs[k]);
+    include(subject, 0.5 * (from.pairs[k] + to.pairs[k] - longest) - rest, from.pairs[k],
+            to.pairs[k]);
     if (contact_ && !touched) verdict.self_pair = static_cast<int>(k);
   }
   verdict.contact = contact_;
   return verdict;
 }
 
-double Certificate::clearance_of_appearing(const scene::Shapes& shape, double time_s, double clearance) const {
+double Certificate::clearance_of_appearing(const scene::Shapes& shape, double time_s,
+                                           double clearance) const {
   for (const std::size_t k : appearing_)
     clearance = std::min(clearance, environment_.clearance_to(k, shape, time_s, clearance));
   return clearance;
@@ -146,7 +156,7 @@ double Certificate::speed(const dynamics::Workspace& ws, Subject subject) const 
   const auto consider = [&](std::size_t s) {
     const int link = model_.shapes()[s].link;
     const auto of = [&](const Vector3d& point) {
-      fastest = std::max(fastest, dynamics::point_velocity(model_, ws, link, point, turning_).norm());
+      fastest = std::max(fastest, dynamics::point_velocity(model_, ws, link, point, rate_).norm());
     };
     if (arm.is_capsule(s)) {
       of(arm.from(s));
@@ -166,40 +176,41 @@ double Certificate::speed(const dynamics::Workspace& ws, Subject subject) const 
   return fastest;
 }
 
-double Certificate::clearance_at(Subject subject, double at) {
-  const scene::Shapes shape = subject.is_pair ? arm_.view() : arm_.view().only(subject.index);
-  const double time_s = time_s_ + at * h_;
-  const double there = subject.is_pair ? self_->distance(subject.index, shape, self_limit_)
-                                       : environment_.clearance(shape, time_s, limit_);
-  contact_ = contact_ || there <= 0.0;
-  return subject.is_pair ? there : clearance_of_appearing(shape, time_s, there);
+double Certificate::clearance_at(Subject subject, double s) {
+  const scene::Shapes shape = subject.is_pair ? arm_.view() : arm_.view().single(subject.index);
+  const double time_s = time_s_ + s * h_;
+  const double clearance = subject.is_pair ? self_->distance(subject.index, shape, self_limit_)
+                                           : environment_.clearance(shape, time_s, limit_);
+  contact_ = contact_ || clearance <= 0.0;
+  return subject.is_pair ? clearance : clearance_of_appearing(shape, time_s, clearance);
 }
 
-// The way of the middle's speed and of what that can change by on a piece of width w is w |c'| + w² κ/4.
+// docs/theory.md (12.9), (12.10)
 double Certificate::prove(dynamics::Workspace& ws, Subject subject, const Piece& piece) {
-  if (++looks_ > looks_max) return 0.0;
+  if (++pieces_ > pieces_max) return 0.0;
   const double middle = piece.at + 0.5 * piece.width;
-  between_ = q_ + middle * dq_;
-  turning_ = dq_;
-  double obstacle_way = obstacle_way_;
+  q_middle_ = q_ + middle * dq_;
+  rate_ = dq_;
+  double obstacle_travel = obstacle_travel_;
   if (subject.is_pair) {
     const auto& pair = self_->pairs()[subject.index];
     const int inner = std::min(self_->parts()[static_cast<std::size_t>(pair.part_a)].body,
                                self_->parts()[static_cast<std::size_t>(pair.part_b)].body);
-    turning_.head(inner + 1).setZero();
-    obstacle_way = 0.0;
+    rate_.head(inner + 1).setZero();  // in the frame of the inner part
+    obstacle_travel = 0.0;
   }
-  dynamics::forward_kinematics(model_, ws, between_);
+  dynamics::forward_kinematics(model_, ws, q_middle_);
   arm_.place(model_, ws);
-  const double way =
-      piece.width * (speed(ws, subject) + obstacle_way) + 0.25 * piece.width * piece.width * lever(subject).dot(bend_);
-  const double bound = 0.5 * (piece.from + piece.to - way) - lever(subject).dot(stray_);
-  if (bound > 0.0 || way <= resolution_m) return bound;
-  const double there = clearance_at(subject, middle);
-  if (there <= 0.0) return there;
+  const double kappa = lever(subject).dot(curvature_);
+  const double path = piece.width * (speed(ws, subject) + obstacle_travel) +
+                      0.25 * piece.width * piece.width * kappa;
+  const double bound = 0.5 * (piece.from + piece.to - path) - lever(subject).dot(stray_);
+  if (bound > 0.0 || path <= resolution_m) return bound;
+  const double clearance = clearance_at(subject, middle);
+  if (clearance <= 0.0) return clearance;
   const double half = 0.5 * piece.width;
-  const double first = prove(ws, subject, {piece.at, half, piece.from, there});
-  return std::min(first, prove(ws, subject, {middle, half, there, piece.to}));
+  const double first = prove(ws, subject, {piece.at, half, piece.from, clearance});
+  return std::min(first, prove(ws, subject, {middle, half, clearance, piece.to}));
 }
 
 }  // namespace hamelin::control

@@ -12,8 +12,8 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 }  // namespace
 
-GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals, const std::optional<scene::StallRule>& rule,
-                         const model::Model& model)
+GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals,
+                         const std::optional<scene::StallRule>& rule, const model::Model& model)
     : goals_(goals), rule_(rule), model_(model) {}
 
 double GoalTracker::tip_speed(const dynamics::Workspace& ws, const Eigen::VectorXd& v) const {
@@ -21,7 +21,8 @@ double GoalTracker::tip_speed(const dynamics::Workspace& ws, const Eigen::Vector
   return dynamics::point_velocity(model_, ws, model_.robot().tip.link, tip, v).norm();
 }
 
-GoalError GoalTracker::error(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v) const {
+GoalError GoalTracker::error(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                             const Eigen::VectorXd& v) const {
   const scene::Goal& target = goal();
   const bool slow = v.lpNorm<Eigen::Infinity>() < target.speed_max;
   GoalError error;
@@ -41,7 +42,8 @@ GoalError GoalTracker::error(const dynamics::Workspace& ws, const Eigen::VectorX
   return error;
 }
 
-bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                          const Eigen::VectorXd& v) {
   if (all_reached() || !error(ws, q, v).reached) return false;
   ++index_;
   rest_s_ = 0.0;

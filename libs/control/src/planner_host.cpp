@@ -36,13 +36,13 @@ hamelin_self_contact to_c(const scene::SelfContact& contact) {
 
 }  // namespace
 
-PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData setup, const Json& params,
-                         WorldView& world, LineSink sink)
+PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData setup,
+                         const Json& params, WorldView& world, LineSink sink)
     : world_(world),
       sink_(std::move(sink)),
-      q_asked_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(setup.dof))),
-      asked_(world.contacts_max()),
-      self_asked_(world.self_contacts_max()),
+      query_q_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(setup.dof))),
+      query_contacts_(world.contacts_max()),
+      query_self_contacts_(world.self_contacts_max()),
       contacts_(world.contacts_max()),
       self_contacts_(world.self_contacts_max()),
       command_(setup.dof, world.contacts_max()),
@@ -73,20 +73,23 @@ void PlannerHost::log(std::int32_t level, std::string_view line) {
   if (sink_) sink_(level, line);
 }
 
-std::size_t PlannerHost::closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) {
-  q_asked_ = Eigen::Map<const Eigen::VectorXd>(q.data(), q_asked_.size());
-  const auto room = std::span(asked_).first(std::min(asked_.size(), out.size()));
-  const std::size_t found = world_.closest(q_asked_, influence_m, room);
-  for (std::size_t i = 0; i < std::min(found, room.size()); ++i) out[i] = to_c(room[i]);
+std::size_t PlannerHost::closest_points(std::span<const double> q, double influence_m,
+                                        std::span<hamelin_contact> out) {
+  query_q_ = Eigen::Map<const Eigen::VectorXd>(q.data(), query_q_.size());
+  const auto contacts =
+      std::span(query_contacts_).first(std::min(query_contacts_.size(), out.size()));
+  const std::size_t found = world_.closest(query_q_, influence_m, contacts);
+  for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i) out[i] = to_c(contacts[i]);
   return found;
 }
 
 std::size_t PlannerHost::closest_self(std::span<const double> q, double influence_m,
                                       std::span<hamelin_self_contact> out) {
-  q_asked_ = Eigen::Map<const Eigen::VectorXd>(q.data(), q_asked_.size());
-  const auto room = std::span(self_asked_).first(std::min(self_asked_.size(), out.size()));
-  const std::size_t found = world_.closest_self(q_asked_, influence_m, room);
-  for (std::size_t i = 0; i < std::min(found, room.size()); ++i) out[i] = to_c(room[i]);
+  query_q_ = Eigen::Map<const Eigen::VectorXd>(q.data(), query_q_.size());
+  const auto contacts =
+      std::span(query_self_contacts_).first(std::min(query_self_contacts_.size(), out.size()));
+  const std::size_t found = world_.closest_self(query_q_, influence_m, contacts);
+  for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i) out[i] = to_c(contacts[i]);
   return found;
 }
 

@@ -24,15 +24,16 @@ hamelin_goal to_c(const scene::Goal& goal) {
 
 }  // namespace
 
-VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit, double unlimited) {
+VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit,
+                      double unlimited) {
   VectorXd limits(robot.dof());
   for (int i = 0; i < robot.dof(); ++i)
     limits[i] = (robot.links[static_cast<std::size_t>(i)].joint.*limit).value_or(unlimited);
   return limits;
 }
 
-planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal, const WorldView& world,
-                                  double control_period_s) {
+planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
+                                  const WorldView& world, double control_period_s) {
   planning::SetupData data(nominal);
   for (const auto& goal : scene.goals)
     data.add_goal(to_c(goal), goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
@@ -41,8 +42,10 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     data.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
     data.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
   }
-  if (scene.model.velocity_limits) data.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
-  if (scene.model.torque_limits) data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
+  if (scene.model.velocity_limits)
+    data.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
+  if (scene.model.torque_limits)
+    data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
   data.sampled = scene.actuation.type == scene::ActuationType::sampled;

@@ -11,15 +11,18 @@ namespace hamelin::control {
 
 namespace {
 
-// The arm is looked at this far from itself, at most.
+// The largest distance at which parts of the arm are found near each other.
 constexpr double self_influence_max_m = 0.10;
-// Motion in unknown space that is to be crossed slowly is asked for at this share of the speed.
+// The share of the speed at which a planner is asked to move in unknown space that is to be crossed
+// slowly.
 constexpr double slow_speed_scale = 0.25;
 
-void require_shapes(const scene::Scene& scene, const model::Model& model, const char* place, const char* expected) {
+void require_shapes(const scene::Scene& scene, const model::Model& model, const char* place,
+                    const char* expected) {
   if (!model.shapes().empty()) return;
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}: '{}' has no collision spheres or capsules, expected {}",
-                                              scene.name, place, model.robot().name, expected));
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: {}: '{}' has no collision spheres or capsules, expected {}",
+                          scene.name, place, model.robot().name, expected));
 }
 
 }  // namespace
@@ -33,9 +36,10 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
       poses_(model),
       arm_(model),
       arm_before_(model),
-      asked_poses_(model),
-      asked_(model) {
-  if (environment_.has_obstacles()) require_shapes(scene, model, "/robot", "some where there are obstacles");
+      query_poses_(model),
+      query_arm_(model) {
+  if (environment_.has_obstacles())
+    require_shapes(scene, model, "/robot", "some because there are obstacles");
   if (scene.model.self_collision) {
     require_shapes(scene, model, "/model/self_collision", "some or false");
     self_ = std::make_unique<scene::SelfField>(model);
@@ -44,7 +48,8 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
     self_clearance_.assign(self_->pairs().size(), self_influence_);
     self_clearance_before_ = self_clearance_;
   }
-  certificate_ = std::make_unique<Certificate>(model, environment_, influence_, self_.get(), self_influence_);
+  certificate_ =
+      std::make_unique<Certificate>(model, environment_, influence_, self_.get(), self_influence_);
   seen_.assign(environment_.obstacles().size(), 0);
   revealed_.reserve(environment_.obstacles().size());
   for (const auto& obstacle : environment_.obstacles())
@@ -66,33 +71,34 @@ void WorldView::look(const Eigen::VectorXd& q, double time_s) {
   speed_scale_ = 1.0;
   revealed_.clear();
   if (has_obstacles() || has_self()) arm_.place(model_, poses_);
-  if (has_obstacles()) look_at_obstacles();
-  if (has_self()) look_at_itself();
+  if (has_obstacles()) update_obstacle_contacts();
+  if (has_self()) update_self_contacts();
 }
 
-void WorldView::look_at_obstacles() {
+void WorldView::update_obstacle_contacts() {
   std::fill(clearance_.begin(), clearance_.end(), influence_);
   if (hidden_obstacles_) reveal_visible();
   contact_count_ = find(scene::View::planner, contacts_);
-  count_clearances(contacts());
+  update_clearances(contacts());
   if (hidden_obstacles_) {
     const std::size_t hidden = find(scene::View::hidden, other_contacts_);
-    count_clearances(std::span(other_contacts_).first(hidden));
+    update_clearances(std::span(other_contacts_).first(hidden));
   }
   if (slow_in_unknown_ && environment_.in_slow_space(arm_.view())) speed_scale_ = slow_speed_scale;
 }
 
 void WorldView::reveal_visible() {
-  for (int found = environment_.see(arm_.view(), time_s_, seen_); found >= 0;
-       found = environment_.see(arm_.view(), time_s_, seen_))
+  for (int found = environment_.reveal_visible(arm_.view(), time_s_, seen_); found >= 0;
+       found = environment_.reveal_visible(arm_.view(), time_s_, seen_))
     revealed_.push_back(found);
 }
 
 std::size_t WorldView::find(scene::View view, std::span<scene::Contact> out) {
-  return std::min(out.size(), environment_.closest(arm_.view(), influence_, time_s_, scratch_, out, view, seen_));
+  return std::min(out.size(), environment_.closest(arm_.view(), influence_, time_s_, scratch_, out,
+                                                   view, seen_));
 }
 
-void WorldView::count_clearances(std::span<const scene::Contact> contacts) {
+void WorldView::update_clearances(std::span<const scene::Contact> contacts) {
   for (const auto& contact : contacts) {
     auto& clearance = clearance_[static_cast<std::size_t>(contact.sphere)];
     clearance = std::min(clearance, contact.distance);
@@ -103,7 +109,7 @@ void WorldView::count_clearances(std::span<const scene::Contact> contacts) {
   }
 }
 
-void WorldView::look_at_itself() {
+void WorldView::update_self_contacts() {
   self_contact_count_ = self_->closest(arm_.view(), self_influence_, self_contacts_);
   std::fill(self_clearance_.begin(), self_clearance_.end(), self_influence_);
   for (const auto& contact : self_contacts()) {
@@ -128,37 +134,42 @@ Certificate::Verdict WorldView::certify(const Eigen::VectorXd& q, const Eigen::V
   const auto to_obstacles = [&](const std::vector<double>& all) {
     return has_obstacles() ? std::span<const double>(all) : std::span<const double>();
   };
-  return certificate_->check(asked_poses_,
-                             {q_before_, v_before_, time_before_s_, arm_before_.view(), to_obstacles(clearance_before_),
-                              self_clearance_before_},
-                             {q, v, time_s_, arm_.view(), to_obstacles(clearance_), self_clearance_});
+  return certificate_->check(
+      query_poses_,
+      {q_before_, v_before_, time_before_s_, arm_before_.view(), to_obstacles(clearance_before_),
+       self_clearance_before_},
+      {q, v, time_s_, arm_.view(), to_obstacles(clearance_), self_clearance_});
 }
 
 scene::Shapes WorldView::place(const Eigen::VectorXd& q) {
-  dynamics::forward_kinematics(model_, asked_poses_, q);
-  asked_.place(model_, asked_poses_);
-  return asked_.view();
+  dynamics::forward_kinematics(model_, query_poses_, q);
+  query_arm_.place(model_, query_poses_);
+  return query_arm_.view();
 }
 
-std::size_t WorldView::closest(const Eigen::VectorXd& q, double influence_m, std::span<scene::Contact> out) {
+std::size_t WorldView::closest(const Eigen::VectorXd& q, double influence_m,
+                               std::span<scene::Contact> out) {
   if (!has_obstacles()) return 0;
-  return environment_.closest(place(q), std::min(influence_m, influence_), time_s_, scratch_, out, scene::View::planner,
-                              seen_);
+  return environment_.closest(place(q), std::min(influence_m, influence_), time_s_, scratch_, out,
+                              scene::View::planner, seen_);
 }
 
-std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m, std::span<scene::SelfContact> out) {
+std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m,
+                                    std::span<scene::SelfContact> out) {
   if (!has_self()) return 0;
   return self_->closest(place(q), std::min(influence_m, self_influence_), out);
 }
 
 bool WorldView::deepest_at_start(const scene::Shapes& shapes, scene::Contact& deepest) {
   const std::size_t count = std::min(
-      other_contacts_.size(), environment_.closest(shapes, 0.0, 0.0, scratch_, other_contacts_, scene::View::judge));
+      other_contacts_.size(),
+      environment_.closest(shapes, 0.0, 0.0, scratch_, other_contacts_, scene::View::judge));
   bool found = false;
   for (const auto& contact : std::span(other_contacts_).first(count)) {
-    // what moves may be elsewhere by then
+    // a moving obstacle may be elsewhere when the arm arrives
     if (contact.obstacle >= 0 &&
-        scene::max_speed(environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)]) > 0.0)
+        scene::max_speed(environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)]) >
+            0.0)
       continue;
     if (!found || contact.distance < deepest.distance) deepest = contact;
     found = true;
@@ -168,19 +179,22 @@ bool WorldView::deepest_at_start(const scene::Shapes& shapes, scene::Contact& de
 
 bool WorldView::deepest_self(const scene::Shapes& shapes, scene::SelfContact& deepest) {
   if (!has_self()) return false;
-  const std::size_t count = std::min(self_contacts_.size(), self_->closest(shapes, 0.0, self_contacts_));
+  const std::size_t count =
+      std::min(self_contacts_.size(), self_->closest(shapes, 0.0, self_contacts_));
   if (count == 0) return false;
-  deepest = *std::min_element(self_contacts_.begin(), self_contacts_.begin() + static_cast<long>(count),
-                              [](const auto& a, const auto& b) { return a.distance < b.distance; });
+  deepest =
+      *std::min_element(self_contacts_.begin(), self_contacts_.begin() + static_cast<long>(count),
+                        [](const auto& a, const auto& b) { return a.distance < b.distance; });
   return true;
 }
 
 std::string WorldView::describe_contact() const {
   if (nearest() != nullptr && clearance_now_ <= 0.0)
-    return fmt::format("{} at {} s; the way out is {}", environment_.words(nearest_, model_), time_s_,
-                       scene::way_out(nearest_));
-  return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s", self_->words(nearest_pair_),
-                     -1e3 * self_clearance_now_, time_s_);
+    return fmt::format("{} at {} s; the exit direction is {}",
+                       environment_.describe(nearest_, model_), time_s_,
+                       scene::describe_exit_direction(nearest_));
+  return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s",
+                     self_->describe(nearest_pair_), -1e3 * self_clearance_now_, time_s_);
 }
 
 }  // namespace hamelin::control

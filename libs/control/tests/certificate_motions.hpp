@@ -21,15 +21,15 @@
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/scene/make.hpp"
 
-/// Random motions of an arm, judged twice: by the certificate, and by dense sampling with FCL, which shares no code
-/// with ours and is given the map by OctoMap itself.
+/// Random motions of an arm, checked twice: by the certificate, and by dense sampling with FCL,
+/// which shares no code with hamelin and reads the map through OctoMap.
 namespace hamelin::test {
 
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// An arm in a map, by both libraries.
-struct Stage {
+/// An arm and a map for both libraries.
+struct ArmInMap {
   std::string name;
   model::Model model;
   scene::MapSpec map;
@@ -37,43 +37,46 @@ struct Stage {
 
 struct MotionCounts {
   long motions = 0, certified = 0, contacts = 0;
-  long free_uncertified = 0;      ///< sampling finds them free, the certificate does not
-  long straight_uncertified = 0;  ///< of these the ones without a change of velocity, which stray from no line
-  long contradictions = 0;        ///< certified, and sampling finds contact
-  long reported = 0;              ///< the certificate met contact itself
-  double least_margin_m = 1.0;    ///< of the certified
+  long free_uncertified = 0;      ///< free by sampling, but not certified
+  long straight_uncertified = 0;  ///< of these, motions with constant velocity
+  long contradictions = 0;        ///< certified, but in contact by sampling
+  long reported = 0;              ///< in contact by the certificate
+  double least_margin_m = 1.0;    ///< of the certified motions
 };
 
 class MotionJudge {
  public:
-  /// OctoMap hands FCL single-precision corners, and its iterations stop at about 1e-6: shapes are this much smaller.
+  /// FCL gets box corners in single precision, and its iterations stop at about 1e-6: shapes are
+  /// smaller by this.
   static constexpr double shrunk_m = 5e-6;
   static constexpr int samples = 240;
   static constexpr double limit_m = 0.25, self_limit_m = 0.1, step_s = 0.001;
 
-  MotionJudge(Stage stage, std::uint64_t seed)
-      : stage_(std::move(stage)),
+  MotionJudge(ArmInMap arm, std::uint64_t seed)
+      : setup_(std::move(arm)),
         rng_(seed),
-        ws_(stage_.model),
-        arm_(stage_.model),
-        next_(stage_.model),
-        self_(stage_.model),
-        tree_(std::make_shared<octomap::OcTree>(stage_.map.file.string())),
+        ws_(setup_.model),
+        arm_(setup_.model),
+        next_(setup_.model),
+        self_(setup_.model),
+        tree_(std::make_shared<octomap::OcTree>(setup_.map.file.string())),
         octree_(std::make_shared<fcl::OcTreed>(tree_)) {
-    const double reach = stage_.model.reach();
+    const double reach = setup_.model.reach();
     for (auto leaf = tree_->begin_leafs(), end = tree_->end_leafs(); leaf != end; ++leaf) {
       if (!tree_->isNodeOccupied(*leaf)) continue;
-      const Vector3d half = Vector3d::Constant(0.5 * leaf.getSize()), c{leaf.getX(), leaf.getY(), leaf.getZ()};
-      if ((stage_.map.pose * c - stage_.model.base().p()).norm() < reach + limit_m + half.norm())
+      const Vector3d half = Vector3d::Constant(0.5 * leaf.getSize()),
+                     c{leaf.getX(), leaf.getY(), leaf.getZ()};
+      if ((setup_.map.pose * c - setup_.model.base().p()).norm() < reach + limit_m + half.norm())
         leaves_.push_back({c - half, c + half});
     }
-    for (const auto& shape : stage_.model.shapes()) {
+    for (const auto& shape : setup_.model.shapes()) {
       if (shape.is_capsule)
-        bodies_.push_back(std::make_shared<fcl::Capsuled>(shape.radius - shrunk_m, 2.0 * shape.half_axis.norm()));
+        bodies_.push_back(
+            std::make_shared<fcl::Capsuled>(shape.radius - shrunk_m, 2.0 * shape.half_axis.norm()));
       else
         bodies_.push_back(std::make_shared<fcl::Sphered>(shape.radius - shrunk_m));
     }
-    // a ball that swings about, and one that is there from some instant of a step on
+    // a ball that oscillates, and one that appears during a step
     moving_.name = "moving";
     moving_.radius_m = 0.12 * reach;
     moving_.motion = scene::SineMotion{reach * Vector3d(0.3, 0.2, -0.1), 0.8};
@@ -82,9 +85,9 @@ class MotionJudge {
     sudden_.motion.reset();
   }
 
-  void play(int motions, MotionCounts& counts) {
-    // many motions in one set-up, so that maps need not be read again
-    constexpr int in_a_row = 50, set_ups_max = 1000;
+  void run(int motions, MotionCounts& counts) {
+    // many motions in one environment, so that the map is not read for each
+    constexpr int motions_per_set_up = 50, set_ups_max = 1000;
     for (int set_up = 0; counts.motions < motions && set_up < set_ups_max; ++set_up) {
       std::vector<scene::Obstacle> obstacles;
       if (set_up % 2 == 1) {
@@ -93,32 +96,34 @@ class MotionJudge {
         sudden_.appears_s = start_s_ + rng_.uniform(0.0, step_s);
         obstacles = {moving_, sudden_};
       }
-      const scene::Environment environment(stage_.map, obstacles, stage_.model.base(), stage_.model.reach(), limit_m);
-      control::Certificate certificate(stage_.model, environment, limit_m, &self_, self_limit_m);
-      for (int i = 0; i < in_a_row && counts.motions < motions; ++i)
+      const scene::Environment environment(setup_.map, obstacles, setup_.model.base(),
+                                           setup_.model.reach(), limit_m);
+      control::Certificate certificate(setup_.model, environment, limit_m, &self_, self_limit_m);
+      for (int i = 0; i < motions_per_set_up && counts.motions < motions; ++i)
         if (!motion(environment, certificate, counts)) break;
     }
   }
 
  private:
   Vector3d random_place() {
-    const double reach = stage_.model.reach(), height = stage_.model.planar() ? 0.1 : 0.7;
-    const Vector3d off{rng_.uniform(-0.7, 0.7), rng_.uniform(-0.7, 0.7), rng_.uniform(-0.1, height)};
-    return stage_.model.base() * (reach * off);
+    const double reach = setup_.model.reach(), height = setup_.model.planar() ? 0.1 : 0.7;
+    const Vector3d off{rng_.uniform(-0.7, 0.7), rng_.uniform(-0.7, 0.7),
+                       rng_.uniform(-0.1, height)};
+    return setup_.model.base() * (reach * off);
   }
 
   VectorXd random_posture() {
-    VectorXd q(stage_.model.dof());
+    VectorXd q(setup_.model.dof());
     for (Eigen::Index j = 0; j < q.size(); ++j) {
-      const auto& joint = stage_.model.robot().links[static_cast<std::size_t>(j)].joint;
+      const auto& joint = setup_.model.robot().links[static_cast<std::size_t>(j)].joint;
       q[j] = rng_.uniform(joint.lower.value_or(-2.5), joint.upper.value_or(2.5));
     }
     return q;
   }
 
-  void stand(const VectorXd& q, scene::PlacedShapes& arm) {
-    dynamics::forward_kinematics(stage_.model, ws_, q);
-    arm.place(stage_.model, ws_);
+  void place(const VectorXd& q, scene::PlacedShapes& arm) {
+    dynamics::forward_kinematics(setup_.model, ws_, q);
+    arm.place(setup_.model, ws_);
   }
 
   void measure(const scene::Environment& environment, const scene::PlacedShapes& arm, double time_s,
@@ -126,25 +131,30 @@ class MotionJudge {
     clearance.clear();
     pairs.clear();
     for (std::size_t s = 0; s < arm.view().size(); ++s)
-      clearance.push_back(environment.clearance(arm.view().only(s), time_s, limit_m));
-    for (std::size_t k = 0; k < self_.pairs().size(); ++k) pairs.push_back(self_.distance(k, arm.view(), self_limit_m));
+      clearance.push_back(environment.clearance(arm.view().single(s), time_s, limit_m));
+    for (std::size_t k = 0; k < self_.pairs().size(); ++k)
+      pairs.push_back(self_.distance(k, arm.view(), self_limit_m));
   }
 
-  static double least(const std::vector<double>& x) { return x.empty() ? 1.0 : *std::min_element(x.begin(), x.end()); }
+  static double least(const std::vector<double>& x) {
+    return x.empty() ? 1.0 : *std::min_element(x.begin(), x.end());
+  }
 
-  /// False if no start was found: a ball may stand in the arm's base.
-  bool motion(const scene::Environment& environment, control::Certificate& certificate, MotionCounts& counts) {
-    // displacements of 1e-3 to 5e-2 a joint; of every other motion the velocity changes, by up to a quarter of it
+  /// False if no start was found: a ball may overlap the arm's base.
+  bool motion(const scene::Environment& environment, control::Certificate& certificate,
+              MotionCounts& counts) {
+    // displacements of 1e-3 to 5e-2 per joint; in every other motion the velocity changes by up to
+    // a quarter
     const bool straight = counts.motions % 2 == 0;
     const double size = std::exp(rng_.uniform(std::log(1e-3), std::log(5e-2)));
-    VectorXd q, dq(stage_.model.dof()), dv(stage_.model.dof());
+    VectorXd q, dq(setup_.model.dof()), dv(setup_.model.dof());
     std::vector<double> clearance, pairs, clearance_next, pairs_next;
-    // most of them start where something is near
+    // most of them start near an obstacle or another part
     const bool near = rng_.uniform() < 0.8;
     constexpr int tries_max = 4000;
     for (int tries = 0; tries < tries_max; ++tries) {
       q = random_posture();
-      stand(q, arm_);
+      place(q, arm_);
       measure(environment, arm_, start_s_, clearance, pairs);
       const double room = std::min(least(clearance), least(pairs));
       if (room > 0.0 && (!near || room < 0.3 * size)) break;
@@ -155,11 +165,11 @@ class MotionJudge {
       dv[j] = straight ? 0.0 : 0.25 * size / step_s * rng_.uniform(-1.0, 1.0);
     }
     const VectorXd q_next = q + dq, v = dq / step_s - 0.5 * dv, v_next = dq / step_s + 0.5 * dv;
-    stand(q_next, next_);
+    place(q_next, next_);
     measure(environment, next_, start_s_ + step_s, clearance_next, pairs_next);
-    const auto verdict =
-        certificate.check(ws_, {q, v, start_s_, arm_.view(), clearance, pairs},
-                          {q_next, v_next, start_s_ + step_s, next_.view(), clearance_next, pairs_next});
+    const auto verdict = certificate.check(
+        ws_, {q, v, start_s_, arm_.view(), clearance, pairs},
+        {q_next, v_next, start_s_ + step_s, next_.view(), clearance_next, pairs_next});
 
     const bool contact = sampled_contact(environment.obstacles(), q, dq, dv);
     ++counts.motions;
@@ -167,7 +177,8 @@ class MotionJudge {
     counts.contacts += contact ? 1 : 0;
     counts.reported += verdict.contact ? 1 : 0;
     counts.contradictions += verdict.certified && contact ? 1 : 0;
-    if (verdict.certified) counts.least_margin_m = std::min(counts.least_margin_m, verdict.margin_m);
+    if (verdict.certified)
+      counts.least_margin_m = std::min(counts.least_margin_m, verdict.margin_m);
     if (!contact && !verdict.certified) {
       ++counts.free_uncertified;
       counts.straight_uncertified += straight ? 1 : 0;
@@ -179,42 +190,46 @@ class MotionJudge {
     fcl::Transform3d at = fcl::Transform3d::Identity();
     at.translation() = arm.centers[s];
     if (arm.is_capsule(s))
-      at.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), arm.half_axes[s]).toRotationMatrix();
+      at.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), arm.half_axes[s])
+                        .toRotationMatrix();
     return at;
   }
 
-  static bool collide(const fcl::CollisionGeometryd* a, const fcl::Transform3d& at_a, const fcl::CollisionGeometryd* b,
-                      const fcl::Transform3d& at_b) {
+  static bool collide(const fcl::CollisionGeometryd* a, const fcl::Transform3d& at_a,
+                      const fcl::CollisionGeometryd* b, const fcl::Transform3d& at_b) {
     const fcl::CollisionRequestd request;
     fcl::CollisionResultd result;
     return fcl::collide(a, at_a, b, at_b, request, result) > 0;
   }
 
   double to_leaves(const Vector3d& p) const {
-    const Vector3d local = stage_.map.pose.inverse() * p;
+    const Vector3d local = setup_.map.pose.inverse() * p;
     double best = std::numeric_limits<double>::infinity();
     for (const auto& leaf : leaves_)
-      best = std::min(best, (leaf.lo - local).cwiseMax(local - leaf.hi).cwiseMax(0.0).squaredNorm());
+      best =
+          std::min(best, (leaf.lo - local).cwiseMax(local - leaf.hi).cwiseMax(0.0).squaredNorm());
     return std::sqrt(best);
   }
 
-  /// Whether FCL finds contact anywhere along a motion of constant acceleration. Shapes that are too far for that by
-  /// their plain distance from all leaves are left out.
-  bool sampled_contact(const std::vector<scene::Obstacle>& obstacles, const VectorXd& q, const VectorXd& dq,
-                       const VectorXd& dv) {
-    const double farthest = 2.0 * stage_.model.reach() * (dq.cwiseAbs().sum() + 0.125 * step_s * dv.cwiseAbs().sum());
+  /// Whether FCL finds contact along a motion of constant acceleration. Shapes are left out if
+  /// their distance from all leaves excludes contact.
+  bool sampled_contact(const std::vector<scene::Obstacle>& obstacles, const VectorXd& q,
+                       const VectorXd& dq, const VectorXd& dv) {
+    const double farthest =
+        2.0 * setup_.model.reach() * (dq.cwiseAbs().sum() + 0.125 * step_s * dv.cwiseAbs().sum());
     std::vector<std::size_t> near_map;
-    stand(q, arm_);
+    place(q, arm_);
     for (std::size_t s = 0; s < arm_.view().size(); ++s) {
-      const double around = arm_.view().radii[s] + (arm_.view().is_capsule(s) ? arm_.view().half_axes[s].norm() : 0.0);
+      const double around = arm_.view().radii[s] +
+                            (arm_.view().is_capsule(s) ? arm_.view().half_axes[s].norm() : 0.0);
       if (to_leaves(arm_.view().centers[s]) - around <= farthest) near_map.push_back(s);
     }
     fcl::Transform3d map_at = fcl::Transform3d::Identity();
-    map_at.linear() = stage_.map.pose.R();
-    map_at.translation() = stage_.map.pose.p();
+    map_at.linear() = setup_.map.pose.R();
+    map_at.translation() = setup_.map.pose.p();
     for (int i = 0; i <= samples; ++i) {
       const double u = static_cast<double>(i) / samples, time_s = start_s_ + u * step_s;
-      stand(q + u * dq + 0.5 * (u * u - u) * step_s * dv, arm_);
+      place(q + u * dq + 0.5 * (u * u - u) * step_s * dv, arm_);
       const scene::Shapes arm = arm_.view();
       for (const std::size_t s : near_map)
         if (collide(octree_.get(), map_at, bodies_[s].get(), place_of(arm, s))) return true;
@@ -229,7 +244,8 @@ class MotionJudge {
         at.translation() = center;
         const fcl::Sphered ball(obstacle.radius_m);
         for (std::size_t s = 0; s < arm.size(); ++s)
-          if ((arm.centers[s] - center).norm() < 0.6 && collide(&ball, at, bodies_[s].get(), place_of(arm, s)))
+          if ((arm.centers[s] - center).norm() < 0.6 &&
+              collide(&ball, at, bodies_[s].get(), place_of(arm, s)))
             return true;
       }
       for (const auto& pair : self_.pairs())
@@ -245,7 +261,7 @@ class MotionJudge {
     return false;
   }
 
-  Stage stage_;
+  ArmInMap setup_;
   Rng rng_;
   dynamics::Workspace ws_;
   scene::PlacedShapes arm_, next_;
@@ -258,11 +274,12 @@ class MotionJudge {
   double start_s_ = 1.0;
 };
 
-/// arm7 with its spheres, the planar arm of the paper, and a chain of capsules, each in clutter made for it; arm7 in
-/// the shipped shelf too. @param folder where the made maps go
-inline std::vector<Stage> stages(const std::filesystem::path& folder) {
+/// arm7 with its spheres, the planar arm of the paper, and a chain of capsules, each in random
+/// clutter, and arm7 in the shelf of data/. @param folder receives the maps
+inline std::vector<ArmInMap> arms_in_maps(const std::filesystem::path& folder) {
   const std::filesystem::path data = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
-  const auto clutter = [&](const char* name, std::uint64_t seed, const scene::Box& bounds, double keep_out) {
+  const auto clutter = [&](const char* name, std::uint64_t seed, const scene::Box& bounds,
+                           double keep_out) {
     scene::MakeMapOptions options;
     options.resolution_m = 0.04;
     scene::Clutter things;
@@ -287,12 +304,14 @@ inline std::vector<Stage> stages(const std::filesystem::path& folder) {
   };
   scene::MapSpec shelf;
   shelf.file = data / "maps/shelf.bt";
-  std::vector<Stage> all;
+  std::vector<ArmInMap> all;
   all.push_back({"arm7, clutter", arm7(), clutter("hamelin_certificate_a.bt", 1, around, 0.25)});
   all.push_back({"arm7, shelf", arm7(), shelf});
-  all.push_back({"planar3, clutter", model::Model(description::read_robot(data / "robots/planar3.json")),
-                 clutter("hamelin_certificate_b.bt", 2, {{-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}}, 0.08)});
-  all.push_back({"capsules, clutter", model::Model(model::make_chain({7, "x,z,x", 0.15, 1.0, 0.04})),
+  all.push_back(
+      {"planar3, clutter", model::Model(description::read_robot(data / "robots/planar3.json")),
+       clutter("hamelin_certificate_b.bt", 2, {{-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}}, 0.08)});
+  all.push_back({"capsules, clutter",
+                 model::Model(model::make_chain({7, "x,z,x", 0.15, 1.0, 0.04})),
                  clutter("hamelin_certificate_c.bt", 3, around, 0.25)});
   return all;
 }

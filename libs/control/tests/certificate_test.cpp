@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// A chain of one capsule of 1 m along y, turning about z, and one obstacle.
+/// A chain of one capsule of 1 m along y that turns about z, and one obstacle.
 struct Rig {
   explicit Rig(scene::Obstacle obstacle)
       : model(model::make_chain({1, "z", 1.0, 1.0, 0.05})),
@@ -27,9 +27,11 @@ struct Rig {
         arm(model),
         next(model) {}
 
-  Certificate::Verdict turn(double from, double to, double t0, double t1, double acceleration = 0.0) {
+  Certificate::Verdict turn(double from, double to, double t0, double t1,
+                            double acceleration = 0.0) {
     const VectorXd q = VectorXd::Constant(1, from), p = VectorXd::Constant(1, to);
-    const VectorXd v = VectorXd::Constant(1, (to - from) / (t1 - t0) - 0.5 * acceleration * (t1 - t0));
+    const VectorXd v =
+        VectorXd::Constant(1, (to - from) / (t1 - t0) - 0.5 * acceleration * (t1 - t0));
     const VectorXd w = VectorXd::Constant(1, v[0] + acceleration * (t1 - t0));
     dynamics::forward_kinematics(model, ws, q);
     arm.place(model, ws);
@@ -37,7 +39,8 @@ struct Rig {
     next.place(model, ws);
     before = {environment.clearance(arm.view(), t0, limit)};
     after = {environment.clearance(next.view(), t1, limit)};
-    return certificate.check(ws, {q, v, t0, arm.view(), before, {}}, {p, w, t1, next.view(), after, {}});
+    return certificate.check(ws, {q, v, t0, arm.view(), before, {}},
+                             {p, w, t1, next.view(), after, {}});
   }
 
   static constexpr double limit = 0.5;
@@ -59,17 +62,20 @@ scene::Obstacle ball(const Vector3d& at, double radius) {
 
 }  // namespace
 
-TEST_CASE("a small turn away from everything is proved clear, with nearly its own clearance", "[control][unit]") {
+TEST_CASE("a small turn away from everything is proved clear, with nearly its own clearance",
+          "[control][unit]") {
   Rig rig(ball({0.2, 1.0, 0.0}, 0.1));
   const auto verdict = rig.turn(0.0, 0.001, 0.0, 0.001);
   CHECK(rig.before[0] == Approx(0.05));
   CHECK(verdict.certified);
-  // the tip moves by 1 mm along the gradient: the bound is the clearance at the start, less what an arc bends by
+  // the tip moves by 1 mm along the gradient: the bound is the clearance at the start, less the
+  // curvature term
   CHECK(verdict.margin_m > 0.05 - 1e-6);
   CHECK(verdict.margin_m <= 0.05);
 }
 
-TEST_CASE("a capsule that sweeps through a ball between two clear nodes is caught", "[control][unit]") {
+TEST_CASE("a capsule that sweeps through a ball between two clear nodes is detected",
+          "[control][unit]") {
   Rig rig(ball({-0.5, 0.5, 0.0}, 0.02));
   const auto verdict = rig.turn(0.2, 1.4, 0.0, 0.01);
   REQUIRE(rig.before[0] > 0.1);
@@ -78,8 +84,8 @@ TEST_CASE("a capsule that sweeps through a ball between two clear nodes is caugh
   CHECK(verdict.contact);
 }
 
-TEST_CASE("clearances down to the resolution are proved on a long way", "[control][unit]") {
-  // the middle of the way passes the ball at so many metres
+TEST_CASE("clearances down to the resolution are proved on a long motion", "[control][unit]") {
+  // the closest approach to the ball, at the middle of the motion [m]
   for (const double gap : {1e-2, 1e-3, 2e-4}) {
     CAPTURE(gap);
     Rig rig(ball({0.0, 1.05 + 0.1 + gap, 0.0}, 0.1));
@@ -93,8 +99,10 @@ TEST_CASE("clearances down to the resolution are proved on a long way", "[contro
   CHECK_FALSE(touching.turn(-0.3, 0.35, 0.0, 0.01).certified);
 }
 
-TEST_CASE("what a trajectory may stray from its line counts in full", "[control][unit]") {
-  // a turn and back within one step: at its middle it has turned by a h²/8 = 0.02 rad, the tip by 2 cm
+TEST_CASE("the possible deviation of a trajectory from its line counts in full",
+          "[control][unit]") {
+  // forth and back within one step: at its middle the joint has turned by a h²/8 = 0.02 rad, the
+  // tip moved by 2 cm
   Rig rig(ball({-0.01 - 0.05 - 0.1, 1.0, 0.0}, 0.1));
   CHECK(rig.turn(0.0, 0.0, 0.0, 0.01).certified);
   CHECK_FALSE(rig.turn(0.0, 0.0, 0.0, 0.01, -1600.0).certified);
@@ -102,9 +110,11 @@ TEST_CASE("what a trajectory may stray from its line counts in full", "[control]
   CHECK(farther.turn(0.0, 0.0, 0.0, 0.01, -1600.0).certified);
 }
 
-TEST_CASE("an obstacle counts with its speed, and in the step in which it appears from its start", "[control][unit]") {
+TEST_CASE("an obstacle counts with its speed, and from the start of the step in which it appears",
+          "[control][unit]") {
   scene::Obstacle swinging = ball({0.0, 1.35, 0.0}, 0.1);
-  swinging.motion = scene::SineMotion{{0.0, -0.3, 0.0}, 0.02};  // at the arm and back within half a period
+  swinging.motion =
+      scene::SineMotion{{0.0, -0.3, 0.0}, 0.02};  // to the arm and back in half a period
   Rig rig(swinging);
   const auto verdict = rig.turn(0.0, 0.0, 0.0, 0.01);
   REQUIRE(rig.before[0] == Approx(0.2));
@@ -112,14 +122,15 @@ TEST_CASE("an obstacle counts with its speed, and in the step in which it appear
   CHECK_FALSE(verdict.certified);
   CHECK(verdict.contact);
 
-  // there for the last third of a step that passes its place in the first: not proved, and no contact
+  // exists in the last third of a step, but the arm passes its place in the first: not proved, and
+  // no contact
   scene::Obstacle sudden = ball({-0.5, 0.5, 0.0}, 0.02);
   sudden.appears_s = 0.007;
   Rig late(sudden);
   const auto passed = late.turn(0.5, 1.4, 0.0, 0.01);
   CHECK_FALSE(passed.certified);
   CHECK_FALSE(passed.contact);
-  // and one whose place the arm passes while it is there
+  // the arm passes its place while it exists
   sudden.appears_s = 0.001;
   Rig early(sudden);
   CHECK(early.turn(0.5, 1.4, 0.0, 0.01).contact);
@@ -129,12 +140,14 @@ TEST_CASE("an obstacle counts with its speed, and in the step in which it appear
   CHECK(Rig(far).turn(0.5, 1.4, 0.0, 0.01).certified);
 }
 
-TEST_CASE("a sliding joint without limits is bounded by where it goes", "[control][unit]") {
+TEST_CASE("the travel of a prismatic joint without limits is bounded by its motion",
+          "[control][unit]") {
   model::Robot robot = model::make_chain({2, "z", 0.2, 1.0, 0.05});
   robot.links[1].joint.type = model::JointType::prismatic;
   robot.links[1].joint.screw << Vector3d::Zero(), Vector3d::UnitY();
   const model::Model model(robot);
-  // turned about z with the slide 4 m out: the last capsule's end is 4.4 m from the axis
+  // a turn about z with the slide extended by 4 m: the end of the last capsule is 4.4 m from the
+  // axis
   scene::Obstacle post = ball({-4.4 * std::sin(0.05), 4.4 * std::cos(0.05), 0.0}, 0.04);
   const scene::Environment environment(std::nullopt, {post}, geometry::SE3{}, 10.0, 0.5);
   Certificate certificate(model, environment, 0.5, nullptr, 0.0);
@@ -147,30 +160,33 @@ TEST_CASE("a sliding joint without limits is bounded by where it goes", "[contro
   next.place(model, ws);
   std::vector<double> before, after;
   for (std::size_t s = 0; s < 2; ++s) {
-    before.push_back(environment.clearance(arm.view().only(s), 0.0, 0.5));
-    after.push_back(environment.clearance(next.view().only(s), 0.0, 0.5));
+    before.push_back(environment.clearance(arm.view().single(s), 0.0, 0.5));
+    after.push_back(environment.clearance(next.view().single(s), 0.0, 0.5));
   }
   REQUIRE(before[1] > 0.1);
   REQUIRE(after[1] > 0.1);
   const VectorXd v = (p - q) / 0.01;
-  const auto verdict = certificate.check(ws, {q, v, 0.0, arm.view(), before, {}}, {p, v, 0.01, next.view(), after, {}});
+  const auto verdict = certificate.check(ws, {q, v, 0.0, arm.view(), before, {}},
+                                         {p, v, 0.01, next.view(), after, {}});
   CHECK_FALSE(verdict.certified);
   CHECK(verdict.contact);
 }
 
 #ifdef HAMELIN_WITH_FCL
-TEST_CASE("no random motion is certified that dense sampling with FCL finds in contact", "[control][property]") {
+TEST_CASE("no random motion is certified that dense sampling with FCL finds in contact",
+          "[control][property]") {
   std::uint64_t seed = 1;
-  for (test::Stage& stage : test::stages(std::filesystem::temp_directory_path())) {
-    CAPTURE(stage.name);
-    test::MotionJudge judge(std::move(stage), seed++);
+  for (test::ArmInMap& arm : test::arms_in_maps(std::filesystem::temp_directory_path())) {
+    CAPTURE(arm.name);
+    test::MotionJudge judge(std::move(arm), seed++);
     test::MotionCounts counts;
-    judge.play(200, counts);
+    judge.run(200, counts);
     CHECK(counts.contradictions == 0);
     CHECK(counts.motions > 150);
     CHECK(counts.contacts > 10);
     CHECK(counts.certified > counts.motions / 2);
-    // free motions that are not certified: those in which something comes nearer than the trajectory may stray
+    // free motions that are not certified: the clearance is smaller than the possible deviation
+    // from the line
     CHECK(counts.free_uncertified < counts.motions / 4);
   }
 }

@@ -10,16 +10,21 @@
 using namespace hamelin;
 
 TEST_CASE("the README's example proves a motion beside a ball", "[control][unit]") {
-  const std::filesystem::path folder = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output";
+  const std::filesystem::path folder =
+      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output";
   std::filesystem::create_directories(folder);
   const model::Robot robot = test::planar4();
-  write_file_aside(folder / "control_readme_robot.json", description::robot_to_json(robot).dump());
-  const Json document{
-      {"schema", "hamelin.scene/1"},
-      {"robot", {{"file", "control_readme_robot.json"}}},
-      {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}}}},
-      {"obstacles", {{{"name", "ball"}, {"type", "sphere"}, {"radius_m", 0.1}, {"position_m", {1.5, 0.4, 0.0}}}}},
-      {"planner", {{"name", "apf"}}}};
+  write_file_atomically(folder / "control_readme_robot.json",
+                        description::robot_to_json(robot).dump());
+  const Json document{{"schema", "hamelin.scene/1"},
+                      {"robot", {{"file", "control_readme_robot.json"}}},
+                      {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}}}},
+                      {"obstacles",
+                       {{{"name", "ball"},
+                         {"type", "sphere"},
+                         {"radius_m", 0.1},
+                         {"position_m", {1.5, 0.4, 0.0}}}}},
+                      {"planner", {{"name", "apf"}}}};
   const Eigen::VectorXd from = Eigen::VectorXd::Zero(4), to = Eigen::VectorXd::Constant(4, 0.02);
   // clang-format off
   // [example]

@@ -4,7 +4,8 @@
 
 namespace hamelin {
 
-Error::Error(ErrorCode code, std::string_view what) : std::runtime_error(one_line(what)), code_(code) {}
+Error::Error(ErrorCode code, std::string_view message)
+    : std::runtime_error(one_line(message)), code_(code) {}
 
 std::string_view to_string(ErrorCode code) noexcept {
   switch (code) {

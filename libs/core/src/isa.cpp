@@ -66,17 +66,20 @@ Isa isa_from_name(std::string_view name, std::string_view where) {
     if (names[i] != name) continue;
     const Isa isa{static_cast<std::int32_t>(i)};
     if (is_available(isa)) return isa;
-    throw Error(ErrorCode::usage, formatted("{}: this machine does not have the instruction set '{}', expected {}",
-                                            where, name, name_of(best_isa())));
+    throw Error(ErrorCode::usage,
+                formatted("{}: this machine does not have the instruction set '{}', expected {}",
+                          where, name, name_of(best_isa())));
   }
   throw Error(ErrorCode::usage,
-              formatted("{}: instruction set '{}' is not known, expected one of {}", where, name, joined(names, ", ")));
+              formatted("{}: instruction set '{}' is not known, expected one of {}", where, name,
+                        joined(names, ", ")));
 }
 
 void require_available(Isa isa) {
   if (!is_available(isa))
-    throw Error(ErrorCode::usage, formatted("instruction set: this machine does not have '{}', expected at most '{}'",
-                                            name_of(isa), name_of(best_isa())));
+    throw Error(ErrorCode::usage,
+                formatted("instruction set: this machine does not have '{}', expected at most '{}'",
+                          name_of(isa), name_of(best_isa())));
 }
 
 }  // namespace hamelin

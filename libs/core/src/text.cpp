@@ -7,21 +7,24 @@ namespace hamelin {
 
 namespace {
 
-// Bytes of the UTF-8 character that text begins with, 0 if it begins with none: no overlong form, no surrogate.
+// The size in bytes of the UTF-8 character at the beginning of the text, 0 if there is none.
+// Overlong forms and surrogates are not accepted.
 std::size_t character_at(std::string_view text) noexcept {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
+  };
   const auto follows = [&](std::size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
   const unsigned first = byte(0), second = byte(1);
   if (first < 0x80U) return 1;
   if (first >= 0xC2U && first <= 0xDFU) return follows(1) ? 2 : 0;
   if ((first & 0xF0U) == 0xE0U) {
-    const bool good =
-        follows(1) && follows(2) && !(first == 0xE0U && second < 0xA0U) && !(first == 0xEDU && second > 0x9FU);
+    const bool good = follows(1) && follows(2) && !(first == 0xE0U && second < 0xA0U) &&
+                      !(first == 0xEDU && second > 0x9FU);
     return good ? 3 : 0;
   }
   if (first >= 0xF0U && first <= 0xF4U) {
-    const bool good = follows(1) && follows(2) && follows(3) && !(first == 0xF0U && second < 0x90U) &&
-                      !(first == 0xF4U && second > 0x8FU);
+    const bool good = follows(1) && follows(2) && follows(3) &&
+                      !(first == 0xF0U && second < 0x90U) && !(first == 0xF4U && second > 0x8FU);
     return good ? 4 : 0;
   }
   return 0;
@@ -60,10 +63,12 @@ std::string one_line(std::string_view text) {
 
 namespace {
 
-// Edits that turn a into b: insert, delete, change, or swap two neighbours (optimal string alignment). Case is no edit.
+// The number of edits that turn a into b: insert, delete, change, or swap two neighbours (optimal
+// string alignment). A difference in case does not count.
 std::size_t edits_between(std::string_view a, std::string_view b) {
   const auto same = [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+    return std::tolower(static_cast<unsigned char>(x)) ==
+           std::tolower(static_cast<unsigned char>(y));
   };
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i)
@@ -83,14 +88,15 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
-  constexpr std::size_t longest = 100;  // no one mistypes a longer one, and the time grows with the square
+  // Longer names are not typed by hand, and the time grows with the square of the length.
+  constexpr std::size_t longest = 100;
   if (name.size() > longest) return {};
   std::string best;
   std::size_t fewest = 1 + std::max<std::size_t>(1, name.size() / 3);
   for (const auto& candidate : candidates) {
     if (candidate.size() > longest) continue;
     const std::size_t edits = edits_between(name, candidate);
-    // Names that share less than half of their letters are not alike, however short they are.
+    // Names that share less than half of their letters are not near, even short ones.
     if (edits >= fewest || 2 * edits >= std::max(name.size(), candidate.size())) continue;
     fewest = edits;
     best = candidate;

@@ -4,8 +4,10 @@
 
 using namespace hamelin;
 
-TEST_CASE("an error's text is one line of UTF-8, whatever it speaks of", "[core][unit]") {
-  const auto text = [](std::string_view what) { return std::string(Error(ErrorCode::parse, what).what()); };
+TEST_CASE("an error's message is one line of UTF-8 for any input", "[core][unit]") {
+  const auto text = [](std::string_view message) {
+    return std::string(Error(ErrorCode::parse, message).what());
+  };
   CHECK(text("a.json: key 'x' is given twice") == "a.json: key 'x' is given twice");
   CHECK(text("a\nb\r\tc\x1b\x7f.") == "a b  c  .");
   CHECK(text("±é€😀") == "±é€😀");

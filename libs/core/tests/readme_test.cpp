@@ -14,12 +14,13 @@ TEST_CASE("the README's example names the misspelt key and draws a number", "[co
 std::string message;
 try {
   const std::string key = "stp_s";
-  throw Error(ErrorCode::invalid, "scene.json: /: unknown key '" + key + "'" + did_you_mean(key, {"step_s", "seed"}));
+  throw Error(ErrorCode::invalid,
+              "scene.json: /: unknown key '" + key + "'" + did_you_mean(key, {"step_s", "seed"}));
 } catch (const Error& error) {
   message = error.what();  // scene.json: /: unknown key 'stp_s'; did you mean 'step_s'?
 }
 Rng rng(1);
-const double x = rng.uniform(-1.0, 1.0);  // 0.6232243177637695 everywhere
+const double x = rng.uniform(-1.0, 1.0);  // 0.6232243177637695 on every platform
   // [example]
   // clang-format on
   CHECK(message == "scene.json: /: unknown key 'stp_s'; did you mean 'step_s'?");

@@ -7,18 +7,19 @@
 using hamelin::Rng;
 
 TEST_CASE("seed 1 gives the numbers of xoshiro256++ seeded by splitmix64", "[core][unit]") {
-  // From a separate implementation with integers of any size, which gives 41943041, 58720359, 3588806011781223, … for
-  // the state {1, 2, 3, 4}, as Blackman and Vigna's own does.
+  // From a separate implementation with integers of any size. For the state {1, 2, 3, 4} it gives
+  // 41943041, 58720359, 3588806011781223, …, as the implementation of Blackman and Vigna does.
   Rng rng(1);
-  const std::array<std::uint64_t, 6> expected{0xcfc5d07f6f03c29b, 0xbf424132963fe08d, 0x19a37d5757aaf520,
-                                              0xbf08119f05cd56d6, 0x2f47184b86186fa4, 0x97299fcae7202345};
+  const std::array<std::uint64_t, 6> expected{0xcfc5d07f6f03c29b, 0xbf424132963fe08d,
+                                              0x19a37d5757aaf520, 0xbf08119f05cd56d6,
+                                              0x2f47184b86186fa4, 0x97299fcae7202345};
   for (const auto value : expected) CHECK(rng.next() == value);
   Rng again(1);
   CHECK(again.uniform() == 0.8116121588818848);
   CHECK(again.uniform() == 0.7471047161582187);
 }
 
-TEST_CASE("uniform numbers fill their range, end excluded, evenly", "[core][property]") {
+TEST_CASE("uniform numbers fill their range evenly, upper end excluded", "[core][property]") {
   Rng rng(2);
   std::array<int, 10> counts{};
   double low = 1.0, high = 0.0;
@@ -53,7 +54,7 @@ TEST_CASE("normal numbers have mean 0 and variance 1", "[core][property]") {
   CHECK(std::abs(squares / n - 1.0) < 0.023);
 }
 
-TEST_CASE("a seed and a copy repeat their numbers, another seed does not", "[core][unit]") {
+TEST_CASE("the same seed or a copy repeats the numbers, another seed does not", "[core][unit]") {
   Rng a(42), b(42), c(43);
   for (int i = 0; i < 5; ++i) CHECK(a.next() == b.next());
   Rng copy = a;

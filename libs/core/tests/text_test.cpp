@@ -4,7 +4,7 @@
 
 using namespace hamelin;
 
-TEST_CASE("what is not UTF-8 is found where it stands", "[core][unit]") {
+TEST_CASE("utf8_prefix ends at the first byte that is not UTF-8", "[core][unit]") {
   CHECK(utf8_prefix("") == 0);
   CHECK(utf8_prefix("plain") == 5);
   CHECK(utf8_prefix("é€😀") == 9);
@@ -27,20 +27,22 @@ TEST_CASE("the nearest name is one within a third of its letters, or none", "[co
   CHECK(nearest_name("x", {}).empty());
 }
 
-TEST_CASE("two neighbours swapped are one slip, and capitals none", "[core][unit]") {
+TEST_CASE("two swapped neighbours count as one edit, and capitals as none", "[core][unit]") {
   CHECK(nearest_name("sede", {"seed", "step_s"}) == "seed");
   CHECK(nearest_name("rnu", {"run", "robot"}) == "run");
-  CHECK(nearest_name("--setp", {"--set", "--step", "--seed"}) == "--set");  // one slip from both: the first
+  // One edit from two names: the first is taken.
+  CHECK(nearest_name("--setp", {"--set", "--step", "--seed"}) == "--set");
   CHECK(nearest_name("RK4", {"hamel", "rk4"}) == "rk4");
   CHECK(nearest_name("abcd", {"badc"}).empty());  // two swaps in four letters
 }
 
-TEST_CASE("no name is near that shares less than half of its letters", "[core][unit]") {
+TEST_CASE("a name that shares less than half of its letters is not near", "[core][unit]") {
   CHECK(nearest_name("x", {"y"}).empty());
   CHECK(nearest_name("q0", {"v0"}).empty());
   CHECK(nearest_name("a", {"ab"}).empty());
   CHECK(nearest_name("rn", {"run"}) == "run");
-  CHECK(nearest_name(std::string(100000, 'x'), {"x", std::string(100000, 'x')}).empty());  // no one mistypes that
+  // Too long to be typed by hand.
+  CHECK(nearest_name(std::string(100000, 'x'), {"x", std::string(100000, 'x')}).empty());
 }
 
 TEST_CASE("an error message ends with the nearest name, if there is one", "[core][unit]") {

@@ -36,7 +36,8 @@ Json json_of(const Vector3d& v) {
 
 SE3 pose_of(const Json& json, const std::string& where) {
   try {
-    return {geometry::rotation_from_wxyz(numbers_of<4>(json["quaternion_wxyz"])), vector_of(json["position_m"])};
+    return {geometry::rotation_from_wxyz(numbers_of<4>(json["quaternion_wxyz"])),
+            vector_of(json["position_m"])};
   } catch (const Error& e) {
     throw Error(ErrorCode::invalid, fmt::format("{}/{}", where, e.what()));
   }
@@ -48,7 +49,7 @@ void put_pose(Json& json, const SE3& pose) {
   json["quaternion_wxyz"] = {q[0], q[1], q[2], q[3]};
 }
 
-// A list that may be left out.
+// A list that may be absent from the document; an absent list is empty.
 const Json& list_of(const Json& json, const char* key) {
   static const Json none = Json::array();
   return json.contains(key) ? json[key] : none;
@@ -77,7 +78,8 @@ Joint joint_of(const Json& json) {
 }
 
 Json json_of(const Joint& joint) {
-  Json json{{"name", joint.name}, {"type", joint.type == JointType::revolute ? "revolute" : "prismatic"}};
+  Json json{{"name", joint.name},
+            {"type", joint.type == JointType::revolute ? "revolute" : "prismatic"}};
   json["screw"] = std::vector<double>(joint.screw.begin(), joint.screw.end());
   json["lower"] = json_of(joint.lower);
   json["upper"] = json_of(joint.upper);
@@ -100,11 +102,14 @@ Json json_of(const Sphere& sphere) {
 }
 
 Segment segment_of(const Json& json) {
-  return {vector_of(json["from_m"]), vector_of(json["to_m"]), json["radius_m"].get<double>(), json.value("part", "")};
+  return {vector_of(json["from_m"]), vector_of(json["to_m"]), json["radius_m"].get<double>(),
+          json.value("part", "")};
 }
 
 Json json_of(const Segment& segment) {
-  Json json{{"from_m", json_of(segment.from_m)}, {"to_m", json_of(segment.to_m)}, {"radius_m", segment.radius_m}};
+  Json json{{"from_m", json_of(segment.from_m)},
+            {"to_m", json_of(segment.to_m)},
+            {"radius_m", segment.radius_m}};
   if (!segment.part.empty()) json["part"] = segment.part;
   return json;
 }
@@ -128,8 +133,8 @@ Matrix3d through_quaternion(const Matrix3d& R) {
 }
 
 Matrix3d rounded(Matrix3d R) {
-  // Rounding makes the passes settle, mostly at once; a rotation that keeps alternating between neighbours is turned by
-  // some roundings, which starts another sequence.
+  // The passes usually converge at once, because of rounding. A rotation that alternates between
+  // neighbours is changed by a few roundings, which starts another sequence.
   constexpr int tries = 100, passes = 20;
   constexpr double roundings = 4e-16;
   Rng rng(0);
@@ -146,7 +151,7 @@ Matrix3d rounded(Matrix3d R) {
   return R;
 }
 
-// A sidecar with collision shapes, read with its places for messages.
+// Reads a sidecar with collision shapes; messages name the place in the document.
 class SidecarReader {
  public:
   explicit SidecarReader(const std::string& where) : where_(where) {}
@@ -156,9 +161,11 @@ class SidecarReader {
       fail("expected an object whose \"links\" maps link names to lists of spheres");
     detail::SphereFile out;
     out.where = where_;
-    for (const auto& [name, list] : document["links"].items()) out.links[name] = spheres(list, "/links/" + name);
+    for (const auto& [name, list] : document["links"].items())
+      out.links[name] = spheres(list, "/links/" + name);
     if (document.contains("capsules")) {
-      if (!document["capsules"].is_object()) fail("/capsules: expected an object that maps link names to capsules");
+      if (!document["capsules"].is_object())
+        fail("/capsules: expected an object that maps link names to capsules");
       for (const auto& [name, list] : document["capsules"].items())
         out.capsules[name] = capsules(list, "/capsules/" + name);
     }
@@ -168,8 +175,8 @@ class SidecarReader {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where_, what));
+  [[noreturn]] void fail(const std::string& message) const {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where_, message));
   }
   [[nodiscard]] double number(const Json& value, const std::string& place) const {
     if (!value.is_number()) fail(fmt::format("{}: expected a number", place));
@@ -192,7 +199,8 @@ class SidecarReader {
     std::vector<Sphere> out;
     for (const Json& sphere : list) {
       const std::string place = fmt::format("{}/{}", where, out.size());
-      if (!sphere.is_object() || sphere.size() != 2 || !has_point(sphere, "center") || !sphere.contains("radius"))
+      if (!sphere.is_object() || sphere.size() != 2 || !has_point(sphere, "center") ||
+          !sphere.contains("radius"))
         fail(fmt::format("{}: expected {{\"center\": [x, y, z], \"radius\": r}}", place));
       out.push_back({point(sphere["center"], place + "/center"), radius(sphere["radius"], place)});
     }
@@ -204,9 +212,10 @@ class SidecarReader {
     std::vector<Segment> out;
     for (const Json& capsule : list) {
       const std::string place = fmt::format("{}/{}", where, out.size());
-      if (!capsule.is_object() || capsule.size() != 3 || !has_point(capsule, "from") || !has_point(capsule, "to") ||
-          !capsule.contains("radius"))
-        fail(fmt::format("{}: expected {{\"from\": [x, y, z], \"to\": [x, y, z], \"radius\": r}}", place));
+      if (!capsule.is_object() || capsule.size() != 3 || !has_point(capsule, "from") ||
+          !has_point(capsule, "to") || !capsule.contains("radius"))
+        fail(fmt::format("{}: expected {{\"from\": [x, y, z], \"to\": [x, y, z], \"radius\": r}}",
+                         place));
       out.push_back({point(capsule["from"], place + "/from"), point(capsule["to"], place + "/to"),
                      radius(capsule["radius"], place)});
     }
@@ -214,11 +223,13 @@ class SidecarReader {
   }
 
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> pairs(const Json& list) const {
-    constexpr const char* expected = "/self_collision_disabled: expected a list of pairs of link names";
+    constexpr const char* expected =
+        "/self_collision_disabled: expected a list of pairs of link names";
     if (!list.is_array()) fail(expected);
     std::vector<std::pair<std::string, std::string>> out;
     for (const Json& pair : list) {
-      if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string()) fail(expected);
+      if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
+        fail(expected);
       out.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
     }
     return out;
@@ -227,29 +238,32 @@ class SidecarReader {
   const std::string& where_;
 };
 
-void take_spheres(Robot& robot, const detail::SphereFile& given) {
+void replace_shapes(Robot& robot, const detail::SphereFile& given) {
   std::vector<std::string> names;
   for (auto& link : robot.links) {
     link.spheres.clear();
     auto& segments = link.segments;
-    segments.erase(std::remove_if(segments.begin(), segments.end(), [](const Segment& s) { return s.is_capsule(); }),
+    segments.erase(std::remove_if(segments.begin(), segments.end(),
+                                  [](const Segment& s) { return s.is_capsule(); }),
                    segments.end());
     names.push_back(link.name);
   }
   robot.base_spheres.clear();
   robot.base_segments.clear();
-  // A sidecar of a JSON robot speaks of links; pairs of the parts that went with the spheres mean nothing any more.
-  const auto gone = [&](const auto& pair) {
+  // Pairs that name parts of the replaced shapes are dropped; the sidecar of a JSON robot names
+  // links only.
+  const auto names_removed_part = [&](const auto& pair) {
     return std::find(names.begin(), names.end(), pair.first) == names.end() ||
            std::find(names.begin(), names.end(), pair.second) == names.end();
   };
   auto& disabled = robot.self_collision_disabled;
-  disabled.erase(std::remove_if(disabled.begin(), disabled.end(), gone), disabled.end());
+  disabled.erase(std::remove_if(disabled.begin(), disabled.end(), names_removed_part),
+                 disabled.end());
   const auto link_named = [&](const std::string& name) -> Link& {
     for (auto& link : robot.links)
       if (link.name == name) return link;
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: the robot has no link '{}'{}", given.where, name, did_you_mean(name, names)));
+    throw Error(ErrorCode::invalid, fmt::format("{}: the robot has no link '{}'{}", given.where,
+                                                name, did_you_mean(name, names)));
   };
   for (const auto& [name, spheres] : given.links) link_named(name).spheres = spheres;
   for (const auto& [name, capsules] : given.capsules) {
@@ -260,8 +274,9 @@ void take_spheres(Robot& robot, const detail::SphereFile& given) {
     robot.self_collision_disabled.emplace_back(link_named(a).name, link_named(b).name);
 }
 
-// Pairs of parts that this robot has; a JSON robot has not all links of the URDF that the SRDF speaks of.
-void take_srdf(Robot& robot, const std::filesystem::path& file) {
+// Adds the pairs whose parts this robot has. A JSON robot may lack links of the URDF for which the
+// SRDF was written.
+void apply_srdf(Robot& robot, const std::filesystem::path& file) {
   std::vector<std::string> parts;
   const auto add = [&](const auto& shapes) {
     for (const auto& shape : shapes) parts.push_back(shape.part);
@@ -279,11 +294,14 @@ void take_srdf(Robot& robot, const std::filesystem::path& file) {
   std::vector<DisabledPair> pairs = read_srdf(file);
   const std::size_t all = pairs.size();
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                             [&](const DisabledPair& pair) { return !known(pair.link_a) || !known(pair.link_b); }),
+                             [&](const DisabledPair& pair) {
+                               return !known(pair.link_a) || !known(pair.link_b);
+                             }),
               pairs.end());
-  std::string said = detail::join_pairs(robot.self_collision_disabled, pairs, file.filename());
-  if (pairs.size() < all) said += fmt::format("; {} more are of links that this robot has not", all - pairs.size());
-  robot.notes.push_back(said);
+  std::string note = detail::merge_pairs(robot.self_collision_disabled, pairs, file.filename());
+  if (pairs.size() < all)
+    note += fmt::format("; {} more name links that this robot does not have", all - pairs.size());
+  robot.notes.push_back(note);
 }
 
 }  // namespace
@@ -292,14 +310,17 @@ std::string detail::join(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-void detail::judge_inertia(Robot& robot, const std::string& link, const Matrix3d& inertia, bool strict,
-                           const std::string& where) {
+void detail::check_triangle_inequality(Robot& robot, const std::string& link,
+                                       const Matrix3d& inertia, bool strict,
+                                       const std::string& where) {
   const std::string fault = model::triangle_fault(inertia);
   if (fault.empty()) return;
-  if (strict) throw Error(ErrorCode::invalid, fmt::format("{}: link '{}': inertia {}", where, link, fault));
-  const std::string note =
-      fmt::format("{}link '{}': inertia {}; it is used as given", model::warning_prefix, link, fault);
-  if (std::find(robot.notes.begin(), robot.notes.end(), note) == robot.notes.end()) robot.notes.push_back(note);
+  if (strict)
+    throw Error(ErrorCode::invalid, fmt::format("{}: link '{}': inertia {}", where, link, fault));
+  const std::string note = fmt::format("{}link '{}': inertia {}; it is used as given",
+                                       model::warning_prefix, link, fault);
+  if (std::find(robot.notes.begin(), robot.notes.end(), note) == robot.notes.end())
+    robot.notes.push_back(note);
 }
 
 void detail::round_to_quaternions(Robot& robot) {
@@ -309,14 +330,17 @@ void detail::round_to_quaternions(Robot& robot) {
 }
 
 std::string detail::normalise_screw(Joint& joint, const std::string& where) {
-  constexpr double rounding = 1e-14;  // within this it is a unit vector already, and stays as it is
+  constexpr double rounding = 1e-14;  // a vector that is a unit vector to within this is kept
   constexpr double worth_a_note = 1e-6;
-  const double length = joint.type == JointType::revolute ? joint.screw.head<3>().norm() : joint.screw.tail<3>().norm();
+  const double length = joint.type == JointType::revolute ? joint.screw.head<3>().norm()
+                                                          : joint.screw.tail<3>().norm();
   if (!(length > 1e-9 && length < 1e9))
-    throw Error(ErrorCode::invalid, fmt::format("{}: the axis has length {}, expected a direction", where, length));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: the axis has length {}, expected a direction", where, length));
   if (std::abs(length - 1.0) > rounding) joint.screw /= length;
   if (std::abs(length - 1.0) <= worth_a_note) return {};
-  return fmt::format("joint '{}': its axis had length {:.6g} and was normalised", joint.name, length);
+  return fmt::format("joint '{}': its axis had length {:.6g} and was normalised", joint.name,
+                     length);
 }
 
 std::size_t check_spheres(const std::filesystem::path& file) {
@@ -341,7 +365,8 @@ Robot robot_from_json(const Json& document, const std::string& where) {
   check_shipped_schema(document, "robot", where);
   Robot robot;
   robot.name = document["name"].get<std::string>();
-  for (const auto& note : list_of(document, "notes")) robot.notes.push_back(note.get<std::string>());
+  for (const auto& note : list_of(document, "notes"))
+    robot.notes.push_back(note.get<std::string>());
   std::vector<std::string> names;
   for (const auto& json : document["links"]) {
     const std::string place = fmt::format("{}: /links/{}", where, robot.links.size());
@@ -369,16 +394,22 @@ Robot robot_from_json(const Json& document, const std::string& where) {
   const Json& tip = document["tip"];
   const auto at = std::find(names.begin(), names.end(), tip["link"].get<std::string>());
   if (at == names.end())
-    throw Error(ErrorCode::invalid, fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
-                                                tip["link"].get<std::string>(), detail::join(names)));
-  robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()), pose_of(tip, where + ": /tip")};
-  for (const auto& sphere : list_of(document, "base_spheres")) robot.base_spheres.push_back(sphere_of(sphere));
-  for (const auto& segment : list_of(document, "base_segments")) robot.base_segments.push_back(segment_of(segment));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /tip/link: no link '{}', expected one of {}", where,
+                            tip["link"].get<std::string>(), detail::join(names)));
+  robot.tip = {tip.value("name", *at), static_cast<int>(at - names.begin()),
+               pose_of(tip, where + ": /tip")};
+  for (const auto& sphere : list_of(document, "base_spheres"))
+    robot.base_spheres.push_back(sphere_of(sphere));
+  for (const auto& segment : list_of(document, "base_segments"))
+    robot.base_segments.push_back(segment_of(segment));
   for (const auto& pair : list_of(document, "self_collision_disabled"))
-    robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(), pair[1].get<std::string>());
+    robot.self_collision_disabled.emplace_back(pair[0].get<std::string>(),
+                                               pair[1].get<std::string>());
   detail::round_to_quaternions(robot);
   model::check(robot, where);
-  for (const Link& link : robot.links) detail::judge_inertia(robot, link.name, link.inertia_kg_m2, false, where);
+  for (const Link& link : robot.links)
+    detail::check_triangle_inequality(robot, link.name, link.inertia_kg_m2, false, where);
   return robot;
 }
 
@@ -396,7 +427,8 @@ Json robot_to_json(const Robot& robot) {
   }
   if (!robot.base_segments.empty()) {
     json["base_segments"] = Json::array();
-    for (const auto& segment : robot.base_segments) json["base_segments"].push_back(json_of(segment));
+    for (const auto& segment : robot.base_segments)
+      json["base_segments"].push_back(json_of(segment));
   }
   json["self_collision_disabled"] = Json::array();
   for (const auto& [a, b] : robot.self_collision_disabled)
@@ -411,19 +443,22 @@ Robot read_robot(const std::filesystem::path& file, const RobotOptions& options)
   if (extension == ".urdf") return detail::read_urdf(text, where, options);
   if (extension != ".json")
     throw Error(ErrorCode::usage,
-                fmt::format("{}: unknown kind of robot file '{}', expected .urdf or .json", where, extension));
+                fmt::format("{}: unknown kind of robot file '{}', expected .urdf or .json", where,
+                            extension));
   Robot robot = robot_from_json(parse_json(text, where), where);
   if (options.strict)
-    for (const Link& link : robot.links) detail::judge_inertia(robot, link.name, link.inertia_kg_m2, true, where);
+    for (const Link& link : robot.links)
+      detail::check_triangle_inequality(robot, link.name, link.inertia_kg_m2, true, where);
   if (options.tip && *options.tip != robot.tip.name)
-    throw Error(ErrorCode::invalid, fmt::format("{}: no tip '{}': a JSON robot has the one tip it names, '{}'", where,
-                                                *options.tip, robot.tip.name));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: no tip '{}', expected '{}', the only tip of a JSON robot", where,
+                            *options.tip, robot.tip.name));
   if (const auto sidecar = detail::sidecar_of(options)) {
-    take_spheres(robot, *sidecar);
+    replace_shapes(robot, *sidecar);
     model::check(robot, sidecar->where);
   }
   if (options.srdf) {
-    take_srdf(robot, *options.srdf);
+    apply_srdf(robot, *options.srdf);
     model::check(robot, options.srdf->string());
   }
   return robot;

@@ -22,7 +22,8 @@ DisabledPair pair_of(const XMLElement& element, const std::string& where) {
   const auto name = [&](const char* attribute) {
     std::string value = detail::text_of(element, attribute);
     if (value.empty())
-      fail(ErrorCode::parse, where, pair.line, fmt::format("<disable_collisions> has no {}", attribute));
+      fail(ErrorCode::parse, where, pair.line,
+           fmt::format("<disable_collisions> has no {}", attribute));
     return value;
   };
   pair.link_a = name("link1");
@@ -39,28 +40,33 @@ void refuse_other_formats(const XMLElement& element, const std::string& where) {
   const int line = element.GetLineNum();
   if (tag == "disable_default_collisions" || tag == "enable_collisions")
     fail(ErrorCode::invalid, where, line,
-         fmt::format("<{}> is not taken, expected the pairs themselves as <disable_collisions>", tag));
+         fmt::format("<{}> is not supported, expected each pair as <disable_collisions>", tag));
   if (tag == "link" || tag == "joint")
-    fail(ErrorCode::invalid, where, line, fmt::format("<{}>: that is a URDF, expected an SRDF", tag));
+    fail(ErrorCode::invalid, where, line,
+         fmt::format("<{}> is an element of URDF, expected an SRDF", tag));
   if (tag.substr(0, 6) == "xacro:")
-    fail(ErrorCode::parse, where, line, fmt::format("<{}>: the file is xacro source, expected expanded SRDF", tag));
+    fail(ErrorCode::parse, where, line,
+         fmt::format("<{}>: the file is xacro source, expected expanded SRDF", tag));
 }
 
 }  // namespace
 
-std::string detail::join_pairs(std::vector<std::pair<std::string, std::string>>& disabled,
-                               const std::vector<DisabledPair>& more, const std::filesystem::path& file) {
+std::string detail::merge_pairs(std::vector<std::pair<std::string, std::string>>& disabled,
+                                const std::vector<DisabledPair>& more,
+                                const std::filesystem::path& file) {
   const std::size_t before = disabled.size();
   for (const DisabledPair& pair : more) {
-    const bool there = std::any_of(disabled.begin(), disabled.end(), [&](const auto& old) {
+    const bool listed = std::any_of(disabled.begin(), disabled.end(), [&](const auto& old) {
       return (old.first == pair.link_a && old.second == pair.link_b) ||
              (old.first == pair.link_b && old.second == pair.link_a);
     });
-    if (!there) disabled.emplace_back(pair.link_a, pair.link_b);
+    if (!listed) disabled.emplace_back(pair.link_a, pair.link_b);
   }
-  std::string said = fmt::format("{}: {} pairs that never count as colliding", file.string(), more.size());
-  if (before > 0) said += fmt::format(", {} of them new to the {} listed elsewhere", disabled.size() - before, before);
-  return said;
+  std::string note =
+      fmt::format("{}: {} pairs that never count as colliding", file.string(), more.size());
+  if (before > 0)
+    note += fmt::format(", {} of them new ({} listed elsewhere)", disabled.size() - before, before);
+  return note;
 }
 
 std::vector<DisabledPair> read_srdf(const std::filesystem::path& file) {
@@ -75,7 +81,8 @@ std::vector<DisabledPair> read_srdf(const std::filesystem::path& file) {
   return pairs;
 }
 
-std::vector<DisabledPair> read_srdf(const std::filesystem::path& file, const std::vector<std::string>& links) {
+std::vector<DisabledPair> read_srdf(const std::filesystem::path& file,
+                                    const std::vector<std::string>& links) {
   auto pairs = read_srdf(file);
   for (const DisabledPair& pair : pairs)
     for (const std::string& link : {pair.link_a, pair.link_b})

@@ -21,7 +21,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using geometry::SE3;
 
-// The inertial of one URDF link, placed.
+// The <inertial> of one URDF link, in the base frame.
 struct Inertial {
   SE3 frame;  // COM frame in the base frame
   double mass_kg = 0.0;
@@ -29,7 +29,8 @@ struct Inertial {
   const UrdfLink* link = nullptr;
 };
 
-// About their common centre of mass, in the axes of `axes`; the centre is the origin of `axes` if there is no mass.
+// The sum of inertias about their common centre of mass, in the axes of `axes`. Without mass, the
+// centre is the origin of `axes`.
 Inertial sum_of(const std::vector<Inertial>& parts, const SE3& axes) {
   Inertial sum;
   Vector3d moment = Vector3d::Zero();
@@ -52,29 +53,34 @@ Inertial sum_of(const std::vector<Inertial>& parts, const SE3& axes) {
 class Reader {
  public:
   Reader(const detail::UrdfFile& file, const std::string& where, const RobotOptions& options)
-      : file_(file), where_(where), options_(options), tree_(detail::make_tree(file, where, options.tip)) {}
+      : file_(file),
+        where_(where),
+        options_(options),
+        tree_(detail::make_tree(file, where, options.tip)) {}
 
   Robot read() {
     robot_.name = file_.name;
     robot_.notes = tree_.notes;
-    take_spheres();
+    read_collision_shapes();
     for (std::size_t i = 0; i < tree_.bodies.size(); ++i) robot_.links.push_back(moving_link(i));
     keep_base_shapes();
     const std::string& tip = tree_.tip->name();
     robot_.tip = {tip, static_cast<int>(tree_.bodies.size()) - 1, tree_.poses.at(tip)};
     disable_pairs();
-    note_the_rest();
+    note_skipped();
     detail::round_to_quaternions(robot_);
     model::check(robot_, where_);
     return std::move(robot_);
   }
 
  private:
-  [[noreturn]] void fail_at(const UrdfLink& link, const std::string& what) const {
-    detail::fail(ErrorCode::invalid, where_, link.shapes.line, fmt::format("link '{}': {}", link.name(), what));
+  [[noreturn]] void fail_at(const UrdfLink& link, const std::string& message) const {
+    detail::fail(ErrorCode::invalid, where_, link.shapes.line,
+                 fmt::format("link '{}': {}", link.name(), message));
   }
-  [[noreturn]] void fail_at(const UrdfJoint& joint, const std::string& what) const {
-    detail::fail(ErrorCode::invalid, where_, joint.line, fmt::format("joint '{}': {}", joint.name, what));
+  [[noreturn]] void fail_at(const UrdfJoint& joint, const std::string& message) const {
+    detail::fail(ErrorCode::invalid, where_, joint.line,
+                 fmt::format("joint '{}': {}", joint.name, message));
   }
   template <class... Args>
   void note(const char* format, const Args&... args) {
@@ -84,32 +90,36 @@ class Reader {
   // ---- collision shapes: those of the file, or the sidecar's ----
 
   // Spheres by URDF link, in that link's frame.
-  void take_spheres() {
-    std::size_t own = 0;
+  void read_collision_shapes() {
+    std::size_t own_spheres = 0;
     for (const UrdfLink* link : tree_.order)
       for (const LinkShape& shape : link->shapes.collision) {
         if (shape.kind != LinkShape::Kind::sphere) continue;
         detail::check_sizes(shape, {where_, fmt::format("link '{}'", link->name())});
         spheres_.links[link->name()].push_back({shape.pose.p(), shape.radius_m});
-        ++own;
+        ++own_spheres;
       }
-    if (auto sidecar = detail::sidecar_of(options_)) take_sidecar(std::move(*sidecar), own);
-    take_srdf();
+    if (auto sidecar = detail::sidecar_of(options_))
+      apply_sidecar(std::move(*sidecar), own_spheres);
+    apply_srdf();
     std::size_t moving = 0;
-    const auto count = [&](const auto& by_link, const char* what) {
-      std::size_t still = 0;
-      for (const auto& [name, list] : by_link) (tree_.body_of.at(name) < 0 ? still : moving) += list.size();
-      if (still > 0) note("{} collision {} on the base do not move: only the arm itself can touch them", still, what);
+    const auto count = [&](const auto& by_link, const char* shapes) {
+      std::size_t fixed = 0;
+      for (const auto& [name, list] : by_link)
+        (tree_.body_of.at(name) < 0 ? fixed : moving) += list.size();
+      if (fixed > 0)
+        note("{} collision {} on the base do not move and are checked for self-collision only",
+             fixed, shapes);
     };
     count(spheres_.links, "spheres");
     count(spheres_.capsules, "capsules");
-    if (moving == 0) note("no collision spheres or capsules: the arm meets nothing");
+    if (moving == 0) note("no collision spheres or capsules: collisions are not checked");
   }
 
-  void take_sidecar(detail::SphereFile sidecar, std::size_t own) {
+  void apply_sidecar(detail::SphereFile sidecar, std::size_t own_spheres) {
     spheres_ = std::move(sidecar);
-    if (own > 0)
-      note("the file's own {} collision spheres are replaced by those of {}", own,
+    if (own_spheres > 0)
+      note("the file's own {} collision spheres are replaced by those of {}", own_spheres,
            std::filesystem::path(spheres_.where).filename().string());
     for (const auto& [name, list] : spheres_.links) require_link(name);
     for (const auto& [name, list] : spheres_.capsules) require_link(name);
@@ -119,10 +129,11 @@ class Reader {
     }
   }
 
-  void take_srdf() {
+  void apply_srdf() {
     if (!options_.srdf) return;
-    robot_.notes.push_back(detail::join_pairs(spheres_.self_collision_disabled, read_srdf(*options_.srdf, link_names()),
-                                              options_.srdf->filename()));
+    const auto pairs = read_srdf(*options_.srdf, link_names());
+    robot_.notes.push_back(
+        detail::merge_pairs(spheres_.self_collision_disabled, pairs, options_.srdf->filename()));
   }
 
   [[nodiscard]] std::vector<std::string> link_names() const {
@@ -133,8 +144,9 @@ class Reader {
 
   void require_link(const std::string& name) const {
     if (tree_.poses.count(name) == 0)
-      detail::fail(ErrorCode::invalid, spheres_.where, 0,
-                   fmt::format("the robot has no link '{}'{}", name, did_you_mean(name, link_names())));
+      detail::fail(
+          ErrorCode::invalid, spheres_.where, 0,
+          fmt::format("the robot has no link '{}'{}", name, did_you_mean(name, link_names())));
   }
 
   // ---- moving links ----
@@ -150,14 +162,14 @@ class Reader {
     for (const UrdfLink* member : body.members)
       if (const auto list = spheres_.links.find(member->name()); list != spheres_.links.end())
         for (const Sphere& sphere : list->second)
-          out.spheres.push_back({to_com * (tree_.poses.at(member->name()) * sphere.center_m), sphere.radius_m,
-                                 member == body.own ? "" : member->name()});
+          out.spheres.push_back({to_com * (tree_.poses.at(member->name()) * sphere.center_m),
+                                 sphere.radius_m, member == body.own ? "" : member->name()});
     for (const UrdfLink* member : body.members)
       if (const auto list = spheres_.capsules.find(member->name()); list != spheres_.capsules.end())
         for (const Segment& capsule : list->second) {
           const SE3 to_link = to_com * tree_.poses.at(member->name());
-          out.segments.push_back({to_link * capsule.from_m, to_link * capsule.to_m, capsule.radius_m,
-                                  member == body.own ? "" : member->name()});
+          out.segments.push_back({to_link * capsule.from_m, to_link * capsule.to_m,
+                                  capsule.radius_m, member == body.own ? "" : member->name()});
         }
     return out;
   }
@@ -174,9 +186,9 @@ class Reader {
     } else {
       out.screw << axis, frame.p().cross(axis);
     }
-    const std::string said =
-        detail::normalise_screw(out, fmt::format("{}: line {}: joint '{}'", where_, joint.line, joint.name));
-    if (!said.empty()) robot_.notes.push_back(said);
+    const std::string axis_note = detail::normalise_screw(
+        out, fmt::format("{}: line {}: joint '{}'", where_, joint.line, joint.name));
+    if (!axis_note.empty()) robot_.notes.push_back(axis_note);
     out.damping = joint.damping;
     out.friction = joint.friction;
     if (joint.limits) set_limits(out, joint, *joint.limits);
@@ -186,23 +198,25 @@ class Reader {
   void set_limits(Joint& out, const UrdfJoint& joint, const detail::UrdfLimits& limits) {
     if (joint.type != UrdfJoint::Type::continuous) {
       if (!(limits.lower < limits.upper))
-        fail_at(joint, fmt::format("lower limit {} is not below upper limit {}", limits.lower, limits.upper));
+        fail_at(joint, fmt::format("lower limit {} is not below upper limit {}", limits.lower,
+                                   limits.upper));
       out.lower = limits.lower;
       out.upper = limits.upper;
     } else if (limits.has_position) {
       note("joint '{}': continuous, so its position limits are ignored", joint.name);
     }
-    const auto bound = [&](const char* what, double value) -> std::optional<double> {
-      if (value < 0.0) fail_at(joint, fmt::format("{} limit {}, expected a positive number", what, value));
+    const auto bound = [&](const char* attribute, double value) -> std::optional<double> {
+      if (value < 0.0)
+        fail_at(joint, fmt::format("{} limit {}, expected a positive number", attribute, value));
       if (value > 0.0) return value;
-      note("joint '{}': {}=\"0\" read as no limit", joint.name, what);
+      note("joint '{}': {}=\"0\" is read as no limit", joint.name, attribute);
       return std::nullopt;
     };
     out.effort_max = bound("effort", limits.effort);
     out.velocity_max = bound("velocity", limits.velocity);
   }
 
-  // The inertial of one URDF link, if it has any mass or inertia.
+  // The <inertial> of one URDF link, if it has mass or inertia.
   std::optional<Inertial> inertial_of(const UrdfLink& link) {
     if (!link.inertial) return std::nullopt;
     const double mass = link.inertial->mass_kg;
@@ -210,10 +224,11 @@ class Reader {
     if (!(mass >= 0.0)) fail_at(link, fmt::format("mass {} kg, expected at least 0", mass));
     const std::string fault = model::inertia_fault(I, false);
     if (!fault.empty()) fail_at(link, "inertia " + fault);
-    detail::judge_inertia(robot_, link.name(), I, options_.strict,
-                          fmt::format("{}: line {}", where_, link.shapes.line));
+    detail::check_triangle_inequality(robot_, link.name(), I, options_.strict,
+                                      fmt::format("{}: line {}", where_, link.shapes.line));
     if (mass == 0.0 && I.isZero(0.0)) return std::nullopt;
-    if (mass == 0.0) note("warning: link '{}' has inertia but no mass; the inertia counts", link.name());
+    if (mass == 0.0)
+      note("warning: link '{}' has inertia but no mass; the inertia is used", link.name());
     return Inertial{tree_.poses.at(link.name()) * link.inertial->pose, mass, I, &link};
   }
 
@@ -226,7 +241,7 @@ class Reader {
     out.com = all.frame;
     out.mass_kg = all.mass_kg;
     out.inertia_kg_m2 = all.inertia;
-    detail::judge_inertia(robot_, out.name, all.inertia, options_.strict, where_);
+    detail::check_triangle_inequality(robot_, out.name, all.inertia, options_.strict, where_);
   }
 
   // ---- the base, pairs, notes ----
@@ -241,36 +256,39 @@ class Reader {
           robot_.base_spheres.push_back({pose * sphere.center_m, sphere.radius_m, name});
       if (const auto list = spheres_.capsules.find(name); list != spheres_.capsules.end())
         for (const Segment& capsule : list->second)
-          robot_.base_segments.push_back({pose * capsule.from_m, pose * capsule.to_m, capsule.radius_m, name});
+          robot_.base_segments.push_back(
+              {pose * capsule.from_m, pose * capsule.to_m, capsule.radius_m, name});
     }
   }
 
-  // Pairs keep the names of the file; a pair with a link that bears no shape and does not move by itself means nothing.
+  // Pairs keep the names of the file. A pair is dropped if one of its links has no shape and is not
+  // moved by a joint of its own.
   void disable_pairs() {
-    const auto bears = [](const auto& by_link, const std::string& name) {
+    const auto has_shapes = [](const auto& by_link, const std::string& name) {
       const auto list = by_link.find(name);
       return list != by_link.end() && !list->second.empty();
     };
-    const auto counts = [&](const std::string& name) {
-      return bears(spheres_.links, name) || bears(spheres_.capsules, name) ||
+    const auto is_part = [&](const std::string& name) {
+      return has_shapes(spheres_.links, name) || has_shapes(spheres_.capsules, name) ||
              std::any_of(tree_.bodies.begin(), tree_.bodies.end(),
                          [&](const UrdfBody& body) { return body.own->name() == name; });
     };
     for (const auto& [a, b] : spheres_.self_collision_disabled)
-      if (counts(a) && counts(b)) robot_.self_collision_disabled.emplace_back(a, b);
+      if (is_part(a) && is_part(b)) robot_.self_collision_disabled.emplace_back(a, b);
   }
 
-  void note_the_rest() {
+  void note_skipped() {
     std::vector<std::string> skipped;
     bool shapes = false;
-    for (const auto& [what, count] : file_.skipped) {
-      skipped.push_back(fmt::format("{} {}", count, what));
-      shapes = shapes || what.rfind("<collision>", 0) == 0;
+    for (const auto& [element, count] : file_.skipped) {
+      skipped.push_back(fmt::format("{} {}", count, element));
+      shapes = shapes || element.rfind("<collision>", 0) == 0;
     }
     if (!skipped.empty())
       note("skipped: {}{}", detail::join(skipped),
-           shapes && spheres_.where.empty() ? "; `hamelin robot fit` makes spheres or capsules of collision shapes"
-                                            : "");
+           shapes && spheres_.where.empty()
+               ? "; `hamelin robot fit` makes spheres or capsules of collision shapes"
+               : "");
   }
 
   const detail::UrdfFile& file_;
@@ -283,7 +301,8 @@ class Reader {
 
 }  // namespace
 
-Robot detail::read_urdf(const std::string& text, const std::string& where, const RobotOptions& options) {
+Robot detail::read_urdf(const std::string& text, const std::string& where,
+                        const RobotOptions& options) {
   const UrdfFile file = read_urdf_file(text, where, Visuals::skip);
   return Reader(file, where, options).read();
 }

@@ -16,7 +16,8 @@ namespace {
 using Eigen::Vector3d;
 using tinyxml2::XMLElement;
 
-constexpr std::array<const char*, 6> type_names{"revolute", "continuous", "prismatic", "fixed", "floating", "planar"};
+constexpr std::array<const char*, 6> type_names{"revolute", "continuous", "prismatic",
+                                                "fixed",    "floating",   "planar"};
 
 class Reader {
  public:
@@ -25,7 +26,8 @@ class Reader {
   UrdfFile read(const XMLElement& robot) {
     file_.name = text_of(robot, "name");
     check_robot(robot);
-    for (const XMLElement* e = robot.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+    for (const XMLElement* e = robot.FirstChildElement(); e != nullptr;
+         e = e->NextSiblingElement()) {
       const std::string_view tag = e->Name();
       if (tag == "link") {
         add_link(*e);
@@ -43,8 +45,8 @@ class Reader {
   }
 
  private:
-  [[noreturn]] void refuse(const XMLElement& element, const std::string& what) const {
-    fail(ErrorCode::parse, where_, element.GetLineNum(), what);
+  [[noreturn]] void refuse(const XMLElement& element, const std::string& message) const {
+    fail(ErrorCode::parse, where_, element.GetLineNum(), message);
   }
 
   void skip(const XMLElement& element) { ++file_.skipped[fmt::format("<{}>", element.Name())]; }
@@ -53,17 +55,18 @@ class Reader {
     if (file_.name.empty()) refuse(robot, "the <robot> has no name");
     const std::string version = text_of(robot, "version");
     if (!version.empty() && version != "1" && version != "1.0")
-      refuse(robot, fmt::format("version=\"{}\" of URDF, expected 1.0", version));
+      refuse(robot, fmt::format("version=\"{}\" of URDF is not supported, expected 1.0", version));
   }
 
-  // The name of a link or joint, which must be new.
+  // The name of a link or joint, which must not occur before.
   std::string new_name(const XMLElement& element, std::map<std::string, int>& lines) const {
     std::string name = text_of(element, "name");
     if (name.empty()) refuse(element, fmt::format("a <{}> has no name", element.Name()));
     const auto [before, is_new] = lines.emplace(name, element.GetLineNum());
     if (!is_new)
       fail(ErrorCode::invalid, where_, element.GetLineNum(),
-           fmt::format("{} '{}' is given twice, first in line {}", element.Name(), name, before->second));
+           fmt::format("{} '{}' is given twice, first in line {}", element.Name(), name,
+                       before->second));
     return name;
   }
 
@@ -76,12 +79,14 @@ class Reader {
       link.inertial = inertial_of(*inertial, owner);
     link.shapes.collision = read_shapes(element, "collision", owner);
     if (visuals_ == Visuals::read) link.shapes.visual = read_shapes(element, "visual", owner);
-    for (const XMLElement* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+    for (const XMLElement* e = element.FirstChildElement(); e != nullptr;
+         e = e->NextSiblingElement()) {
       const std::string_view tag = e->Name();
       if (tag != "inertial" && tag != "collision") skip(*e);
     }
     for (const LinkShape& shape : link.shapes.collision)
-      if (shape.kind != LinkShape::Kind::sphere) ++file_.skipped[fmt::format("<collision><{}>", tag_of(shape.kind))];
+      if (shape.kind != LinkShape::Kind::sphere)
+        ++file_.skipped[fmt::format("<collision><{}>", tag_of(shape.kind))];
     file_.links.push_back(std::move(link));
   }
 
@@ -100,8 +105,8 @@ class Reader {
     const std::string type = text_of(element, "type");
     const auto at = std::find(type_names.begin(), type_names.end(), type);
     if (at == type_names.end())
-      refuse(element,
-             fmt::format("{}: its type is '{}', expected one of {}", owner.name, type, fmt::join(type_names, ", ")));
+      refuse(element, fmt::format("{}: its type is '{}', expected one of {}", owner.name, type,
+                                  fmt::join(type_names, ", ")));
     return static_cast<UrdfJoint::Type>(at - type_names.begin());
   }
 
@@ -124,7 +129,8 @@ class Reader {
     if (const XMLElement* mimic = only_child(element, "mimic", owner); mimic != nullptr)
       joint.mimics = mimicked(*mimic, owner);
     for (const char* tag : {"safety_controller", "calibration"})
-      if (const XMLElement* unused = element.FirstChildElement(tag); unused != nullptr) skip(*unused);
+      if (const XMLElement* unused = element.FirstChildElement(tag); unused != nullptr)
+        skip(*unused);
     file_.joints.push_back(std::move(joint));
   }
 
@@ -141,9 +147,11 @@ class Reader {
     return link;
   }
 
-  static std::optional<UrdfLimits> limits_of(const XMLElement& element, UrdfJoint::Type type, const Owner& owner) {
+  static std::optional<UrdfLimits> limits_of(const XMLElement& element, UrdfJoint::Type type,
+                                             const Owner& owner) {
     const bool required = type == UrdfJoint::Type::revolute || type == UrdfJoint::Type::prismatic;
-    const XMLElement* limit = required ? &required_child(element, "limit", owner) : only_child(element, "limit", owner);
+    const XMLElement* limit =
+        required ? &required_child(element, "limit", owner) : only_child(element, "limit", owner);
     if (limit == nullptr) return std::nullopt;
     UrdfLimits out;
     out.has_position = limit->Attribute("lower") != nullptr || limit->Attribute("upper") != nullptr;
@@ -154,7 +162,8 @@ class Reader {
     return out;
   }
 
-  // Joints name links of the file, each link is the child of one joint at most, and one link of none.
+  // Checks that joints name links of the file, that each link is the child of at most one joint,
+  // and that exactly one link is the child of none.
   void connect() {
     std::map<std::string, UrdfLink*> links;
     std::vector<std::string> names;
@@ -162,25 +171,28 @@ class Reader {
       links.emplace(link.name(), &link);
       names.push_back(link.name());
     }
-    std::map<std::string, std::string> carrier;  // joint by child
+    std::map<std::string, std::string> carrier;  // name of the joint, by child link
     for (const UrdfJoint& joint : file_.joints) {
-      for (const auto& [end, link] : {std::pair("parent", joint.parent), std::pair("child", joint.child)})
+      for (const auto& [end, link] :
+           {std::pair("parent", joint.parent), std::pair("child", joint.child)})
         if (links.count(link) == 0)
           fail(ErrorCode::invalid, where_, joint.line,
-               fmt::format("joint '{}': its {} '{}' is no link of the file{}", joint.name, end, link,
-                           did_you_mean(link, names)));
+               fmt::format("joint '{}': its {} '{}' is not a link of the file{}", joint.name, end,
+                           link, did_you_mean(link, names)));
       if (const auto [before, is_new] = carrier.emplace(joint.child, joint.name); !is_new)
         fail(ErrorCode::invalid, where_, joint.line,
-             fmt::format("link '{}' is the child of two joints, '{}' and '{}', expected one", joint.child,
-                         before->second, joint.name));
+             fmt::format("link '{}' is the child of two joints, '{}' and '{}', expected one",
+                         joint.child, before->second, joint.name));
       links.at(joint.child)->shapes.parent = joint.parent;
     }
     check_cycles(links);
     for (const UrdfLink& link : file_.links) {
       if (!link.shapes.parent.empty()) continue;
       if (!file_.root.empty())
-        fail(ErrorCode::invalid, where_, link.shapes.line,
-             fmt::format("link '{}': no joint carries it, nor '{}', expected one root", link.name(), file_.root));
+        fail(
+            ErrorCode::invalid, where_, link.shapes.line,
+            fmt::format("link '{}': neither it nor '{}' is the child of a joint, expected one root",
+                        link.name(), file_.root));
       file_.root = link.name();
     }
   }
@@ -188,13 +200,15 @@ class Reader {
   void check_cycles(const std::map<std::string, UrdfLink*>& links) const {
     std::set<std::string> rooted;
     for (const auto& [name, link] : links) {
-      std::set<std::string> way;
+      std::set<std::string> path;
       for (const UrdfLink* at = link; !at->shapes.parent.empty() && rooted.count(at->name()) == 0;
            at = links.at(at->shapes.parent))
-        if (!way.insert(at->name()).second)
+        if (!path.insert(at->name()).second)
           fail(ErrorCode::invalid, where_, link->shapes.line,
-               fmt::format("link '{}': it hangs in a cycle of joints, expected a tree from one root", name));
-      rooted.merge(way);
+               fmt::format(
+                   "link '{}': its parents form a cycle of joints, expected a tree with one root",
+                   name));
+      rooted.merge(path);
     }
   }
 

@@ -9,7 +9,7 @@
 #include "hamelin/geometry/se3.hpp"
 #include "xml.hpp"
 
-/// A URDF as it stands in the file, before anything is made of it.
+/// The content of a URDF file as it is, before a robot is made of it.
 namespace hamelin::description::detail {
 
 struct UrdfInertial {
@@ -19,14 +19,14 @@ struct UrdfInertial {
 };
 
 struct UrdfLink {
-  LinkGeometry shapes;  ///< with the link's name, line and parent
+  LinkGeometry shapes;  ///< also holds the link's name, line and parent
   std::optional<UrdfInertial> inertial;
 
   [[nodiscard]] const std::string& name() const noexcept { return shapes.name; }
 };
 
 struct UrdfLimits {
-  bool has_position = false;  ///< whether the file gives lower or upper; each is 0 if it does not
+  bool has_position = false;  ///< whether the file gives lower or upper; a missing one is 0
   double lower = 0.0, upper = 0.0, effort = 0.0, velocity = 0.0;
 };
 
@@ -36,7 +36,7 @@ struct UrdfJoint {
   int line = 0;
   Type type = Type::fixed;
   std::string parent, child;
-  geometry::SE3 origin;                             ///< of the child's frame in the parent's at q = 0
+  geometry::SE3 origin;                             ///< child's frame in the parent's at q = 0
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< in the child's frame, as given
   std::optional<UrdfLimits> limits;
   double damping = 0.0, friction = 0.0;
@@ -48,26 +48,30 @@ struct UrdfFile {
   std::string name;             ///< of the robot
   std::vector<UrdfLink> links;  ///< in the file's order
   std::vector<UrdfJoint> joints;
-  std::string root;                    ///< the link that no joint carries
-  std::map<std::string, int> skipped;  ///< elements that are not read, and how many of each
+  std::string root;                    ///< the link that is the child of no joint
+  std::map<std::string, int> skipped;  ///< count of each kind of element that is not read
 };
 
-/// What of <visual> is read: nothing is counted as skipped if it is.
+/// Whether <visual> is read.
 enum class Visuals { skip, read };
 
-/// Reads and checks: names given once, each a number where one belongs, joints that make a tree.
+/// Reads and checks a URDF: names are unique, values are numbers where numbers are expected, and
+/// the joints form a tree.
 /// @param where the file's name, for messages
 /// @throws Error parse or invalid: "file: line N: link 'x': what is wrong, what was expected"
-[[nodiscard]] UrdfFile read_urdf_file(const std::string& text, const std::string& where, Visuals visuals);
+[[nodiscard]] UrdfFile read_urdf_file(const std::string& text, const std::string& where,
+                                      Visuals visuals);
 
-/// The shapes of a link's elements of one name, <collision> or <visual>. Sizes may still be zero or negative.
+/// The shapes of a link's elements of one name, <collision> or <visual>. Sizes may still be zero or
+/// negative.
 /// @throws Error parse
-[[nodiscard]] std::vector<LinkShape> read_shapes(const tinyxml2::XMLElement& link, const char* tag, const Owner& owner);
+[[nodiscard]] std::vector<LinkShape> read_shapes(const tinyxml2::XMLElement& link, const char* tag,
+                                                 const Owner& owner);
 
 /// @throws Error invalid unless all sizes of the shape are positive
 void check_sizes(const LinkShape& shape, const Owner& owner);
 
-/// The element that a shape is made of: "sphere", "box", "cylinder" or "mesh".
+/// The name of a shape's element: "sphere", "box", "cylinder" or "mesh".
 [[nodiscard]] const char* tag_of(LinkShape::Kind kind);
 
 }  // namespace hamelin::description::detail

@@ -14,17 +14,18 @@ namespace {
 using Eigen::Vector3d;
 using tinyxml2::XMLElement;
 
-// The one element inside <geometry>.
+// The only element inside <geometry>.
 const XMLElement& shape_element(const XMLElement& element, const Owner& owner) {
   const XMLElement& geometry = required_child(element, "geometry", owner);
   const XMLElement* shape = geometry.FirstChildElement();
   if (shape == nullptr)
     fail(ErrorCode::parse, owner.file, geometry.GetLineNum(),
-         fmt::format("{}: <geometry> is empty, expected a box, cylinder, sphere or mesh", owner.name));
+         fmt::format("{}: <geometry> is empty, expected a box, cylinder, sphere or mesh",
+                     owner.name));
   if (const XMLElement* second = shape->NextSiblingElement(); second != nullptr)
     fail(ErrorCode::parse, owner.file, second->GetLineNum(),
-         fmt::format("{}: <geometry> has both <{}> and <{}>, expected one shape", owner.name, shape->Name(),
-                     second->Name()));
+         fmt::format("{}: <geometry> has both <{}> and <{}>, expected one shape", owner.name,
+                     shape->Name(), second->Name()));
   return *shape;
 }
 
@@ -58,7 +59,8 @@ LinkShape read_shape(const XMLElement& element, const Owner& owner) {
     out.scale = triple_or(shape, "scale", owner, Vector3d::Ones());
   } else {
     fail(ErrorCode::parse, owner.file, out.line,
-         fmt::format("{}: <{}> is no shape of a URDF, expected a box, cylinder, sphere or mesh", owner.name, kind));
+         fmt::format("{}: <{}> is not a shape of URDF, expected a box, cylinder, sphere or mesh",
+                     owner.name, kind));
   }
   return out;
 }
@@ -81,17 +83,20 @@ const char* tag_of(LinkShape::Kind kind) {
 
 std::vector<LinkShape> read_shapes(const XMLElement& link, const char* tag, const Owner& owner) {
   std::vector<LinkShape> shapes;
-  for (const XMLElement* e = link.FirstChildElement(tag); e != nullptr; e = e->NextSiblingElement(tag))
+  for (const XMLElement* e = link.FirstChildElement(tag); e != nullptr;
+       e = e->NextSiblingElement(tag))
     shapes.push_back(read_shape(*e, owner));
   return shapes;
 }
 
 void check_sizes(const LinkShape& shape, const Owner& owner) {
-  const auto refuse = [&](const std::string& what) {
-    fail(ErrorCode::invalid, owner.file, shape.line, fmt::format("{}: <{}>: {}", owner.name, tag_of(shape.kind), what));
+  const auto refuse = [&](const std::string& message) {
+    fail(ErrorCode::invalid, owner.file, shape.line,
+         fmt::format("{}: <{}>: {}", owner.name, tag_of(shape.kind), message));
   };
-  const auto positive = [&](const char* what, double value) {
-    if (!(value > 0.0)) refuse(fmt::format("{} {} m, expected a positive number", what, value));
+  const auto positive = [&](const char* dimension, double value) {
+    if (!(value > 0.0))
+      refuse(fmt::format("{} {} m, expected a positive number", dimension, value));
   };
   switch (shape.kind) {
     case LinkShape::Kind::sphere:
@@ -105,8 +110,9 @@ void check_sizes(const LinkShape& shape, const Owner& owner) {
       positive("length", shape.length_m);
       break;
     case LinkShape::Kind::mesh:
-      if (shape.mesh.empty()) refuse("it names no file");
-      if (!((shape.scale.array() != 0.0).all())) refuse("a scale of 0, expected factors other than 0");
+      if (shape.mesh.empty()) refuse("the filename is empty, expected a mesh file");
+      if (!((shape.scale.array() != 0.0).all()))
+        refuse("the scale has a factor 0, expected factors other than 0");
       break;
   }
 }
@@ -116,8 +122,8 @@ void check_sizes(const LinkShape& shape, const Owner& owner) {
 std::vector<LinkGeometry> read_urdf_geometry(const std::filesystem::path& file) {
   const std::string text = read_file(file), where = file.string();
   if (file.extension() != ".urdf")
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: unknown kind of file '{}', expected .urdf", where, file.extension().string()));
+    throw Error(ErrorCode::usage, fmt::format("{}: unknown kind of file '{}', expected .urdf",
+                                              where, file.extension().string()));
   std::vector<LinkGeometry> links;
   for (detail::UrdfLink& link : detail::read_urdf_file(text, where, detail::Visuals::read).links) {
     const detail::Owner owner{where, fmt::format("link '{}'", link.name())};

@@ -6,10 +6,10 @@
 
 #include "urdf_file.hpp"
 
-/// Which links of a URDF move with which joint on the way to a tip.
+/// Finds which links of a URDF move with which joint between the base and a tip.
 namespace hamelin::description::detail {
 
-/// One moving link, and all that is fixed to it or carried by joints that are locked at 0.
+/// One moving link, and the links that are attached to it by fixed joints or by joints locked at 0.
 struct UrdfBody {
   const UrdfLink* own = nullptr;
   std::vector<const UrdfLink*> members;  ///< `own` first
@@ -19,7 +19,7 @@ struct UrdfTree {
   const UrdfLink* tip = nullptr;
   std::vector<const UrdfLink*> order;             ///< all links, parents first
   std::map<std::string, geometry::SE3> poses;     ///< link frames in the base frame at q = 0
-  std::map<std::string, const UrdfJoint*> joint;  ///< the joint that carries a link
+  std::map<std::string, const UrdfJoint*> joint;  ///< by child link, the joint that moves it
   std::vector<UrdfBody> bodies;                   ///< from the base to the tip
   std::map<std::string, int> body_of;             ///< index into `bodies` by link; −1: the base
   std::vector<std::string> notes;                 ///< what was locked, lumped or ignored
@@ -27,9 +27,10 @@ struct UrdfTree {
 
 /// @param file must outlive the tree
 /// @param where the file's name, for messages
-/// @param tip name of a link; none: the only leaf
-/// @throws Error invalid for a tip that is not there or not clear, and for joints on the way that this library cannot
-/// move
-[[nodiscard]] UrdfTree make_tree(const UrdfFile& file, const std::string& where, const std::optional<std::string>& tip);
+/// @param tip name of a link; by default the only leaf
+/// @throws Error invalid for a tip that does not exist or is ambiguous, and for unsupported types
+/// of joints between the base and the tip
+[[nodiscard]] UrdfTree make_tree(const UrdfFile& file, const std::string& where,
+                                 const std::optional<std::string>& tip);
 
 }  // namespace hamelin::description::detail

@@ -18,26 +18,30 @@ namespace {
 using Eigen::Vector3d;
 using tinyxml2::XMLElement;
 
-// The parser recurses into the tree of elements, and compares each attribute of a tag with all before it.
+// The parser recurses into the tree of elements, and compares each attribute of a tag with all
+// attributes before it.
 constexpr int nesting_max = 100, attributes_max = 100;
 constexpr std::size_t size_max = std::size_t{4} << 20;
 
-// Goes from tag to tag as TinyXML 2 does and refuses what would take it long: the time for a tag grows with the square
-// of its attributes.
+// Scans the tags as TinyXML 2 does and refuses text that would take it too long. Its time for a tag
+// grows with the square of the number of attributes.
 class TagScan {
  public:
   TagScan(std::string_view text, const std::string& file) : text_(text), file_(file) {}
 
   void check() {
     while ((at_ = text_.find('<', at_)) != std::string_view::npos) {
-      if (!skip("<?", "?>") && !skip("<!--", "-->") && !skip("<![CDATA[", "]]>") && !skip("<!", ">")) check_tag();
+      if (!skip("<?", "?>") && !skip("<!--", "-->") && !skip("<![CDATA[", "]]>") &&
+          !skip("<!", ">"))
+        check_tag();
     }
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& what) const {
-    const auto line = 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n');
-    fail(ErrorCode::parse, file_, static_cast<int>(line), what);
+  [[noreturn]] void refuse(const std::string& message) const {
+    const auto line =
+        1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n');
+    fail(ErrorCode::parse, file_, static_cast<int>(line), message);
   }
 
   bool skip(std::string_view open, std::string_view close) {
@@ -55,15 +59,16 @@ class TagScan {
       if (c == '<') refuse("not XML: '<' inside a tag");
       if (c == '=' && ++attributes > attributes_max)
         refuse(fmt::format("a tag has more than {} attributes", attributes_max));
-      // a '>' in a value does not end the tag
+      // A '>' in a value does not end the tag.
       if (c == '"' || c == '\'') at_ = std::min(text_.find(c, at_ + 1), text_.size() - 1);
     }
-    if (at_ == text_.size()) return;  // the parser says that the tag is not closed
+    if (at_ == text_.size()) return;  // the parser reports that the tag is not closed
     const bool empty = text_[at_ - 1] == '/';
     if (closes && empty) refuse("not XML: a closing tag ends in '/>'");
     ++at_;
     if (closes) depth_ = std::max(0, depth_ - 1);
-    if (!closes && !empty && ++depth_ > nesting_max) refuse(fmt::format("elements nest deeper than {}", nesting_max));
+    if (!closes && !empty && ++depth_ > nesting_max)
+      refuse(fmt::format("elements nest deeper than {}", nesting_max));
   }
 
   std::string_view text_;
@@ -74,13 +79,15 @@ class TagScan {
 
 void check_text(std::string_view text, const std::string& file, const char* format) {
   if (text.size() > size_max)
-    fail(ErrorCode::parse, file, 0, fmt::format("the file has {} bytes, expected at most {}", text.size(), size_max));
+    fail(ErrorCode::parse, file, 0,
+         fmt::format("the file has {} bytes, expected at most {}", text.size(), size_max));
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos)
     fail(ErrorCode::parse, file, 0, "the file is empty, expected a <robot>");
   if (text.find('\0') != std::string_view::npos)
     fail(ErrorCode::parse, file, 0, fmt::format("the file is not text, expected {} (XML)", format));
   if (const auto good = utf8_prefix(text); good != text.size())
-    fail(ErrorCode::parse, file, 0, fmt::format("byte {} is not UTF-8, expected {} (XML) in UTF-8", good, format));
+    fail(ErrorCode::parse, file, 0,
+         fmt::format("byte {} is not UTF-8, expected {} (XML) in UTF-8", good, format));
   TagScan(text, file).check();
 }
 
@@ -97,13 +104,13 @@ std::string describe(tinyxml2::XMLError error) {
     case tinyxml2::XML_ERROR_PARSING_COMMENT:
       return "not XML: a comment is not closed";
     case tinyxml2::XML_ERROR_PARSING_DECLARATION:
-      return "not XML: <?...?> is not closed or does not stand at the beginning";
+      return "not XML: <?...?> is not closed or is not at the beginning";
     case tinyxml2::XML_ERROR_PARSING_UNKNOWN:
       return "not XML: <!...> is not closed";
     case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
       return "not XML: no element";
     case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
-      return "not XML: an element is not closed, or by a tag of another name";
+      return "not XML: an element is not closed, or is closed by a tag of another name";
     case tinyxml2::XML_ERROR_PARSING:
       return "not XML: an element is not closed";
     case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED:
@@ -113,17 +120,20 @@ std::string describe(tinyxml2::XMLError error) {
   }
 }
 
-// Names and values with character references (&#xD800;) can hold what the text itself may not.
+// Character references (&#xD800;) in values can produce characters that the text itself may not
+// contain.
 void check_values(const XMLElement& element, const std::string& file) {
   for (const auto* a = element.FirstAttribute(); a != nullptr; a = a->Next())
     if (const std::string_view value = a->Value(); utf8_prefix(value) != value.size())
       fail(ErrorCode::parse, file, element.GetLineNum(),
-           fmt::format("<{}>: {} refers to a character that does not exist", element.Name(), a->Name()));
-  for (const auto* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) check_values(*e, file);
+           fmt::format("<{}>: {} refers to a character that does not exist", element.Name(),
+                       a->Name()));
+  for (const auto* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement())
+    check_values(*e, file);
 }
 
 bool parse_number(std::string_view word, double& value) {
-  // from_chars takes no '+'
+  // from_chars does not accept a '+'.
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   return error == std::errc{} && end == word.data() + word.size() && std::isfinite(value);
@@ -141,15 +151,15 @@ std::vector<std::string_view> words_of(std::string_view text) {
   return words;
 }
 
-[[noreturn]] void fail_at_value(const XMLElement& element, const char* attribute, const Owner& owner,
-                                const char* expected) {
+[[noreturn]] void fail_at_value(const XMLElement& element, const char* attribute,
+                                const Owner& owner, const char* expected) {
   fail(ErrorCode::parse, owner.file, element.GetLineNum(),
        fmt::format("{}: <{}>: {}=\"{}\", expected {}", owner.name, element.Name(), attribute,
                    text_of(element, attribute), expected));
 }
 
-// Half angles and the product of three quaternions. Normalised twice, since the length left by one pass still shows in
-// the last bit of some rotations.
+// The product of three quaternions of half angles. It is normalised twice, because after one pass
+// the remaining error of the norm still affects the last bit of some rotations.
 Eigen::Quaterniond quaternion_of(const Vector3d& rpy) {
   const Vector3d half = rpy / 2.0;
   const double cr = std::cos(half.x()), sr = std::sin(half.x());
@@ -164,12 +174,13 @@ Eigen::Quaterniond quaternion_of(const Vector3d& rpy) {
 
 }  // namespace
 
-void fail(ErrorCode code, const std::string& file, int line, const std::string& what) {
-  throw Error(code, line > 0 ? fmt::format("{}: line {}: {}", file, line, what) : fmt::format("{}: {}", file, what));
+void fail(ErrorCode code, const std::string& file, int line, const std::string& message) {
+  throw Error(code, line > 0 ? fmt::format("{}: line {}: {}", file, line, message)
+                             : fmt::format("{}: {}", file, message));
 }
 
-const XMLElement& parse_robot_xml(tinyxml2::XMLDocument& document, const std::string& text, const std::string& file,
-                                  const char* format) {
+const XMLElement& parse_robot_xml(tinyxml2::XMLDocument& document, const std::string& text,
+                                  const std::string& file, const char* format) {
   check_text(text, file, format);
   if (const auto error = document.Parse(text.data(), text.size()); error != tinyxml2::XML_SUCCESS)
     fail(ErrorCode::parse, file, document.ErrorLineNum(), describe(error));
@@ -202,7 +213,8 @@ const XMLElement* only_child(const XMLElement& parent, const char* tag, const Ow
 const XMLElement& required_child(const XMLElement& parent, const char* tag, const Owner& owner) {
   const XMLElement* child = only_child(parent, tag, owner);
   if (child == nullptr)
-    fail(ErrorCode::parse, owner.file, parent.GetLineNum(), fmt::format("{}: <{}> is missing", owner.name, tag));
+    fail(ErrorCode::parse, owner.file, parent.GetLineNum(),
+         fmt::format("{}: <{}> is missing", owner.name, tag));
   return *child;
 }
 
@@ -216,17 +228,20 @@ double number(const XMLElement& element, const char* attribute, const Owner& own
   return value;
 }
 
-double number_or(const XMLElement& element, const char* attribute, const Owner& owner, double otherwise) {
+double number_or(const XMLElement& element, const char* attribute, const Owner& owner,
+                 double otherwise) {
   return element.Attribute(attribute) == nullptr ? otherwise : number(element, attribute, owner);
 }
 
-Vector3d triple_or(const XMLElement& element, const char* attribute, const Owner& owner, const Vector3d& otherwise) {
+Vector3d triple_or(const XMLElement& element, const char* attribute, const Owner& owner,
+                   const Vector3d& otherwise) {
   const char* const text = element.Attribute(attribute);
   if (text == nullptr) return otherwise;
   const auto words = words_of(text);
   Vector3d values = Vector3d::Zero();
   bool good = words.size() == 3;
-  for (std::size_t i = 0; good && i < 3; ++i) good = parse_number(words[i], values[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 0; good && i < 3; ++i)
+    good = parse_number(words[i], values[static_cast<Eigen::Index>(i)]);
   if (!good) fail_at_value(element, attribute, owner, "three finite numbers");
   return values;
 }

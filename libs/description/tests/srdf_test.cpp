@@ -27,7 +27,8 @@ const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
 
 }  // namespace
 
-TEST_CASE("disabled pairs are read with their reasons and lines, all else is passed over", "[description][unit]") {
+TEST_CASE("disabled pairs are read with their reasons and lines, other elements are skipped",
+          "[description][unit]") {
   const test::TemporaryFolder folder;
   const auto file = folder.put("a.srdf", R"(<?xml version="1.0"?>
 <!-- a comment -->
@@ -47,7 +48,8 @@ TEST_CASE("disabled pairs are read with their reasons and lines, all else is pas
   CHECK(pairs[1].reason.empty());
 }
 
-TEST_CASE("a broken SRDF ends in one line with file, line and what was expected", "[description][unit]") {
+TEST_CASE("a broken SRDF ends in one line with file, line and what was expected",
+          "[description][unit]") {
   const test::TemporaryFolder folder;
   const auto of = [&](const std::string& text) {
     return error_of([&] { (void)description::read_srdf(folder.put("x.srdf", text)); });
@@ -55,23 +57,30 @@ TEST_CASE("a broken SRDF ends in one line with file, line and what was expected"
   CHECK_THAT(of(""), Catch::Contains("x.srdf") && Catch::Contains("empty"));
   CHECK_THAT(of("<robot>\n<disable_collisions link1=\"a\"/></robot>"),
              Catch::Contains("x.srdf: line 2") && Catch::Contains("no link2"));
-  CHECK_THAT(of("<robot>\n\n<disable_collisions link1=\"a\" link2=\"a\"/></robot>"), Catch::Contains("line 3"));
+  CHECK_THAT(of("<robot>\n\n<disable_collisions link1=\"a\" link2=\"a\"/></robot>"),
+             Catch::Contains("line 3"));
   CHECK_THAT(of("<robot><disable_collisions</robot>"), Catch::Contains("not XML"));
   CHECK_THAT(of("<model/>"), Catch::Contains("expected <robot>"));
-  CHECK_THAT(of("<robot>\n<link name=\"a\"/></robot>"), Catch::Contains("line 2") && Catch::Contains("URDF"));
-  CHECK_THAT(of("<robot>\n<xacro:if/></robot>"), Catch::Contains("line 2") && Catch::Contains("xacro"));
-  CHECK_THAT(of("<robot>\n<disable_default_collisions link=\"a\"/></robot>"), Catch::Contains("line 2"));
+  CHECK_THAT(of("<robot>\n<link name=\"a\"/></robot>"),
+             Catch::Contains("line 2") && Catch::Contains("URDF"));
+  CHECK_THAT(of("<robot>\n<xacro:if/></robot>"),
+             Catch::Contains("line 2") && Catch::Contains("xacro"));
+  CHECK_THAT(of("<robot>\n<disable_default_collisions link=\"a\"/></robot>"),
+             Catch::Contains("line 2"));
   std::string deep;
   for (int i = 0; i < 5000; ++i) deep += "<a>";
   CHECK_THAT(of(deep), Catch::Contains("nest"));
 }
 
-TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note says so", "[description][unit]") {
+TEST_CASE("an SRDF's pairs are added to those of the sidecar, each once, with a note",
+          "[description][unit]") {
   const test::TemporaryFolder folder;
-  const auto srdf = folder.put("x.srdf",
-                               "<robot name=\"arm7\"><disable_collisions link1=\"link2\" link2=\"link1\"/>"
-                               "<disable_collisions link1=\"link2\" link2=\"link3\" reason=\"Adjacent\"/></robot>");
-  const auto spheres = folder.put("s.json", R"({"links": {"link1": [{"center": [0, 0, 0], "radius": 0.1}],
+  const auto srdf = folder.put(
+      "x.srdf",
+      "<robot name=\"arm7\"><disable_collisions link1=\"link2\" link2=\"link1\"/>"
+      "<disable_collisions link1=\"link2\" link2=\"link3\" reason=\"Adjacent\"/></robot>");
+  const auto spheres =
+      folder.put("s.json", R"({"links": {"link1": [{"center": [0, 0, 0], "radius": 0.1}],
       "link2": [{"center": [0, 0, 0], "radius": 0.1}], "link3": [{"center": [0, 0, 0], "radius": 0.1}]},
       "self_collision_disabled": [["link1", "link2"]]})");
   const auto robot = description::read_robot(robots / "arm7.urdf", {{}, spheres, srdf});
@@ -82,23 +91,31 @@ TEST_CASE("an SRDF's pairs join those of the sidecar, each once, and the note sa
   }));
 }
 
-TEST_CASE("a link that the URDF has not is an error with the nearest name", "[description][unit]") {
+TEST_CASE("a link that is not in the URDF is an error with the nearest name",
+          "[description][unit]") {
   const test::TemporaryFolder folder;
-  const auto srdf = folder.put("x.srdf", "<robot>\n<disable_collisions link1=\"link1\" link2=\"linc2\"/></robot>");
-  const std::string said = error_of([&] { (void)description::read_robot(robots / "arm7.urdf", {{}, {}, srdf}); });
-  CHECK_THAT(said, Catch::Contains("x.srdf: line 2") && Catch::Contains("no link 'linc2'") &&
-                       Catch::Contains("did you mean 'link2'"));
+  const auto srdf = folder.put(
+      "x.srdf", "<robot>\n<disable_collisions link1=\"link1\" link2=\"linc2\"/></robot>");
+  const std::string message = error_of([&] {
+    (void)description::read_robot(robots / "arm7.urdf", {{}, {}, srdf});
+  });
+  CHECK_THAT(message, Catch::Contains("x.srdf: line 2") && Catch::Contains("no link 'linc2'") &&
+                          Catch::Contains("did you mean 'link2'"));
 }
 
-TEST_CASE("a JSON robot takes the pairs of links it has and notes the others", "[description][unit]") {
+TEST_CASE("a JSON robot uses the pairs of links that it has and notes the others",
+          "[description][unit]") {
   const test::TemporaryFolder folder;
-  const auto urdf = description::read_robot(robots / "arm7.urdf", {{}, robots / "arm7.spheres.json"});
+  const auto urdf =
+      description::read_robot(robots / "arm7.urdf", {{}, robots / "arm7.spheres.json"});
   const auto json = folder.put("r.json", description::robot_to_json(urdf).dump());
   const auto srdf = folder.put("x.srdf",
                                "<robot><disable_collisions link1=\"link1\" link2=\"link2\"/>"
                                "<disable_collisions link1=\"link1\" link2=\"gripper\"/></robot>");
   const auto robot = description::read_robot(json, {{}, {}, srdf});
-  CHECK(robot.self_collision_disabled == std::vector<std::pair<std::string, std::string>>{{"link1", "link2"}});
-  CHECK(std::any_of(robot.notes.begin(), robot.notes.end(),
-                    [](const std::string& note) { return note.find("1 more are of links") != std::string::npos; }));
+  CHECK(robot.self_collision_disabled ==
+        std::vector<std::pair<std::string, std::string>>{{"link1", "link2"}});
+  CHECK(std::any_of(robot.notes.begin(), robot.notes.end(), [](const std::string& note) {
+    return note.find("1 more name links") != std::string::npos;
+  }));
 }

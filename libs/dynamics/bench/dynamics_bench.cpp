@@ -18,7 +18,8 @@ model::Robot chain(int n, bool planar) {
     model::Link link;
     link.name = std::to_string(i);
     link.parent = i - 1;
-    const Eigen::Vector3d axis = planar || i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d axis =
+        planar || i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d at{0.0, 0.2 * i, 0.0};
     link.joint.screw << axis, -axis.cross(at);
     link.com = geometry::SE3{Eigen::Matrix3d::Identity(), at + Eigen::Vector3d{0.0, 0.1, 0.0}};
@@ -32,7 +33,7 @@ model::Robot chain(int n, bool planar) {
 
 }  // namespace
 
-TEST_CASE("dynamics over the chain's length", "[!benchmark][dynamics]") {
+TEST_CASE("time of dynamics over the number of links", "[!benchmark][dynamics]") {
   for (const bool planar : {false, true}) {
     for (const int n : {2, 7, 30, 100}) {
       const model::Model model(chain(n, planar));

@@ -10,13 +10,15 @@ namespace hamelin::dynamics {
 namespace {
 
 std::size_t sweep_bytes(const Model& model, const KernelSet& set) {
-  return kernel::with_group(model, set,
-                            [&](const auto& sweeps, const auto& chain) { return sweeps.bytes(chain.links.size()); });
+  return kernel::with_group(model, set, [&](const auto& sweeps, const auto& chain) {
+    return sweeps.bytes(chain.links.size());
+  });
 }
 
 std::size_t batch_bytes(const Model& model, const KernelSet& set) {
-  return kernel::with_group(
-      model, set, [&](const auto& sweeps, const auto& chain) { return sweeps.batch_bytes(chain.links.size()); });
+  return kernel::with_group(model, set, [&](const auto& sweeps, const auto& chain) {
+    return sweeps.batch_bytes(chain.links.size());
+  });
 }
 
 }  // namespace
@@ -37,44 +39,49 @@ BatchWorkspace::BatchWorkspace(const Model& model, Isa isa)
 namespace detail {
 
 void refuse_workspace(const char* function, const Model& model, const WorkspaceOwner& owner) {
-  throw Error(ErrorCode::usage,
-              formatted("{}: the workspace was made for another model (of {} joints), expected one made for this '{}' "
-                        "(of {} joints) or a copy of it",
-                        function, owner.dof, model.robot().name, model.dof()));
+  throw Error(ErrorCode::usage, formatted("{}: the workspace was made for another model (of {} "
+                                          "joints), expected one made for this '{}' "
+                                          "(of {} joints) or a copy of it",
+                                          function, owner.dof, model.robot().name, model.dof()));
 }
 
-void refuse_size(const char* function, const char* argument, Eigen::Index given, Eigen::Index expected) {
-  throw Error(ErrorCode::usage,
-              formatted("{}: {}: {} given, expected {} (one per joint)", function, argument, given, expected));
+void refuse_size(const char* function, const char* argument, Eigen::Index given,
+                 Eigen::Index expected) {
+  throw Error(ErrorCode::usage, formatted("{}: {}: {} given, expected {} (one per joint)", function,
+                                          argument, given, expected));
 }
 
 void refuse_states(const char* function, const char* argument, Eigen::Index rows, Eigen::Index cols,
-                   Eigen::Index stride, Eigen::Index dof, Eigen::Index states, Eigen::Index expected) {
+                   Eigen::Index stride, Eigen::Index dof, Eigen::Index states,
+                   Eigen::Index expected) {
   throw Error(ErrorCode::usage,
-              formatted("{}: {}: {} x {} numbers with row stride {} given, expected {} x {} (joints x states) with row "
+              formatted("{}: {}: {} x {} numbers with row stride {} given, expected {} x {} "
+                        "(joints x states) with row "
                         "stride {}",
                         function, argument, rows, cols, stride, dof, states, expected));
 }
 
 void refuse_link(const char* function, int link, Eigen::Index dof) {
+  throw Error(ErrorCode::usage, formatted("{}: link: {} given, expected an index from 0 to {}",
+                                          function, link, dof - 1));
+}
+
+void refuse_count(const char* function, const char* argument, std::size_t given,
+                  std::size_t expected) {
   throw Error(ErrorCode::usage,
-              formatted("{}: link: {} given, expected an index from 0 to {}", function, link, dof - 1));
+              formatted("{}: {}: room for {} given, expected {} (one per collision shape)",
+                        function, argument, given, expected));
 }
 
-void refuse_count(const char* function, const char* argument, std::size_t given, std::size_t expected) {
-  throw Error(ErrorCode::usage, formatted("{}: {}: room for {} given, expected {} (one per collision shape)", function,
-                                          argument, given, expected));
-}
-
-void inverse_dynamics(const Model& model, Workspace& ws, const double* q, const double* v, const double* a,
-                      double* tau) {
+void inverse_dynamics(const Model& model, Workspace& ws, const double* q, const double* v,
+                      const double* a, double* tau) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.inverse_dynamics(chain, ws.sweep.get(), q, v, a, tau);
   });
 }
 
-void forward_dynamics(const Model& model, Workspace& ws, const double* q, const double* v, const double* tau,
-                      double* a) {
+void forward_dynamics(const Model& model, Workspace& ws, const double* q, const double* v,
+                      const double* tau, double* a) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.forward_dynamics(chain, ws.sweep.get(), q, v, tau, a);
   });
@@ -87,16 +94,19 @@ void gravity_torque(const Model& model, Workspace& ws, const double* q, double* 
 }
 
 void solve_mass(const Model& model, Workspace& ws, const double* q, const double* y, double* x) {
-  kernel::with_group(model, *ws.kernels,
-                     [&](const auto& sweeps, const auto& chain) { sweeps.solve_mass(chain, ws.sweep.get(), q, y, x); });
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.solve_mass(chain, ws.sweep.get(), q, y, x);
+  });
 }
 
 void momentum(const Model& model, Workspace& ws, const double* q, const double* v, double* p) {
-  kernel::with_group(model, *ws.kernels,
-                     [&](const auto& sweeps, const auto& chain) { sweeps.momentum(chain, ws.sweep.get(), q, v, p); });
+  kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
+    sweeps.momentum(chain, ws.sweep.get(), q, v, p);
+  });
 }
 
-void mass_matrix(const Model& model, Workspace& ws, const double* q, double* M, Eigen::Index stride) {
+void mass_matrix(const Model& model, Workspace& ws, const double* q, double* M,
+                 Eigen::Index stride) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.mass_matrix(chain, ws.sweep.get(), q, M, static_cast<std::size_t>(stride));
   });
@@ -114,16 +124,18 @@ double potential_energy(const Model& model, Workspace& ws, const double* q) {
   });
 }
 
-void inverse_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states, Eigen::Index stride, const double* q,
-                      const double* v, const double* a, double* tau) {
+void inverse_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states,
+                      Eigen::Index stride, const double* q, const double* v, const double* a,
+                      double* tau) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.inverse_dynamics_batch(chain, ws.sweep.get(), static_cast<std::size_t>(states),
                                   static_cast<std::size_t>(stride), q, v, a, tau);
   });
 }
 
-void forward_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states, Eigen::Index stride, const double* q,
-                      const double* v, const double* tau, double* a) {
+void forward_dynamics(const Model& model, BatchWorkspace& ws, Eigen::Index states,
+                      Eigen::Index stride, const double* q, const double* v, const double* tau,
+                      double* a) {
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.forward_dynamics_batch(chain, ws.sweep.get(), static_cast<std::size_t>(states),
                                   static_cast<std::size_t>(stride), q, v, tau, a);

@@ -1,4 +1,4 @@
-// Compiled once for each instruction set; see kernel/lanes.hpp on what may be used here.
+// Compiled once per instruction set; kernel/lanes.hpp explains which functions may be used here.
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
 #include "hamelin/dynamics/kernel/sweeps.hpp"
@@ -11,7 +11,7 @@ namespace {
 
 using Pack = kernel::Lanes<kernel::native_lanes>;
 
-// The sweeps behind plain function pointers: scratch is laid out in the caller's memory at each call.
+// The sweeps as plain functions. Each call lays out its scratch in the caller's memory.
 template <template <class> class Group>
 struct Entry {
   using Space = Group<double>;
@@ -22,18 +22,19 @@ struct Entry {
   static Scratch scratch(const Chain& chain, void* memory) noexcept {
     return Scratch::at(memory, kernel::count<Space>(chain));
   }
-  static void inverse_dynamics(const Chain& c, void* m, const double* q, const double* v, const double* a,
-                               double* tau) noexcept {
+  static void inverse_dynamics(const Chain& c, void* m, const double* q, const double* v,
+                               const double* a, double* tau) noexcept {
     kernel::inverse_dynamics<Space>(c, scratch(c, m), q, v, a, tau);
   }
-  static void forward_dynamics(const Chain& c, void* m, const double* q, const double* v, const double* tau,
-                               double* a) noexcept {
+  static void forward_dynamics(const Chain& c, void* m, const double* q, const double* v,
+                               const double* tau, double* a) noexcept {
     kernel::forward_dynamics<Space>(c, scratch(c, m), q, v, tau, a);
   }
   static void gravity_torque(const Chain& c, void* m, const double* q, double* tau) noexcept {
     kernel::gravity_torque<Space>(c, scratch(c, m), q, tau);
   }
-  static void solve_mass(const Chain& c, void* m, const double* q, const double* y, double* x) noexcept {
+  static void solve_mass(const Chain& c, void* m, const double* q, const double* y,
+                         double* x) noexcept {
     kernel::solve_mass<Space>(c, scratch(c, m), q, y, x);
   }
   static void factor(const Chain& c, void* m, const double* q) noexcept {
@@ -43,7 +44,8 @@ struct Entry {
   static void solve_factored(const Chain& c, void* m, const double* y, double* x) noexcept {
     kernel::solve_factored<Space>(c, scratch(c, m), y, x);
   }
-  static void momentum(const Chain& c, void* m, const double* q, const double* v, double* p) noexcept {
+  static void momentum(const Chain& c, void* m, const double* q, const double* v,
+                       double* p) noexcept {
     kernel::momentum<Space>(c, scratch(c, m), q, v, p);
   }
   static double kinetic_energy(const Chain& c, void* m, const double* q, const double* v) noexcept {
@@ -52,17 +54,20 @@ struct Entry {
   static double potential_energy(const Chain& c, void* m, const double* q) noexcept {
     return kernel::potential_energy<Space>(c, scratch(c, m), q);
   }
-  static void mass_matrix(const Chain& c, void* m, const double* q, double* M, std::size_t ld) noexcept {
+  static void mass_matrix(const Chain& c, void* m, const double* q, double* M,
+                          std::size_t ld) noexcept {
     kernel::mass_matrix<Space>(c, scratch(c, m), q, M, ld);
   }
 
-  // A packet's joint vectors stand behind its scratch, so that the sweeps read them without a stride.
+  // The joint vectors of a packet are copied to memory next to its scratch, where they have no
+  // stride.
   static std::size_t batch_bytes(std::size_t n) noexcept {
     return kernel::Scratch<Packed>::bytes(n) + 4 * n * sizeof(Pack);
   }
   template <class Sweep>
-  static void batch(const Chain& chain, void* memory, std::size_t states, std::size_t stride, const double* q,
-                    const double* v, const double* in, double* out, Sweep sweep) noexcept {
+  static void batch(const Chain& chain, void* memory, std::size_t states, std::size_t stride,
+                    const double* q, const double* v, const double* in, double* out,
+                    Sweep sweep) noexcept {
     constexpr auto lanes = static_cast<std::size_t>(kernel::native_lanes);
     const std::size_t n = kernel::count<Space>(chain);
     Pack* const vectors = static_cast<Pack*>(memory);
@@ -75,8 +80,9 @@ struct Entry {
           const double* const row = from[j] + i * stride + first;
           if (count == lanes) {
             vectors[j * n + i] = Pack::load(row);
-          } else {  // the last packet's idle lanes repeat its first state
-            for (std::size_t lane = 0; lane < lanes; ++lane) vectors[j * n + i].v[lane] = row[lane < count ? lane : 0];
+          } else {  // unused lanes of the last packet repeat its first state
+            for (std::size_t lane = 0; lane < lanes; ++lane)
+              vectors[j * n + i].v[lane] = row[lane < count ? lane : 0];
           }
         }
       }
@@ -90,12 +96,14 @@ struct Entry {
       }
     }
   }
-  static void inverse_dynamics_batch(const Chain& c, void* m, std::size_t states, std::size_t stride, const double* q,
-                                     const double* v, const double* a, double* tau) noexcept {
+  static void inverse_dynamics_batch(const Chain& c, void* m, std::size_t states,
+                                     std::size_t stride, const double* q, const double* v,
+                                     const double* a, double* tau) noexcept {
     batch(c, m, states, stride, q, v, a, tau, kernel::inverse_dynamics<Packed>);
   }
-  static void forward_dynamics_batch(const Chain& c, void* m, std::size_t states, std::size_t stride, const double* q,
-                                     const double* v, const double* tau, double* a) noexcept {
+  static void forward_dynamics_batch(const Chain& c, void* m, std::size_t states,
+                                     std::size_t stride, const double* q, const double* v,
+                                     const double* tau, double* a) noexcept {
     batch(c, m, states, stride, q, v, tau, a, kernel::forward_dynamics<Packed>);
   }
 

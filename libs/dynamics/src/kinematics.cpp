@@ -16,8 +16,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Frame = Workspace::Frame;
 
-Frame child_frame(const model::SpatialLink& l, const kernel::Spatial<double>::Placement& x, const Matrix3d& R,
-                  const Vector3d& p) {
+Frame child_frame(const model::SpatialLink& l, const kernel::Spatial<double>::Placement& x,
+                  const Matrix3d& R, const Vector3d& p) {
   Frame out;
   const Vector3d e1 = R.col(1) * l.cos_alpha + R.col(2) * l.sin_alpha;
   out.R.col(0) = R.col(0) * x.c + e1 * x.s;
@@ -28,8 +28,8 @@ Frame child_frame(const model::SpatialLink& l, const kernel::Spatial<double>::Pl
   return out;
 }
 
-Frame child_frame(const model::PlanarLink& l, const kernel::Planar<double>::Placement& x, const Matrix3d& R,
-                  const Vector3d& p) {
+Frame child_frame(const model::PlanarLink& l, const kernel::Planar<double>::Placement& x,
+                  const Matrix3d& R, const Vector3d& p) {
   Frame out;
   out.R.col(0) = R.col(0) * x.c + R.col(1) * x.s;
   out.R.col(1) = R.col(1) * x.c - R.col(0) * x.s;
@@ -43,11 +43,12 @@ const Frame& frame(const Workspace& ws, int link) {
   return ws.frames[static_cast<std::size_t>(link)];
 }
 
-bool slides(const Model& model, int link) {
-  return model.robot().links[static_cast<std::size_t>(link)].joint.type == model::JointType::prismatic;
+bool is_prismatic(const Model& model, int link) {
+  return model.robot().links[static_cast<std::size_t>(link)].joint.type ==
+         model::JointType::prismatic;
 }
 
-// Link indices come from outside, so each is compared once.
+// Checks a link index that a caller gave.
 void check_link(const char* function, const Model& model, const Workspace& ws, int link) {
   const detail::Call call(function, model, ws.owner);
   if (link < 0 || link >= ws.owner.dof) [[unlikely]]
@@ -58,22 +59,23 @@ int parent(const Model& model, int link) {
   return model.robot().links[static_cast<std::size_t>(link)].parent;
 }
 
-void check_shapes(const char* function, const char* argument, const Model& model, const Workspace& ws,
-                  std::span<const Vector3d> given) {
+void check_shapes(const char* function, const char* argument, const Model& model,
+                  const Workspace& ws, std::span<const Vector3d> given) {
   const detail::Call call(function, model, ws.owner);
   if (given.size() != model.shapes().size())
     detail::refuse_count(function, argument, given.size(), model.shapes().size());
 }
 
-// How joint j moves a world point that it carries.
+// The world velocity per rate of joint j of a point that the joint moves.
 Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const Vector3d& point) {
   const Frame& f = frame(ws, j);
-  return slides(model, j) ? f.axis : Vector3d(f.axis.cross(point - f.p));
+  return is_prismatic(model, j) ? f.axis : Vector3d(f.axis.cross(point - f.p));
 }
 
 }  // namespace
 
-Vector3d point_position(const Model& model, const Workspace& ws, int link, const Vector3d& point_link) {
+Vector3d point_position(const Model& model, const Workspace& ws, int link,
+                        const Vector3d& point_link) {
   check_link("point_position", model, ws, link);
   return frame(ws, link).p + frame(ws, link).R * (model.com_in_frame(link) * point_link);
 }
@@ -109,7 +111,8 @@ void point_jacobian(const Model& model, const Workspace& ws, int link, const Vec
   check_link("point_jacobian", model, ws, link);
   detail::Call("point_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
   J.setZero();
-  for (int j = link; j >= 0; j = parent(model, j)) J.col(j) = velocity_column(model, ws, j, point_world);
+  for (int j = link; j >= 0; j = parent(model, j))
+    J.col(j) = velocity_column(model, ws, j, point_world);
 }
 
 void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
@@ -118,13 +121,14 @@ void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vec
   detail::Call("frame_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
   J.setZero();
   for (int j = link; j >= 0; j = parent(model, j)) {
-    if (!slides(model, j)) J.col(j).head<3>() = frame(ws, j).axis;
+    if (!is_prismatic(model, j)) J.col(j).head<3>() = frame(ws, j).axis;
     J.col(j).tail<3>() = velocity_column(model, ws, j, point_world);
   }
 }
 
-void point_jacobian_transpose(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
-                              const Vector3d& direction_world, VectorRef row) {
+void point_jacobian_transpose(const Model& model, const Workspace& ws, int link,
+                              const Vector3d& point_world, const Vector3d& direction_world,
+                              VectorRef row) {
   check_link("point_jacobian_transpose", model, ws, link);
   detail::Call("point_jacobian_transpose", model, ws.owner).joints("row", row);
   row.setZero();
@@ -149,11 +153,12 @@ void forward_kinematics(const Model& model, Workspace& ws, const double* q) {
     place(kernel::Spatial<double>{}, std::get<model::SpatialChain>(model.chain()));
 }
 
-Vector3d point_velocity(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
-                        const double* v) {
+Vector3d point_velocity(const Model& model, const Workspace& ws, int link,
+                        const Vector3d& point_world, const double* v) {
   check_link("point_velocity", model, ws, link);
   Vector3d velocity = Vector3d::Zero();
-  for (int j = link; j >= 0; j = parent(model, j)) velocity += velocity_column(model, ws, j, point_world) * v[j];
+  for (int j = link; j >= 0; j = parent(model, j))
+    velocity += velocity_column(model, ws, j, point_world) * v[j];
   return velocity;
 }
 
@@ -167,14 +172,16 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const double* q, const
     auto& motion = ws.motions[static_cast<std::size_t>(i)];
     motion = {Vector3d::Zero(), Vector3d::Zero()};
     if (const int up = parent(model, i); up >= 0) {
-      const auto& carrier = ws.motions[static_cast<std::size_t>(up)];
-      motion = {carrier.angular, carrier.linear + carrier.angular.cross(f.p - frame(ws, up).p)};
+      const auto& parent_motion = ws.motions[static_cast<std::size_t>(up)];
+      motion = {parent_motion.angular,
+                parent_motion.linear + parent_motion.angular.cross(f.p - frame(ws, up).p)};
     }
-    (slides(model, i) ? motion.linear : motion.angular) += f.axis * v[i];
+    (is_prismatic(model, i) ? motion.linear : motion.angular) += f.axis * v[i];
     ws.forces[static_cast<std::size_t>(i)] = {Vector3d::Zero(), Vector3d::Zero()};
   }
   for (const auto& term : terms) {
-    const Vector3d arm = point_position(model, ws, term.link, term.point_link) - frame(ws, term.link).p;
+    const Vector3d arm =
+        point_position(model, ws, term.link, term.point_link) - frame(ws, term.link).p;
     const auto& motion = ws.motions[static_cast<std::size_t>(term.link)];
     const Vector3d force = term.w_world.cross(motion.linear + motion.angular.cross(arm));
     auto& total = ws.forces[static_cast<std::size_t>(term.link)];
@@ -184,18 +191,19 @@ void gyroscopic_torque(const Model& model, Workspace& ws, const double* q, const
   for (int i = n - 1; i >= 0; --i) {
     const Frame& f = frame(ws, i);
     const auto& total = ws.forces[static_cast<std::size_t>(i)];
-    tau[i] = f.axis.dot(slides(model, i) ? total.linear : total.angular);
+    tau[i] = f.axis.dot(is_prismatic(model, i) ? total.linear : total.angular);
     if (const int up = parent(model, i); up >= 0) {
-      auto& carrier = ws.forces[static_cast<std::size_t>(up)];
-      carrier.linear += total.linear;
-      carrier.angular += total.angular + (f.p - frame(ws, up).p).cross(total.linear);
+      auto& parent_total = ws.forces[static_cast<std::size_t>(up)];
+      parent_total.linear += total.linear;
+      parent_total.angular += total.angular + (f.p - frame(ws, up).p).cross(total.linear);
     }
   }
 }
 
-Matrix3d operational_inertia(const Model& model, Workspace& ws, const double* q, const double* columns,
-                             Eigen::Index stride, double damping) {
-  const Eigen::Map<const Matrix3Xd, 0, Eigen::OuterStride<>> J(columns, 3, ws.owner.dof, Eigen::OuterStride<>(stride));
+Matrix3d operational_inertia(const Model& model, Workspace& ws, const double* q,
+                             const double* columns, Eigen::Index stride, double damping) {
+  const Eigen::Map<const Matrix3Xd, 0, Eigen::OuterStride<>> J(columns, 3, ws.owner.dof,
+                                                               Eigen::OuterStride<>(stride));
   Matrix3d inverse;
   kernel::with_group(model, *ws.kernels, [&](const auto& sweeps, const auto& chain) {
     sweeps.factor(chain, ws.sweep.get(), q);

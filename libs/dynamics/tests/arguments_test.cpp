@@ -15,27 +15,31 @@ using Catch::Contains;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-// What must not compile.
+// Arguments that must not compile.
 namespace must_not_compile {
 
 template <class Made, class... Given>
 constexpr bool refused = !std::is_constructible_v<Made, Given...>;
 
-static_assert(refused<Workspace, Model> && refused<Workspace, const Model> && !refused<Workspace, const Model&>);
+static_assert(refused<Workspace, Model> && refused<Workspace, const Model> &&
+              !refused<Workspace, const Model&>);
 static_assert(refused<BatchWorkspace, Model> && !refused<BatchWorkspace, Model&>);
-// A strided view would be copied without a word.
-static_assert(refused<ConstVectorRef, decltype(std::declval<const MatrixXd&>().row(0).transpose())>);
+// A strided view would be copied silently.
+static_assert(
+    refused<ConstVectorRef, decltype(std::declval<const MatrixXd&>().row(0).transpose())>);
 static_assert(refused<ConstVectorRef, Eigen::Map<const VectorXd, 0, Eigen::InnerStride<>>>);
 static_assert(refused<ConstVectorRef, decltype(std::declval<const StatesXd&>().col(0))>);
 static_assert(refused<ConstVectorRef, MatrixXd> && refused<ConstVectorRef, Eigen::VectorXf>);
 static_assert(refused<ConstStatesRef, MatrixXd>);
 static_assert(refused<VectorRef, decltype(std::declval<MatrixXd&>().row(0).transpose())>);
 static_assert(refused<VectorRef, const VectorXd&>);
-// And what must.
-static_assert(!refused<ConstVectorRef, const VectorXd&> && !refused<ConstVectorRef, Eigen::Matrix<double, 7, 1>>);
+// Arguments that must compile.
+static_assert(!refused<ConstVectorRef, const VectorXd&> &&
+              !refused<ConstVectorRef, Eigen::Matrix<double, 7, 1>>);
 static_assert(!refused<ConstVectorRef, decltype(std::declval<const VectorXd&>().segment(1, 3))>);
 static_assert(!refused<ConstVectorRef, decltype(std::declval<const MatrixXd&>().col(0))>);
-static_assert(!refused<ConstVectorRef, Eigen::Map<const VectorXd>> && !refused<ConstVectorRef, const VectorRef&>);
+static_assert(!refused<ConstVectorRef, Eigen::Map<const VectorXd>> &&
+              !refused<ConstVectorRef, const VectorRef&>);
 static_assert(!refused<ConstVectorRef, decltype(2.0 * std::declval<const VectorXd&>())>);
 
 }  // namespace must_not_compile
@@ -44,11 +48,12 @@ namespace {
 
 constexpr int n = 6;
 
-// Every call that takes joint vectors, with one of them as long as told.
+// All calls that take joint vectors; the tests change the size of one vector at a time.
 struct Calls {
   Model model{test::random_robot(3, n, 4)};
   Workspace ws{model};
-  VectorXd q = VectorXd::Constant(n, 0.3), v = VectorXd::Constant(n, -0.2), a = VectorXd::Ones(n), out{n};
+  VectorXd q = VectorXd::Constant(n, 0.3), v = VectorXd::Constant(n, -0.2), a = VectorXd::Ones(n),
+           out{n};
   Matrix3Xd J{3, n};
   Matrix6Xd F{6, n};
   const std::vector<GyroscopicTerm> terms{{n - 1, Vector3d::Zero(), Vector3d::UnitX()}};
@@ -72,7 +77,7 @@ struct Calls {
       mass_matrix(model, ws, q, M);
     });
   }
-  // Calls that read the poses.
+  // Calls that read the poses of forward_kinematics.
   template <class F_>
   void each_of_poses(int link, F_&& f) {
     std::vector<Vector3d> centers(model.shapes().size());
@@ -88,13 +93,15 @@ struct Calls {
 
 }  // namespace
 
-TEST_CASE("a joint vector of another size is refused by function and argument", "[dynamics][unit]") {
+TEST_CASE("a joint vector of another size is refused with the names of function and argument",
+          "[dynamics][unit]") {
   Calls calls;
   for (const int size : {0, n - 1, n + 1}) {
     calls.q = VectorXd::Zero(size);
     calls.each([&](const std::string& function, auto&& call) {
       CAPTURE(function, size);
-      CHECK_THROWS_WITH(call(), function + ": q: " + std::to_string(size) + " given, expected 6 (one per joint)");
+      CHECK_THROWS_WITH(
+          call(), function + ": q: " + std::to_string(size) + " given, expected 6 (one per joint)");
     });
     calls.q = VectorXd::Zero(n);
   }
@@ -102,17 +109,23 @@ TEST_CASE("a joint vector of another size is refused by function and argument", 
   CHECK_THROWS_WITH(gravity_torque(calls.model, calls.ws, calls.q, calls.out),
                     Contains("gravity_torque: tau: 5 given"));
   CHECK(calls.out.size() == n - 1);
-  CHECK_THROWS_WITH(solve_mass(calls.model, calls.ws, calls.q, calls.v, calls.out), Contains("solve_mass: x: 5 given"));
-  CHECK_THROWS_WITH(forward_dynamics(calls.model, calls.ws, calls.q, calls.v.head(3), calls.a, calls.out),
-                    Contains("forward_dynamics: v: 3 given"));
+  CHECK_THROWS_WITH(solve_mass(calls.model, calls.ws, calls.q, calls.v, calls.out),
+                    Contains("solve_mass: x: 5 given"));
+  CHECK_THROWS_WITH(
+      forward_dynamics(calls.model, calls.ws, calls.q, calls.v.head(3), calls.a, calls.out),
+      Contains("forward_dynamics: v: 3 given"));
   MatrixXd M(n, n - 1);
-  CHECK_THROWS_WITH(mass_matrix(calls.model, calls.ws, calls.q, M), Contains("mass_matrix: M (columns): 5 given"));
+  CHECK_THROWS_WITH(mass_matrix(calls.model, calls.ws, calls.q, M),
+                    Contains("mass_matrix: M (columns): 5 given"));
   calls.out.resize(n);
   calls.J.resize(3, n + 1);
-  CHECK_THROWS_WITH(operational_inertia(calls.model, calls.ws, calls.q, calls.J), Contains("J (columns): 7 given"));
-  CHECK_THROWS_WITH(point_jacobian(calls.model, calls.ws, 0, Vector3d::Zero(), calls.J), Contains("point_jacobian: J"));
+  CHECK_THROWS_WITH(operational_inertia(calls.model, calls.ws, calls.q, calls.J),
+                    Contains("J (columns): 7 given"));
+  CHECK_THROWS_WITH(point_jacobian(calls.model, calls.ws, 0, Vector3d::Zero(), calls.J),
+                    Contains("point_jacobian: J"));
   std::vector<Vector3d> centers(calls.model.shapes().size() + 1);
-  CHECK_THROWS_WITH(shape_centers(calls.model, calls.ws, centers), Contains("shape_centers: centers: room for"));
+  CHECK_THROWS_WITH(shape_centers(calls.model, calls.ws, centers),
+                    Contains("shape_centers: centers: room for"));
 }
 
 TEST_CASE("a link that the chain does not have is refused", "[dynamics][unit]") {
@@ -121,7 +134,8 @@ TEST_CASE("a link that the chain does not have is refused", "[dynamics][unit]") 
   for (const int link : {-1, n, 1000})
     calls.each_of_poses(link, [&](const std::string& function, auto&& call) {
       CAPTURE(function, link);
-      CHECK_THROWS_WITH(call(), function + ": link: " + std::to_string(link) + " given, expected an index from 0 to 5");
+      CHECK_THROWS_WITH(call(), function + ": link: " + std::to_string(link) +
+                                    " given, expected an index from 0 to 5");
     });
   calls.each_of_poses(n - 1, [&](const std::string&, auto&& call) { CHECK_NOTHROW(call()); });
   const std::vector<GyroscopicTerm> past{{n, Vector3d::Zero(), Vector3d::UnitX()}};
@@ -131,13 +145,15 @@ TEST_CASE("a link that the chain does not have is refused", "[dynamics][unit]") 
 
 TEST_CASE("a workspace of another model is refused, one of a copy is not", "[dynamics][unit]") {
   Calls calls;
-  const Model other(test::random_robot(3, n, 4)), copy(calls.model);  // the same robot, but not the same model
+  // `other` has the same robot, but is not the same model.
+  const Model other(test::random_robot(3, n, 4)), copy(calls.model);
   const auto refuses = [&](const Model& model) {
     Calls foreign;
     foreign.ws = Workspace(model);
     const auto check = [&](const std::string& function, auto&& call) {
       CAPTURE(function);
-      CHECK_THROWS_WITH(call(), Contains(function + ": the workspace was made for another model (of 6 joints)"));
+      CHECK_THROWS_WITH(
+          call(), Contains(function + ": the workspace was made for another model (of 6 joints)"));
     };
     foreign.each(check);
     foreign.each_of_poses(0, check);
@@ -148,24 +164,27 @@ TEST_CASE("a workspace of another model is refused, one of a copy is not", "[dyn
   calls.each([&](const std::string&, auto&& call) { CHECK_NOTHROW(call()); });
   BatchWorkspace batch(other);
   StatesXd x = StatesXd::Zero(n, 4), y(n, 4);
-  CHECK_THROWS_WITH(forward_dynamics(calls.model, batch, x, x, x, y), Contains("made for another model"));
+  CHECK_THROWS_WITH(forward_dynamics(calls.model, batch, x, x, x, y),
+                    Contains("made for another model"));
 }
 
-TEST_CASE("a model at the address of one that is gone is another model", "[dynamics][unit]") {
+TEST_CASE("a new model at the address of a destroyed one is another model", "[dynamics][unit]") {
   std::optional<Model> place(std::in_place, test::random_robot(1, n));
   Workspace ws(*place);
   const Model* const address = &*place;
   place.emplace(test::random_robot(2, n, 2));
   REQUIRE(&*place == address);
   VectorXd tau(n);
-  CHECK_THROWS_WITH(gravity_torque(*place, ws, VectorXd::Zero(n), tau), Contains("made for another model"));
+  CHECK_THROWS_WITH(gravity_torque(*place, ws, VectorXd::Zero(n), tau),
+                    Contains("made for another model"));
   const Model moved(std::move(*place));
   Workspace again(moved);
   CHECK_NOTHROW(gravity_torque(moved, again, VectorXd::Zero(n), tau));
-  CHECK_THROWS_WITH(gravity_torque(*place, again, VectorXd::Zero(n), tau), Contains("another model"));
+  CHECK_THROWS_WITH(gravity_torque(*place, again, VectorXd::Zero(n), tau),
+                    Contains("another model"));
 }
 
-TEST_CASE("segments, columns and maps are taken where they lie", "[dynamics][unit][allocation]") {
+TEST_CASE("segments, columns and maps are used in place", "[dynamics][unit][allocation]") {
   (void)test::counts_allocations();
   const Model model(test::random_robot(5, n, 3));
   Workspace ws(model);
@@ -176,8 +195,10 @@ TEST_CASE("segments, columns and maps are taken where they lie", "[dynamics][uni
   const VectorXd q = x.segment(0, n), v = x.segment(n, n), tau = x.segment(2 * n, n);
   forward_dynamics(model, ws, q, v, tau, whole);
   const auto calls = [&] {
-    forward_dynamics(model, ws, x.segment(0, n), x.segment(n, n), x.segment(2 * n, n), parts.segment(0, n));
-    forward_dynamics(model, ws, columns.col(0), columns.col(1), columns.col(2), parts.segment(n, n));
+    forward_dynamics(model, ws, x.segment(0, n), x.segment(n, n), x.segment(2 * n, n),
+                     parts.segment(0, n));
+    forward_dynamics(model, ws, columns.col(0), columns.col(1), columns.col(2),
+                     parts.segment(n, n));
     forward_dynamics(model, ws, VectorXd::Map(x.data(), n), VectorXd::Map(x.data() + n, n),
                      VectorXd::Map(x.data() + 2 * n, n), VectorXd::Map(parts.data() + 2 * n, n));
   };
@@ -185,28 +206,34 @@ TEST_CASE("segments, columns and maps are taken where they lie", "[dynamics][uni
   for (int j = 0; j < 3; ++j) CHECK(parts.segment(j * n, n) == whole);
   forward_dynamics(model, ws, 1.0 * q, v + VectorXd::Zero(n), tau, whole);  // expressions
   CHECK(parts.head(n) == whole);
-  forward_dynamics(model, ws, columns.transpose().row(0).transpose(), v, tau, whole);  // no stride at all
+  // A transposed row of a transposed matrix has no stride.
+  forward_dynamics(model, ws, columns.transpose().row(0).transpose(), v, tau, whole);
   CHECK(parts.head(n) == whole);
 }
 
-TEST_CASE("blocks of states with one row stride are taken where they lie", "[dynamics][unit][allocation]") {
+TEST_CASE("blocks of states with one row stride are used in place",
+          "[dynamics][unit][allocation]") {
   (void)test::counts_allocations();
   const Model model(test::random_robot(5, n, 3));
   BatchWorkspace ws(model);
-  const StatesXd q = StatesXd::Random(n, 12), v = StatesXd::Random(n, 12), tau = StatesXd::Random(n, 12);
+  const StatesXd q = StatesXd::Random(n, 12), v = StatesXd::Random(n, 12),
+                 tau = StatesXd::Random(n, 12);
   StatesXd whole(n, 12), parts(n, 12);
   forward_dynamics(model, ws, q, v, tau, whole);
   CHECK(test::allocations_in([&] {
           for (int k = 0; k < 12; k += 4)
-            forward_dynamics(model, ws, q.middleCols(k, 4), v.middleCols(k, 4), tau.middleCols(k, 4),
-                             parts.middleCols(k, 4));
+            forward_dynamics(model, ws, q.middleCols(k, 4), v.middleCols(k, 4),
+                             tau.middleCols(k, 4), parts.middleCols(k, 4));
         }) == 0);
   CHECK((parts - whole).norm() < 1e-12 * whole.norm());
   StatesXd narrow(n, 4);
-  CHECK_THROWS_WITH(forward_dynamics(model, ws, q.leftCols(4), v.leftCols(4), tau.leftCols(4), narrow),
-                    "forward_dynamics: a: 6 x 4 numbers with row stride 4 given, expected 6 x 4 (joints x states) with "
-                    "row stride 12");
-  CHECK_THROWS_WITH(inverse_dynamics(model, ws, q, v.leftCols(5), tau, whole), Contains("inverse_dynamics: v: 6 x 5"));
+  CHECK_THROWS_WITH(
+      forward_dynamics(model, ws, q.leftCols(4), v.leftCols(4), tau.leftCols(4), narrow),
+      "forward_dynamics: a: 6 x 4 numbers with row stride 4 given, expected 6 x 4 (joints x "
+      "states) with "
+      "row stride 12");
+  CHECK_THROWS_WITH(inverse_dynamics(model, ws, q, v.leftCols(5), tau, whole),
+                    Contains("inverse_dynamics: v: 6 x 5"));
 }
 
 TEST_CASE("the instruction set is an argument", "[dynamics][unit][isa]") {

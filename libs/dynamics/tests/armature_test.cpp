@@ -8,9 +8,10 @@ using namespace hamelin;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Rotors turn with their joints alone, so M(q) becomes M(q) + diag(armature) and nothing else changes: the dense
-// formula needs only the same robot without rotors.
-TEST_CASE("rotor inertia is the mass matrix plus a diagonal, in every algorithm", "[dynamics][armature]") {
+// Rotors turn with their joints only, so M(q) becomes M(q) + diag(armature) and nothing else
+// changes. The dense formula needs only the same robot without rotors.
+TEST_CASE("rotor inertia adds a diagonal to the mass matrix in every algorithm",
+          "[dynamics][armature]") {
   const bool planar = GENERATE(false, true);
   const int prismatic_every = GENERATE(0, 3);
   const auto seed = GENERATE(range(0u, 4u));
@@ -20,7 +21,7 @@ TEST_CASE("rotor inertia is the mass matrix plus a diagonal, in every algorithm"
   const model::Model bare(robot);
   Rng rng(1000 + seed);
   VectorXd armature(n);
-  // from nothing to far more than the links have
+  // from zero to far more than the inertia of the links
   for (int i = 0; i < n; ++i) armature[i] = i == 2 ? 0.0 : std::pow(10.0, rng.uniform(-3.0, 2.0));
   for (int i = 0; i < n; ++i) robot.links[static_cast<std::size_t>(i)].joint.armature = armature[i];
   const model::Model model(robot);
@@ -52,20 +53,22 @@ TEST_CASE("rotor inertia is the mass matrix plus a diagonal, in every algorithm"
   dynamics::momentum(model, ws, q, v, x);
   close(x, dense * v);
   CHECK(dynamics::kinetic_energy(model, ws, q, v) == Approx(0.5 * v.dot(dense * v)).epsilon(1e-12));
-  // chains without rotors run code of their own
+  // chains without rotors use separate code
   CHECK(dynamics::potential_energy(model, ws, q) ==
         Approx(dynamics::potential_energy(bare, bare_ws, q)).epsilon(1e-13));
 }
 
-TEST_CASE("a massless link is fine where its rotor has inertia", "[dynamics][armature]") {
+TEST_CASE("a massless link is accepted if its rotor has inertia", "[dynamics][armature]") {
   model::Robot robot = test::random_robot(7, 3);
   robot.links[2].mass_kg = 0.0;
   robot.links[2].inertia_kg_m2.setZero();
-  CHECK_THROWS_WITH(model::Model(robot), Catch::Contains("nothing it moves has inertia about joint 'joint2'"));
+  CHECK_THROWS_WITH(model::Model(robot),
+                    Catch::Contains("nothing it moves has inertia about joint 'joint2'"));
   robot.links[2].joint.armature = 0.05;
   const model::Model model(robot);
   dynamics::Workspace ws(model);
   VectorXd a(3);
-  dynamics::forward_dynamics(model, ws, VectorXd::Constant(3, 0.3), VectorXd::Zero(3), VectorXd::Unit(3, 2), a);
+  dynamics::forward_dynamics(model, ws, VectorXd::Constant(3, 0.3), VectorXd::Zero(3),
+                             VectorXd::Unit(3, 2), a);
   CHECK(a.allFinite());
 }

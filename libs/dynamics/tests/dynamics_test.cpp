@@ -29,11 +29,13 @@ SE3 a_base() {
 
 }  // namespace
 
-TEST_CASE("recursive dynamics equal dense Lagrangian mechanics", "[dynamics][property]") {
-  const auto c = GENERATE(Case{1, 1, 0, false}, Case{2, 3, 0, false}, Case{3, 7, 0, false}, Case{4, 6, 2, false},
-                          Case{5, 5, 1, false}, Case{6, 4, 0, true}, Case{7, 6, 3, true}, Case{8, 2, 2, true});
+TEST_CASE("recursive dynamics agree with dense Lagrangian mechanics", "[dynamics][property]") {
+  const auto c = GENERATE(Case{1, 1, 0, false}, Case{2, 3, 0, false}, Case{3, 7, 0, false},
+                          Case{4, 6, 2, false}, Case{5, 5, 1, false}, Case{6, 4, 0, true},
+                          Case{7, 6, 3, true}, Case{8, 2, 2, true});
   CAPTURE(c.seed, c.n, c.prismatic_every, c.planar);
-  const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar), a_base(), Vector3d{1.0, -2.0, -9.0});
+  const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar), a_base(),
+                    Vector3d{1.0, -2.0, -9.0});
   REQUIRE(model.planar() == (c.planar || c.n == 1));
   const test::Dense dense{model};
   Workspace ws(model);
@@ -65,7 +67,8 @@ TEST_CASE("recursive dynamics equal dense Lagrangian mechanics", "[dynamics][pro
   CHECK((tau - x).norm() < 1e-13 * (1.0 + tau.norm()));
 }
 
-TEST_CASE("kinematics equal the product of exponentials, Jacobians its differences", "[dynamics][property]") {
+TEST_CASE("kinematics agree with the product of exponentials, Jacobians with its differences",
+          "[dynamics][property]") {
   const auto c = GENERATE(Case{11, 7, 0, false}, Case{12, 6, 2, false}, Case{13, 5, 3, true});
   CAPTURE(c.seed);
   const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar), a_base());
@@ -86,7 +89,8 @@ TEST_CASE("kinematics equal the product of exponentials, Jacobians its differenc
   shape_centers(model, ws, centers);
   for (int i = 0; i < c.n; ++i)
     CHECK((centers[static_cast<std::size_t>(i)] -
-           dense.com_pose(i, q) * model.robot().links[static_cast<std::size_t>(i)].spheres[0].center_m)
+           dense.com_pose(i, q) *
+               model.robot().links[static_cast<std::size_t>(i)].spheres[0].center_m)
               .norm() < 1e-13);
 
   Matrix3Xd J(3, c.n);
@@ -109,7 +113,8 @@ TEST_CASE("kinematics equal the product of exponentials, Jacobians its differenc
     CHECK((spin - geometry::hat(Vector3d(J6.col(j).head<3>()))).norm() < 1e-8);
   }
   CHECK((tip_pose(model, ws).p() -
-         dense.com_pose(c.n - 1, q) * (model.robot().links.back().com.inverse() * model.robot().tip.pose.p()))
+         dense.com_pose(c.n - 1, q) *
+             (model.robot().links.back().com.inverse() * model.robot().tip.pose.p()))
             .norm() < 1e-13);
 }
 
@@ -121,7 +126,8 @@ TEST_CASE("gyroscopic terms are J^T (w x J v) and do no work", "[dynamics][prope
   Rng rng(c.seed);
   const VectorXd q = test::random_joints(rng, c.n, 2.0), v = test::random_joints(rng, c.n, 3.0);
   std::vector<GyroscopicTerm> terms;
-  for (int i = 0; i < c.n; ++i) terms.push_back({i, test::random_vector(rng), test::random_vector(rng, 10.0)});
+  for (int i = 0; i < c.n; ++i)
+    terms.push_back({i, test::random_vector(rng), test::random_vector(rng, 10.0)});
   VectorXd tau(c.n), expected = VectorXd::Zero(c.n);
   gyroscopic_torque(model, ws, q, v, terms, tau);
   Matrix3Xd J(3, c.n);
@@ -133,7 +139,8 @@ TEST_CASE("gyroscopic terms are J^T (w x J v) and do no work", "[dynamics][prope
   CHECK(std::abs(tau.dot(v)) < 1e-13 * tau.norm() * v.norm());
 }
 
-TEST_CASE("operational inertia inverts J M^-1 J^T, and is zero in a lost direction", "[dynamics][unit]") {
+TEST_CASE("operational inertia inverts J M^-1 J^T, and is zero where J loses rank",
+          "[dynamics][unit]") {
   const Model model(test::random_robot(31, 7));
   Workspace ws(model);
   Rng rng(31);

@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-// Those of this machine.
+// The instruction sets of this machine.
 std::vector<Isa> sets_here() {
   std::vector<Isa> sets;
   for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4})
@@ -56,9 +56,11 @@ Errors worst_errors(F&& next) {
 
 }  // namespace
 
-TEST_CASE("sine and cosine in lanes are right to 1.5 ulp up to 100 rad and to 2.5 ulp at any angle",
-          "[dynamics][lanes]") {
-  static_assert(std::numeric_limits<long double>::digits > 60, "the reference needs more digits than a double has");
+TEST_CASE(
+    "sine and cosine in lanes are accurate to 1.5 ulp up to 100 rad and to 2.5 ulp at any angle",
+    "[dynamics][lanes]") {
+  static_assert(std::numeric_limits<long double>::digits > 60,
+                "the reference needs more digits than a double has");
   Rng rng(1);
   for (const double size : {1e-300, 1e-8, 1e-3, 1.0, 4.0, 100.0, 9e5, 1e9}) {
     CAPTURE(size);
@@ -66,15 +68,17 @@ TEST_CASE("sine and cosine in lanes are right to 1.5 ulp up to 100 rad and to 2.
     CHECK(worst.ulps < (size > 100.0 ? 2.5 : 1.5));
     CHECK(worst.absolute < 0.75 * std::numeric_limits<double>::epsilon());
   }
-  // beside multiples of a quarter turn, where sine or cosine nearly vanishes and the reduction has to be exact
+  // Near multiples of a quarter turn sine or cosine nearly vanishes, and the range reduction has to
+  // be exact.
   for (const double off : {0.0, 1e-12, 1e-6, 1e-3}) {
     CAPTURE(off);
-    CHECK(worst_errors([&] { return std::floor(rng.uniform(-6e5, 6e5)) * 0.5 * M_PI + rng.uniform(-off, off); }).ulps <
-          1.5);
+    CHECK(worst_errors([&] {
+            return std::floor(rng.uniform(-6e5, 6e5)) * 0.5 * M_PI + rng.uniform(-off, off);
+          }).ulps < 1.5);
   }
 }
 
-TEST_CASE("NaN in any lane stays in it, and is seen by the largest of all", "[dynamics][lanes]") {
+TEST_CASE("NaN stays in its lane, and largest() returns it", "[dynamics][lanes]") {
   using Pack = kernel::Lanes<2>;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int bad = 0; bad < 2; ++bad) {
@@ -96,13 +100,14 @@ TEST_CASE("NaN in any lane stays in it, and is seen by the largest of all", "[dy
   CHECK(largest(abs(Pack::load(numbers))) == 3.0);
 }
 
-TEST_CASE("batches equal single calls, whatever the number of states", "[dynamics][lanes]") {
+TEST_CASE("batches equal single calls for any number of states", "[dynamics][lanes]") {
   struct Case {
     std::uint64_t seed;
     int n, prismatic_every;
     bool planar;
   };
-  const auto c = GENERATE(Case{1, 7, 0, false}, Case{2, 5, 2, false}, Case{3, 4, 0, true}, Case{4, 4, 3, true});
+  const auto c = GENERATE(Case{1, 7, 0, false}, Case{2, 5, 2, false}, Case{3, 4, 0, true},
+                          Case{4, 4, 3, true});
   const int states = GENERATE(1, 3, 8, 21);
   CAPTURE(c.seed, states);
   const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar));
@@ -122,7 +127,7 @@ TEST_CASE("batches equal single calls, whatever the number of states", "[dynamic
   }
 }
 
-TEST_CASE("on every instruction set the sweeps are those of dense matrices", "[dynamics][isa]") {
+TEST_CASE("on every instruction set the sweeps agree with dense matrices", "[dynamics][isa]") {
   const bool planar = GENERATE(false, true);
   const int prismatic_every = GENERATE(0, 3);
   const int n = 9;
@@ -130,10 +135,12 @@ TEST_CASE("on every instruction set the sweeps are those of dense matrices", "[d
   if (prismatic_every > 0) robot.links[4].joint.armature = 0.3;
   const Model model(robot);
   Rng rng(31);
-  const VectorXd q = test::random_joints(rng, n, 3.0), v = test::random_joints(rng, n), y = test::random_joints(rng, n);
+  const VectorXd q = test::random_joints(rng, n, 3.0), v = test::random_joints(rng, n),
+                 y = test::random_joints(rng, n);
   const test::Dense dense{model};
   const MatrixXd M_dense = dense.mass(q);
-  const VectorXd gravity = dense.bias(q, VectorXd::Zero(n)), bias = dense.bias(q, v);  // by differences
+  // By central differences.
+  const VectorXd gravity = dense.bias(q, VectorXd::Zero(n)), bias = dense.bias(q, v);
   const auto sets = sets_here();
   REQUIRE_FALSE(sets.empty());
   for (const auto& set : sets) {
@@ -157,13 +164,14 @@ TEST_CASE("on every instruction set the sweeps are those of dense matrices", "[d
   }
 }
 
-TEST_CASE("all instruction sets agree but for rounding", "[dynamics][isa]") {
+TEST_CASE("all instruction sets agree up to rounding", "[dynamics][isa]") {
   const bool planar = GENERATE(false, true);
   const int prismatic_every = GENERATE(0, 3);
   const int n = 9;
   const Model model(test::random_robot(31, n, prismatic_every, planar));
   Rng rng(31);
-  const VectorXd q = test::random_joints(rng, n, 3.0), v = test::random_joints(rng, n), y = test::random_joints(rng, n);
+  const VectorXd q = test::random_joints(rng, n, 3.0), v = test::random_joints(rng, n),
+                 y = test::random_joints(rng, n);
   std::vector<VectorXd> first;
   for (const auto& set : sets_here()) {
     CAPTURE(name_of(set));
@@ -178,6 +186,7 @@ TEST_CASE("all instruction sets agree but for rounding", "[dynamics][isa]") {
     mass_matrix(model, ws, q, M);
     all[5] = M * y;
     if (first.empty()) first = all;
-    for (std::size_t i = 0; i < all.size(); ++i) CHECK((all[i] - first[i]).norm() < 1e-11 * (1.0 + first[i].norm()));
+    for (std::size_t i = 0; i < all.size(); ++i)
+      CHECK((all[i] - first[i]).norm() < 1e-11 * (1.0 + first[i].norm()));
   }
 }

@@ -18,18 +18,19 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double grains = 1e5;      // of written coordinates, in a metre
-constexpr double piece_m = 2.5e-4;  // how fine coverage is proven
+constexpr double units_per_m = 1e5;  // written coordinates are multiples of 1e-5 m
+constexpr double piece_m = 2.5e-4;   // size of the finest pieces in the proof of coverage
 constexpr std::size_t samples_wanted = 4000;
 
-// Thins points to about one in each cube of the given side, keeping the first of each; in the order of the cubes.
+// Keeps the first point in each cube of the given side, in the order of the cubes.
 std::vector<Vector3d> thin(const std::vector<Vector3d>& points, double side) {
   std::vector<std::pair<std::array<std::int64_t, 3>, std::size_t>> keyed;
   keyed.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     std::array<std::int64_t, 3> cube{};
     for (int k = 0; k < 3; ++k)
-      cube[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor(points[i][k] / side));
+      cube[static_cast<std::size_t>(k)] =
+          static_cast<std::int64_t>(std::floor(points[i][k] / side));
     keyed.push_back({cube, i});
   }
   std::sort(keyed.begin(), keyed.end());
@@ -39,7 +40,7 @@ std::vector<Vector3d> thin(const std::vector<Vector3d>& points, double side) {
   return out;
 }
 
-// Points of the surface, about `side` apart; corners of the mesh before others.
+// Points of the surface, about `side` apart; corners of the mesh come first.
 std::vector<Vector3d> sample(const Mesh& mesh, double side) {
   std::vector<Vector3d> points = thin(mesh.vertices, 0.5 * side), extra;
   std::vector<std::array<Vector3d, 3>> stack;
@@ -48,10 +49,13 @@ std::vector<Vector3d> sample(const Mesh& mesh, double side) {
     while (!stack.empty()) {
       const auto [a, b, c] = stack.back();
       stack.pop_back();
-      const double ab = (b - a).squaredNorm(), bc = (c - b).squaredNorm(), ca = (a - c).squaredNorm();
+      const double ab = (b - a).squaredNorm(), bc = (c - b).squaredNorm(),
+                   ca = (a - c).squaredNorm();
       const double longest = std::max({ab, bc, ca});
       if (longest <= side * side) continue;
-      const Vector3d middle = longest == ab ? 0.5 * (a + b) : longest == bc ? 0.5 * (b + c) : 0.5 * (c + a);
+      const Vector3d middle = longest == ab   ? 0.5 * (a + b)
+                              : longest == bc ? 0.5 * (b + c)
+                                              : 0.5 * (c + a);
       extra.push_back(middle);
       if (longest == ab) {
         stack.push_back({a, middle, c});
@@ -70,17 +74,17 @@ std::vector<Vector3d> sample(const Mesh& mesh, double side) {
   return thin(points, 0.5 * side);
 }
 
-// An axis (both ends the same for a ball) with the surface points that are nearest to it in the sense of `cost`.
+// An axis (both ends the same for a ball) with the surface points for which it has the least cost.
 struct Item {
   Vector3d from, to;
   double depth = 0.0;
-  double need = 0.0;  // largest cost in its group
+  double need = 0.0;  // largest cost in its group: the excess that the group needs
   std::vector<std::size_t> group{};
 };
 
 using Items = std::vector<Item>;
 
-double bulge_of(const Items& items) {
+double largest_need(const Items& items) {
   double most = -infinity;
   for (const Item& item : items) most = std::max(most, item.need);
   return most;
@@ -93,30 +97,36 @@ class Coverer {
 
   std::vector<Vector3d>& samples() { return samples_; }
   [[nodiscard]] bool good(const Items& items) const {
-    return items.size() <= static_cast<std::size_t>(options_.count_max) && bulge_of(items) <= options_.excess_m;
+    return items.size() <= static_cast<std::size_t>(options_.count_max) &&
+           largest_need(items) <= options_.excess_m;
   }
 
-  // Few that do with the excess allowed; if that takes more than allowed, as many as allowed and a larger excess.
+  // Few shapes within the excess allowed. If these are more than count_max, count_max shapes with
+  // the least excess found.
   Items find() {
-    Items best = options_.capsules ? improved(greedy(), 12) : grown();
+    Items best = options_.capsules ? improved(choose_greedily(), 12) : grow_balls();
     const auto count_max = static_cast<std::size_t>(options_.count_max);
-    for (std::size_t count = 1; count < best.size() && count <= std::min<std::size_t>(count_max, 24); ++count)
-      if (Items row = improved(in_a_row(count), 12); bulge_of(row) <= options_.excess_m) best = std::move(row);
+    for (std::size_t count = 1;
+         count < best.size() && count <= std::min<std::size_t>(count_max, 24); ++count)
+      if (Items row = improved(balls_in_a_row(count), 12); largest_need(row) <= options_.excess_m)
+        best = std::move(row);
     for (;;) {
       if (best.size() <= 1) break;
       const bool too_many = best.size() > count_max;
       Items fewer = without_one(best, too_many ? 1 : 3);
-      if (!too_many && bulge_of(fewer) > options_.excess_m) break;
+      if (!too_many && largest_need(fewer) > options_.excess_m) break;
       best = std::move(fewer);
     }
-    while (best.size() < count_max && bulge_of(best) > options_.excess_m) best = improved(with_one_more(best), 12);
+    while (best.size() < count_max && largest_need(best) > options_.excess_m)
+      best = improved(with_one_more(best), 12);
     return improved(std::move(best), 40);
   }
 
-  // After samples were added: moves, and more if moving does not do.
-  Items mended(Items items) {
+  // After samples were added: moves the axes, and adds some if that is not enough.
+  Items refit(Items items) {
     items = improved(std::move(items), 20);
-    while (items.size() < static_cast<std::size_t>(options_.count_max) && bulge_of(items) > options_.excess_m)
+    while (items.size() < static_cast<std::size_t>(options_.count_max) &&
+           largest_need(items) > options_.excess_m)
       items = improved(with_one_more(items), 20);
     return items;
   }
@@ -138,11 +148,13 @@ class Coverer {
       items[at].group.push_back(j);
       items[at].need = std::max(items[at].need, least);
     }
-    items.erase(std::remove_if(items.begin(), items.end(), [](const Item& item) { return item.group.empty(); }),
+    items.erase(std::remove_if(items.begin(), items.end(),
+                               [](const Item& item) { return item.group.empty(); }),
                 items.end());
   }
 
  private:
+  // docs/theory.md (13.32)
   static double cost(const Item& item, const Vector3d& x) {
     return segment_distance(item.from, item.to, x) - item.depth;
   }
@@ -150,7 +162,7 @@ class Coverer {
     return {from, to, from == to ? solid_.depth(from) : solid_.depth(from, to)};
   }
 
-  // Points of the inside, spread evenly.
+  // Grid points inside, spread evenly.
   [[nodiscard]] std::vector<Vector3d> inner(std::size_t count) const {
     auto all = solid_.inner_points();
     if (all.size() <= count) return all;
@@ -160,24 +172,27 @@ class Coverer {
     return some;
   }
 
-  // Deep points far from each other: the ends of candidate capsules.
+  // Deep points that are far from each other: the ends of candidate capsules.
   [[nodiscard]] std::vector<Vector3d> ends(std::size_t count) const {
     const auto points = inner(4000);
     std::vector<double> depth(points.size()), apart(points.size(), infinity);
     double deepest = 0.0;
-    for (std::size_t i = 0; i < points.size(); ++i) deepest = std::max(deepest, depth[i] = solid_.depth(points[i]));
+    for (std::size_t i = 0; i < points.size(); ++i)
+      deepest = std::max(deepest, depth[i] = solid_.depth(points[i]));
     std::vector<Vector3d> chosen;
     while (chosen.size() < std::min(count, points.size())) {
       std::size_t best = 0;
       double most = -infinity;
       for (std::size_t i = 0; i < points.size(); ++i)
-        if (const double worth = std::min(apart[i], deepest) + 2.0 * depth[i]; worth > most && apart[i] > 0.0) {
-          most = worth;
+        if (const double score = std::min(apart[i], deepest) + 2.0 * depth[i];
+            score > most && apart[i] > 0.0) {
+          most = score;
           best = i;
         }
       if (most == -infinity) break;
       chosen.push_back(points[best]);
-      for (std::size_t i = 0; i < points.size(); ++i) apart[i] = std::min(apart[i], (points[i] - points[best]).norm());
+      for (std::size_t i = 0; i < points.size(); ++i)
+        apart[i] = std::min(apart[i], (points[i] - points[best]).norm());
     }
     return chosen;
   }
@@ -191,17 +206,19 @@ class Coverer {
     const auto points = ends(44);
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t j = i; j < points.size(); ++j)
-        if (Item item = item_at(points[i], points[j]); item.depth > -options_.excess_m) out.push_back(std::move(item));
+        if (Item item = item_at(points[i], points[j]); item.depth > -options_.excess_m)
+          out.push_back(std::move(item));
     return out;
   }
 
-  // Balls in a row along the longest axis, as suits rods and boxes.
-  [[nodiscard]] Items in_a_row(std::size_t count) const {
+  // Balls in a row along the longest axis, a good start for rods and boxes.
+  [[nodiscard]] Items balls_in_a_row(std::size_t count) const {
     Vector3d mean = Vector3d::Zero();
     for (const Vector3d& x : samples_) mean += x / static_cast<double>(samples_.size());
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vector3d& x : samples_) spread += (x - mean) * (x - mean).transpose();
-    const Vector3d axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(2);
+    const Vector3d axis =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(2);
     double low = infinity, high = -infinity;
     for (const Vector3d& x : samples_) {
       low = std::min(low, axis.dot(x - mean));
@@ -209,27 +226,30 @@ class Coverer {
     }
     Items row;
     for (std::size_t i = 0; i < count; ++i) {
-      const double at = low + (high - low) * (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+      const double at =
+          low + (high - low) * (static_cast<double>(i) + 0.5) / static_cast<double>(count);
       const Vector3d p = mean + at * axis;
       row.push_back(item_at(p, p));
     }
     return row;
   }
 
-  // One after the other, each where most is missing.
-  Items grown() {
+  // Adds balls one by one, each where the cost is largest.
+  Items grow_balls() {
     const auto points = inner(4000);
     Item deepest = item_at(points.front(), points.front());
     for (const Vector3d& p : points)
       if (Item item = item_at(p, p); item.depth > deepest.depth) deepest = std::move(item);
     Items items = improved({std::move(deepest)}, 12);
-    while (items.size() < static_cast<std::size_t>(options_.count_max) && bulge_of(items) > options_.excess_m)
+    while (items.size() < static_cast<std::size_t>(options_.count_max) &&
+           largest_need(items) > options_.excess_m)
       items = improved(with_one_more(items), 20);
     return items;
   }
 
-  // Each time the candidate that covers the most of what is left, with the excess allowed.
-  Items greedy() const {
+  // Takes, again and again, the candidate that covers the most remaining samples within the excess
+  // allowed.
+  Items choose_greedily() const {
     Items pool = candidates();
     const double reach = options_.excess_m;
     for (Item& item : pool)
@@ -243,8 +263,9 @@ class Coverer {
       for (std::size_t i = 0; i < pool.size(); ++i) {
         auto& group = pool[i].group;
         if (group.size() <= most) continue;
-        group.erase(std::remove_if(group.begin(), group.end(), [&](std::size_t j) { return left[j] == 0; }),
-                    group.end());
+        group.erase(
+            std::remove_if(group.begin(), group.end(), [&](std::size_t j) { return left[j] == 0; }),
+            group.end());
         if (group.size() > most) {
           most = group.size();
           best = i;
@@ -263,25 +284,26 @@ class Coverer {
     return chosen;
   }
 
-  // One more, where most is missing: the largest ball that reaches that point with half of what is needed now.
+  // Adds the deepest ball that reaches the costliest sample at half its cost.
   Items with_one_more(Items items) {
     assign(items);
-    const auto worst =
-        std::max_element(items.begin(), items.end(), [](const Item& a, const Item& b) { return a.need < b.need; });
-    const Item wanting = *worst;
-    Vector3d x = samples_[wanting.group.front()];
-    for (const std::size_t j : wanting.group)
-      if (cost(wanting, samples_[j]) >= wanting.need) x = samples_[j];
+    const auto worst = std::max_element(
+        items.begin(), items.end(), [](const Item& a, const Item& b) { return a.need < b.need; });
+    const Item worst_item = *worst;
+    Vector3d x = samples_[worst_item.group.front()];
+    for (const std::size_t j : worst_item.group)
+      if (cost(worst_item, samples_[j]) >= worst_item.need) x = samples_[j];
     Item best = item_at(x, x);
     for (const Vector3d& p : inner(4000)) {
       Item item = item_at(p, p);
-      if (cost(item, x) <= 0.5 * wanting.need && item.depth > best.depth) best = std::move(item);
+      if (cost(item, x) <= 0.5 * worst_item.need && item.depth > best.depth) best = std::move(item);
     }
     items.push_back(std::move(best));
     return items;
   }
 
-  // One less: tries to leave out each of the `tries` whose points the others reach best, and moves the rest.
+  // Leaves out one axis and moves the rest: the best result for the `tries` axes whose samples the
+  // others reach at the least cost.
   Items without_one(const Items& items, int tries) {
     std::vector<std::pair<double, std::size_t>> loss;
     for (std::size_t i = 0; i < items.size(); ++i) {
@@ -301,8 +323,8 @@ class Coverer {
       Items fewer = items;
       fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(loss[k].second));
       fewer = improved(std::move(fewer), 20);
-      if (const double bulge = bulge_of(fewer); bulge < least) {
-        least = bulge;
+      if (const double largest = largest_need(fewer); largest < least) {
+        least = largest;
         best = std::move(fewer);
       }
       if (least <= options_.excess_m) break;
@@ -310,43 +332,48 @@ class Coverer {
     return best;
   }
 
-  // Moves axes and hands points over, round by round; the best of all rounds.
+  // Moves axes and reassigns samples in turn. Returns the best of all rounds.
   Items improved(Items items, int rounds) {
     assign(items);
     Items best = items;
-    double least = bulge_of(best);
+    double least = largest_need(best);
     int idle = 0;
     for (int round = 0; round < rounds && idle < 4; ++round) {
-      for (Item& item : items) settle(item);
+      for (Item& item : items) descend(item);
       assign(items);
-      const double bulge = bulge_of(items);
-      idle = bulge < least - 1e-5 ? 0 : idle + 1;
-      if (bulge < least) {
-        least = bulge;
+      const double largest = largest_need(items);
+      idle = largest < least - 1e-5 ? 0 : idle + 1;
+      if (largest < least) {
+        least = largest;
         best = items;
       }
     }
     return best;
   }
 
-  // Moves one axis so that the largest cost of its group falls: steps along random directions, halved when none helps.
-  void settle(Item& item) {
-    item.depth = item_at(item.from, item.to).depth;  // from the grid, as that of the trials
-    // The points whose cost is largest matter for the steps made here, and some all around to see a step too far.
+  // Moves one axis to lower the largest cost of its group: steps along random directions, halved
+  // when none helps.
+  void descend(Item& item) {
+    item.depth = item_at(item.from, item.to).depth;  // from the grid, as for the trials
+    // The samples with the largest cost decide on small steps, some others on steps that are too
+    // large.
     constexpr std::size_t worst_watched = 96, others_watched = 160;
     std::vector<std::pair<double, std::size_t>> costs;
     for (const std::size_t j : item.group) costs.emplace_back(-cost(item, samples_[j]), j);
     std::size_t watched = std::min(worst_watched, costs.size());
-    std::nth_element(costs.begin(), costs.begin() + static_cast<std::ptrdiff_t>(watched - 1), costs.end());
+    std::nth_element(costs.begin(), costs.begin() + static_cast<std::ptrdiff_t>(watched - 1),
+                     costs.end());
     const std::size_t stride = std::max<std::size_t>(1, (costs.size() - watched) / others_watched);
     for (std::size_t w = watched; w < costs.size(); w += stride) costs[watched++] = costs[w];
     const auto worst = [&](const Item& at) {
       double most = -infinity;
-      for (std::size_t w = 0; w < watched; ++w) most = std::max(most, cost(at, samples_[costs[w].second]));
+      for (std::size_t w = 0; w < watched; ++w)
+        most = std::max(most, cost(at, samples_[costs[w].second]));
       return most;
     };
     double now = worst(item);
-    const double first_step = options_.capsules ? 0.5 * options_.excess_m : 0.25 * options_.excess_m;
+    const double first_step =
+        options_.capsules ? 0.5 * options_.excess_m : 0.25 * options_.excess_m;
     for (double step = std::max(first_step, 4e-4); step > 1e-4;) {
       const Vector3d u = Vector3d(rng_.normal(), rng_.normal(), rng_.normal()).normalized();
       const Vector3d v = u.unitOrthogonal(), w = u.cross(v);
@@ -383,20 +410,22 @@ class Coverer {
   Rng rng_{1};
 };
 
-Vector3d on_grain(const Vector3d& p) {
-  return (p * grains).array().round().matrix() / grains;
+Vector3d rounded(const Vector3d& p) {
+  return (p * units_per_m).array().round().matrix() / units_per_m;
 }
 
 }  // namespace
 
 Cover cover(const Solid& solid, const std::vector<Shape>& covered, const CoverOptions& options) {
-  const double side = std::max(1e-3, std::sqrt(2.0 * solid.area() / static_cast<double>(samples_wanted)));
-  const auto held = [&](const Vector3d& p) {
-    return std::any_of(covered.begin(), covered.end(), [&](const Shape& ball) { return distance(ball, p) < 0.0; });
+  const double side =
+      std::max(1e-3, std::sqrt(2.0 * solid.area() / static_cast<double>(samples_wanted)));
+  const auto is_covered = [&](const Vector3d& p) {
+    return std::any_of(covered.begin(), covered.end(),
+                       [&](const Shape& ball) { return distance(ball, p) < 0.0; });
   };
   std::vector<Vector3d> samples;
   for (const Vector3d& p : sample(solid.mesh(), side))
-    if (!held(p)) samples.push_back(p);
+    if (!is_covered(p)) samples.push_back(p);
   Cover best;
   if (samples.empty()) {
     if (coverage_gap(solid.mesh(), covered, 1e-6).bound_m <= 0.0) return best;
@@ -404,32 +433,35 @@ Cover cover(const Solid& solid, const std::vector<Shape>& covered, const CoverOp
   }
   Coverer coverer(solid, std::move(samples), options);
   Items items = coverer.find();
-  const auto bulge_of_shape = [&](const Shape& shape) {
+  const auto excess_bound_of = [&](const Shape& shape) {
     return shape.radius_m - solid.exact_depth(shape.from, shape.to);
   };
-  // Samples miss what lies between them: what sealing finds joins them.
+  // Samples do not show the surface between them. Points where radii were raised join them.
   constexpr int rounds = 6;
   for (int round = 0; round < rounds; ++round) {
     for (Item& item : items) {
       const bool ball = item.from == item.to;
-      item.from = on_grain(item.from);
-      item.to = ball ? item.from : on_grain(item.to);
+      item.from = rounded(item.from);
+      item.to = ball ? item.from : rounded(item.to);
     }
     coverer.assign(items);
     Cover now;
     for (const Item& item : items)
-      now.shapes.push_back({item.from, item.to, std::max(1.0 / grains, item.need + item.depth)});
+      // docs/theory.md (13.33)
+      now.shapes.push_back(
+          {item.from, item.to, std::max(1.0 / units_per_m, item.need + item.depth)});
     std::vector<Shape> all = now.shapes;
-    const auto raised = seal(solid.mesh(), covered, all, piece_m);
-    now.bulge_m = -infinity;
+    const auto raised = close_gaps(solid.mesh(), covered, all, piece_m);
+    now.excess_bound_m = -infinity;
     for (std::size_t i = 0; i < now.shapes.size(); ++i) {
-      now.shapes[i].radius_m = std::ceil((all[i].radius_m + 1e-9) * grains) / grains;
-      now.bulge_m = std::max(now.bulge_m, bulge_of_shape(now.shapes[i]));
+      // docs/theory.md (13.36)
+      now.shapes[i].radius_m = std::ceil((all[i].radius_m + 1e-9) * units_per_m) / units_per_m;
+      now.excess_bound_m = std::max(now.excess_bound_m, excess_bound_of(now.shapes[i]));
     }
-    if (best.shapes.empty() || now.bulge_m < best.bulge_m) best = now;
-    if (raised.empty() || now.bulge_m <= options.excess_m) break;
+    if (best.shapes.empty() || now.excess_bound_m < best.excess_bound_m) best = now;
+    if (raised.empty() || now.excess_bound_m <= options.excess_m) break;
     for (const Vector3d& p : thin(raised, 1e-3)) coverer.samples().push_back(p);
-    items = coverer.mended(std::move(items));
+    items = coverer.refit(std::move(items));
   }
   return best;
 }

@@ -15,14 +15,16 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Cutting stops there in any case, and the bound says what was reached.
+// Cutting stops at this number in any case; the bound then is what was reached.
 constexpr std::size_t pieces_max = 40'000'000;
-// Pieces so short are cut on only for the sake of the tolerance. Half of what seal leaves whole.
+// Shorter pieces are cut only to reach the tolerance. Less than half the size that close_gaps
+// leaves uncut.
 constexpr double finest_m = 1e-4;
 
 using Piece = std::array<Vector3d, 3>;
 
-// The two halves across the middle of the longest edge; its length.
+// Cuts a piece at the middle of its longest edge, into `one` and `other`. Returns that edge's
+// length.
 double cut(const Piece& piece, Piece& one, Piece& other) {
   std::size_t longest = 0;
   double length2 = -1.0;
@@ -40,17 +42,18 @@ double cut(const Piece& piece, Piece& one, Piece& other) {
   return std::sqrt(length2);
 }
 
-// The shape that holds a piece best: how far the piece sticks out of it, at most.
-struct Hold {
+// The shape out of which a piece sticks least, and how far at most: docs/theory.md (13.34).
+struct BestShape {
   double out = infinity;
   std::size_t shape = 0;
 };
 
-Hold best_hold(const Piece& piece, std::span<const Shape> shapes, std::size_t guess) {
+BestShape best_shape(const Piece& piece, std::span<const Shape> shapes, std::size_t guess) {
   const auto out_of = [&](std::size_t i) {
-    return std::max({distance(shapes[i], piece[0]), distance(shapes[i], piece[1]), distance(shapes[i], piece[2])});
+    return std::max({distance(shapes[i], piece[0]), distance(shapes[i], piece[1]),
+                     distance(shapes[i], piece[2])});
   };
-  Hold best;
+  BestShape best;
   if (guess < shapes.size()) best = {out_of(guess), guess};
   for (std::size_t i = 0; i < shapes.size() && best.out > 0.0; ++i)
     if (const double out = out_of(i); out < best.out) best = {out, i};
@@ -63,7 +66,7 @@ Gap coverage_gap(const Mesh& mesh, std::span<const Shape> shapes, double toleran
   Gap gap;
   if (shapes.empty()) return {infinity, infinity, mesh.corner(0, 0)};
   std::size_t pieces = 0, guess = 0;
-  const auto see = [&](const Vector3d& corner) {
+  const auto update_found = [&](const Vector3d& corner) {
     double least = infinity;
     for (const Shape& shape : shapes) least = std::min(least, distance(shape, corner));
     if (least > gap.found_m) {
@@ -71,27 +74,27 @@ Gap coverage_gap(const Mesh& mesh, std::span<const Shape> shapes, double toleran
       gap.point = corner;
     }
   };
-  // A corner that all share is seen first, so that little is cut.
-  for (const Vector3d& vertex : mesh.vertices) see(vertex);
+  // The mesh's own corners come first: a large gap found early saves cutting.
+  for (const Vector3d& vertex : mesh.vertices) update_found(vertex);
   std::vector<std::pair<Piece, double>> stack;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     stack.push_back({{mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)}, infinity});
     while (!stack.empty()) {
       const auto [piece, before] = stack.back();
       stack.pop_back();
-      const Hold hold = best_hold(piece, shapes, guess);
-      guess = hold.shape;
-      const double out = std::min(before, hold.out);
+      const BestShape best = best_shape(piece, shapes, guess);
+      guess = best.shape;
+      const double out = std::min(before, best.out);
       if (out <= 0.0) continue;
       Piece one, other;
       const double longest = cut(piece, one, other);
-      // as long as nothing is seen to stick out, it may well be proven that nothing does
-      const bool hopeful = gap.found_m == 0.0 && longest > finest_m;
-      if ((out <= gap.found_m + tolerance_m && !hopeful) || ++pieces > pieces_max) {
+      // Nothing found to stick out so far: cutting further may prove that nothing does.
+      const bool may_be_covered = gap.found_m == 0.0 && longest > finest_m;
+      if ((out <= gap.found_m + tolerance_m && !may_be_covered) || ++pieces > pieces_max) {
         gap.bound_m = std::max(gap.bound_m, out);
         continue;
       }
-      see(one[1]);  // the middle of the edge
+      update_found(one[1]);  // the middle of the edge
       stack.push_back({one, out});
       stack.push_back({other, out});
     }
@@ -99,7 +102,8 @@ Gap coverage_gap(const Mesh& mesh, std::span<const Shape> shapes, double toleran
   return gap;
 }
 
-std::vector<Vector3d> seal(const Mesh& mesh, std::span<const Shape> fixed, std::span<Shape> shapes, double piece_m) {
+std::vector<Vector3d> close_gaps(const Mesh& mesh, std::span<const Shape> fixed,
+                                 std::span<Shape> shapes, double piece_m) {
   std::vector<Vector3d> raised;
   if (shapes.empty()) return raised;
   std::vector<double> before;
@@ -111,19 +115,19 @@ std::vector<Vector3d> seal(const Mesh& mesh, std::span<const Shape> fixed, std::
     while (!stack.empty()) {
       const Piece piece = stack.back();
       stack.pop_back();
-      const Hold hold = best_hold(piece, shapes, guess);
-      guess = hold.shape;
-      if (hold.out <= 0.0 || (!fixed.empty() && best_hold(piece, fixed, 0).out <= 0.0)) continue;
+      const BestShape best = best_shape(piece, shapes, guess);
+      guess = best.shape;
+      if (best.out <= 0.0 || (!fixed.empty() && best_shape(piece, fixed, 0).out <= 0.0)) continue;
       Piece one, other;
       if (cut(piece, one, other) > piece_m) {
         stack.push_back(one);
         stack.push_back(other);
         continue;
       }
-      if (shapes[hold.shape].radius_m + hold.out > before[hold.shape] + piece_m)
+      if (shapes[best.shape].radius_m + best.out > before[best.shape] + piece_m)
         raised.emplace_back((piece[0] + piece[1] + piece[2]) / 3.0);
-      // a rounding more, so that the distance comes out as no more than 0
-      shapes[hold.shape].radius_m += hold.out + 1e-12;
+      // A little more than rounding, so that the distance is computed as at most 0.
+      shapes[best.shape].radius_m += best.out + 1e-12;
     }
   }
   return raised;
@@ -135,12 +139,13 @@ SurfacePoints surface_points(const Shape& shape, std::size_t count) {
   const double length = along.norm(), r = shape.radius_m;
   const Vector3d z = length > 0.0 ? Vector3d(along / length) : Vector3d::UnitZ();
   const Vector3d x = z.unitOrthogonal(), y = z.cross(x);
-  // Area is even along the axis, over the caps as over the cylinder (Archimedes).
+  // docs/theory.md (13.37): equal steps along the axis carry equal areas (Archimedes).
   const double reach = 2.0 * r + length;
   out.area_each_m2 = 2.0 * std::numbers::pi * r * reach / static_cast<double>(count);
   const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
   for (std::size_t i = 0; i < count; ++i) {
-    const double h = reach * (static_cast<double>(i) + 0.5) / static_cast<double>(count) - r;  // from `from`, along z
+    // height along z, from `from`
+    const double h = reach * (static_cast<double>(i) + 0.5) / static_cast<double>(count) - r;
     const double beyond = h < 0.0 ? h : std::max(0.0, h - length);
     const double ring = std::sqrt(std::max(0.0, r * r - beyond * beyond));
     const double turn = golden * static_cast<double>(i);
@@ -167,9 +172,10 @@ Excess excess(const Solid* solid, std::span<const Shape> balls, std::span<const 
       out.area_m2 += surface.area_each_m2;
     }
   }
+  // docs/theory.md (13.38)
   if (out.area_m2 > 0.0) out.mean_m /= out.area_m2;
 
-  // The volume, from middles of cubes.
+  // The volume, by cubes: docs/theory.md (13.39).
   constexpr double cubes = 200'000.0;
   Vector3d low = Vector3d::Constant(infinity), high = -low;
   for (const Shape& shape : shapes)

@@ -27,16 +27,16 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-std::string after(const std::string& text, const std::string& scheme) {
+std::string without_scheme(const std::string& text, const std::string& scheme) {
   return text.rfind(scheme, 0) == 0 ? text.substr(scheme.size()) : "";
 }
 
-// What one link's shapes must cover.
+// The geometry of one link, which its shapes must cover.
 struct LinkSolid {
   std::string name;
   std::size_t triangles = 0;
-  std::vector<Shape> balls;      // kept as they are
-  std::unique_ptr<Solid> solid;  // of all else; none if there is nothing else
+  std::vector<Shape> balls;      // spheres of the URDF, kept unchanged
+  std::unique_ptr<Solid> solid;  // all other geometry; null if there is none
 
   [[nodiscard]] double volume() const {
     double volume = solid ? solid->volume() : 0.0;
@@ -45,31 +45,36 @@ struct LinkSolid {
   }
 };
 
-class Gatherer {
+class GeometryReader {
  public:
-  Gatherer(const fs::path& urdf, const FitOptions& options, std::vector<std::string>& notes)
+  GeometryReader(const fs::path& urdf, const FitOptions& options, std::vector<std::string>& notes)
       : urdf_(urdf), options_(options), notes_(notes) {}
 
-  std::vector<LinkSolid> gather() {
+  std::vector<LinkSolid> read() {
     std::vector<LinkSolid> solids;
-    std::vector<std::string> bare, by_visual;
+    std::vector<std::string> without_geometry, by_visual;
     for (const description::LinkGeometry& link : description::read_urdf_geometry(urdf_)) {
       const bool visual = link.collision.empty() && !link.visual.empty() && options_.visual;
       const auto& shapes = visual ? link.visual : link.collision;
       if (shapes.empty()) {
-        bare.push_back(link.name + (link.visual.empty() ? "" : " (has <visual>)"));
+        without_geometry.push_back(link.name + (link.visual.empty() ? "" : " (has <visual>)"));
         continue;
       }
       if (visual) by_visual.push_back(link.name);
       solids.push_back(solid_of(link.name, shapes));
     }
-    const auto joined = [](const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); };
-    if (!by_visual.empty()) notes_.push_back("taken from <visual>, there is no <collision>: " + joined(by_visual));
-    if (!bare.empty()) notes_.push_back("no geometry, so no shapes: " + joined(bare));
+    const auto joined = [](const std::vector<std::string>& names) {
+      return fmt::format("{}", fmt::join(names, ", "));
+    };
+    if (!by_visual.empty())
+      notes_.push_back("taken from <visual> because there is no <collision>: " + joined(by_visual));
+    if (!without_geometry.empty())
+      notes_.push_back("no geometry and therefore no shapes: " + joined(without_geometry));
     if (solids.empty())
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: no link has a <collision>, expected one at least{}", urdf_.string(),
-                              options_.visual ? "" : " (--visual takes <visual> instead)"));
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{}: no link has a <collision>, expected at least one{}", urdf_.string(),
+                      options_.visual ? "" : " (--visual takes <visual> instead)"));
     return solids;
   }
 
@@ -94,8 +99,9 @@ class Gatherer {
           break;
       }
       if (all.triangles.size() > triangles_max)
-        throw Error(ErrorCode::invalid, fmt::format("{}: link '{}': more than {} triangles, expected coarser meshes",
-                                                    urdf_.string(), name, triangles_max));
+        throw Error(ErrorCode::invalid,
+                    fmt::format("{}: link '{}': more than {} triangles, expected coarser meshes",
+                                urdf_.string(), name, triangles_max));
     }
     out.triangles = all.triangles.size();
     if (all.triangles.empty()) return out;
@@ -105,24 +111,27 @@ class Gatherer {
       throw Error(e.code(), fmt::format("{}: link '{}': {}", urdf_.string(), name, e.what()));
     }
     if (!out.solid->closed())
-      notes_.push_back(
-          fmt::format("link '{}': its mesh is not closed; the inside is what its winding number says", name));
+      notes_.push_back(fmt::format(
+          "link '{}': its mesh is not closed; the winding number decides what is inside", name));
     return out;
   }
 
   Mesh mesh_of(const std::string& name, const description::LinkShape& shape) const {
-    const std::string place = fmt::format("{}: line {}: link '{}'", urdf_.string(), shape.line, name);
+    const std::string place =
+        fmt::format("{}: line {}: link '{}'", urdf_.string(), shape.line, name);
     std::vector<fs::path> tried;
     const auto file = find_mesh(shape.mesh, urdf_, options_.meshes, &tried);
     if (!file) {
-      std::string looked;
+      std::string tried_paths;
       constexpr std::size_t shown = 3;
       for (std::size_t i = 0; i < std::min(tried.size(), shown); ++i)
-        looked += (i == 0 ? "" : ", ") + tried[i].string();
-      if (tried.size() > shown) looked += fmt::format(" and {} more", tried.size() - shown);
-      throw Error(ErrorCode::io, fmt::format("{}: no file for mesh '{}', looked for {}; --package NAME=DIR or --meshes "
-                                             "DIR say where meshes are",
-                                             place, shape.mesh, looked));
+        tried_paths += (i == 0 ? "" : ", ") + tried[i].string();
+      if (tried.size() > shown) tried_paths += fmt::format(" and {} more", tried.size() - shown);
+      throw Error(
+          ErrorCode::io,
+          fmt::format("{}: no file for mesh '{}', tried {}; --package NAME=DIR and --meshes DIR "
+                      "add folders with meshes",
+                      place, shape.mesh, tried_paths));
     }
     try {
       return load_mesh(*file, shape.scale);
@@ -142,17 +151,18 @@ LinkFit measured(const LinkSolid& link, std::vector<Shape> shapes, double tolera
   out.triangles = link.triangles;
   out.closed = !link.solid || link.solid->closed();
   out.shapes = std::move(shapes);
-  const auto worse = [&](const Gap& gap) {
+  const auto merge_gap = [&](const Gap& gap) {
     if (gap.found_m > out.gap.found_m) out.gap.point = gap.point;
     out.gap.found_m = std::max(out.gap.found_m, gap.found_m);
     out.gap.bound_m = std::max(out.gap.bound_m, gap.bound_m);
   };
-  if (link.solid) worse(coverage_gap(link.solid->mesh(), out.shapes, tolerance_m));
+  if (link.solid) merge_gap(coverage_gap(link.solid->mesh(), out.shapes, tolerance_m));
   for (const Shape& ball : link.balls) {
-    const bool held = std::any_of(out.shapes.begin(), out.shapes.end(), [&](const Shape& shape) {
-      return distance(shape, ball.from) + ball.radius_m <= 1e-12;
-    });
-    if (!held) worse(coverage_gap(ball_mesh(ball.from, ball.radius_m), out.shapes, tolerance_m));
+    const bool is_covered = std::any_of(
+        out.shapes.begin(), out.shapes.end(),
+        [&](const Shape& shape) { return distance(shape, ball.from) + ball.radius_m <= 1e-12; });
+    if (!is_covered)
+      merge_gap(coverage_gap(ball_mesh(ball.from, ball.radius_m), out.shapes, tolerance_m));
   }
   out.excess = excess(link.solid.get(), link.balls, out.shapes);
   out.volume_m3 = link.volume();
@@ -178,12 +188,13 @@ Vector3d vector_of(const Json& list) {
 
 }  // namespace
 
-std::optional<fs::path> find_mesh(const std::string& name, const fs::path& urdf, const MeshPlaces& places,
-                                  std::vector<fs::path>* tried) {
+std::optional<fs::path> find_mesh(const std::string& name, const fs::path& urdf,
+                                  const MeshPlaces& places, std::vector<fs::path>* tried) {
   std::optional<fs::path> found;
-  const auto look = [&](const fs::path& path) {
+  const auto try_path = [&](const fs::path& path) {
     const fs::path plain = resolve_path({}, path);
-    if (tried != nullptr && std::find(tried->begin(), tried->end(), plain) == tried->end()) tried->push_back(plain);
+    if (tried != nullptr && std::find(tried->begin(), tried->end(), plain) == tried->end())
+      tried->push_back(plain);
     if (!is_file(plain)) return false;
     found = plain;
     return true;
@@ -191,22 +202,24 @@ std::optional<fs::path> find_mesh(const std::string& name, const fs::path& urdf,
   const fs::path here = urdf.parent_path();
   fs::path rest = name;
   for (const char* scheme : {"package://", "model://"}) {
-    const std::string inner = after(name, scheme);
+    const std::string inner = without_scheme(name, scheme);
     if (inner.empty()) continue;
     rest = inner;
     const fs::path below = fs::path(inner).lexically_relative(*fs::path(inner).begin());
     for (const auto& [package, folder] : places.packages)
-      if (package == fs::path(inner).begin()->string() && look(folder / below)) return found;
+      if (package == fs::path(inner).begin()->string() && try_path(folder / below)) return found;
   }
-  if (const std::string path = after(name, "file://"); !path.empty()) rest = path;
-  if (look(rest.is_absolute() ? rest : here / rest)) return found;
+  if (const std::string path = without_scheme(name, "file://"); !path.empty()) rest = path;
+  if (try_path(rest.is_absolute() ? rest : here / rest)) return found;
   std::vector<fs::path> folders = places.folders;
   std::error_code ignored;
   fs::path up = resolve_path({}, fs::absolute(urdf, ignored)).parent_path();
-  for (int i = 0; i < 4 && up.has_relative_path(); ++i, up = up.parent_path()) folders.push_back(up);
+  for (int i = 0; i < 4 && up.has_relative_path(); ++i, up = up.parent_path())
+    folders.push_back(up);
   for (const fs::path& folder : folders)
-    for (fs::path end = rest.relative_path(); !end.empty() && end != "."; end = end.lexically_relative(*end.begin()))
-      if (look(folder / end)) return found;
+    for (fs::path end = rest.relative_path(); !end.empty() && end != ".";
+         end = end.lexically_relative(*end.begin()))
+      if (try_path(folder / end)) return found;
   return std::nullopt;
 }
 
@@ -248,13 +261,15 @@ double RobotFit::volume_ratio() const {
 
 RobotFit fit_robot(const fs::path& urdf, const FitOptions& options) {
   RobotFit out;
-  const std::vector<LinkSolid> solids = Gatherer(urdf, options, out.notes).gather();
+  const std::vector<LinkSolid> solids = GeometryReader(urdf, options, out.notes).read();
   if (options.total) {
     std::size_t least = 0;
     for (const LinkSolid& link : solids) least += link.balls.size() + (link.solid ? 1 : 0);
     if (static_cast<std::size_t>(*options.total) < least)
-      throw Error(ErrorCode::usage, fmt::format("{}: {} shapes asked in all, expected at least {}, one a link",
-                                                urdf.string(), *options.total, least));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: {} shapes requested in total, expected at least {}, one per link",
+                      urdf.string(), *options.total, least));
   }
   const auto shapes_at = [&](double excess_m) {
     CoverOptions cover_options = options.cover;
@@ -272,7 +287,7 @@ RobotFit fit_robot(const fs::path& urdf, const FitOptions& options) {
   std::vector<std::vector<Shape>> best = shapes_at(options.cover.excess_m);
   if (options.total) {
     const auto total = static_cast<std::size_t>(*options.total);
-    // The least excess for which so many do, between steps of a twelfth.
+    // The least excess for which at most `total` shapes are needed, in steps of a factor 13/12.
     constexpr double step = 1.0 + 1.0 / 12.0;
     double excess_m = options.cover.excess_m;
     if (count(best) > total) {
@@ -291,31 +306,37 @@ RobotFit fit_robot(const fs::path& urdf, const FitOptions& options) {
   }
   for (const LinkFit& link : out.links)
     if (link.excess.max_m > options.cover.excess_m + options.padding_m + 1e-3 && !options.total)
-      out.notes.push_back(fmt::format("link '{}': {} shapes stick out up to {:.0f} mm, {:.0f} mm were asked", link.name,
-                                      link.shapes.size(), 1e3 * link.excess.max_m, 1e3 * options.cover.excess_m));
+      out.notes.push_back(fmt::format(
+          "link '{}': {} shapes stick out up to {:.0f} mm, expected at most {:.0f} mm", link.name,
+          link.shapes.size(), 1e3 * link.excess.max_m, 1e3 * options.cover.excess_m));
   return out;
 }
 
 RobotFit measure_sidecar(const fs::path& urdf, const fs::path& sidecar, const FitOptions& options) {
   RobotFit out;
-  const std::vector<LinkSolid> solids = Gatherer(urdf, options, out.notes).gather();
+  const std::vector<LinkSolid> solids = GeometryReader(urdf, options, out.notes).read();
   (void)description::check_spheres(sidecar);
   const Json document = read_json(sidecar);
   std::map<std::string, std::vector<Shape>> shapes;
   for (const auto& [name, list] : document["links"].items())
     for (const Json& ball : list)
-      shapes[name].push_back({vector_of(ball["center"]), vector_of(ball["center"]), ball["radius"].get<double>()});
+      shapes[name].push_back(
+          {vector_of(ball["center"]), vector_of(ball["center"]), ball["radius"].get<double>()});
   if (document.contains("capsules"))
     for (const auto& [name, list] : document["capsules"].items())
       for (const Json& capsule : list)
-        shapes[name].push_back({vector_of(capsule["from"]), vector_of(capsule["to"]), capsule["radius"].get<double>()});
+        shapes[name].push_back({vector_of(capsule["from"]), vector_of(capsule["to"]),
+                                capsule["radius"].get<double>()});
   for (const LinkSolid& link : solids) {
-    if (shapes[link.name].empty()) out.notes.push_back(fmt::format("link '{}' has geometry but no shapes", link.name));
+    if (shapes[link.name].empty())
+      out.notes.push_back(fmt::format("link '{}' has geometry but no shapes", link.name));
     out.links.push_back(measured(link, shapes[link.name], options.tolerance_m));
     shapes.erase(link.name);
   }
   for (const auto& [name, list] : shapes)
-    if (!list.empty()) out.notes.push_back(fmt::format("link '{}' has {} shapes but no geometry", name, list.size()));
+    if (!list.empty())
+      out.notes.push_back(
+          fmt::format("link '{}' has {} shapes but no geometry", name, list.size()));
   return out;
 }
 
@@ -326,7 +347,8 @@ Json sidecar_json(const RobotFit& fit, const std::string& note,
   for (const LinkFit& link : fit.links)
     for (const Shape& shape : link.shapes) {
       if (shape.ball())
-        out["links"][link.name].push_back({{"center", numbers(shape.from)}, {"radius", shape.radius_m}});
+        out["links"][link.name].push_back(
+            {{"center", numbers(shape.from)}, {"radius", shape.radius_m}});
       else
         capsules[link.name].push_back(
             {{"from", numbers(shape.from)}, {"to", numbers(shape.to)}, {"radius", shape.radius_m}});
@@ -334,16 +356,20 @@ Json sidecar_json(const RobotFit& fit, const std::string& note,
   if (!capsules.empty()) out["capsules"] = std::move(capsules);
   if (!self_collision_disabled.empty()) {
     out["self_collision_disabled"] = Json::array();
-    for (const auto& [a, b] : self_collision_disabled) out["self_collision_disabled"].push_back(Json::array({a, b}));
+    for (const auto& [a, b] : self_collision_disabled)
+      out["self_collision_disabled"].push_back(Json::array({a, b}));
   }
   return out;
 }
 
 Json figures_json(const RobotFit& fit) {
-  const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
+  const auto number = [](double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+  };
   Json links = Json::array();
   for (const LinkFit& link : fit.links) {
-    const auto balls = std::count_if(link.shapes.begin(), link.shapes.end(), [](const Shape& s) { return s.ball(); });
+    const auto balls = std::count_if(link.shapes.begin(), link.shapes.end(),
+                                     [](const Shape& s) { return s.ball(); });
     links.push_back({{"name", link.name},
                      {"triangles", link.triangles},
                      {"closed", link.closed},

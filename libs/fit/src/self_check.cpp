@@ -21,7 +21,7 @@ using geometry::SE3;
 struct Part {
   std::string name;
   int body = -1;              // −1: base
-  std::vector<Shape> shapes;  // in the body's COM frame, of the base in the base frame
+  std::vector<Shape> shapes;  // in the body's COM frame; those of the base in the base frame
 };
 
 std::vector<Part> parts_of(const model::Robot& robot) {
@@ -34,26 +34,31 @@ std::vector<Part> parts_of(const model::Robot& robot) {
       }
     parts.push_back({name, body, {shape}});
   };
-  const auto add_all = [&](const auto& spheres, const auto& segments, const std::string& own, int body) {
+  const auto add_all = [&](const auto& spheres, const auto& segments, const std::string& own,
+                           int body) {
     for (const model::Sphere& s : spheres)
       add(s.part.empty() ? own : s.part, body, {s.center_m, s.center_m, s.radius_m});
     for (const model::Segment& s : segments)
-      if (s.radius_m > 0.0) add(s.part.empty() ? own : s.part, body, {s.from_m, s.to_m, s.radius_m});
+      if (s.radius_m > 0.0)
+        add(s.part.empty() ? own : s.part, body, {s.from_m, s.to_m, s.radius_m});
   };
   for (std::size_t i = 0; i < robot.links.size(); ++i)
-    add_all(robot.links[i].spheres, robot.links[i].segments, robot.links[i].name, static_cast<int>(i));
+    add_all(robot.links[i].spheres, robot.links[i].segments, robot.links[i].name,
+            static_cast<int>(i));
   add_all(robot.base_spheres, robot.base_segments, "base", -1);
   return parts;
 }
 
-// Distance of two segments (Ericson 2005, 5.1.9).
-double segments_apart(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2, const Vector3d& q2) {
+// Distance of two segments (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
+double segment_segment_distance(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2,
+                                const Vector3d& q2) {
   const Vector3d d1 = q1 - p1, d2 = q2 - p2, r = p1 - p2;
   const double a = d1.squaredNorm(), e = d2.squaredNorm(), f = d2.dot(r);
   if (a <= 0.0) return segment_distance(p2, q2, p1);
   if (e <= 0.0) return segment_distance(p1, q1, p2);
   const double c = d1.dot(r), b = d1.dot(d2), denominator = a * e - b * b;
-  double s = denominator > 1e-12 * a * e ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
+  double s =
+      denominator > 1e-12 * a * e ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
   double t = (b * s + f) / e;
   if (t < 0.0) {
     t = 0.0;
@@ -65,11 +70,13 @@ double segments_apart(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2
   return (p1 + s * d1 - p2 - t * d2).norm();
 }
 
-double apart(const std::vector<Shape>& a, const std::vector<Shape>& b) {
+double shapes_distance(const std::vector<Shape>& a, const std::vector<Shape>& b) {
   double least = infinity;
   for (const Shape& x : a)
     for (const Shape& y : b) {
-      const double axes = x.ball() && y.ball() ? (x.from - y.from).norm() : segments_apart(x.from, x.to, y.from, y.to);
+      const double axes = x.ball() && y.ball()
+                              ? (x.from - y.from).norm()
+                              : segment_segment_distance(x.from, x.to, y.from, y.to);
       least = std::min(least, axes - x.radius_m - y.radius_m);
     }
   return least;
@@ -100,36 +107,43 @@ std::pair<double, double> range_of(const model::Joint& joint) {
   return {joint.lower.value_or(-open), joint.upper.value_or(open)};
 }
 
-std::vector<std::string> odd_limits_of(const model::Robot& robot) {
-  std::vector<std::string> odd;
+std::vector<std::string> suspicious_limits_of(const model::Robot& robot) {
+  std::vector<std::string> findings;
   for (const model::Link& link : robot.links) {
     const model::Joint& joint = link.joint;
     const bool turns = joint.type == model::JointType::revolute;
     const char* unit = turns ? "rad" : "m";
-    const auto say = [&](const std::string& what) { odd.push_back(fmt::format("joint '{}': {}", joint.name, what)); };
+    const auto add = [&](const std::string& what) {
+      findings.push_back(fmt::format("joint '{}': {}", joint.name, what));
+    };
     if (joint.lower && joint.upper) {
       const double low = *joint.lower, high = *joint.upper;
-      if (low > 0.0 || high < 0.0) say(fmt::format("0 is outside its limits [{:.4g}, {:.4g}] {}", low, high, unit));
+      if (low > 0.0 || high < 0.0)
+        add(fmt::format("0 is outside its limits [{:.4g}, {:.4g}] {}", low, high, unit));
       if (turns && high - low > 4.0 * std::numbers::pi + 1e-6)
-        say(fmt::format("its limits [{:.4g}, {:.4g}] rad span more than two turns; degrees?", low, high));
+        add(fmt::format(
+            "its limits [{:.4g}, {:.4g}] rad span more than two turns; are they in degrees?", low,
+            high));
       if (!turns && high - low > 10.0)
-        say(fmt::format("its limits [{:.4g}, {:.4g}] m span more than 10 m; millimetres?", low, high));
+        add(fmt::format(
+            "its limits [{:.4g}, {:.4g}] m span more than 10 m; are they in millimetres?", low,
+            high));
       if (high - low < (turns ? 0.01 : 0.001))
-        say(fmt::format("its limits [{:.4g}, {:.4g}] {} leave it next to no room", low, high, unit));
+        add(fmt::format("its limits [{:.4g}, {:.4g}] {} leave it almost no room", low, high, unit));
     } else if (!turns) {
-      say("it slides without limits");
+      add("it is prismatic and has no limits");
     }
     if (joint.velocity_max && *joint.velocity_max > (turns ? 50.0 : 20.0))
-      say(fmt::format("its speed limit is {:.4g} {}/s", *joint.velocity_max, unit));
-    if (!joint.velocity_max) say("it has no speed limit");
-    if (!joint.effort_max) say(fmt::format("it has no {} limit", turns ? "torque" : "force"));
+      add(fmt::format("its speed limit is {:.4g} {}/s", *joint.velocity_max, unit));
+    if (!joint.velocity_max) add("it has no speed limit");
+    if (!joint.effort_max) add(fmt::format("it has no {} limit", turns ? "torque" : "force"));
   }
-  return odd;
+  return findings;
 }
 
 }  // namespace
 
-std::vector<PartPair> SelfCheck::faults() const {
+std::vector<PartPair> SelfCheck::contacts_at_rest() const {
   std::vector<PartPair> out;
   for (const PartPair& pair : pairs)
     if (pair.checked && pair.touches_at_rest()) out.push_back(pair);
@@ -163,43 +177,45 @@ std::vector<description::DisabledPair> SelfCheck::disabled(bool never) const {
 
 namespace {
 
-bool bears_shapes(const std::vector<Part>& parts, int body) {
-  return std::any_of(parts.begin(), parts.end(), [body](const Part& part) { return part.body == body; });
+bool has_shapes(const std::vector<Part>& parts, int body) {
+  return std::any_of(parts.begin(), parts.end(),
+                     [body](const Part& part) { return part.body == body; });
 }
 
 bool shapes_between(const std::vector<Part>& parts, int low, int high) {
   for (int body = low + 1; body < high; ++body)
-    if (bears_shapes(parts, body)) return true;
+    if (has_shapes(parts, body)) return true;
   return false;
 }
 
-// Whether the pair is looked at in a run, and why not.
+// Whether the pair is checked in a run, and the reason if it is not.
 PartPair pair_of(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
                  const std::vector<Part>& parts, const Part& a, const Part& b) {
   PartPair pair;
   pair.part_a = a.name;
   pair.part_b = b.name;
-  const auto is_pair = [&pair](const std::string& x, const std::string& y) {
+  const auto is_this_pair = [&pair](const std::string& x, const std::string& y) {
     return (x == pair.part_a && y == pair.part_b) || (x == pair.part_b && y == pair.part_a);
   };
   const auto [low, high] = std::minmax(a.body, b.body);
   pair.neighbours = !shapes_between(parts, low, high);
   pair.checked = true;
   for (const auto& [x, y] : robot.self_collision_disabled)
-    if (is_pair(x, y)) {
+    if (is_this_pair(x, y)) {
       pair.checked = false;
       pair.reason = "listed";
     }
   if (robot.self_collision_disabled.empty() && high - low == 1) {
     pair.checked = false;
-    pair.reason = "neighbours, and nothing is listed";
+    pair.reason = "neighbours, and no pair is listed";
   }
-  for (const description::DisabledPair& why : listed)
-    if (!pair.checked && is_pair(why.link_a, why.link_b) && !why.reason.empty()) pair.reason = why.reason;
+  for (const description::DisabledPair& known : listed)
+    if (!pair.checked && is_this_pair(known.link_a, known.link_b) && !known.reason.empty())
+      pair.reason = known.reason;
   return pair;
 }
 
-// A joint's rest: 0, or the middle of a range without it.
+// Each joint at 0, or in the middle of its range if that does not contain 0.
 std::vector<double> rest_of(const model::Robot& robot) {
   std::vector<double> q;
   for (const model::Link& link : robot.links) {
@@ -211,7 +227,8 @@ std::vector<double> rest_of(const model::Robot& robot) {
 
 }  // namespace
 
-SelfCheck check_self(const model::Robot& robot, const std::vector<description::DisabledPair>& listed,
+SelfCheck check_self(const model::Robot& robot,
+                     const std::vector<description::DisabledPair>& listed,
                      const SelfCheckOptions& options) {
   SelfCheck out;
   const std::vector<Part> parts = parts_of(robot);
@@ -229,7 +246,8 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
   std::vector<std::vector<Shape>> placed;
   place(robot, q, parts, placed);
   for (std::size_t k = 0; k < indices.size(); ++k)
-    out.pairs[k].rest_m = out.pairs[k].least_m = apart(placed[indices[k].first], placed[indices[k].second]);
+    out.pairs[k].rest_m = out.pairs[k].least_m =
+        shapes_distance(placed[indices[k].first], placed[indices[k].second]);
   Rng rng(options.seed);
   for (int sample = 0; sample < options.samples; ++sample) {
     for (std::size_t i = 0; i < q.size(); ++i) {
@@ -238,19 +256,21 @@ SelfCheck check_self(const model::Robot& robot, const std::vector<description::D
     }
     place(robot, q, parts, placed);
     for (std::size_t k = 0; k < indices.size(); ++k) {
-      const double distance = apart(placed[indices[k].first], placed[indices[k].second]);
+      const double distance = shapes_distance(placed[indices[k].first], placed[indices[k].second]);
       out.pairs[k].least_m = std::min(out.pairs[k].least_m, distance);
       if (distance <= 0.0) ++out.pairs[k].contacts;
     }
   }
 
   for (std::size_t i = 0; i < robot.links.size(); ++i)
-    if (!bears_shapes(parts, static_cast<int>(i))) out.shapeless.push_back(robot.links[i].name);
-  out.odd_limits = odd_limits_of(robot);
+    if (!has_shapes(parts, static_cast<int>(i)))
+      out.links_without_shapes.push_back(robot.links[i].name);
+  out.suspicious_limits = suspicious_limits_of(robot);
   return out;
 }
 
-std::string srdf_text(const std::string& robot, const std::vector<description::DisabledPair>& pairs) {
+std::string srdf_text(const std::string& robot,
+                      const std::vector<description::DisabledPair>& pairs) {
   const auto quoted = [](const std::string& text) {
     std::string out;
     for (const char c : text) {
@@ -268,8 +288,8 @@ std::string srdf_text(const std::string& robot, const std::vector<description::D
   };
   std::string text = fmt::format("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", quoted(robot));
   for (const description::DisabledPair& pair : pairs)
-    text += fmt::format("  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{}\"/>\n", quoted(pair.link_a),
-                        quoted(pair.link_b), quoted(pair.reason));
+    text += fmt::format("  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{}\"/>\n",
+                        quoted(pair.link_a), quoted(pair.link_b), quoted(pair.reason));
   return text + "</robot>\n";
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using Pair = std::pair<std::size_t, std::size_t>;  // indices of links, the first below the second
 
-// The links of a URDF as a graph: who is joined to whom, and who bears shapes.
+// The links of a URDF as a graph: which links a joint connects, and which have shapes.
 class Links {
  public:
   Links(const std::filesystem::path& urdf, const Json& sidecar) {
@@ -35,11 +35,12 @@ class Links {
       joined_[b].push_back(a);
       leaf_[b] = false;
     }
-    bears_shapes_.assign(names.size(), false);
+    has_shapes_.assign(names.size(), false);
     for (const char* key : {"links", "capsules"})
       if (sidecar.contains(key))
         for (const auto& [name, list] : sidecar[key].items())
-          if (const auto at = index_.find(name); at != index_.end() && !list.empty()) bears_shapes_[at->second] = true;
+          if (const auto at = index_.find(name); at != index_.end() && !list.empty())
+            has_shapes_[at->second] = true;
   }
 
   [[nodiscard]] Pair pair(const std::string& a, const std::string& b) const {
@@ -53,11 +54,11 @@ class Links {
     return out;
   }
 
-  // Pairs with shapes that are joined directly or across links without any.
+  // Pairs of links with shapes that are connected directly or across links without shapes.
   [[nodiscard]] std::set<Pair> adjacent() const {
     std::set<Pair> out;
     for (std::size_t start = 0; start < names.size(); ++start) {
-      if (!bears_shapes_[start]) continue;
+      if (!has_shapes_[start]) continue;
       std::set<std::size_t> seen{start};
       std::vector<std::size_t> open{start};
       while (!open.empty()) {
@@ -65,7 +66,7 @@ class Links {
         open.pop_back();
         for (const std::size_t next : joined_[at]) {
           if (!seen.insert(next).second) continue;
-          if (bears_shapes_[next])
+          if (has_shapes_[next])
             out.insert(std::minmax({start, next}));
           else
             open.push_back(next);
@@ -80,7 +81,7 @@ class Links {
  private:
   std::map<std::string, std::size_t> index_;
   std::vector<std::vector<std::size_t>> joined_;
-  std::vector<bool> leaf_, bears_shapes_;
+  std::vector<bool> leaf_, has_shapes_;
 };
 
 }  // namespace
@@ -89,7 +90,7 @@ SelfPairs pairs_to_disable(const std::filesystem::path& urdf, const Json& sideca
                            const std::optional<std::string>& tip, const SelfCheckOptions& options) {
   SelfPairs out;
   const Links links(urdf, sidecar);
-  std::map<Pair, std::string> reasons;  // empty: on the way to some leaf there is none
+  std::map<Pair, std::string> reasons;  // empty: none in the chain to some leaf
   for (const std::string& leaf : tip ? std::vector<std::string>{*tip} : links.leaves()) {
     description::RobotOptions robot;
     robot.tip = leaf;
@@ -98,17 +99,20 @@ SelfPairs pairs_to_disable(const std::filesystem::path& urdf, const Json& sideca
       const SelfCheck check = check_self(description::read_robot(urdf, robot), {}, options);
       for (const PartPair& parts : check.pairs) {
         const std::string reason = contact_reason(parts, check.samples);
-        const auto [before, is_new] = reasons.emplace(links.pair(parts.part_a, parts.part_b), reason);
+        const auto [before, is_new] =
+            reasons.emplace(links.pair(parts.part_a, parts.part_b), reason);
         if (!is_new && reason.empty()) before->second.clear();
       }
     } catch (const Error& error) {
       if (tip) throw;
-      out.notes.push_back(fmt::format("self-collision on the way to '{}' is not sampled: {}", leaf, error.what()));
+      out.notes.push_back(fmt::format("self-collision in the chain to '{}' is not sampled: {}",
+                                      leaf, error.what()));
     }
   }
   for (const Pair& pair : links.adjacent()) reasons[pair] = "Adjacent";
   for (const auto& [pair, reason] : reasons)
-    if (!reason.empty()) out.pairs.push_back({links.names[pair.first], links.names[pair.second], reason, 0});
+    if (!reason.empty())
+      out.pairs.push_back({links.names[pair.first], links.names[pair.second], reason, 0});
   return out;
 }
 

@@ -19,8 +19,9 @@ using Eigen::Vector3d;
 
 constexpr int leaf_triangles = 4;
 
-// Nearest point of a triangle with an area (Ericson 2005, 5.1.5).
-Vector3d closest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+// Nearest point of a triangle with an area (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+Vector3d closest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b,
+                             const Vector3d& c) {
   const Vector3d ab = b - a, ac = c - a, ap = p - a;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
   if (d1 <= 0.0 && d2 <= 0.0) return a;
@@ -35,7 +36,8 @@ Vector3d closest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3
   const double vb = d5 * d2 - d1 * d6;
   if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return a + d2 / (d2 - d6) * ac;
   const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
+    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
   const double sum = va + vb + vc;
   return a + vb / sum * ab + vc / sum * ac;
 }
@@ -51,17 +53,18 @@ Vector3d area_vector(const Mesh& mesh, std::size_t t) {
 }  // namespace
 
 Solid::Solid(Mesh mesh, std::size_t nodes) : mesh_(std::move(mesh)), outer_(mesh_) {
-  constexpr int reach = 3;  // grid steps in which a point looks for one that is clear of the surface
+  constexpr int reach = 3;  // grid steps within which a point searches for a clear one
   for (int k = -reach; k <= reach; ++k)
     for (int j = -reach; j <= reach; ++j)
-      for (int i = -reach; i <= reach; ++i) around_.emplace_back(i, j, k);
-  std::stable_sort(around_.begin(), around_.end(), [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
-    return a.squaredNorm() < b.squaredNorm();
-  });
+      for (int i = -reach; i <= reach; ++i) offsets_.emplace_back(i, j, k);
+  std::stable_sort(offsets_.begin(), offsets_.end(),
+                   [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+                     return a.squaredNorm() < b.squaredNorm();
+                   });
   find_closed();
   build_tree();
   fill_grid(nodes);
-  if (drop_hidden()) {
+  if (remove_hidden_triangles()) {
     build_tree();
     fill_grid(nodes);
   }
@@ -72,15 +75,19 @@ void Solid::build_tree() {
   tree_.clear();
   for (std::size_t t = 0; t < outer_.triangles.size(); ++t) {
     const Vector3d a = outer_.corner(t, 0), b = outer_.corner(t, 1), c = outer_.corner(t, 2);
-    const double longest2 = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    // what has no height is no surface, and its edges are its neighbours'
-    if (area_vector(outer_, t).norm() > 1e-9 * longest2) order_.push_back(static_cast<std::int32_t>(t));
+    const double longest2 =
+        std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    // A triangle without height has no area, and its edges belong to its neighbours.
+    if (area_vector(outer_, t).norm() > 1e-9 * longest2)
+      order_.push_back(static_cast<std::int32_t>(t));
   }
-  if (order_.empty()) throw Error(ErrorCode::invalid, "a mesh without any triangle that has an area");
+  if (order_.empty())
+    throw Error(ErrorCode::invalid, "no triangle of its meshes has an area, expected at least one");
   tree_.reserve(order_.size());
   (void)build(0, order_.size());
   area_ = 0.0;
-  for (const std::int32_t t : order_) area_ += area_vector(outer_, static_cast<std::size_t>(t)).norm();
+  for (const std::int32_t t : order_)
+    area_ += area_vector(outer_, static_cast<std::size_t>(t)).norm();
 }
 
 std::int32_t Solid::build(std::size_t first, std::size_t last) {
@@ -113,7 +120,9 @@ std::int32_t Solid::build(std::size_t first, std::size_t last) {
   node.center /= area;
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t k = 0; k < 3; ++k)
-      node.radius = std::max(node.radius, (outer_.corner(static_cast<std::size_t>(order_[i]), k) - node.center).norm());
+      node.radius =
+          std::max(node.radius,
+                   (outer_.corner(static_cast<std::size_t>(order_[i]), k) - node.center).norm());
   node.first = static_cast<std::int32_t>(first);
   if (last - first <= leaf_triangles) {
     node.count = static_cast<std::int32_t>(last - first);
@@ -122,11 +131,12 @@ std::int32_t Solid::build(std::size_t first, std::size_t last) {
     (high_center - low_center).maxCoeff(&axis);
     const auto middle = first + (last - first) / 2;
     const auto begin = order_.begin();
-    std::nth_element(begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(middle),
-                     begin + static_cast<std::ptrdiff_t>(last), [&](std::int32_t x, std::int32_t y) {
-                       const double cx = center_of(x)[axis], cy = center_of(y)[axis];
-                       return cx != cy ? cx < cy : x < y;
-                     });
+    std::nth_element(
+        begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(middle),
+        begin + static_cast<std::ptrdiff_t>(last), [&](std::int32_t x, std::int32_t y) {
+          const double cx = center_of(x)[axis], cy = center_of(y)[axis];
+          return cx != cy ? cx < cy : x < y;
+        });
     (void)build(first, middle);
     node.right = build(middle, last);
   }
@@ -135,10 +145,12 @@ std::int32_t Solid::build(std::size_t first, std::size_t last) {
 }
 
 void Solid::find_closed() {
-  // Corners at the same place are one, whatever the file says.
+  // Corners at the same place count as one, even if the file has several vertices there.
   std::vector<std::int32_t> by_place(mesh_.vertices.size()), place(mesh_.vertices.size());
   for (std::size_t i = 0; i < by_place.size(); ++i) by_place[i] = static_cast<std::int32_t>(i);
-  const auto vertex = [&](std::int32_t i) -> const Vector3d& { return mesh_.vertices[static_cast<std::size_t>(i)]; };
+  const auto vertex = [&](std::int32_t i) -> const Vector3d& {
+    return mesh_.vertices[static_cast<std::size_t>(i)];
+  };
   const auto before = [&](std::int32_t x, std::int32_t y) {
     const Vector3d &a = vertex(x), &b = vertex(y);
     if (a.x() != b.x()) return a.x() < b.x();
@@ -150,7 +162,7 @@ void Solid::find_closed() {
     place[static_cast<std::size_t>(by_place[i])] =
         same ? place[static_cast<std::size_t>(by_place[i - 1])] : by_place[i];
   }
-  std::vector<std::array<std::int32_t, 3>> edges;  // low end, high end, way it is walked
+  std::vector<std::array<std::int32_t, 3>> edges;  // low end, high end, direction ±1
   edges.reserve(3 * mesh_.triangles.size());
   for (const auto& t : mesh_.triangles)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -163,7 +175,8 @@ void Solid::find_closed() {
   for (std::size_t i = 0; i < edges.size() && closed_;) {
     std::int32_t balance = 0;
     const auto edge = edges[i];
-    for (; i < edges.size() && edges[i][0] == edge[0] && edges[i][1] == edge[1]; ++i) balance += edges[i][2];
+    for (; i < edges.size() && edges[i][0] == edge[0] && edges[i][1] == edge[1]; ++i)
+      balance += edges[i][2];
     closed_ = balance == 0;
   }
 }
@@ -181,7 +194,8 @@ Vector3d Solid::closest(const Vector3d& p, double within) const {
     if (node.count > 0) {
       for (std::int32_t i = node.first; i < node.first + node.count; ++i) {
         const auto t = static_cast<std::size_t>(order_[static_cast<std::size_t>(i)]);
-        const Vector3d c = closest_on_triangle(p, outer_.corner(t, 0), outer_.corner(t, 1), outer_.corner(t, 2));
+        const Vector3d c =
+            closest_on_triangle(p, outer_.corner(t, 0), outer_.corner(t, 1), outer_.corner(t, 2));
         const double d2 = (p - c).squaredNorm();
         if (d2 <= best2) {
           best2 = d2;
@@ -191,7 +205,8 @@ Vector3d Solid::closest(const Vector3d& p, double within) const {
       continue;
     }
     const std::int32_t left = at_node + 1, right = node.right;
-    const Node &l = tree_[static_cast<std::size_t>(left)], &r = tree_[static_cast<std::size_t>(right)];
+    const Node &l = tree_[static_cast<std::size_t>(left)],
+               &r = tree_[static_cast<std::size_t>(right)];
     const double l2 = box_distance2(p, l.low, l.high), r2 = box_distance2(p, r.low, r.high);
     const bool left_first = l2 <= r2;
     stack[top++] = left_first ? std::pair{right, r2} : std::pair{left, l2};
@@ -205,7 +220,7 @@ double Solid::distance(const Vector3d& p) const {
 }
 
 double Solid::winding(const Vector3d& p) const {
-  // Solid angles; a far part counts as one dipole (Barill, Dickson, Schmidt, Levin, Jacobson 2018).
+  // docs/theory.md (13.28)–(13.30): solid angles; a far part counts as one dipole.
   constexpr double far = 2.5;
   double angle = 0.0;
   std::array<std::int32_t, 64> stack;
@@ -221,9 +236,11 @@ double Solid::winding(const Vector3d& p) const {
     } else if (node.count > 0) {
       for (std::int32_t i = node.first; i < node.first + node.count; ++i) {
         const auto t = static_cast<std::size_t>(order_[static_cast<std::size_t>(i)]);
-        const Vector3d a = outer_.corner(t, 0) - p, b = outer_.corner(t, 1) - p, c = outer_.corner(t, 2) - p;
+        const Vector3d a = outer_.corner(t, 0) - p, b = outer_.corner(t, 1) - p,
+                       c = outer_.corner(t, 2) - p;
         const double la = a.norm(), lb = b.norm(), lc = c.norm();
-        angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+        angle += 2.0 * std::atan2(a.dot(b.cross(c)),
+                                  la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
       }
     } else {
       stack[top++] = at_node + 1;
@@ -234,7 +251,9 @@ double Solid::winding(const Vector3d& p) const {
 }
 
 bool Solid::blocked(const Vector3d& from, const Vector3d& to) const {
-  // Whether a triangle crosses the way (Möller, Trumbore 1997); where it begins does not count.
+  // Whether a triangle crosses the segment (Möller, Trumbore 1997,
+  // doi:10.1080/10867651.1997.10487468). A triangle at its first thousandth does not count: `from`
+  // may lie on the surface.
   constexpr double begin = 1e-3;
   const Vector3d way = to - from;
   std::array<std::int32_t, 64> stack;
@@ -261,7 +280,8 @@ bool Solid::blocked(const Vector3d& from, const Vector3d& to) const {
     }
     for (std::int32_t i = node.first; i < node.first + node.count; ++i) {
       const auto t = static_cast<std::size_t>(order_[static_cast<std::size_t>(i)]);
-      const Vector3d a = outer_.corner(t, 0), ab = outer_.corner(t, 1) - a, ac = outer_.corner(t, 2) - a;
+      const Vector3d a = outer_.corner(t, 0), ab = outer_.corner(t, 1) - a,
+                     ac = outer_.corner(t, 2) - a;
       const Vector3d h = way.cross(ac);
       const double det = ab.dot(h);
       if (std::abs(det) < 1e-300) continue;
@@ -273,11 +293,11 @@ bool Solid::blocked(const Vector3d& from, const Vector3d& to) const {
   return false;
 }
 
-Solid::Side Solid::seen_from(const Vector3d& p, bool outside_only) const {
-  constexpr int rays = 16;  // how many points are tried
+Solid::Side Solid::visible_side(const Vector3d& p, bool outside_only) const {
+  constexpr int rays = 16;  // grid points that are tried at most
   const Eigen::Vector3i cell = ((p - origin_) / spacing_).array().round().cast<int>();
   int tried = 0;
-  for (const Eigen::Vector3i& shift : around_) {
+  for (const Eigen::Vector3i& shift : offsets_) {
     const Eigen::Vector3i to = cell + shift;
     if ((to.array() < 0).any() || (to.array() >= size_.array()).any()) continue;
     const Side side = side_[index(to.x(), to.y(), to.z())];
@@ -288,8 +308,8 @@ Solid::Side Solid::seen_from(const Vector3d& p, bool outside_only) const {
   return Side::near;
 }
 
-bool Solid::drop_hidden() {
-  const auto seen = [&](const Vector3d& p) { return seen_from(p, true) == Side::outside; };
+bool Solid::remove_hidden_triangles() {
+  const auto visible = [&](const Vector3d& p) { return visible_side(p, true) == Side::outside; };
   Mesh outer;
   bool hidden = false;
   std::vector<std::array<Vector3d, 3>> stack;
@@ -305,7 +325,8 @@ bool Solid::drop_hidden() {
         if ((corners[(k + 1) % 3] - corners[k]).squaredNorm() >
             (corners[(longest + 1) % 3] - corners[longest]).squaredNorm())
           longest = k;
-      const Vector3d &p = corners[longest], &q = corners[(longest + 1) % 3], &r = corners[(longest + 2) % 3];
+      const Vector3d &p = corners[longest], &q = corners[(longest + 1) % 3],
+                     &r = corners[(longest + 2) % 3];
       if ((q - p).norm() > 2.0 * spacing_) {
         const Vector3d middle = 0.5 * (p + q);
         stack.push_back({p, middle, r});
@@ -313,7 +334,8 @@ bool Solid::drop_hidden() {
         continue;
       }
       const Vector3d center = (p + q + r) / 3.0;
-      if (!seen(center) && !seen(0.5 * (center + p)) && !seen(0.5 * (center + q)) && !seen(0.5 * (center + r))) {
+      if (!visible(center) && !visible(0.5 * (center + p)) && !visible(0.5 * (center + q)) &&
+          !visible(0.5 * (center + r))) {
         hidden = true;
         continue;
       }
@@ -334,26 +356,30 @@ Vector3d Solid::at(int i, int j, int k) const {
 std::size_t Solid::index(int i, int j, int k) const {
   return static_cast<std::size_t>(i) +
          static_cast<std::size_t>(size_.x()) *
-             (static_cast<std::size_t>(j) + static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(k));
+             (static_cast<std::size_t>(j) +
+              static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(k));
 }
 
 void Solid::fill_grid(std::size_t nodes) {
-  constexpr int rim = 2;  // points beyond the surface's box, so that the outside hangs together
+  constexpr int margin = 2;  // points outside the surface's box: they connect the outside
   const Node& all = tree_.front();
   const Vector3d extent = all.high - all.low;
-  // the spacing for which the points, rim included, are no more than asked
-  const auto points_at = [&](double h) { return (extent / h + Vector3d::Constant(2.0 * rim + 1.0)).prod(); };
+  // The smallest spacing for which the points, margin included, are at most `nodes`.
+  const auto points_at = [&](double h) {
+    return (extent / h + Vector3d::Constant(2.0 * margin + 1.0)).prod();
+  };
   double low = extent.maxCoeff() / 1000.0, high = extent.maxCoeff();
   for (int i = 0; i < 60; ++i) {
     const double h = 0.5 * (low + high);
     (points_at(h) > static_cast<double>(nodes) ? low : high) = h;
   }
   spacing_ = high;
-  size_ = (extent / spacing_).array().ceil().cast<int>() + 2 * rim + 1;
-  origin_ = 0.5 * (all.low + all.high) - 0.5 * spacing_ * (size_ - Eigen::Vector3i::Ones()).cast<double>();
+  size_ = (extent / spacing_).array().ceil().cast<int>() + 2 * margin + 1;
+  origin_ = 0.5 * (all.low + all.high) -
+            0.5 * spacing_ * (size_ - Eigen::Vector3i::Ones()).cast<double>();
 
-  const auto count =
-      static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) * static_cast<std::size_t>(size_.z());
+  const auto count = static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()) *
+                     static_cast<std::size_t>(size_.z());
   field_.resize(count);
   side_.assign(count, Side::near);
   std::vector<Vector3d> nearest(count);
@@ -363,13 +389,15 @@ void Solid::fill_grid(std::size_t nodes) {
       for (int i = 0; i < size_.x(); ++i) {
         const Vector3d p = at(i, j, k);
         const std::size_t self = index(i, j, k);
-        const double within = i > 0 ? static_cast<double>(field_[self - 1]) * (1.0 + 1e-6) + 1.01 * spacing_ : infinity;
+        const double within =
+            i > 0 ? static_cast<double>(field_[self - 1]) * (1.0 + 1e-6) + 1.01 * spacing_
+                  : infinity;
         nearest[self] = closest(p, within);
         field_[self] = static_cast<float>((nearest[self] - p).norm());
-        // no triangle enters the cube about such a point
+        // docs/theory.md (13.27): no triangle enters the cube about such a point.
         if (static_cast<double>(field_[self]) > half_diagonal) side_[self] = Side::inside;
       }
-  // The outside grows from a corner through cubes without triangles; what it does not reach is inside.
+  // The outside grows from a corner through cubes without triangles. The rest is inside.
   std::vector<Eigen::Vector3i> stack{Eigen::Vector3i::Zero()};
   side_[0] = Side::outside;
   while (!stack.empty()) {
@@ -395,7 +423,8 @@ void Solid::fill_grid(std::size_t nodes) {
   for (int k = 0; k < size_.z(); ++k)
     for (int j = 0; j < size_.y(); ++j)
       for (int i = 0; i < size_.x(); ++i)
-        if (const std::size_t self = index(i, j, k); inside(at(i, j, k), nearest[self])) field_[self] = -field_[self];
+        if (const std::size_t self = index(i, j, k); inside(at(i, j, k), nearest[self]))
+          field_[self] = -field_[self];
 }
 
 bool Solid::inside(const Vector3d& p, const Vector3d& nearest) const {
@@ -406,7 +435,7 @@ bool Solid::inside(const Vector3d& p, const Vector3d& nearest) const {
   };
   const Side here = side(p);
   if (here != Side::near) return here == Side::inside;
-  // Straight away from the surface, to where the grid knows; else wherever that is in sight.
+  // Go straight away from the surface to the first clear grid point, else to any that is visible.
   const double away = (p - nearest).norm();
   if (!(away > 0.0)) return false;
   const Vector3d step = 0.5 * spacing_ / away * (p - nearest);
@@ -417,7 +446,7 @@ bool Solid::inside(const Vector3d& p, const Vector3d& nearest) const {
     if (!blocked(p, there)) return found == Side::inside;
     break;
   }
-  return seen_from(p, false) != Side::outside;
+  return visible_side(p, false) != Side::outside;
 }
 
 double Solid::signed_distance(const Vector3d& p) const {
@@ -429,37 +458,43 @@ double Solid::signed_distance(const Vector3d& p) const {
 double Solid::depth(const Vector3d& p) const {
   const Vector3d at_grid = (p - origin_) / spacing_;
   const Vector3d last = (size_ - Eigen::Vector3i::Ones()).cast<double>();
-  const Vector3d held = at_grid.cwiseMax(0.0).cwiseMin(last);
-  const double beyond = spacing_ * (at_grid - held).norm();
-  const Eigen::Vector3i cell = held.cast<int>().cwiseMin(size_ - Eigen::Vector3i::Constant(2));
-  const Vector3d f = held - cell.cast<double>();
+  const Vector3d clamped = at_grid.cwiseMax(0.0).cwiseMin(last);
+  const double off_grid = spacing_ * (at_grid - clamped).norm();
+  const Eigen::Vector3i cell = clamped.cast<int>().cwiseMin(size_ - Eigen::Vector3i::Constant(2));
+  const Vector3d f = clamped - cell.cast<double>();
   const float* v = field_.data() + index(cell.x(), cell.y(), cell.z());
-  const auto row = static_cast<std::size_t>(size_.x()), layer = row * static_cast<std::size_t>(size_.y());
+  const auto row = static_cast<std::size_t>(size_.x()),
+             layer = row * static_cast<std::size_t>(size_.y());
   const auto mix = [](double t, double a, double b) { return a + t * (b - a); };
   const auto along = [&](std::size_t shift) {
     return mix(f.x(), static_cast<double>(v[shift]), static_cast<double>(v[shift + 1]));
   };
-  const double value = mix(f.z(), mix(f.y(), along(0), along(row)), mix(f.y(), along(layer), along(layer + row)));
-  return -(value + beyond);
+  const double value =
+      mix(f.z(), mix(f.y(), along(0), along(row)), mix(f.y(), along(layer), along(layer + row)));
+  return -(value + off_grid);
 }
 
 double Solid::depth(const Vector3d& from, const Vector3d& to) const {
   const int pieces = static_cast<int>(std::min(200.0, std::ceil((to - from).norm() / spacing_)));
   double least = depth(from);
-  for (int i = 1; i <= pieces; ++i) least = std::min(least, depth(Vector3d(from + (to - from) * i / pieces)));
+  for (int i = 1; i <= pieces; ++i)
+    least = std::min(least, depth(Vector3d(from + (to - from) * i / pieces)));
   return least;
 }
 
 double Solid::exact_depth(const Vector3d& from, const Vector3d& to) const {
   const int pieces = static_cast<int>(std::min(200.0, std::ceil((to - from).norm() / spacing_)));
   double most = signed_distance(from);
-  for (int i = 1; i <= pieces; ++i) most = std::max(most, signed_distance(from + (to - from) * i / pieces));
+  for (int i = 1; i <= pieces; ++i)
+    most = std::max(most, signed_distance(from + (to - from) * i / pieces));
   return -most;
 }
 
 double Solid::volume() const {
   double cells = 0.0;
-  for (const float d : field_) cells += std::clamp(0.5 - static_cast<double>(d) / spacing_, 0.0, 1.0);
+  // docs/theory.md (13.39)
+  for (const float d : field_)
+    cells += std::clamp(0.5 - static_cast<double>(d) / spacing_, 0.0, 1.0);
   return cells * spacing_ * spacing_ * spacing_;
 }
 

@@ -19,14 +19,15 @@ struct Case {
 };
 
 std::vector<Case> cases() {
-  return {{"box", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.3, 0.1, 0.08)}})},
-          {"cylinder", test::tube(0.05, 0.4, 48, true)},
-          {"open tube", test::tube(0.05, 0.4, 48, false)},
-          {"L", test::l_shape()},
-          {"ball", test::ball(0.1, 16)},
-          {"thin plate", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.2, 0.15, 0.001)}})},
-          {"two that overlap", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.2, 0.1, 0.1)},
-                                            {Vector3d(0.1, -0.05, 0.02), Vector3d(0.15, 0.2, 0.08)}})}};
+  return {
+      {"box", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.3, 0.1, 0.08)}})},
+      {"cylinder", test::tube(0.05, 0.4, 48, true)},
+      {"open tube", test::tube(0.05, 0.4, 48, false)},
+      {"L", test::l_shape()},
+      {"ball", test::ball(0.1, 16)},
+      {"thin plate", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.2, 0.15, 0.001)}})},
+      {"two that overlap", test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.2, 0.1, 0.1)},
+                                        {Vector3d(0.1, -0.05, 0.02), Vector3d(0.15, 0.2, 0.08)}})}};
 }
 
 double least_distance(const std::vector<Shape>& shapes, const Vector3d& p) {
@@ -37,7 +38,8 @@ double least_distance(const std::vector<Shape>& shapes, const Vector3d& p) {
 
 }  // namespace
 
-TEST_CASE("covers hold every random point of the surface and stick out no farther than asked", "[fit][property]") {
+TEST_CASE("covers contain every random point of the surface and stick out no farther than allowed",
+          "[fit][property]") {
   for (const bool capsules : {false, true})
     for (const Case& c : cases()) {
       CAPTURE(c.name, capsules);
@@ -46,9 +48,10 @@ TEST_CASE("covers hold every random point of the surface and stick out no farthe
       options.capsules = capsules;
       options.excess_m = 0.025;
       const Cover found = cover(solid, {}, options);
-      for (const Vector3d& p : test::random_points(c.mesh, 5000, 7)) REQUIRE(least_distance(found.shapes, p) <= 0.0);
+      for (const Vector3d& p : test::random_points(c.mesh, 5000, 7))
+        REQUIRE(least_distance(found.shapes, p) <= 0.0);
       CHECK(coverage_gap(c.mesh, found.shapes, 1e-4).bound_m == 0.0);
-      // a grid step for what the grid does not know, 1 mm for sealing
+      // a grid step for the grid's resolution, 1 mm for radii raised by the proof
       const double most = excess(&solid, {}, found.shapes).max_m;
       if (solid.closed()) CHECK(most <= options.excess_m + 1e-3 + solid.spacing());
       CHECK(found.shapes.size() <= 24);
@@ -58,7 +61,8 @@ TEST_CASE("covers hold every random point of the surface and stick out no farthe
     }
 }
 
-TEST_CASE("a cube that one ball may cover gets that one, and a finer excess more", "[fit][unit]") {
+TEST_CASE("a cube that one ball may cover gets one ball, and several for a smaller excess",
+          "[fit][unit]") {
   const Mesh cube = test::boxes({{Vector3d(0.9, -0.1, -0.1), Vector3d(1.1, 0.1, 0.1)}});
   const Solid solid(cube);
   CoverOptions options;
@@ -73,11 +77,12 @@ TEST_CASE("a cube that one ball may cover gets that one, and a finer excess more
   options.count_max = 3;
   const Cover few = cover(solid, {}, options);
   CHECK(few.shapes.size() <= 3);
-  CHECK(few.bulge_m > 0.03);
+  CHECK(few.excess_bound_m > 0.03);
   CHECK(coverage_gap(cube, few.shapes, 1e-4).bound_m == 0.0);
 }
 
-TEST_CASE("a capsule's own shape is covered by one capsule, where balls need several", "[fit][unit]") {
+TEST_CASE("a capsule's own shape is covered by one capsule, where balls need several",
+          "[fit][unit]") {
   const Mesh rod = test::tube(0.04, 0.5, 64, true);
   const Solid solid(rod);
   CoverOptions options;
@@ -91,7 +96,7 @@ TEST_CASE("a capsule's own shape is covered by one capsule, where balls need sev
   CHECK(std::abs((rod_shape.to - rod_shape.from).normalized().z()) > 0.99);
 }
 
-TEST_CASE("what a given ball holds needs no cover", "[fit][unit]") {
+TEST_CASE("geometry inside a given ball needs no cover", "[fit][unit]") {
   const Mesh box = test::boxes({{Vector3d(-0.1, -0.02, -0.02), Vector3d(0.1, 0.02, 0.02)}});
   const Solid solid(box);
   const std::vector<Shape> whole{{Vector3d::Zero(), Vector3d::Zero(), 0.2}};

@@ -34,7 +34,8 @@ std::string mesh_error(const std::filesystem::path& file) {
 
 }  // namespace
 
-TEST_CASE("binary STL, ASCII STL and OBJ give the box they were written from, scaled", "[fit][unit]") {
+TEST_CASE("binary STL, ASCII STL and OBJ read back as the box that was written, scaled",
+          "[fit][unit]") {
   const test::TemporaryFolder scratch;
   const Mesh box = test::boxes({{Vector3d(-0.1, 0.0, 0.2), Vector3d(0.3, 0.5, 0.25)}});
   const std::vector<std::filesystem::path> files = {scratch.put("b.stl", test::binary_stl(box)),
@@ -50,7 +51,7 @@ TEST_CASE("binary STL, ASCII STL and OBJ give the box they were written from, sc
   }
 }
 
-TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]") {
+TEST_CASE("the unit of a COLLADA file is applied and its up-axis is ignored", "[fit][unit]") {
   const test::TemporaryFolder scratch;
   const auto file = scratch.put("t.dae", R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
@@ -69,12 +70,13 @@ TEST_CASE("a COLLADA file's unit counts and its up-axis does not", "[fit][unit]"
   CHECK((high - Vector3d(0.1, 0.2, 0.3)).norm() < 1e-7);
 }
 
-TEST_CASE("files that are no mesh end in one line with their name", "[fit][unit]") {
+TEST_CASE("files without a mesh are refused in one line that names them", "[fit][unit]") {
   const test::TemporaryFolder scratch;
   Mesh bad = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
   CHECK_THAT(mesh_error(scratch.path() / "absent.stl"),
-             Catch::Contains("absent.stl") && Catch::Contains("cannot read"));
-  CHECK_THAT(mesh_error(scratch.put("junk.stl", "this is no mesh")), Catch::Contains("junk.stl: not a mesh"));
+             Catch::Contains("absent.stl") && Catch::Contains("cannot be read"));
+  CHECK_THAT(mesh_error(scratch.put("junk.stl", "this is no mesh")),
+             Catch::Contains("junk.stl: not a mesh"));
   CHECK_THAT(mesh_error(scratch.put("empty.obj", "")), Catch::Contains("empty.obj: not a mesh"));
   CHECK_THAT(mesh_error(scratch.put("kind.xyzzy", "1")), Catch::Contains("kind.xyzzy: not a mesh"));
   bad.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
@@ -101,5 +103,6 @@ TEST_CASE("the meshes of primitives enclose them and stay within the facet error
     REQUIRE(out >= -1e-12);
     REQUIRE(out <= 4.0 * facet_error_m);
   }
-  for (const Mesh& mesh : {cylinder, sphere, box_mesh({0.1, 0.2, 0.3})}) CHECK(Solid(mesh, 8000).closed());
+  for (const Mesh& mesh : {cylinder, sphere, box_mesh({0.1, 0.2, 0.3})})
+    CHECK(Solid(mesh, 8000).closed());
 }

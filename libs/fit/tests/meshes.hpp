@@ -18,13 +18,14 @@ using fit::Mesh;
 
 using Eigen::Vector3d;
 
-/// Stacks of boxes, each with its own closed surface.
+/// Several boxes, each with its own closed surface.
 inline Mesh boxes(const std::vector<std::array<Vector3d, 2>>& low_high) {
   Mesh mesh;
   for (const auto& [low, high] : low_high) {
     const auto first = static_cast<std::int32_t>(mesh.vertices.size());
     for (int i = 0; i < 8; ++i)
-      mesh.vertices.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
+      mesh.vertices.emplace_back((i & 1) != 0 ? high.x() : low.x(),
+                                 (i & 2) != 0 ? high.y() : low.y(),
                                  (i & 4) != 0 ? high.z() : low.z());
     for (const auto& [a, b, c, d] : std::vector<std::array<int, 4>>{
              {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
@@ -47,7 +48,8 @@ inline Mesh l_shape() {
     mesh.triangles.push_back({i, j, 6 + j});
     mesh.triangles.push_back({i, 6 + j, 6 + i});
   }
-  for (const auto& [a, b, c] : std::vector<std::array<int, 3>>{{0, 3, 1}, {1, 3, 2}, {0, 4, 3}, {0, 5, 4}}) {
+  for (const auto& [a, b, c] :
+       std::vector<std::array<int, 3>>{{0, 3, 1}, {1, 3, 2}, {0, 4, 3}, {0, 5, 4}}) {
     mesh.triangles.push_back({a, b, c});
     mesh.triangles.push_back({6 + a, 6 + c, 6 + b});
   }
@@ -59,8 +61,8 @@ inline Mesh tube(double radius, double length, int sides, bool ends) {
   Mesh mesh;
   for (const double z : {0.0, length})
     for (int i = 0; i < sides; ++i)
-      mesh.vertices.emplace_back(radius * std::cos(2.0 * M_PI * i / sides), radius * std::sin(2.0 * M_PI * i / sides),
-                                 z);
+      mesh.vertices.emplace_back(radius * std::cos(2.0 * M_PI * i / sides),
+                                 radius * std::sin(2.0 * M_PI * i / sides), z);
   mesh.vertices.emplace_back(0.0, 0.0, 0.0);
   mesh.vertices.emplace_back(0.0, 0.0, length);
   for (int i = 0; i < sides; ++i) {
@@ -74,15 +76,15 @@ inline Mesh tube(double radius, double length, int sides, bool ends) {
   return mesh;
 }
 
-/// A ball by latitudes.
+/// A ball, triangulated along its circles of latitude.
 inline Mesh ball(double radius, int rings) {
   Mesh mesh;
   const int around = 2 * rings;
   for (int r = 0; r <= rings; ++r)
     for (int i = 0; i < around; ++i) {
       const double up = M_PI * r / rings, side = 2.0 * M_PI * i / around;
-      mesh.vertices.emplace_back(radius * std::sin(up) * std::cos(side), radius * std::sin(up) * std::sin(side),
-                                 radius * std::cos(up));
+      mesh.vertices.emplace_back(radius * std::sin(up) * std::cos(side),
+                                 radius * std::sin(up) * std::sin(side), radius * std::cos(up));
     }
   for (int r = 0; r < rings; ++r)
     for (int i = 0; i < around; ++i) {
@@ -128,12 +130,14 @@ inline std::string obj(const Mesh& mesh) {
   std::string text;
   for (const Vector3d& v : mesh.vertices) text += "v " + numbers(v) + "\n";
   for (const auto& t : mesh.triangles)
-    text += "f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " + std::to_string(t[2] + 1) + "\n";
+    text += "f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " +
+            std::to_string(t[2] + 1) + "\n";
   return text;
 }
 
-/// Random points of a surface, even by area.
-inline std::vector<Vector3d> random_points(const Mesh& mesh, std::size_t count, std::uint64_t seed) {
+/// Random points of a surface, uniform by area.
+inline std::vector<Vector3d> random_points(const Mesh& mesh, std::size_t count,
+                                           std::uint64_t seed) {
   std::vector<double> sums;
   double area = 0.0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -145,13 +149,15 @@ inline std::vector<Vector3d> random_points(const Mesh& mesh, std::size_t count, 
   std::vector<Vector3d> points;
   while (points.size() < count) {
     const double at = rng.uniform(0.0, area);
-    const auto t = static_cast<std::size_t>(std::lower_bound(sums.begin(), sums.end(), at) - sums.begin());
+    const auto t =
+        static_cast<std::size_t>(std::lower_bound(sums.begin(), sums.end(), at) - sums.begin());
     double u = rng.uniform(), v = rng.uniform();
     if (u + v > 1.0) {
       u = 1.0 - u;
       v = 1.0 - v;
     }
-    points.emplace_back((1.0 - u - v) * mesh.corner(t, 0) + u * mesh.corner(t, 1) + v * mesh.corner(t, 2));
+    points.emplace_back((1.0 - u - v) * mesh.corner(t, 0) + u * mesh.corner(t, 1) +
+                        v * mesh.corner(t, 2));
   }
   return points;
 }

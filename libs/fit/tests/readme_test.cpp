@@ -9,7 +9,7 @@ using namespace hamelin;
 TEST_CASE("the README's example runs", "[fit][docs]") {
   // clang-format off
   // [example]
-// A rod of 50 cm covered by capsules, and by balls that stick out 3 cm at most.
+// A rod of 50 cm, covered by capsules and by balls that stick out at most 3 cm.
 const fit::Solid rod(fit::cylinder_mesh(0.05, 0.5));
 fit::CoverOptions options;
 options.excess_m = 0.03;

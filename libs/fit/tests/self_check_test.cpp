@@ -45,12 +45,14 @@ TEST_CASE("distances at rest are those of a stretched chain", "[fit][unit]") {
   // without a list, neighbours are left out
   CHECK_FALSE(pair_of(check, "link1", "link2").checked);
   CHECK(pair_of(check, "link1", "link3").checked);
-  CHECK(check.faults().empty());
+  CHECK(check.contacts_at_rest().empty());
 }
 
-TEST_CASE("a rest pose follows the limits, and its distances the product of exponentials", "[fit][unit]") {
+TEST_CASE("a rest pose follows the limits, and its distances the product of exponentials",
+          "[fit][unit]") {
   model::Robot robot = chain();
-  // the second and third joint at a right angle: the square nearly closes, link 4's end comes 1 m beside link 1's
+  // the second and third joint at a right angle: the square nearly closes, link 4's end comes 1 m
+  // beside link 1's
   for (const std::size_t i : {1U, 2U}) {
     robot.links[i].joint.lower = 0.5 * M_PI - 0.1;
     robot.links[i].joint.upper = 0.5 * M_PI + 0.1;
@@ -59,13 +61,15 @@ TEST_CASE("a rest pose follows the limits, and its distances the product of expo
   CHECK(check.rest_q[1] == Approx(0.5 * M_PI));
   CHECK(pair_of(check, "link1", "link3").rest_m == Approx(std::sqrt(2.0) - 0.2));
   CHECK(pair_of(check, "link1", "link4").rest_m == Approx(std::sqrt(5.0) - 0.2));
-  CHECK(std::count_if(check.odd_limits.begin(), check.odd_limits.end(),
-                      [](const std::string& line) { return line.find("0 is outside") != std::string::npos; }) == 2);
+  CHECK(std::count_if(check.suspicious_limits.begin(), check.suspicious_limits.end(),
+                      [](const std::string& line) {
+                        return line.find("0 is outside") != std::string::npos;
+                      }) == 2);
 }
 
-TEST_CASE("pairs fall into always, sometimes and never in contact", "[fit][unit]") {
+TEST_CASE("pairs are in contact always, sometimes or never", "[fit][unit]") {
   model::Robot robot = chain();
-  robot.links[1].spheres[0].radius_m = 0.95;  // reaches link 1's ball wherever the joint stands
+  robot.links[1].spheres[0].radius_m = 0.95;  // reaches link 1's ball at every joint angle
   for (auto& link : robot.links) {
     link.joint.lower = -0.1;
     link.joint.upper = 0.1;
@@ -87,7 +91,8 @@ TEST_CASE("pairs fall into always, sometimes and never in contact", "[fit][unit]
                       [](const description::DisabledPair& p) { return p.reason == "Never"; }) >= 1);
 }
 
-TEST_CASE("links around a link without shapes are neighbours, though without a list they are checked", "[fit][unit]") {
+TEST_CASE("links around a link without shapes are neighbours, but are checked if no pair is listed",
+          "[fit][unit]") {
   model::Robot robot = chain();
   robot.links[1].spheres.clear();
   robot.links[2].spheres[0].radius_m = 1.95;  // reaches link 1's ball at rest
@@ -96,7 +101,7 @@ TEST_CASE("links around a link without shapes are neighbours, though without a l
   CHECK(pair.neighbours);
   CHECK(pair.checked);
   CHECK_FALSE(pair_of(check, "link1", "link4").neighbours);
-  REQUIRE(check.faults().size() == 1);
+  REQUIRE(check.contacts_at_rest().size() == 1);
   const auto listed = check.disabled(false);
   CHECK(std::any_of(listed.begin(), listed.end(), [](const description::DisabledPair& p) {
     return p.link_a == "link1" && p.link_b == "link3" && p.reason == "Adjacent";
@@ -116,20 +121,20 @@ TEST_CASE("a pair in contact in 95 of 100 samples counts as always, in 94 not", 
   CHECK(contact_reason(pair, 0) == "Default");
 }
 
-TEST_CASE("what touches at rest and is checked is a fault; listed with its reason it is none", "[fit][unit]") {
+TEST_CASE("a checked pair that touches at rest is reported; a listed one is not", "[fit][unit]") {
   model::Robot robot = chain();
   robot.links[0].spheres[0].radius_m = 1.95;
   const SelfCheck check = check_self(robot, {}, {100, 1});
-  const auto faults = check.faults();
-  REQUIRE(faults.size() == 1);
-  CHECK(faults[0].part_b == "link3");
-  CHECK(faults[0].rest_m == Approx(-0.05));
+  const auto contacts_at_rest = check.contacts_at_rest();
+  REQUIRE(contacts_at_rest.size() == 1);
+  CHECK(contacts_at_rest[0].part_b == "link3");
+  CHECK(contacts_at_rest[0].rest_m == Approx(-0.05));
   robot.self_collision_disabled = {{"link3", "link1"}};
   const SelfCheck listed = check_self(robot, {{"link1", "link3", "because", 7}}, {100, 1});
   CHECK(pair_of(listed, "link1", "link3").reason == "because");
   // now that there is a list, neighbours count
-  REQUIRE(listed.faults().size() == 1);
-  CHECK(listed.faults()[0].part_b == "link2");
+  REQUIRE(listed.contacts_at_rest().size() == 1);
+  CHECK(listed.contacts_at_rest()[0].part_b == "link2");
 }
 
 TEST_CASE("capsules are measured by their segments", "[fit][unit]") {
@@ -149,7 +154,8 @@ TEST_CASE("capsules are measured by their segments", "[fit][unit]") {
 
 TEST_CASE("an SRDF written reads back", "[fit][unit]") {
   const test::TemporaryFolder scratch;
-  const std::vector<description::DisabledPair> pairs = {{"a<b", "c&d", "Adjacent", 0}, {"e", "f\"g", "Never", 0}};
+  const std::vector<description::DisabledPair> pairs = {{"a<b", "c&d", "Adjacent", 0},
+                                                        {"e", "f\"g", "Never", 0}};
   const auto read = description::read_srdf(scratch.put("x.srdf", srdf_text("r", pairs)));
   REQUIRE(read.size() == 2);
   CHECK(read[0].link_a == "a<b");

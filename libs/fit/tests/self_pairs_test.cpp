@@ -12,25 +12,28 @@ using namespace hamelin::fit;
 namespace {
 
 const char* const row_inertial =
-    "<inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>";
+    "<inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" "
+    "izz=\"1\"/></inertial>";
 
 std::string row_link(const std::string& name) {
   return "<link name=\"" + name + "\">" + row_inertial + "</link>\n";
 }
 
 // Each joint turns about x, 1 m along y from the one before.
-std::string row_joint(const std::string& parent, const std::string& child, const std::string& type = "revolute") {
-  return "<joint name=\"to_" + child + "\" type=\"" + type + "\"><origin xyz=\"0 1 0\"/><parent link=\"" + parent +
-         "\"/><child link=\"" + child +
-         "\"/><axis xyz=\"1 0 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"1\" velocity=\"1\"/></joint>\n";
+std::string row_joint(const std::string& parent, const std::string& child,
+                      const std::string& type = "revolute") {
+  return "<joint name=\"to_" + child + "\" type=\"" + type +
+         "\"><origin xyz=\"0 1 0\"/><parent link=\"" + parent + "\"/><child link=\"" + child +
+         "\"/><axis xyz=\"1 0 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"1\" "
+         "velocity=\"1\"/></joint>\n";
 }
 
 // base, a, b, c, d in a row, each by a joint; a fork after d: left and right.
 std::string row_arm(const std::string& more = "") {
   std::string text = "<robot name=\"r\">";
   for (const char* name : {"base", "a", "b", "c", "d", "left", "right"}) text += row_link(name);
-  return text + row_joint("base", "a") + row_joint("a", "b") + row_joint("b", "c") + row_joint("c", "d") +
-         row_joint("d", "left") + row_joint("d", "right") + more + "</robot>";
+  return text + row_joint("base", "a") + row_joint("a", "b") + row_joint("b", "c") +
+         row_joint("c", "d") + row_joint("d", "left") + row_joint("d", "right") + more + "</robot>";
 }
 
 Json row_ball(double y, double radius) {
@@ -45,12 +48,18 @@ std::string reason_of(const SelfPairs& self, const std::string& a, const std::st
 
 }  // namespace
 
-TEST_CASE("links with shapes are adjacent across links without, and far ones are not listed", "[fit][unit]") {
+TEST_CASE(
+    "links with shapes are adjacent across links without shapes, and distant ones are not listed",
+    "[fit][unit]") {
   const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", row_arm());
-  // nothing touches ever; a and d have no shapes
+  // no pair ever touches; a and d have no shapes
   const Json sidecar = {
-      {"links", {{"base", row_ball(0, 0.1)}, {"b", row_ball(0, 0.1)}, {"c", row_ball(0, 0.1)}, {"a", Json::array()}}},
+      {"links",
+       {{"base", row_ball(0, 0.1)},
+        {"b", row_ball(0, 0.1)},
+        {"c", row_ball(0, 0.1)},
+        {"a", Json::array()}}},
       {"capsules",
        {{"left", {{{"from", {0, 0, 0}}, {"to", {0, 0.2, 0}}, {"radius", 0.1}}}},
         {"right", {{{"from", {0.3, 0, 0}}, {"to", {0.3, 0.2, 0}}, {"radius", 0.1}}}}}}};
@@ -64,7 +73,8 @@ TEST_CASE("links with shapes are adjacent across links without, and far ones are
   CHECK(reason_of(self, "left", "right") == "Adjacent");  // d between them has none
 }
 
-TEST_CASE("what touches always or at rest is listed, what touches sometimes is not", "[fit][unit]") {
+TEST_CASE("pairs that touch always or at rest are listed, pairs that touch sometimes are not",
+          "[fit][unit]") {
   const test::TemporaryFolder scratch;
   const auto urdf = scratch.put("r.urdf", row_arm());
   const auto with = [&](const Json& of_a, const Json& of_c, const std::optional<std::string>& tip) {
@@ -75,12 +85,13 @@ TEST_CASE("what touches always or at rest is listed, what touches sometimes is n
   CHECK(with(row_ball(0, 1.1), row_ball(0, 1.0), "left") == "Always");
   CHECK(with(row_ball(0, 1.1), row_ball(0, 0.3), "left") == "none");
   CHECK(with(row_ball(0, 1.1), row_ball(0, 0.3), std::nullopt) == "none");
-  // a ball that reaches ahead to where c is at rest only
+  // a ball that touches c at rest only
   CHECK(with(row_ball(2, 0.1), row_ball(0, 0.1), "left") == "Default");
   CHECK(with(row_ball(2, 0.1), row_ball(0, 0.1), std::nullopt) == "Default");
 }
 
-TEST_CASE("ways to leaves that no robot has are noted, a tip asked for is refused", "[fit][unit]") {
+TEST_CASE("chains to leaves that cannot be read are noted, and refused for an explicit tip",
+          "[fit][unit]") {
   const test::TemporaryFolder scratch;
   std::string text = row_arm();
   const std::string mimicking = "<child link=\"right\"/>";
@@ -90,6 +101,8 @@ TEST_CASE("ways to leaves that no robot has are noted, a tip asked for is refuse
   const SelfPairs self = pairs_to_disable(urdf, sidecar, std::nullopt, {10, 1});
   CHECK(reason_of(self, "a", "b") == "Adjacent");
   REQUIRE(self.notes.size() == 1);
-  CHECK_THAT(self.notes[0], Catch::Contains("on the way to 'right'") && Catch::Contains("mimics 'to_left'"));
-  CHECK_THROWS_WITH(pairs_to_disable(urdf, sidecar, "right", {10, 1}), Catch::Contains("mimics 'to_left'"));
+  CHECK_THAT(self.notes[0],
+             Catch::Contains("in the chain to 'right'") && Catch::Contains("mimics 'to_left'"));
+  CHECK_THROWS_WITH(pairs_to_disable(urdf, sidecar, "right", {10, 1}),
+                    Catch::Contains("mimics 'to_left'"));
 }

@@ -20,7 +20,8 @@ double box_distance(const Vector3d& p, const Vector3d& low, const Vector3d& high
 
 }  // namespace
 
-TEST_CASE("signed distances of a box are those of the closed form, and the grid's depth is near them", "[fit][unit]") {
+TEST_CASE("signed distances of a box equal the closed form, and the grid's depth is close to it",
+          "[fit][unit]") {
   const Vector3d low(-0.1, 0.0, 0.05), high(0.2, 0.1, 0.4);
   const Solid solid(test::boxes({{low, high}}));
   CHECK(solid.closed());
@@ -36,7 +37,7 @@ TEST_CASE("signed distances of a box are those of the closed form, and the grid'
   }
 }
 
-TEST_CASE("walls that the outside cannot see do not count", "[fit][unit]") {
+TEST_CASE("walls that are not visible from outside do not count", "[fit][unit]") {
   // two boxes that overlap, and a box inside the whole: the solid is the long box
   const Vector3d low(0.0, 0.0, 0.0), high(0.3, 0.1, 0.1);
   const Solid solid(test::boxes({{low, Vector3d(0.2, 0.1, 0.1)},
@@ -65,7 +66,8 @@ TEST_CASE("an open tube has an inside", "[fit][unit]") {
   CHECK(open.volume() == Approx(closed.volume()).epsilon(0.1));
 }
 
-TEST_CASE("a mesh of degenerate triangles alone is refused, among others they do no harm", "[fit][unit]") {
+TEST_CASE("a mesh of degenerate triangles only is refused; among others they have no effect",
+          "[fit][unit]") {
   Mesh flat;
   flat.vertices = {{0.0, 0.0, 0.0}, {0.1, 0.0, 0.0}, {0.2, 0.0, 0.0}};
   flat.triangles = {{0, 1, 2}, {0, 0, 1}};

@@ -37,7 +37,8 @@ SE3 SE3::exp(const Tangent& x) {
   const ExpCoefficients c = exp_coefficients(omega.squaredNorm());
   const Eigen::Matrix3d W = geometry::hat(omega);
   const Eigen::Vector3d w_v = omega.cross(v);
-  return {Eigen::Matrix3d::Identity() + c.sinc * W + c.a * (W * W), v + c.a * w_v + c.b * omega.cross(w_v)};
+  return {Eigen::Matrix3d::Identity() + c.sinc * W + c.a * (W * W),
+          v + c.a * w_v + c.b * omega.cross(w_v)};
 }
 
 SE3::Tangent SE3::log() const {
@@ -66,7 +67,8 @@ SE3::Adjoint SE3::ad(const Tangent& x) {
 }
 
 SE3::Tangent SE3::ad(const Tangent& x, const Tangent& y) {
-  const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>(), omega_y = y.head<3>(), v_y = y.tail<3>();
+  const Eigen::Vector3d omega = x.head<3>(), v = x.tail<3>(), omega_y = y.head<3>(),
+                        v_y = y.tail<3>();
   return (Tangent() << omega.cross(omega_y), v.cross(omega_y) + omega.cross(v_y)).finished();
 }
 

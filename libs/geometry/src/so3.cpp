@@ -10,7 +10,8 @@
 namespace hamelin::geometry {
 
 Eigen::Matrix3d hat(const Eigen::Vector3d& x) {
-  return (Eigen::Matrix3d() << 0.0, -x.z(), x.y(), x.z(), 0.0, -x.x(), -x.y(), x.x(), 0.0).finished();
+  return (Eigen::Matrix3d() << 0.0, -x.z(), x.y(), x.z(), 0.0, -x.x(), -x.y(), x.x(), 0.0)
+      .finished();
 }
 
 Eigen::Vector3d vee(const Eigen::Matrix3d& m) {
@@ -28,9 +29,11 @@ Eigen::Matrix3d rotation_from_wxyz(const Eigen::Vector4d& wxyz) {
   constexpr double tolerance = 1e-6;
   const double norm = wxyz.norm();
   if (!(std::abs(norm - 1.0) <= tolerance)) {
-    throw Error(ErrorCode::invalid, "quaternion_wxyz: the norm is " + std::to_string(norm) + ", expected 1 (to 1e-6)");
+    throw Error(ErrorCode::invalid,
+                "quaternion_wxyz: the norm is " + std::to_string(norm) + ", expected 1 (to 1e-6)");
   }
-  return Eigen::Quaterniond(wxyz[0] / norm, wxyz[1] / norm, wxyz[2] / norm, wxyz[3] / norm).toRotationMatrix();
+  return Eigen::Quaterniond(wxyz[0] / norm, wxyz[1] / norm, wxyz[2] / norm, wxyz[3] / norm)
+      .toRotationMatrix();
 }
 
 SO3 SO3::exp(const Tangent& omega) {

@@ -19,7 +19,8 @@ using std::numbers::pi;
 
 namespace {
 
-static_assert(inverse_exp_series_threshold == exp_series_threshold);  // else angles() wants both
+// Otherwise angles() needs both thresholds.
+static_assert(inverse_exp_series_threshold == exp_series_threshold);
 
 template <class G>
 constexpr int angular_dof = std::is_same_v<G, SO3> || std::is_same_v<G, SE3> ? 3 : 1;
@@ -41,7 +42,7 @@ typename G::Point point(Rng& rng) {
   return p;
 }
 
-/// Angles at which every law is tried [rad].
+/// Angles at which every law is tested [rad].
 std::vector<double> angles() {
   std::vector<double> list{0.0, 1e-8, 1e-4, 0.1};
   for (const double threshold : {2.0 * SO3::log_threshold, exp_series_threshold}) {
@@ -51,7 +52,7 @@ std::vector<double> angles() {
   return list;
 }
 
-/// exp of a matrix by its power series, scaled and squared: no formula of the groups in it.
+/// exp of a matrix by power series, scaling and squaring, without any formula of the groups.
 template <class Matrix>
 Matrix power_series_exp(const Matrix& m) {
   const Matrix small = m / 16.0;
@@ -73,7 +74,8 @@ constexpr double rounding = 2e-14;
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a displacement obeys the laws of a Lie group", "[geometry][property]", SO2, SO3, SE2, SE3) {
+TEMPLATE_TEST_CASE("a displacement obeys the laws of a Lie group", "[geometry][property]", SO2, SO3,
+                   SE2, SE3) {
   using G = TestType;
   using Tangent = typename G::Tangent;
   using Adjoint = typename G::Adjoint;
@@ -81,7 +83,8 @@ TEMPLATE_TEST_CASE("a displacement obeys the laws of a Lie group", "[geometry][p
   const double angle = GENERATE(from_range(angles()));
   CAPTURE(seed, angle);
   Rng rng(seed);
-  const Tangent x = twist<G>(rng, angle), y = twist<G>(rng, rng.uniform(0.0, pi)), z = twist<G>(rng, 1.0);
+  const Tangent x = twist<G>(rng, angle), y = twist<G>(rng, rng.uniform(0.0, pi)),
+                z = twist<G>(rng, 1.0);
   const G a = G::exp(x), b = G::exp(y), c = G::exp(z);
   const auto p = point<G>(rng);
   const Adjoint one = Adjoint::Identity();
@@ -93,19 +96,19 @@ TEMPLATE_TEST_CASE("a displacement obeys the laws of a Lie group", "[geometry][p
     CHECK((a.inverse() == a) == (angle == 0.0 && x.tail(G::dof - angular_dof<G>).norm() == 0.0));
     CHECK(gap(((a * b) * p).eval(), (a * b.act(p)).eval()) < rounding);
   }
-  SECTION("matrices multiply as the values do") {
+  SECTION("the matrix of a product is the product of the matrices") {
     CHECK(gap((a * b).matrix(), typename G::Matrix(a.matrix() * b.matrix())) < rounding);
   }
   SECTION("exp is the matrix exponential") {
     CHECK(gap(typename G::Matrix(a.matrix()), power_series_exp(G::hat(x))) < rounding);
   }
-  SECTION("log undoes exp, to relative precision at small angles") {
+  SECTION("log inverts exp, to relative precision at small angles") {
     const Tangent back = a.log();
-    // Near π the rotation vector's direction is as good as ever, its angle to rounding.
+    // Near π the rotation vector's direction is accurate, and its angle is right to rounding.
     CHECK(gap(back, x) < rounding);
     CHECK((back - x).template head<angular_dof<G>>().norm() <= 1e-14 * std::max(angle, 1e-300));
   }
-  SECTION("exp undoes log") {
+  SECTION("exp inverts log") {
     const G product = a * b;
     CHECK(gap(G::exp(product.log()).matrix(), product.matrix()) < rounding);
   }
@@ -127,11 +130,11 @@ TEMPLATE_TEST_CASE("a displacement obeys the laws of a Lie group", "[geometry][p
     const Tangent sum = G::ad(x, G::ad(y, z)) + G::ad(y, G::ad(z, x)) + G::ad(z, G::ad(x, y));
     CHECK(sum.norm() < 1e-12);
   }
-  SECTION("the duals pair to the same power") {
+  SECTION("the dual maps give the same power") {
     CHECK(a.Ad_T(y).dot(z) == Approx(y.dot(a.Ad(z))).margin(1e-13));
     CHECK(G::ad_T(x, y).dot(z) == Approx(y.dot(G::ad(x, z))).margin(1e-13));
   }
-  SECTION("hat and vee undo each other") {
+  SECTION("hat and vee invert each other") {
     CHECK(G::vee(G::hat(x)) == x);
   }
   SECTION("dexp is the right-trivialised derivative of exp") {
@@ -186,19 +189,24 @@ TEST_CASE("planar groups are the space groups about z", "[geometry][property]") 
   CAPTURE(seed);
   Rng rng(seed);
   const Eigen::Vector3d x = twist<SE2>(rng, rng.uniform(0.0, 3.0)), y = twist<SE2>(rng, 1.0);
-  const auto lift = [](const Eigen::Vector3d& t) { return (Vector6d() << 0.0, 0.0, t[0], t[1], t[2], 0.0).finished(); };
+  const auto lift = [](const Eigen::Vector3d& t) {
+    return (Vector6d() << 0.0, 0.0, t[0], t[1], t[2], 0.0).finished();
+  };
   const auto drop = [](const Vector6d& t) { return Eigen::Vector3d(t.segment<3>(2)); };
   CHECK(gap(SE2::exp(x).log(), drop(SE3::exp(lift(x)).log())) < rounding);
   CHECK(gap(SE2::ad(x, y), drop(SE3::ad(lift(x), lift(y)))) < rounding);
   CHECK(gap(SE2::exp(x).Ad(y), drop(SE3::exp(lift(x)).Ad(lift(y)))) < rounding);
   CHECK(gap(Eigen::Vector3d(SE2::dexp(x) * y), drop(SE3::dexp(lift(x)) * lift(y))) < rounding);
-  CHECK(gap(Eigen::Vector3d(SE2::dexp_inv(x) * y), drop(SE3::dexp_inv(lift(x)) * lift(y))) < rounding);
-  CHECK(gap(SO2::exp(SO2::Tangent(x[0])).R(), Eigen::Matrix2d(SE3::exp(lift(x)).R().topLeftCorner<2, 2>())) < rounding);
+  CHECK(gap(Eigen::Vector3d(SE2::dexp_inv(x) * y), drop(SE3::dexp_inv(lift(x)) * lift(y))) <
+        rounding);
+  CHECK(gap(SO2::exp(SO2::Tangent(x[0])).R(),
+            Eigen::Matrix2d(SE3::exp(lift(x)).R().topLeftCorner<2, 2>())) < rounding);
 }
 
-TEST_CASE("the coefficients keep full precision on both sides of their thresholds", "[geometry][unit]") {
-  // The closed forms in long double as reference: their cancellation costs at most 64-bit mantissa digits we do not
-  // need.
+TEST_CASE("the coefficients keep full precision on both sides of their thresholds",
+          "[geometry][unit]") {
+  // The closed forms in long double are the reference; the digits that they lose by cancellation
+  // lie beyond those of a double.
   for (const double theta : {0.3, 0.49999, 0.50001, 0.7, 0.99999, 1.0, 1.00001, 1.5, 3.0}) {
     CAPTURE(theta);
     using Real = long double;
@@ -218,7 +226,8 @@ TEST_CASE("the coefficients keep full precision on both sides of their threshold
   }
 }
 
-TEST_CASE("quaternions and rotation matrices agree, and a quaternion must be unit", "[geometry][unit]") {
+TEST_CASE("quaternions and rotation matrices agree, and a quaternion must be unit",
+          "[geometry][unit]") {
   const Eigen::Vector4d q = Eigen::Vector4d(0.5, -0.5, 0.5, 0.5);
   CHECK(quaternion_wxyz(rotation_from_wxyz(q)) == q);
   CHECK(quaternion_wxyz(rotation_from_wxyz(-q)) == q);

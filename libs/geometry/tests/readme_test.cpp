@@ -12,10 +12,12 @@ using std::numbers::pi;
 TEST_CASE("the README's example runs", "[geometry][docs]") {
   // clang-format off
   // [example]
-const Vector6d screw = (Vector6d() << 0.0, 0.0, 1.0, 0.0, -0.5, 0.0).finished();  // about z through (0.5, 0, 0)
+// A rotation about z through (0.5, 0, 0).
+const Vector6d screw = (Vector6d() << 0.0, 0.0, 1.0, 0.0, -0.5, 0.0).finished();
 const SE3 g = SE3::exp(screw * (pi / 2.0));
 const Eigen::Vector3d moved = g * Eigen::Vector3d(1.0, 0.0, 0.0);  // (0.5, 0.5, 0)
-const Vector6d seen_from_body = g.inverse().Ad(screw);             // the same screw: exp commutes with it
+// In the moved frame the screw is the same, because exp(screw) commutes with it.
+const Vector6d seen_from_body = g.inverse().Ad(screw);
 const Vector6d wrench = (Vector6d() << 0.0, 0.0, 2.0, 0.0, 0.0, 0.0).finished();
 const double power = wrench.dot(g.Ad(screw)), same = g.Ad_T(wrench).dot(screw);  // [W] at 1 rad/s
   // [example]

@@ -27,9 +27,10 @@ struct Row {
 }  // namespace
 
 TEST_CASE("what a step of each scheme costs", "[!benchmark][integration]") {
-  // 100 steps of 1 ms from rest, the least of many repetitions; spatial chains of 0.2 m links.
-  fmt::print("{:<22}{:>6}{:>10}{:>10}{:>14}{:>16}\n", "scheme", "links", "us/step", "in ABA", "evaluations",
-             "factorisations");
+  // 100 steps of 1 ms from rest, the minimum of many repetitions; spatial chains with links of 0.2
+  // m.
+  fmt::print("{:<22}{:>6}{:>10}{:>10}{:>14}{:>16}\n", "scheme", "links", "us/step", "in ABA",
+             "evaluations", "factorisations");
   for (const int n : {3, 7, 20, 100}) {
     model::ChainOptions spec;
     spec.links = n;
@@ -40,9 +41,9 @@ TEST_CASE("what a step of each scheme costs", "[!benchmark][integration]") {
     const VectorXd rest = VectorXd::Zero(n);
     double aba = 1e9;
     for (int r = 0; r < 50; ++r) {
-      const double begun = cpu_us();
+      const double start_us = cpu_us();
       for (int k = 0; k < 200; ++k) dynamics::forward_dynamics(model, ws, q0, rest, rest, a);
-      aba = std::min(aba, (cpu_us() - begun) / 200.0);
+      aba = std::min(aba, (cpu_us() - start_us) / 200.0);
     }
     std::vector<Row> rows;
     for (const auto& name : integrator_names()) {
@@ -65,18 +66,19 @@ TEST_CASE("what a step of each scheme costs", "[!benchmark][integration]") {
       for (int r = 0; r < (n > 20 ? 5 : 20); ++r) {
         state = start;
         evaluations = factorizations = 0;
-        const double begun = cpu_us();
+        const double start_us = cpu_us();
         for (int k = 0; k < steps; ++k) {
           const auto report = integrator->step(state, {}, 1e-3);
           evaluations += report.evaluations;
           factorizations += report.factorizations;
         }
-        best = std::min(best, (cpu_us() - begun) / steps);
+        best = std::min(best, (cpu_us() - start_us) / steps);
       }
-      const auto label =
-          row.order > 0 ? fmt::format("{} {}", row.name, row.order) : row.name + (row.riqn ? " riqn" : "");
+      const auto label = row.order > 0 ? fmt::format("{} {}", row.name, row.order)
+                                       : row.name + (row.riqn ? " riqn" : "");
       fmt::print("{:<22}{:>6}{:>10.2f}{:>10.1f}{:>14.2f}{:>16.2f}\n", label, n, best, best / aba,
-                 static_cast<double>(evaluations) / steps, static_cast<double>(factorizations) / steps);
+                 static_cast<double>(evaluations) / steps,
+                 static_cast<double>(factorizations) / steps);
     }
   }
 }

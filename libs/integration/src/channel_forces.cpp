@@ -2,26 +2,31 @@
 
 namespace hamelin::integration {
 
-ChannelForces::ChannelForces(const Model& model) : model_(model), total_(VectorXd::Zero(model.dof())) {
+ChannelForces::ChannelForces(const Model& model)
+    : model_(model), total_(VectorXd::Zero(model.dof())) {
   for (Part* part : parts_) part->force = total_;
 }
 
-void ChannelForces::sum(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v) {
+void ChannelForces::sum(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q,
+                        const VectorXd& v) {
   any_ = !channels.none();
-  if ((held_.acts = channels.held_torque.size() > 0)) held_.force = channels.held_torque;
-  if ((damping_.acts = channels.damping.size() > 0)) damping_.force = channels.damping.cwiseProduct(v);
-  if ((coulomb_.acts = channels.coulomb.size() > 0))
-    coulomb_.force = channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
-  if ((gyroscopic_.acts = !channels.gyroscopic.empty()))
+  if ((held_.active = channels.held_torque.size() > 0)) held_.force = channels.held_torque;
+  if ((damping_.active = channels.damping.size() > 0))
+    damping_.force = channels.damping.cwiseProduct(v);
+  if ((coulomb_.active = channels.coulomb.size() > 0))
+    coulomb_.force =
+        channels.coulomb.cwiseProduct((v / channels.coulomb_speed).array().tanh().matrix());
+  if ((gyroscopic_.active = !channels.gyroscopic.empty()))
     dynamics::gyroscopic_torque(model_, ws, q, v, channels.gyroscopic, gyroscopic_.force);
   total_.setZero();
   for (const Part* part : parts_)
-    if (part->acts) total_ += part->sign * part->force;
+    if (part->active) total_ += part->sign * part->force;
 }
 
-void ChannelForces::sum_work(StepReport& report, const VectorXd& displacement, double weight) const {
+void ChannelForces::sum_work(StepReport& report, const VectorXd& displacement,
+                             double weight) const {
   for (const Part* part : parts_)
-    if (part->acts) report.*part->account += weight * part->force.dot(displacement);
+    if (part->active) report.*part->account += weight * part->force.dot(displacement);
 }
 
 }  // namespace hamelin::integration

@@ -5,21 +5,22 @@
 
 namespace hamelin::integration {
 
-/// The generalised force of the channels, by its parts, for schemes that evaluate it joint vector by joint vector. (The
-/// kernels of gauss and hamel-variational have kernel/forces.hpp.)
+/// The generalised force of the channels and its parts, docs/theory.md (8.2), for the schemes that
+/// work on joint vectors. (The kernels of gauss and hamel-variational use kernel/forces.hpp.)
 class ChannelForces {
  public:
   explicit ChannelForces(const Model& model);
   ChannelForces(const ChannelForces&) = delete;
   ChannelForces& operator=(const ChannelForces&) = delete;
 
-  /// The force at (q, v). It stays until the next call.
-  const VectorXd& evaluate(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v) {
-    if (any_ || !channels.none()) sum(channels, ws, q, v);  // else it is zero already
+  /// The force at (q, v), valid until the next call.
+  const VectorXd& evaluate(const Channels& channels, dynamics::Workspace& ws, const VectorXd& q,
+                           const VectorXd& v) {
+    if (any_ || !channels.none()) sum(channels, ws, q, v);  // otherwise it is zero already
     return total_;
   }
   [[nodiscard]] const VectorXd& total() const noexcept { return total_; }
-  /// Adds the work of the force last evaluated over the displacement to the report.
+  /// Adds the work of the last evaluated force over the displacement, times weight, to the report.
   void add_work(StepReport& report, const VectorXd& displacement, double weight) const {
     if (any_) sum_work(report, displacement, weight);
   }
@@ -29,9 +30,9 @@ class ChannelForces {
   void sum_work(StepReport& report, const VectorXd& displacement, double weight) const;
 
   struct Part {
-    double StepReport::*account;  ///< where its work is booked
-    double sign;                  ///< −1 for what is taken from the motion
-    bool acts = false;
+    double StepReport::*account;  ///< the entry of the report for its work
+    double sign;                  ///< −1 for dissipating forces
+    bool active = false;
     VectorXd force{};
   };
   const Model& model_;

@@ -3,8 +3,8 @@
 
 namespace hamelin::integration {
 
-/// The options with what follows from others: atol where rtol is alone.
-/// @throws Error usage for numbers out of range
+/// The options with derived values filled in: atol = rtol if only rtol is given.
+/// @throws Error usage for values out of range
 [[nodiscard]] Options checked(Options options);
 
 }  // namespace hamelin::integration

@@ -7,19 +7,23 @@ namespace hamelin::integration {
 
 namespace {
 
-// Suzuki 1990: 1/(4 − ∛4) four times about 1 − 4/(4 − ∛4).
-constexpr std::array<double, 5> order4{0.41449077179437573714, 0.41449077179437573714, -0.65796308717750294856,
-                                       0.41449077179437573714, 0.41449077179437573714};
-// Kahan and Li 1997, nine and seventeen stages (as in Hairer, Lubich, Wanner, Geometric Numerical Integration, V.3.2).
-constexpr std::array<double, 9> order6{0.39216144400731413928,  0.33259913678935943860, -0.70624617255763935981,
-                                       0.08221359629355080023,  0.79854399093482996340, 0.08221359629355080023,
-                                       -0.70624617255763935981, 0.33259913678935943860, 0.39216144400731413928};
-constexpr std::array<double, 17> order8{0.13020248308889008088,  0.56116298177510838456,  -0.38947496264484728641,
-                                        0.15884190655515560090,  -0.39590389413323757734, 0.18453964097831570709,
-                                        0.25837438768632204729,  0.29501172360931029887,  -0.60550853383003451170,
-                                        0.29501172360931029887,  0.25837438768632204729,  0.18453964097831570709,
-                                        -0.39590389413323757734, 0.15884190655515560090,  -0.38947496264484728641,
-                                        0.56116298177510838456,  0.13020248308889008088};
+// Suzuki (1990): 1/(4 − ∛4) four times about 1 − 4/(4 − ∛4).
+constexpr std::array<double, 5> order4{0.41449077179437573714, 0.41449077179437573714,
+                                       -0.65796308717750294856, 0.41449077179437573714,
+                                       0.41449077179437573714};
+// Kahan, Li (1997), nine and seventeen sub-steps, as printed in Hairer, Lubich, Wanner, Geometric
+// Numerical Integration (2006), V.3.2.
+constexpr std::array<double, 9> order6{
+    0.39216144400731413928,  0.33259913678935943860, -0.70624617255763935981,
+    0.08221359629355080023,  0.79854399093482996340, 0.08221359629355080023,
+    -0.70624617255763935981, 0.33259913678935943860, 0.39216144400731413928};
+constexpr std::array<double, 17> order8{
+    0.13020248308889008088,  0.56116298177510838456,  -0.38947496264484728641,
+    0.15884190655515560090,  -0.39590389413323757734, 0.18453964097831570709,
+    0.25837438768632204729,  0.29501172360931029887,  -0.60550853383003451170,
+    0.29501172360931029887,  0.25837438768632204729,  0.18453964097831570709,
+    -0.39590389413323757734, 0.15884190655515560090,  -0.38947496264484728641,
+    0.56116298177510838456,  0.13020248308889008088};
 
 }  // namespace
 
@@ -51,10 +55,12 @@ StepReport Composition::attempt(State& state, const Channels& channels, double h
   history_ = state.history;
   for (std::size_t i = 0; i < weights_.size() && report.converged; ++i) {
     std::swap(inner_.history[0], history_[i]);
-    if (i > 0 && inner_.history[0].empty()) inner_.history[0].restart(rate_);  // the sub-step before will do
-    // A sub-step is not halved by itself: the composition would lose its symmetry. The whole step is.
-    report = together(report, step_.attempt(inner_, channels, weights_[i] * h));
-    if (i + 1 < weights_.size() && history_[i + 1].empty()) rate_ = inner_.history[0].last() / (weights_[i] * h);
+    // in the first step the guess comes from the sub-step before
+    if (i > 0 && inner_.history[0].empty()) inner_.history[0].restart(rate_);
+    // A sub-step is not halved alone, which would break the symmetry; the whole step is halved.
+    report = merge(report, step_.attempt(inner_, channels, weights_[i] * h));
+    if (i + 1 < weights_.size() && history_[i + 1].empty())
+      rate_ = inner_.history[0].last() / (weights_[i] * h);
     std::swap(inner_.history[0], history_[i]);
   }
   if (!report.converged) return report;

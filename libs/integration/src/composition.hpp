@@ -6,11 +6,13 @@
 
 namespace hamelin::integration {
 
-/// Weights γ_i of a symmetric composition of sub-steps γ_i h: Σ γ_i = 1, γ_i = γ_{s+1−i}; order 4, 6 or 8.
+/// Weights γ_i of a symmetric composition of sub-steps γ_i h, docs/theory.md (5.11).
+/// @param order 4, 6 or 8
 [[nodiscard]] std::span<const double> composition_weights(int order);
 
-/// Symmetric compositions of the variational step: Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h}. As φ is symmetric and symplectic,
-/// so is Φ. Some γ_i are negative: such a sub-step goes back in time, its damping feeds energy in and is booked so.
+/// Symmetric compositions of the variational step φ, docs/theory.md (5.11): Φ_h = φ_{γ_s h} ∘ … ∘
+/// φ_{γ_1 h}. φ is symmetric and symplectic, so Φ is too. Some γ_i are negative, docs/theory.md
+/// (5.13): in such a sub-step damping feeds energy in, and its work is booked with that sign.
 class Composition final : public Momentum {
  public:
   Composition(const Model& model, const CompositionOptions& options);
@@ -25,8 +27,8 @@ class Composition final : public Momentum {
   int order_;
   std::span<const double> weights_;
   Variational step_;
-  State inner_;                       ///< what the sub-steps move
-  std::vector<StepHistory> history_;  ///< State::history as a step changes it
+  State inner_;                       ///< the state of the sub-steps
+  std::vector<StepHistory> history_;  ///< State::history during a step
   VectorXd rate_;                     ///< mean velocity of the sub-step before
 };
 

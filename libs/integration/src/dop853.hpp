@@ -5,10 +5,11 @@
 
 namespace hamelin::integration {
 
-/// DOP853 of Hairer, Nørsett and Wanner (Solving Ordinary Differential Equations I, 2nd ed., code dop853.f): twelve
-/// stages, order 8, error estimate of orders 5 and 3 combined as published. With rtol or atol the step is chosen by
-/// their controller, else fixed. The thirteenth evaluation of the published code is the first of the next step and is
-/// made there, so nothing goes from step to step but State::step_next.
+/// DOP853 of Hairer, Nørsett, Wanner (Solving Ordinary Differential Equations I, 2nd edition, 1993,
+/// code dop853.f): twelve stages, order 8, error estimate of orders 5 and 3, docs/theory.md (7.11).
+/// With rtol or atol their controller chooses the step, otherwise it is fixed. The thirteenth
+/// evaluation of the published code is the first of the next step and is made there, so only
+/// State::step_next passes from step to step.
 class Dop853 final : public Explicit {
  public:
   Dop853(const Model& model, const Dop853Options& options);
@@ -17,15 +18,15 @@ class Dop853 final : public Explicit {
 
  private:
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  StepReport controlled(State& state, const Channels& channels, double limit) override;
+  StepReport controlled_step(State& state, const Channels& channels, double limit) override;
 
-  /// The derivative at the node. It does not depend on h, so it outlives a rejected step.
+  /// The derivative at the node. It does not depend on h, so all tries share it.
   void first_stage(const State& state, const Channels& channels, StepReport& report);
   /// All other stages, then q_new_, v_new_ at the end of the step.
   void stages(const State& state, const Channels& channels, double h, StepReport& report);
   template <std::size_t s>
   void stage(const State& state, const Channels& channels, double h, StepReport& report);
-  /// Over q and v together; at most 1 where the tolerances are met.
+  /// docs/theory.md (7.11), over q and v together; at most 1 if the tolerances are met.
   [[nodiscard]] double error_norm(const State& state, double h) const;
 
   static constexpr std::size_t count = 12;

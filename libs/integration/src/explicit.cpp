@@ -5,16 +5,20 @@
 namespace hamelin::integration {
 
 Explicit::Explicit(std::string name, const Model& model, const Settings& settings)
-    : Integrator(std::move(name), model, settings), forces_(model), acceleration_(VectorXd::Zero(model.dof())) {}
+    : Integrator(std::move(name), model, settings),
+      forces_(model),
+      acceleration_(VectorXd::Zero(model.dof())) {}
 
 void Explicit::add_momentum(State& state, const ConstVectorRef& dp) {
   dynamics::solve_mass(model_, ws_, state.q, dp, acceleration_);
   state.v += acceleration_;
 }
 
-void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report) {
-  // model and sizes were compared when the step began
-  dynamics::detail::forward_dynamics(model_, ws_, q.data(), v.data(), forces_.evaluate(channels, ws_, q, v).data(),
+void Explicit::accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v,
+                          StepReport& report) {
+  // without checks: model and sizes were checked when the step began
+  dynamics::detail::forward_dynamics(model_, ws_, q.data(), v.data(),
+                                     forces_.evaluate(channels, ws_, q, v).data(),
                                      acceleration_.data());
   ++report.evaluations;
 }
@@ -29,7 +33,7 @@ StepReport SemiImplicitEuler::attempt(State& state, const Channels& channels, do
   accelerate(channels, state.q, state.v, report);
   v_ = state.v + h * acceleration_;
   q_ = state.q + h * v_;
-  report.converged = all_finite(q_);  // and so is v_
+  report.converged = all_finite(q_);  // q_ is finite only if v_ is
   if (!report.converged) return report;
   forces_.add_work(report, v_, h);
   state.q.swap(q_);
@@ -42,8 +46,9 @@ Rk4::Rk4(const Model& model, const Rk4Options& options) : Explicit("rk4", model,
 }
 
 StepReport Rk4::attempt(State& state, const Channels& channels, double h) {
-  // stage i stands at (q, v) + c_i h (v_, acceleration_) of the stage before
-  static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  // stage i is evaluated at (q, v) + c_i h (v_, acceleration_) of the stage before
+  static constexpr std::array<double, 4> c{0.0, 0.5, 0.5, 1.0},
+      b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   StepReport report;
   q_sum_ = state.q;
   v_sum_ = state.v;

@@ -6,7 +6,8 @@
 
 namespace hamelin::integration {
 
-/// What the explicit schemes share: a state (q, v), forward dynamics at a point, kicks as M⁻¹ dp.
+/// Base of the schemes whose state is (q, v), with forward dynamics at a point. A kick dp changes v
+/// by M⁻¹ dp.
 class Explicit : public Integrator {
  public:
   [[nodiscard]] std::string criterion() const override { return "explicit"; }
@@ -17,14 +18,16 @@ class Explicit : public Integrator {
   void begin(State& state, const ConstVectorRef& v0) override { state.v = v0; }
   void add_momentum(State& state, const ConstVectorRef& dp) override;
   void replace_velocity(State& state, const ConstVectorRef& v) override { state.v = v; }
-  /// acceleration_ at (q, v) under gravity and the channels.
-  void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
+  /// acceleration_ = a(q, v) under gravity and the channels, docs/theory.md (7.1).
+  void accelerate(const Channels& channels, const VectorXd& q, const VectorXd& v,
+                  StepReport& report);
 
   ChannelForces forces_;
   VectorXd acceleration_;
 };
 
-/// v⁺ = v + h a(q, v), q⁺ = q + h v⁺: the paper's baseline. Order 1.
+/// docs/theory.md (7.2): v⁺ = v + h a(q, v), q⁺ = q + h v⁺. Order 1; the baseline of Shen, Wang,
+/// Shi (2021).
 class SemiImplicitEuler final : public Explicit {
  public:
   SemiImplicitEuler(const Model& model, const SemiImplicitEulerOptions& options);
@@ -36,7 +39,7 @@ class SemiImplicitEuler final : public Explicit {
   VectorXd q_, v_;
 };
 
-/// The classical Runge–Kutta scheme of order 4.
+/// The classical Runge–Kutta scheme of order 4, docs/theory.md (7.3), (7.4).
 class Rk4 final : public Explicit {
  public:
   Rk4(const Model& model, const Rk4Options& options);

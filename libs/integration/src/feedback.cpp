@@ -8,17 +8,21 @@ namespace hamelin::integration {
 
 namespace {
 
-constexpr double gain = 10.0;  // κ [1/s]: an error fades within 0.1 s, and steps up to 0.1 s stay stable
+// κ of docs/theory.md (7.8), (7.9) [1/s]: an error fades within 0.1 s; steps to 0.1 s stay stable
+constexpr double gain = 10.0;
 
 }  // namespace
 
-Feedback::Feedback(const Model& model, const FeedbackOptions& options) : Explicit("feedback", model, {options.isa}) {
-  for (const auto& link : model.robot().links) turns_.push_back(link.joint.type == model::JointType::revolute);
-  for (auto* x : {&q_, &v_, &c_, &s_, &dc_, &ds_, &dv_, &c_sum_, &s_sum_, &v_sum_}) *x = VectorXd::Zero(model.dof());
+Feedback::Feedback(const Model& model, const FeedbackOptions& options)
+    : Explicit("feedback", model, {options.isa}) {
+  for (const auto& link : model.robot().links)
+    revolute_.push_back(link.joint.type == model::JointType::revolute);
+  for (auto* x : {&q_, &v_, &c_, &s_, &dc_, &ds_, &dv_, &c_sum_, &s_sum_, &v_sum_})
+    *x = VectorXd::Zero(model.dof());
   embedded_ = VectorXd::Zero(2 * model.dof() + 1);
 }
 
-// State::memory: c, s of all joints (of a sliding one c is the coordinate and s is 0), then E*.
+// State::memory: c and s of all joints (for a prismatic joint the coordinate and 0), then E*.
 void Feedback::begin(State& state, const ConstVectorRef& v0) {
   state.memory = VectorXd::Zero(2 * model_.dof() + 1);
   Explicit::begin(state, v0);
@@ -31,26 +35,29 @@ void Feedback::embed(const State& state) {
     return;
   }
   for (Eigen::Index i = 0; i < n; ++i) {
-    const bool turns = turns_[static_cast<std::size_t>(i)];
-    embedded_[i] = turns ? std::cos(state.q[i]) : state.q[i];
-    embedded_[n + i] = turns ? std::sin(state.q[i]) : 0.0;
+    const bool revolute = revolute_[static_cast<std::size_t>(i)];
+    embedded_[i] = revolute ? std::cos(state.q[i]) : state.q[i];
+    embedded_[n + i] = revolute ? std::sin(state.q[i]) : 0.0;
   }
   embedded_[2 * n] = node_energy(state).total();
 }
 
 StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
-  static constexpr std::array<double, 4> node{0.0, 0.5, 0.5, 1.0}, b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  static constexpr std::array<double, 4> node{0.0, 0.5, 0.5, 1.0},
+      b{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   const Eigen::Index n = model_.dof();
   StepReport report;
   embed(state);
   const auto c0 = embedded_.head(n), s0 = embedded_.segment(n, n);
-  // The energy's term is as small as the scheme's error, so it may be held over the step.
+  // β of docs/theory.md (7.9). It is as small as the error of the scheme, so it may be constant
+  // over the step.
   const Energy now = node_energy(state);
   const double excess = now.total() - embedded_[2 * n];
-  const double brake = excess == 0.0 ? 0.0 : gain * excess / (2.0 * now.kinetic_J + std::abs(excess));
-  // where a pair stands, as an angle counted on from the node's
+  const double energy_gain =
+      excess == 0.0 ? 0.0 : gain * excess / (2.0 * now.kinetic_J + std::abs(excess));
+  // the angle of a pair, counted on from the angle of the node
   const auto joint = [&](Eigen::Index i, double c, double s) {
-    if (!turns_[static_cast<std::size_t>(i)]) return c;
+    if (!revolute_[static_cast<std::size_t>(i)]) return c;
     return state.q[i] + std::atan2(s * c0[i] - c * s0[i], c * c0[i] + s * s0[i]);
   };
   c_sum_ = c0;
@@ -68,7 +75,7 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
     accelerate(channels, q_, v_, report);
     forces_.add_work(report, v_, weight);
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (turns_[static_cast<std::size_t>(i)]) {
+      if (revolute_[static_cast<std::size_t>(i)]) {
         const double off = gain * (c_[i] * c_[i] + s_[i] * s_[i] - 1.0);
         dc_[i] = -s_[i] * v_[i] - off * c_[i];
         ds_[i] = c_[i] * v_[i] - off * s_[i];
@@ -76,15 +83,16 @@ StepReport Feedback::attempt(State& state, const Channels& channels, double h) {
         dc_[i] = v_[i];
       }
     }
-    dv_ = acceleration_ - brake * v_;
+    dv_ = acceleration_ - energy_gain * v_;
     c_sum_ += weight * dc_;
     s_sum_ += weight * ds_;
     v_sum_ += weight * dv_;
   }
   for (Eigen::Index i = 0; i < n; ++i) q_[i] = joint(i, c_sum_[i], s_sum_[i]);
-  const double target = embedded_[2 * n] + report.held_work_J + report.gyroscopic_work_J - report.dissipated_J;
-  report.converged =
-      all_finite(q_) && all_finite(v_sum_) && all_finite(c_sum_) && all_finite(s_sum_) && std::isfinite(target);
+  const double target =
+      embedded_[2 * n] + report.held_work_J + report.gyroscopic_work_J - report.dissipated_J;
+  report.converged = all_finite(q_) && all_finite(v_sum_) && all_finite(c_sum_) &&
+                     all_finite(s_sum_) && std::isfinite(target);
   if (!report.converged) return report;
   state.q = q_;
   state.v = v_sum_;

@@ -21,23 +21,25 @@ HAMELIN_SELECT_KERNELS(GaussSet, gauss_set)
 namespace {
 
 constexpr int max_sweeps = 60;
-// What an iteration stopped at 1e-12 leaves has a sign, and energy drifts with it (1e-10 J in 10⁵ steps of planar3); a
-// sweep more for structure's sake.
-constexpr double to_rounding = 1e-2;
-// Of the step error that is allowed, what the iteration may leave; and how much of the estimate, which is a cautious
-// one, the step may use. Both found by work and error on falling arms.
+// The share of the tolerance to which the structure mode iterates. The error left at 1e-12 has a
+// sign, and energy drifts with it (1e-10 J in 10⁵ steps of planar3).
+constexpr double structure_share = 1e-2;
+// The share of the allowed error that the iteration may leave, and the factor 3 of docs/theory.md
+// (5.9) for the estimate, which is cautious. Both were found by work and error on falling arms.
 constexpr double iteration_share = 1e-3, estimate_share = 3.0;
 
 }  // namespace
 
 GaussLegendre::GaussLegendre(const Model& model, const GaussOptions& options)
-    : Momentum("gauss", model, {options.isa, options.max_halvings, options.tolerance, options.rtol, options.atol}),
+    : Momentum("gauss", model,
+               {options.isa, options.max_halvings, options.tolerance, options.rtol, options.atol}),
       tableau_(gauss_tableau(static_cast<std::size_t>(options.order / 2))),
       kernels_(&kernel::select_gauss_set(options.isa)),
-      memory_(dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
-        return entry.bytes(chain.links.size(), tableau_.stages);
-      })) {
-  spins_.reserve(most_spins);
+      memory_(
+          dynamics::kernel::with_group(model, *kernels_, [&](const auto& entry, const auto& chain) {
+            return entry.bytes(chain.links.size(), tableau_.stages);
+          })) {
+  spins_.reserve(reserved_spins);
   q_next_ = p_next_ = VectorXd::Zero(model.dof());
   slopes_ = VectorXd::Zero(2 * static_cast<Eigen::Index>(tableau_.stages) * model.dof());
 }
@@ -58,8 +60,8 @@ void GaussLegendre::begin(State& state, const ConstVectorRef& v0) {
   if (adaptive()) ahead_ = state;
 }
 
-kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& channels, double h, double tolerance,
-                                          StepReport& report) {
+kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& channels, double h,
+                                          double tolerance, StepReport& report) {
   slopes_ = state.memory;
   const kernel::Forces forces = to_forces(model_, channels, spins_);
   auto outcome = dynamics::kernel::with_group(
@@ -77,7 +79,8 @@ kernel::GaussOutcome GaussLegendre::solve(const State& state, const Channels& ch
   return outcome;
 }
 
-void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, double h, StepReport& report) {
+void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, double h,
+                           StepReport& report) {
   state.q = q_next_;
   state.p = p_next_;
   state.memory = slopes_;
@@ -88,7 +91,7 @@ void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, do
 
 StepReport GaussLegendre::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
-  const double tolerance = (structure() ? to_rounding : 1.0) * settings_.tolerance;
+  const double tolerance = (structure() ? structure_share : 1.0) * settings_.tolerance;
   const auto outcome = solve(state, channels, h, tolerance, report);
   report.residual = outcome.residual;
   report.converged = outcome.converged;
@@ -96,18 +99,19 @@ StepReport GaussLegendre::attempt(State& state, const Channels& channels, double
   return report;
 }
 
-// The guess is the last step's polynomial of degree s, so what the first sweep changes, e, is its error O(h^{s+1}),
-// while the step's own is O(h^{2s+1}): relative to the displacement scale 1 it is taken for e^{(2s+1)/(s+1)}. It costs
-// nothing, and it sees a motion that quickens one step late at most. The first step has no guess, and after an impulse
-// the guess is of a motion that ended there: such a step is judged by a second one like it, which is then dropped.
-StepReport GaussLegendre::controlled(State& state, const Channels& channels, double limit) {
+// docs/theory.md (5.9), (5.10): the change e in the first sweep is the error of the guess,
+// O(h^{s+1}), and the error of the step is estimated from it as e^{(2s+1)/(s+1)}. A first step has
+// no guess, and after an impulse the guess belongs to another motion: such a step is judged by a
+// second step of the same length, which is then dropped.
+StepReport GaussLegendre::controlled_step(State& state, const Channels& channels, double limit) {
   StepReport report;
   report.converged = false;
   const double s = static_cast<double>(tableau_.stages);
-  const double allowed = settings_.atol + settings_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
+  const double allowed =
+      settings_.atol + settings_.rtol * std::max(1.0, state.q.lpNorm<Eigen::Infinity>());
   const double tolerance = std::max(iteration_share * allowed, 1e-15);
   const double target = std::pow(estimate_share * allowed, (s + 1.0) / (2.0 * s + 1.0));
-  // The estimate is cautious: a step is taken as long as half of it would have met the target.
+  // The estimate is cautious: a step is accepted if half its length would meet the target.
   const StepController::Rule rule{s + 1.0, 0.5, 0.1, 4.0};
   const double accepted = target * std::pow(2.0, s + 1.0);
   const bool first = state.jumped;

@@ -6,10 +6,10 @@
 
 namespace hamelin::integration {
 
-/// Gauss–Legendre collocation in (θ, p), order 4 … 16 by order/2 stages: the Galerkin variational integrator of that
-/// degree, symplectic and symmetric. A stage is v = M⁻¹p, ṗ_i = λ_i·ad(X_i)A_i − ∂_iU + F_i; all stages of a
-/// sweep go through SIMD lanes together (kernel/gauss.hpp). Fixed steps iterated to rounding keep the structure; with
-/// rtol or atol the step follows an error estimate made of what the first sweep changed.
+/// Gauss–Legendre collocation in (θ, p), docs/theory.md (5.1): order 4 to 16 with order/2 stages,
+/// symplectic and symmetric. All stages of a sweep go through SIMD lanes together
+/// (kernel/gauss.hpp). Fixed steps iterated to rounding keep the structure; with rtol or atol the
+/// step length follows an error estimate from the change in the first sweep, docs/theory.md (5.9).
 class GaussLegendre final : public Momentum {
  public:
   GaussLegendre(const Model& model, const GaussOptions& options);
@@ -20,12 +20,14 @@ class GaussLegendre final : public Momentum {
  private:
   void begin(State& state, const ConstVectorRef& v0) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  StepReport controlled(State& state, const Channels& channels, double limit) override;
+  StepReport controlled_step(State& state, const Channels& channels, double limit) override;
   /// Fixed steps iterated to rounding.
-  [[nodiscard]] bool structure() const noexcept { return !adaptive() && settings_.tolerance <= 1e-12; }
-  /// One solve from the state into q_next_, p_next_, slopes_; the state stays.
-  kernel::GaussOutcome solve(const State& state, const Channels& channels, double h, double tolerance,
-                             StepReport& report);
+  [[nodiscard]] bool structure() const noexcept {
+    return !adaptive() && settings_.tolerance <= 1e-12;
+  }
+  /// Solves a step from the state into q_next_, p_next_ and slopes_; the state is unchanged.
+  kernel::GaussOutcome solve(const State& state, const Channels& channels, double h,
+                             double tolerance, StepReport& report);
   void accept(State& state, const kernel::GaussOutcome& outcome, double h, StepReport& report);
 
   kernel::GaussTableau tableau_;
@@ -33,7 +35,7 @@ class GaussLegendre final : public Momentum {
   dynamics::AlignedBuffer memory_;
   std::vector<dynamics::kernel::Spin> spins_;
   VectorXd q_next_, p_next_, slopes_;
-  State ahead_;  ///< the first step's end, until a second has judged it
+  State ahead_;  ///< the end of a first step until a second step has estimated its error
 };
 
 }  // namespace hamelin::integration

@@ -5,15 +5,17 @@
 
 namespace hamelin::integration {
 
-// Nodes are the roots of the Legendre polynomial P_s on [0, 1], by Newton; a_ij = ∫₀^{c_i} ℓ_j, which Gauss quadrature
-// of the same nodes does exactly. In long double, so that the rounded numbers are right.
+// Nodes are the roots of the Legendre polynomial P_s on [0, 1], found by Newton's method. The
+// integrals a_ij are exact by Gauss quadrature with the same nodes. Computed in long double, so
+// that the rounded numbers are correct.
 kernel::GaussTableau gauss_tableau(std::size_t s) {
   using Real = long double;
   kernel::GaussTableau t{};
   t.stages = s;
-  Real x[kernel::most_stages], w[kernel::most_stages];
+  Real x[kernel::max_stages], w[kernel::max_stages];
   for (std::size_t i = 0; i < s; ++i) {
-    Real z = std::cos(std::numbers::pi_v<Real> * (static_cast<Real>(i) + 0.75L) / (static_cast<Real>(s) + 0.5L));
+    Real z = std::cos(std::numbers::pi_v<Real> * (static_cast<Real>(i) + 0.75L) /
+                      (static_cast<Real>(s) + 0.5L));
     Real slope = 1.0L;
     for (int newton = 0; newton < 50; ++newton) {
       Real before = 1.0L, value = z;
@@ -37,11 +39,11 @@ kernel::GaussTableau gauss_tableau(std::size_t s) {
   };
   for (std::size_t j = 0; j < s; ++j) {
     t.b[j] = static_cast<double>(w[j]);
-    Real apart = 1.0L;
+    Real product = 1.0L;
     for (std::size_t m = 0; m < s; ++m)
-      if (m != j) apart *= x[j] - x[m];
-    t.barycentric[j] = static_cast<double>(1.0L / apart);
-    for (std::size_t i = 0; i < kernel::most_stages; ++i) {
+      if (m != j) product *= x[j] - x[m];
+    t.barycentric[j] = static_cast<double>(1.0L / product);
+    for (std::size_t i = 0; i < kernel::max_stages; ++i) {
       const Real c = x[i < s ? i : 0];
       Real a = 0.0L;
       for (std::size_t m = 0; m < s; ++m) a += w[m] * c * basis(j, c * x[m]);

@@ -30,7 +30,8 @@ Hamel::Hamel(const Model& model, const HamelOptions& options, bool midpoint)
     links_ = Links<dynamics::kernel::Planar<double>>(n);
   else
     links_ = Links<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
+  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &residual_, &gradient_})
+    *x = VectorXd::Zero(model.dof());
 }
 
 std::string Hamel::criterion() const {
@@ -39,7 +40,8 @@ std::string Hamel::criterion() const {
 
 template <class F>
 decltype(auto) Hamel::with_links(F&& f) const {
-  if (model_.planar()) return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
+  if (model_.planar())
+    return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
   return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
 }
 
@@ -50,23 +52,24 @@ void Hamel::begin(State& state, const ConstVectorRef& v0) {
 }
 
 void Hamel::replace_velocity(State& state, const ConstVectorRef& v) {
-  state.p.setZero();  // pending node impulse
+  state.p.setZero();  // the impulses at the node
   state.force_previous.setZero();
   state.step_previous = 0.0;
-  // ξ^{−1+α} from the velocity by (5)
+  // ξ' from the velocity, docs/theory.md (2.1)
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     constexpr std::size_t width = sizeof(typename Space::Motion) / sizeof(double);
     state.memory.resize(static_cast<Eigen::Index>((width + 1) * k.size()));
     for (std::size_t i = 0; i < k.size(); ++i) {
       const auto& l = chain.links[i];
       const auto x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
-      k[i].twist =
-          l.parent < 0 ? Space::zero_motion() : Space::to_child(l, x, k[static_cast<std::size_t>(l.parent)].twist);
+      k[i].twist = l.parent < 0
+                       ? Space::zero_motion()
+                       : Space::to_child(l, x, k[static_cast<std::size_t>(l.parent)].twist);
       Space::add_along_axis(l, k[i].twist, v[static_cast<Eigen::Index>(i)]);
       std::memcpy(state.memory.data() + width * i, &k[i].twist, sizeof(k[i].twist));
     }
   });
-  state.memory.tail(v.size()) = v;  // joint rates of ξ', for the rotors
+  state.memory.tail(v.size()) = v;  // joint rates that belong to ξ', for the rotors
 }
 
 void Hamel::add_momentum(State& state, const ConstVectorRef& dp) {
@@ -82,7 +85,8 @@ void Hamel::load(const State& state, double h_before) const {
       std::memcpy(&twist, state.memory.data() + width * i, sizeof(twist));
       k[i].x = Space::place(l, state.q[static_cast<Eigen::Index>(i)]);
       const auto mu = Space::momentum(l, twist);
-      k[i].before = Space::scaled(Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * h_before)), -1.0);
+      k[i].before = Space::scaled(
+          Space::sum(mu, Space::scaled(Space::ad_T(twist, mu), alpha_ * h_before)), -1.0);
     }
   });
 }
@@ -94,7 +98,8 @@ void Hamel::momentum_before(const State& state, VectorXd& p) const {
     for (std::size_t i = 0; i < k.size(); ++i) k[i].force = Space::scaled(k[i].before, -1.0);
     for (std::size_t i = k.size(); i-- > 0;) {
       const auto& l = chain.links[i];
-      p[static_cast<Eigen::Index>(i)] = Space::along_axis(l, k[i].force) + rate_before[i] * l.armature;
+      p[static_cast<Eigen::Index>(i)] =
+          Space::along_axis(l, k[i].force) + rate_before[i] * l.armature;
       if (l.parent < 0) continue;
       auto& outer = k[static_cast<std::size_t>(l.parent)].force;
       outer = Space::sum(outer, Space::to_parent(l, k[i].x, k[i].force));
@@ -114,20 +119,22 @@ void Hamel::node_velocity(const State& state, VectorRef v) const {
 
 Energy Hamel::node_energy(const State& state) const {
   if (state.step_previous == 0.0) {
-    rate_ = state.memory.tail(model_.dof());  // as set
-    return {dynamics::kinetic_energy(model_, ws_, state.q, rate_), dynamics::potential_energy(model_, ws_, state.q)};
+    rate_ = state.memory.tail(model_.dof());  // the velocity that was set
+    return {dynamics::kinetic_energy(model_, ws_, state.q, rate_),
+            dynamics::potential_energy(model_, ws_, state.q)};
   }
   const VectorXd& delta = state.history[0].last();
   rate_ = delta / state.step_previous;
   mid_ = state.q - 0.5 * delta;
   Energy energy{dynamics::kinetic_energy(model_, ws_, mid_, rate_), 0.0};
   mid_ = state.q - delta;
-  energy.potential_J =
-      0.5 * (dynamics::potential_energy(model_, ws_, mid_) + dynamics::potential_energy(model_, ws_, state.q));
+  energy.potential_J = 0.5 * (dynamics::potential_energy(model_, ws_, mid_) +
+                              dynamics::potential_energy(model_, ws_, state.q));
   return energy;
 }
 
-void Hamel::evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force) {
+void Hamel::evaluate(const State& state, const Channels& channels, double h, double h_before,
+                     double h_force) {
   const double* const rate_before = state.memory.data() + state.memory.size() - model_.dof();
   rate_ = delta_ / h;
   mid_ = state.q + 0.5 * delta_;
@@ -136,8 +143,9 @@ void Hamel::evaluate(const State& state, const Channels& channels, double h, dou
       const auto& l = chain.links[i];
       const auto j = static_cast<Eigen::Index>(i);
       const auto transport = midpoint_ ? Space::place(l, mid_[j]) : k[i].x;
-      k[i].twist = l.parent < 0 ? Space::zero_motion()
-                                : Space::to_child(l, transport, k[static_cast<std::size_t>(l.parent)].twist);
+      k[i].twist = l.parent < 0
+                       ? Space::zero_motion()
+                       : Space::to_child(l, transport, k[static_cast<std::size_t>(l.parent)].twist);
       Space::add_along_axis(l, k[i].twist, rate_[j]);
       const auto mu = Space::momentum(l, k[i].twist);
       const auto turn = Space::scaled(Space::ad_T(k[i].twist, mu), -(1.0 - alpha_) * h);
@@ -153,20 +161,22 @@ void Hamel::evaluate(const State& state, const Channels& channels, double h, dou
     }
   });
   forces_.evaluate(channels, ws_, mid_, rate_);
-  residual_ +=
-      0.5 * (h + h_before) * gradient_ - h_force * forces_.total() - 0.5 * h_before * state.force_previous - state.p;
+  residual_ += 0.5 * (h + h_before) * gradient_ - h_force * forces_.total() -
+               0.5 * h_before * state.force_previous - state.p;
 }
 
 StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
   report.converged = false;
-  // The published start counts the whole node at k = 0, as if a step like this one had ended there.
-  const bool whole_node = state.k == 0 && state.step_previous == 0.0 && options_.start == Start::published;
+  // docs/theory.md (3.14): the published start counts the whole potential at k = 0, as if a step of
+  // the same length had ended there.
+  const bool whole_node =
+      state.k == 0 && state.step_previous == 0.0 && options_.start == Start::published;
   const double h_before = whole_node ? h : state.step_previous;
   const double h_force = whole_node ? h : 0.5 * h;
   load(state, h_before);
   dynamics::gravity_torque(model_, ws_, state.q, gradient_);
-  delta_.setZero();  // the paper's guess θ^k
+  delta_.setZero();  // the published guess θ^{k+1} = θ^k
   for (;;) {
     evaluate(state, channels, h, h_before, h_force);
     ++report.evaluations;
@@ -175,7 +185,7 @@ StepReport Hamel::attempt(State& state, const Channels& channels, double h) {
     if (report.residual < options_.feedback_tolerance) break;
     if (report.updates == options_.max_updates) return report;
     residual_ *= -h;
-    dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);  // (16)
+    dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);  // docs/theory.md (3.9)
     delta_ += correction_;
     ++report.updates;
     ++report.factorizations;

@@ -8,12 +8,11 @@
 
 namespace hamelin::integration {
 
-/// The published scheme: (9), (13), Algorithm 1 with the feedback (15)–(16); and hamel-midpoint, the same with the
-/// twists (9) transported at θ^k + Δ/2 and α = ½. In impulse form, with h' the step before (0 right after a consistent
-/// start, h after a published one), the equation at node k is
-///   A_i · f_i = 0,  f_i = Adᵀ f_{i+1} + I ξ − I ξ' − (1−α) h adᵀ(ξ) I ξ − α h' adᵀ(ξ') I ξ' + ½(h + h') ∂U − ½h F −
-///   ½h' F',
-/// which is h times (13) for equal steps.
+/// The scheme of Shen, Wang, Shi (2021), docs/theory.md (3.2), (3.6), (3.7), solved by the feedback
+/// (3.9); and hamel-midpoint, with α = ½ and the twists transported at θ^k + Δ/2. Computed in
+/// impulse form, docs/theory.md (3.10), (3.11), with ξ', h', F' those of the step before:
+///   f_i = Adᵀ f_{i+1} + I ξ − (1 − α) h adᵀ(ξ) I ξ − I ξ' − α h' adᵀ(ξ') I ξ',
+///   R_i = A_i·f_i + ½ (h + h') ∂_iU − ½ h F_i − ½ h' F'_i − (node impulses) = 0.
 class Hamel final : public Integrator {
  public:
   Hamel(const Model& model, const HamelOptions& options);
@@ -24,14 +23,15 @@ class Hamel final : public Integrator {
  private:
   Hamel(const Model& model, const HamelOptions& options, bool midpoint);
   void node_velocity(const State& state, VectorRef v) const override;
-  /// T(θ_mid, Δ/h) + ½U(θ^k) + ½U(θ^{k+1}) of the last step.
+  /// docs/theory.md (3.13), of the last step.
   [[nodiscard]] Energy node_energy(const State& state) const override;
   void begin(State& state, const ConstVectorRef& v0) override;
   void add_momentum(State& state, const ConstVectorRef& dp) override;
   void replace_velocity(State& state, const ConstVectorRef& v) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  /// τ_e of the node equation at delta_, times h.
-  void evaluate(const State& state, const Channels& channels, double h, double h_before, double h_force);
+  /// residual_ = R at delta_, docs/theory.md (3.11).
+  void evaluate(const State& state, const Channels& channels, double h, double h_before,
+                double h_force);
 
   template <class Space>
   struct Link {
@@ -44,15 +44,18 @@ class Hamel final : public Integrator {
   using Links = std::vector<Link<Space>>;
   template <class F>
   decltype(auto) with_links(F&& f) const;
-  /// Node momentum as the step before left it, A_i · Σ (I ξ' + α h' adᵀ(ξ') I ξ') − ½h' ∂U + ½h' F'.
+  /// Momentum at the node, docs/theory.md (3.12).
   void momentum_before(const State& state, VectorXd& p) const;
-  /// Reads ξ' from the state, h' given, and places the chain at θ^k.
+  /// Reads ξ' from the state, computes the terms of the step before for h' = h_before, and places
+  /// the chain at θ^k.
   void load(const State& state, double h_before) const;
 
   const HamelOptions options_;
   const bool midpoint_;
   const double alpha_;
-  mutable std::variant<Links<dynamics::kernel::Spatial<double>>, Links<dynamics::kernel::Planar<double>>> links_;
+  mutable std::variant<Links<dynamics::kernel::Spatial<double>>,
+                       Links<dynamics::kernel::Planar<double>>>
+      links_;
   ChannelForces forces_;
   mutable VectorXd delta_, correction_, mid_, rate_, residual_, gradient_;  // scratch
 };

@@ -21,39 +21,46 @@ double Integrator::tolerance() const noexcept {
 }
 
 Integrator::Shape Integrator::shape_of(const State& state) noexcept {
-  return {state.q.size(),      state.v.size(), state.p.size(), state.memory.size(), state.force_previous.size(),
+  return {state.q.size(),
+          state.v.size(),
+          state.p.size(),
+          state.memory.size(),
+          state.force_previous.size(),
           state.history.size()};
 }
 
 void Integrator::check_size(const char* function, const char* argument, Eigen::Index given) const {
   if (given != model_.dof()) [[unlikely]]
-    throw Error(ErrorCode::usage, formatted("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
-                                            argument, given, model_.dof(), model_.robot().name));
+    throw Error(ErrorCode::usage,
+                formatted("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
+                          argument, given, model_.dof(), model_.robot().name));
 }
 
 void Integrator::check(const char* function, const State& state) const {
-  const dynamics::detail::Call call(function, model_, ws_.owner);  // no other model has taken its place
+  const dynamics::detail::Call call(function, model_, ws_.owner);  // refuses a replaced model
   if (shape_of(state) != shape_) [[unlikely]]
     refuse_shape(function, state);
 }
 
 void Integrator::refuse_shape(const char* function, const State& state) const {
   check_size(function, "state.q", state.q.size());
-  if (saved_.empty()) return;  // no state was made yet to compare with
+  if (saved_.empty()) return;  // the expected sizes are not known before prepare()
   const Shape given = shape_of(state);
-  throw Error(
-      ErrorCode::usage,
-      formatted("{}: state: {} velocities, {} momenta and {} numbers of memory given, expected {}, {} and {}: a "
-                "state that '{}' with these options makes for this model",
-                function, given.v, given.p, given.memory, shape_.v, shape_.p, shape_.memory, name_));
+  throw Error(ErrorCode::usage, formatted("{}: state: {} velocities, {} momenta and {} numbers of "
+                                          "memory given, expected {}, {} and {}: a "
+                                          "state that '{}' with these options makes for this model",
+                                          function, given.v, given.p, given.memory, shape_.v,
+                                          shape_.p, shape_.memory, name_));
 }
 
-void Integrator::check(const char* function, const State& state, const Channels& channels, double h) {
+void Integrator::check(const char* function, const State& state, const Channels& channels,
+                       double h) {
   if (saved_.empty()) prepare();
   check(function, state);
   if (!channels.none()) check_channels(function, channels);
   if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
-    throw Error(ErrorCode::usage, formatted("{}: a step of {} s given, expected a positive number", function, h));
+    throw Error(ErrorCode::usage,
+                formatted("{}: a step of {} s given, expected a positive number", function, h));
 }
 
 void Integrator::check_channels(const char* function, const Channels& channels) const {
@@ -65,8 +72,10 @@ void Integrator::check_channels(const char* function, const Channels& channels) 
   sized("channels.held_torque", channels.held_torque);
   for (const auto& term : channels.gyroscopic)
     if (term.link < 0 || term.link >= model_.dof()) [[unlikely]]
-      throw Error(ErrorCode::usage, formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
-                                              function, term.link, model_.dof() - 1));
+      throw Error(
+          ErrorCode::usage,
+          formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
+                    function, term.link, model_.dof() - 1));
 }
 
 State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
@@ -75,8 +84,9 @@ State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
   State state;
   state.q = q0;
   if (!all_finite(state.q) || !v0.allFinite())
-    throw Error(ErrorCode::usage, formatted("start: {}: a number is not finite, expected finite numbers",
-                                            all_finite(state.q) ? "v0" : "q0"));
+    throw Error(ErrorCode::usage,
+                formatted("start: {}: a number is not finite, expected finite numbers",
+                          all_finite(state.q) ? "v0" : "q0"));
   if (saved_.empty()) prepare();
   begin(state, v0);
   return state;
@@ -115,7 +125,7 @@ void Integrator::set_velocity(State& state, const ConstVectorRef& v) {
   state.jumped = true;
 }
 
-StepReport together(const StepReport& a, const StepReport& b) {
+StepReport merge(const StepReport& a, const StepReport& b) {
   StepReport sum = a;
   sum.converged = a.converged && b.converged;
   sum.updates += b.updates;
@@ -133,9 +143,9 @@ StepReport together(const StepReport& a, const StepReport& b) {
 
 namespace {
 
-// What a failed step reports is its cost: it moved nothing, so it did no work. Reports are changed where they stand, so
-// that they are handed on without copies.
-void take_back(StepReport& report) {
+// A failed step reports its cost, but no motion and no work. Reports are changed in place to avoid
+// copies.
+void mark_failed(StepReport& report) {
   report.converged = false;
   report.step_s = report.gyroscopic_work_J = report.dissipated_J = report.held_work_J = 0.0;
 }
@@ -144,18 +154,17 @@ void take_back(StepReport& report) {
 
 StepReport Integrator::step(State& state, const Channels& channels, double h) {
   check("step", state, channels, h);
-  return adaptive() ? parts(state, channels, h) : go(state, channels, h);
+  return adaptive() ? take_controlled_steps(state, channels, h) : take_step(state, channels, h);
 }
 
-// Exactly h ahead under step control.
-StepReport Integrator::parts(State& state, const Channels& channels, double h) {
+StepReport Integrator::take_controlled_steps(State& state, const Channels& channels, double h) {
   saved_[0] = state;
   StepReport report;
   for (double left = h; left > 0.0 && report.converged;) {
-    const StepReport part = go(state, channels, left);
-    // the last part ends at h itself, not a rounding error before it
+    const StepReport part = take_step(state, channels, left);
+    // the last part must end at exactly h
     left = part.step_s == left ? 0.0 : left - part.step_s;
-    report = together(report, part);
+    report = merge(report, part);
   }
   if (report.converged) {
     report.step_s = h;
@@ -163,63 +172,67 @@ StepReport Integrator::parts(State& state, const Channels& channels, double h) {
     state.time_s = saved_[0].time_s + h;
   } else {
     state = saved_[0];
-    take_back(report);
+    mark_failed(report);
   }
   return report;
 }
 
 StepReport Integrator::advance(State& state, const Channels& channels, double limit) {
   check("advance", state, channels, limit);
-  return go(state, channels, limit);
+  return take_step(state, channels, limit);
 }
 
-StepReport Integrator::go(State& state, const Channels& channels, double limit) {
-  StepReport report = adaptive() ? controlled(state, channels, limit) : divide(state, channels, limit, 0);
+StepReport Integrator::take_step(State& state, const Channels& channels, double limit) {
+  StepReport report = adaptive() ? controlled_step(state, channels, limit)
+                                 : attempt_or_halve(state, channels, limit, 0);
   if (report.converged) {
     state.jumped = false;
     ++state.k;
     state.time_s += report.step_s;
   } else {
-    take_back(report);
+    mark_failed(report);
   }
   return report;
 }
 
-StepReport Integrator::controlled(State&, const Channels&, double) {
+StepReport Integrator::controlled_step(State&, const Channels&, double) {
   StepReport report;
   report.converged = false;
   return report;
 }
 
-StepReport Integrator::divide(State& state, const Channels& channels, double h, int depth) {
+StepReport Integrator::attempt_or_halve(State& state, const Channels& channels, double h,
+                                        int depth) {
   StepReport report = attempt(state, channels, h);
   report.step_s = h;
   if (report.converged) {
     state.jumped = false;  // for the other half
   } else {
-    take_back(report);
+    mark_failed(report);
     if (depth < settings_.max_halvings) halve(state, channels, h, depth, report);
   }
   return report;
 }
 
-// The channels stay as they are, so the planner is not asked again.
-void Integrator::halve(State& state, const Channels& channels, double h, int depth, StepReport& report) {
+// docs/theory.md (4.30). The channels stay the same, so the planner is not called again.
+void Integrator::halve(State& state, const Channels& channels, double h, int depth,
+                       StepReport& report) {
   State& before = saved_[static_cast<std::size_t>(depth)];
   before = state;
   report.converged = true;
   report.residual = 0.0;
   ++report.halvings;
   for (int half = 0; half < 2 && report.converged; ++half)
-    report = together(report, divide(state, channels, 0.5 * h, depth + 1));
+    report = merge(report, attempt_or_halve(state, channels, 0.5 * h, depth + 1));
   if (report.converged) return;
   state = before;
-  take_back(report);
+  mark_failed(report);
 }
 
 Energy Integrator::node_energy(const State& state) const {
   node_velocity(state, velocity_);
-  return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_), dynamics::potential_energy(model_, ws_, state.q)};
+  return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_),
+          dynamics::potential_energy(model_, ws_, state.q)};
 }
 
 }  // namespace hamelin::integration

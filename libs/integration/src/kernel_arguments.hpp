@@ -9,26 +9,31 @@
 
 namespace hamelin::integration {
 
-/// A channel as the kernels take it: null where there is none.
+/// The data of a channel, or null if the channel is empty.
 inline const double* data_or_null(const Eigen::VectorXd& x) noexcept {
   return x.size() > 0 ? x.data() : nullptr;
 }
 
-/// Room for as many terms is made beforehand, so that steps do not allocate; more are taken too.
-inline constexpr std::size_t most_spins = 256;
+/// Memory for this number of gyroscopic terms is reserved, so that steps do not allocate. More
+/// terms are possible and allocate.
+inline constexpr std::size_t reserved_spins = 256;
 
-/// Gyroscopic terms in the frames of the sweeps: points in joint-aligned frames, w in the root's axes.
+/// Converts gyroscopic terms to the frames of the sweeps: points in joint-aligned frames, w in the
+/// axes of the root.
 inline void to_spins(const model::Model& model, std::span<const dynamics::GyroscopicTerm> terms,
                      std::vector<dynamics::kernel::Spin>& spins) {
   spins.clear();
   for (const auto& term : terms) {
     const Eigen::Vector3d point = model.com_in_frame(term.link) * term.point_link;
     const Eigen::Vector3d w = model.root().R().transpose() * term.w_world;
-    spins.push_back({static_cast<std::size_t>(term.link), {point.x(), point.y(), point.z()}, {w.x(), w.y(), w.z()}});
+    spins.push_back({static_cast<std::size_t>(term.link),
+                     {point.x(), point.y(), point.z()},
+                     {w.x(), w.y(), w.z()}});
   }
 }
 
-/// The channels of a step as the kernels take them; `spins` keeps the gyroscopic terms meanwhile.
+/// The channels of a step in the form of the kernels. `spins` holds the gyroscopic terms and must
+/// outlive the result.
 inline kernel::Forces to_forces(const model::Model& model, const Channels& channels,
                                 std::vector<dynamics::kernel::Spin>& spins) {
   to_spins(model, channels.gyroscopic, spins);

@@ -23,13 +23,15 @@ LieExact::LieExact(const Model& model, const LieExactOptions& options)
     links_ = kernel::LieScratch<dynamics::kernel::Planar<double>>(n);
   else
     links_ = kernel::LieScratch<dynamics::kernel::Spatial<double>>(n);
-  for (auto* x : {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_, &q_next_})
+  for (auto* x :
+       {&delta_, &correction_, &mid_, &rate_, &minus_, &plus_, &residual_, &gradient_, &q_next_})
     *x = VectorXd::Zero(model.dof());
 }
 
 template <class F>
 decltype(auto) LieExact::with_links(F&& f) {
-  if (model_.planar()) return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
+  if (model_.planar())
+    return f(dynamics::kernel::Planar<double>{}, std::get<1>(model_.chain()), std::get<1>(links_));
   return f(dynamics::kernel::Spatial<double>{}, std::get<0>(model_.chain()), std::get<0>(links_));
 }
 
@@ -39,7 +41,7 @@ std::string LieExact::criterion() const {
 
 bool LieExact::evaluate(const State& state, const Channels& channels, double h) {
   const bool found = with_links([&]<class Space>(Space, const auto& chain, auto& k) {
-    return kernel::lie_left<Space>(chain, k, delta_.data(), h, minus_.data());
+    return kernel::lie_left_momenta<Space>(chain, k, delta_.data(), h, minus_.data());
   });
   if (!found) return false;
   mid_ = state.q + 0.5 * delta_;
@@ -56,7 +58,8 @@ bool LieExact::factor(const State& state, const Channels& channels, double h) {
       const auto j = static_cast<Eigen::Index>(i);
       k[i].after = Space::place(chain.links[i], state.q[j] + delta_[j]);
     }
-    return kernel::lie_factor<Space>(chain, k, h, channels.damping.size() > 0 ? channels.damping.data() : nullptr);
+    return kernel::lie_factor<Space>(
+        chain, k, h, channels.damping.size() > 0 ? channels.damping.data() : nullptr);
   });
 }
 
@@ -71,13 +74,14 @@ void LieExact::correct(const State& state, double h) {
   });
 }
 
-// The residual of the sweep that p⁺ needs is turned into the error of Δ by the kept factors. Theirs takes the iterate
-// it stands at when the iterations are used up; here that step has failed.
+// As docs/theory.md (4.25): the kept factors turn the residual of a sweep into the error of Δ. A
+// step that uses up its iterations has failed.
 bool LieExact::solve(const State& state, const Channels& channels, double h, StepReport& report) {
   const bool riqn = options_.solver == Solver::riqn;
-  constexpr double any = std::numeric_limits<double>::infinity();  // RIQN may contract as slowly as it likes
-  kernel::Corrections corrections(riqn ? kernel::CorrectionRule{largest_correction, any, 0.0, 0}
-                                       : kernel::newton_rule(largest_correction, options_.tolerance));
+  constexpr double unbounded = std::numeric_limits<double>::infinity();  // RIQN may contract slowly
+  kernel::Corrections corrections(
+      riqn ? kernel::CorrectionRule{largest_correction, unbounded, 0.0, 0}
+           : kernel::newton_rule(largest_correction, options_.tolerance));
   for (;;) {
     if (!evaluate(state, channels, h)) return false;
     ++report.evaluations;
@@ -96,7 +100,7 @@ bool LieExact::solve(const State& state, const Channels& channels, double h, Ste
       ++report.factorizations;
       correct(state, h);
     }
-    if (!corrections.take(largest_size(correction_))) return false;
+    if (!corrections.record(largest_size(correction_))) return false;
     delta_ += correction_;
     ++report.updates;
   }
@@ -112,14 +116,14 @@ StepReport LieExact::attempt(State& state, const Channels& channels, double h) {
   state.history[0].guess(h, delta_);
   report.converged = solve(state, channels, h, report);
   if (!report.converged) return report;
-  forces_.add_work(report, rate_, h);  // over the displacement that the forces were evaluated at
+  forces_.add_work(report, rate_, h);  // over the displacement of the last evaluation
   q_next_ = state.q + delta_;
   with_links([&]<class Space>(Space, const auto& chain, auto& k) {
     for (std::size_t i = 0; i < k.size(); ++i)
       k[i].after = Space::place(chain.links[i], q_next_[static_cast<Eigen::Index>(i)]);
-    kernel::lie_right<Space>(chain, k, delta_.data(), h, plus_.data());
+    kernel::lie_right_momenta<Space>(chain, k, delta_.data(), h, plus_.data());
   });
-  // p_{k+1} = p⁺ − (h/2) ∂U(θ^{k+1}) + (h/2) F; the last correction took R out of p⁻, and p⁺ moves along
+  // docs/theory.md (6.9), with p⁺ − R as in (4.26)
   dynamics::gravity_torque(model_, ws_, q_next_, mid_);
   plus_ += 0.5 * h * (forces_.total() - mid_) - residual_;
   report.converged = all_finite(q_next_) && all_finite(plus_);

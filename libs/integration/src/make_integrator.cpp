@@ -59,7 +59,8 @@ std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& o
   return std::visit([&](const auto& o) { return make(model, o); }, checked(options));
 }
 
-std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model& model, const Parameters& parameters) {
+std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model& model,
+                                            const Parameters& parameters) {
   return make_integrator(model, make_options(name, parameters));
 }
 

@@ -3,7 +3,7 @@
 
 namespace hamelin::integration {
 
-/// What the schemes share that keep the node's momentum: a state (q, p), velocity as M⁻¹ p, kicks as they are.
+/// Base of the schemes whose state is (q, p): the velocity is M⁻¹ p, and kicks add to p.
 class Momentum : public Integrator {
  protected:
   using Integrator::Integrator;

@@ -63,16 +63,20 @@ const char* to_string(Solver solver) {
 
 void check_solver(const Scheme& scheme, Solver solver) {
   const auto& known = scheme.solvers;
-  if (known.empty()) refuse(formatted("integrator '{}' takes no solver", scheme.name));
+  if (known.empty())
+    refuse(
+        formatted("integrator '{}' takes no solver, '{}' given", scheme.name, to_string(solver)));
   if (std::find(known.begin(), known.end(), solver) != known.end()) return;
   std::vector<std::string> names;
   names.reserve(known.size());
   for (const Solver one : known) names.push_back(formatted("'{}'", to_string(one)));
-  refuse(formatted("integrator '{}' has the solver {} only", scheme.name, joined(names, " or ")));
+  refuse(formatted("integrator '{}' has no solver '{}', expected {}", scheme.name,
+                   to_string(solver), joined(names, " or ")));
 }
 
 void check_order(const Scheme& scheme, int order) {
-  if (scheme.orders.empty()) refuse(formatted("integrator '{}' has one order, it takes none", scheme.name));
+  if (scheme.orders.empty())
+    refuse(formatted("integrator '{}' has one order, expected none", scheme.name));
   if (std::find(scheme.orders.begin(), scheme.orders.end(), order) == scheme.orders.end())
     refuse(formatted("integrator '{}' has no order {}, expected one of {}", scheme.name, order,
                      joined(scheme.orders, ", ")));
@@ -81,72 +85,79 @@ void check_order(const Scheme& scheme, int order) {
 void check_step_control(const Scheme& scheme, double rtol, double atol) {
   const auto valid = [](double x) { return std::isfinite(x) && x >= 0.0; };
   if (!valid(rtol) || !valid(atol))
-    refuse(formatted("integrator '{}': rtol {} and atol {}, expected finite numbers from 0", scheme.name, rtol, atol));
+    refuse(formatted("integrator '{}': rtol {} and atol {}, expected finite numbers of at least 0",
+                     scheme.name, rtol, atol));
   if (!scheme.step_control && (rtol > 0.0 || atol > 0.0))
-    refuse(formatted("integrator '{}' has no step control, it takes neither rtol nor atol", scheme.name));
+    refuse(formatted("integrator '{}' has no step control, expected neither rtol nor atol",
+                     scheme.name));
 }
 
-// Numbers from `least` to `most`.
-void check_range(const Scheme& scheme, const char* what, double x, double least, double most) {
+void check_range(const Scheme& scheme, const char* option, double x, double least, double most) {
   if (!(x >= least && x <= most))
-    refuse(formatted("integrator '{}': {} {}, expected a number from {} to {}", scheme.name, what, x, least, most));
+    refuse(formatted("integrator '{}': {} {}, expected a number from {} to {}", scheme.name, option,
+                     x, least, most));
 }
 
 constexpr double largest = std::numeric_limits<double>::max();
 
-// What all schemes that have an option of that name ask of it.
+// Checks each option that the scheme has.
 template <class O>
 void check(const Scheme& scheme, O& o) {
   require_available(o.isa);
   if constexpr (requires { o.order; }) check_order(scheme, o.order);
   if constexpr (requires { o.alpha; }) check_range(scheme, "alpha", o.alpha, 0.0, 1.0);
-  if constexpr (requires { o.tolerance; }) check_range(scheme, "tolerance", o.tolerance, 0.0, largest);
+  if constexpr (requires { o.tolerance; })
+    check_range(scheme, "tolerance", o.tolerance, 0.0, largest);
   if constexpr (requires { o.feedback_tolerance; })
     check_range(scheme, "feedback_tolerance", o.feedback_tolerance, 0.0, largest);
   if constexpr (requires { o.newmark_beta; }) {
     check_range(scheme, "newmark_beta", o.newmark_beta, 0.0, largest);
     check_range(scheme, "newmark_gamma", o.newmark_gamma, 0.0, largest);
   }
-  if constexpr (requires { o.max_updates; }) check_range(scheme, "max_updates", o.max_updates, 0.0, largest);
-  if constexpr (requires { o.max_halvings; }) check_range(scheme, "max_halvings", o.max_halvings, 0.0, 30.0);
+  if constexpr (requires { o.max_updates; })
+    check_range(scheme, "max_updates", o.max_updates, 0.0, largest);
+  if constexpr (requires { o.max_halvings; })
+    check_range(scheme, "max_halvings", o.max_halvings, 0.0, 30.0);
   if constexpr (requires { o.rtol; }) {
     check_step_control(scheme, o.rtol, o.atol);
-    if (o.atol == 0.0) o.atol = o.rtol;  // alone, a relative tolerance asks for the impossible at rest
+    if (o.atol == 0.0) o.atol = o.rtol;  // a purely relative tolerance cannot be met at rest
   }
 }
 
 template <class T>
-void take(const std::optional<T>& given, T& into) {
+void set_if_given(const std::optional<T>& given, T& into) {
   if (given) into = *given;
 }
 
-void take_solver(Solver given, VariationalOptions::Solver& into) {
-  into = given == Solver::feedback ? VariationalOptions::Solver::feedback : VariationalOptions::Solver::newton;
+void set_solver(Solver given, VariationalOptions::Solver& into) {
+  into = given == Solver::feedback ? VariationalOptions::Solver::feedback
+                                   : VariationalOptions::Solver::newton;
 }
-void take_solver(Solver given, LieExactOptions::Solver& into) {
+void set_solver(Solver given, LieExactOptions::Solver& into) {
   into = given == Solver::riqn ? LieExactOptions::Solver::riqn : LieExactOptions::Solver::newton;
 }
 
 template <class O>
-void take_all(const Parameters& p, O& o) {
-  take(p.isa, o.isa);
-  if constexpr (requires { o.order; }) take(p.order, o.order);
+void set_all(const Parameters& p, O& o) {
+  set_if_given(p.isa, o.isa);
+  if constexpr (requires { o.order; }) set_if_given(p.order, o.order);
   if constexpr (requires { o.solver; })
-    if (p.solver) take_solver(*p.solver, o.solver);
+    if (p.solver) set_solver(*p.solver, o.solver);
   if constexpr (requires { o.rtol; }) {
-    take(p.rtol, o.rtol);
-    take(p.atol, o.atol);
+    set_if_given(p.rtol, o.rtol);
+    set_if_given(p.atol, o.atol);
   }
-  if constexpr (requires { o.alpha; }) take(p.alpha, o.alpha);
-  if constexpr (requires { o.start; }) take(p.start, o.start);
-  if constexpr (requires { o.tolerance; }) take(p.tolerance, o.tolerance);
-  if constexpr (requires { o.feedback_tolerance; }) take(p.feedback_tolerance, o.feedback_tolerance);
+  if constexpr (requires { o.alpha; }) set_if_given(p.alpha, o.alpha);
+  if constexpr (requires { o.start; }) set_if_given(p.start, o.start);
+  if constexpr (requires { o.tolerance; }) set_if_given(p.tolerance, o.tolerance);
+  if constexpr (requires { o.feedback_tolerance; })
+    set_if_given(p.feedback_tolerance, o.feedback_tolerance);
   if constexpr (requires { o.newmark_beta; }) {
-    take(p.newmark_beta, o.newmark_beta);
-    take(p.newmark_gamma, o.newmark_gamma);
+    set_if_given(p.newmark_beta, o.newmark_beta);
+    set_if_given(p.newmark_gamma, o.newmark_gamma);
   }
-  if constexpr (requires { o.max_updates; }) take(p.max_updates, o.max_updates);
-  if constexpr (requires { o.max_halvings; }) take(p.max_halvings, o.max_halvings);
+  if constexpr (requires { o.max_updates; }) set_if_given(p.max_updates, o.max_updates);
+  if constexpr (requires { o.max_halvings; }) set_if_given(p.max_halvings, o.max_halvings);
 }
 
 }  // namespace
@@ -179,22 +190,25 @@ SchemeName parse_scheme_name(std::string_view text) {
   int order = 0;
   const auto [read_to, ec] = std::from_chars(digits.data(), digits.data() + digits.size(), order);
   if (ec != std::errc() || read_to != digits.data() + digits.size() || order < 1)
-    refuse(formatted("'{}': '{}' is no order, expected a name and a number as gauss:8", text, digits));
+    refuse(formatted("'{}': '{}' is not an order, expected a name and a number such as gauss:8",
+                     text, digits));
   parsed.order = order;
   return parsed;
 }
 
 Options make_options(std::string_view name, const Parameters& given) {
-  const SchemeName asked = parse_scheme_name(name);
-  const Entry* const entry = find_entry(asked.name);
+  const SchemeName parsed = parse_scheme_name(name);
+  const Entry* const entry = find_entry(parsed.name);
   if (entry == nullptr)
-    refuse(formatted("integrator '{}' is not known, expected one of {}{}", asked.name, joined(integrator_names(), ", "),
-                     did_you_mean(asked.name, integrator_names())));
+    refuse(formatted("integrator '{}' is not known, expected one of {}{}", parsed.name,
+                     joined(integrator_names(), ", "),
+                     did_you_mean(parsed.name, integrator_names())));
   Parameters parameters = given;
-  if (asked.order) {
-    if (given.order && *given.order != *asked.order)
-      refuse(formatted("integrator '{}': order {} is given as well, expected one of the two", name, *given.order));
-    parameters.order = asked.order;
+  if (parsed.order) {
+    if (given.order && *given.order != *parsed.order)
+      refuse(formatted("integrator '{}': order {} is also given, expected only one order", name,
+                       *given.order));
+    parameters.order = parsed.order;
   }
   const Scheme& scheme = entry->scheme;
   if (parameters.order) check_order(scheme, *parameters.order);
@@ -204,7 +218,7 @@ Options make_options(std::string_view name, const Parameters& given) {
   std::visit(
       [&](auto& o) {
         o.isa = default_isa();
-        take_all(parameters, o);
+        set_all(parameters, o);
       },
       options);
   return checked(options);

@@ -10,41 +10,44 @@ namespace hamelin::integration {
 namespace {
 
 constexpr double default_tolerance = 1e-10;
-constexpr double difference = 1e-5;  // of the Jacobian; central, so its error is about 1e-10
+constexpr double difference = 1e-5;  // increment of the central differences; error about 1e-10
 constexpr StepController::Rule rule{4.0, 0.9, 0.2, 6.0};
 
-// The published coefficients, transformed as in rodas.f so that no stage multiplies by the Jacobian: stage i stands at
-// y + Σ a_ij u_j and solves (1/(γh) − J) u_i = f + Σ c_ij u_j / h. The last two rows of a are those of the embedded and
-// of the new solution: the fifth and sixth stage are added whole.
+// The published coefficients in the form of rodas.f, in which no stage multiplies by the Jacobian,
+// docs/theory.md (7.12), (7.13). The last two rows of a are those of the embedded and of the new
+// solution, to which the fifth and the sixth stage are added with weight 1.
 constexpr double gamma = 0.25;
 using Row = std::array<double, 5>;
-constexpr std::array<Row, 6> a{Row{},
-                               Row{1.544},
-                               Row{0.9466785280815826, 0.2557011698983284},
-                               Row{3.314825187068521, 2.896124015972201, 0.9986419139977817},
-                               Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950},
-                               Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0}};
+constexpr std::array<Row, 6> a{
+    Row{},
+    Row{1.544},
+    Row{0.9466785280815826, 0.2557011698983284},
+    Row{3.314825187068521, 2.896124015972201, 0.9986419139977817},
+    Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950},
+    Row{1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1.0}};
 constexpr std::array<Row, 6> c{
     Row{},
     Row{-5.6688},
     Row{-2.430093356833875, -0.2063599157091915},
     Row{-0.1073529058151375, -9.594562251023355, -20.47028614809616},
     Row{7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160},
-    Row{8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}};
+    Row{8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136,
+        -6.058818238834054}};
 
-// There are no fixed steps.
-RosenbrockOptions controlled_always(RosenbrockOptions options) {
+// Sets the default tolerances: the scheme has no fixed steps.
+RosenbrockOptions with_tolerances(RosenbrockOptions options) {
   if (options.rtol == 0.0 && options.atol == 0.0) options.rtol = options.atol = default_tolerance;
   return options;
 }
 
 }  // namespace
 
-Rosenbrock::Rosenbrock(const Model& model, const RosenbrockOptions& asked)
-    : Rosenbrock(controlled_always(asked), model) {}
+Rosenbrock::Rosenbrock(const Model& model, const RosenbrockOptions& options)
+    : Rosenbrock(with_tolerances(options), model) {}
 
 Rosenbrock::Rosenbrock(const RosenbrockOptions& options, const Model& model)
-    : Explicit("rosenbrock", model, {.isa = options.isa, .rtol = options.rtol, .atol = options.atol}),
+    : Explicit("rosenbrock", model,
+               {.isa = options.isa, .rtol = options.rtol, .atol = options.atol}),
       factors_(model.dof()) {
   const int n = model.dof();
   by_q_ = by_v_ = matrix_ = Eigen::MatrixXd::Zero(n, n);
@@ -58,8 +61,8 @@ std::string Rosenbrock::criterion() const {
   return formatted("error <= {} + {} |(q, v)|, rms", settings_.atol, settings_.rtol);
 }
 
-Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorXd& q, const VectorXd& v,
-                                         StepReport& report) {
+Rosenbrock::Works Rosenbrock::derivative(const Channels& channels, const VectorXd& q,
+                                         const VectorXd& v, StepReport& report) {
   accelerate(channels, q, v, report);
   StepReport power;
   forces_.add_work(power, v, 1.0);
@@ -86,9 +89,10 @@ void Rosenbrock::make_jacobian(const State& state, const Channels& channels, Ste
   }
 }
 
-// The increments (dq, dv) of a stage solve dq/(γh) − dv = r_q and dv/(γh) − J_q dq − J_v dv = r_v: dq = γh (r_q + dv)
-// leaves a system for dv.
-void Rosenbrock::solve_stage(std::size_t stage, const Channels& channels, double h, StepReport& report) {
+// docs/theory.md (7.14): the increments (dq, dv) of a stage solve dq/(γh) − dv = r_q and
+// dv/(γh) − J_q dq − J_v dv = r_v; inserting dq = γh (r_q + dv) leaves a system for dv.
+void Rosenbrock::solve_stage(std::size_t stage, const Channels& channels, double h,
+                             StepReport& report) {
   const double step = gamma * h;
   Works right = derivative(channels, q_, v_, report);
   right_q_ = v_;
@@ -106,7 +110,8 @@ void Rosenbrock::solve_stage(std::size_t stage, const Channels& channels, double
   dworks_[stage] = step * right;
 }
 
-void Rosenbrock::try_step(const State& state, const Channels& channels, double h, StepReport& report) {
+void Rosenbrock::try_step(const State& state, const Channels& channels, double h,
+                          StepReport& report) {
   const double step = gamma * h;
   matrix_ = -by_v_ - step * by_q_;
   matrix_.diagonal().array() += 1.0 / step;
@@ -128,11 +133,13 @@ void Rosenbrock::try_step(const State& state, const Channels& channels, double h
   works_ += dworks_.back();
 }
 
+// docs/theory.md (7.15)
 double Rosenbrock::error_norm(const State& state) const {
   double sum = 0.0;
   const auto add = [&](const VectorXd& before, const VectorXd& after, const VectorXd& error) {
     for (Eigen::Index i = 0; i < before.size(); ++i) {
-      const double e = error[i] / (settings_.atol + settings_.rtol * std::max(std::abs(before[i]), std::abs(after[i])));
+      const double e = error[i] / (settings_.atol + settings_.rtol * std::max(std::abs(before[i]),
+                                                                              std::abs(after[i])));
       sum += e * e;
     }
   };
@@ -143,18 +150,19 @@ double Rosenbrock::error_norm(const State& state) const {
 
 StepReport Rosenbrock::attempt(State&, const Channels&, double) {
   StepReport report;
-  report.converged = false;  // there are no fixed steps
+  report.converged = false;  // the scheme has no fixed steps
   return report;
 }
 
-StepReport Rosenbrock::controlled(State& state, const Channels& channels, double limit) {
+StepReport Rosenbrock::controlled_step(State& state, const Channels& channels, double limit) {
   StepReport report;
   report.converged = false;
   make_jacobian(state, channels, report);
   StepController control(rule, state, limit);
   while (control.has_try()) {
     try_step(state, channels, control.step(), report);
-    report.residual = all_finite(q_) && all_finite(v_) && works_.allFinite() ? error_norm(state) : std::nan("");
+    report.residual =
+        all_finite(q_) && all_finite(v_) && works_.allFinite() ? error_norm(state) : std::nan("");
     if (!control.accepts(report.residual)) continue;
     state.q = q_;
     state.v = v_;

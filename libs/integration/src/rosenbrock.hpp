@@ -7,10 +7,11 @@
 
 namespace hamelin::integration {
 
-/// RODAS of Hairer and Wanner (Solving Ordinary Differential Equations II, 2nd ed., IV.7, code rodas.f): a stiffly
-/// accurate Rosenbrock method of order 4 with six stages and an embedded one of order 3. It is there for stiff forces
-/// and to judge others by. Always under step control, rtol = atol = 1e-10 unless told else. The Jacobian is dense, by
-/// central differences of forward dynamics, made once a step; as q̇ = v, the linear systems are of size dof only.
+/// RODAS of Hairer, Wanner (Solving Ordinary Differential Equations II, 2nd edition, 1996, IV.7,
+/// code rodas.f), docs/theory.md (7.12): a stiffly accurate Rosenbrock method of order 4 with six
+/// stages and an embedded one of order 3, for stiff forces and as a reference. Always under step
+/// control, with rtol = atol = 1e-10 unless set. The dense Jacobian comes from central differences
+/// of forward dynamics, once per step; as q̇ = v, the linear systems have size dof only.
 class Rosenbrock final : public Explicit {
  public:
   Rosenbrock(const Model& model, const RosenbrockOptions& options);
@@ -21,19 +22,22 @@ class Rosenbrock final : public Explicit {
   Rosenbrock(const RosenbrockOptions& options, const Model& model);
 
   static constexpr std::size_t stages = 6;
-  using Works = Eigen::Vector3d;  ///< of gyroscopic terms, dissipated, of held torques: they come along with the motion
+  /// Work of gyroscopic terms, dissipated work, work of held torques; integrated along with the
+  /// motion.
+  using Works = Eigen::Vector3d;
 
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  StepReport controlled(State& state, const Channels& channels, double limit) override;
+  StepReport controlled_step(State& state, const Channels& channels, double limit) override;
   /// acceleration_ and the channels' powers at (q, v).
-  Works derivative(const Channels& channels, const VectorXd& q, const VectorXd& v, StepReport& report);
+  Works derivative(const Channels& channels, const VectorXd& q, const VectorXd& v,
+                   StepReport& report);
   void make_jacobian(const State& state, const Channels& channels, StepReport& report);
-  /// From the state over h to q_, v_, works_, with the error in the last stage.
+  /// A step of length h from the state to q_, v_, works_; the last stage is the error estimate.
   void try_step(const State& state, const Channels& channels, double h, StepReport& report);
   void solve_stage(std::size_t stage, const Channels& channels, double h, StepReport& report);
   [[nodiscard]] double error_norm(const State& state) const;
 
-  Eigen::MatrixXd by_q_, by_v_, matrix_;      ///< ∂a/∂q, ∂a/∂v, what is factored
+  Eigen::MatrixXd by_q_, by_v_, matrix_;      ///< ∂a/∂q, ∂a/∂v, the matrix that is factored
   Eigen::Matrix3Xd works_by_q_, works_by_v_;  ///< ∂powers/∂(q, v)
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   std::array<VectorXd, stages> dq_, dv_;  ///< the stages' increments

@@ -8,7 +8,7 @@ namespace hamelin::integration {
 
 namespace {
 
-constexpr double stretch = 1.01;  // a step that ends this near to the limit ends at it
+constexpr double stretch = 1.01;  // a step that would end within 1 % of the limit ends at it
 constexpr double after_failure = 0.5;
 constexpr int max_rejections = 60;
 
@@ -17,9 +17,9 @@ constexpr int max_rejections = 60;
 StepController::StepController(const Rule& rule, const State& state, double limit)
     : rule_(rule),
       limit_(limit),
-      wish_(state.step_next > 0.0 ? state.step_next : limit),
+      proposed_(state.step_next > 0.0 ? state.step_next : limit),
       shortest_(10.0 * std::numeric_limits<double>::epsilon() * std::abs(state.time_s)),
-      step_(wish_) {}
+      step_(proposed_) {}
 
 bool StepController::has_try() {
   if (finished_ || rejected_ > max_rejections || !(step_ > shortest_)) return false;
@@ -33,7 +33,8 @@ bool StepController::accepts(double error) {
     step_ *= after_failure;
     return false;
   }
-  const double factor = std::clamp(rule_.safety * std::pow(error, -1.0 / rule_.order), rule_.least, rule_.most);
+  const double factor =
+      std::clamp(rule_.safety * std::pow(error, -1.0 / rule_.order), rule_.least, rule_.most);
   next_ = factor * step_;
   if (error > 1.0) {
     ++rejected_;
@@ -41,8 +42,8 @@ bool StepController::accepts(double error) {
     return false;
   }
   if (rejected_ > 0) next_ = std::min(next_, step_);
-  // A step that the limit cut short says nothing against the wish there was.
-  if (rejected_ == 0 && step_ < wish_) next_ = std::max(next_, wish_);
+  // A step that the limit cut short does not reduce the proposal.
+  if (rejected_ == 0 && step_ < proposed_) next_ = std::max(next_, proposed_);
   return true;
 }
 

@@ -11,7 +11,8 @@ void StepHistory::restart(const dynamics::ConstVectorRef& v) {
 
 void StepHistory::record(double h, const dynamics::ConstVectorRef& delta) {
   const bool same_step = count_ > 0 && step_ == h;
-  for (std::size_t i = displacements_.size() - 1; i > 0; --i) displacements_[i].swap(displacements_[i - 1]);
+  for (std::size_t i = displacements_.size() - 1; i > 0; --i)
+    displacements_[i].swap(displacements_[i - 1]);
   displacements_[0] = delta;
   count_ = same_step ? std::min(count_ + 1, 4) : 1;
   step_ = h;

@@ -17,40 +17,47 @@ HAMELIN_SELECT_KERNELS(VariationalSet, variational_set)
 
 namespace {
 
-// From this tolerance up the square of the first correction may vouch for it: below, energy would drift (measured).
-constexpr double loosest_confirmed = 1e-10;
+// The smallest tolerance at which a step may be accepted unconfirmed, docs/theory.md (4.28): with
+// smaller ones energy would drift (measured).
+constexpr double least_unconfirmed_tolerance = 1e-10;
 
 }  // namespace
 
 Variational::Variational(const Model& model, const VariationalOptions& options)
-    : Momentum("hamel-variational", model,
-               {options.isa, options.max_halvings,
-                options.solver == Solver::feedback ? options.feedback_tolerance : options.tolerance}),
+    : Momentum(
+          "hamel-variational", model,
+          {options.isa, options.max_halvings,
+           options.solver == Solver::feedback ? options.feedback_tolerance : options.tolerance}),
       options_(options),
       kernels_(&kernel::select_variational_set(options.isa)),
       memory_(dynamics::kernel::with_group(
-          model, *kernels_, [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
-  for (auto* x : {&delta_, &p_, &p_next_, &correction_, &residual_, &gradient_}) *x = VectorXd::Zero(model.dof());
-  spins_.reserve(most_spins);
+          model, *kernels_,
+          [](const auto& entry, const auto& chain) { return entry.bytes(chain.links.size()); })) {
+  for (auto* x : {&delta_, &p_, &p_next_, &correction_, &residual_, &gradient_})
+    *x = VectorXd::Zero(model.dof());
+  spins_.reserve(reserved_spins);
   gradient_at_ = VectorXd::Constant(model.dof(), std::nan(""));
 }
 
-bool Variational::trusts_quadratic() const noexcept {
-  return options_.solver == Solver::newton && options_.tolerance >= loosest_confirmed;
+bool Variational::accepts_unconfirmed() const noexcept {
+  return options_.solver == Solver::newton && options_.tolerance >= least_unconfirmed_tolerance;
 }
 
 std::string Variational::criterion() const {
-  if (options_.solver == Solver::feedback) return formatted("|tau_e|_2 < {}", options_.feedback_tolerance);
-  if (trusts_quadratic())
-    return formatted("|error of delta|_inf <= {}, or 10 |first correction|^2 <= it, unconfirmed", options_.tolerance);
+  if (options_.solver == Solver::feedback)
+    return formatted("|tau_e|_2 < {}", options_.feedback_tolerance);
+  if (accepts_unconfirmed())
+    return formatted("|error of delta|_inf <= {}, or 10 |first correction|^2 <= it, unconfirmed",
+                     options_.tolerance);
   return formatted("|error of delta|_inf <= {}", options_.tolerance);
 }
 
 std::string Variational::mode() const {
-  return options_.solver == Solver::newton && options_.tolerance <= 1e-12 ? "structure" : "accurate";
+  return options_.solver == Solver::newton && options_.tolerance <= 1e-12 ? "structure"
+                                                                          : "accurate";
 }
 
-// The end of one step is the start of the next.
+// A step ends where the next one starts, so ∂U is computed once per node.
 const VectorXd& Variational::gradient(const VectorXd& q) {
   if (q != gradient_at_) {
     dynamics::gravity_torque(model_, ws_, q, gradient_);
@@ -63,20 +70,28 @@ template <class F>
 kernel::VariationalOutcome Variational::with_call(const State& state, double h, F&& f) {
   return dynamics::kernel::with_group(
       model_, *kernels_, [&]<class Entry, class Chain>(const Entry& entry, const Chain& chain) {
-        const kernel::VariationalCall<Chain> call{
-            chain,          h,       state.q.data(),     p_.data(),         delta_.data(),
-            p_next_.data(), forces_, options_.tolerance, trusts_quadratic()};
+        const kernel::VariationalCall<Chain> call{chain,
+                                                  h,
+                                                  state.q.data(),
+                                                  p_.data(),
+                                                  delta_.data(),
+                                                  p_next_.data(),
+                                                  forces_,
+                                                  options_.tolerance,
+                                                  accepts_unconfirmed()};
         return f(entry, call);
       });
 }
 
 kernel::VariationalOutcome Variational::solve_newton(const State& state, double h) {
   state.history[0].guess(h, delta_);
-  return with_call(state, h, [&](const auto& entry, const auto& call) { return entry.step(call, memory_.get()); });
+  return with_call(state, h, [&](const auto& entry, const auto& call) {
+    return entry.step(call, memory_.get());
+  });
 }
 
 kernel::VariationalOutcome Variational::solve_feedback(const State& state, double h) {
-  delta_.setZero();  // the paper's guess θ^k
+  delta_.setZero();  // the published guess θ^{k+1} = θ^k
   int updates = 0;
   for (;;) {
     auto out = with_call(state, h, [&](const auto& entry, const auto& call) {
@@ -86,8 +101,9 @@ kernel::VariationalOutcome Variational::solve_feedback(const State& state, doubl
     out.evaluations = updates + 1;
     out.residual = residual_.norm() / std::abs(h);  // ‖τ_e‖
     out.converged = out.residual < options_.feedback_tolerance;
-    if (out.converged || !std::isfinite(out.residual) || updates == options_.max_updates) return out;
-    residual_ *= -h;  // h² M⁻¹ τ_e with τ_e = R/h, (16)
+    if (out.converged || !std::isfinite(out.residual) || updates == options_.max_updates)
+      return out;
+    residual_ *= -h;  // docs/theory.md (4.29)
     dynamics::solve_mass(model_, ws_, state.q, residual_, correction_);
     delta_ += correction_;
     ++updates;
@@ -97,7 +113,8 @@ kernel::VariationalOutcome Variational::solve_feedback(const State& state, doubl
 StepReport Variational::attempt(State& state, const Channels& channels, double h) {
   p_ = state.p - 0.5 * h * gradient(state.q);
   forces_ = to_forces(model_, channels, spins_);
-  const auto out = options_.solver == Solver::newton ? solve_newton(state, h) : solve_feedback(state, h);
+  const auto out =
+      options_.solver == Solver::newton ? solve_newton(state, h) : solve_feedback(state, h);
   StepReport report;
   report.converged = out.converged && all_finite(delta_) && all_finite(p_next_);
   report.updates = out.updates;

@@ -6,8 +6,10 @@
 
 namespace hamelin::integration {
 
-/// hamel-variational: the exact variation of L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})], solved for Δ by
-/// the exact O(n) Newton step (kernel/variational.hpp) or by the paper's feedback (16).
+/// hamel-variational: the exact variation of the discrete Lagrangian
+///   L_d = h [K(θ_mid, Δ/h) − ½ U(θ^k) − ½ U(θ^{k+1})],
+/// docs/theory.md (4.1), solved for Δ by an exact Newton step in O(n) (kernel/variational.hpp) or
+/// by the feedback (4.29).
 class Variational final : public Momentum {
  public:
   Variational(const Model& model, const VariationalOptions& options);
@@ -16,16 +18,17 @@ class Variational final : public Momentum {
   [[nodiscard]] std::string mode() const override;
 
  private:
-  friend class Composition;  // whose sub-steps may go back in time
+  friend class Composition;  // calls attempt() with negative steps
   StepReport attempt(State& state, const Channels& channels, double h) override;
-  /// ∂U(q), kept from the last call where that was for the same q.
+  /// ∂U(q), reused from the last call if that was for the same q.
   const VectorXd& gradient(const VectorXd& q);
   /// f(entry, call) for the kernel of this model.
   template <class F>
   kernel::VariationalOutcome with_call(const State& state, double h, F&& f);
   kernel::VariationalOutcome solve_newton(const State& state, double h);
   kernel::VariationalOutcome solve_feedback(const State& state, double h);
-  [[nodiscard]] bool trusts_quadratic() const noexcept;
+  /// Whether steps may be accepted without the confirming sweep, docs/theory.md (4.28).
+  [[nodiscard]] bool accepts_unconfirmed() const noexcept;
 
   using Solver = VariationalOptions::Solver;
 
@@ -33,7 +36,7 @@ class Variational final : public Momentum {
   const kernel::VariationalSet* kernels_;
   dynamics::AlignedBuffer memory_;
   std::vector<dynamics::kernel::Spin> spins_;
-  kernel::Forces forces_{};  ///< of the step under way
+  kernel::Forces forces_{};  ///< of the current step
   VectorXd delta_, p_, p_next_, correction_, residual_;
   VectorXd gradient_, gradient_at_;
 };

@@ -21,7 +21,7 @@ Channels all_channels(int n) {
   return channels;
 }
 
-// Whatever a caller does in a tick, after the first step.
+// All calls that a tick can make, after the first step.
 void check_tick(Integrator& integrator, const Channels& channels, double h) {
   const int n = integrator.model().dof();
   State state = integrator.start(VectorXd::Constant(n, 0.2), VectorXd::Constant(n, 0.3));
@@ -44,7 +44,8 @@ void check_tick(Integrator& integrator, const Channels& channels, double h) {
 
 }  // namespace
 
-TEST_CASE("the count sees what Eigen, operator new and the C library take from the heap", "[allocation]") {
+TEST_CASE("the counter sees the allocations of Eigen, operator new and the C library",
+          "[allocation]") {
   if (!test::counts_allocations()) return;
   const VectorXd a = VectorXd::Ones(5), b = a;
   VectorXd c(5);
@@ -85,7 +86,7 @@ TEST_CASE("a step does not allocate", "[integration][allocation]") {
   }
 }
 
-TEST_CASE("solvers that are not the default do not allocate either, nor does a step that is halved or fails",
+TEST_CASE("other solvers, halved steps and failed steps do not allocate",
           "[integration][allocation]") {
   if (!test::counts_allocations()) return;
   const Model model(test::random_robot(10, 6));
@@ -94,7 +95,8 @@ TEST_CASE("solvers that are not the default do not allocate either, nor does a s
   check_tick(*make_integrator("hamel-variational", model, options), all_channels(6), 1e-3);
   options.solver = Solver::riqn;
   check_tick(*make_integrator("lie-exact", model, options), all_channels(6), 1e-3);
-  for (const std::string name : {"hamel-variational", "gauss", "composition", "lie-exact", "hamel", "newmark"}) {
+  for (const std::string name :
+       {"hamel-variational", "gauss", "composition", "lie-exact", "hamel", "newmark"}) {
     CAPTURE(name);
     const auto integrator = make_integrator(name, model);
     State state = integrator->start(VectorXd::Constant(6, 0.2), VectorXd::Constant(6, 8.0));

@@ -12,15 +12,17 @@ using namespace hamelin;
 using namespace hamelin::integration;
 using Catch::Contains;
 
-// What must not compile: an integrator of a model that is gone when the call ends.
+// An integrator of a temporary model must not compile.
 namespace must_not_compile {
 
 template <class... Given>
 concept makes = requires(Given&&... given) {
   make_integrator(std::forward<Given>(given)...);
 };
-static_assert(makes<const char*, const Model&> && makes<const char*, Model&> && makes<const Model&, GaussOptions>);
-static_assert(!makes<const char*, Model> && !makes<const char*, const Model> && !makes<Model, GaussOptions>);
+static_assert(makes<const char*, const Model&> && makes<const char*, Model&> &&
+              makes<const Model&, GaussOptions>);
+static_assert(!makes<const char*, Model> && !makes<const char*, const Model> &&
+              !makes<Model, GaussOptions>);
 static_assert(!makes<const char*, Model, Parameters> && !makes<const Model, Options>);
 
 template <class O>
@@ -31,7 +33,8 @@ template <class O>
 concept has_step_control = requires(O o) {
   o.rtol;
 };
-static_assert(has_order<GaussOptions> && !has_order<Rk4Options> && !has_step_control<VariationalOptions>);
+static_assert(has_order<GaussOptions> && !has_order<Rk4Options> &&
+              !has_step_control<VariationalOptions>);
 
 }  // namespace must_not_compile
 
@@ -58,7 +61,7 @@ TEST_CASE("velocity and energy are const", "[integration][unit]") {
                dynamics::potential_energy(model, ws, state.q)));
 }
 
-TEST_CASE("every call checks the sizes of what it is given", "[integration][unit]") {
+TEST_CASE("every call checks the sizes of its arguments", "[integration][unit]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
   const Model model(test::random_robot(4, n, 3));
@@ -69,8 +72,10 @@ TEST_CASE("every call checks the sizes of what it is given", "[integration][unit
   CHECK_THROWS_WITH(integrator->start(good, bad), Contains("start: v0: 6 numbers"));
   VectorXd nan = good;
   nan[2] = std::nan("");
-  CHECK_THROWS_WITH(integrator->start(nan, good), "start: q0: a number is not finite, expected finite numbers");
-  CHECK_THROWS_WITH(integrator->start(good, nan), "start: v0: a number is not finite, expected finite numbers");
+  CHECK_THROWS_WITH(integrator->start(nan, good),
+                    "start: q0: a number is not finite, expected finite numbers");
+  CHECK_THROWS_WITH(integrator->start(good, nan),
+                    "start: v0: a number is not finite, expected finite numbers");
   State state = integrator->start(good, good);
   const State before = state;
   VectorXd short_v(n - 1);
@@ -81,20 +86,25 @@ TEST_CASE("every call checks the sizes of what it is given", "[integration][unit
     CHECK_THROWS_WITH(integrator->step(state, {}, h), Contains("step: a step of"));
     CHECK_THROWS_WITH(integrator->advance(state, {}, h), Contains("advance: a step of"));
   }
-  const auto refuses = [&](const char* words, auto&& change) {
+  const auto refuses = [&](const char* message, auto&& change) {
     Channels channels;
     change(channels);
-    CHECK_THROWS_WITH(integrator->step(state, channels, 1e-3), Contains(words));
+    CHECK_THROWS_WITH(integrator->step(state, channels, 1e-3), Contains(message));
   };
   refuses("step: channels.damping: 6 numbers", [&](Channels& c) { c.damping = bad; });
   refuses("step: channels.coulomb: 6 numbers", [&](Channels& c) { c.coulomb = bad; });
   refuses("step: channels.held_torque: 4 numbers", [&](Channels& c) { c.held_torque = short_v; });
-  refuses("step: channels.gyroscopic: link 5 given", [&](Channels& c) { c.gyroscopic = {{n, {}, {}}}; });
-  refuses("step: channels.gyroscopic: link -1 given", [&](Channels& c) { c.gyroscopic = {{-1, {}, {}}}; });
+  refuses("step: channels.gyroscopic: link 5 given", [&](Channels& c) {
+    c.gyroscopic = {{n, {}, {}}};
+  });
+  refuses("step: channels.gyroscopic: link -1 given", [&](Channels& c) {
+    c.gyroscopic = {{-1, {}, {}}};
+  });
   CHECK(test::same_state(state, before));
 }
 
-TEST_CASE("a state of another scheme or robot is refused, one of the same scheme is not", "[integration][unit]") {
+TEST_CASE("a state of another scheme or robot is refused, a state of the same scheme is accepted",
+          "[integration][unit]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
   const Model model(test::random_robot(4, n, 3)), larger(test::random_robot(4, n + 1, 3));
@@ -102,17 +112,22 @@ TEST_CASE("a state of another scheme or robot is refused, one of the same scheme
   const VectorXd zero = VectorXd::Zero(n);
   State own = twin->start(zero, zero);
   CHECK(integrator->step(own, {}, 1e-4).converged);
-  State foreign = make_integrator(name, larger)->start(VectorXd::Zero(n + 1), VectorXd::Zero(n + 1));
-  CHECK_THROWS_WITH(integrator->step(foreign, {}, 1e-4), Contains("step: state.q: 6 numbers given, expected 5"));
-  CHECK_THROWS_WITH(integrator->energy(foreign), Contains("energy: state.q: 6 numbers given, expected 5"));
+  State foreign =
+      make_integrator(name, larger)->start(VectorXd::Zero(n + 1), VectorXd::Zero(n + 1));
+  CHECK_THROWS_WITH(integrator->step(foreign, {}, 1e-4),
+                    Contains("step: state.q: 6 numbers given, expected 5"));
+  CHECK_THROWS_WITH(integrator->energy(foreign),
+                    Contains("energy: state.q: 6 numbers given, expected 5"));
   State bare;
   bare.q = zero;
-  CHECK_THROWS_WITH(integrator->step(bare, {}, 1e-4), Contains("step: state: 0 velocities, 0 momenta"));
+  CHECK_THROWS_WITH(integrator->step(bare, {}, 1e-4),
+                    Contains("step: state: 0 velocities, 0 momenta"));
   VectorXd v(n);
   CHECK_THROWS_WITH(integrator->velocity(bare, v), Contains("velocity: state: 0 velocities"));
   CHECK_THROWS_WITH(integrator->energy(bare), Contains("energy: state: 0 velocities"));
   CHECK_THROWS_WITH(integrator->kick(bare, v), Contains("kick: state: 0 velocities"));
-  CHECK_THROWS_WITH(integrator->set_velocity(bare, v), Contains("set_velocity: state: 0 velocities"));
+  CHECK_THROWS_WITH(integrator->set_velocity(bare, v),
+                    Contains("set_velocity: state: 0 velocities"));
 }
 
 TEST_CASE("a state of gauss of another order is refused", "[integration][gauss][unit]") {
@@ -122,7 +137,8 @@ TEST_CASE("a state of gauss of another order is refused", "[integration][gauss][
   CHECK_THROWS_WITH(eight->step(state, {}, 1e-3), Contains("20 numbers of memory given"));
 }
 
-TEST_CASE("an integrator whose model was replaced at its address is refused", "[integration][unit]") {
+TEST_CASE("an integrator whose model was replaced at its address is refused",
+          "[integration][unit]") {
   for (const std::string& name : integrator_names()) {
     CAPTURE(name);
     std::optional<Model> place(std::in_place, test::random_robot(1, n));
@@ -134,7 +150,7 @@ TEST_CASE("an integrator whose model was replaced at its address is refused", "[
   }
 }
 
-TEST_CASE("a name may carry the order", "[integration][unit]") {
+TEST_CASE("a name can include the order", "[integration][unit]") {
   const Model model(test::random_robot(4, n));
   CHECK(make_integrator("gauss:8", model)->order() == 8);
   CHECK(make_integrator("gauss:12", model)->order() == 12);
@@ -144,14 +160,17 @@ TEST_CASE("a name may carry the order", "[integration][unit]") {
   CHECK(find_scheme("gauss:8") == find_scheme("gauss"));
   CHECK_THROWS_WITH(make_integrator("gauss:7", model),
                     "integrator 'gauss' has no order 7, expected one of 4, 6, 8, 10, 12, 14, 16");
-  CHECK_THROWS_WITH(make_integrator("rk4:4", model), "integrator 'rk4' has one order, it takes none");
+  CHECK_THROWS_WITH(make_integrator("rk4:4", model),
+                    "integrator 'rk4' has one order, expected none");
   CHECK_THROWS_WITH(make_integrator("gaus:8", model), Contains("integrator 'gaus' is not known"));
   for (const char* text : {"gauss:", "gauss:x", "gauss:8x", "gauss:-8", "gauss: 8", "gauss:8:8"})
-    CHECK_THROWS_WITH(make_integrator(text, model), Contains("is no order, expected a name and a number as gauss:8"));
-  CHECK_THROWS_WITH(make_integrator("gauss:8", model, test::of_order(6)), Contains("order 6 is given as well"));
+    CHECK_THROWS_WITH(make_integrator(text, model),
+                      Contains("is not an order, expected a name and a number such as gauss:8"));
+  CHECK_THROWS_WITH(make_integrator("gauss:8", model, test::of_order(6)),
+                    Contains("order 6 is also given"));
 }
 
-TEST_CASE("options of a scheme make what its name makes", "[integration][unit]") {
+TEST_CASE("a scheme made from options equals the scheme made by name", "[integration][unit]") {
   const Model model(test::random_robot(4, n));
   const VectorXd q0 = VectorXd::Constant(n, 0.2);
   const auto end = [&](Integrator& integrator) {
@@ -166,7 +185,8 @@ TEST_CASE("options of a scheme make what its name makes", "[integration][unit]")
     CHECK(by_options->name() == name);
     CHECK(end(*by_name) == end(*by_options));
   }
-  CHECK(end(*make_integrator(model, GaussOptions{.order = 6})) == end(*make_integrator("gauss:6", model)));
+  CHECK(end(*make_integrator(model, GaussOptions{.order = 6})) ==
+        end(*make_integrator("gauss:6", model)));
   Parameters riqn;
   riqn.solver = Solver::riqn;
   CHECK(end(*make_integrator(model, LieExactOptions{.solver = LieExactOptions::Solver::riqn})) ==
@@ -178,20 +198,23 @@ TEST_CASE("options of a scheme make what its name makes", "[integration][unit]")
         end(*make_integrator("hamel", model, published)));
   CHECK(make_integrator(model, Dop853Options{.rtol = 1e-6})->tolerance() == 1e-6);
   CHECK(make_integrator(model, Dop853Options{.rtol = 1e-6})->adaptive());
-  CHECK(make_integrator(model, VariationalOptions{.solver = VariationalOptions::Solver::feedback})->tolerance() ==
-        1e-8);
+  CHECK(make_integrator(model, VariationalOptions{.solver = VariationalOptions::Solver::feedback})
+            ->tolerance() == 1e-8);
 }
 
 TEST_CASE("options out of range are refused", "[integration][unit]") {
   const Model model(test::random_robot(4, n));
-  const auto refuses = [&](const Options& options, const char* words) {
-    CHECK_THROWS_WITH(make_integrator(model, options), Contains(words));
+  const auto refuses = [&](const Options& options, const char* message) {
+    CHECK_THROWS_WITH(make_integrator(model, options), Contains(message));
   };
   refuses(GaussOptions{.order = 5}, "integrator 'gauss' has no order 5");
   refuses(CompositionOptions{.order = 10}, "integrator 'composition' has no order 10");
-  refuses(HamelOptions{.alpha = 1.5}, "integrator 'hamel': alpha 1.5, expected a number from 0 to 1");
-  refuses(VariationalOptions{.tolerance = std::nan("")}, "integrator 'hamel-variational': tolerance nan");
-  refuses(VariationalOptions{.max_halvings = 31}, "max_halvings 31, expected a number from 0 to 30");
+  refuses(HamelOptions{.alpha = 1.5},
+          "integrator 'hamel': alpha 1.5, expected a number from 0 to 1");
+  refuses(VariationalOptions{.tolerance = std::nan("")},
+          "integrator 'hamel-variational': tolerance nan");
+  refuses(VariationalOptions{.max_halvings = 31},
+          "max_halvings 31, expected a number from 0 to 30");
   refuses(LieExactOptions{.max_updates = -1}, "max_updates -1");
   refuses(Dop853Options{.rtol = -1.0}, "integrator 'dop853': rtol -1");
   refuses(NewmarkOptions{.newmark_beta = -1.0}, "newmark_beta -1");

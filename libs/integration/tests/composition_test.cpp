@@ -12,21 +12,25 @@ using namespace hamelin::integration;
 
 namespace {
 
-VectorXd end_of(Integrator& integrator, const VectorXd& q0, double duration, int steps, const Channels& channels = {}) {
+VectorXd end_of(Integrator& integrator, const VectorXd& q0, double duration, int steps,
+                const Channels& channels = {}) {
   State state = integrator.start(q0, VectorXd::Zero(q0.size()));
-  for (int k = 0; k < steps; ++k) REQUIRE(integrator.step(state, channels, duration / steps).converged);
+  for (int k = 0; k < steps; ++k)
+    REQUIRE(integrator.step(state, channels, duration / steps).converged);
   return state.q;
 }
 
 }  // namespace
 
-TEST_CASE("composition weights are symmetric and meet the first order conditions", "[integration][composition]") {
-  // For a symmetric base of order 2: Σγ = 1, Σγ³ = 0 for order 4, Σγ⁵ = 0 besides for 6, Σγ⁷ = 0 besides for 8; these
-  // are the conditions on the single powers (the mixed ones are left to the observed orders).
+TEST_CASE("composition weights are symmetric and meet the first order conditions",
+          "[integration][composition]") {
+  // docs/theory.md (5.12), the conditions on single powers; the mixed conditions are covered by the
+  // observed orders.
   for (const int order : {4, 6, 8}) {
     CAPTURE(order);
     const auto weights = composition_weights(order);
-    for (std::size_t i = 0; i < weights.size(); ++i) CHECK(weights[i] == weights[weights.size() - 1 - i]);
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      CHECK(weights[i] == weights[weights.size() - 1 - i]);
     for (int power = 1; power < order; power += 2) {
       double sum = 0.0;
       for (const double w : weights) sum += std::pow(w, power);
@@ -35,7 +39,8 @@ TEST_CASE("composition weights are symmetric and meet the first order conditions
   }
 }
 
-TEST_CASE("compositions have their orders, with damping and gyroscopic terms too", "[integration][order]") {
+TEST_CASE("compositions have their orders, with damping and gyroscopic terms too",
+          "[integration][order]") {
   const int order = GENERATE(4, 6, 8);
   const bool forced = GENERATE(false, true);
   CAPTURE(order, forced);
@@ -54,7 +59,7 @@ TEST_CASE("compositions have their orders, with damping and gyroscopic terms too
   State truth = reference->start(q0, VectorXd::Zero(4));
   REQUIRE(reference->step(truth, channels, 1.0).converged);
   std::vector<double> errors;
-  const int few = order == 8 ? 16 : 40;  // order 8 meets rounding soon
+  const int few = order == 8 ? 16 : 40;  // order 8 reaches rounding errors early
   for (const int steps : {few, 2 * few}) {
     Parameters options = test::of_order(order);
     options.tolerance = 1e-14;
@@ -66,7 +71,7 @@ TEST_CASE("compositions have their orders, with damping and gyroscopic terms too
   CHECK(std::log2(errors[0] / errors[1]) == Approx(order).margin(0.6));
 }
 
-TEST_CASE("a composition runs backwards along its own way and a state restored goes on with the same bits",
+TEST_CASE("a composition is reversible, and a restored state continues with the same bits",
           "[integration][composition]") {
   const Model model(test::spatial_chain(5));
   const int order = GENERATE(4, 6, 8);

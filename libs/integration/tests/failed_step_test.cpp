@@ -11,11 +11,12 @@ using namespace hamelin::integration;
 
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                 infinity = std::numeric_limits<double>::infinity();
 
-// Channels that leave no finite step from a state at rest; the bad number stands at one joint only.
+// Channels with which a step from rest is not finite; the invalid number is at one joint only.
 struct Bad {
-  std::string what;
+  std::string description;
   Channels channels;
 };
 
@@ -27,22 +28,22 @@ std::vector<Bad> bad_channels(int n, int joint) {
   };
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   std::vector<Bad> all(8);
-  all[0].what = "NaN held torque";
+  all[0].description = "NaN held torque";
   all[0].channels.held_torque = one(nan);
-  all[1].what = "infinite held torque";
+  all[1].description = "infinite held torque";
   all[1].channels.held_torque = one(-infinity);
-  all[2].what = "dry friction without a width, at rest: 0/0";
+  all[2].description = "dry friction without a width, at rest: 0/0";
   all[2].channels.coulomb = one(1.0);
   all[2].channels.coulomb_speed = 0.0;
-  all[3].what = "infinite damping";
+  all[3].description = "infinite damping";
   all[3].channels.damping = one(infinity);
-  all[4].what = "NaN damping";
+  all[4].description = "NaN damping";
   all[4].channels.damping = one(nan);
-  all[5].what = "infinite dry friction";
+  all[5].description = "infinite dry friction";
   all[5].channels.coulomb = one(infinity);
-  all[6].what = "NaN in the vector of a gyroscopic term";
+  all[6].description = "NaN in the vector of a gyroscopic term";
   all[6].channels.gyroscopic = {{joint, zero, {1.0, nan, 0.0}}};
-  all[7].what = "NaN in the point of a gyroscopic term";
+  all[7].description = "NaN in the point of a gyroscopic term";
   all[7].channels.gyroscopic = {{joint, {0.1, nan, 0.0}, Eigen::Vector3d::Ones()}};
   return all;
 }
@@ -60,7 +61,7 @@ void check_refused(Integrator& integrator, State& state, const Channels& channel
   CHECK_FALSE(advance.converged);
   CHECK(advance.step_s == 0.0);
   CHECK(test::same_state(state, before));
-  // and the object is none the worse for it
+  // the object still works
   CHECK(integrator.step(state, {}, 1e-3).converged);
   CHECK(test::velocity(integrator, state).allFinite());
 }
@@ -71,12 +72,12 @@ void check_all(const std::string& name, const Parameters& options) {
     for (const int joint : {0, 2, n - 1}) {
       const Model model(test::random_robot(12, n, planar ? 3 : 0, planar));
       for (const auto& bad : bad_channels(n, joint)) {
-        CAPTURE(name, planar, joint, bad.what);
+        CAPTURE(name, planar, joint, bad.description);
         const auto integrator = make_integrator(name, model, options);
         State state = integrator->start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n));
         check_refused(*integrator, state, bad.channels);
-        if (bad.channels.coulomb_speed == 0.0) continue;  // in motion that is friction without a width, and sound
-        // in motion, with the scheme's memory of past steps filled
+        if (bad.channels.coulomb_speed == 0.0) continue;  // 0/0 only at rest; in motion tanh is ±1
+        // the same in motion, with the scheme's memory of past steps filled
         state = integrator->start(VectorXd::Constant(n, 0.3), VectorXd::Constant(n, 0.5));
         for (int k = 0; k < 5; ++k) REQUIRE(integrator->step(state, {}, 1e-3).converged);
         check_refused(*integrator, state, bad.channels);
@@ -86,34 +87,38 @@ void check_all(const std::string& name, const Parameters& options) {
 
 }  // namespace
 
-TEST_CASE("a step whose result is not finite has not converged, went nowhere and leaves the state as it was",
-          "[integration][failed-step]") {
+TEST_CASE(
+    "a step whose result is not finite is reported as not converged and leaves the state unchanged",
+    "[integration][failed-step]") {
   const auto name = GENERATE(from_range(integrator_names()));
   check_all(name, {});
 }
 
-TEST_CASE("so does every order of gauss and composition", "[integration][failed-step]") {
+TEST_CASE("failed steps of every order of gauss and composition leave the state unchanged",
+          "[integration][failed-step]") {
   for (const std::string name : {"gauss", "composition"})
     for (const int order : find_scheme(name)->orders) check_all(name, test::of_order(order));
 }
 
-TEST_CASE("so does a step under step control", "[integration][failed-step]") {
+TEST_CASE("failed steps under step control leave the state unchanged",
+          "[integration][failed-step]") {
   const auto name = GENERATE(from_range(test::controlled_names()));
   check_all(name, test::tolerances(1e-6, 1e-6));
 }
 
-TEST_CASE("so do the solvers that are not the default", "[integration][failed-step]") {
+TEST_CASE("failed steps of the other solvers leave the state unchanged",
+          "[integration][failed-step]") {
   Parameters options;
   options.solver = Solver::feedback;
   check_all("hamel-variational", options);
   options.solver = Solver::riqn;
   check_all("lie-exact", options);
   Parameters loose;
-  loose.tolerance = 1e-8;  // takes unconfirmed steps
+  loose.tolerance = 1e-8;  // accepts unconfirmed steps
   check_all("hamel-variational", loose);
 }
 
-TEST_CASE("a step that overflows is refused", "[integration][failed-step]") {
+TEST_CASE("a step that overflows fails", "[integration][failed-step]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
   const Model model(test::planar3());
@@ -124,10 +129,12 @@ TEST_CASE("a step that overflows is refused", "[integration][failed-step]") {
   CHECK(test::same_state(state, before));
 }
 
-TEST_CASE("a halved step reports how far it went: all of it, or not at all", "[integration][failed-step]") {
-  // 50 links of 4 cm: the paper's feedback needs halving at 20 ms
+TEST_CASE("a halved step reports its full length, or zero if it failed",
+          "[integration][failed-step]") {
+  // with 50 links of 4 cm the feedback needs halving at 20 ms
   const int n = 50;
-  const Model model(test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
+  const Model model(
+      test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
   VectorXd q0(n);
   for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
   Parameters options;

@@ -14,8 +14,8 @@ using namespace hamelin::integration;
 
 namespace {
 
-State run(const Model& model, const Parameters& options, const VectorXd& q0, const VectorXd& v0, double h, int steps,
-          const Channels& channels = {}) {
+State run(const Model& model, const Parameters& options, const VectorXd& q0, const VectorXd& v0,
+          double h, int steps, const Channels& channels = {}) {
   const auto integrator = make_integrator("gauss", model, options);
   State state = integrator->start(q0, v0);
   for (int k = 0; k < steps; ++k) REQUIRE(integrator->step(state, channels, h).converged);
@@ -25,7 +25,7 @@ State run(const Model& model, const Parameters& options, const VectorXd& q0, con
 }  // namespace
 
 TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gauss][order]") {
-  // Slow enough for the asymptotic range: a chain in a slow swing, errors well above rounding.
+  // A slow swing, so that the errors are in the asymptotic range and well above rounding.
   const Model model(test::random_robot(20, 3, GENERATE(0, 2)));
   const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
   const VectorXd truth = run(model, test::of_order(16), q0, v0, 1e-3, 400).q;
@@ -34,21 +34,24 @@ TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gau
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
   REQUIRE((truth - peer.q).norm() < 1e-10);
   for (const int order : {4, 6, 8}) {
-    const auto error = [&](int n) { return (run(model, test::of_order(order), q0, v0, 0.4 / n, n).q - truth).norm(); };
+    const auto error = [&](int n) {
+      return (run(model, test::of_order(order), q0, v0, 0.4 / n, n).q - truth).norm();
+    };
     int steps = 2;
     while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
     CAPTURE(order, steps, error(steps), error(2 * steps));
     const double observed = std::log2(error(steps) / error(2 * steps));
     CHECK(observed > order - 0.7);
   }
-  for (const int order : {10, 12, 14, 16})  // beneath what doubles can tell apart
+  for (const int order : {10, 12, 14, 16})  // errors at the level of rounding
     CHECK((run(model, test::of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
 }
 
 TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), and is symplectic",
           "[integration][gauss][order]") {
-  // Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7: with C(s) and D(s), B(2s) gives order 2s.
-  for (std::size_t s = 2; s <= kernel::most_stages; ++s) {
+  // Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7: with C(s) and D(s),
+  // B(2s) gives order 2s.
+  for (std::size_t s = 2; s <= kernel::max_stages; ++s) {
     CAPTURE(s);
     const auto t = gauss_tableau(s);
     REQUIRE(t.stages == s);
@@ -59,8 +62,9 @@ TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), a
       for (std::size_t j = 0; j < s; ++j) sum += t.b[j] * power(t.c[j], k - 1);
       return sum;
     };
-    for (std::size_t k = 1; k <= 2 * s; ++k) CHECK(std::abs(sum_b(k) - 1.0 / static_cast<double>(k)) < 5e-16);
-    // and no more than that: Gauss quadrature misses x^2s by (s!)⁴/((2s+1) (2s)!²)
+    for (std::size_t k = 1; k <= 2 * s; ++k)
+      CHECK(std::abs(sum_b(k) - 1.0 / static_cast<double>(k)) < 5e-16);
+    // and not B(2s + 1): the error of Gauss quadrature for x^2s is (s!)⁴/((2s+1) (2s)!²)
     const auto stages = static_cast<double>(s);
     const double some = std::tgamma(stages + 1.0), all = std::tgamma(2.0 * stages + 1.0);
     const double missed = std::pow(some * some / all, 2) / (2.0 * stages + 1.0);
@@ -83,14 +87,14 @@ TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), a
       }
       CHECK(distances == Approx(1.0).epsilon(1e-13));
     }
-    for (std::size_t i = s; i < kernel::most_stages; ++i) {  // lanes without a stage
+    for (std::size_t i = s; i < kernel::max_stages; ++i) {  // lanes without a stage
       CHECK(t.c[i] == t.c[0]);
       for (std::size_t j = 0; j < s; ++j) CHECK(a(i, j) == a(0, j));
     }
   }
 }
 
-TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start is found again",
+TEST_CASE("Gauss steps are symmetric: integrating back with reversed momentum returns to the start",
           "[integration][gauss]") {
   const Model model(test::random_robot(21, 5, 3));
   Rng rng(21);
@@ -103,10 +107,10 @@ TEST_CASE("Gauss steps are symmetric: back with the momentum turned, the start i
     VectorXd back;
     back.resize(5);
     integrator->velocity(state, back);
-    State home = integrator->start(state.q, -back);
-    for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(home, {}, 0.02).converged);
-    CHECK((home.q - q0).norm() < 1e-10);
-    CHECK((home.p + p0).norm() < 1e-9 * (1.0 + p0.norm()));
+    State returned = integrator->start(state.q, -back);
+    for (int k = 0; k < 20; ++k) REQUIRE(integrator->step(returned, {}, 0.02).converged);
+    CHECK((returned.q - q0).norm() < 1e-10);
+    CHECK((returned.p + p0).norm() < 1e-9 * (1.0 + p0.norm()));
   }
 }
 
@@ -139,7 +143,7 @@ TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss
   }
 }
 
-TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all channels, and books their work",
+TEST_CASE("forces act at the stages: Gauss agrees with rk4 under all channels and books their work",
           "[integration][gauss][channels]") {
   const bool planar = GENERATE(false, true);
   const Model model(test::random_robot(7, 4, 3, planar));
@@ -151,8 +155,9 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
   channels.coulomb_speed = 0.5;
   channels.held_torque = test::random_joints(rng, 4, 2.0);
   const Eigen::Vector3d normal = model.robot().links[0].joint.screw.head<3>();
-  channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal + test::random_vector(rng, 1.0)},
-                         {3, test::random_vector(rng, 0.2), -1.0 * normal}};
+  channels.gyroscopic = {
+      {1, test::random_vector(rng, 0.2), 2.0 * normal + test::random_vector(rng, 1.0)},
+      {3, test::random_vector(rng, 0.2), -1.0 * normal}};
   const auto rk4 = make_integrator("rk4", model);
   State truth = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(truth, channels, 0.5 / 8000).converged);
@@ -171,7 +176,8 @@ TEST_CASE("forces act at the stages: Gauss finds the motion of rk4 under all cha
   CHECK(std::abs(gauss->energy(state).total() - start - booked) < 1e-8);
 }
 
-TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to rounding", "[integration][gauss]") {
+TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to rounding",
+          "[integration][gauss]") {
   const Model model(test::planar3());
   const auto gauss = make_integrator("gauss", model, test::of_order(8));
   State state = gauss->start(VectorXd::Zero(3), VectorXd::Zero(3));
@@ -187,7 +193,8 @@ TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to roun
   CHECK(late < 1.5 * early + 1e-10);
 }
 
-TEST_CASE("all instruction sets come to the same motion but for rounding", "[integration][gauss][isa]") {
+TEST_CASE("all instruction sets give the same motion except for rounding",
+          "[integration][gauss][isa]") {
   const Model model(test::random_robot(22, 6, 4));
   Rng rng(22);
   const VectorXd q0 = test::random_joints(rng, 6), v0 = test::random_joints(rng, 6);
@@ -212,11 +219,11 @@ TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer
   const Model model(test::spatial_chain(n));
   dynamics::Workspace ws(model);
   const auto gauss = make_integrator("gauss", model, test::of_order(order)),
-             afresh = make_integrator("gauss", model, test::of_order(order));
+             restarted = make_integrator("gauss", model, test::of_order(order));
   State state = gauss->start(VectorXd::Constant(n, 0.3), VectorXd::Zero(n)), other = state;
   Rng rng(static_cast<std::uint64_t>(order));
   VectorXd v(n), dp(n);
-  int sweeps = 0, sweeps_afresh = 0;
+  int sweeps = 0, sweeps_restarted = 0;
   for (int k = 0; k < 100; ++k) {
     v = test::velocity(*gauss, state) + test::random_joints(rng, n, 0.01);
     if (kicks) {
@@ -225,21 +232,22 @@ TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer
     } else {
       gauss->set_velocity(state, v);
     }
-    other = afresh->start(state.q, v);
-    const auto report = gauss->step(state, {}, 1e-3), report_afresh = afresh->step(other, {}, 1e-3);
+    other = restarted->start(state.q, v);
+    const auto report = gauss->step(state, {}, 1e-3),
+               report_restarted = restarted->step(other, {}, 1e-3);
     REQUIRE(report.converged);
-    REQUIRE(report_afresh.converged);
+    REQUIRE(report_restarted.converged);
     CHECK((state.q - other.q).lpNorm<Eigen::Infinity>() < 1e-13);
     CHECK((state.p - other.p).lpNorm<Eigen::Infinity>() < 1e-13);
     sweeps += report.updates;
-    sweeps_afresh += report_afresh.updates;
+    sweeps_restarted += report_restarted.updates;
   }
-  CAPTURE(sweeps, sweeps_afresh);
-  CHECK(sweeps < 400);  // 480 where the guess stays behind the impulse
-  CHECK(sweeps < sweeps_afresh - 100);
+  CAPTURE(sweeps, sweeps_restarted);
+  CHECK(sweeps < 400);  // 480 if the guess ignores the impulse
+  CHECK(sweeps < sweeps_restarted - 100);
 }
 
-TEST_CASE("an impulse is no error of the step after it: step control goes on as it was",
+TEST_CASE("an impulse does not disturb step control of the step after it",
           "[integration][gauss][impulse][step-control]") {
   const int order = GENERATE(4, 8, 16);
   CAPTURE(order);
@@ -255,7 +263,8 @@ TEST_CASE("an impulse is no error of the step after it: step control goes on as 
     state.step_next = 1e-3;
     int steps = 0, rejected = 0;
     for (int part = 0; part < 10; ++part) {
-      if (impulses && part > 0) integrator.set_velocity(state, test::velocity(integrator, state) + jump);
+      if (impulses && part > 0)
+        integrator.set_velocity(state, test::velocity(integrator, state) + jump);
       for (double left = 0.05; left > 0.0; ++steps) {
         const auto report = integrator.advance(state, {}, left);
         REQUIRE(report.converged);

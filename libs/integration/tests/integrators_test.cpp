@@ -20,7 +20,7 @@ VectorXd vector_of(const Json& numbers) {
   return x;
 }
 
-// Runs and reports the largest number of updates; a step that does not converge fails the test.
+// The end of a run and its largest counts; a step that does not converge fails the test.
 struct Run {
   State state;
   int updates_max = 0, factorizations_max = 0;
@@ -37,18 +37,19 @@ Run run(Integrator& integrator, const VectorXd& q0, const VectorXd& v0, double h
     REQUIRE(report.converged);
     out.updates_max = std::max(out.updates_max, report.updates);
     out.factorizations_max = std::max(out.factorizations_max, report.factorizations);
-    out.energy_error_max = std::max(out.energy_error_max, std::abs(integrator.energy(out.state).total() - energy));
+    out.energy_error_max =
+        std::max(out.energy_error_max, std::abs(integrator.energy(out.state).total() - energy));
   }
   return out;
 }
 
-// Motions computed with an implementation that shares no code with this one.
+// Motions from an implementation that shares no code with this one.
 const Json& golden() {
   static const Json motions = read_json(HAMELIN_SOURCE_DIR "/data/golden/integration/motions.json");
   return motions;
 }
 
-// q(0.5 s) and v(0.5 s) of chains of cylinders at rest at first, by RK4 with 40000 steps.
+// q(0.5 s) and v(0.5 s) of chains of cylinders that start at rest, by RK4 with 40000 steps.
 struct Reference {
   int n;
   VectorXd q0, q, v;
@@ -73,7 +74,9 @@ TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integr
     const std::string name = scheme["scheme"];
     Parameters options;
     options.start = Start::published;
-    options.alpha = scheme.contains("alpha") && scheme["alpha"].is_number() ? scheme["alpha"].get<double>() : 0.5;
+    options.alpha = scheme.contains("alpha") && scheme["alpha"].is_number()
+                        ? scheme["alpha"].get<double>()
+                        : 0.5;
     for (const bool feedback : {true, false}) {
       if (name == "hamel-variational") {
         options.solver = feedback ? Solver::feedback : Solver::newton;
@@ -91,7 +94,8 @@ TEST_CASE("example 5.1 gives the published schemes' reference figures", "[integr
         REQUIRE(report.updates <= 4);
         energy_error = std::max(energy_error, std::abs(integrator->energy(state).total() - energy));
         for (const auto& sample : scheme["samples"])
-          if (sample["k"] == k && k <= 1000) CHECK((state.q - vector_of(sample["q"])).lpNorm<Eigen::Infinity>() < 1e-8);
+          if (sample["k"] == k && k <= 1000)
+            CHECK((state.q - vector_of(sample["q"])).lpNorm<Eigen::Infinity>() < 1e-8);
       }
       CHECK(energy_error == Approx(scheme["max_energy_error_J"].get<double>()).epsilon(1e-4));
       if (name == "hamel-variational") CHECK(energy_error <= 1.8e-4);
@@ -104,17 +108,18 @@ TEST_CASE("observed orders against an independent RK4 reference", "[integration]
     std::string name;
     double order;
   };
-  const auto expected =
-      GENERATE(Expected{"hamel", 1.0}, Expected{"hamel-midpoint", 2.0}, Expected{"hamel-variational", 2.0},
-               Expected{"lie-exact", 2.0}, Expected{"newmark", 2.0}, Expected{"semi-implicit-euler", 1.0},
-               Expected{"rk4", 4.0}, Expected{"feedback", 4.0});
+  const auto expected = GENERATE(Expected{"hamel", 1.0}, Expected{"hamel-midpoint", 2.0},
+                                 Expected{"hamel-variational", 2.0}, Expected{"lie-exact", 2.0},
+                                 Expected{"newmark", 2.0}, Expected{"semi-implicit-euler", 1.0},
+                                 Expected{"rk4", 4.0}, Expected{"feedback", 4.0});
   for (const auto& reference : references()) {
     CAPTURE(expected.name, reference.n);
     const Model model(test::spatial_chain(reference.n));
     std::vector<double> errors;
     for (const int steps : {250, 500, 1000, 2000}) {
       const auto integrator = make_integrator(expected.name, model);
-      const auto out = run(*integrator, reference.q0, VectorXd::Zero(reference.n), 0.5 / steps, steps);
+      const auto out =
+          run(*integrator, reference.q0, VectorXd::Zero(reference.n), 0.5 / steps, steps);
       VectorXd v(reference.n);
       integrator->velocity(out.state, v);
       errors.push_back((out.state.q - reference.q).norm() + 0.1 * (v - reference.v).norm());
@@ -131,29 +136,33 @@ TEST_CASE("the published start costs hamel-midpoint its second order", "[integra
   options.start = Start::published;
   std::vector<double> errors;
   for (const int steps : {500, 1000, 2000})
-    errors.push_back(
-        (run(*make_integrator("hamel-midpoint", model, options), reference.q0, VectorXd::Zero(3), 0.5 / steps, steps)
-             .state.q -
-         reference.q)
-            .norm());
+    errors.push_back((run(*make_integrator("hamel-midpoint", model, options), reference.q0,
+                          VectorXd::Zero(3), 0.5 / steps, steps)
+                          .state.q -
+                      reference.q)
+                         .norm());
   for (std::size_t i = 1; i < errors.size(); ++i)
     CHECK(std::log2(errors[i - 1] / errors[i]) == Approx(1.0).margin(0.1));
 }
 
-TEST_CASE("Newton needs at most three solves a step on chains of 3 to 200 links at 1 ms", "[integration][newton]") {
+TEST_CASE("Newton needs at most three solves per step on chains of 3 to 200 links at 1 ms",
+          "[integration][newton]") {
   const int n = GENERATE(3, 20, 100, 200);
   const Model model(test::spatial_chain(n));
   VectorXd q0(n);
   for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
-  const auto out = run(*make_integrator("hamel-variational", model), q0, VectorXd::Zero(n), 1e-3, 300);
+  const auto out =
+      run(*make_integrator("hamel-variational", model), q0, VectorXd::Zero(n), 1e-3, 300);
   CAPTURE(n);
   CHECK(out.factorizations_max <= 3);
 }
 
-TEST_CASE("one variational step solves the discrete Euler-Lagrange equation made of kinetic and potential energy",
-          "[integration][property]") {
-  // Independent of the recursion: L_d = h [T(θ_mid, Δ/h) − ½U(θ^k) − ½U(θ^{k+1})] by its values, p_k = −D₁L_d by
-  // differences.
+TEST_CASE(
+    "one variational step solves the discrete Euler-Lagrange equation made of kinetic and "
+    "potential energy",
+    "[integration][property]") {
+  // Independent of the recursion: the values of L_d and its derivatives by differences,
+  // docs/theory.md (4.1), (4.2).
   struct Case {
     std::uint64_t seed;
     int n, prismatic_every;
@@ -172,20 +181,25 @@ TEST_CASE("one variational step solves the discrete Euler-Lagrange equation made
   REQUIRE(integrator->step(state, {}, h).converged);
   const auto lagrangian = [&](const VectorXd& a, const VectorXd& b) {
     const VectorXd mid = 0.5 * (a + b), rate = (b - a) / h;
-    return h * (dynamics::kinetic_energy(model, ws, mid, rate) - 0.5 * dynamics::potential_energy(model, ws, a) -
+    return h * (dynamics::kinetic_energy(model, ws, mid, rate) -
+                0.5 * dynamics::potential_energy(model, ws, a) -
                 0.5 * dynamics::potential_energy(model, ws, b));
   };
   const double e = 1e-5;
   for (int i = 0; i < c.n; ++i) {
     VectorXd ap = q0, am = q0, bp = state.q, bm = state.q;
     ap[i] += e, am[i] -= e, bp[i] += e, bm[i] -= e;
-    CHECK(-(lagrangian(ap, state.q) - lagrangian(am, state.q)) / (2 * e) == Approx(p0[i]).margin(1e-6 * p0.norm()));
-    CHECK((lagrangian(q0, bp) - lagrangian(q0, bm)) / (2 * e) == Approx(state.p[i]).margin(1e-6 * p0.norm()));
+    CHECK(-(lagrangian(ap, state.q) - lagrangian(am, state.q)) / (2 * e) ==
+          Approx(p0[i]).margin(1e-6 * p0.norm()));
+    CHECK((lagrangian(q0, bp) - lagrangian(q0, bm)) / (2 * e) ==
+          Approx(state.p[i]).margin(1e-6 * p0.norm()));
   }
 }
 
-TEST_CASE("all integrators come to the same motion under damping, friction, rotors, held torque and gyroscopic terms",
-          "[integration][channels]") {
+TEST_CASE(
+    "all integrators give the same motion under damping, friction, rotors, held torque and "
+    "gyroscopic terms",
+    "[integration][channels]") {
   const bool planar = GENERATE(false, true);
   auto robot = test::random_robot(7, 4, 0, planar);
   robot.links[1].joint.armature = 0.1;
@@ -196,7 +210,7 @@ TEST_CASE("all integrators come to the same motion under damping, friction, roto
   Channels channels;
   channels.damping = VectorXd::Constant(4, 0.3);
   channels.coulomb = VectorXd::Constant(4, 0.05);
-  channels.coulomb_speed = 2.0;  // wide enough for the orders to show
+  channels.coulomb_speed = 2.0;  // smooth enough to observe the orders
   channels.held_torque = test::random_joints(rng, 4, 2.0);
   const Eigen::Vector3d normal = model.robot().links[0].joint.screw.head<3>();
   channels.gyroscopic = {{1, test::random_vector(rng, 0.2), 2.0 * normal},
@@ -213,7 +227,8 @@ TEST_CASE("all integrators come to the same motion under damping, friction, roto
     const double power = std::pow(2.0, integrator->order());
     const bool high = integrator->order() > 2;
     const int steps = high ? 20 : 500;  // high orders: few enough to stay above rounding
-    const VectorXd coarse = run(*make_integrator(name, model), q0, v0, 0.5 / steps, steps, channels).state.q;
+    const VectorXd coarse =
+        run(*make_integrator(name, model), q0, v0, 0.5 / steps, steps, channels).state.q;
     const VectorXd fine = run(*integrator, q0, v0, 0.25 / steps, 2 * steps, channels).state.q;
     const double coarse_error = (coarse - truth.q).norm(), fine_error = (fine - truth.q).norm();
     if (high) {  // not yet in the asymptotic range at every such step
@@ -222,13 +237,14 @@ TEST_CASE("all integrators come to the same motion under damping, friction, roto
       continue;
     }
     CHECK(coarse_error / fine_error == Approx(power).epsilon(0.1));
-    // with its leading error taken out, each scheme lands on the truth
+    // Richardson extrapolation removes the leading error
     const VectorXd extrapolated = fine + (fine - coarse) / (power - 1.0);
     CHECK((extrapolated - truth.q).norm() < 0.05 * fine_error);
   }
 }
 
-TEST_CASE("the booked work closes the energy account of the variational step", "[integration][channels]") {
+TEST_CASE("the booked work closes the energy account of the variational step",
+          "[integration][channels]") {
   const Model model(test::random_robot(8, 4));
   Rng rng(8);
   Channels channels;
@@ -255,7 +271,7 @@ TEST_CASE("the booked work closes the energy account of the variational step", "
   CHECK(errors[1] / errors[2] == Approx(4.0).epsilon(0.2));
 }
 
-TEST_CASE("every scheme's booked work closes its energy account the better the smaller the step",
+TEST_CASE("with smaller steps every scheme's booked work closes its energy account more exactly",
           "[integration][channels]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
@@ -283,8 +299,10 @@ TEST_CASE("every scheme's booked work closes its energy account the better the s
   CHECK(errors[1] < 0.1);
 }
 
-TEST_CASE("two runs give the same bits, and a copied state goes on with the same bits in another object",
-          "[integration][determinism]") {
+TEST_CASE(
+    "two runs give the same bits, and a copied state continues with the same bits in another "
+    "object",
+    "[integration][determinism]") {
   const auto name = GENERATE(from_range(integrator_names()));
   const bool planar = GENERATE(false, true);
   CAPTURE(name, planar);
@@ -292,19 +310,19 @@ TEST_CASE("two runs give the same bits, and a copied state goes on with the same
   Channels channels;
   channels.damping = VectorXd::Constant(4, 0.1);
   const VectorXd q0 = VectorXd::Constant(4, 0.3), v0 = VectorXd::Constant(4, 0.5);
-  const auto go = [&](Integrator& integrator, State& state, int steps) {
+  const auto run_steps = [&](Integrator& integrator, State& state, int steps) {
     for (int k = 0; k < steps; ++k) REQUIRE(integrator.step(state, channels, 2e-3).converged);
   };
   const auto first = make_integrator(name, model), second = make_integrator(name, model);
   State a = first->start(q0, v0), b = second->start(q0, v0);
-  go(*first, a, 20);
-  go(*second, b, 20);
+  run_steps(*first, a, 20);
+  run_steps(*second, b, 20);
   CHECK(a.q == b.q);
   State copy = a;
-  go(*first, a, 20);
+  run_steps(*first, a, 20);
   const auto third = make_integrator(name, model);
-  go(*third, copy, 20);
-  go(*second, b, 20);
+  run_steps(*third, copy, 20);
+  run_steps(*second, b, 20);
   VectorXd va(4), vb(4), vc(4);
   first->velocity(a, va);
   second->velocity(b, vb);
@@ -321,7 +339,8 @@ TEST_CASE("node impulses add momentum, node velocities replace it", "[integratio
   const Model model(test::random_robot(9, 4));
   dynamics::Workspace ws(model);
   Rng rng(9);
-  const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4), dp = test::random_joints(rng, 4);
+  const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4),
+                 dp = test::random_joints(rng, 4);
   const auto integrator = make_integrator(name, model);
   State state = integrator->start(q0, v0);
   VectorXd v(4), p(4), before(4);
@@ -339,7 +358,7 @@ TEST_CASE("node impulses add momentum, node velocities replace it", "[integratio
   CHECK((v - v0).norm() < 1e-12);
 }
 
-TEST_CASE("a state shows no velocity or momentum but that of its node", "[integration][state]") {
+TEST_CASE("a state has only the velocity or the momentum of its node", "[integration][state]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
   const Model model(test::random_robot(9, 4));
@@ -366,7 +385,7 @@ TEST_CASE("a state shows no velocity or momentum but that of its node", "[integr
   check();
 }
 
-TEST_CASE("the variational step runs backwards along its own way", "[integration][property]") {
+TEST_CASE("the variational step is reversible", "[integration][property]") {
   const Model model(test::spatial_chain(5));
   const VectorXd q0 = VectorXd::Constant(5, 0.4), v0 = VectorXd::Constant(5, -0.5);
   const auto integrator = make_integrator("hamel-variational", model);
@@ -381,8 +400,8 @@ TEST_CASE("the variational step runs backwards along its own way", "[integration
   CHECK((v + v0).lpNorm<Eigen::Infinity>() < 1e-7);
 }
 
-TEST_CASE("planar and spatial paths integrate one motion", "[integration][property]") {
-  // A joint tilted by a hair forbids the planar path without changing the motion beyond it.
+TEST_CASE("the planar and the spatial code give the same motion", "[integration][property]") {
+  // A joint tilted by 2e-9 rad forbids the planar code without changing the motion noticeably.
   auto robot = test::planar3();
   const Model planar(robot);
   robot.links[2].joint.screw.head<3>() = Eigen::Vector3d(1.0, 0.0, 2e-9).normalized();
@@ -398,11 +417,14 @@ TEST_CASE("planar and spatial paths integrate one motion", "[integration][proper
   }
 }
 
-TEST_CASE("energy stays bounded without drift over 10^5 steps, and semi-implicit Euler's does not stay near",
-          "[integration][hard]") {
+TEST_CASE(
+    "energy stays bounded without drift over 10^5 steps, and that of semi-implicit Euler is not "
+    "small",
+    "[integration][hard]") {
   const Model model(test::planar3());
   const auto worst = [&](const std::string& name, long steps) {
-    return run(*make_integrator(name, model), VectorXd::Zero(3), VectorXd::Zero(3), 0.01, steps).energy_error_max;
+    return run(*make_integrator(name, model), VectorXd::Zero(3), VectorXd::Zero(3), 0.01, steps)
+        .energy_error_max;
   };
   for (const std::string name : {"hamel-variational", "lie-exact", "composition"}) {
     CAPTURE(name);
@@ -412,41 +434,44 @@ TEST_CASE("energy stays bounded without drift over 10^5 steps, and semi-implicit
     CHECK(worst("semi-implicit-euler", 10000) > 100.0 * early);
     CHECK(worst("hamel", 10000) > 100.0 * early);
   }
-  // feedback holds the energy by force; newmark keeps it near, but not for ever
+  // feedback holds the energy by force; newmark keeps it near its initial value for some time
   CHECK(worst("feedback", 100000) < 1e-6);
   CHECK(worst("newmark", 10000) < 1e-2);
 }
 
-TEST_CASE("a step without a root is halved, and an unconverged one is never used", "[integration][hard]") {
-  const int n = 50;  // 50 links of 4 cm: the feedback fails at 3 ms, as measured for the paper's scheme
-  const Model model(test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
+TEST_CASE("a step without a root is halved, and an unconverged step is never used",
+          "[integration][hard]") {
+  const int n = 50;  // with 50 links of 4 cm the feedback fails at 3 ms (measured)
+  const Model model(
+      test::chain_along_y(n, 0.04, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal(), "xzx"));
   VectorXd q0(n);
   for (int i = 0; i < n; ++i) q0[i] = 0.3 * std::sin(1.0 + i);
   Parameters options;
   options.solver = Solver::feedback;
   options.max_halvings = 0;
   const double h = 0.02;
-  const auto stiff = make_integrator("hamel-variational", model, options);
-  State state = stiff->start(q0, VectorXd::Constant(n, 0.5));
+  const auto without_halving = make_integrator("hamel-variational", model, options);
+  State state = without_halving->start(q0, VectorXd::Constant(n, 0.5));
   const VectorXd q_before = state.q, p_before = state.p;
-  const auto refused = stiff->step(state, {}, h);
+  const auto refused = without_halving->step(state, {}, h);
   REQUIRE_FALSE(refused.converged);
   CHECK((state.q - q_before).norm() == 0.0);
   CHECK((state.p - p_before).norm() == 0.0);
   CHECK(state.k == 0);
 
   options.max_halvings = 12;
-  const auto patient = make_integrator("hamel-variational", model, options);
-  state = patient->start(q0, VectorXd::Constant(n, 0.5));
-  const auto report = patient->step(state, {}, h);
+  const auto with_halving = make_integrator("hamel-variational", model, options);
+  state = with_halving->start(q0, VectorXd::Constant(n, 0.5));
+  const auto report = with_halving->step(state, {}, h);
   CHECK(report.converged);
   CHECK(report.halvings > 0);
   CHECK(state.k == 1);
 }
 
-TEST_CASE("Newton takes no far root: a whipping chain at a coarse step keeps its energy near", "[integration][hard]") {
-  // At h = 0.01 the falling 7-link chain whips so fast that some steps have no root near the guess; one far away once
-  // multiplied the energy by a million.
+TEST_CASE("Newton takes no far root: a whipping chain at a coarse step keeps its energy bounded",
+          "[integration][hard]") {
+  // At h = 0.01 the falling 7-link chain whips so fast that some steps have no root near the guess;
+  // one far away once multiplied the energy by a million.
   const Model model(test::spatial_chain(7));
   const auto integrator = make_integrator("hamel-variational", model);
   State state = integrator->start(VectorXd::Constant(7, 0.3), VectorXd::Zero(7));
@@ -462,7 +487,8 @@ TEST_CASE("Newton takes no far root: a whipping chain at a coarse step keeps its
   CHECK(halvings > 0);
 }
 
-TEST_CASE("steps from 1e-6 to 0.01 s converge to the motion, with the error of their order", "[integration][hard]") {
+TEST_CASE("steps from 1e-6 to 0.01 s converge to the motion, with the error of their order",
+          "[integration][hard]") {
   const auto name = GENERATE(from_range(integrator_names()));
   const double h = GENERATE(1e-6, 1e-5, 1e-4, 1e-3, 1e-2);
   CAPTURE(name, h);
@@ -477,29 +503,33 @@ TEST_CASE("steps from 1e-6 to 0.01 s converge to the motion, with the error of t
     CHECK(report.step_s == h);
   }
   CHECK(state.time_s == Approx(20.0 * h).epsilon(1e-14));
-  // another scheme of another kind, exact to rounding at these steps
-  const auto peer = name == "dop853" ? make_integrator("gauss", model, test::of_order(16))
-                                     : make_integrator("dop853", model, test::tolerances(1e-13, 1e-13));
+  // a scheme of another kind, exact to rounding at these steps
+  const auto peer = name == "dop853"
+                        ? make_integrator("gauss", model, test::of_order(16))
+                        : make_integrator("dop853", model, test::tolerances(1e-13, 1e-13));
   State truth = peer->start(q0, rest);
   for (int k = 0; k < 20; ++k) REQUIRE(peer->step(truth, {}, h).converged);
-  const double order = integrator->adaptive() ? 8.0 : integrator->order();  // else 1e-10 is its tolerance
+  // under step control the tolerance of 1e-10 decides
+  const double order = integrator->adaptive() ? 8.0 : integrator->order();
   CHECK((state.q - truth.q).lpNorm<Eigen::Infinity>() < std::pow(5.0 * h, order) + 1e-11);
 }
 
-TEST_CASE("steps of 0.1 s, which resolve nothing, are halved or refused: the state stays, or all of the step is done",
-          "[integration][hard]") {
+TEST_CASE(
+    "steps of 0.1 s, which are too long, are halved or fail: the step is complete or the state is "
+    "unchanged",
+    "[integration][hard]") {
   const auto name = GENERATE(from_range(integrator_names()));
   CAPTURE(name);
   const double h = 0.1;
   const Model model(test::spatial_chain(7));
   const auto integrator = make_integrator(name, model);
   State state = integrator->start(VectorXd::Constant(7, 0.3), VectorXd::Zero(7));
-  int trouble = 0;
+  int problems = 0;
   for (int k = 0; k < 20; ++k) {
     CAPTURE(k);
     const State before = state;
     const auto report = integrator->step(state, {}, h);
-    trouble += report.halvings + report.rejected + (report.converged ? 0 : 1);
+    problems += report.halvings + report.rejected + (report.converged ? 0 : 1);
     if (!report.converged) {
       CHECK(report.step_s == 0.0);
       CHECK(test::same_state(state, before));
@@ -510,12 +540,13 @@ TEST_CASE("steps of 0.1 s, which resolve nothing, are halved or refused: the sta
     CHECK(test::velocity(*integrator, state).allFinite());
     CHECK(state.q != before.q);
   }
-  CHECK(trouble > 0);
+  CHECK(problems > 0);
 }
 
-TEST_CASE("unknown names and solvers are refused with what is known", "[integration][unit]") {
+TEST_CASE("errors about unknown names and solvers list the known ones", "[integration][unit]") {
   const Model model(test::planar3());
-  CHECK_THROWS_WITH(make_integrator("hamel-variatonal", model), Catch::Contains("did you mean 'hamel-variational'"));
+  CHECK_THROWS_WITH(make_integrator("hamel-variatonal", model),
+                    Catch::Contains("did you mean 'hamel-variational'"));
   Parameters options;
   options.solver = Solver::newton;
   CHECK_THROWS_WITH(make_integrator("hamel", model, options), Catch::Contains("feedback"));

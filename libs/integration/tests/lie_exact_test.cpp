@@ -23,9 +23,11 @@ struct Case {
 
 TEST_CASE("one lie-exact step solves the discrete Euler-Lagrange equation of the logarithms",
           "[integration][lie-exact]") {
-  // Independent of the recursion: L_d = Σ (h/2) ξᵀ I ξ − (h/2)(U(θ^k) + U(θ^{k+1})), ξ = log(g_k⁻¹ g_{k+1})/h from the
-  // world poses of the COM frames and the geometry library's logarithm; momenta by central differences.
-  const auto c = GENERATE(Case{1, 5, 0, false}, Case{2, 6, 2, false}, Case{3, 4, 3, true}, Case{4, 4, 0, true});
+  // Independent of the recursion: the values of L_d, docs/theory.md (6.1), (6.2), from the world
+  // poses of the frames at the centres of mass and the geometry library's logarithm; momenta by
+  // central differences.
+  const auto c = GENERATE(Case{1, 5, 0, false}, Case{2, 6, 2, false}, Case{3, 4, 3, true},
+                          Case{4, 4, 0, true});
   CAPTURE(c.seed);
   auto robot = test::random_robot(c.seed, c.n, c.prismatic_every, c.planar);
   for (auto& link : robot.links) link.joint.armature = 0.02;
@@ -46,13 +48,16 @@ TEST_CASE("one lie-exact step solves the discrete Euler-Lagrange equation of the
   };
   const auto lagrangian = [&](const VectorXd& a, const VectorXd& b) {
     const auto from = poses(a), to = poses(b);
-    double sum = -0.5 * h * (dynamics::potential_energy(model, ws, a) + dynamics::potential_energy(model, ws, b));
+    double sum =
+        -0.5 * h *
+        (dynamics::potential_energy(model, ws, a) + dynamics::potential_energy(model, ws, b));
     for (std::size_t i = 0; i < from.size(); ++i) {
       const geometry::Vector6d xi = (from[i].inverse() * to[i]).log() / h;
       const auto& link = model.robot().links[i];
       const Eigen::Vector3d w = xi.head<3>(), v = xi.tail<3>();
       const double rate = (b - a)[static_cast<Eigen::Index>(i)] / h;
-      sum += 0.5 * h * (w.dot(link.inertia_kg_m2 * w) + link.mass_kg * v.squaredNorm() + 0.02 * rate * rate);
+      sum += 0.5 * h *
+             (w.dot(link.inertia_kg_m2 * w) + link.mass_kg * v.squaredNorm() + 0.02 * rate * rate);
     }
     return sum;
   };
@@ -60,21 +65,24 @@ TEST_CASE("one lie-exact step solves the discrete Euler-Lagrange equation of the
   for (int i = 0; i < c.n; ++i) {
     VectorXd ap = q0, am = q0, bp = state.q, bm = state.q;
     ap[i] += e, am[i] -= e, bp[i] += e, bm[i] -= e;
-    CHECK(-(lagrangian(ap, state.q) - lagrangian(am, state.q)) / (2 * e) == Approx(p0[i]).margin(1e-6 * p0.norm()));
-    CHECK((lagrangian(q0, bp) - lagrangian(q0, bm)) / (2 * e) == Approx(state.p[i]).margin(1e-6 * p0.norm()));
+    CHECK(-(lagrangian(ap, state.q) - lagrangian(am, state.q)) / (2 * e) ==
+          Approx(p0[i]).margin(1e-6 * p0.norm()));
+    CHECK((lagrangian(q0, bp) - lagrangian(q0, bm)) / (2 * e) ==
+          Approx(state.p[i]).margin(1e-6 * p0.norm()));
   }
 }
 
 namespace {
 
-// p⁻(Δ) + ½ D Δ and, by the kernel, its Newton correction for some residual.
+// Compares the kernel's Newton correction for a residual with the Jacobian of p⁻(Δ) + ½ D Δ.
 template <class Space, class Chain>
 void check_newton(const Chain& chain, const Case& c) {
   kernel::LieScratch<Space> k(static_cast<std::size_t>(c.n));
   Rng rng(c.seed);
   const double h = 0.1;
   const VectorXd q = test::random_joints(rng, c.n, 2.0), delta = test::random_joints(rng, c.n, 0.5),
-                 damping = test::random_joints(rng, c.n).cwiseAbs(), residual = test::random_joints(rng, c.n);
+                 damping = test::random_joints(rng, c.n).cwiseAbs(),
+                 residual = test::random_joints(rng, c.n);
   VectorXd minus(c.n), correction(c.n);
   const auto left = [&](const VectorXd& d) -> VectorXd {
     for (std::size_t i = 0; i < k.size(); ++i) {
@@ -82,7 +90,7 @@ void check_newton(const Chain& chain, const Case& c) {
       k[i].before = Space::place(chain.links[i], q[j]);
       k[i].after = Space::place(chain.links[i], q[j] + d[j]);
     }
-    REQUIRE(kernel::lie_left<Space>(chain, k, d.data(), h, minus.data()));
+    REQUIRE(kernel::lie_left_momenta<Space>(chain, k, d.data(), h, minus.data()));
     return minus + 0.5 * damping.cwiseProduct(d);
   };
   Eigen::MatrixXd jacobian(c.n, c.n);
@@ -102,9 +110,10 @@ void check_newton(const Chain& chain, const Case& c) {
 
 }  // namespace
 
-TEST_CASE("the O(n) Newton step of lie-exact agrees with a finite-difference Jacobian", "[integration][lie-exact]") {
-  const auto c = GENERATE(Case{1, 1, 0, false}, Case{2, 3, 0, false}, Case{3, 5, 0, false}, Case{4, 6, 2, false},
-                          Case{5, 4, 0, true}, Case{6, 6, 3, true});
+TEST_CASE("the O(n) Newton step of lie-exact agrees with a finite-difference Jacobian",
+          "[integration][lie-exact]") {
+  const auto c = GENERATE(Case{1, 1, 0, false}, Case{2, 3, 0, false}, Case{3, 5, 0, false},
+                          Case{4, 6, 2, false}, Case{5, 4, 0, true}, Case{6, 6, 3, true});
   CAPTURE(c.seed);
   const Model model(test::random_robot(c.seed, c.n, c.prismatic_every, c.planar));
   if (model.planar())
@@ -113,14 +122,16 @@ TEST_CASE("the O(n) Newton step of lie-exact agrees with a finite-difference Jac
     check_newton<dynamics::kernel::Spatial<double>>(std::get<0>(model.chain()), c);
 }
 
-TEST_CASE("the logarithm of a dual quaternion is the geometry library's at every angle", "[integration][lie-exact]") {
+TEST_CASE("the logarithm of a dual quaternion is the geometry library's at every angle",
+          "[integration][lie-exact]") {
   for (const double angle : {1e-9, 1e-4, 0.05, 0.199, 0.201, 1.0, 2.5}) {
     CAPTURE(angle);
     Rng rng(5);
-    const Eigen::Vector3d axis = test::random_vector(rng).normalized(), at = test::random_vector(rng);
+    const Eigen::Vector3d axis = test::random_vector(rng).normalized(),
+                          at = test::random_vector(rng);
     geometry::Vector6d x;
     x << angle * axis, angle * at.cross(axis) + 0.3 * axis;
-    // a turn about a line, then a slide along it: the dual quaternion by hand
+    // a rotation about a line and a shift along it: the dual quaternion by hand
     const double half = 0.5 * angle, slide = 0.15;
     const Eigen::Vector3d u = std::sin(half) * axis;
     const Eigen::Vector3d du = std::sin(half) * at.cross(axis) + slide * std::cos(half) * axis;
@@ -136,8 +147,9 @@ TEST_CASE("the logarithm of a dual quaternion is the geometry library's at every
   }
 }
 
-TEST_CASE("RIQN and Newton find the same lie-exact motion, Newton in at most three factorisations a step",
-          "[integration][lie-exact]") {
+TEST_CASE(
+    "RIQN and Newton find the same lie-exact motion, Newton in at most three factorisations per step",
+    "[integration][lie-exact]") {
   const int n = GENERATE(3, 7, 20);
   CAPTURE(n);
   const Model model(test::spatial_chain(n));

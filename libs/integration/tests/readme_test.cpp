@@ -7,7 +7,8 @@
 using namespace hamelin;
 using namespace hamelin::integration;
 
-TEST_CASE("the README's example loses what the damper takes", "[integration][unit]") {
+TEST_CASE("the README's example loses the energy that the damping dissipates",
+          "[integration][unit]") {
   // clang-format off
   // [example]
 const Model arm(model::make_chain({}));  // seven links of 0.2 m, gravity along -z
@@ -19,7 +20,7 @@ const double before = integrator->energy(state).total();
 double dissipated = 0.0;
 for (int k = 0; k < 1000; ++k) {
   const StepReport report = integrator->step(state, channels, 1e-3);
-  if (!report.converged) break;  // the state is as it was
+  if (!report.converged) break;  // the state is unchanged
   dissipated += report.dissipated_J;
 }
 const double error = integrator->energy(state).total() + dissipated - before;

@@ -21,7 +21,8 @@ namespace {
 /// A file open for reading.
 class Descriptor {
  public:
-  explicit Descriptor(const std::filesystem::path& file) : fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {}
+  explicit Descriptor(const std::filesystem::path& file)
+      : fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {}
   ~Descriptor() {
     if (fd_ >= 0) ::close(fd_);
   }
@@ -36,21 +37,24 @@ class Descriptor {
 }  // namespace
 
 std::string read_file(const std::filesystem::path& file) {
-  const auto fail = [&file](const std::string& what) {
-    return Error(ErrorCode::io, fmt::format("{}: {}", file.string(), what));
+  const auto fail = [&file](const std::string& message) {
+    return Error(ErrorCode::io, fmt::format("{}: {}", file.string(), message));
   };
   const Descriptor in(file);
   if (in.get() < 0) throw fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
-  struct stat about {};
-  if (::fstat(in.get(), &about) != 0) throw fail(fmt::format("cannot be read: {}", std::strerror(errno)));
-  if (S_ISDIR(about.st_mode)) throw fail("is a directory, expected a file");
-  // A scene may name /dev/zero as its map, which has no end.
-  if (S_ISCHR(about.st_mode) || S_ISBLK(about.st_mode)) throw fail("is a device, expected a file");
-  constexpr std::size_t least_room = std::size_t{1} << 16;
+  struct stat status {};
+  if (::fstat(in.get(), &status) != 0)
+    throw fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+  if (S_ISDIR(status.st_mode)) throw fail("is a directory, expected a file");
+  // A scene may name /dev/zero as its map, and reading that never ends.
+  if (S_ISCHR(status.st_mode) || S_ISBLK(status.st_mode))
+    throw fail("is a device, expected a file");
+  constexpr std::size_t min_growth = std::size_t{1} << 16;
   std::string bytes;
   for (std::size_t size = 0;;) {
-    // one byte more than the file has, so that the end of a whole file is seen without growing
-    if (size == bytes.size()) bytes.resize(std::max(static_cast<std::size_t>(about.st_size) + 1, size + least_room));
+    // One byte more than the file has, so the end of the file is found without growing the buffer.
+    if (size == bytes.size())
+      bytes.resize(std::max(static_cast<std::size_t>(status.st_size) + 1, size + min_growth));
     const ::ssize_t count = ::read(in.get(), bytes.data() + size, bytes.size() - size);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw fail(fmt::format("cannot be read: {}", std::strerror(errno)));
@@ -61,15 +65,18 @@ std::string read_file(const std::filesystem::path& file) {
   }
 }
 
-std::filesystem::path resolve_path(const std::filesystem::path& base, const std::filesystem::path& path) {
+std::filesystem::path resolve_path(const std::filesystem::path& base,
+                                   const std::filesystem::path& path) {
   std::filesystem::path resolved;
   for (const auto& part : base / path) {
     if (part.empty() || part == ".") continue;
     std::error_code ec;
     const bool up = part == "..";
-    if (up && resolved.has_root_path() && !resolved.has_relative_path()) continue;  // above the root there is the root
+    // The parent of the root is the root.
+    if (up && resolved.has_root_path() && !resolved.has_relative_path()) continue;
     if (up && resolved.has_filename() && resolved.filename() != ".." &&
-        std::filesystem::symlink_status(resolved, ec).type() == std::filesystem::file_type::directory)
+        std::filesystem::symlink_status(resolved, ec).type() ==
+            std::filesystem::file_type::directory)
       resolved = resolved.parent_path();
     else
       resolved /= part;
@@ -77,16 +84,17 @@ std::filesystem::path resolve_path(const std::filesystem::path& base, const std:
   return resolved.empty() ? std::filesystem::path(".") : resolved;
 }
 
-void write_file_aside(const std::filesystem::path& file, std::string_view content) {
-  std::string aside = file.string() + ".XXXXXX";
-  const int fd = ::mkstemp(aside.data());
-  const auto fail = [&](const char* what) {
+void write_file_atomically(const std::filesystem::path& file, std::string_view content) {
+  std::string temporary = file.string() + ".XXXXXX";
+  const int fd = ::mkstemp(temporary.data());
+  const auto fail = [&](const char* problem) {
     const int reason = errno;
     if (fd >= 0) {
       ::close(fd);
-      ::unlink(aside.c_str());
+      ::unlink(temporary.c_str());
     }
-    throw Error(ErrorCode::io, fmt::format("{}: {}: {}", file.string(), what, std::strerror(reason)));
+    throw Error(ErrorCode::io,
+                fmt::format("{}: {}: {}", file.string(), problem, std::strerror(reason)));
   };
   if (fd < 0) fail("cannot be written");
   for (std::size_t done = 0; done < content.size();) {
@@ -95,7 +103,7 @@ void write_file_aside(const std::filesystem::path& file, std::string_view conten
     if (n > 0) done += static_cast<std::size_t>(n);
   }
   if (::fchmod(fd, 0644) != 0 || ::fsync(fd) != 0) fail("cannot be written");
-  if (std::rename(aside.c_str(), file.c_str()) != 0) fail("cannot be replaced");
+  if (std::rename(temporary.c_str(), file.c_str()) != 0) fail("cannot be replaced");
   ::close(fd);
 }
 

@@ -22,11 +22,12 @@ std::string position_of(std::string_view text, std::size_t byte) {
   return fmt::format("line {}, column {}", line, std::max<std::size_t>(column, 1));
 }
 
-// dump(), copying and schemas recurse into a document.
+// Limits the recursion depth of dump(), copies and schema checks.
 constexpr std::size_t nesting_max = 100;
 
-// Builds a document as it is read. nlohmann's own builder keeps the last of two equal keys without a word (a typo in a
-// scene must not vanish like that) and takes a time that grows with the square of a list or of an object.
+// Builds a document from parser events. nlohmann's own builder silently keeps the last of two equal
+// keys, which would hide a typing error in a scene, and its time grows with the square of the size
+// of a list or object.
 class Builder final : public nlohmann::json_sax<Json> {
  public:
   Builder(std::string_view text, const std::string& where) : text_(text), where_(where) {}
@@ -50,23 +51,27 @@ class Builder final : public nlohmann::json_sax<Json> {
     std::vector<const std::string*> keys;
     for (const auto& member : members()) keys.push_back(&member.first);
     std::sort(keys.begin(), keys.end(), [](const auto* a, const auto* b) { return *a < *b; });
-    const auto doubled =
-        std::adjacent_find(keys.begin(), keys.end(), [](const auto* a, const auto* b) { return *a == *b; });
-    if (doubled != keys.end())
-      throw Error(ErrorCode::parse, fmt::format("{}: key '{}' is given twice", where_, **doubled));
+    const auto duplicate = std::adjacent_find(
+        keys.begin(), keys.end(), [](const auto* a, const auto* b) { return *a == *b; });
+    if (duplicate != keys.end())
+      throw Error(ErrorCode::parse,
+                  fmt::format("{}: key '{}' is given twice", where_, **duplicate));
     return close();
   }
   bool parse_error(std::size_t byte, const std::string&, const Json::exception& e) override {
-    std::string_view reason = e.what();  // opens with the exception's name in brackets
+    std::string_view reason = e.what();  // begins with the exception's name in brackets
     constexpr int number_out_of_range = 406;
     if (e.id == number_out_of_range)
-      throw Error(ErrorCode::parse, fmt::format("{}: not JSON: {}", where_, reason.substr(reason.find("] ") + 2)));
-    if (const auto at = reason.find("syntax error"); at != std::string_view::npos) reason.remove_prefix(at);
-    throw Error(ErrorCode::parse, fmt::format("{}: {}: not JSON: {}", where_, position_of(text_, byte), reason));
+      throw Error(ErrorCode::parse,
+                  fmt::format("{}: not JSON: {}", where_, reason.substr(reason.find("] ") + 2)));
+    if (const auto at = reason.find("syntax error"); at != std::string_view::npos)
+      reason.remove_prefix(at);
+    throw Error(ErrorCode::parse,
+                fmt::format("{}: {}: not JSON: {}", where_, position_of(text_, byte), reason));
   }
 
  private:
-  // The object being read, as the list of members that it is.
+  // The members of the object that is being read.
   Json::object_t::Container& members() { return open_.back()->get_ref<Json::object_t&>(); }
   Json& place(Json&& value) {
     if (open_.empty()) return document_ = std::move(value);
@@ -79,7 +84,8 @@ class Builder final : public nlohmann::json_sax<Json> {
   }
   bool open(Json&& value) {
     if (open_.size() == nesting_max)
-      throw Error(ErrorCode::parse, fmt::format("{}: lists and objects nest deeper than {}", where_, nesting_max));
+      throw Error(ErrorCode::parse,
+                  fmt::format("{}: lists and objects nest deeper than {}", where_, nesting_max));
     open_.push_back(&place(std::move(value)));
     return true;
   }
@@ -91,7 +97,8 @@ class Builder final : public nlohmann::json_sax<Json> {
   std::string_view text_;
   const std::string& where_;
   Json document_;
-  std::vector<Json*> open_;  // what is not closed yet; a parent does not grow while its child is open
+  // The open lists and objects; a parent does not grow while its child is open.
+  std::vector<Json*> open_;
 };
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <memory>
 #include <mutex>
 
-#define VALIJSON_USE_EXCEPTIONS 1  // else it aborts on a bad schema
+#define VALIJSON_USE_EXCEPTIONS 1  // otherwise valijson aborts on an invalid schema
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>
@@ -17,11 +17,12 @@
 
 namespace hamelin {
 
-std::string_view embedded_schema(std::string_view name) noexcept;  // made at configure time from docs/schema
+// Generated from docs/schema at configure time.
+std::string_view embedded_schema(std::string_view name) noexcept;
 
 namespace {
 
-// nlohmann's own message for a missing or mistyped value has no place in it; valijson's path is "<root>[a][0]".
+// The place of an error as a JSON pointer; valijson gives it as "<root>[a][0]".
 nlohmann::json::json_pointer pointer_of(const std::vector<std::string>& context) {
   nlohmann::json::json_pointer pointer;
   for (std::size_t i = 1; i < context.size(); ++i) {
@@ -33,8 +34,10 @@ nlohmann::json::json_pointer pointer_of(const std::vector<std::string>& context)
   return pointer;
 }
 
-// The part of the schema that speaks of the place, as far as properties and items lead to it.
-const nlohmann::json* schema_at(const nlohmann::json& schema, nlohmann::json::json_pointer pointer) {
+// The part of the schema that applies to the place, found through "properties", "items" and "$ref";
+// null if they do not lead to it.
+const nlohmann::json* schema_at(const nlohmann::json& schema,
+                                nlohmann::json::json_pointer pointer) {
   std::vector<std::string> tokens;
   for (; !pointer.empty(); pointer.pop_back()) tokens.insert(tokens.begin(), pointer.back());
   const auto resolved = [&schema](const nlohmann::json* part) {
@@ -57,7 +60,7 @@ const nlohmann::json* schema_at(const nlohmann::json& schema, nlohmann::json::js
   return at;
 }
 
-std::string shown(const nlohmann::json& value) {
+std::string abbreviated(const nlohmann::json& value) {
   std::string text = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   if (text.size() > 60) text = text.substr(0, 57) + "...";
   return text;
@@ -65,10 +68,11 @@ std::string shown(const nlohmann::json& value) {
 
 std::string expectation(const nlohmann::json& rule) {
   std::vector<std::string> parts;
-  const auto add = [&](const char* key, const char* words) {
+  const auto add = [&](const char* key, const char* label, const char* unit = "") {
     if (rule.contains(key))
-      parts.push_back(
-          fmt::format("{} {}", words, rule[key].is_string() ? rule[key].get<std::string>() : rule[key].dump()));
+      parts.push_back(fmt::format(
+          "{} {}{}", label, rule[key].is_string() ? rule[key].get<std::string>() : rule[key].dump(),
+          unit));
   };
   add("type", "type");
   add("enum", "one of");
@@ -77,8 +81,8 @@ std::string expectation(const nlohmann::json& rule) {
   add("exclusiveMinimum", "above");
   add("maximum", "at most");
   add("exclusiveMaximum", "below");
-  add("minItems", "items at least");
-  add("maxItems", "items at most");
+  add("minItems", "at least", " items");
+  add("maxItems", "at most", " items");
   if (rule.contains("required")) parts.push_back("required keys " + rule["required"].dump());
   return fmt::format("{}", fmt::join(parts, ", "));
 }
@@ -95,27 +99,30 @@ std::string violation(const nlohmann::json& schema, const nlohmann::json& docume
     for (const auto& [key, unused] : (*rule)["properties"].items()) known.push_back(key);
     for (const auto& [key, unused] : value->items()) {
       if ((*rule)["properties"].contains(key)) continue;
-      const auto near = nearest_name(key, known);
-      return fmt::format("{}: unknown key '{}', expected {}", at, key,
-                         near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'?", near));
+      const auto hint = did_you_mean(key, known);
+      return fmt::format(
+          "{}: unknown key '{}'{}", at, key,
+          hint.empty() ? fmt::format(", expected one of {}", fmt::join(known, ", ")) : hint);
     }
     for (const auto& key : rule->value("required", nlohmann::json::array()))
       if (!value->contains(key.get<std::string>()))
         return fmt::format("{}: key '{}' is missing", at, key.get<std::string>());
   }
   if (rule != nullptr && value != nullptr && !expectation(*rule).empty())
-    return fmt::format("{}: {} is not allowed, expected {}", at, shown(*value), expectation(*rule));
+    return fmt::format("{}: {} is not allowed, expected {}", at, abbreviated(*value),
+                       expectation(*rule));
   return fmt::format("{}: {}", at, error.description);
 }
 
-// A copy with the first items only of each list.
-nlohmann::json beginning(const nlohmann::json& document, std::size_t items) {
+// A copy with only the first items of each list.
+nlohmann::json shortened(const nlohmann::json& document, std::size_t items) {
   if (!document.is_structured()) return document;
   nlohmann::json out = document.is_array() ? nlohmann::json::array() : nlohmann::json::object();
   if (document.is_array())
-    for (std::size_t i = 0; i < std::min(items, document.size()); ++i) out.push_back(beginning(document[i], items));
+    for (std::size_t i = 0; i < std::min(items, document.size()); ++i)
+      out.push_back(shortened(document[i], items));
   else
-    for (const auto& [key, value] : document.items()) out[key] = beginning(value, items);
+    for (const auto& [key, value] : document.items()) out[key] = shortened(value, items);
   return out;
 }
 
@@ -126,7 +133,8 @@ std::size_t longest_list(const nlohmann::json& document) {
   return longest;
 }
 
-bool valid(const valijson::Schema& schema, const nlohmann::json& document, valijson::ValidationResults* results) {
+bool valid(const valijson::Schema& schema, const nlohmann::json& document,
+           valijson::ValidationResults* results) {
   valijson::Validator validator(valijson::Validator::kStrongTypes);
   return validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), results);
 }
@@ -139,40 +147,43 @@ struct Schema::Compiled {
 };
 
 Schema::Schema(const Json& schema, const std::string& where) {
-  const auto made = std::make_shared<Compiled>();
-  made->text = nlohmann::json::parse(schema.dump());
+  const auto compiled = std::make_shared<Compiled>();
+  compiled->text = nlohmann::json::parse(schema.dump());
   valijson::SchemaParser parser(valijson::SchemaParser::kDraft7);
   try {
-    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(made->text), made->schema);
+    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(compiled->text),
+                          compiled->schema);
   } catch (const std::exception& e) {
-    throw Error(ErrorCode::invalid, fmt::format("{}: its JSON Schema cannot be used: {}", where, e.what()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: its JSON Schema cannot be used: {}", where, e.what()));
   }
-  compiled_ = made;
+  compiled_ = compiled;
 }
 
 void Schema::check(const Json& document, const std::string& where) const {
   const nlohmann::json plain = nlohmann::json::parse(document.dump());
   if (valid(compiled_->schema, plain, nullptr)) return;
-  // Asked for its reasons valijson gathers all there are, each many times the size of what it is about. Of long lists
-  // the beginning that holds the first fault will do.
+  // valijson collects all violations, each many times larger than the value concerned. To save
+  // time, long lists are shortened to a beginning that contains the first violation.
   nlohmann::json part = plain;
   const std::size_t longest = longest_list(plain);
   for (std::size_t items = 1000; items < longest; items += items / 4) {
-    nlohmann::json begun = beginning(plain, items);
-    if (valid(compiled_->schema, begun, nullptr)) continue;
-    part = std::move(begun);
+    nlohmann::json head = shortened(plain, items);
+    if (valid(compiled_->schema, head, nullptr)) continue;
+    part = std::move(head);
     break;
   }
   valijson::ValidationResults results;
   (void)valid(compiled_->schema, part, &results);
-  // The deepest place says most; the first of those, as written.
+  // The deepest place is the most specific one; of several, the first in the document is reported.
   valijson::ValidationResults::Error error, deepest;
   bool first = true;
   while (results.popError(error)) {
     if (first || error.context.size() > deepest.context.size()) deepest = error;
     first = false;
   }
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, violation(compiled_->text, part, deepest)));
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: {}", where, violation(compiled_->text, part, deepest)));
 }
 
 void check_schema(const Json& document, const Json& schema, const std::string& where) {
@@ -183,16 +194,18 @@ std::string_view schema_text(std::string_view name) {
   return embedded_schema(fmt::format("{}.schema.json", name));
 }
 
-void check_shipped_schema(const Json& document, std::string_view schema_name, const std::string& where) {
-  static std::mutex one_at_a_time;
-  static std::map<std::string, Schema, std::less<>> ready;
+void check_shipped_schema(const Json& document, std::string_view schema_name,
+                          const std::string& where) {
+  static std::mutex mutex;
+  static std::map<std::string, Schema, std::less<>> cache;
   const auto schema = [&] {
-    const std::lock_guard lock(one_at_a_time);
-    auto at = ready.find(schema_name);
-    if (at == ready.end()) {
+    const std::lock_guard lock(mutex);
+    auto at = cache.find(schema_name);
+    if (at == cache.end()) {
       const auto text = schema_text(schema_name);
-      if (text.empty()) throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", schema_name));
-      at = ready.emplace(schema_name, Schema(Json::parse(text), where)).first;
+      if (text.empty())
+        throw Error(ErrorCode::usage, fmt::format("no schema '{}' is shipped", schema_name));
+      at = cache.emplace(schema_name, Schema(Json::parse(text), where)).first;
     }
     return at->second;
   }();
@@ -203,7 +216,8 @@ Json with_defaults(Json document, const Json& schema) {
   if (!document.is_object() || !schema.contains("properties")) return document;
   for (const auto& [key, rule] : schema["properties"].items()) {
     if (!document.contains(key) && rule.contains("default")) document[key] = rule["default"];
-    if (document.contains(key) && document[key].is_object()) document[key] = with_defaults(document[key], rule);
+    if (document.contains(key) && document[key].is_object())
+      document[key] = with_defaults(document[key], rule);
   }
   return document;
 }

@@ -24,26 +24,29 @@ struct Folder {
 
 }  // namespace
 
-TEST_CASE("bytes come back as they were written, and nothing else is left in the folder", "[io][unit]") {
+TEST_CASE("bytes come back as they were written, and nothing else is left in the folder",
+          "[io][unit]") {
   const Folder folder;
   const std::string bytes("a\0b\r\n\xff", 6);
-  write_file_aside(folder.path / "f", bytes);
+  write_file_atomically(folder.path / "f", bytes);
   CHECK(read_file(folder.path / "f") == bytes);
-  write_file_aside(folder.path / "f", "shorter");
+  write_file_atomically(folder.path / "f", "shorter");
   CHECK(read_file(folder.path / "f") == "shorter");
-  write_file_aside(folder.path / "empty", "");
+  write_file_atomically(folder.path / "empty", "");
   CHECK(read_file(folder.path / "empty").empty());
   CHECK(folder.files() == 2);
 }
 
-TEST_CASE("a device is refused: it may have no end", "[io][unit]") {
+TEST_CASE("a device is refused, since reading it may not end", "[io][unit]") {
   CHECK_THROWS_WITH(read_file("/dev/zero"), "/dev/zero: is a device, expected a file");
 }
 
-TEST_CASE("a file that cannot be read to its end is refused, never taken for an empty one", "[io][unit]") {
-  // opens like a file, but address 0 is not mapped: the first read fails
-  CHECK_THROWS_WITH(read_file("/proc/self/mem"), "/proc/self/mem: cannot be read: Input/output error");
-  // states no size, but has an end
+TEST_CASE("a file that cannot be read to its end is refused, not taken for an empty one",
+          "[io][unit]") {
+  // This opens like a file, but address 0 is not mapped and the first read fails.
+  CHECK_THROWS_WITH(read_file("/proc/self/mem"),
+                    "/proc/self/mem: cannot be read: Input/output error");
+  // This file reports no size, but has an end.
   CHECK(read_file("/proc/self/cmdline").size() > 1);
 }
 
@@ -63,27 +66,28 @@ TEST_CASE("a path is shortened only where that does not change the file", "[io][
   CHECK(resolve_path("", "../x") == "../x");
   CHECK(resolve_path("", "../../x") == "../../x");
   CHECK(resolve_path("", "") == ".");
-  // the system refuses it, so it must not become another file
+  // The system refuses this path, so it must not become the path of another file.
   CHECK(resolve_path(folder.path, "absent/../a/f") == folder.path / "absent" / ".." / "a" / "f");
 }
 
-TEST_CASE("a write that fails leaves the old file and no half one", "[io][unit]") {
+TEST_CASE("a failed write leaves the old file and no partial one", "[io][unit]") {
   const Folder folder;
-  SECTION("where a folder stands in the way") {
+  SECTION("where a folder has the file's name") {
     fs::create_directory(folder.path / "taken");
     std::ofstream(folder.path / "taken" / "inside") << "kept";
-    CHECK_THROWS_WITH(write_file_aside(folder.path / "taken", "new"),
+    CHECK_THROWS_WITH(write_file_atomically(folder.path / "taken", "new"),
                       Catch::StartsWith((folder.path / "taken").string()));
     CHECK(read_file(folder.path / "taken" / "inside") == "kept");
     CHECK(folder.files() == 1);
   }
   SECTION("where the folder does not exist") {
     try {
-      write_file_aside(folder.path / "no" / "f", "new");
-      FAIL("written into nowhere");
+      write_file_atomically(folder.path / "no" / "f", "new");
+      FAIL("written into a folder that does not exist");
     } catch (const Error& error) {
       CHECK(error.code() == ErrorCode::io);
-      CHECK_THAT(error.what(), Catch::Contains("/no/f: cannot be written: No such file or directory"));
+      CHECK_THAT(error.what(),
+                 Catch::Contains("/no/f: cannot be written: No such file or directory"));
     }
     CHECK(folder.files() == 0);
   }
@@ -92,15 +96,16 @@ TEST_CASE("a write that fails leaves the old file and no half one", "[io][unit]"
       WARN("skipped: root may write everywhere");
       return;
     }
-    write_file_aside(folder.path / "f", "old");
+    write_file_atomically(folder.path / "f", "old");
     fs::permissions(folder.path, fs::perms::owner_read | fs::perms::owner_exec);
-    CHECK_THROWS_WITH(write_file_aside(folder.path / "f", "new"), Catch::Contains("Permission denied"));
+    CHECK_THROWS_WITH(write_file_atomically(folder.path / "f", "new"),
+                      Catch::Contains("Permission denied"));
     CHECK(read_file(folder.path / "f") == "old");
     CHECK(folder.files() == 1);
   }
 }
 
-TEST_CASE("what cannot be read is named with the system's reason", "[io][unit]") {
+TEST_CASE("an unreadable file is reported with the system's reason", "[io][unit]") {
   const Folder folder;
   CHECK_THROWS_WITH(read_file(folder.path / "absent"),
                     Catch::Contains("absent: cannot be opened: No such file or directory"));

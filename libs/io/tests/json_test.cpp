@@ -9,7 +9,7 @@ using namespace hamelin;
 
 namespace {
 
-// The error's text, which must be one line and of that kind.
+// The message of the error, which must be one line and have that code.
 template <class F>
 std::string refusal(ErrorCode code, F&& f) {
   try {
@@ -29,7 +29,8 @@ TEST_CASE("a parse error names file, line and column", "[io][unit]") {
   const auto parse = [](const std::string& text) {
     return refusal(ErrorCode::parse, [&] { (void)parse_json(text, "a.json"); });
   };
-  CHECK_THAT(parse("{\n  \"a\": 1,\n  \"b\": ?\n}"), Catch::StartsWith("a.json: line 3, column 8: not JSON"));
+  CHECK_THAT(parse("{\n  \"a\": 1,\n  \"b\": ?\n}"),
+             Catch::StartsWith("a.json: line 3, column 8: not JSON"));
   CHECK_THAT(parse("[1, 2"), Catch::StartsWith("a.json: line 1, column"));
   CHECK_THAT(parse(""), Catch::StartsWith("a.json: line 1, column 1: not JSON"));
   CHECK_THAT(parse("[1] ?"), Catch::StartsWith("a.json: line 1, column 5"));
@@ -37,15 +38,18 @@ TEST_CASE("a parse error names file, line and column", "[io][unit]") {
   CHECK_THAT(parse("{\"a\": \"\xff\"}"), Catch::StartsWith("a.json: line 1, column"));
 }
 
-TEST_CASE("a key given twice is refused at any depth, equal keys of different objects are not", "[io][unit]") {
-  CHECK_THAT(refusal(ErrorCode::parse, [] { (void)parse_json(R"({"a": 1, "b": 2, "a": 3})", "a.json"); }),
-             Catch::Contains("a.json: key 'a' is given twice"));
-  CHECK_THAT(refusal(ErrorCode::parse, [] { (void)parse_json(R"([{"x": {"in": 1, "in": 1}}])", "a.json"); }),
+TEST_CASE("a key given twice is refused at any depth, equal keys of different objects are not",
+          "[io][unit]") {
+  CHECK_THAT(
+      refusal(ErrorCode::parse, [] { (void)parse_json(R"({"a": 1, "b": 2, "a": 3})", "a.json"); }),
+      Catch::Contains("a.json: key 'a' is given twice"));
+  CHECK_THAT(refusal(ErrorCode::parse,
+                     [] { (void)parse_json(R"([{"x": {"in": 1, "in": 1}}])", "a.json"); }),
              Catch::Contains("'in'"));
   CHECK_NOTHROW(parse_json(R"([{"a": {"a": 1}}, {"a": 2}])", "a.json"));
 }
 
-TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[io][unit]") {
+TEST_CASE("lists and objects nested deeper than a hundred are refused", "[io][unit]") {
   const auto nested = [](std::size_t depth, std::size_t closed) {
     return std::string(depth, '[') + std::string(closed, ']');
   };
@@ -56,7 +60,7 @@ TEST_CASE("what nests deeper than a hundred lists and objects is refused", "[io]
              Catch::Contains("nest deeper"));
 }
 
-// With time that grows as the square of these, this test would not end.
+// If time grew with the square of these sizes, this test would not end.
 TEST_CASE("long lists of objects and objects of many keys are read", "[io][unit]") {
   constexpr std::size_t count = 200000;
   std::string list = "[{}", object = "{\"k\": 0";
@@ -72,8 +76,9 @@ TEST_CASE("long lists of objects and objects of many keys are read", "[io][unit]
              Catch::Contains("key 'k7' is given twice"));
 }
 
-TEST_CASE("numbers, words, texts and empty parts are read as they stand", "[io][unit]") {
-  const char* text = R"({"a":[1,-2,18446744073709551615,0.5,true,false,null,"x",[],{}],"b":{"c":{}}})";
+TEST_CASE("numbers, literals, strings and empty containers are read unchanged", "[io][unit]") {
+  const char* text =
+      R"({"a":[1,-2,18446744073709551615,0.5,true,false,null,"x",[],{}],"b":{"c":{}}})";
   CHECK(parse_json(text, "a.json").dump() == text);
   CHECK(parse_json("7", "a.json") == 7);
 }

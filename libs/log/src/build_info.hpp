@@ -2,7 +2,7 @@
 
 namespace hamelin::log {
 
-/// What the configure step knows of this build; an empty text is not known.
+/// What the configure step knows about this build; an empty text means unknown.
 struct BuildInfo {
   const char *compiler, *flags, *type, *sanitizers, *git_commit, *octomap_version;
 };

@@ -20,8 +20,8 @@ namespace hamelin::log {
 
 namespace {
 
-// The text behind `key` and `separator` on the first line that begins with the key, quotes removed; empty if there is
-// none.
+// The text after `key` and `separator` on the first line that begins with the key, without quotes;
+// empty if there is no such line.
 std::string line_value(const char* file, std::string_view key, char separator) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
@@ -50,14 +50,16 @@ bool has_fma() {
 Json host() {
   std::string os = line_value("/etc/os-release", "PRETTY_NAME", '=');
   utsname system{};
-  if (::uname(&system) == 0) os += (os.empty() ? "" : ", ") + std::string(system.sysname) + " " + system.release;
+  if (::uname(&system) == 0)
+    os += (os.empty() ? "" : ", ") + std::string(system.sysname) + " " + system.release;
   return {{"os", known(os)},
           {"cpu", known(line_value("/proc/cpuinfo", "model name", ':'))},
           {"cores", ::sysconf(_SC_NPROCESSORS_ONLN)},
           {"fma", has_fma()}};
 }
 
-// The build-id note of the program itself, the first object listed; empty if the linker made none.
+// The build-id note of the program itself, which is the first object listed; empty if the linker
+// wrote none.
 std::string build_id() {
   std::string id;
   dl_iterate_phdr(
@@ -66,15 +68,19 @@ std::string build_id() {
           const auto& segment = object->dlpi_phdr[i];
           if (segment.p_type != PT_NOTE) continue;
           const std::size_t align = segment.p_align == 8 ? 8 : 4;
-          const auto padded = [align](std::size_t size) { return (size + align - 1) / align * align; };
-          const char* at = reinterpret_cast<const char*>(object->dlpi_addr + segment.p_vaddr);  // NOLINT
+          const auto padded = [align](std::size_t size) {
+            return (size + align - 1) / align * align;
+          };
+          const char* at =
+              reinterpret_cast<const char*>(object->dlpi_addr + segment.p_vaddr);  // NOLINT
           const char* const end = at + segment.p_memsz;
           while (at + sizeof(ElfW(Nhdr)) <= end) {
             ElfW(Nhdr) note;
             std::memcpy(&note, at, sizeof note);
             const char* const name = at + sizeof note;
             const char* const bytes = name + padded(note.n_namesz);
-            if (note.n_type == NT_GNU_BUILD_ID && note.n_namesz == 4 && std::memcmp(name, "GNU", 4) == 0) {
+            if (note.n_type == NT_GNU_BUILD_ID && note.n_namesz == 4 &&
+                std::memcmp(name, "GNU", 4) == 0) {
               for (std::size_t b = 0; b < note.n_descsz; ++b) {
                 constexpr const char* digits = "0123456789abcdef";
                 const auto byte = static_cast<unsigned char>(bytes[b]);
@@ -85,7 +91,7 @@ std::string build_id() {
             at = bytes + padded(note.n_descsz);
           }
         }
-        return 1;  // no other object
+        return 1;  // stop after the first object
       },
       &id);
   return id;
@@ -96,10 +102,12 @@ std::string build_id() {
 Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>& argv) {
   Json hashed = Json::array();
   for (const auto& [role, file] : inputs)
-    hashed.push_back({{"role", role}, {"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
+    hashed.push_back(
+        {{"role", role}, {"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
   std::error_code ec;
   const BuildInfo& build = build_info();
-  const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+  const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." +
+                            std::to_string(EIGEN_MAJOR_VERSION) + "." +
                             std::to_string(EIGEN_MINOR_VERSION);
   return {{"host", host()},
           {"isa", std::string(name_of(default_isa()))},

@@ -17,10 +17,12 @@ namespace hamelin::log {
 namespace {
 
 constexpr std::size_t chunk = std::size_t{1} << 16;
-// A frame of ours holds 256 lines and is kept back until its end vouches for it. A file compressed by hand may be one
-// frame of any size: beyond this it is handed on as it comes.
-constexpr std::size_t kept_back = std::size_t{8} << 20;
-// Logs of an arm at rest pack to a fiftieth. What unpacks to more than these times its size is no log but a trap.
+// A frame written by RunLog holds 256 lines and is buffered until its checksum is verified. A file
+// compressed by another program may be one frame of any size: beyond this size it is passed on as
+// it comes.
+constexpr std::size_t buffered_max = std::size_t{8} << 20;
+// Logs of an arm at rest compress to a fiftieth. A file that expands by more than these factors is
+// not a log but a decompression bomb.
 constexpr std::size_t unpacked_per_byte = 200, line_per_byte = 4;
 constexpr std::size_t line_always = std::size_t{1} << 20;
 
@@ -28,7 +30,7 @@ std::string place(const std::filesystem::path& file, std::size_t line) {
   return fmt::format("{}: line {}", file.string(), line);
 }
 
-// The schema of one kind of line, with what it refers to.
+// The schema of one kind of line, with the definitions that it refers to.
 Json line_schema(const std::string& type) {
   if (type == "result") {
     Json schema = Json::parse(schema_text("result"));
@@ -52,13 +54,13 @@ const Schema& schema_of(const std::string& type) {
   return all.at(type);
 }
 
-// The line's type, if it is one of ours. @throws Error invalid
+// The line's type. @throws Error invalid for an unknown type
 std::string type_of(const Json& line, const std::string& where) {
   const Json type = line.value("type", Json(nullptr));
   for (const char* known : line_types)
     if (type == known) return known;
-  throw Error(ErrorCode::invalid,
-              fmt::format("{}: type {}, expected header, tick, event or result", where, type.dump()));
+  throw Error(ErrorCode::invalid, fmt::format("{}: type {}, expected header, tick, event or result",
+                                              where, type.dump()));
 }
 
 }  // namespace
@@ -66,9 +68,9 @@ std::string type_of(const Json& line, const std::string& where) {
 struct LogReader::Decompressor {
   ZSTD_DCtx* context = ZSTD_createDCtx();
   std::string input, frame;
-  std::size_t at = 0;                  ///< read up to here in `input`
-  std::size_t offset = 0, number = 1;  ///< where the frame begins in the file, and its number
-  std::size_t taken = 0, given = 0;    ///< bytes of the file taken in so far, and of text given out
+  std::size_t at = 0;                  ///< end of what was read of `input`
+  std::size_t offset = 0, number = 1;  ///< of the frame: first byte in the file, and its number
+  std::size_t taken = 0, given = 0;    ///< bytes read from the file so far, and bytes of text made
 
   Decompressor() {
     if (context == nullptr) throw std::bad_alloc();
@@ -82,13 +84,15 @@ LogReader::LogReader(const std::filesystem::path& file) : file_(file) {
   std::error_code ec;
   if (std::filesystem::is_directory(file, ec))
     throw Error(ErrorCode::io, fmt::format("{}: cannot be read: Is a directory", file.string()));
+  // A device may be endless.
   if (std::filesystem::is_character_file(file, ec) || std::filesystem::is_block_file(file, ec))
-    throw Error(ErrorCode::io, fmt::format("{}: is a device, expected a file", file.string()));  // it may have no end
+    throw Error(ErrorCode::io, fmt::format("{}: is a device, expected a file", file.string()));
   errno = 0;
   in_.open(file, std::ios::binary);
   if (!in_)
-    throw Error(ErrorCode::io, fmt::format("{}: cannot be read: {}", file.string(),
-                                           errno != 0 ? std::strerror(errno) : "the stream failed"));
+    throw Error(ErrorCode::io,
+                fmt::format("{}: cannot be read: {}", file.string(),
+                            errno != 0 ? std::strerror(errno) : "the stream failed"));
   constexpr std::string_view magic = "\x28\xb5\x2f\xfd";
   std::string first(magic.size(), '\0');
   in_.read(first.data(), static_cast<std::streamsize>(first.size()));
@@ -111,22 +115,24 @@ bool LogReader::read_more() {
     in_.read(bytes.data() + before, static_cast<std::streamsize>(chunk));
     const auto got = static_cast<std::size_t>(in_.gcount());
     bytes.resize(before + got);
-    if (in_.bad()) throw Error(ErrorCode::io, fmt::format("{}: cannot be read: the stream failed", file_.string()));
+    if (in_.bad())
+      throw Error(ErrorCode::io,
+                  fmt::format("{}: cannot be read: the stream failed", file_.string()));
     return got;
   };
   if (!decompressor_) return fill(text_) > 0;
 
   auto& d = *decompressor_;
   const auto damaged = [&](const std::string& what) {
-    return Error(ErrorCode::parse,
-                 fmt::format("{}: frame {} at byte {}: {}", file_.string(), d.number, d.offset, what));
+    return Error(ErrorCode::parse, fmt::format("{}: frame {} at byte {}: {}", file_.string(),
+                                               d.number, d.offset, what));
   };
   for (;;) {
     if (d.at == d.input.size()) {
       d.input.clear();
       d.at = 0;
       if (fill(d.input) == 0) {
-        // what a crash left of a frame is of no use: without its end nothing vouches for it
+        // An incomplete frame is skipped: its checksum is at its end.
         cut_ = d.taken > d.offset;
         return false;
       }
@@ -136,15 +142,17 @@ bool LogReader::read_more() {
     ZSTD_inBuffer in{d.input.data(), d.input.size(), d.at};
     ZSTD_outBuffer out{d.frame.data(), d.frame.size(), before};
     const std::size_t left = ZSTD_decompressStream(d.context, &out, &in);
-    if (ZSTD_isError(left) != 0) throw damaged(fmt::format("is damaged ({})", ZSTD_getErrorName(left)));
+    if (ZSTD_isError(left) != 0)
+      throw damaged(fmt::format("is damaged ({})", ZSTD_getErrorName(left)));
     d.taken += in.pos - d.at;
     d.at = in.pos;
     d.frame.resize(out.pos);
     d.given += out.pos - before;
-    if (d.given > kept_back + unpacked_per_byte * d.taken)
+    if (d.given > buffered_max + unpacked_per_byte * d.taken)
       throw damaged(
-          fmt::format("unpacks to more than {} times its size, expected a log of hamelin", unpacked_per_byte));
-    if (left == 0 || d.frame.size() > kept_back) {
+          fmt::format("decompresses to more than {} times its size, expected a log of hamelin",
+                      unpacked_per_byte));
+    if (left == 0 || d.frame.size() > buffered_max) {
       text_ += d.frame;
       d.frame.clear();
       if (left != 0) return true;
@@ -157,10 +165,12 @@ bool LogReader::read_more() {
 
 bool LogReader::next_text(std::string_view& line) {
   const auto check_size = [this](std::size_t bytes) {
-    const std::size_t most = decompressor_ ? line_always + line_per_byte * decompressor_->taken : bytes;
+    const std::size_t most =
+        decompressor_ ? line_always + line_per_byte * decompressor_->taken : bytes;
     if (bytes > most)
       throw Error(ErrorCode::parse,
-                  fmt::format("{}: has more than {} bytes, expected a log of hamelin", place(file_, lines_ + 1), most));
+                  fmt::format("{}: has more than {} bytes, expected a log of hamelin",
+                              place(file_, lines_ + 1), most));
   };
   std::size_t end = text_.find('\n', at_);
   while (end == std::string::npos) {
@@ -185,7 +195,9 @@ bool LogReader::next(Json& line) {
   std::string_view text;
   if (!next_text(text)) return false;
   line = parse_json(text, where());
-  if (!line.is_object()) throw Error(ErrorCode::parse, fmt::format("{}: no JSON object, expected one a line", where()));
+  if (!line.is_object())
+    throw Error(ErrorCode::parse,
+                fmt::format("{}: not a JSON object, expected one per line", where()));
   return true;
 }
 
@@ -209,10 +221,12 @@ LogSummary check_log(const std::filesystem::path& file) {
     const std::string where = reader.where();
     const std::string type = type_of(line, where);
     if ((type == "header") != (reader.lines() == 1))
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: type \"{}\", expected the header first, and only there", where, type));
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{}: type \"{}\", expected a header on line 1 and only there", where, type));
     if (summary.has_result)
-      throw Error(ErrorCode::invalid, fmt::format("{}: stands behind the result, expected nothing there", where));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: follows the result, expected nothing after it", where));
     summary.ticks += type == "tick" ? 1 : 0;
     summary.events += type == "event" ? 1 : 0;
     summary.has_result = type == "result";
@@ -220,13 +234,16 @@ LogSummary check_log(const std::filesystem::path& file) {
     if (type == "tick") {
       const double k = line["k"].get<double>();
       if (k <= k_before)
-        throw Error(ErrorCode::invalid, fmt::format("{}: /k: {} after {}, expected rising steps", where, k, k_before));
+        throw Error(
+            ErrorCode::invalid,
+            fmt::format("{}: /k: {} after {}, expected increasing steps", where, k, k_before));
       k_before = k;
     }
   }
   summary.cut = reader.cut();
   if (reader.lines() == 0)
-    throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a header", file.string()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has no complete line, expected a header", file.string()));
   return summary;
 }
 

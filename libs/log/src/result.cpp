@@ -31,7 +31,8 @@ Json goal(const std::optional<Result::Goal>& goal) {
 
 Json solver(const SolverSummary& s) {
   const auto mean = [&](long sum) {
-    return s.steps > 0 ? Json(static_cast<double>(sum) / static_cast<double>(s.steps)) : Json(nullptr);
+    return s.steps > 0 ? Json(static_cast<double>(sum) / static_cast<double>(s.steps))
+                       : Json(nullptr);
   };
   return {{"updates_mean", mean(s.updates)},
           {"updates_max", s.updates_max},
@@ -92,41 +93,43 @@ int exit_code(Outcome outcome) noexcept {
 
 Json to_json(const Result& r) {
   Json tick_us = nullptr;
-  if (r.tick_us) tick_us = {{"p50", r.tick_us->p50}, {"p99", r.tick_us->p99}, {"max", r.tick_us->max}};
-  Json document = {{"schema", "hamelin.result/1"},
-                   {"version", std::string(version())},
-                   {"scene", r.scene},
-                   {"planner", optional(r.planner)},
-                   {"integrator", r.integrator},
-                   {"outcome", std::string(to_string(r.outcome))},
-                   {"cause", r.cause.empty() ? Json(nullptr) : Json(r.cause)},
-                   {"time_s", r.time_s},
-                   {"steps", r.steps},
-                   {"q", array(r.q)},
-                   {"v", array(r.v)},
-                   {"v_abs_max", r.v_abs_max.size() > 0 ? array(r.v_abs_max) : Json(nullptr)},
-                   {"a_abs_max", r.a_abs_max.size() > 0 ? array(r.a_abs_max) : Json(nullptr)},
-                   {"jerk_abs_max", r.jerk_abs_max.size() > 0 ? array(r.jerk_abs_max) : Json(nullptr)},
-                   {"energy_initial_J", r.energy_initial_J},
-                   {"energy_final_J", r.energy_final_J},
-                   {"energy_error_max_J", r.energy_error_max_J},
-                   {"min_clearance_m", optional(r.min_clearance_m)},
-                   {"min_self_clearance_m", optional(r.min_self_clearance_m)},
-                   {"goal", goal(r.goal)},
-                   {"solver", solver(r.solver)},
-                   {"gyroscopic_work_J", r.gyroscopic_work_J},
-                   {"filter_work_J", r.filter_work_J},
-                   {"recovery_work_J", r.recovery_work_J},
-                   {"dissipated_J", r.dissipated_J},
-                   {"held_work_J", r.held_work_J},
-                   {"node_work_J", r.node_work_J},
-                   {"saturated_share", optional(r.saturated_share)},
-                   {"certified_share", optional(r.certified_share)},
-                   {"tightest_step_m", optional(r.tightest_step_m)},
-                   {"seed", r.seed},
-                   {"warnings", r.warnings},
-                   {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
-                   {"provenance", r.provenance}};
+  if (r.tick_us)
+    tick_us = {{"p50", r.tick_us->p50}, {"p99", r.tick_us->p99}, {"max", r.tick_us->max}};
+  Json document = {
+      {"schema", "hamelin.result/1"},
+      {"version", std::string(version())},
+      {"scene", r.scene},
+      {"planner", optional(r.planner)},
+      {"integrator", r.integrator},
+      {"outcome", std::string(to_string(r.outcome))},
+      {"cause", r.cause.empty() ? Json(nullptr) : Json(r.cause)},
+      {"time_s", r.time_s},
+      {"steps", r.steps},
+      {"q", array(r.q)},
+      {"v", array(r.v)},
+      {"v_abs_max", r.v_abs_max.size() > 0 ? array(r.v_abs_max) : Json(nullptr)},
+      {"a_abs_max", r.a_abs_max.size() > 0 ? array(r.a_abs_max) : Json(nullptr)},
+      {"jerk_abs_max", r.jerk_abs_max.size() > 0 ? array(r.jerk_abs_max) : Json(nullptr)},
+      {"energy_initial_J", r.energy_initial_J},
+      {"energy_final_J", r.energy_final_J},
+      {"energy_error_max_J", r.energy_error_max_J},
+      {"min_clearance_m", optional(r.min_clearance_m)},
+      {"min_self_clearance_m", optional(r.min_self_clearance_m)},
+      {"goal", goal(r.goal)},
+      {"solver", solver(r.solver)},
+      {"gyroscopic_work_J", r.gyroscopic_work_J},
+      {"filter_work_J", r.filter_work_J},
+      {"recovery_work_J", r.recovery_work_J},
+      {"dissipated_J", r.dissipated_J},
+      {"held_work_J", r.held_work_J},
+      {"node_work_J", r.node_work_J},
+      {"saturated_share", optional(r.saturated_share)},
+      {"certified_share", optional(r.certified_share)},
+      {"tightest_step_m", optional(r.tightest_step_m)},
+      {"seed", r.seed},
+      {"warnings", r.warnings},
+      {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
+      {"provenance", r.provenance}};
   for (const auto& replaced : null_non_finite(document))
     document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
   return document;

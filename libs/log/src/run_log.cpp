@@ -24,7 +24,8 @@ void null_non_finite(Json& value, const std::string& pointer, std::vector<std::s
     replaced.push_back(fmt::format("{} is {}", pointer, number));
     value = nullptr;
   } else if (value.is_object()) {
-    for (auto& [key, item] : value.items()) null_non_finite(item, fmt::format("{}/{}", pointer, key), replaced);
+    for (auto& [key, item] : value.items())
+      null_non_finite(item, fmt::format("{}/{}", pointer, key), replaced);
   } else if (value.is_array()) {
     for (std::size_t i = 0; i < value.size(); ++i)
       null_non_finite(value[i], fmt::format("{}/{}", pointer, i), replaced);
@@ -32,7 +33,8 @@ void null_non_finite(Json& value, const std::string& pointer, std::vector<std::s
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, int reason) {
-  throw Error(ErrorCode::io, fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+  throw Error(ErrorCode::io,
+              fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
 }
 
 }  // namespace
@@ -51,16 +53,17 @@ void check_writable(const std::filesystem::path& file) {
     return;
   }
   if (errno != EEXIST) refuse(file, errno);
-  // O_NONBLOCK: a named pipe without a reader is refused, not waited for.
+  // O_NONBLOCK: a named pipe without a reader is refused instead of blocking.
   fd = ::open(file.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) refuse(file, errno);
   ::close(fd);
 }
 
 double estimated_bytes(int dof, double ticks, bool compressed) noexcept {
-  // A number takes about 20 characters. A tick holds q, v, tau and about two channels, its names and 15 single figures.
+  // A number takes about 20 characters. A tick holds q, v, tau and about two channels, the names of
+  // its fields and 15 single numbers.
   const double line = 650.0 + 20.0 * 5.0 * dof;
-  // zstd -3 on such lines: 2.5 to 3 times less, for most of it is digits
+  // zstd -3 makes such lines 2.5 to 3 times smaller, as they consist mostly of digits.
   return ticks * line / (compressed ? 2.7 : 1.0);
 }
 
@@ -73,12 +76,13 @@ void LineSink::write(const char* type, const Json& fields) {
   if (!replaced.empty())
     event = {{"type", "event"},
              {"time_s", line.value("time_s", Json(nullptr))},
-             {"text", fmt::format("not finite in the {} above, written as null: {}", type, fmt::join(replaced, ", "))}};
+             {"text", fmt::format("not finite in the {} above, written as null: {}", type,
+                                  fmt::join(replaced, ", "))}};
   take(std::move(line));
   if (!replaced.empty()) take(std::move(event));
 }
 
-/// Gathers the lines of a frame.
+/// Collects the lines of a frame.
 struct RunLog::Compressor {
   ZSTD_CCtx* context = ZSTD_createCCtx();
   std::string lines, frame;
@@ -95,8 +99,10 @@ struct RunLog::Compressor {
 
   void compress() {
     frame.resize(ZSTD_compressBound(lines.size()));
-    const std::size_t size = ZSTD_compress2(context, frame.data(), frame.size(), lines.data(), lines.size());
-    if (ZSTD_isError(size) != 0) throw std::bad_alloc();  // the buffer is large enough: memory is all that can lack
+    const std::size_t size =
+        ZSTD_compress2(context, frame.data(), frame.size(), lines.data(), lines.size());
+    // The buffer is large enough, so only memory can be missing.
+    if (ZSTD_isError(size) != 0) throw std::bad_alloc();
     frame.resize(size);
     lines.clear();
     count = 0;
@@ -111,7 +117,7 @@ RunLog::RunLog(const std::filesystem::path& file) : file_(file) {
 RunLog::~RunLog() {
   try {
     flush();
-  } catch (const std::exception&) {  // nobody is left to tell
+  } catch (const std::exception&) {  // a destructor cannot report it
   }
   if (fd_ >= 0) ::close(fd_);
 }
@@ -128,15 +134,18 @@ void RunLog::append(std::string_view bytes) {
 }
 
 void RunLog::take(Json line) {
-  // A name that is not UTF-8 (a path, say) is shown with replacement characters rather than losing the record.
+  // Names that are not UTF-8 (such as paths) get replacement characters, so that the line is not
+  // lost.
   const std::string text = line.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
   if (!compressor_) {
     append(text);
     return;
   }
   compressor_->lines += text;
-  // The header stands in a frame of its own, so that it is there from the start.
-  if (++compressor_->count == lines_per_frame || line["type"] == "header" || line["type"] == "result") flush();
+  // The header has a frame of its own, so that it can be read from the start.
+  if (++compressor_->count == lines_per_frame || line["type"] == "header" ||
+      line["type"] == "result")
+    flush();
 }
 
 void RunLog::flush() {

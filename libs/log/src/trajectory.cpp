@@ -23,7 +23,7 @@ VectorXd vector_of(const Json& numbers) {
   return x;
 }
 
-// A field of CSV: quoted where it must be.
+// A CSV field, quoted if it must be.
 std::string field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted(1, '"');
@@ -36,7 +36,7 @@ void append_numbers(std::string& row, const VectorXd& x) {
   for (const double number : x) row += std::isfinite(number) ? fmt::format(",{}", number) : ",";
 }
 
-// Whole seconds and the nanoseconds beyond.
+// Whole seconds and the remaining nanoseconds.
 Json duration(double time_s) {
   double seconds = std::floor(time_s);
   double nanoseconds = std::round((time_s - seconds) * 1e9);
@@ -44,7 +44,8 @@ Json duration(double time_s) {
     seconds += 1.0;
     nanoseconds = 0.0;
   }
-  return {{"sec", static_cast<std::int64_t>(seconds)}, {"nanosec", static_cast<std::int64_t>(nanoseconds)}};
+  return {{"sec", static_cast<std::int64_t>(seconds)},
+          {"nanosec", static_cast<std::int64_t>(nanoseconds)}};
 }
 
 Json finite_array(const VectorXd& x, double time_s, const char* what) {
@@ -53,7 +54,9 @@ Json finite_array(const VectorXd& x, double time_s, const char* what) {
     if (!std::isfinite(number))
       throw Error(
           ErrorCode::invalid,
-          fmt::format("{} at {} s: is not finite, expected numbers; CSV leaves such cells empty", what, time_s));
+          fmt::format(
+              "{} at {} s: is not finite, expected finite numbers; CSV leaves such cells empty",
+              what, time_s));
     array.push_back(number);
   }
   return array;
@@ -66,25 +69,31 @@ Trajectory read_trajectory(const std::filesystem::path& log) {
   Trajectory trajectory;
   Json line;
   if (!reader.next(line) || line.value("type", Json()) != "header")
-    throw Error(ErrorCode::invalid, fmt::format("{}: has no header, expected a log of hamelin", log.string()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has no header, expected a log of hamelin", log.string()));
   check_line(line, reader.where());
-  for (const auto& joint : line["joints"]) trajectory.joints.push_back(joint["name"].get<std::string>());
+  for (const auto& joint : line["joints"])
+    trajectory.joints.push_back(joint["name"].get<std::string>());
   const auto joints = static_cast<Eigen::Index>(trajectory.joints.size());
   while (reader.next(line)) {
     if (line.value("type", Json()) != "tick") continue;
     check_line(line, reader.where());
-    Trajectory::Point point{line["time_s"].get<double>(), vector_of(line["q"]), vector_of(line["v"]),
-                            vector_of(line.value("tau", Json::array()))};
-    if (point.q.size() != joints || point.v.size() != joints || (point.tau.size() != 0 && point.tau.size() != joints))
+    Trajectory::Point point{line["time_s"].get<double>(), vector_of(line["q"]),
+                            vector_of(line["v"]), vector_of(line.value("tau", Json::array()))};
+    if (point.q.size() != joints || point.v.size() != joints ||
+        (point.tau.size() != 0 && point.tau.size() != joints))
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: joint vectors of another length, expected {}", reader.where(), joints));
+                  fmt::format("{}: joint vectors of another length, expected {} numbers",
+                              reader.where(), joints));
     if (!trajectory.points.empty() && !(point.time_s > trajectory.points.back().time_s))
-      throw Error(ErrorCode::invalid, fmt::format("{}: /time_s: {} s after {} s, expected rising times", reader.where(),
-                                                  point.time_s, trajectory.points.back().time_s));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /time_s: {} s after {} s, expected increasing times",
+                              reader.where(), point.time_s, trajectory.points.back().time_s));
     trajectory.points.push_back(std::move(point));
   }
   if (trajectory.points.empty())
-    throw Error(ErrorCode::invalid, fmt::format("{}: has no tick, expected some motion", log.string()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has no ticks, expected a motion", log.string()));
   return trajectory;
 }
 
@@ -97,20 +106,24 @@ Trajectory resampled(const Trajectory& trajectory, double rate_hz) {
   const double begin = points.front().time_s, span = points.back().time_s - begin;
   if (span * rate_hz > 1e8)
     throw Error(ErrorCode::usage,
-                fmt::format("rate {} Hz: makes {:.3g} points, expected at most 1e8", rate_hz, span * rate_hz));
-  // a sample that meets the last point but for rounding is the last point
-  const auto whole = static_cast<long>(std::ceil(span * rate_hz - 1e-6));
+                fmt::format("rate {} Hz: gives {:.3g} points, expected at most 1e8", rate_hz,
+                            span * rate_hz));
+  // A sample that equals the last point up to rounding is the last point.
+  const auto sample_count = static_cast<long>(std::ceil(span * rate_hz - 1e-6));
   std::size_t at = 0;
-  for (long i = 0; i < whole; ++i) {
+  for (long i = 0; i < sample_count; ++i) {
     const double time_s = begin + static_cast<double>(i) / rate_hz;
     while (at + 2 < points.size() && points[at + 1].time_s <= time_s) ++at;
     const auto &a = points[at], &b = points[at + 1];
+    // docs/theory.md (13.42)
     const double h = b.time_s - a.time_s, u = (time_s - a.time_s) / h;
     const double u2 = u * u, u3 = u2 * u;
     out.points.push_back(
         {time_s,
-         (2 * u3 - 3 * u2 + 1) * a.q + (u3 - 2 * u2 + u) * h * a.v + (3 * u2 - 2 * u3) * b.q + (u3 - u2) * h * b.v,
-         6 * (u2 - u) / h * (a.q - b.q) + (3 * u2 - 4 * u + 1) * a.v + (3 * u2 - 2 * u) * b.v, a.tau});
+         (2 * u3 - 3 * u2 + 1) * a.q + (u3 - 2 * u2 + u) * h * a.v + (3 * u2 - 2 * u3) * b.q +
+             (u3 - u2) * h * b.v,
+         6 * (u2 - u) / h * (a.q - b.q) + (3 * u2 - 4 * u + 1) * a.v + (3 * u2 - 2 * u) * b.v,
+         a.tau});
   }
   out.points.push_back(points.back());
   return out;
@@ -122,7 +135,8 @@ std::string to_csv(const Trajectory& trajectory) {
   std::string text = "time_s";
   for (const char* kind : {"q_", "v_", "tau_"}) {
     if (!torques && kind[0] == 't') continue;
-    for (const auto& joint : trajectory.joints) text += fmt::format(",{}", field(fmt::format("{}{}", kind, joint)));
+    for (const auto& joint : trajectory.joints)
+      text += fmt::format(",{}", field(fmt::format("{}{}", kind, joint)));
   }
   text += '\n';
   for (const auto& point : trajectory.points) {

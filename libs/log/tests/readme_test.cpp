@@ -9,24 +9,26 @@
 
 using namespace hamelin;
 
-TEST_CASE("the README's example writes a log that checks", "[log][unit]") {
-  const auto file = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "log_readme.jsonl";
+TEST_CASE("the README's example writes a valid log", "[log][unit]") {
+  const auto file =
+      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "log_readme.jsonl";
   std::filesystem::create_directories(file.parent_path());
   std::filesystem::remove(file);
   // clang-format off
   // [example]
 {
   log::RunLog run(file);
-  run.write("header", {{"program", "integrate"}, {"scene", "spring.json"}, {"every", 1}, {"joints", Json::array()},
-                       {"config", {{"step_s", 0.001}}}, {"provenance", log::provenance({})}});
-  run.write("event", {{"time_s", 0.0}, {"text", "a spring joins in"}});
+  run.write("header", {{"program", "integrate"}, {"scene", "spring.json"}, {"every", 1},
+                       {"joints", Json::array()}, {"config", {{"step_s", 0.001}}},
+                       {"provenance", log::provenance({})}});
+  run.write("event", {{"time_s", 0.0}, {"text", "a spring is attached"}});
   log::Result result;
   result.scene = "spring.json";
   result.integrator = "rk4";
   result.outcome = log::Outcome::stalled;
   run.write("result", log::to_json(result));
 }
-const log::LogSummary found = log::check_log(file);  // throws, naming the line, if it is no log
+const log::LogSummary found = log::check_log(file);  // throws, naming the line, if it is not a log
 const int code = log::exit_code(log::Outcome::stalled);
   // [example]
   // clang-format on

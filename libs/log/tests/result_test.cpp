@@ -23,7 +23,9 @@ log::Result some_result() {
 
 }  // namespace
 
-TEST_CASE("a result has the keys of its schema, in a fixed order, and what does not apply is null", "[log][unit]") {
+TEST_CASE(
+    "a result has the keys of its schema in a fixed order, with null for keys that do not apply",
+    "[log][unit]") {
   const Json document = log::to_json(some_result());
   CHECK_NOTHROW(check_shipped_schema(document, "result", "result"));
   std::vector<std::string> keys;
@@ -31,7 +33,8 @@ TEST_CASE("a result has the keys of its schema, in a fixed order, and what does 
   const std::vector<std::string> first = {"schema",     "version", "scene", "planner",
                                           "integrator", "outcome", "cause", "time_s"};
   REQUIRE(keys.size() > first.size());
-  CHECK(std::vector<std::string>(keys.begin(), keys.begin() + static_cast<long>(first.size())) == first);
+  CHECK(std::vector<std::string>(keys.begin(), keys.begin() + static_cast<long>(first.size())) ==
+        first);
   for (const char* key : {"planner", "cause", "min_clearance_m", "goal", "certified_share"}) {
     CAPTURE(key);
     CHECK(document[key].is_null());
@@ -68,7 +71,8 @@ TEST_CASE("non-finite numbers become null and are named in the warnings", "[log]
   CHECK(document["energy_final_J"].is_null());
   REQUIRE(document["warnings"].size() == 2);
   CHECK(document["warnings"][0].get<std::string>().find("/q/1 is nan") != std::string::npos);
-  CHECK(document["warnings"][1].get<std::string>().find("/energy_final_J is inf") != std::string::npos);
+  CHECK(document["warnings"][1].get<std::string>().find("/energy_final_J is inf") !=
+        std::string::npos);
   CHECK_NOTHROW(check_shipped_schema(document, "result", "result"));
 }
 
@@ -78,7 +82,7 @@ TEST_CASE("a result before its first step has no mean", "[log][unit]") {
   CHECK(log::to_json(result)["solver"]["updates_mean"].is_null());
 }
 
-TEST_CASE("outcomes have the exit codes of the contract", "[log][unit]") {
+TEST_CASE("outcomes have the documented exit codes", "[log][unit]") {
   CHECK(log::exit_code(Outcome::completed) == 0);
   CHECK(log::exit_code(Outcome::reached) == 0);
   CHECK(log::exit_code(Outcome::stalled) == 1);

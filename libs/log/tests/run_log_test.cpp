@@ -31,8 +31,9 @@ void put(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
 }
 
-const Json header = {{"program", "integrate"},   {"scene", "a.json"},       {"every", 1},
-                     {"config", Json::object()}, {"joints", Json::array()}, {"provenance", Json::object()}};
+const Json header = {
+    {"program", "integrate"},   {"scene", "a.json"},       {"every", 1},
+    {"config", Json::object()}, {"joints", Json::array()}, {"provenance", Json::object()}};
 
 log::Result result() {
   log::Result r;
@@ -41,7 +42,7 @@ log::Result result() {
   return r;
 }
 
-std::string what_of_check(const fs::path& file) {
+std::string check_error(const fs::path& file) {
   try {
     log::check_log(file);
   } catch (const Error& e) {
@@ -87,7 +88,8 @@ TEST_CASE("every line is in the file as soon as it is written", "[log][unit]") {
 
 TEST_CASE("doubles come back bit for bit", "[log][unit]") {
   const auto file = fresh_directory("bits") / "run.jsonl";
-  const std::vector<double> numbers = {0.1, 1.0 / 3.0, 5e-324, -1.7976931348623157e308, 6.02214076e23};
+  const std::vector<double> numbers = {0.1, 1.0 / 3.0, 5e-324, -1.7976931348623157e308,
+                                       6.02214076e23};
   log::RunLog record(file);
   Json fields = tick(0);
   fields["q"] = numbers;
@@ -95,7 +97,7 @@ TEST_CASE("doubles come back bit for bit", "[log][unit]") {
   CHECK(log::read_log(file).lines.at(0)["q"].get<std::vector<double>>() == numbers);
 }
 
-TEST_CASE("non-finite numbers are written as null and told in an event", "[log][unit]") {
+TEST_CASE("non-finite numbers are written as null and named in an event", "[log][unit]") {
   const auto file = fresh_directory("nan") / "run.jsonl";
   {
     log::RunLog record(file);
@@ -110,11 +112,12 @@ TEST_CASE("non-finite numbers are written as null and told in an event", "[log][
   CHECK(log.lines[1]["q"][0].is_null());
   CHECK(log.lines[1]["energy"]["kinetic_J"].is_null());
   CHECK(log.lines[2]["type"] == "event");
-  CHECK_THAT(log.lines[2]["text"].get<std::string>(), Contains("/q/0 is nan") && Contains("/energy/kinetic_J is -inf"));
+  CHECK_THAT(log.lines[2]["text"].get<std::string>(),
+             Contains("/q/0 is nan") && Contains("/energy/kinetic_J is -inf"));
   CHECK_NOTHROW(log::check_log(file));
 }
 
-TEST_CASE("a cut line at the end is left out, the lines before it stay", "[log][unit]") {
+TEST_CASE("an incomplete line at the end is skipped, the lines before it are read", "[log][unit]") {
   const auto file = fresh_directory("cut") / "run.jsonl";
   {
     log::RunLog record(file);
@@ -145,23 +148,26 @@ TEST_CASE("check_log names the line that breaks the rules", "[log][unit]") {
     fs::remove(file);
     log::RunLog record(file);
     for (const auto& [type, fields] : lines) record.write(type, fields);
-    return what_of_check(file);
+    return check_error(file);
   };
   CHECK(with({{"header", header}, {"tick", tick(0)}}).empty());
-  CHECK_THAT(with({{"tick", tick(0)}}), Contains("line 1") && Contains("header first"));
+  CHECK_THAT(with({{"tick", tick(0)}}), Contains("line 1") && Contains("a header on line 1"));
   CHECK_THAT(with({{"header", header}, {"header", header}}), Contains("line 2"));
   CHECK_THAT(with({{"header", header}, {"tick", tick(1)}, {"tick", tick(1)}}),
-             Contains("line 3: /k") && Contains("rising"));
-  CHECK_THAT(with({{"header", header}, {"result", log::to_json(result())}, {"tick", tick(0)}}), Contains("line 3"));
+             Contains("line 3: /k") && Contains("increasing"));
+  CHECK_THAT(with({{"header", header}, {"result", log::to_json(result())}, {"tick", tick(0)}}),
+             Contains("line 3"));
   CHECK_THAT(with({{"header", header}, {"note", header}}), Contains("line 2") && Contains("note"));
   Json extra = tick(1);
   extra["speed"] = 1;
-  CHECK_THAT(with({{"header", header}, {"tick", tick(0)}, {"tick", extra}}), Contains("line 3") && Contains("speed"));
+  CHECK_THAT(with({{"header", header}, {"tick", tick(0)}, {"tick", extra}}),
+             Contains("line 3") && Contains("speed"));
   Json short_tick = tick(0);
   short_tick.erase("q");
-  CHECK_THAT(with({{"header", header}, {"tick", short_tick}}), Contains("line 2") && Contains("'q' is missing"));
+  CHECK_THAT(with({{"header", header}, {"tick", short_tick}}),
+             Contains("line 2") && Contains("'q' is missing"));
   put(file, "");
-  CHECK_THAT(what_of_check(file), Contains("no whole line"));
+  CHECK_THAT(check_error(file), Contains("no complete line"));
 }
 
 TEST_CASE("a log named .zst is compressed, and read back as the same lines", "[log][zstd]") {
@@ -172,12 +178,14 @@ TEST_CASE("a log named .zst is compressed, and read back as the same lines", "[l
     for (long k = 0; k < 1000; ++k) record.write("tick", tick(k));
     record.write("result", log::to_json(result()));
   }
-  CHECK(log::read_log(directory / "run.jsonl.zst").lines == log::read_log(directory / "run.jsonl").lines);
+  CHECK(log::read_log(directory / "run.jsonl.zst").lines ==
+        log::read_log(directory / "run.jsonl").lines);
   CHECK(log::check_log(directory / "run.jsonl.zst").ticks == 1000);
   CHECK(fs::file_size(directory / "run.jsonl.zst") * 3 < fs::file_size(directory / "run.jsonl"));
 }
 
-TEST_CASE("a compressed log has its header at once, and loses at most a frame of lines", "[log][zstd]") {
+TEST_CASE("a compressed log has its header at once, and a crash loses at most a frame of lines",
+          "[log][zstd]") {
   const auto file = fresh_directory("frames") / "run.jsonl.zst";
   log::RunLog record(file);
   record.write("header", header);
@@ -189,11 +197,11 @@ TEST_CASE("a compressed log has its header at once, and loses at most a frame of
   CHECK(log::read_log(file).lines.size() == 1 + static_cast<std::size_t>(ticks));
 }
 
-TEST_CASE("a log cut anywhere is read up to its last whole line or frame", "[log][zstd]") {
+TEST_CASE("a log cut anywhere is read up to its last complete line or frame", "[log][zstd]") {
   const auto directory = fresh_directory("cuts");
   for (const char* name : {"run.jsonl", "run.jsonl.zst"}) {
     CAPTURE(name);
-    std::vector<std::uintmax_t> ends = {0};  // of what is whole, in bytes
+    std::vector<std::uintmax_t> ends = {0};  // of complete lines or frames [bytes]
     std::vector<std::size_t> lines = {0};
     {
       log::RunLog record(directory / name);
@@ -208,29 +216,30 @@ TEST_CASE("a log cut anywhere is read up to its last whole line or frame", "[log
       for (long k = 0; k < 700; ++k) write("tick", tick(k));
       write("result", log::to_json(result()));
     }
-    const std::string whole = read_file(directory / name);
+    const std::string content = read_file(directory / name);
     const auto all = log::read_log(directory / name).lines;
     Rng random(7);
     for (int i = 0; i < 200; ++i) {
-      const auto at = static_cast<std::uintmax_t>(random.uniform(0.0, static_cast<double>(whole.size())));
+      const auto at =
+          static_cast<std::uintmax_t>(random.uniform(0.0, static_cast<double>(content.size())));
       CAPTURE(at);
-      put(directory / "cut", whole.substr(0, at));
+      put(directory / "cut", content.substr(0, at));
       // the last write that ended before the cut
-      std::size_t wanted = 0;
+      std::size_t expected = 0;
       bool clean = at == 0;
       for (std::size_t n = 1; n < ends.size(); ++n) {
-        if (ends[n] <= at) wanted = lines[n];
+        if (ends[n] <= at) expected = lines[n];
         clean = clean || ends[n] == at;
       }
       const auto read = log::read_log(directory / "cut");
-      REQUIRE(read.lines.size() == wanted);
+      REQUIRE(read.lines.size() == expected);
       CHECK(read.cut != clean);
       CHECK(std::equal(read.lines.begin(), read.lines.end(), all.begin()));
     }
   }
 }
 
-TEST_CASE("a damaged frame is named, and a file compressed by hand is read", "[log][zstd]") {
+TEST_CASE("a damaged frame is named", "[log][zstd]") {
   const auto directory = fresh_directory("damaged");
   const auto file = directory / "run.jsonl.zst";
   {
@@ -241,25 +250,27 @@ TEST_CASE("a damaged frame is named, and a file compressed by hand is read", "[l
   std::string bytes = read_file(file);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
   put(file, bytes);
-  CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl.zst: frame ") && Contains("is damaged"));
+  CHECK_THROWS_WITH(log::read_log(file),
+                    Contains("run.jsonl.zst: frame ") && Contains("is damaged"));
 }
 
-TEST_CASE("a small file that unpacks to no end is refused", "[log][zstd]") {
+TEST_CASE("a small file that expands to a huge one is refused", "[log][zstd]") {
   const auto file = fresh_directory("bomb") / "run.jsonl.zst";
   const auto record = [&](std::size_t lines, std::size_t bytes) {
     log::RunLog log(file);
     log.write("header", header);
-    for (std::size_t i = 0; i < lines; ++i) log.write("event", {{"time_s", 0.0}, {"text", std::string(bytes, 'x')}});
+    for (std::size_t i = 0; i < lines; ++i)
+      log.write("event", {{"time_s", 0.0}, {"text", std::string(bytes, 'x')}});
   };
   record(1, 4U << 20);
   CHECK_THROWS_WITH(log::read_log(file), Contains("run.jsonl.zst: line 2: has more than "));
   record(40, 900U << 10);
   REQUIRE(fs::file_size(file) < 100000);
-  CHECK_THROWS_WITH(log::read_log(file), Contains("unpacks to more than 200 times its size"));
+  CHECK_THROWS_WITH(log::read_log(file), Contains("decompresses to more than 200 times its size"));
   CHECK_THROWS_WITH(log::LogReader("/dev/zero"), "/dev/zero: is a device, expected a file");
 }
 
-TEST_CASE("the size foretold is right to a factor of two", "[log][unit]") {
+TEST_CASE("the estimated size is correct to a factor of two", "[log][unit]") {
   const auto directory = fresh_directory("size");
   for (const int dof : {3, 7, 20})
     for (const char* name : {"run.jsonl", "run.jsonl.zst"}) {
@@ -281,9 +292,10 @@ TEST_CASE("the size foretold is right to a factor of two", "[log][unit]") {
         }
       }
       const double size = static_cast<double>(fs::file_size(directory / name));
-      const double foretold = log::estimated_bytes(dof, 2000.0, std::string(name).ends_with(".zst"));
-      CHECK(foretold < 2.0 * size);
-      CHECK(foretold > 0.5 * size);
+      const double estimated =
+          log::estimated_bytes(dof, 2000.0, std::string(name).ends_with(".zst"));
+      CHECK(estimated < 2.0 * size);
+      CHECK(estimated > 0.5 * size);
     }
 }
 
@@ -304,7 +316,7 @@ TEST_CASE("a full disk is an error that names the file", "[log][unit]") {
   CHECK_THROWS_WITH(record.write("header", header), Contains("/dev/full: cannot be written"));
 }
 
-TEST_CASE("a log that is never begun leaves no file, and an old one as it was", "[log][unit]") {
+TEST_CASE("a log without lines creates no file and leaves an old one unchanged", "[log][unit]") {
   const auto directory = fresh_directory("untouched");
   { const log::RunLog record(directory / "new.jsonl"); }
   CHECK_FALSE(fs::exists(directory / "new.jsonl"));
@@ -313,12 +325,13 @@ TEST_CASE("a log that is never begun leaves no file, and an old one as it was", 
   CHECK(read_file(directory / "old.jsonl") == "kept\n");
 }
 
-TEST_CASE("provenance names machine, build and the inputs with their hashes", "[log][unit]") {
+TEST_CASE("provenance names machine, build and inputs with their hashes", "[log][unit]") {
   const auto file = fresh_directory("provenance") / "input.txt";
   put(file, "abc");
   const Json p = log::provenance({{"robot", file}}, {"hamelin", "run"});
   // FIPS 180-2, appendix B.1
-  CHECK(p["inputs"][0]["sha256"] == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  CHECK(p["inputs"][0]["sha256"] ==
+        "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   CHECK(p["inputs"][0]["path"] == file.string());
   CHECK(p["inputs"][0]["role"] == "robot");
   CHECK(p["build"]["id"].get<std::string>().size() == 40);
@@ -330,7 +343,7 @@ TEST_CASE("provenance names machine, build and the inputs with their hashes", "[
   CHECK_THROWS_AS(log::provenance({{"map", file.parent_path() / "absent"}}), Error);
 }
 
-TEST_CASE("the tick in docs/logs.md is one", "[log][docs]") {
+TEST_CASE("the tick in docs/logs.md fits its schema", "[log][docs]") {
   const std::string page = read_file(fs::path(HAMELIN_SOURCE_DIR) / "docs/logs.md");
   const auto begin = page.find("```json\n") + 8;
   const Json tick = parse_json(page.substr(begin, page.find("```", begin) - begin), "docs/logs.md");

@@ -16,7 +16,8 @@ using Catch::Matchers::Contains;
 namespace {
 
 std::filesystem::path file() {
-  const auto directory = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "trajectory";
+  const auto directory =
+      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "trajectory";
   std::filesystem::create_directories(directory);
   return directory / "run.jsonl.zst";
 }
@@ -33,14 +34,14 @@ log::Trajectory::Point at(double t) {
 
 void write_log(const std::vector<double>& times) {
   log::RunLog record(file());
-  record.write(
-      "header",
-      {{"program", "run"},
-       {"scene", "a.json"},
-       {"every", 1},
-       {"config", Json::object()},
-       {"joints", {{{"name", "shoulder"}, {"type", "revolute"}}, {{"name", "rail, left"}, {"type", "prismatic"}}}},
-       {"provenance", Json::object()}});
+  record.write("header", {{"program", "run"},
+                          {"scene", "a.json"},
+                          {"every", 1},
+                          {"config", Json::object()},
+                          {"joints",
+                           {{{"name", "shoulder"}, {"type", "revolute"}},
+                            {{"name", "rail, left"}, {"type", "prismatic"}}}},
+                          {"provenance", Json::object()}});
   long k = 0;
   for (const double t : times) {
     const auto point = at(t);
@@ -68,7 +69,7 @@ TEST_CASE("a trajectory is the ticks of its log, bit for bit", "[log][trajectory
   }
 }
 
-TEST_CASE("resampling keeps a cubic motion and both ends", "[log][trajectory]") {
+TEST_CASE("resampling reproduces a cubic motion and both ends", "[log][trajectory]") {
   write_log({0.0, 0.1, 0.3, 0.35, 1.0});
   const auto fine = log::resampled(log::read_trajectory(file()), 64.0);
   REQUIRE(fine.points.size() == 65);
@@ -86,24 +87,28 @@ TEST_CASE("resampling keeps a cubic motion and both ends", "[log][trajectory]") 
   CHECK_THROWS_AS(log::resampled(fine, std::nan("")), Error);
 }
 
-TEST_CASE("CSV names its columns, quotes what must be, and gives numbers that read back", "[log][trajectory]") {
+TEST_CASE("CSV names its columns, quotes names where needed, and its numbers read back",
+          "[log][trajectory]") {
   write_log({0.0, 0.1});
   const std::string text = log::to_csv(log::read_trajectory(file()));
   std::istringstream lines(text);
   std::string line;
   std::getline(lines, line);
-  CHECK(line == R"(time_s,q_shoulder,"q_rail, left",v_shoulder,"v_rail, left",tau_shoulder,"tau_rail, left")");
+  CHECK(
+      line ==
+      R"(time_s,q_shoulder,"q_rail, left",v_shoulder,"v_rail, left",tau_shoulder,"tau_rail, left")");
   std::getline(lines, line);
   std::getline(lines, line);
   std::vector<double> numbers;
   std::istringstream cells(line);
   for (std::string cell; std::getline(cells, cell, ',');) numbers.push_back(std::stod(cell));
   const auto point = at(0.1);
-  CHECK(numbers ==
-        std::vector<double>{0.1, point.q[0], point.q[1], point.v[0], point.v[1], point.tau[0], point.tau[1]});
+  CHECK(numbers == std::vector<double>{0.1, point.q[0], point.q[1], point.v[0], point.v[1],
+                                       point.tau[0], point.tau[1]});
 }
 
-TEST_CASE("a joint trajectory has ROS's fields and strictly rising times", "[log][trajectory]") {
+TEST_CASE("a joint trajectory has ROS's fields and strictly increasing times",
+          "[log][trajectory]") {
   write_log({0.0, 0.1, 1.9999999999});
   auto trajectory = log::read_trajectory(file());
   const Json message = log::to_joint_trajectory(trajectory);
@@ -119,11 +124,12 @@ TEST_CASE("a joint trajectory has ROS's fields and strictly rising times", "[log
   CHECK_THAT(log::to_csv(trajectory), Contains(",,"));
 }
 
-TEST_CASE("what is no log of a motion is refused", "[log][trajectory]") {
+TEST_CASE("files that are not logs of a motion are refused", "[log][trajectory]") {
   write_log({});
-  CHECK_THROWS_WITH(log::read_trajectory(file()), Contains("has no tick"));
+  CHECK_THROWS_WITH(log::read_trajectory(file()), Contains("has no ticks"));
   write_log({0.0, 0.2, 0.1});
-  CHECK_THROWS_WITH(log::read_trajectory(file()), Contains("line 4: /time_s") && Contains("rising"));
+  CHECK_THROWS_WITH(log::read_trajectory(file()),
+                    Contains("line 4: /time_s") && Contains("increasing"));
   std::ofstream(file()) << "{\"schema\":\"hamelin.scene/1\"}\n";
   CHECK_THROWS_WITH(log::read_trajectory(file()), Contains("no header"));
 }

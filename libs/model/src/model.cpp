@@ -17,9 +17,10 @@ using Eigen::Vector3d;
 using geometry::SE3;
 using geometry::Vec3;
 
-// Below this the sine of the angle between two directions counts as zero: they are one direction.
+// Two directions count as parallel if the sine of the angle between them is below this.
 constexpr double parallel_sine = 1e-14;
-// Below this a chain's axes count as parallel for the choice of SE(2): rounding in files is larger than in doubles.
+// A chain counts as planar if its axes deviate by less than this. It is larger than parallel_sine
+// because numbers in files are rounded more than doubles.
 constexpr double planar_sine = 1e-9;
 
 Vec3<double> small(const Vector3d& v) {
@@ -30,7 +31,8 @@ Vector3d axis_of(const Joint& joint) {
   return joint.type == JointType::revolute ? joint.screw.head<3>() : joint.screw.tail<3>();
 }
 
-// A point on the joint's axis (revolute; the screw is [ω; −ω × r]), nearest to `near`. Prismatic: `near` itself.
+// The point nearest to `near` on the axis of a revolute joint, whose screw is [ω; −ω × r] with a
+// point r of the axis. `near` itself for a prismatic joint.
 Vector3d origin_near(const Joint& joint, const Vector3d& near) {
   if (joint.type == JointType::prismatic) return near;
   const Vector3d w = joint.screw.head<3>();
@@ -39,9 +41,10 @@ Vector3d origin_near(const Joint& joint, const Vector3d& near) {
 }
 
 Vector3d any_normal(const Vector3d& z) {
-  const Vector3d least = std::abs(z.x()) <= std::abs(z.y()) && std::abs(z.x()) <= std::abs(z.z()) ? Vector3d::UnitX()
-                         : std::abs(z.y()) <= std::abs(z.z())                                     ? Vector3d::UnitY()
-                                                                                                  : Vector3d::UnitZ();
+  const Vector3d least = std::abs(z.x()) <= std::abs(z.y()) && std::abs(z.x()) <= std::abs(z.z())
+                             ? Vector3d::UnitX()
+                         : std::abs(z.y()) <= std::abs(z.z()) ? Vector3d::UnitY()
+                                                              : Vector3d::UnitZ();
   return (least - z * z.dot(least)).normalized();
 }
 
@@ -49,7 +52,8 @@ double angle_about(const Vector3d& axis, const Vector3d& from, const Vector3d& t
   return std::atan2(axis.dot(from.cross(to)), from.dot(to));
 }
 
-// Inertia about the origin of `frame` in its axes, of a link whose COM pose is in the same base frame.
+// A link's inertia about the origin of `frame`, in its axes. Both `frame` and the link's COM pose
+// are given in the base frame. docs/theory.md (1.19).
 Matrix3d inertia_in(const SE3& frame, const Link& link) {
   const SE3 com = frame.inverse() * link.com;
   const Vector3d& c = com.p();
@@ -65,7 +69,7 @@ SE3 frame_of(const Vector3d& x, const Vector3d& z, const Vector3d& origin) {
   return {R, origin};
 }
 
-// The plane's normal if all joints keep one plane.
+// The plane's normal if all joints move in one plane.
 std::optional<Vector3d> plane_normal(const Robot& robot) {
   std::optional<Vector3d> normal;
   for (const auto& link : robot.links)
@@ -73,14 +77,14 @@ std::optional<Vector3d> plane_normal(const Robot& robot) {
   if (!normal) return std::nullopt;
   for (const auto& link : robot.links) {
     const Vector3d axis = axis_of(link.joint);
-    const double off =
-        link.joint.type == JointType::revolute ? normal->cross(axis).norm() : std::abs(normal->dot(axis));
+    const double off = link.joint.type == JointType::revolute ? normal->cross(axis).norm()
+                                                              : std::abs(normal->dot(axis));
     if (off > planar_sine) return std::nullopt;
   }
   return normal;
 }
 
-// Joint-aligned frames at q = 0 in the base frame, one a link, and the root in front.
+// Joint-aligned frames at q = 0 in the base frame: the root first, then one per link.
 std::vector<SE3> spatial_frames(const Robot& robot) {
   const auto& links = robot.links;
   std::vector<SE3> frames;
@@ -134,14 +138,17 @@ SpatialChain spatial_chain(const Robot& robot, const std::vector<SE3>& frames, c
   return chain;
 }
 
-// Planar frames: z is the normal, all origins in the root's plane; out-of-plane offsets stay in com_in_frame.
+// Planar frames: z is the normal and all origins are in the root's plane. Out-of-plane offsets are
+// kept in com_in_frame.
 std::vector<SE3> planar_frames(const Robot& robot, const Vector3d& normal) {
   std::vector<SE3> frames;
   const Vector3d root = origin_near(robot.links[0].joint, robot.links[0].com.p());
-  const auto in_plane = [&](const Vector3d& p) -> Vector3d { return p - normal * normal.dot(p - root); };
+  const auto in_plane = [&](const Vector3d& p) -> Vector3d {
+    return p - normal * normal.dot(p - root);
+  };
   for (const auto& link : robot.links) {
-    const bool slides = link.joint.type == JointType::prismatic;
-    Vector3d x = slides ? axis_of(link.joint) : any_normal(normal);
+    const bool prismatic = link.joint.type == JointType::prismatic;
+    Vector3d x = prismatic ? axis_of(link.joint) : any_normal(normal);
     x = (x - normal * normal.dot(x)).normalized();
     frames.push_back(frame_of(x, normal, in_plane(origin_near(link.joint, link.com.p()))));
   }
@@ -149,7 +156,8 @@ std::vector<SE3> planar_frames(const Robot& robot, const Vector3d& normal) {
   return frames;
 }
 
-PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base, const Vector3d& gravity) {
+PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, const SE3& base,
+                         const Vector3d& gravity) {
   PlanarChain chain;
   const SE3 root = base * frames[0];
   const Vector3d g = root.R().transpose() * gravity;
@@ -182,13 +190,14 @@ PlanarChain planar_chain(const Robot& robot, const std::vector<SE3>& frames, con
 }
 
 double reach_of(const Robot& robot, const std::vector<SE3>& frames) {
-  // Distances between successive frames bound how far anything gets from the base, whatever the joints do.
+  // The sum of the distances between successive frames bounds the distance from the base for all q.
   double to_frame = frames[1].p().norm(), reach = 0.0;
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const Link& link = robot.links[i];
     if (i > 0) to_frame += (frames[i + 1].p() - frames[i].p()).norm();
     if (link.joint.type == JointType::prismatic)
-      to_frame += std::max(std::abs(link.joint.lower.value_or(-1.0)), std::abs(link.joint.upper.value_or(1.0)));
+      to_frame += std::max(std::abs(link.joint.lower.value_or(-1.0)),
+                           std::abs(link.joint.upper.value_or(1.0)));
     const auto farthest = [&](const Vector3d& point_base, double radius) {
       reach = std::max(reach, to_frame + (point_base - frames[i + 1].p()).norm() + radius);
     };
@@ -222,21 +231,24 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     chain_ = spatial_chain(robot_, frames, base_, gravity_);
   }
   root_ = base_ * frames[0];
-  mixed_ = std::any_of(robot_.links.begin(), robot_.links.end(), [](const Link& link) {
-    return link.joint.type == JointType::prismatic || link.joint.armature != 0.0;
-  });
+  has_prismatic_or_rotor_ =
+      std::any_of(robot_.links.begin(), robot_.links.end(), [](const Link& link) {
+        return link.joint.type == JointType::prismatic || link.joint.armature != 0.0;
+      });
   for (std::size_t i = 0; i < robot_.links.size(); ++i) {
     const Link& link = robot_.links[i];
     com_in_frame_.push_back(frames[i + 1].inverse() * link.com);
     const SE3& com = com_in_frame_.back();
     for (std::size_t s = 0; s < link.spheres.size(); ++s)
-      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), false, com * link.spheres[s].center_m,
-                         Vector3d::Zero(), link.spheres[s].radius_m});
+      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), false,
+                         com * link.spheres[s].center_m, Vector3d::Zero(),
+                         link.spheres[s].radius_m});
     for (std::size_t s = 0; s < link.segments.size(); ++s) {
       const Segment& segment = link.segments[s];
       if (!segment.is_capsule()) continue;
       has_capsules_ = true;
-      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), true, com * (0.5 * (segment.from_m + segment.to_m)),
+      shapes_.push_back({static_cast<int>(i), static_cast<int>(s), true,
+                         com * (0.5 * (segment.from_m + segment.to_m)),
                          com.R() * (0.5 * (segment.to_m - segment.from_m)), segment.radius_m});
     }
   }
@@ -244,9 +256,9 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
   reach_ = reach_of(robot_, frames);
 }
 
-std::string Model::words(const Shape& shape) const {
-  return formatted("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere", shape.index_in_link,
-                   robot_.links[static_cast<std::size_t>(shape.link)].name);
+std::string Model::describe(const Shape& shape) const {
+  return formatted("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere",
+                   shape.index_in_link, robot_.links[static_cast<std::size_t>(shape.link)].name);
 }
 
 }  // namespace hamelin::model

@@ -15,16 +15,18 @@ using geometry::SE3;
 
 namespace {
 
-// Pose of a link's COM frame at q by the product of exponentials (3).
+// Pose of a link's COM frame at q by the product of exponentials,
+// docs/theory.md (1.15).
 SE3 com_pose(const model::Robot& robot, int link, const Eigen::VectorXd& q) {
   SE3 g;
-  for (int j = 0; j <= link; ++j) g = g * SE3::exp(robot.links[static_cast<std::size_t>(j)].joint.screw * q[j]);
+  for (int j = 0; j <= link; ++j)
+    g = g * SE3::exp(robot.links[static_cast<std::size_t>(j)].joint.screw * q[j]);
   return g * robot.links[static_cast<std::size_t>(link)].com;
 }
 
 }  // namespace
 
-TEST_CASE("nothing of the arm is ever farther from the base than reach", "[model][property]") {
+TEST_CASE("no shape of the arm is ever farther from the base than reach", "[model][property]") {
   const bool planar = GENERATE(false, true);
   const int prismatic_every = GENERATE(0, 3);
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -42,7 +44,7 @@ TEST_CASE("nothing of the arm is ever farther from the base than reach", "[model
   }
 }
 
-TEST_CASE("chains that keep a plane run in SE(2), others in SE(3)", "[model][unit]") {
+TEST_CASE("planar chains run in SE(2), others in SE(3)", "[model][unit]") {
   CHECK(model::Model(test::random_robot(1, 5, 0, true)).planar());
   CHECK(model::Model(test::random_robot(1, 5, 2, true)).planar());
   CHECK_FALSE(model::Model(test::random_robot(1, 5, 0, false)).planar());
@@ -53,15 +55,16 @@ TEST_CASE("chains that keep a plane run in SE(2), others in SE(3)", "[model][uni
   CHECK_FALSE(model::Model(tilted).planar());
 }
 
-TEST_CASE("axes parallel to a hair still give exact frames", "[model][hard]") {
-  // The common normal of two axes 1e-9 rad apart lies kilometres away; only its direction may be used.
+TEST_CASE("nearly parallel axes still give exact frames", "[model][hard]") {
+  // The foot of the common normal of two axes 1e-9 rad apart is kilometres away, so only the
+  // normal's direction may be used.
   for (const double tilt : {1e-15, 1e-12, 1e-9, 1e-6}) {
     auto robot = test::random_robot(3, 4, 0, true);
     const Eigen::Vector3d axis = robot.links[1].joint.screw.head<3>();
     const Eigen::Vector3d turned = (axis + tilt * axis.unitOrthogonal()).normalized();
     const Eigen::Vector3d at = robot.links[1].com.p();
     robot.links[1].joint.screw << turned, -turned.cross(at);
-    // an axis across makes it spatial whatever the tilt
+    // a perpendicular axis makes the chain spatial for every tilt
     const Eigen::Vector3d across = axis.unitOrthogonal();
     robot.links[3].joint.screw << across, -across.cross(robot.links[3].com.p());
     const model::Model model(robot);
@@ -83,7 +86,7 @@ TEST_CASE("axes parallel to a hair still give exact frames", "[model][hard]") {
   }
 }
 
-TEST_CASE("a made chain is the one that the reference figures speak of", "[model][unit]") {
+TEST_CASE("make_chain builds the chain of the reference figures", "[model][unit]") {
   model::ChainOptions options;
   options.links = 4;
   const auto robot = model::make_chain(options);
@@ -91,7 +94,8 @@ TEST_CASE("a made chain is the one that the reference figures speak of", "[model
   const char axes[] = {'x', 'z', 'x', 'x'};
   for (int i = 0; i < 4; ++i) {
     const auto& link = robot.links[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d axis = axes[i] == 'x' ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d axis =
+        axes[i] == 'x' ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d at{0.0, 0.2 * i, 0.0};
     CHECK((link.joint.screw.head<3>() - axis).norm() < 1e-15);
     CHECK((link.joint.screw.tail<3>() + axis.cross(at)).norm() < 1e-15);
@@ -102,7 +106,7 @@ TEST_CASE("a made chain is the one that the reference figures speak of", "[model
   CHECK((robot.tip.pose.p() - Eigen::Vector3d(0.0, 0.8, 0.0)).norm() < 1e-15);
 }
 
-TEST_CASE("a robot written as JSON reads back as the same", "[model][io]") {
+TEST_CASE("a robot written as JSON reads back the same", "[model][io]") {
   model::ChainOptions options;
   options.links = 5;
   const auto robot = model::make_chain(options);
@@ -111,24 +115,31 @@ TEST_CASE("a robot written as JSON reads back as the same", "[model][io]") {
   CHECK(written == again);
 }
 
-TEST_CASE("what no arm can be is refused with one line", "[model][input]") {
+TEST_CASE("an impossible arm is refused with one line", "[model][input]") {
   struct Bad {
-    const char* what;
+    const char* name;
     std::function<void(model::Robot&)> spoil;
-    const char* said;
+    const char* expected;
   };
   const std::vector<Bad> all{
       {"no link", [](model::Robot& r) { r.links.clear(); }, "link"},
       {"negative mass", [](model::Robot& r) { r.links[1].mass_kg = -1.0; }, "mass"},
-      {"NaN inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(0, 0) = std::nan(""); }, "link1"},
-      {"indefinite inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(1, 1) = -0.1; }, "inertia"},
+      {"NaN inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(0, 0) = std::nan(""); },
+       "link1"},
+      {"indefinite inertia", [](model::Robot& r) { r.links[1].inertia_kg_m2(1, 1) = -0.1; },
+       "inertia"},
       {"zero moment with mass",
-       [](model::Robot& r) { r.links[1].inertia_kg_m2 = Eigen::Vector3d(0.1, 0.1, 0.0).asDiagonal(); }, "inertia"},
+       [](model::Robot& r) {
+         r.links[1].inertia_kg_m2 = Eigen::Vector3d(0.1, 0.1, 0.0).asDiagonal();
+       },
+       "inertia"},
       {"zero axis", [](model::Robot& r) { r.links[1].joint.screw.setZero(); }, "joint1"},
-      {"crossed limits", [](model::Robot& r) { r.links[1].joint.lower = 1.0, r.links[1].joint.upper = -1.0; }, "limit"},
+      {"crossed limits",
+       [](model::Robot& r) { r.links[1].joint.lower = 1.0, r.links[1].joint.upper = -1.0; },
+       "limit"},
   };
   for (const auto& bad : all) {
-    CAPTURE(bad.what);
+    CAPTURE(bad.name);
     auto robot = test::random_robot(5, 3);
     bad.spoil(robot);
     try {
@@ -139,18 +150,20 @@ TEST_CASE("what no arm can be is refused with one line", "[model][input]") {
       CHECK(text.find("bad.json") == 0);
       CHECK(text.find('\n') == std::string::npos);
       CAPTURE(text);
-      CHECK(text.find(bad.said) != std::string::npos);
+      CHECK(text.find(bad.expected) != std::string::npos);
     }
   }
 }
 
-TEST_CASE("inertias that rounding left not quite symmetric are taken, others are refused", "[model][unit]") {
+TEST_CASE("inertias that are asymmetric by rounding only are accepted, others are refused",
+          "[model][unit]") {
   const Eigen::Vector3d moments(0.3, 0.7, 0.9);
   int rounded = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Rng rng(seed);
     const Eigen::Matrix3d R =
-        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_vector(rng).normalized()).toRotationMatrix();
+        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_vector(rng).normalized())
+            .toRotationMatrix();
     model::Robot robot = test::random_robot(seed, 3);
     Eigen::Matrix3d& inertia = robot.links[1].inertia_kg_m2;
     inertia = R * moments.asDiagonal() * R.transpose();
@@ -159,13 +172,14 @@ TEST_CASE("inertias that rounding left not quite symmetric are taken, others are
     const Eigen::Matrix3d& used = model.robot().links[1].inertia_kg_m2;
     CHECK(used == used.transpose());
     CHECK((used - inertia).cwiseAbs().maxCoeff() < 1e-15);
-    // its JSON form is that of the same model
-    const model::Model again(description::robot_from_json(description::robot_to_json(robot), "again"));
+    // its JSON form gives the same model
+    const model::Model again(
+        description::robot_from_json(description::robot_to_json(robot), "again"));
     CHECK(again.robot().links[1].inertia_kg_m2 == used);
 
     inertia(0, 1) += 1e-11;
-    CHECK_THROWS_WITH(model::Model(robot),
-                      Catch::Contains("link '" + robot.links[1].name) && Catch::Contains("inertia is not symmetric"));
+    CHECK_THROWS_WITH(model::Model(robot), Catch::Contains("link '" + robot.links[1].name) &&
+                                               Catch::Contains("inertia is not symmetric"));
   }
   CHECK(rounded > 10);
 }

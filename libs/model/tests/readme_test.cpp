@@ -16,7 +16,7 @@ options.axes = "x";
 const model::Robot robot = model::make_chain(options);
 const geometry::SE3 base(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, 0.7));
 const model::Model arm(robot, base);
-REQUIRE(arm.planar());  // so the SE(2) path is taken
+REQUIRE(arm.planar());  // uses SE(2)
 REQUIRE(arm.dof() == 3);
   // [example]
   // clang-format on

@@ -33,16 +33,19 @@ Eigen::Matrix3d NominalArm::operational_inertia(int link, const Eigen::Vector3d&
   return dynamics::operational_inertia(model_, ws_, q_, J_);
 }
 
-void NominalArm::add_force(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& force, Eigen::VectorXd& tau) {
+void NominalArm::add_force(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& force,
+                           Eigen::VectorXd& tau) {
   dynamics::point_jacobian_transpose(model_, ws_, link, point, force, joint_out_);
   tau += joint_out_;
 }
 
-void NominalArm::add_mapped(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& f, Eigen::VectorXd& tau) {
+void NominalArm::add_mapped(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& f,
+                            Eigen::VectorXd& tau) {
   add_force(link, point, operational_inertia(link, point) * f, tau);
 }
 
-void NominalArm::add_mapped_attraction(const hamelin_goal& goal, double k_p, double k_v, Eigen::VectorXd& tau) {
+void NominalArm::add_mapped_attraction(const hamelin_goal& goal, double k_p, double k_v,
+                                       Eigen::VectorXd& tau) {
   if (goal.type == HAMELIN_GOAL_JOINT) {
     joint_in_ = -k_p * (q_ - ConstVectorMap(goal.q, q_.size())) - k_v * v_;
     dynamics::momentum(model_, ws_, q_, joint_in_, joint_out_);
@@ -50,7 +53,8 @@ void NominalArm::add_mapped_attraction(const hamelin_goal& goal, double k_p, dou
     return;
   }
   const Eigen::Vector3d tip = tip_position();
-  const Eigen::Vector3d f = -k_p * (tip - vec3(goal.position_world_m)) - k_v * point_velocity(tip_link(), tip);
+  const Eigen::Vector3d f =
+      -k_p * (tip - vec3(goal.position_world_m)) - k_v * point_velocity(tip_link(), tip);
   add_mapped(tip_link(), tip, f, tau);
 }
 

@@ -12,8 +12,9 @@ namespace hamelin::planning {
 model::Model Setup::model() const {
   const std::string where = "nominal robot";
   const auto& w = raw_->base_quaternion_wxyz;
-  const geometry::SE3 base(Eigen::Quaterniond(w[0], w[1], w[2], w[3]).normalized().toRotationMatrix(),
-                           vec3(raw_->base_position_world_m));
+  const geometry::SE3 base(
+      Eigen::Quaterniond(w[0], w[1], w[2], w[3]).normalized().toRotationMatrix(),
+      vec3(raw_->base_position_world_m));
   return model::Model(description::robot_from_json(parse_json(robot_json(), where), where), base,
                       vec3(raw_->gravity_world_m_s2));
 }
@@ -24,19 +25,21 @@ namespace {
 void write_line(std::string_view text, char* error, std::size_t error_size) noexcept {
   if (error_size == 0) return;
   const std::size_t size = std::min(text.size(), error_size - 1);
-  std::replace_copy(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(size), error, '\n', ' ');
+  std::replace_copy(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(size), error, '\n',
+                    ' ');
   error[size] = '\0';
 }
 
 }  // namespace
 
 void take_instruction_set(const hamelin_setup& setup) noexcept {
-  if (setup.struct_size < offsetof(hamelin_setup, instruction_set) + sizeof setup.instruction_set) return;
+  if (setup.struct_size < offsetof(hamelin_setup, instruction_set) + sizeof setup.instruction_set)
+    return;
   if (setup.instruction_set == nullptr) return;
   try {
     set_default_isa(isa_from_name(setup.instruction_set, "instruction_set"));
   } catch (const Error&) {
-    // a name of some later host: the best there is will do
+    // The name comes from a later host: the plugin keeps its own default.
   }
 }
 
@@ -46,7 +49,7 @@ void write_current_exception(char* error, std::size_t error_size) noexcept {
   } catch (const std::exception& e) {
     write_line(e.what(), error, error_size);
   } catch (...) {
-    write_line("an exception that is no std::exception", error, error_size);
+    write_line("an exception that is not a std::exception", error, error_size);
   }
 }
 

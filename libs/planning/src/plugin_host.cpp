@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-[[noreturn]] void refuse(const fs::path& file, std::string_view what) {
-  throw Error(ErrorCode::plugin, fmt::format("{}: {}", file.string(), what));
+[[noreturn]] void refuse(const fs::path& file, std::string_view reason) {
+  throw Error(ErrorCode::plugin, fmt::format("{}: {}", file.string(), reason));
 }
 
 std::string one_line(std::string text) {
@@ -30,7 +30,7 @@ std::string one_line(std::string text) {
   return text;
 }
 
-// The loader names the file itself; said once is enough.
+// The loader's message begins with the file's name, which the caller's message has already.
 std::string system_reason(const fs::path& file) {
   const char* raw = dlerror();
   std::string text = raw != nullptr ? one_line(raw) : "unknown reason";
@@ -39,9 +39,10 @@ std::string system_reason(const fs::path& file) {
   return text;
 }
 
-// JSON Schema lets unknown keys pass unless told otherwise; a mistyped parameter must not.
+// JSON Schema accepts unknown keys by default, but a mistyped parameter must be an error.
 void forbid_unknown_keys(Json& schema) {
-  if (!schema.is_object() || !schema.contains("properties") || !schema["properties"].is_object()) return;
+  if (!schema.is_object() || !schema.contains("properties") || !schema["properties"].is_object())
+    return;
   schema["additionalProperties"] = false;
   for (auto& [key, rule] : schema["properties"].items()) forbid_unknown_keys(rule);
 }
@@ -53,25 +54,29 @@ bool finite(const double (&x)[3]) {
   return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]);
 }
 
-// What is wrong with a planner's answer, or null.
+// Describes the first error in a planner's answer, or returns null.
 const char* defect(const CommandBuffers& out, std::size_t dof, std::size_t gyroscopic_capacity) {
   const hamelin_command& raw = out.raw();
-  if (raw.state < HAMELIN_PLANNER_RUNNING || raw.state > HAMELIN_PLANNER_OWN_STALL_RULE) return "unknown planner state";
+  if (raw.state < HAMELIN_PLANNER_RUNNING || raw.state > HAMELIN_PLANNER_OWN_STALL_RULE)
+    return "unknown planner state";
   if (std::find(std::begin(raw.cause), std::end(raw.cause), '\0') == std::end(raw.cause))
     return "cause is not nul-terminated";
-  if (!std::isfinite(raw.potential_J) || !finite(out.potential_gradient())) return "potential is not finite";
+  if (!std::isfinite(raw.potential_J) || !finite(out.potential_gradient()))
+    return "potential is not finite";
   if (!finite(out.damping())) return "damping is not finite";
   if (out.damping().minCoeff() < 0.0) return "damping is negative";
   if (!finite(out.held_torque())) return "held torque is not finite";
-  if (raw.has_node_velocity != 0 && !finite(out.node_velocity())) return "node velocity is not finite";
-  if (raw.gyroscopic_count > gyroscopic_capacity) return "more gyroscopic terms than there is room for";
+  if (raw.has_node_velocity != 0 && !finite(out.node_velocity()))
+    return "node velocity is not finite";
+  if (raw.gyroscopic_count > gyroscopic_capacity)
+    return "more gyroscopic terms than the host's capacity";
   for (const auto& term : out.gyroscopic()) {
     if (term.link < 0 || static_cast<std::size_t>(term.link) >= dof)
-      return "gyroscopic term on a link that is not there";
+      return "gyroscopic term on a link that does not exist";
     if (!finite(term.point_link_m) || !finite(term.w_world)) return "gyroscopic term is not finite";
   }
   if (!std::isfinite(raw.filter_work_J) || !std::isfinite(raw.recovery_work_J))
-    return "its energy accounts are not finite";
+    return "energy account is not finite";
   return nullptr;
 }
 
@@ -106,7 +111,8 @@ SetupData::SetupData(const model::Model& nominal)
   }
 }
 
-void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q, const Eigen::MatrixXd& path) {
+void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q,
+                         const Eigen::MatrixXd& path) {
   goals.push_back(goal);
   goals_q.push_back(q);
   paths.push_back(path);
@@ -143,13 +149,14 @@ hamelin_setup SetupData::view() {
   raw.influence_m = influence_m;
   raw.map_resolution_m = map_resolution_m;
   raw.seed = seed;
-  raw.instruction_set = name_of(default_isa()).data();  // of a literal, which ends in a nul
+  raw.instruction_set = name_of(default_isa()).data();  // views a literal, so it is nul-terminated
   return raw;
 }
 
 // ---- CommandBuffers
 
-CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity) : gyroscopic_(gyroscopic_capacity) {
+CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity)
+    : gyroscopic_(gyroscopic_capacity) {
   for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_})
     x->resize(static_cast<Eigen::Index>(dof));
   clear();
@@ -170,13 +177,14 @@ void CommandBuffers::clear() noexcept {
 // ---- Plugin
 
 struct Plugin::Library {
-  explicit Library(fs::path path) : file(std::move(path)), handle(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+  explicit Library(fs::path path)
+      : file(std::move(path)), handle(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL)) {
     if (handle == nullptr) refuse(file, fmt::format("cannot be loaded: {}", system_reason(file)));
   }
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
   ~Library() {
-#ifndef HAMELIN_SANITIZED  // their reports need the names of what was loaded
+#ifndef HAMELIN_SANITIZED  // the sanitizers' reports need the symbols of the library
     if (handle != nullptr) dlclose(handle);
 #endif
   }
@@ -192,27 +200,29 @@ Plugin Plugin::load(const fs::path& file) {
   std::error_code code;
   const fs::path path = fs::absolute(file, code);
   if (code || !fs::exists(path, code)) refuse(file, "no such file, expected a planner plugin");
-  if (!fs::is_regular_file(path, code)) refuse(path, "not a regular file, expected a planner plugin");
+  if (!fs::is_regular_file(path, code))
+    refuse(path, "not a regular file, expected a planner plugin");
   const auto library = std::make_shared<Library>(path);
 
   void* symbol = dlsym(library->handle, HAMELIN_PLUGIN_ENTRY_NAME);
   if (symbol == nullptr)
-    refuse(path, fmt::format("no symbol {}, so it is no planner plugin", HAMELIN_PLUGIN_ENTRY_NAME));
-  // POSIX promises that a function's address survives in a void*.
+    refuse(path, fmt::format("no symbol {}, expected a planner plugin", HAMELIN_PLUGIN_ENTRY_NAME));
+  // POSIX guarantees that a void* can hold the address of a function.
   const auto* raw = reinterpret_cast<hamelin_plugin_entry_fn>(symbol)();
   if (raw == nullptr) refuse(path, fmt::format("{} returned null", HAMELIN_PLUGIN_ENTRY_NAME));
-  // The number first: what the other fields mean depends on it.
+  // The ABI number comes first, because the meaning of the other fields depends on it.
   if (raw->abi_version != HAMELIN_PLUGIN_ABI_VERSION)
-    refuse(path,
-           fmt::format("built for plugin ABI {}, this host has ABI {}", raw->abi_version, HAMELIN_PLUGIN_ABI_VERSION));
+    refuse(path, fmt::format("built for plugin ABI {}, expected ABI {}", raw->abi_version,
+                             HAMELIN_PLUGIN_ABI_VERSION));
   if (raw->struct_size < sizeof(hamelin_plugin))
-    refuse(path, fmt::format("its hamelin_plugin has {} bytes, expected at least {}", raw->struct_size,
+    refuse(path, fmt::format("hamelin_plugin has {} bytes, expected at least {}", raw->struct_size,
                              sizeof(hamelin_plugin)));
   using Required = std::pair<const char*, bool>;
-  for (const auto& [what, there] : {Required{"create", raw->create != nullptr}, Required{"tick", raw->tick != nullptr},
-                                    Required{"destroy", raw->destroy != nullptr}})
-    if (!there) refuse(path, fmt::format("its function '{}' is null", what));
-  if (raw->name == nullptr || *raw->name == '\0') refuse(path, "it has no name");
+  for (const auto& [function, present] :
+       {Required{"create", raw->create != nullptr}, Required{"tick", raw->tick != nullptr},
+        Required{"destroy", raw->destroy != nullptr}})
+    if (!present) refuse(path, fmt::format("function '{}' is null", function));
+  if (raw->name == nullptr || *raw->name == '\0') refuse(path, "the plugin has no name");
   const auto text = [](const char* string) { return one_line(string != nullptr ? string : ""); };
   library->raw = raw;
   library->name = text(raw->name);
@@ -220,11 +230,11 @@ Plugin Plugin::load(const fs::path& file) {
   library->description = text(raw->description);
   try {
     library->params_schema =
-        parse_json(raw->params_schema != nullptr ? raw->params_schema : "", "its parameter schema");
+        parse_json(raw->params_schema != nullptr ? raw->params_schema : "", "parameter schema");
   } catch (const Error& e) {
     refuse(path, e.what());
   }
-  if (!library->params_schema.is_object()) refuse(path, "its parameter schema is no JSON object");
+  if (!library->params_schema.is_object()) refuse(path, "parameter schema: not a JSON object");
   forbid_unknown_keys(library->params_schema);
   return Plugin(library);
 }
@@ -264,7 +274,8 @@ Json check_params(const Plugin& plugin, const Json& params) {
 // ---- LoadedPlanner
 
 struct LoadedPlanner::Instance {
-  Instance(Plugin p, SetupData s, HostServices& h) : plugin(std::move(p)), setup_data(std::move(s)), services(&h) {
+  Instance(Plugin p, SetupData s, HostServices& h)
+      : plugin(std::move(p)), setup_data(std::move(s)), services(&h) {
     setup = setup_data.view();
     host.struct_size = sizeof host;
     host.context = this;
@@ -279,7 +290,8 @@ struct LoadedPlanner::Instance {
     if (planner != nullptr) plugin.library_->raw->destroy(planner);
   }
 
-  // No exception of ours may run through the plugin's frames either: it is kept and ends the call.
+  // No exception of the host may propagate through the plugin's frames: its message is kept and the
+  // plugin's call fails.
   template <class F>
   void guarded(F&& call) noexcept {
     try {
@@ -300,18 +312,22 @@ struct LoadedPlanner::Instance {
     auto& self = *static_cast<Instance*>(context);
     self.guarded([&] { self.services->log(level, {text, size}); });
   }
-  static std::size_t closest_points(void* context, const double* q, double influence_m, hamelin_contact* out,
-                                    std::size_t capacity) noexcept {
+  static std::size_t closest_points(void* context, const double* q, double influence_m,
+                                    hamelin_contact* out, std::size_t capacity) noexcept {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
-    self.guarded([&] { count = self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity}); });
+    self.guarded([&] {
+      count = self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity});
+    });
     return count;
   }
-  static std::size_t closest_self(void* context, const double* q, double influence_m, hamelin_self_contact* out,
-                                  std::size_t capacity) noexcept {
+  static std::size_t closest_self(void* context, const double* q, double influence_m,
+                                  hamelin_self_contact* out, std::size_t capacity) noexcept {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
-    self.guarded([&] { count = self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity}); });
+    self.guarded([&] {
+      count = self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity});
+    });
     return count;
   }
 
@@ -325,24 +341,26 @@ struct LoadedPlanner::Instance {
   std::array<char, 512> error{};
 };
 
-LoadedPlanner Plugin::create(SetupData setup, HostServices& services, const Json& checked_params) const {
+LoadedPlanner Plugin::create(SetupData setup, HostServices& services,
+                             const Json& checked_params) const {
   auto instance = std::make_unique<LoadedPlanner::Instance>(*this, std::move(setup), services);
   const std::string params = checked_params.dump();
   std::array<char, 512> text{};
-  const auto failed = library_->raw->create(&instance->host, &instance->setup, params.data(), params.size(),
-                                            &instance->planner, text.data(), text.size());
+  const auto failed =
+      library_->raw->create(&instance->host, &instance->setup, params.data(), params.size(),
+                            &instance->planner, text.data(), text.size());
   text.back() = '\0';
-  std::string why;
+  std::string reason;
   if (instance->host_failed) {
-    why = instance->error.data();
+    reason = instance->error.data();
   } else if (failed != 0) {
-    why = text.front() != '\0' ? text.data() : "no reason given";
+    reason = text.front() != '\0' ? text.data() : "no reason given";
   } else if (instance->planner == nullptr) {
-    why = "create returned no planner";
+    reason = "create returned no planner";
   }
-  if (!why.empty())
-    throw Error(ErrorCode::plugin,
-                one_line(fmt::format("{}: planner '{}' refuses to start: {}", file().string(), name(), why)));
+  if (!reason.empty())
+    throw Error(ErrorCode::plugin, one_line(fmt::format("{}: planner '{}' cannot start: {}",
+                                                        file().string(), name(), reason)));
   return LoadedPlanner(std::move(instance));
 }
 
@@ -361,16 +379,16 @@ bool LoadedPlanner::tick(const hamelin_tick& tick, CommandBuffers& out) noexcept
   self.host_failed = false;
   self.error[0] = '\0';
   const std::size_t gyroscopic_capacity = out.raw().gyroscopic_capacity;
-  const auto failed =
-      self.plugin.library_->raw->tick(self.planner, &tick, &out.raw(), self.error.data(), self.error.size());
+  const auto failed = self.plugin.library_->raw->tick(self.planner, &tick, &out.raw(),
+                                                      self.error.data(), self.error.size());
   self.error.back() = '\0';
   if (self.host_failed) return false;
   if (failed != 0) {
     if (self.error[0] == '\0') self.fail("no reason given");
     return false;
   }
-  if (const char* what = defect(out, self.setup.dof, gyroscopic_capacity); what != nullptr) {
-    self.fail(what);
+  if (const char* reason = defect(out, self.setup.dof, gyroscopic_capacity); reason != nullptr) {
+    self.fail(reason);
     return false;
   }
   return true;
@@ -380,7 +398,7 @@ std::string_view LoadedPlanner::error() const noexcept {
   return instance_->error.data();
 }
 
-// ---- finding
+// ---- finding plugins
 
 namespace {
 
@@ -404,10 +422,12 @@ std::string planner_name(const fs::path& file) {
 
 }  // namespace
 
-std::vector<fs::path> plugin_directories(const std::vector<fs::path>& given, const std::vector<fs::path>& own) {
+std::vector<fs::path> plugin_directories(const std::vector<fs::path>& given,
+                                         const std::vector<fs::path>& own) {
   std::vector<fs::path> all;
   const auto add = [&](const fs::path& directory) {
-    if (!directory.empty() && std::find(all.begin(), all.end(), directory) == all.end()) all.push_back(directory);
+    if (!directory.empty() && std::find(all.begin(), all.end(), directory) == all.end())
+      all.push_back(directory);
   };
   for (const auto& directory : given) add(directory);
   if (const char* variable = std::getenv("HAMELIN_PLUGIN_PATH"); variable != nullptr) {
@@ -426,10 +446,12 @@ Plugin find_plugin(const std::string& name_or_path, const std::vector<fs::path>&
   return Plugin::load(find_plugin_file(name_or_path, directories));
 }
 
-fs::path find_plugin_file(const std::string& name_or_path, const std::vector<fs::path>& directories) {
-  const bool is_path = name_or_path.find('/') != std::string::npos ||
-                       (name_or_path.size() > plugin_suffix.size() &&
-                        name_or_path.substr(name_or_path.size() - plugin_suffix.size()) == plugin_suffix);
+fs::path find_plugin_file(const std::string& name_or_path,
+                          const std::vector<fs::path>& directories) {
+  const bool is_path =
+      name_or_path.find('/') != std::string::npos ||
+      (name_or_path.size() > plugin_suffix.size() &&
+       name_or_path.substr(name_or_path.size() - plugin_suffix.size()) == plugin_suffix);
   if (is_path) return name_or_path;
   std::string searched;
   std::vector<std::string> names;
@@ -440,17 +462,18 @@ fs::path find_plugin_file(const std::string& name_or_path, const std::vector<fs:
       here.push_back(planner_name(file));
     }
     std::error_code code;
-    const std::string found = !here.empty()                       ? fmt::format("{}", fmt::join(here, ", "))
+    const std::string found = !here.empty() ? fmt::format("{}", fmt::join(here, ", "))
                               : fs::is_directory(directory, code) ? "no plugins"
                                                                   : "no such directory";
     searched += fmt::format("{}{} ({})", searched.empty() ? "" : "; ", directory.string(), found);
     names.insert(names.end(), here.begin(), here.end());
   }
   const std::string near = nearest_name(name_or_path, names);
-  throw Error(ErrorCode::plugin,
-              fmt::format("planner '{}': not found{}; searched for {}{} in: {}", name_or_path,
-                          near.empty() ? "" : fmt::format(", did you mean '{}'?", near), name_or_path, plugin_suffix,
-                          searched.empty() ? "no directory" : searched));
+  throw Error(
+      ErrorCode::plugin,
+      fmt::format("planner '{}': not found{}; searched for {}{} in: {}", name_or_path,
+                  near.empty() ? "" : fmt::format(", did you mean '{}'?", near), name_or_path,
+                  plugin_suffix, searched.empty() ? "no directory" : searched));
 }
 
 std::vector<ListedPlugin> list_plugins(const std::vector<fs::path>& directories) {

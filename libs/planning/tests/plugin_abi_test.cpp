@@ -19,10 +19,11 @@ struct PinnedRow {
   bool same_type;
 };
 
-/// abi_layout.inc beside what this compiler makes of plugin_abi.h.
+/// The layout in abi_layout.inc beside this compiler's layout of plugin_abi.h.
 const std::vector<PinnedRow>& rows() {
   static const std::vector<PinnedRow> all{
-#define STRUCT(name, size) {{#name, 0, size}, {#name, 0, sizeof(name)}, std::is_standard_layout_v<name>},
+#define STRUCT(name, size) \
+  {{#name, 0, size}, {#name, 0, sizeof(name)}, std::is_standard_layout_v<name>},
 #define FIELD(name, field, offset, size, ...)                                      \
   {{#name "." #field, offset, size},                                               \
    {#name "." #field, offsetof(name, field), sizeof(std::declval<name&>().field)}, \
@@ -46,7 +47,7 @@ constexpr bool takes(std::index_sequence<I...>) {
   };
 }
 
-/// How many numbers and pointers a struct holds, elements of arrays counted one by one.
+/// The number of scalars and pointers in a struct, with the elements of arrays counted one by one.
 template <typename S, std::size_t N = 1>
 constexpr std::size_t scalars() {
   if constexpr (takes<S>(std::make_index_sequence<N + 1>{}))
@@ -60,7 +61,7 @@ constexpr std::size_t elements = std::is_array_v<T> ? std::extent_v<T> : 1;
 
 }  // namespace
 
-TEST_CASE("plugin interface: C++ lays out every field where ABI 3 has it", "[planning][unit]") {
+TEST_CASE("plugin interface: the layout in C++ is that of ABI 3", "[planning][unit]") {
   REQUIRE(HAMELIN_PLUGIN_ABI_VERSION == 3);
   for (const auto& [pinned, seen, same_type] : rows()) {
     INFO(pinned.name);
@@ -70,7 +71,7 @@ TEST_CASE("plugin interface: C++ lays out every field where ABI 3 has it", "[pla
   }
 }
 
-TEST_CASE("plugin interface: C lays out every field where ABI 3 has it", "[planning][unit]") {
+TEST_CASE("plugin interface: the layout in C is that of ABI 3", "[planning][unit]") {
   REQUIRE(layout_in_c_count == rows().size());
   for (std::size_t i = 0; i < layout_in_c_count; ++i) {
     const auto& pinned = rows()[i].pinned;
@@ -82,7 +83,7 @@ TEST_CASE("plugin interface: C lays out every field where ABI 3 has it", "[plann
 }
 
 TEST_CASE("plugin interface: no struct has a field that is not pinned", "[planning][unit]") {
-  // A field that fits into padding changes no offset and no size, so numbers and pointers are counted too.
+  // A field that fits into padding changes no offset and no size, so scalars are counted as well.
   std::map<std::string, std::size_t> pinned, seen;
 #define STRUCT(name, size) seen[#name] = scalars<name>();
 #define FIELD(name, field, offset, size, ...) pinned[#name] += elements<__VA_ARGS__>;
@@ -106,7 +107,8 @@ TEST_CASE("plugin interface: constants keep their values", "[planning][unit]") {
   CHECK(HAMELIN_LOG_WARNING == 1);
 }
 
-TEST_CASE("plugin interface: the host looks for the symbol that a plugin in C exports", "[planning][unit]") {
+TEST_CASE("plugin interface: a plugin in C exports the symbol that the host looks up",
+          "[planning][unit]") {
   const std::string file = HAMELIN_TEST_BINARY_DIR "/lib/hamelin/test_plugins/plain_c.hamelin.so";
   void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   REQUIRE(library != nullptr);

@@ -44,7 +44,8 @@ struct Services : HostServices {
     if (log_throws) throw std::runtime_error("the log is full");
     lines.push_back(std::to_string(level) + " " + std::string(line));
   }
-  std::size_t closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) override {
+  std::size_t closest_points(std::span<const double> q, double influence_m,
+                             std::span<hamelin_contact> out) override {
     if (throws) throw std::runtime_error("the map is gone");
     out[0].distance_m = q[0] + influence_m;
     return out.size() + 3;
@@ -57,13 +58,14 @@ model::Model arm() {
   return model::Model(test::random_robot(7, 3));
 }
 
-/// A planner of the plugin `awkward` at one state.
+/// A planner of the plugin `awkward` and the input of one tick.
 struct Bench {
   explicit Bench(const std::string& fault) {
     SetupData setup(model);
     setup.influence_m = 0.5;
     const Plugin plugin = Plugin::load(test_plugin("awkward"));
-    planner.emplace(plugin.create(std::move(setup), services, check_params(plugin, Json{{"fault", fault}})));
+    planner.emplace(
+        plugin.create(std::move(setup), services, check_params(plugin, Json{{"fault", fault}})));
     tick.struct_size = sizeof tick;
     tick.q = q.data();
     tick.v = v.data();
@@ -79,48 +81,53 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("a plugin that is no plugin is refused with one line that names it", "[planning][plugin]") {
+TEST_CASE("a file that is not a valid plugin is refused with one line that names it",
+          "[planning][plugin]") {
   const std::string absent = test_plugin("absent").string();
   CHECK(refusal(absent) == absent + ": no such file, expected a planner plugin");
-  CHECK(refusal(test_plugins) == test_plugins.string() + ": not a regular file, expected a planner plugin");
+  CHECK(refusal(test_plugins) ==
+        test_plugins.string() + ": not a regular file, expected a planner plugin");
 
   const fs::path text = fs::path(HAMELIN_TEST_BINARY_DIR) / "text.hamelin.so";
-  std::ofstream(text) << "not a shared object, but long enough to hold the header of one, which it does not\n";
+  std::ofstream(text)
+      << "not a shared object, but a text that is longer than the header of a shared object\n";
   CHECK(refusal(text) == text.string() + ": cannot be loaded: invalid ELF header");
 
-  const auto expect = [](const std::string& name, const std::string& what) {
+  const auto expect = [](const std::string& name, const std::string& reason) {
     CAPTURE(name);
-    CHECK(refusal(test_plugin(name)) == test_plugin(name).string() + ": " + what);
+    CHECK(refusal(test_plugin(name)) == test_plugin(name).string() + ": " + reason);
   };
-  expect("no_entry", "no symbol hamelin_plugin_entry, so it is no planner plugin");
+  expect("no_entry", "no symbol hamelin_plugin_entry, expected a planner plugin");
   expect("null_entry", "hamelin_plugin_entry returned null");
-  expect("wrong_abi", "built for plugin ABI 9, this host has ABI 3");
-  expect("short_struct", "its hamelin_plugin has 64 bytes, expected at least 72");
-  expect("null_create", "its function 'create' is null");
-  expect("null_tick", "its function 'tick' is null");
-  expect("null_destroy", "its function 'destroy' is null");
-  expect("no_name", "it has no name");
-  CHECK_THAT(refusal(test_plugin("bad_schema")), Catch::Contains("its parameter schema: line 1"));
+  expect("wrong_abi", "built for plugin ABI 9, expected ABI 3");
+  expect("short_struct", "hamelin_plugin has 64 bytes, expected at least 72");
+  expect("null_create", "function 'create' is null");
+  expect("null_tick", "function 'tick' is null");
+  expect("null_destroy", "function 'destroy' is null");
+  expect("no_name", "the plugin has no name");
+  CHECK_THAT(refusal(test_plugin("bad_schema")), Catch::Contains("parameter schema: line 1"));
 }
 
-TEST_CASE("a constructor that throws ends in one line with its text", "[planning][plugin]") {
+TEST_CASE("an exception of a planner's constructor becomes one line with its text",
+          "[planning][plugin]") {
   const std::string file = test_plugin("awkward").string();
   CHECK(error_of([] { Bench("throw in constructor"); }) ==
-        file + ": planner 'awkward' refuses to start: this gain is out of tune");
+        file + ": planner 'awkward' cannot start: this gain is out of tune");
   CHECK(error_of([] { Bench("throw an int"); }) ==
-        file + ": planner 'awkward' refuses to start: an exception that is no std::exception");
+        file + ": planner 'awkward' cannot start: an exception that is not a std::exception");
 
   Services services;
   const Plugin empty = Plugin::load(test_plugin("creates_nothing"));
   CHECK_THAT(error_of([&] { (void)empty.create(SetupData(arm()), services, Json::object()); }),
-             Catch::EndsWith("refuses to start: create returned no planner"));
+             Catch::EndsWith("cannot start: create returned no planner"));
   services.log_throws = true;
   const Plugin plain = Plugin::load(test_plugin("plain_c"));
   CHECK_THAT(error_of([&] { (void)plain.create(SetupData(arm()), services, Json::object()); }),
-             Catch::EndsWith("refuses to start: the log is full"));
+             Catch::EndsWith("cannot start: the log is full"));
 }
 
-TEST_CASE("a planner written in plain C answers ticks and keeps its library loaded", "[planning][plugin]") {
+TEST_CASE("a planner written in plain C answers ticks and keeps its library loaded",
+          "[planning][plugin]") {
   Services services;
   const model::Model model = arm();
   std::optional<LoadedPlanner> planner;
@@ -140,7 +147,8 @@ TEST_CASE("a planner written in plain C answers ticks and keeps its library load
   CHECK(services.lines == std::vector<std::string>{"0 made in C"});
 }
 
-TEST_CASE("every channel crosses the border and is cleared before the next tick", "[planning][plugin]") {
+TEST_CASE("every channel reaches the host and is cleared before the next tick",
+          "[planning][plugin]") {
   Bench bench("node velocity");
   CHECK(bench.services.lines == std::vector<std::string>{"1 awkward is here"});
   REQUIRE(bench.planner->tick(bench.tick, bench.out));
@@ -176,20 +184,22 @@ TEST_CASE("a planner can give up with a cause, which is no defect", "[planning][
   CHECK(std::string(bench.out.raw().cause) == "no way on");
 }
 
-TEST_CASE("what no planner may answer is a defect with a line that says so", "[planning][plugin]") {
-  const auto [fault, line] =
-      GENERATE(table<std::string, std::string>({{"throw in tick", "tick went wrong"},
-                                                {"nan", "held torque is not finite"},
-                                                {"negative damping", "damping is negative"},
-                                                {"wrong link", "gyroscopic term on a link that is not there"},
-                                                {"many terms", "more gyroscopic terms than the host has room for"},
-                                                {"state", "unknown planner state"}}));
+TEST_CASE("an invalid answer of a planner is a defect with one line that names the reason",
+          "[planning][plugin]") {
+  const auto [fault, line] = GENERATE(table<std::string, std::string>(
+      {{"throw in tick", "tick went wrong"},
+       {"nan", "held torque is not finite"},
+       {"negative damping", "damping is negative"},
+       {"wrong link", "gyroscopic term on a link that does not exist"},
+       {"many terms", "more gyroscopic terms than the host's capacity"},
+       {"state", "unknown planner state"}}));
   Bench bench(fault);
   CHECK_FALSE(bench.planner->tick(bench.tick, bench.out));
   CHECK(bench.planner->error() == line);
 }
 
-TEST_CASE("closest points at any q come from the host, and its failure ends the tick", "[planning][plugin]") {
+TEST_CASE("the host answers queries of closest points, and its failure ends the tick",
+          "[planning][plugin]") {
   Bench bench("closest points");
   REQUIRE(bench.planner->tick(bench.tick, bench.out));
   CHECK(bench.out.held_torque()[0] == Approx(7.0 + 0.1 + 0.5));
@@ -200,10 +210,12 @@ TEST_CASE("closest points at any q come from the host, and its failure ends the 
   CHECK(bench.planner->tick(bench.tick, bench.out));
 }
 
-TEST_CASE("the setup carries the nominal model across the border", "[planning][plugin]") {
-  const geometry::SE3 base = geometry::SE3::exp((Eigen::Matrix<double, 6, 1>() << 0.3, -0.2, 0.9, 1, 2, 3).finished());
+TEST_CASE("the setup passes the nominal model to the plugin", "[planning][plugin]") {
+  const geometry::SE3 base =
+      geometry::SE3::exp((Eigen::Matrix<double, 6, 1>() << 0.3, -0.2, 0.9, 1, 2, 3).finished());
   model::Robot robot = test::random_robot(3, 4, 2);
-  robot.links[2].segments = {{{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 0.0}, {{0.0, 0.1, -0.1}, {0.0, 0.3, 0.1}, 0.03}};
+  robot.links[2].segments = {{{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 0.0},
+                             {{0.0, 0.1, -0.1}, {0.0, 0.3, 0.1}, 0.03}};
   const model::Model model(std::move(robot), base, {0.0, 1.0, -9.0});
   SetupData data(model);
   data.q_lower = Eigen::Vector4d::Constant(-2.0);
@@ -223,7 +235,7 @@ TEST_CASE("the setup carries the nominal model across the border", "[planning][p
   REQUIRE(setup.spheres().size() == 5);
   CHECK(vec3(setup.spheres()[2].center_link_m) == model.robot().links[2].spheres[0].center_m);
   CHECK(vec3(setup.spheres()[2].half_axis_link_m).isZero(0.0));
-  const hamelin_sphere& capsule = setup.spheres()[3];  // a line is no shape
+  const hamelin_sphere& capsule = setup.spheres()[3];  // a segment of radius zero is not a shape
   CHECK(capsule.link == 2);
   CHECK(capsule.index_in_link == 1);
   CHECK(vec3(capsule.center_link_m).isApprox(Eigen::Vector3d(0.0, 0.2, 0.0)));
@@ -239,7 +251,8 @@ TEST_CASE("the setup carries the nominal model across the border", "[planning][p
   }
 }
 
-TEST_CASE("parameters are completed, and refused by planner, key and range", "[planning][plugin]") {
+TEST_CASE("parameters are completed, and errors name planner, key and range",
+          "[planning][plugin]") {
   const Plugin plugin = Plugin::load(test_plugin("awkward"));
   const Json resolved = check_params(plugin, Json{{"gain", 4}});
   CHECK(resolved == Json::parse(R"({"gain": 4, "fault": "", "nested": {"depth": 3}})"));
@@ -250,14 +263,18 @@ TEST_CASE("parameters are completed, and refused by planner, key and range", "[p
     return error_of([&] { (void)check_params(plugin, Json::parse(params)); });
   };
   CHECK(error(R"({"gain": 11})") ==
-        "parameters of planner 'awkward': /gain: 11 is not allowed, expected type number, at least 0, at most 10");
-  CHECK_THAT(error(R"({"gainn": 1})"), Catch::Contains("planner 'awkward'") && Catch::Contains("unknown key 'gainn'") &&
+        "parameters of planner 'awkward': /gain: 11 is not allowed, expected type number, at least "
+        "0, at most 10");
+  CHECK_THAT(error(R"({"gainn": 1})"), Catch::Contains("planner 'awkward'") &&
+                                           Catch::Contains("unknown key 'gainn'") &&
                                            Catch::Contains("'gain'?"));
-  CHECK_THAT(error(R"({"nested": {"dept": 1}})"), Catch::Contains("/nested") && Catch::Contains("unknown key 'dept'"));
+  CHECK_THAT(error(R"({"nested": {"dept": 1}})"),
+             Catch::Contains("/nested") && Catch::Contains("unknown key 'dept'"));
   CHECK(error("[1]") == "parameters of planner 'awkward': /: expected an object");
 }
 
-TEST_CASE("a planner that is not found: every directory, what is there, the nearest name", "[planning][plugin]") {
+TEST_CASE("a missing planner is reported with all directories and a similar name",
+          "[planning][plugin]") {
   const fs::path root = fs::path(HAMELIN_TEST_BINARY_DIR) / "plugin_search";
   fs::remove_all(root);
   fs::create_directories(root / "one");
@@ -267,9 +284,10 @@ TEST_CASE("a planner that is not found: every directory, what is there, the near
   const std::vector<fs::path> directories{root / "one", root / "two", root / "three"};
 
   CHECK(error_of([&] { (void)find_plugin("plain-c", directories); }) ==
-        "planner 'plain-c': not found, did you mean 'plain_c'?; searched for plain-c.hamelin.so in: " +
-            (root / "one").string() + " (no plugins); " + (root / "two").string() + " (old, plain_c); " +
-            (root / "three").string() + " (no such directory)");
+        "planner 'plain-c': not found, did you mean 'plain_c'?; searched for plain-c.hamelin.so "
+        "in: " +
+            (root / "one").string() + " (no plugins); " + (root / "two").string() +
+            " (old, plain_c); " + (root / "three").string() + " (no such directory)");
   CHECK(find_plugin("plain_c", directories).file() == root / "two/plain_c.hamelin.so");
   CHECK(find_plugin((root / "two/plain_c.hamelin.so").string(), {}).name() == "plain_c");
 
@@ -281,7 +299,8 @@ TEST_CASE("a planner that is not found: every directory, what is there, the near
   CHECK(listed[1].plugin->version() == "1.0");
 }
 
-TEST_CASE("directories: those given, then HAMELIN_PLUGIN_PATH, then the program's own", "[planning][plugin]") {
+TEST_CASE("plugin directories: those given, then HAMELIN_PLUGIN_PATH, then the program's own",
+          "[planning][plugin]") {
   setenv("HAMELIN_PLUGIN_PATH", "/b::/c:/a", 1);
   const auto all = plugin_directories({"/a"}, {"/own", "/c"});
   unsetenv("HAMELIN_PLUGIN_PATH");
@@ -311,7 +330,8 @@ TEST_CASE("the README's example loads a planner and gets an answer", "[planning]
   CHECK(command.potential_gradient() == 4.0 * q);
 }
 
-TEST_CASE("a planner's own copy of the library computes with the host's instruction set", "[planning][unit]") {
+TEST_CASE("a planner's own copy of the library computes with the host's instruction set",
+          "[planning][unit]") {
   const Isa before = default_isa();
   for (const Isa isa : {Isa::v4, Isa::v3, Isa::baseline}) {
     if (!is_available(isa)) continue;

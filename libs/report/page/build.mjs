@@ -1,20 +1,20 @@
-// Makes the templates of the pages, each one HTML file with script and style inside.
+// Makes the templates of the pages, each one HTML file that contains its script and style.
 //   node build.mjs --modules DIR/node_modules --out FOLDER
-// Imports are looked up in --modules, so this folder needs no node_modules of its own.
+// Imports are resolved in --modules, so this folder needs no node_modules of its own.
 import { readFile, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 
-/** Each becomes FOLDER/NAME.html. */
+/** Each entry becomes FOLDER/NAME.html. */
 const PAGES = [
   { name: 'page', title: 'hamelin report', script: 'src/main.js', style: 'src/style.css' },
   { name: 'sweep', title: 'hamelin sweep', script: 'src/sweep.js', style: 'src/document.css' },
   { name: 'accuracy', title: 'hamelin accuracy', script: 'src/accuracy.js', style: 'src/document.css' },
 ];
 
-/** The place of the data; must stand in a template exactly once. */
+/** The placeholder of the data; it must occur exactly once in a template. */
 const TOKEN = '__HAMELIN_REPORT_DATA__';
 
 function fail(message) {
@@ -39,8 +39,9 @@ try {
   fail(`${modules}: esbuild cannot be loaded, expected the result of "npm ci": ${error.message.split('\n')[0]}`);
 }
 
-// three carries the shaders of all its materials as strings, which esbuild cannot touch: blanks and comments go, and so do the
-// pieces that only materials and features we do not use include (physical and toon light, shadows, maps, morphs, skins, probes).
+// The library three contains the shaders of all its materials as strings, which esbuild cannot
+// minify. This removes blanks, comments, and the parts for materials and features that the pages do
+// not use (physical and toon light, shadows, maps, morphs, skins, probes).
 const UNUSED = new RegExp(
   `^((?:var|const) (?:${[
     'lights_physical_\\w+', 'lights_toon_\\w+', 'transmission_\\w+', 'iridescence_\\w+', 'clearcoat_\\w+', 'envmap_\\w+', 'cube_uv_\\w+',
@@ -59,7 +60,10 @@ const shortShaders = {
   },
 };
 
-/** A string literal of GLSL without what the compiler skips. Lines of the preprocessor stay as they are. */
+/**
+ * Removes blanks and comments from a string literal with GLSL. Preprocessor lines keep their
+ * blanks.
+ */
 function shorten(literal) {
   const code = literal.slice(1, -1).replace(/\/\*.*?\*\//g, '');
   const lines = code.split('\\n').map((line) => {
@@ -69,7 +73,7 @@ function shorten(literal) {
   return `"${lines.filter((line) => line).join('\\n')}"`;
 }
 
-/** Bundles one entry and returns its text. */
+/** Bundles one entry point and returns its text. */
 async function bundle(entry) {
   const result = await esbuild.build({
     entryPoints: [path.join(here, entry)],
@@ -88,7 +92,8 @@ async function bundle(entry) {
   return result.outputFiles[0].text.trim();
 }
 
-// Inside <script>, these three would end or nest the element. In the bundle they occur in strings only.
+// Inside of <script>, these three sequences would end or nest the element. In the bundle they occur
+// only in strings.
 const forScript = (code) => code.replace(/<(?=\/script|script|!--)/gi, '\\x3C');
 
 const skeleton = await readFile(path.join(here, 'index.html'), 'utf8');

@@ -6,7 +6,7 @@ namespace hamelin::report {
 
 Bins::Bins(std::size_t lines, std::size_t points_max) : lines_(lines), points_max_(points_max) {}
 
-Bins::Extremes Bins::joined(const Extremes& a, const Extremes& b) noexcept {
+Bins::Extremes Bins::merged(const Extremes& a, const Extremes& b) noexcept {
   if (std::isnan(a.lo)) return b;
   if (std::isnan(b.lo)) return a;
   Extremes both = a;
@@ -21,15 +21,17 @@ Bins::Extremes Bins::joined(const Extremes& a, const Extremes& b) noexcept {
   return both;
 }
 
-void Bins::join_neighbours() {
+void Bins::merge_neighbours() {
   std::size_t kept = 0;
   for (std::size_t bin = 0; bin < spans_.size(); bin += 2, ++kept) {
     const bool pair = bin + 1 < spans_.size();
-    spans_[kept] =
-        pair ? Span{spans_[bin].first, spans_[bin + 1].last, spans_[bin].ticks + spans_[bin + 1].ticks} : spans_[bin];
+    spans_[kept] = pair ? Span{spans_[bin].first, spans_[bin + 1].last,
+                               spans_[bin].ticks + spans_[bin + 1].ticks}
+                        : spans_[bin];
     for (std::size_t line = 0; line < lines_; ++line) {
       const Extremes& even = extremes_[bin * lines_ + line];
-      extremes_[kept * lines_ + line] = pair ? joined(even, extremes_[(bin + 1) * lines_ + line]) : even;
+      extremes_[kept * lines_ + line] =
+          pair ? merged(even, extremes_[(bin + 1) * lines_ + line]) : even;
     }
   }
   spans_.resize(kept);
@@ -39,7 +41,8 @@ void Bins::join_neighbours() {
 
 void Bins::add(double t, std::span<const double> y) {
   if (spans_.empty() || spans_.back().ticks == ticks_per_bin_) {
-    while (spans_.size() >= (ticks_per_bin_ == 1 ? points_max_ : points_max_ / 2)) join_neighbours();
+    while (spans_.size() >= (ticks_per_bin_ == 1 ? points_max_ : points_max_ / 2))
+      merge_neighbours();
     if (spans_.empty() || spans_.back().ticks == ticks_per_bin_) {
       spans_.push_back({t, t, 0});
       extremes_.resize(extremes_.size() + lines_);
@@ -48,7 +51,8 @@ void Bins::add(double t, std::span<const double> y) {
   spans_.back().last = t;
   ++spans_.back().ticks;
   Extremes* const bin = &extremes_[(spans_.size() - 1) * lines_];
-  for (std::size_t line = 0; line < lines_; ++line) bin[line] = joined(bin[line], {y[line], y[line], ticks_, ticks_});
+  for (std::size_t line = 0; line < lines_; ++line)
+    bin[line] = merged(bin[line], {y[line], y[line], ticks_, ticks_});
   ++ticks_;
 }
 

@@ -13,7 +13,8 @@
 
 namespace hamelin::report {
 
-static_assert(std::endian::native == std::endian::little, "the container's numbers are little endian");
+static_assert(std::endian::native == std::endian::little,
+              "the container's numbers are little endian");
 
 namespace {
 
@@ -61,11 +62,13 @@ Json Container::add(const char* type, const char* data, std::size_t count, std::
 
 Json Container::stepped(std::span<const double> values, double step) {
   const auto [lo, hi] = range_of(values);
-  const bool finite = std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  const bool finite =
+      std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   if (!finite || std::max(-lo, hi) > 2e9 * step) return exact(values);
   std::vector<std::int32_t> raw;
   raw.reserve(values.size());
-  for (const double value : values) raw.push_back(static_cast<std::int32_t>(std::lround(value / step)));
+  for (const double value : values)
+    raw.push_back(static_cast<std::int32_t>(std::lround(value / step)));
   return scaled(add<std::int32_t>("i32", raw), step, 0.0);
 }
 
@@ -79,7 +82,8 @@ Json Container::bounded(std::span<const double> values, double step, double offs
   raw.reserve(values.size());
   for (const double value : values) {
     const double level = std::round((value - offset) / step);
-    raw.push_back(level < none ? static_cast<std::uint16_t>(std::max(0.0, level)) : none);  // NaN is not less
+    // NaN is not less than none
+    raw.push_back(level < none ? static_cast<std::uint16_t>(std::max(0.0, level)) : none);
   }
   Json array = scaled(exact(raw), step, offset);
   array["none"] = none;
@@ -95,7 +99,8 @@ Json Container::centred(std::span<const double> values, double step) {
   std::vector<std::int16_t> raw;
   raw.reserve(values.size());
   for (const double value : values)
-    raw.push_back(static_cast<std::int16_t>(std::clamp(std::round((value - offset) / scale), -half, half)));
+    raw.push_back(
+        static_cast<std::int16_t>(std::clamp(std::round((value - offset) / scale), -half, half)));
   return scaled(exact(raw), scale, offset);
 }
 
@@ -105,7 +110,8 @@ Json Container::relative(std::span<const double> values, int bits) {
   for (const double value : values) {
     int exponent = 0;
     const double mantissa = std::frexp(value, &exponent);  // NaN and infinity pass through
-    raw.push_back(static_cast<float>(std::ldexp(std::round(std::ldexp(mantissa, bits)), exponent - bits)));
+    raw.push_back(
+        static_cast<float>(std::ldexp(std::round(std::ldexp(mantissa, bits)), exponent - bits)));
   }
   return add<float>("f32", raw);
 }
@@ -113,7 +119,8 @@ Json Container::relative(std::span<const double> values, int bits) {
 std::string Container::finish(const Json& head) const {
   const std::string text = head.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > std::numeric_limits<std::uint32_t>::max())
-    throw Error(ErrorCode::invalid, fmt::format("report: {} bytes of text, expected less than 4 GiB", text.size()));
+    throw Error(ErrorCode::invalid,
+                fmt::format("report: {} bytes of text, expected less than 4 GiB", text.size()));
   const auto size = static_cast<std::uint32_t>(text.size());
   std::string bytes(reinterpret_cast<const char*>(&size), sizeof(size));
   bytes += text;

@@ -11,29 +11,33 @@
 
 namespace hamelin::report {
 
-/// Gathers arrays of numbers behind a JSON head: u32 (little endian) size of the head, the head, zeros up to a multiple
-/// of 8, the arrays. An array is named in the head by {at, n, type, scale, offset, none}; its values are
-/// offset + scale · raw. Equal arrays are kept once.
+/// Collects arrays of numbers behind a JSON head. The layout is: size of the head as u32 (little
+/// endian), the head, zeros up to a multiple of 8, the arrays. The head describes an array by {at,
+/// n, type, scale, offset, none}; its values are offset + scale · raw. Equal arrays are stored
+/// once.
 class Container {
  public:
-  /// As they are.
+  /// Stores the values unchanged.
   [[nodiscard]] Json exact(std::span<const double> values) { return add("f64", values); }
   [[nodiscard]] Json exact(std::span<const std::int16_t> values) { return add("i16", values); }
   [[nodiscard]] Json exact(std::span<const std::uint16_t> values) { return add("u16", values); }
   [[nodiscard]] Json exact(std::span<const std::uint8_t> values) { return add("u8", values); }
 
-  /// Rounded to multiples of `step`; f64 as they are where an i32 cannot hold that.
+  /// Rounds the values to multiples of `step`, as i32; stores them unchanged as f64 if an i32
+  /// cannot hold the multiples.
   [[nodiscard]] Json stepped(std::span<const double> values, double step);
-  /// 65535 levels between smallest and largest, NaN as none.
+  /// 65535 levels between the smallest and the largest value; NaN becomes none.
   [[nodiscard]] Json levels(std::span<const double> values);
-  /// Multiples of `step` from `offset` on as u16, NaN and what is too large as none; what is too small as the smallest.
+  /// offset + multiples of `step`, as u16. NaN and values that are too large become none; values
+  /// that are too small become `offset`.
   [[nodiscard]] Json bounded(std::span<const double> values, double step, double offset);
-  /// i16 around their middle, in steps of `step` or coarser where the range asks for it. No NaN.
+  /// i16 around the middle of the range, in steps of `step`, or of a larger one if the range
+  /// requires it. No NaN.
   [[nodiscard]] Json centred(std::span<const double> values, double step);
-  /// f32 of `bits` significant bits: a relative error of 2^-bits over any range. NaN stays.
+  /// f32 with `bits` significant bits, a relative error of 2^-bits. NaN is preserved.
   [[nodiscard]] Json relative(std::span<const double> values, int bits);
 
-  /// The whole. @throws Error invalid for a head of 4 GiB or more
+  /// The bytes of the container. @throws Error invalid for a head of 4 GiB or more
   [[nodiscard]] std::string finish(const Json& head) const;
 
  private:

@@ -13,28 +13,31 @@
 namespace hamelin::report {
 
 /// Channels of a tick, in the order of Frame::channels.
-inline constexpr std::array<const char*, 5> channel_names{"potential", "damping", "gyroscopic", "held", "node"};
+inline constexpr std::array<const char*, 5> channel_names{"potential", "damping", "gyroscopic",
+                                                          "held", "node"};
 
 /// A tick that becomes a pose of the replayed arm.
 struct Frame {
   double time_s = 0.0;
   Eigen::VectorXd q;
   std::size_t goal_index = 0;
-  std::array<Eigen::VectorXd, channel_names.size()> channels;  ///< joint torques; empty where the channel is not used
+  /// Joint torques of the channels; empty if a channel is not used.
+  std::array<Eigen::VectorXd, channel_names.size()> channels;
 };
 
-/// Gathers the columns of the frames, with what the log does not say: clearances, closest points, forces at the tip.
+/// Collects the columns of the frames and computes what the log does not contain: clearances,
+/// closest points, forces at the tip.
 class Frames {
  public:
   explicit Frames(const World& world);
-  void take(const Frame& frame);
+  void add(const Frame& frame);
   [[nodiscard]] Json json(Container& container, double step_s) const;
 
  private:
-  /// Of each collision shape its clearance; closest points of the nearest few.
-  void take_contacts(const Frame& frame);
-  /// Of each channel the force at the tip that accelerates it as the channel's torque does.
-  void take_forces(const Frame& frame);
+  /// Adds the clearance of each collision shape, and the closest points of the nearest shapes.
+  void add_contacts(const Frame& frame);
+  /// Adds, for each channel, the force that accelerates the tip as the channel's torque does.
+  void add_forces(const Frame& frame);
 
   const World& world_;
   dynamics::Workspace ws_;
@@ -47,7 +50,7 @@ class Frames {
   std::vector<std::uint16_t> goal_index_;
   std::vector<std::uint8_t> counts_;
   std::array<std::vector<double>, channel_names.size()> forces_;
-  std::array<bool, channel_names.size()> acts_{};
+  std::array<bool, channel_names.size()> channel_used_{};
 };
 
 }  // namespace hamelin::report

@@ -19,11 +19,11 @@ namespace hamelin::report {
 
 namespace {
 
-// Whatever a file is that does not begin as a log does, one line says so.
+// Reads the header. A file of any kind that does not begin with one is refused in one line.
 Json read_first_line(log::LogReader& reader, const std::filesystem::path& file) {
-  const auto fail = [&file](const std::string& what) {
-    return Error(ErrorCode::invalid,
-                 fmt::format("{}: {}, expected a log, as `hamelin run --log` writes it", file.string(), what));
+  const auto error = [&file](const std::string& problem) {
+    return Error(ErrorCode::invalid, fmt::format("{}: {}, expected a log of `hamelin run --log`",
+                                                 file.string(), problem));
   };
   Json header;
   bool any = false;
@@ -31,41 +31,48 @@ Json read_first_line(log::LogReader& reader, const std::filesystem::path& file) 
     any = reader.next(header);
   } catch (const Error& e) {
     if (e.code() != ErrorCode::parse || reader.lines() != 1) throw;
-    throw fail("its first line is no JSON object");
+    throw error("its first line is not a JSON object");
   }
-  if (!any) throw fail(reader.cut() ? "has no whole line" : "is empty");
-  if (header.value("type", Json()) != "header") throw fail("its first line is no header");
+  if (!any) throw error(reader.cut() ? "has no complete line" : "is empty");
+  if (header.value("type", Json()) != "header") throw error("its first line is not a header");
   return header;
 }
 
-// Whether the very map that was run is there.
-bool map_at_hand(const simulation::Recorded& recorded) {
-  return recorded.scene.map && std::none_of(recorded.changed.begin(), recorded.changed.end(),
-                                            [](const auto& changed) { return changed.role == "map"; });
+// Whether the map of the run is available and unchanged.
+bool has_original_map(const simulation::Recorded& recorded) {
+  return recorded.scene.map &&
+         std::none_of(recorded.changed.begin(), recorded.changed.end(),
+                      [](const auto& changed) { return changed.role == "map"; });
 }
 
-// Runs of one planner are told apart by their logs, and logs of one name by their number.
+// Runs are named by their planner. Runs of one planner are distinguished by the names of their
+// logs, and logs of one name by their number.
 std::vector<std::string> names_of(const Json& runs) {
   std::vector<std::string> names;
   for (const Json& run : runs)
-    names.push_back((run["planner"].is_null() ? run["integrator"] : run["planner"]).get<std::string>());
-  const auto with = [&](const auto& addition) {
+    names.push_back(
+        (run["planner"].is_null() ? run["integrator"] : run["planner"]).get<std::string>());
+  const auto extend_duplicates = [&](const auto& suffix) {
     std::map<std::string, int> count;
     for (const auto& name : names) ++count[name];
     for (std::size_t i = 0; i < names.size(); ++i)
-      if (count[names[i]] > 1) names[i] = fmt::format("{} {}", names[i], addition(i));
+      if (count[names[i]] > 1) names[i] = fmt::format("{} {}", names[i], suffix(i));
   };
-  with([&](std::size_t i) { return std::filesystem::path(runs[i]["log"].get<std::string>()).stem().string(); });
-  with([](std::size_t i) { return fmt::format("#{}", i + 1); });
+  extend_duplicates([&](std::size_t i) {
+    return std::filesystem::path(runs[i]["log"].get<std::string>()).stem().string();
+  });
+  extend_duplicates([](std::size_t i) { return fmt::format("#{}", i + 1); });
   return names;
 }
 
 void check(const std::vector<std::filesystem::path>& logs, const Options& options) {
   if (logs.empty()) throw Error(ErrorCode::usage, "report: no logs given, expected at least one");
   if (options.frames_max < 2)
-    throw Error(ErrorCode::usage, fmt::format("report: {} frames, expected at least 2", options.frames_max));
+    throw Error(ErrorCode::usage,
+                fmt::format("report: {} frames, expected at least 2", options.frames_max));
   if (options.plot_points_max < 4)
-    throw Error(ErrorCode::usage, fmt::format("report: {} points, expected at least 4", options.plot_points_max));
+    throw Error(ErrorCode::usage,
+                fmt::format("report: {} points, expected at least 4", options.plot_points_max));
 }
 
 }  // namespace
@@ -81,13 +88,15 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
     log::LogReader reader(file);
     const Json header = read_first_line(reader, file);
     const simulation::Recorded recorded = simulation::read_header(header, file);
-    const bool has_map = map_at_hand(recorded);
+    const bool has_map = has_original_map(recorded);
     std::string key = fmt::format("{}{}", world_key(recorded), has_map ? "" : " without map");
-    auto world = std::find_if(worlds.begin(), worlds.end(), [&](const auto& known) { return known->key == key; });
-    if (world == worlds.end()) world = worlds.insert(world, make_world(recorded, std::move(key), has_map, container));
+    auto world = std::find_if(worlds.begin(), worlds.end(),
+                              [&](const auto& known) { return known->key == key; });
+    if (world == worlds.end())
+      world = worlds.insert(world, make_world(recorded, std::move(key), has_map, container));
 
     Run run(header, recorded, **world, options);
-    for (Json line; reader.next(line);) run.take(std::move(line), reader);
+    for (Json line; reader.next(line);) run.add_line(std::move(line), reader);
     RunSummary summary;
     summary.log = file;
     Json named{{"name", ""}, {"world", world - worlds.begin()}};
@@ -95,7 +104,8 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
     runs.push_back(std::move(named));
     data.runs.push_back(std::move(summary));
     std::string scene = std::filesystem::path(recorded.scene.name).filename().string();
-    if (std::find(scenes.begin(), scenes.end(), scene) == scenes.end()) scenes.push_back(std::move(scene));
+    if (std::find(scenes.begin(), scenes.end(), scene) == scenes.end())
+      scenes.push_back(std::move(scene));
   }
   const std::vector<std::string> names = names_of(runs);
   for (std::size_t i = 0; i < names.size(); ++i) runs[i]["name"] = data.runs[i].name = names[i];

@@ -19,10 +19,11 @@ using Eigen::VectorXd;
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-// A page holds that many joint angles, events and joints' lines, however long the chain or the log.
+// Limits of the joint values, events and joints' lines in a page, for chains and logs of any
+// length.
 constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24;
 
-// Columns behind the joints' q, v and tau, in the order of a tick's row.
+// Columns of a tick's row after q, v and tau of the joints.
 enum Column : std::size_t {
   clearance,
   goal_m,
@@ -45,8 +46,8 @@ enum Column : std::size_t {
   columns
 };
 
-Error bad(const log::LogReader& reader, const std::string& what) {
-  return Error(ErrorCode::invalid, fmt::format("{}: {}", reader.where(), what));
+Error line_error(const log::LogReader& reader, const std::string& problem) {
+  return Error(ErrorCode::invalid, fmt::format("{}: {}", reader.where(), problem));
 }
 
 const Json* find(const Json& object, const char* key) {
@@ -54,49 +55,53 @@ const Json* find(const Json& object, const char* key) {
   return at == object.end() || at->is_null() ? nullptr : &*at;
 }
 
-// A member that must be an object where it is there.
-const Json& part(const Json& line, const char* key, const log::LogReader& reader) {
+// A member that must be an object if it exists; an empty object otherwise.
+const Json& object_member(const Json& line, const char* key, const log::LogReader& reader) {
   static const Json empty = Json::object();
   const Json* at = find(line, key);
   if (at == nullptr) return empty;
-  if (!at->is_object()) throw bad(reader, fmt::format("/{}: expected an object", key));
+  if (!at->is_object()) throw line_error(reader, fmt::format("/{}: expected an object", key));
   return *at;
 }
 
-// A number, or NaN for null or none.
+// A number, or NaN if it is null or missing.
 double number(const Json& object, const char* key, const log::LogReader& reader) {
   const Json* at = find(object, key);
   if (at == nullptr) return unknown;
-  if (!at->is_number()) throw bad(reader, fmt::format("{}: expected a number", key));
+  if (!at->is_number()) throw line_error(reader, fmt::format("{}: expected a number", key));
   return at->get<double>();
 }
 
-// One number a joint; null becomes NaN. Empty where there is none.
+// One number per joint; null becomes NaN. Empty if the member is missing.
 VectorXd joint_vector(const Json& object, const char* key, int dof, const log::LogReader& reader) {
   const Json* at = find(object, key);
   if (at == nullptr) return {};
   if (!at->is_array() || at->size() != static_cast<std::size_t>(dof))
-    throw bad(reader, fmt::format("{}: expected {} numbers, one a joint", key, dof));
+    throw line_error(reader, fmt::format("{}: expected {} numbers, one per joint", key, dof));
   VectorXd x(dof);
   for (int i = 0; i < dof; ++i) {
     const Json& value = (*at)[static_cast<std::size_t>(i)];
-    if (!value.is_number() && !value.is_null()) throw bad(reader, fmt::format("{}/{}: expected a number", key, i));
+    if (!value.is_number() && !value.is_null())
+      throw line_error(reader, fmt::format("{}/{}: expected a number", key, i));
     x[i] = value.is_null() ? unknown : value.get<double>();
   }
   return x;
 }
 
 std::size_t frames_of(const Options& options, int dof) {
-  return std::clamp<std::size_t>(joint_values_max / static_cast<std::size_t>(dof), 2, options.frames_max);
+  return std::clamp<std::size_t>(joint_values_max / static_cast<std::size_t>(dof), 2,
+                                 options.frames_max);
 }
 
 }  // namespace
 
-Run::Run(const Json& header, const simulation::Recorded& recorded, const World& world, const Options& options)
+Run::Run(const Json& header, const simulation::Recorded& recorded, const World& world,
+         const Options& options)
     : world_(world),
       recorded_(recorded),
       ws_(world.model),
-      plotted_joints_(std::min<std::size_t>(static_cast<std::size_t>(world.model.dof()), plotted_joints_max)),
+      plotted_joints_(
+          std::min<std::size_t>(static_cast<std::size_t>(world.model.dof()), plotted_joints_max)),
       row_(3 * plotted_joints_ + columns, unknown),
       bins_(row_.size(), options.plot_points_max),
       sample_(frames_of(options, world.model.dof())),
@@ -105,43 +110,51 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   const auto& links = world.model.robot().links;
   const Json& joints = header["joints"];
   bool same = joints.size() == links.size();
-  for (std::size_t i = 0; same && i < links.size(); ++i) same = joints[i]["name"] == links[i].joint.name;
+  for (std::size_t i = 0; same && i < links.size(); ++i)
+    same = joints[i]["name"] == links[i].joint.name;
   if (!same)
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: its joints are not those of the log, expected the robot as it was run",
-                            recorded.scene.robot.file.string()));
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: its joints differ from those in the log, expected the robot of the run",
+                    recorded.scene.robot.file.string()));
   for (const auto& changed : recorded.changed) notes_.push_back(changed.text);
   if (recorded.every > 1)
-    notes_.push_back(
-        fmt::format("the log has a tick every {} steps; clearance, energy error, updates, residual and "
-                    "the longest tick are over all steps",
-                    recorded.every));
+    notes_.push_back(fmt::format(
+        "the log has a tick every {} steps; clearance, energy error, updates, residual and "
+        "the longest tick are over all steps",
+        recorded.every));
 
   const auto unit = [](bool first, bool second, const char* one, const char* other) {
     return first && second ? fmt::format("{}, {}", one, other) : std::string(first ? one : other);
   };
-  bool turns = false, slides = false, has_place = false, has_joints = false;
-  for (const auto& link : links) (link.joint.type == model::JointType::revolute ? turns : slides) = true;
-  for (const auto& goal : world.goals) (goal.type == scene::GoalType::joint ? has_joints : has_place) = true;
-  const std::string cut = plotted_joints_ < links.size() ? fmt::format(" (first {})", plotted_joints_) : "";
+  bool has_revolute = false, has_prismatic = false, has_tip_goal = false, has_joint_goal = false;
+  for (const auto& link : links)
+    (link.joint.type == model::JointType::revolute ? has_revolute : has_prismatic) = true;
+  for (const auto& goal : world.goals)
+    (goal.type == scene::GoalType::joint ? has_joint_goal : has_tip_goal) = true;
+  const std::string suffix =
+      plotted_joints_ < links.size() ? fmt::format(" (first {})", plotted_joints_) : "";
   std::size_t column = 0;
-  for (auto [id, title, of] : {std::tuple("q", "joint angles", unit(turns, slides, "rad", "m")),
-                               std::tuple("v", "joint rates", unit(turns, slides, "rad/s", "m/s")),
-                               std::tuple("tau", "joint torques", unit(turns, slides, "Nm", "N"))}) {
-    plots_.push_back({id, title + cut, of, {}, false});
-    for (std::size_t i = 0; i < plotted_joints_; ++i) plots_.back().lines.emplace_back(links[i].joint.name, column++);
+  for (auto [id, title, plot_unit] :
+       {std::tuple("q", "joint angles", unit(has_revolute, has_prismatic, "rad", "m")),
+        std::tuple("v", "joint rates", unit(has_revolute, has_prismatic, "rad/s", "m/s")),
+        std::tuple("tau", "joint torques", unit(has_revolute, has_prismatic, "Nm", "N"))}) {
+    plots_.push_back({id, title + suffix, plot_unit, {}, false});
+    for (std::size_t i = 0; i < plotted_joints_; ++i)
+      plots_.back().lines.emplace_back(links[i].joint.name, column++);
   }
-  const auto add = [&](const char* id, const char* title, const std::string& of, bool small_numbers,
+  const auto add = [&](const char* id, const char* title, const std::string& plot_unit,
+                       bool wide_range,
                        std::initializer_list<std::pair<const char*, Column>> lines) {
-    plots_.push_back({id, title, of, {}, small_numbers});
+    plots_.push_back({id, title, plot_unit, {}, wide_range});
     for (const auto& [label, at] : lines) plots_.back().lines.emplace_back(label, column + at);
   };
   add("clearance", "clearance", "m", false, {{"smallest", clearance}});
-  if (has_place) add("goal", "distance to the goal", "m", false, {{"tip", goal_m}});
-  if (has_joints)
-    add(has_place ? "goal_joint" : "goal", "distance to the joint goal", unit(turns, slides, "rad", "m"), false,
-        {{"largest joint error", goal_rad}});
-  add("energy", "energy ledger", "J", false,
+  if (has_tip_goal) add("goal", "distance to the goal", "m", false, {{"tip", goal_m}});
+  if (has_joint_goal)
+    add(has_tip_goal ? "goal_joint" : "goal", "distance to the joint goal",
+        unit(has_revolute, has_prismatic, "rad", "m"), false, {{"largest joint error", goal_rad}});
+  add("energy", "energy account", "J", false,
       {{"kinetic", kinetic},
        {"potential", potential},
        {"control", control},
@@ -151,20 +164,24 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
        {"dissipated", dissipated},
        {"held work", held},
        {"node work", node}});
-  add("energy_error", "energy error", "J", true, {{"|E - E0 - work booked|", energy_error}});
-  add("solver", "solver updates per step", "1", true, {{"updates", updates}, {"halvings", halvings}});
+  add("energy_error", "energy error", "J", true, {{"|E - E0 - work|", energy_error}});
+  add("solver", "solver updates per step", "1", true,
+      {{"updates", updates}, {"halvings", halvings}});
   add("residual", "solver residual", "1", true, {{"residual", residual}});
-  add("tick_us", "time of one tick", "µs", true, {{"tick", tick_us}, {"longest since the line before", tick_us_max}});
+  add("tick_us", "time of one tick", "µs", true,
+      {{"tick", tick_us}, {"longest since the previous line", tick_us_max}});
 }
 
-void Run::take(Json line, const log::LogReader& reader) {
+void Run::add_line(Json line, const log::LogReader& reader) {
   const Json type = line.value("type", Json());
-  if (!result_.is_null()) throw bad(reader, "stands behind the result, expected nothing there");
+  if (!result_.is_null())
+    throw line_error(reader, "follows the result, expected the end of the log");
   if (type == "tick") {
-    take_tick(line, reader);
+    add_tick(line, reader);
   } else if (type == "event") {
     const Json* text = find(line, "text");
-    if (text == nullptr || !text->is_string()) throw bad(reader, "text: expected one line of text");
+    if (text == nullptr || !text->is_string())
+      throw line_error(reader, "text: expected one line of text");
     const double t = number(line, "time_s", reader);
     if (events_.size() < events_max)
       events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
@@ -175,29 +192,32 @@ void Run::take(Json line, const log::LogReader& reader) {
     line.erase("type");
     result_ = std::move(line);
   } else {
-    throw bad(reader, fmt::format("type {}, expected tick, event or result", type.dump()));
+    throw line_error(reader, fmt::format("type {}, expected tick, event or result", type.dump()));
   }
 }
 
-void Run::take_tick(const Json& line, const log::LogReader& reader) {
+void Run::add_tick(const Json& line, const log::LogReader& reader) {
   const int dof = world_.model.dof();
   const double k = number(line, "k", reader), t = number(line, "time_s", reader);
-  if (!(k > k_before_)) throw bad(reader, fmt::format("k: {} after {}, expected rising steps", k, k_before_));
+  if (!(k > last_k_))
+    throw line_error(reader, fmt::format("k: {} after {}, expected increasing steps", k, last_k_));
   if (!std::isfinite(t) || (ticks_ > 0 && !(t > time_s_)))
-    throw bad(reader, fmt::format("time_s: {} after {}, expected rising times", t, time_s_));
-  k_before_ = k;
+    throw line_error(reader,
+                     fmt::format("time_s: {} after {}, expected increasing times", t, time_s_));
+  last_k_ = k;
   time_s_ = t;
 
   Frame frame;
   frame.time_s = t;
   frame.q = joint_vector(line, "q", dof, reader);
-  if (frame.q.size() == 0) throw bad(reader, "q: is missing, expected one number a joint");
+  if (frame.q.size() == 0) throw line_error(reader, "q: is missing, expected one number per joint");
   if (const double goals = number(line, "goal_index", reader); goals >= 0.0 && goals < 65535.0)
     frame.goal_index = static_cast<std::size_t>(goals);
   const Json* channels = find(line, "channels");
   if (channels != nullptr)
     for (std::size_t i = 0; i < channel_names.size(); ++i)
-      frame.channels[i] = joint_vector(part(line, "channels", reader), channel_names[i], dof, reader);
+      frame.channels[i] =
+          joint_vector(object_member(line, "channels", reader), channel_names[i], dof, reader);
 
   std::fill(row_.begin(), row_.end(), unknown);
   const auto joints = [&](std::size_t at, const VectorXd& x) {
@@ -207,20 +227,21 @@ void Run::take_tick(const Json& line, const log::LogReader& reader) {
   joints(1, joint_vector(line, "v", dof, reader));
   joints(2, joint_vector(line, "tau", dof, reader));
   double* const row = &row_[3 * plotted_joints_];
-  const Json& energy = part(line, "energy", reader);
-  const Json& solver = part(line, "solver", reader);
-  const Json& timing = part(line, "timing", reader);
-  const Json& extrema = part(line, "extrema", reader);
+  const Json& energy = object_member(line, "energy", reader);
+  const Json& solver = object_member(line, "solver", reader);
+  const Json& timing = object_member(line, "timing", reader);
+  const Json& extrema = object_member(line, "extrema", reader);
 
   row[clearance] = number(line, "clearance_m", reader);
-  const std::pair<Column, const char*> entries[] = {{kinetic, "kinetic_J"},       {potential, "potential_J"},
-                                                    {control, "control_J"},       {gyroscopic, "gyroscopic_work_J"},
-                                                    {filter, "filter_work_J"},    {recovery, "recovery_work_J"},
-                                                    {dissipated, "dissipated_J"}, {held, "held_work_J"},
-                                                    {node, "node_work_J"}};
+  const std::pair<Column, const char*> entries[] = {
+      {kinetic, "kinetic_J"},       {potential, "potential_J"},
+      {control, "control_J"},       {gyroscopic, "gyroscopic_work_J"},
+      {filter, "filter_work_J"},    {recovery, "recovery_work_J"},
+      {dissipated, "dissipated_J"}, {held, "held_work_J"},
+      {node, "node_work_J"}};
   for (const auto& [column, key] : entries) row[column] = number(energy, key, reader);
-  const double balance =
-      row[kinetic] + row[potential] + row[control] - (row[gyroscopic] + row[held] - row[dissipated] + row[node]);
+  const double balance = row[kinetic] + row[potential] + row[control] -
+                         (row[gyroscopic] + row[held] - row[dissipated] + row[node]);
   if (ticks_ == 0) first_balance_ = balance;
   row[energy_error] = std::abs(balance - first_balance_);
   row[updates] = number(solver, "updates", reader);
@@ -237,7 +258,7 @@ void Run::take_tick(const Json& line, const log::LogReader& reader) {
   }
   ++ticks_;
   if (frame.q.allFinite()) {
-    goal_distance(frame);
+    set_goal_distance(frame);
     bins_.add(t, row_);
     sample_.add(std::move(frame));
   } else {
@@ -246,12 +267,13 @@ void Run::take_tick(const Json& line, const log::LogReader& reader) {
   }
 }
 
-void Run::goal_distance(const Frame& frame) {
+void Run::set_goal_distance(const Frame& frame) {
   if (world_.goals.empty()) return;
   double* const row = &row_[3 * plotted_joints_];
   const auto& goal = world_.goals[std::min(frame.goal_index, world_.goals.size() - 1)];
   if (goal.type == scene::GoalType::joint) {
-    if (goal.q.size() == frame.q.size()) row[goal_rad] = (frame.q - goal.q).lpNorm<Eigen::Infinity>();
+    if (goal.q.size() == frame.q.size())
+      row[goal_rad] = (frame.q - goal.q).lpNorm<Eigen::Infinity>();
     return;
   }
   dynamics::forward_kinematics(world_.model, ws_, frame.q);
@@ -262,15 +284,19 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   std::vector<Frame> frames = sample_.take();
   if (frames.empty())
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: has no tick with finite joint angles, expected a run", summary.log.string()));
-  if (reader.cut()) notes_.push_back("the log ends in the middle of a line or frame, which is left out");
+                fmt::format("{}: has no tick with finite joint angles, expected at least one",
+                            summary.log.string()));
+  if (reader.cut())
+    notes_.push_back("the log ends in the middle of a line or frame, which is omitted");
   if (result_.is_null()) notes_.push_back("the log has no result: the run was not finished");
   if (not_finite_ > 0)
-    notes_.push_back(fmt::format("{} ticks have joint angles that are not finite: they are not drawn", not_finite_));
-  if (events_left_out_ > 0) notes_.push_back(fmt::format("{} events more are in the log", events_left_out_));
+    notes_.push_back(fmt::format(
+        "{} ticks have joint angles that are not finite; they are not drawn", not_finite_));
+  if (events_left_out_ > 0)
+    notes_.push_back(fmt::format("{} more events are in the log", events_left_out_));
   notes_.insert(notes_.end(), world_.notes.begin(), world_.notes.end());
   if (recorded_.scene.map && world_.json["map"].is_null())
-    notes_.push_back("without the map that was run there are no clearances and closest points");
+    notes_.push_back("without the map of the run there are no clearances and closest points");
 
   const auto text = [](const Json& object, const char* key) {
     const Json* at = object.is_object() ? find(object, key) : nullptr;
@@ -294,7 +320,7 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["provenance"] = std::move(provenance_);
   run["notes"] = notes_;
   Frames columns(world_);
-  for (const Frame& frame : frames) columns.take(frame);
+  for (const Frame& frame : frames) columns.add(frame);
   run["frames"] = columns.json(container, recorded_.scene.step_s);
   run["events"] = std::move(events_);
   run["plots"] = plots_json(container);
@@ -313,17 +339,19 @@ Json Run::marks(const Plot& plot) const {
   if (id == "clearance") {
     add(0.0, "contact");
     const Json params = scene.planner ? scene.planner->params : Json::object();
-    for (const auto& [key, label] : {std::pair("margin_m", "margin"), std::pair("contact_radius_m", "looked for"),
-                                     std::pair("rho0_m", "influence")})
-      if (const Json* at = find(params, key); at != nullptr && at->is_number()) add(at->get<double>(), label);
+    for (const auto& [key, label] :
+         {std::pair("margin_m", "margin"), std::pair("contact_radius_m", "search radius"),
+          std::pair("rho0_m", "influence")})
+      if (const Json* at = find(params, key); at != nullptr && at->is_number())
+        add(at->get<double>(), label);
   } else if (id == "goal" || id == "goal_joint") {
     const bool of_joints = plot.lines.front().second == 3 * plotted_joints_ + goal_rad;
     for (const auto& goal : world_.goals)
       if ((goal.type == scene::GoalType::joint) == of_joints)
         add(of_joints ? goal.tolerance_rad : goal.tolerance_m, "tolerance");
   } else if (id == "v" || id == "tau") {
-    // Joints of one limit share its line, which is drawn where one of them comes near; a limit far above what happens
-    // would only squash the lines.
+    // Joints with the same limit share its line. It is drawn if one of them comes near to it; a
+    // limit far away would only compress the scale.
     const std::size_t first = (id == "v" ? 1 : 2) * plotted_joints_;
     if (!(id == "v" ? scene.model.velocity_limits : scene.model.torque_limits)) return marks;
     struct Shared {
@@ -337,15 +365,17 @@ Json Run::marks(const Plot& plot) const {
       if (!limit) continue;
       auto& shared = limits[*limit];
       shared.joints.push_back(joint.name);
-      for (const double value : bins_.values(first + i)) shared.near = shared.near || std::abs(value) > *limit / 1.5;
+      for (const double value : bins_.values(first + i))
+        shared.near = shared.near || std::abs(value) > *limit / 1.5;
     }
     for (const auto& [limit, shared] : limits) {
       if (!shared.near) continue;
-      const std::string who = shared.joints.size() == plotted_joints_ ? "limit"
-                              : shared.joints.size() <= 4 ? fmt::format("limit of {}", fmt::join(shared.joints, ", "))
-                                                          : fmt::format("limit of {} joints", shared.joints.size());
-      add(limit, who);
-      add(-limit, who);
+      const std::string label = shared.joints.size() == plotted_joints_ ? "limit"
+                                : shared.joints.size() <= 4
+                                    ? fmt::format("limit of {}", fmt::join(shared.joints, ", "))
+                                    : fmt::format("limit of {} joints", shared.joints.size());
+      add(limit, label);
+      add(-limit, label);
     }
   }
   return marks;
@@ -359,13 +389,16 @@ Json Run::plots_json(Container& container) const {
     Json series = Json::array();
     for (const auto& [label, column] : plot.lines) {
       const std::vector<double> y = bins_.values(column);
-      const bool known = std::any_of(y.begin(), y.end(), [](double value) { return !std::isnan(value); });
-      const bool moves =
-          std::any_of(y.begin(), y.end(), [](double value) { return value != 0.0 && !std::isnan(value); });
-      // Work that is never done is no line of the ledger; nor are halvings that never were.
-      if (!known || (!moves && !series.empty())) continue;
+      const bool known =
+          std::any_of(y.begin(), y.end(), [](double value) { return !std::isnan(value); });
+      const bool nonzero = std::any_of(
+          y.begin(), y.end(), [](double value) { return value != 0.0 && !std::isnan(value); });
+      // Only the first line is shown if it is zero throughout, for example not the work of an
+      // unused channel.
+      if (!known || (!nonzero && !series.empty())) continue;
       series.push_back(
-          {{"label", label}, {"y", plot.small_numbers ? container.relative(y, bits) : container.levels(y)}});
+          {{"label", label},
+           {"y", plot.wide_range ? container.relative(y, bits) : container.levels(y)}});
     }
     if (series.empty()) continue;
     plots.push_back({{"id", plot.id},

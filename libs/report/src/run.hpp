@@ -15,29 +15,31 @@
 
 namespace hamelin::report {
 
-/// Takes a log's lines behind the header and makes a run of them.
+/// Makes the data of a run from the lines of a log that follow the header.
 class Run {
  public:
-  /// @throws Error invalid if the header's joints are not the robot's
-  Run(const Json& header, const simulation::Recorded& recorded, const World& world, const Options& options);
+  /// @throws Error invalid if the joints in the header differ from the robot's
+  Run(const Json& header, const simulation::Recorded& recorded, const World& world,
+      const Options& options);
 
-  /// @param reader says where the line stood
-  /// @throws Error invalid for a line that is none of a log, or out of order
-  void take(Json line, const log::LogReader& reader);
+  /// @param reader knows the position of the line, for messages
+  /// @throws Error invalid for a line that does not belong to a log or is out of order
+  void add_line(Json line, const log::LogReader& reader);
 
-  /// The run's object but for name and world; the run is of no use then.
+  /// The JSON object of the run, without its name and world. The Run must not be used afterwards.
   /// @throws Error invalid for a run without a tick
-  [[nodiscard]] Json finish(const log::LogReader& reader, Container& container, RunSummary& summary);
+  [[nodiscard]] Json finish(const log::LogReader& reader, Container& container,
+                            RunSummary& summary);
 
  private:
   struct Plot {
     const char* id;
     std::string title, unit;
     std::vector<std::pair<std::string, std::size_t>> lines;  ///< label and column
-    bool small_numbers;                                      ///< of interest over many powers of ten
+    bool wide_range;                                         ///< values cover many powers of ten
   };
-  void take_tick(const Json& line, const log::LogReader& reader);
-  void goal_distance(const Frame& frame);
+  void add_tick(const Json& line, const log::LogReader& reader);
+  void set_goal_distance(const Frame& frame);
   [[nodiscard]] Json plots_json(Container& container) const;
   [[nodiscard]] Json marks(const Plot& plot) const;
 
@@ -51,7 +53,7 @@ class Run {
   EvenSample<Frame> sample_;
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;
-  double k_before_ = -1.0, time_s_ = 0.0, first_balance_ = 0.0;
+  double last_k_ = -1.0, time_s_ = 0.0, first_balance_ = 0.0;
   std::vector<std::string> notes_;
 };
 

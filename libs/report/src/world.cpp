@@ -22,11 +22,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// What a page shows fluently; beyond it cells that nobody sees are left out, then small ones drawn as larger ones.
+// A page with more cells is slow: hidden cells are then omitted first, and if necessary small cells
+// are drawn as larger ones.
 constexpr std::size_t cells_max = 60000;
 
-// Clearances are told up to this share of the reach, between these bounds [m].
-constexpr double influence_share = 0.15, influence_least = 0.3, influence_most = 5.0;
+// Clearances are computed up to this share of the reach, within these bounds [m].
+constexpr double influence_share = 0.15, influence_min = 0.3, influence_max = 5.0;
 
 Json array(const Eigen::Ref<const Eigen::VectorXd>& x) {
   Json out = Json::array();
@@ -35,23 +36,26 @@ Json array(const Eigen::Ref<const Eigen::VectorXd>& x) {
 }
 
 Json pose_json(const geometry::SE3& pose) {
-  return {{"position_m", array(pose.p())}, {"quaternion_wxyz", array(geometry::quaternion_wxyz(pose.R()))}};
+  return {{"position_m", array(pose.p())},
+          {"quaternion_wxyz", array(geometry::quaternion_wxyz(pose.R()))}};
 }
 
 // ---- robot
 
-// Balls that stand for a capsule: so many radii apart, and not more than so many.
+// Largest spacing, in radii, and largest number of the balls that a capsule is drawn as.
 constexpr double ball_spacing_share = 0.4, balls_max = 60.0;
 
 Json robot_json(const model::Model& model) {
   const model::Robot& robot = model.robot();
-  Json joints = Json::array(), spheres = Json::array(), segments = Json::array(), points = Json::array();
+  Json joints = Json::array(), spheres = Json::array(), segments = Json::array(),
+       points = Json::array();
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     const model::Link& link = robot.links[i];
-    joints.push_back({{"name", link.joint.name},
-                      {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
-                      {"screw", array(link.joint.screw)},
-                      {"link", link.name}});
+    joints.push_back(
+        {{"name", link.joint.name},
+         {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
+         {"screw", array(link.joint.screw)},
+         {"link", link.name}});
     for (const auto& segment : link.segments)
       segments.push_back({{"link", i},
                           {"from_m", array(link.com * segment.from_m)},
@@ -61,11 +65,14 @@ Json robot_json(const model::Model& model) {
   // a capsule is drawn as a row of balls
   for (std::size_t s = 0; s < model.shapes().size(); ++s) {
     const auto& shape = model.shapes()[s];
-    const auto i = static_cast<std::size_t>(shape.link), index = static_cast<std::size_t>(shape.index_in_link);
+    const auto i = static_cast<std::size_t>(shape.link),
+               index = static_cast<std::size_t>(shape.index_in_link);
     const model::Link& link = robot.links[i];
     const auto add = [&](const Vector3d& center) {
-      spheres.push_back(
-          {{"link", i}, {"center_m", array(link.com * center)}, {"radius_m", shape.radius}, {"shape", s}});
+      spheres.push_back({{"link", i},
+                         {"center_m", array(link.com * center)},
+                         {"radius_m", shape.radius},
+                         {"shape", s}});
     };
     if (!shape.is_capsule) {
       add(link.spheres[index].center_m);
@@ -73,15 +80,17 @@ Json robot_json(const model::Model& model) {
     }
     const model::Segment& capsule = link.segments[index];
     const Vector3d axis = capsule.to_m - capsule.from_m;
-    const double parts = std::clamp(std::ceil(axis.norm() / (ball_spacing_share * shape.radius)), 1.0, balls_max);
+    const double parts =
+        std::clamp(std::ceil(axis.norm() / (ball_spacing_share * shape.radius)), 1.0, balls_max);
     for (double part = 0.0; part <= parts; part += 1.0) add(capsule.from_m + (part / parts) * axis);
   }
   for (const Vector3d& point : skeleton(robot)) points.push_back(array(point));
   Json normal = nullptr;
   if (model.planar()) normal = array(model.root().R().col(2));
-  return {{"name", robot.name},   {"base", pose_json(model.base())}, {"joints", std::move(joints)},
-          {"skeleton", points},   {"tip_link", robot.tip.link},      {"spheres", std::move(spheres)},
-          {"segments", segments}, {"planar_normal", normal},         {"shapes", model.shapes().size()}};
+  return {
+      {"name", robot.name},   {"base", pose_json(model.base())}, {"joints", std::move(joints)},
+      {"skeleton", points},   {"tip_link", robot.tip.link},      {"spheres", std::move(spheres)},
+      {"segments", segments}, {"planar_normal", normal},         {"shapes", model.shapes().size()}};
 }
 
 // ---- map
@@ -92,10 +101,10 @@ Key key_of(const scene::Cell& cell) {
   return {cell.size, cell.lo[2], cell.lo[1], cell.lo[0]};
 }
 
-// The cell of that size in the octree's grid that holds the voxel; sizes are powers of two.
-scene::Cell around(const std::array<std::int32_t, 3>& voxel, std::int32_t size) {
+// The cell of the octree's grid with the given size, a power of two, that contains the voxel.
+scene::Cell enclosing_cell(const std::array<std::int32_t, 3>& voxel, std::int32_t size) {
   scene::Cell cell{voxel, size};
-  for (auto& lo : cell.lo) lo &= ~(size - 1);  // towards −∞, as the tree counts
+  for (auto& lo : cell.lo) lo &= ~(size - 1);  // rounds towards −∞, as the octree does
   return cell;
 }
 
@@ -108,22 +117,22 @@ class Occupancy {
     }
   }
 
-  /// Whether no face of the cell can be seen.
+  /// Whether all six faces of the cell are covered by other cells.
   [[nodiscard]] bool hides(const scene::Cell& cell) const {
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (const bool up : {false, true}) {
-        scene::Cell beside = cell;
-        beside.lo[axis] += up ? cell.size : -cell.size;
-        if (!covers(beside, axis, up)) return false;
+        scene::Cell neighbour = cell;
+        neighbour.lo[axis] += up ? cell.size : -cell.size;
+        if (!covers(neighbour, axis, up)) return false;
       }
     return true;
   }
 
  private:
-  /// Whether the side of `cell` that looks against the axis (up) or along it is occupied all over.
+  /// Whether the lower (up) or the upper side of `cell` along the axis is occupied all over.
   [[nodiscard]] bool covers(const scene::Cell& cell, std::size_t axis, bool up) const {
     for (std::int32_t size = cell.size; size <= largest_; size *= 2)
-      if (keys_.count(key_of(around(cell.lo, size))) > 0) return true;
+      if (keys_.count(key_of(enclosing_cell(cell.lo, size))) > 0) return true;
     if (cell.size == 1) return false;
     const std::int32_t half = cell.size / 2;
     for (unsigned part = 0; part < 4; ++part) {
@@ -140,27 +149,27 @@ class Occupancy {
   std::int32_t largest_ = 1;
 };
 
-// The cells with those below a size drawn as whole cells of that size.
+// Replaces cells smaller than a size by the cells of that size that contain them.
 std::vector<scene::Cell> coarsened(const std::vector<scene::Cell>& cells, std::int32_t size) {
   std::set<Key> seen;
   std::vector<scene::Cell> out;
   for (const auto& cell : cells) {
-    const scene::Cell wide = around(cell.lo, std::max(size, cell.size));
-    if (seen.insert(key_of(wide)).second) out.push_back(wide);
+    const scene::Cell coarse = enclosing_cell(cell.lo, std::max(size, cell.size));
+    if (seen.insert(key_of(coarse)).second) out.push_back(coarse);
   }
   return out;
 }
 
-Json map_json(const scene::Scene& scene, const model::Model& model, double influence, Container& container,
-              std::vector<std::string>& notes) {
+Json map_json(const scene::Scene& scene, const model::Model& model, double influence,
+              Container& container, std::vector<std::string>& notes) {
   const scene::MapSpec& spec = *scene.map;
   const scene::MapRegion region = scene::make_region(scene, model, influence);
   std::vector<scene::Cell> cells = region.occupied;
   std::size_t left_out = 0;
   if (cells.size() > cells_max) {
     const Occupancy occupancy(cells);
-    const auto seen =
-        std::remove_if(cells.begin(), cells.end(), [&](const auto& cell) { return occupancy.hides(cell); });
+    const auto seen = std::remove_if(cells.begin(), cells.end(),
+                                     [&](const auto& cell) { return occupancy.hides(cell); });
     left_out = static_cast<std::size_t>(cells.end() - seen);
     cells.erase(seen, cells.end());
   }
@@ -168,17 +177,19 @@ Json map_json(const scene::Scene& scene, const model::Model& model, double influ
   for (const std::size_t visible = cells.size(); cells.size() > cells_max;) {
     cells = coarsened(cells, size *= 2);
     if (cells.size() <= cells_max)
-      notes.push_back(
-          fmt::format("the map's {} visible cells are drawn {} m wide at least, {} m is its resolution; "
-                      "clearances are from the map itself",
-                      visible, size * region.resolution_m, region.resolution_m));
+      notes.push_back(fmt::format(
+          "the map's {} visible cells are drawn at least {} m wide, its resolution is {} m; "
+          "clearances are computed from the map itself",
+          visible, size * region.resolution_m, region.resolution_m));
   }
-  std::sort(cells.begin(), cells.end(), [](const auto& a, const auto& b) { return key_of(a) < key_of(b); });
+  std::sort(cells.begin(), cells.end(),
+            [](const auto& a, const auto& b) { return key_of(a) < key_of(b); });
   std::vector<std::int16_t> lo;
   std::vector<std::uint8_t> level;
   for (const auto& cell : cells) {
     for (const std::int32_t at : cell.lo) lo.push_back(static_cast<std::int16_t>(at));
-    level.push_back(static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(cell.size))));
+    level.push_back(
+        static_cast<std::uint8_t>(std::countr_zero(static_cast<std::uint32_t>(cell.size))));
   }
   Json json{{"file", spec.file.string()}, {"resolution_m", region.resolution_m}};
   json.update(pose_json(spec.pose));
@@ -224,8 +235,11 @@ Json goal_json(const scene::Goal& goal) {
 
 }  // namespace
 
-// With p_i = r_i + B_i s_i, B_i the axis (or all of space), the sum of |p_i − p_(i−1)|² is least where
-// B_iᵀ(2 p_i − p_(i−1) − p_(i+1)) = 0: eliminated joint by joint as p_i = A_i p_(i+1) + b_i, from the base outwards.
+// Point p_i = r_i + B_i s_i lies on the axis of joint i, with r_i a point of the axis, B_i its
+// direction (the identity for a prismatic joint) and s_i free. The sum of |p_i − p_(i−1)|² is
+// smallest where B_iᵀ(2 p_i − p_(i−1) − p_(i+1)) = 0. These equations are eliminated from the base
+// outwards as p_i = A_i p_(i+1) + b_i, where A_0 = 0, b_0 is the origin of the base, and
+//   W_i = 2 I − A_(i−1),  A_i = B_i (B_iᵀ W_i B_i)⁻¹ B_iᵀ,  b_i = r_i + A_i (b_(i−1) − W_i r_i).
 std::vector<Vector3d> skeleton(const model::Robot& robot) {
   const std::size_t n = robot.links.size();
   std::vector<Matrix3d> A(n);
@@ -259,7 +273,8 @@ std::string world_key(const simulation::Recorded& recorded) {
   Json key;
   for (const char* part : {"robot", "base", "map", "obstacles", "goals"}) key[part] = config[part];
   key["payload"] = config["model"]["payload"];
-  if (recorded.scene.map && recorded.scene.map->self_filter_padding_m) key["start"] = config["start"];
+  if (recorded.scene.map && recorded.scene.map->self_filter_padding_m)
+    key["start"] = config["start"];
   const auto content = [&key](const Json::json_pointer& file) {
     if (!key.contains(file) || !key[file].is_string()) return;
     std::error_code ec;
@@ -271,29 +286,34 @@ std::string world_key(const simulation::Recorded& recorded) {
   return key.dump();
 }
 
-std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::string key, bool map_at_hand,
-                                  Container& container) {
+std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::string key,
+                                  bool has_map, Container& container) {
   const scene::Scene& scene = recorded.scene;
   model::Model model = simulation::load_model(scene);
-  const double influence = std::clamp(influence_share * model.reach(), influence_least, influence_most);
-  auto world =
-      std::make_unique<World>(World{std::move(key), std::move(model), scene.goals, {}, false, influence, {}, {}});
+  const double influence =
+      std::clamp(influence_share * model.reach(), influence_min, influence_max);
+  auto world = std::make_unique<World>(
+      World{std::move(key), std::move(model), scene.goals, {}, false, influence, {}, {}});
   const double reach = world->model.reach();
   scene::Scene shown = scene;
-  if (!map_at_hand) shown.map.reset();
+  if (!has_map) shown.map.reset();
   world->environment = scene::make_environment(shown, world->model, influence);
-  world->judged = (map_at_hand || !scene.map) && world->environment.has_obstacles() && !world->model.shapes().empty();
+  world->has_clearances = (has_map || !scene.map) && world->environment.has_obstacles() &&
+                          !world->model.shapes().empty();
   if (shown.map && !shown.map->changes.empty())
-    world->notes.push_back(fmt::format("{}: changes during the run, from {} s on; shown and measured as at the start",
-                                       scene.map->file.string(), scene.map->changes.front().time_s));
+    world->notes.push_back(fmt::format(
+        "{}: changes during the run, from {} s on; cells and clearances are those at 0 s",
+        scene.map->file.string(), scene.map->changes.front().time_s));
   Json goals = Json::array(), obstacles = Json::array();
   for (const auto& goal : scene.goals) goals.push_back(goal_json(goal));
   for (const auto& obstacle : scene.obstacles) obstacles.push_back(obstacle_json(obstacle));
-  world->json = {{"robot", robot_json(world->model)},
-                 {"goals", std::move(goals)},
-                 {"map", shown.map ? map_json(shown, world->model, influence, container, world->notes) : Json(nullptr)},
-                 {"obstacles", std::move(obstacles)},
-                 {"reach_m", reach}};
+  world->json = {
+      {"robot", robot_json(world->model)},
+      {"goals", std::move(goals)},
+      {"map", shown.map ? map_json(shown, world->model, influence, container, world->notes)
+                        : Json(nullptr)},
+      {"obstacles", std::move(obstacles)},
+      {"reach_m", reach}};
   return world;
 }
 

@@ -17,7 +17,7 @@ using test::vector_of;
 
 namespace {
 
-// T_i = exp(S_1 q_1)…exp(S_i q_i) of the page's contract, from the data alone.
+// T_i = exp(S_1 q_1) … exp(S_i q_i) as the README defines it, from the data alone.
 std::vector<geometry::SE3> poses(const Json& robot, const Eigen::VectorXd& q) {
   std::vector<geometry::SE3> T;
   geometry::SE3 now;
@@ -30,7 +30,8 @@ std::vector<geometry::SE3> poses(const Json& robot, const Eigen::VectorXd& q) {
 }
 
 geometry::SE3 pose_of(const Json& pose) {
-  return {geometry::rotation_from_wxyz(vector_of(pose["quaternion_wxyz"])), vector_of(pose["position_m"])};
+  return {geometry::rotation_from_wxyz(vector_of(pose["quaternion_wxyz"])),
+          vector_of(pose["position_m"])};
 }
 
 Eigen::VectorXd q_of(const std::vector<double>& q, std::size_t frame, int dof) {
@@ -39,7 +40,8 @@ Eigen::VectorXd q_of(const std::vector<double>& q, std::size_t frame, int dof) {
 
 }  // namespace
 
-TEST_CASE("the poses are ticks of the log, first and last among them, evenly chosen", "[report]") {
+TEST_CASE("the poses are evenly spaced ticks of the log, including the first and the last",
+          "[report]") {
   const auto log = test::scratch("frames") / "run.jsonl";
   (void)test::log_run(test::shelf(0.5), log);
   const auto ticks = test::ticks_of(log);
@@ -65,16 +67,19 @@ TEST_CASE("the poses are ticks of the log, first and last among them, evenly cho
     }
     CHECK(chosen.front() == 0);
     CHECK(chosen.back() == ticks.size() - 1);
-    for (std::size_t f = 2; f + 1 < chosen.size(); ++f) REQUIRE(chosen[f] - chosen[f - 1] == chosen[1] - chosen[0]);
+    for (std::size_t f = 2; f + 1 < chosen.size(); ++f)
+      REQUIRE(chosen[f] - chosen[f - 1] == chosen[1] - chosen[0]);
   }
 }
 
-TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the model has them", "[report]") {
+TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the model has them",
+          "[report]") {
   const auto folder = test::scratch("kinematics");
   scene::Scene scene = test::shelf(0.01);
   scene.model.payload = scene::Payload{1.0, {0.01, 0.02, 0.05}, 0.01 * Eigen::Matrix3d::Identity()};
   scene::Scene planar = scene::read_scene(test::checkout("data/scenes/paper_51.json"));
-  planar.base = geometry::SE3(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {1, 2, 3});
+  planar.base = geometry::SE3(
+      Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {1, 2, 3});
   planar.duration_s = planar.step_s;
   (void)test::log_run(scene, folder / "arm.jsonl");
   (void)test::log_run(planar, folder / "planar.jsonl");
@@ -95,7 +100,8 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
     dynamics::shape_centers(model, ws, centers);
     REQUIRE(robot["spheres"].size() == centers.size());
     for (std::size_t s = 0; s < centers.size(); ++s) {
-      REQUIRE((place(robot["spheres"][s]["link"], robot["spheres"][s]["center_m"]) - centers[s]).norm() < 1e-12);
+      REQUIRE((place(robot["spheres"][s]["link"], robot["spheres"][s]["center_m"]) - centers[s])
+                  .norm() < 1e-12);
       REQUIRE(robot["spheres"][s]["radius_m"] == model.shapes()[s].radius);
     }
     const auto& links = model.robot().links;
@@ -103,15 +109,18 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
     for (std::size_t k = 0; k < links.size(); ++k)
       for (const auto& segment : links[k].segments) {
         const Json& drawn = robot["segments"].at(segments++);
-        const auto at = [&](const Vector3d& p) { return dynamics::point_position(model, ws, static_cast<int>(k), p); };
+        const auto at = [&](const Vector3d& p) {
+          return dynamics::point_position(model, ws, static_cast<int>(k), p);
+        };
         REQUIRE((place(drawn["link"], drawn["from_m"]) - at(segment.from_m)).norm() < 1e-12);
         REQUIRE((place(drawn["link"], drawn["to_m"]) - at(segment.to_m)).norm() < 1e-12);
       }
     CHECK(robot["segments"].size() == segments);
     const Json& skeleton = robot["skeleton"];
     REQUIRE(skeleton.size() == links.size() + 1);
-    CHECK((place(robot["tip_link"], skeleton.back()) - dynamics::tip_pose(model, ws).p()).norm() < 1e-12);
-    // A point on its joint's axis is one point of both links that the joint holds together.
+    CHECK((place(robot["tip_link"], skeleton.back()) - dynamics::tip_pose(model, ws).p()).norm() <
+          1e-12);
+    // A point on the axis of a joint belongs to both links of the joint.
     for (std::size_t k = 1; k < links.size(); ++k)
       REQUIRE((place(k, skeleton[k]) - place(k - 1, skeleton[k])).norm() < 1e-12);
     if (model.planar())
@@ -121,7 +130,7 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
   }
 }
 
-TEST_CASE("skeletons look like their arms", "[report]") {
+TEST_CASE("skeletons follow the links of their arms", "[report]") {
   const auto folder = test::scratch("skeleton");
   scene::Scene scene = scene::read_scene(test::checkout("data/scenes/paper_52_hybrid.json"));
   scene.planner.reset();
@@ -132,18 +141,20 @@ TEST_CASE("skeletons look like their arms", "[report]") {
   const Json& planar = page.head["worlds"][0]["robot"]["skeleton"];
   for (std::size_t i = 0; i <= 4; ++i)
     CHECK((vector_of(planar[i]) - Vector3d(static_cast<double>(i), 0, 0)).norm() < 1e-12);
-  // The arm's elbow, 82.5 mm before the column of its shoulder and wrist (its URDF's joint origins).
+  // By the joint origins in the URDF, the elbow is 82.5 mm in front of the line from shoulder to
+  // wrist.
   const Json& arm = page.head["worlds"][1]["robot"]["skeleton"];
   CHECK((vector_of(arm[1]) - Vector3d(0, 0, 0.333)).norm() < 1e-9);
   CHECK((vector_of(arm[3]) - Vector3d(0.0825, 0, 0.649)).norm() < 1e-9);
   CHECK((vector_of(arm[5]) - Vector3d(0, 0, 1.033)).norm() < 1e-9);
 }
 
-TEST_CASE("clearances and closest points are those to the cells that the page shows", "[report]") {
+TEST_CASE("clearances and closest points belong to the cells that the page shows", "[report]") {
   const auto log = test::scratch("clearance") / "run.jsonl";
   (void)test::log_run(test::shelf(2.5), log);
   const Decoded page(report::make_data({log}, {20, 100}).bytes);
-  const Json &world = page.head["worlds"][0], &robot = world["robot"], &frames = page.head["runs"][0]["frames"];
+  const Json &world = page.head["worlds"][0], &robot = world["robot"],
+             &frames = page.head["runs"][0]["frames"];
   CHECK(world["map"]["left_out"] == 0);
   const auto lo = page(world["map"]["lo"]), level = page(world["map"]["level"]);
   const geometry::SE3 base = pose_of(robot["base"]), map = pose_of(world["map"]);
@@ -151,9 +162,11 @@ TEST_CASE("clearances and closest points are those to the cells that the page sh
   std::vector<scene::Box> boxes;
   for (std::size_t c = 0; c < level.size(); ++c) {
     const Vector3d corner = triple(lo, c);
-    boxes.push_back({corner * resolution, (corner + Vector3d::Constant(std::exp2(level[c]))) * resolution});
+    boxes.push_back(
+        {corner * resolution, (corner + Vector3d::Constant(std::exp2(level[c]))) * resolution});
   }
-  const auto q = page(frames["q"]), clearance = page(frames["clearance"]), points = page(frames["contacts"]["points"]);
+  const auto q = page(frames["q"]), clearance = page(frames["clearance"]),
+             points = page(frames["contacts"]["points"]);
   const auto count = page(frames["contacts"]["count"]);
   const std::size_t spheres = robot["spheres"].size();
   REQUIRE(clearance.size() == count.size() * spheres);
@@ -163,30 +176,34 @@ TEST_CASE("clearances and closest points are those to the cells that the page sh
     std::vector<double> distances;
     for (std::size_t s = 0; s < spheres; ++s) {
       const Json& sphere = robot["spheres"][s];
-      const Vector3d center =
-          map.inverse() * (base * (T.at(sphere["link"].get<std::size_t>()) * Vector3d(vector_of(sphere["center_m"]))));
+      const Vector3d center = map.inverse() * (base * (T.at(sphere["link"].get<std::size_t>()) *
+                                                       Vector3d(vector_of(sphere["center_m"]))));
       double distance = std::numeric_limits<double>::infinity();
       for (const auto& box : boxes)
-        distance = std::min(distance, scene::closest_on_box(center, box).distance - sphere["radius_m"].get<double>());
-      const double told = clearance[f * spheres + s];
+        distance = std::min(distance, scene::closest_on_box(center, box).distance -
+                                          sphere["radius_m"].get<double>());
+      const double stored = clearance[f * spheres + s];
       if (distance > influence + 1e-4) {
-        REQUIRE(std::isnan(told));
+        REQUIRE(std::isnan(stored));
       } else if (distance < influence - 1e-4) {
-        REQUIRE(std::abs(told - distance) < 0.6e-4);  // steps of 0.1 mm, q to 1e-6
+        REQUIRE(std::abs(stored - distance) < 0.6e-4);  // steps of 0.1 mm, q rounded to 1e-6
         ++near;
       }
-      if (!std::isnan(told)) distances.push_back(told);
+      if (!std::isnan(stored)) distances.push_back(stored);
     }
     std::sort(distances.begin(), distances.end());
     REQUIRE(count[f] == static_cast<double>(std::min<std::size_t>(6, distances.size())));
     for (std::size_t c = 0; c < static_cast<std::size_t>(count[f]); ++c, ++contact)
-      REQUIRE(std::abs((triple(points, 2 * contact) - triple(points, 2 * contact + 1)).norm() - distances[c]) < 4e-4);
+      REQUIRE(std::abs((triple(points, 2 * contact) - triple(points, 2 * contact + 1)).norm() -
+                       distances[c]) < 4e-4);
   }
   CHECK(near > 100);
   CHECK(points.size() == 6 * contact);
 }
 
-TEST_CASE("a force at the tip is its channel's torque through the damped operational-space inertia", "[report]") {
+TEST_CASE(
+    "a force at the tip is its channel's torque mapped by the damped operational-space inertia",
+    "[report]") {
   const auto log = test::scratch("forces") / "run.jsonl";
   const scene::Scene scene = test::shelf(0.6);
   (void)test::log_run(scene, log);
@@ -208,7 +225,8 @@ TEST_CASE("a force at the tip is its channel's torque through the damped operati
         dynamics::mass_matrix(model, ws, q, M);
         dynamics::forward_kinematics(model, ws, q);
         dynamics::Matrix3Xd J(3, 7);
-        dynamics::point_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(), J);
+        dynamics::point_jacobian(model, ws, model.robot().tip.link,
+                                 dynamics::tip_pose(model, ws).p(), J);
         const Eigen::MatrixXd inverse = M.inverse();
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(J * inverse * J.transpose());
         const Vector3d d = eigen.eigenvalues();
@@ -217,12 +235,13 @@ TEST_CASE("a force at the tip is its channel's torque through the damped operati
                    (J * inverse * vector_of(torques[channel["channel"]]));
       }
       CAPTURE(channel["channel"], k);
-      REQUIRE((triple(f, k) - expected).norm() <= 2e-3 * expected.norm() + 1e-12);  // ten bits
+      REQUIRE((triple(f, k) - expected).norm() <= 2e-3 * expected.norm() + 1e-12);  // 10 bits
     }
   }
 }
 
-TEST_CASE("binned lines keep the smallest and largest value of every bin, in their order", "[report]") {
+TEST_CASE("binned lines keep the smallest and largest value of every bin, in their order in time",
+          "[report]") {
   const auto log = test::scratch("bins") / "run.jsonl";
   scene::Scene scene = scene::read_scene(test::checkout("data/scenes/paper_51.json"));
   scene.step_s = 0.002;
@@ -262,14 +281,17 @@ TEST_CASE("binned lines keep the smallest and largest value of every bin, in the
   }
 }
 
-TEST_CASE("the plotted energy error peaks at the result's, with all ticks and with every tenth", "[report]") {
+TEST_CASE(
+    "the plotted energy error has the maximum in the result, with all ticks and with every tenth",
+    "[report]") {
   const auto folder = test::scratch("energy");
   for (const long every : {1L, 10L}) {
     for (const std::string name : {"shelf", "free", "potential"}) {
       scene::Scene scene = test::shelf(1.0);
       if (name == "free") scene.planner.reset();
       if (name == "potential")
-        scene.planner = scene::Choice{"apf", {{"mapping", "potential"}, {"gravity_compensation", true}}};
+        scene.planner =
+            scene::Choice{"apf", {{"mapping", "potential"}, {"gravity_compensation", true}}};
       const auto log = folder / (name + ".jsonl");
       const auto result = test::log_run(scene, log, every);
       const Decoded page(report::make_data({log}).bytes);
@@ -284,7 +306,7 @@ TEST_CASE("the plotted energy error peaks at the result's, with all ticks and wi
   }
 }
 
-TEST_CASE("runs of one scene share a world, and are told apart by name", "[report]") {
+TEST_CASE("runs of one scene share a world and have different names", "[report]") {
   const auto folder = test::scratch("worlds");
   scene::Scene scene = test::shelf(0.02);
   (void)test::log_run(scene, folder / "a.jsonl");
@@ -293,8 +315,9 @@ TEST_CASE("runs of one scene share a world, and are told apart by name", "[repor
   (void)test::log_run(scene, folder / "c.jsonl");
   scene.planner.reset();
   (void)test::log_run(scene, folder / "free.jsonl");
-  const auto data = report::make_data(
-      {folder / "a.jsonl", folder / "b.jsonl.zst", folder / "c.jsonl", folder / "free.jsonl", folder / "a.jsonl"});
+  const auto data =
+      report::make_data({folder / "a.jsonl", folder / "b.jsonl.zst", folder / "c.jsonl",
+                         folder / "free.jsonl", folder / "a.jsonl"});
   const Decoded page(data.bytes);
   CHECK(page.head["format"] == "hamelin.report/1");
   CHECK(page.head["title"] == "shelf.json");
@@ -306,9 +329,9 @@ TEST_CASE("runs of one scene share a world, and are told apart by name", "[repor
     names.push_back(run["name"]);
   }
   CHECK(worlds == std::vector<int>{0, 0, 1, 2, 0});
-  CHECK(names ==
-        std::vector<std::string>{"hybrid a #1", "hybrid b.jsonl", "hybrid c", "hamel-variational", "hybrid a #5"});
-  CHECK(page.head["runs"][0]["frames"]["q"] == page.head["runs"][4]["frames"]["q"]);  // equal arrays are kept once
+  CHECK(names == std::vector<std::string>{"hybrid a #1", "hybrid b.jsonl", "hybrid c",
+                                          "hamel-variational", "hybrid a #5"});
+  CHECK(page.head["runs"][0]["frames"]["q"] == page.head["runs"][4]["frames"]["q"]);  // stored once
   CHECK(page.head["runs"][0]["result"]["outcome"] == "timeout");
   CHECK(page.head["runs"][0]["config"]["planner"]["name"] == "hybrid");
 }

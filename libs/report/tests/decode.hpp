@@ -14,7 +14,8 @@
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/run.hpp"
 
-/// Reads what make_data writes, by the layout that the library's README states; and makes logs to write it from.
+/// Reads the bytes of make_data, following the layout in the library's README, and makes logs for
+/// it.
 namespace hamelin::test {
 
 struct Decoded {
@@ -40,7 +41,7 @@ struct Decoded {
     return values<std::uint8_t>(array);
   }
 
-  /// One line of a plot: by the plot's id and the line's number.
+  /// The plot of a run with this id.
   [[nodiscard]] const Json& plot(std::size_t run, const std::string& id) const {
     for (const auto& plot : head["runs"][run]["plots"])
       if (plot["id"] == id) return plot;
@@ -67,9 +68,10 @@ struct Decoded {
   }
 };
 
-/// A folder of this test's own, empty at first.
+/// An empty folder for one test.
 inline std::filesystem::path scratch(const std::string& name) {
-  const auto folder = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / ("report_" + name);
+  const auto folder =
+      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / ("report_" + name);
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;
@@ -79,8 +81,9 @@ inline std::filesystem::path checkout(const std::string& file) {
   return std::filesystem::path(HAMELIN_SOURCE_DIR) / file;
 }
 
-/// Runs a scene and logs it; in free motion if it has no planner.
-inline log::Result log_run(const scene::Scene& scene, const std::filesystem::path& file, long every = 1) {
+/// Runs a scene and logs it, in free motion if it has no planner.
+inline log::Result log_run(const scene::Scene& scene, const std::filesystem::path& file,
+                           long every = 1) {
   log::RunLog log(file);
   simulation::Watch watch;
   watch.log = &log;
@@ -105,11 +108,12 @@ inline scene::Scene shelf(double duration_s) {
 
 inline Eigen::VectorXd vector_of(const Json& numbers) {
   Eigen::VectorXd x(static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t i = 0; i < numbers.size(); ++i) x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    x[static_cast<Eigen::Index>(i)] = numbers[i].get<double>();
   return x;
 }
 
-/// Number i of a list of triples.
+/// Triple i of a list of triples.
 inline Eigen::Vector3d triple(const std::vector<double>& numbers, std::size_t i) {
   return {numbers.at(3 * i), numbers.at(3 * i + 1), numbers.at(3 * i + 2)};
 }

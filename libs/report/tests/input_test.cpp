@@ -24,7 +24,7 @@ std::string notes_of(const Decoded& page) {
 
 }  // namespace
 
-TEST_CASE("a log that was cut makes a page of what it has, and says so", "[report]") {
+TEST_CASE("a truncated log makes a page of its complete lines, with notes", "[report]") {
   const auto folder = test::scratch("cut");
   (void)test::log_run(test::shelf(0.2), folder / "whole.jsonl");
   const std::string text = read_file(folder / "whole.jsonl");
@@ -35,10 +35,11 @@ TEST_CASE("a log that was cut makes a page of what it has, and says so", "[repor
   CHECK(page.head["runs"][0]["result"].is_null());
   CHECK(page.head["runs"][0]["outcome"] == "unfinished");
   CHECK_THAT(notes_of(page), Contains("middle of a line") && Contains("no result"));
-  CHECK(page(page.head["runs"][0]["frames"]["t"]).size() == test::ticks_of(folder / "cut.jsonl").size());
+  CHECK(page(page.head["runs"][0]["frames"]["t"]).size() ==
+        test::ticks_of(folder / "cut.jsonl").size());
 }
 
-TEST_CASE("what is no log is refused in one line that names it", "[report]") {
+TEST_CASE("a file that is not a log is refused in one line with its name", "[report]") {
   const auto folder = test::scratch("refused");
   (void)test::log_run(test::shelf(0.01), folder / "run.jsonl");
   const std::string text = read_file(folder / "run.jsonl");
@@ -49,27 +50,27 @@ TEST_CASE("what is no log is refused in one line that names it", "[report]") {
   backwards.replace(backwards.find("\"k\":3"), 5, "\"k\":1");
   const std::pair<std::string, std::string> cases[] = {
       {"", "is empty"},
-      {text.substr(0, 100), "has no whole line"},
+      {text.substr(0, 100), "has no complete line"},
       {text.substr(0, header), "has no tick"},
-      {"{\n \"schema\": \"hamelin.scene/1\"\n}\n", "its first line is no JSON object"},
-      {"{\"schema\": \"hamelin.scene/1\"}\n", "its first line is no header"},
-      {text.substr(header), "its first line is no header"},
+      {"{\n \"schema\": \"hamelin.scene/1\"\n}\n", "its first line is not a JSON object"},
+      {"{\"schema\": \"hamelin.scene/1\"}\n", "its first line is not a header"},
+      {text.substr(header), "its first line is not a header"},
       {damaged, "line 2: q: expected 7 numbers"},
       {backwards, "line 5: k: 1 after 2"},
-      {text + text.substr(header), "stands behind the result"},
+      {text + text.substr(header), "follows the result"},
       {text.substr(0, header) + "{\"type\":\"tock\"}\n", "line 2: type \"tock\""},
       {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":\"now\"}\n",
        "line 2: time_s: expected a number"},
   };
-  for (const auto& [content, what] : cases) {
+  for (const auto& [content, expected] : cases) {
     write(folder / "bad.jsonl", content);
-    CAPTURE(what);
+    CAPTURE(expected);
     try {
       (void)report::make_data({folder / "bad.jsonl"});
       FAIL("no error");
     } catch (const Error& e) {
       const std::string message = e.what();
-      CHECK_THAT(message, Contains(what) && Contains("bad.jsonl"));
+      CHECK_THAT(message, Contains(expected) && Contains("bad.jsonl"));
       CHECK(message.find('\n') == std::string::npos);
     }
   }
@@ -79,7 +80,8 @@ TEST_CASE("what is no log is refused in one line that names it", "[report]") {
   CHECK_THROWS_AS(report::make_data({folder / "run.jsonl"}, {2, 3}), Error);
 }
 
-TEST_CASE("without the very map a page goes without clearances; without the robot there is none", "[report]") {
+TEST_CASE("without the original map a page has no clearances; without the robot there is no page",
+          "[report]") {
   const auto folder = test::scratch("missing");
   scene::Scene scene = test::shelf(0.02);
   const auto copy = [&](fs::path& file) {
@@ -93,15 +95,17 @@ TEST_CASE("without the very map a page goes without clearances; without the robo
   const auto run_of = [&] { return Decoded(report::make_data({folder / "run.jsonl"}).bytes); };
   CHECK_FALSE(run_of().head["runs"][0]["frames"]["clearance"].is_null());
 
-  const auto check_without_map = [&](const std::string& what) {
+  const auto check_without_map = [&](const std::string& reason) {
     const Decoded page = run_of();
     CHECK(page.head["worlds"][0]["map"].is_null());
     CHECK(page.head["runs"][0]["frames"]["clearance"].is_null());
     CHECK(page.head["runs"][0]["frames"]["contacts"].is_null());
-    CHECK_THAT(notes_of(page), Contains("shelf.bt") && Contains(what) && Contains("without the map"));
-    CHECK(page(page.plot(0, "clearance")["t"]).size() == 21);  // the log's own
+    CHECK_THAT(notes_of(page),
+               Contains("shelf.bt") && Contains(reason) && Contains("without the map"));
+    CHECK(page(page.plot(0, "clearance")["t"]).size() == 21);  // from the log
   };
-  fs::copy_file(test::checkout("data/maps/clutter.bt"), scene.map->file, fs::copy_options::overwrite_existing);
+  fs::copy_file(test::checkout("data/maps/clutter.bt"), scene.map->file,
+                fs::copy_options::overwrite_existing);
   check_without_map("changed");
   fs::remove(scene.map->file);
   check_without_map("missing");
@@ -112,7 +116,7 @@ TEST_CASE("without the very map a page goes without clearances; without the robo
   CHECK_THROWS_WITH(run_of(), Contains("arm7.urdf"));
 }
 
-TEST_CASE("of a map too large to draw no visible cell is lost", "[report]") {
+TEST_CASE("no visible cell of a map that is too large to draw is lost", "[report]") {
   const auto folder = test::scratch("large_map");
   scene::MakeMapOptions options;
   scene::Obstacle ball;
@@ -125,14 +129,15 @@ TEST_CASE("of a map too large to draw no visible cell is lost", "[report]") {
   scene::Scene scene = test::shelf(0.01);
   scene.map->file = options.output;
   scene.map->pose = geometry::SE3(Eigen::Matrix3d::Identity(), {0.8, 0.2, 0.2});
-  (void)test::log_run(scene, folder / "run.jsonl");  // refused at once: the base stands inside
+  // refused at once because the base is inside the ball
+  (void)test::log_run(scene, folder / "run.jsonl");
   const Decoded page(report::make_data({folder / "run.jsonl"}).bytes);
   const Json& map = page.head["worlds"][0]["map"];
   const auto lo = page(map["lo"]), level = page(map["level"]);
   CHECK(level.size() <= 60000);
   CHECK(level.size() > 10000);
   CHECK(map["left_out"] > 0);
-  CHECK_THAT(notes_of(page), Contains("are drawn 0.02 m wide"));
+  CHECK_THAT(notes_of(page), Contains("are drawn at least 0.02 m wide"));
 
   constexpr int n = 200, half = n / 2;
   const auto index = [](int x, int y, int z) {
@@ -143,16 +148,19 @@ TEST_CASE("of a map too large to draw no visible cell is lost", "[report]") {
       for (int y = 0; y < size; ++y)
         for (int x = 0; x < size; ++x) grid[index(from[0] + x, from[1] + y, from[2] + z)] = true;
   };
-  // What the arm can come near to is drawn; the far side of the ball is cropped by whole cells.
+  // The cells near the arm are drawn; the far side of the ball is cropped by whole cells.
   const model::Model model = simulation::load_model(scene);
   const auto data = scene::read_map(options.output);
   const double radius = model.reach() + page.head["runs"][0]["frames"]["influence_m"].get<double>();
   std::vector<bool> occupied(n * n * n), drawn(n * n * n);
-  const auto near = scene::crop(data.occupied, 0.01, {scene.map->pose.inverse() * scene.base.p(), radius});
+  const auto near =
+      scene::crop(data.occupied, 0.01, {scene.map->pose.inverse() * scene.base.p(), radius});
   REQUIRE(near.size() > 60000);
   for (const auto& cell : near) paint(occupied, cell.lo, cell.size);
   for (std::size_t c = 0; c < level.size(); ++c)
-    paint(drawn, {static_cast<int>(lo[3 * c]), static_cast<int>(lo[3 * c + 1]), static_cast<int>(lo[3 * c + 2])},
+    paint(drawn,
+          {static_cast<int>(lo[3 * c]), static_cast<int>(lo[3 * c + 1]),
+           static_cast<int>(lo[3 * c + 2])},
           1 << static_cast<int>(level[c]));
   std::size_t visible = 0, lost = 0, far_off = 0;
   for (int z = -half + 2; z < half - 2; ++z)

@@ -47,26 +47,30 @@ std::string gunzipped(std::string packed, std::size_t size) {
 
 }  // namespace
 
-TEST_CASE("a page is its template with the data in the token's place", "[report]") {
+TEST_CASE("a page is its template with the token replaced by the data", "[report]") {
   for (const std::size_t size : {0UL, 1UL, 2UL, 3UL, 1000UL, 3000000UL}) {
     std::string data;
     for (std::size_t i = 0; data.size() < size; ++i) data += std::to_string(i * i % 7919);
     data.resize(size);
-    const std::string page = report::make_page("<head>" + std::string(report::token) + "</head>", data, "page.html");
+    const std::string page =
+        report::make_page("<head>" + std::string(report::token) + "</head>", data, "page.html");
     REQUIRE(page.starts_with("<head>"));
     REQUIRE(page.ends_with("</head>"));
     const std::string packed = from_base64(page.substr(6, page.size() - 13));
     CHECK(gunzipped(packed, size) == data);
-    CHECK(packed.substr(4, 4) == std::string(4, '\0'));  // RFC 1952: the time of packing, unknown
+    CHECK(packed.substr(4, 4) == std::string(4, '\0'));  // RFC 1952: time unknown
   }
 }
 
-TEST_CASE("a template without the token, or with two, is refused by name", "[report]") {
+TEST_CASE("a template without the token, or with two tokens, is refused with the name of the file",
+          "[report]") {
   const std::string token(report::token);
-  CHECK_THROWS_WITH(report::make_page("<html></html>", "data", "share/page.html"),
-                    "share/page.html: the token __HAMELIN_REPORT_DATA__ is missing, expected it once");
-  CHECK_THROWS_WITH(report::make_page(token + " " + token, "data", "share/page.html"),
-                    "share/page.html: the token __HAMELIN_REPORT_DATA__ occurs twice, expected it once");
+  CHECK_THROWS_WITH(
+      report::make_page("<html></html>", "data", "share/page.html"),
+      "share/page.html: the token __HAMELIN_REPORT_DATA__ is missing, expected it once");
+  CHECK_THROWS_WITH(
+      report::make_page(token + " " + token, "data", "share/page.html"),
+      "share/page.html: the token __HAMELIN_REPORT_DATA__ occurs twice, expected it once");
 }
 
 TEST_CASE("JSON alone is packed as a container without arrays", "[report]") {

@@ -23,7 +23,7 @@ for (const auto& run : data.runs) {
 }
 const std::string page_template = "<script id=\"hamelin-data\">__HAMELIN_REPORT_DATA__</script>";
 const std::string page = report::make_page(page_template, data.bytes, "template.html");
-write_file_aside(folder / "page.html", page);
+write_file_atomically(folder / "page.html", page);
   // [example]
   // clang-format on
   CHECK(read_file(folder / "page.html") == page);

@@ -1,6 +1,7 @@
-// Prints what Environment::closest and SelfField::closest cost for a scene's arm, over random configurations near start
-// and goal, by how near the nearest obstacle is: poses of that kind, mean number of contacts, time of one call for all
-// spheres of the arm, the same a sphere, time of one call for all pairs of parts of the arm.
+// Prints the cost of Environment::closest and SelfField::closest for a scene's arm, over random
+// configurations near start and goal, grouped by the distance of the nearest obstacle. Columns:
+// number of configurations, mean number of contacts, time of one call for all shapes of the arm,
+// the same per shape, time of one call for all pairs of parts of the arm.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +26,7 @@ struct Pose {
   double clearance = 0.0;
 };
 
-// The best of several passes over all poses [µs a call].
+// The best of several passes over all poses [µs per call].
 template <typename Call>
 double cost_us(const std::vector<const Pose*>& poses, const Call& call) {
   double best = std::numeric_limits<double>::infinity();
@@ -44,8 +45,9 @@ int run(int argc, char** argv) {
   }
   const Scene scene = read_scene(argv[1]);
   const double influence = std::stod(argv[2]), spread = argc > 3 ? std::stod(argv[3]) : 0.6;
-  const model::Model model(description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres}),
-                           scene.base);
+  const model::Model model(
+      description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres}),
+      scene.base);
   auto start = Clock::now();
   const Environment environment = make_environment(scene, model, influence);
   const double build_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -64,10 +66,12 @@ int run(int argc, char** argv) {
     poses[i].arm.place(model, ws);
     poses[i].clearance = environment.clearance(poses[i].arm.view(), 0.0, 1.0, View::planner);
   }
-  fmt::print("{}: {} shapes, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n", argv[1],
-             shapes, environment.map_field().boxes().boxes().size(), influence, build_ms, self.pairs().size());
-  fmt::print("{:<22} {:>8} {:>15} {:>17} {:>22} {:>21}\n", "clearance to obstacles", "poses", "contacts a pose",
-             "obstacles us/pose", "obstacles ns/shape", "itself us/pose");
+  fmt::print(
+      "{}: {} shapes, {} boxes, influence {} m, environment made in {:.1f} ms, {} pairs of parts\n",
+      argv[1], shapes, environment.map_field().boxes().boxes().size(), influence, build_ms,
+      self.pairs().size());
+  fmt::print("{:<22} {:>8} {:>15} {:>17} {:>22} {:>21}\n", "clearance to obstacles", "poses",
+             "contacts a pose", "obstacles us/pose", "obstacles ns/shape", "itself us/pose");
   Environment::Scratch scratch(environment, shapes);
   std::vector<Contact> out(environment.contacts_max(shapes));
   std::vector<SelfContact> pairs(self.pairs().size());
@@ -79,10 +83,13 @@ int run(int argc, char** argv) {
     for (const Pose& pose : poses)
       if (pose.clearance > edges[row] && pose.clearance <= edges[row + 1]) chosen.push_back(&pose);
     if (chosen.empty()) continue;
-    for (const Pose* pose : chosen) contacts += environment.closest(pose->arm.view(), influence, 0.0, scratch, out);
-    const double us = cost_us(
-        chosen, [&](const Pose& pose) { (void)environment.closest(pose.arm.view(), influence, 0.0, scratch, out); });
-    const double self_us = cost_us(chosen, [&](const Pose& pose) { (void)self.closest(pose.arm.view(), 0.05, pairs); });
+    for (const Pose* pose : chosen)
+      contacts += environment.closest(pose->arm.view(), influence, 0.0, scratch, out);
+    const double us = cost_us(chosen, [&](const Pose& pose) {
+      (void)environment.closest(pose.arm.view(), influence, 0.0, scratch, out);
+    });
+    const double self_us = cost_us(
+        chosen, [&](const Pose& pose) { (void)self.closest(pose.arm.view(), 0.05, pairs); });
     fmt::print("{:<22} {:>8} {:>15.1f} {:>17.2f} {:>22.0f} {:>21.2f}\n", names[row], chosen.size(),
                static_cast<double>(contacts) / static_cast<double>(chosen.size()), us,
                1e3 * us / static_cast<double>(shapes), self_us);

@@ -1,6 +1,7 @@
-// Prints, for one map and one crop, what building the structure, asking it and changing it costs, beside FCL's octree
-// and dynamicEDT3D where they are installed, and the largest errors against brute force: over all leaf boxes outside,
-// over the voxels around inside. Same points, same run. `--points 100000 --capsules 10000` is the long comparison.
+// Prints, for one map and one crop, the cost of building the structure, of queries and of changes,
+// beside FCL's octree and dynamicEDT3D where they are installed, and the largest errors against
+// brute force: over all leaf boxes outside, over the surrounding voxels inside. All with the same
+// points in the same run. `--points 100000 --capsules 10000` is the long comparison.
 #include <fmt/format.h>
 #include <octomap/OcTree.h>
 
@@ -55,13 +56,13 @@ double least_ms(const F& f) {
   return best;
 }
 
-struct Capsule {
+struct Segment {
   Vector3d a, b;
 };
 
 // ---- brute force ----
 
-// The occupied voxels of a crop, one bit each; all else is free.
+// The occupied voxels of a crop, one bit each; all others are free.
 class Voxels {
  public:
   Voxels(const std::vector<Cell>& cells, double resolution) : resolution_(resolution) {
@@ -78,10 +79,12 @@ class Voxels {
     for (const Cell& cell : cells)
       for (std::int32_t x = cell.lo[0]; x < cell.lo[0] + cell.size; ++x)
         for (std::int32_t y = cell.lo[1]; y < cell.lo[1] + cell.size; ++y)
-          for (std::int32_t z = cell.lo[2]; z < cell.lo[2] + cell.size; ++z) bits_[index(x, y, z)] = true;
+          for (std::int32_t z = cell.lo[2]; z < cell.lo[2] + cell.size; ++z)
+            bits_[index(x, y, z)] = true;
   }
 
-  // Distance to the nearest free voxel, by rings of voxels around p's own; nothing nearer than `enough` is looked for.
+  // Distance to the nearest free voxel, by rings of voxels around that of p. The search ends once
+  // it is at most `enough`.
   [[nodiscard]] double depth(const Vector3d& p, double enough = -1.0) const {
     std::array<std::int32_t, 3> at{};
     for (std::size_t i = 0; i < 3; ++i)
@@ -102,7 +105,9 @@ class Voxels {
 
  private:
   [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    return (static_cast<std::size_t>(x - lo_[0]) * size_[1] + static_cast<std::size_t>(y - lo_[1])) * size_[2] +
+    return (static_cast<std::size_t>(x - lo_[0]) * size_[1] +
+            static_cast<std::size_t>(y - lo_[1])) *
+               size_[2] +
            static_cast<std::size_t>(z - lo_[2]);
   }
   [[nodiscard]] bool occupied(std::int32_t x, std::int32_t y, std::int32_t z) const {
@@ -118,8 +123,8 @@ class Voxels {
   std::vector<bool> bits_;
 };
 
-// Distance of a segment from a union of boxes, by golden section on the convex distance of each.
-double brute_force_distance(const std::vector<Box>& leaves, const Capsule& c) {
+// Distance of a segment from a union of boxes, by golden section on the convex distance from each.
+double brute_force_distance(const std::vector<Box>& leaves, const Segment& c) {
   const double half = 0.5 * (c.b - c.a).norm();
   const auto distance = [&](const Box& box, double t) {
     const Vector3d p = c.a + t * (c.b - c.a);
@@ -131,7 +136,8 @@ double brute_force_distance(const std::vector<Box>& leaves, const Capsule& c) {
     double left = 0.0, right = 1.0;
     for (int k = 0; k < 70; ++k) {
       const double x = left + 0.381966 * (right - left), y = left + 0.618034 * (right - left);
-      (distance(box, x) < distance(box, y) ? right : left) = distance(box, x) < distance(box, y) ? y : x;
+      (distance(box, x) < distance(box, y) ? right : left) =
+          distance(box, x) < distance(box, y) ? y : x;
     }
     best = std::min({best, distance(box, left), distance(box, 0.0), distance(box, 1.0)});
   }
@@ -148,7 +154,8 @@ Errors point_errors(const MapField& field, const std::vector<Box>& leaves, const
   Errors errors;
   for (const Vector3d& p : points) {
     BoxHit hit;
-    if (!field.nearest(p, infinity, hit)) throw Error(ErrorCode::invalid, "no answer for a point");
+    if (!field.nearest(p, infinity, hit))
+      throw Error(ErrorCode::invalid, "no nearest box of a point, expected one");
     const double truth = test::brute_force_distance(leaves, p);
     const bool inside = truth == 0.0;
     double& worst = inside ? errors.inside : errors.outside;
@@ -159,26 +166,29 @@ Errors point_errors(const MapField& field, const std::vector<Box>& leaves, const
 }
 
 Errors capsule_errors(const MapField& field, const std::vector<Box>& leaves, const Voxels& voxels,
-                      const std::vector<Capsule>& capsules) {
+                      const std::vector<Segment>& capsules) {
   Errors errors;
-  for (const Capsule& c : capsules) {
+  for (const Segment& c : capsules) {
     SegmentHit hit;
-    if (!field.nearest(c.a, c.b, infinity, hit)) throw Error(ErrorCode::invalid, "no answer for a capsule");
+    if (!field.nearest(c.a, c.b, infinity, hit))
+      throw Error(ErrorCode::invalid, "no nearest box of a capsule, expected one");
     if (hit.distance > 0.0) {
       ++errors.n_outside;
-      errors.outside = std::max(errors.outside, std::abs(hit.distance - brute_force_distance(leaves, c)));
+      errors.outside =
+          std::max(errors.outside, std::abs(hit.distance - brute_force_distance(leaves, c)));
       continue;
     }
     ++errors.n_inside;
-    // as deep as said, and nowhere on the axis deeper
+    // the depth is that of the axis point, and no other point of the axis is deeper
     errors.inside = std::max(errors.inside, std::abs(-hit.distance - voxels.depth(hit.axis_point)));
     for (int k = 0; k <= 100; ++k)
-      errors.inside = std::max(errors.inside, voxels.depth(c.a + 0.01 * k * (c.b - c.a), -hit.distance) + hit.distance);
+      errors.inside = std::max(
+          errors.inside, voxels.depth(c.a + 0.01 * k * (c.b - c.a), -hit.distance) + hit.distance);
   }
   return errors;
 }
 
-// ---- what is printed ----
+// ---- output ----
 
 // The best of several passes over all queries [ns].
 template <class Query>
@@ -192,7 +202,7 @@ double least_ns(std::size_t count, const Query& query) {
   return best;
 }
 
-// Largest errors to the unsafe and to the safe side.
+// One row: cost, and the largest errors to the unsafe (over) and to the safe side (under).
 template <class Query>
 void row(const std::string& method, double build_ms, const std::vector<Vector3d>& points,
          const std::vector<double>& truth, const Query& query) {
@@ -203,12 +213,14 @@ void row(const std::string& method, double build_ms, const std::vector<Vector3d>
     over = std::max(over, std::max(answers[i], 0.0) - truth[i]);
     under = std::max(under, truth[i] - std::max(answers[i], 0.0));
   }
-  fmt::print("{:<34} {:>10.2f} {:>12.0f} {:>12.2g} {:>12.2g}\n", method, build_ms, ns, 1e3 * over, 1e3 * under);
+  fmt::print("{:<34} {:>10.2f} {:>12.0f} {:>12.2g} {:>12.2g}\n", method, build_ms, ns, 1e3 * over,
+             1e3 * under);
 }
 
-void print_changes(const MapField& made, const std::vector<Cell>& cells, double resolution, const Ball& region) {
+void print_changes(const MapField& made, const std::vector<Cell>& cells, double resolution,
+                   const Ball& region) {
   Rng rng(7);
-  const auto timed = [&](const char* what, const auto& make) {
+  const auto timed = [&](const char* name, const auto& make) {
     MapField field(cells, resolution, region);
     double ms = 0.0;
     std::size_t voxels = 0;
@@ -221,8 +233,9 @@ void print_changes(const MapField& made, const std::vector<Cell>& cells, double 
       ms += 1e3 * seconds_since(start);
       voxels += changed.added + changed.removed;
     }
-    fmt::print("{:<34} {:>10.3f} ms a change of {:.0f} voxels, {:.3f} ms per 1000\n", what, ms / rounds,
-               static_cast<double>(voxels) / rounds, 1e3 * ms / static_cast<double>(voxels));
+    fmt::print("{:<34} {:>10.3f} ms per change of {:.0f} voxels, {:.3f} ms per 1000\n", name,
+               ms / rounds, static_cast<double>(voxels) / rounds,
+               1e3 * ms / static_cast<double>(voxels));
   };
   const auto voxel_of = [&](const Vector3d& p) {
     std::array<std::int32_t, 3> v{};
@@ -230,15 +243,20 @@ void print_changes(const MapField& made, const std::vector<Cell>& cells, double 
       v[i] = static_cast<std::int32_t>(std::floor(p[static_cast<Eigen::Index>(i)] / resolution));
     return v;
   };
-  const auto near_box = [&] { return made.boxes().boxes()[rng.below(made.boxes().boxes().size())]; };
+  const auto near_box = [&] {
+    return made.boxes().boxes()[rng.below(made.boxes().boxes().size())];
+  };
   timed("change: a cube of 10 x 10 x 10", [&] {
     const auto lo = voxel_of(near_box().lo);
-    return std::vector<VoxelBox>{{{lo[0] - 5, lo[1] - 5, lo[2] - 5}, {lo[0] + 5, lo[1] + 5, lo[2] + 5}}};
+    return std::vector<VoxelBox>{
+        {{lo[0] - 5, lo[1] - 5, lo[2] - 5}, {lo[0] + 5, lo[1] + 5, lo[2] + 5}}};
   });
   timed("change: 1000 scattered voxels", [&] {
     std::vector<Cell> scattered;
     for (int i = 0; i < 1000; ++i)
-      scattered.push_back({voxel_of(region.center + region.radius * rng.uniform() * test::random_direction(rng)), 1});
+      scattered.push_back(
+          {voxel_of(region.center + region.radius * rng.uniform() * test::random_direction(rng)),
+           1});
     return merge(scattered);
   });
 }
@@ -267,11 +285,12 @@ std::optional<Command> command_of(int argc, char** argv) {
   }
   if (words.size() != 5) return std::nullopt;
   command.file = words[0];
-  command.region = {{std::stod(words[1]), std::stod(words[2]), std::stod(words[3])}, std::stod(words[4])};
+  command.region = {{std::stod(words[1]), std::stod(words[2]), std::stod(words[3])},
+                    std::stod(words[4])};
   return command;
 }
 
-// The part of the map that is asked, and what making it cost.
+// The cropped map and the cost of building it.
 struct Part {
   explicit Part(const Command& command) : region(command.region) {
     const auto start = Clock::now();
@@ -279,13 +298,15 @@ struct Part {
     const double read_ms = 1e3 * seconds_since(start);
     crop_ms = least_ms([&] { cells = crop(map.occupied, map.resolution, region); });
     build_ms = least_ms([&] { field = MapField(cells, map.resolution, region); });
-    if (field.empty()) throw Error(ErrorCode::invalid, fmt::format("{}: no occupied leaf in that ball", command.file));
+    if (field.empty())
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: no occupied leaf in that ball", command.file));
     for (const Cell& cell : cells) leaves.push_back(to_metres(cell, map.resolution));
-    fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n", command.file,
-               map.resolution, map.occupied.size(), leaves.size(), field.boxes().boxes().size(),
-               name_of(default_isa()));
-    fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms, crop_ms, build_ms,
-               1e-3 * static_cast<double>(field.bytes()));
+    fmt::print("{}: resolution {} m, {} leaves, {} in the ball, {} boxes; instruction set {}\n",
+               command.file, map.resolution, map.occupied.size(), leaves.size(),
+               field.boxes().boxes().size(), name_of(default_isa()));
+    fmt::print("read {:.1f} ms, crop {:.2f} ms, merge and build {:.2f} ms, {:.0f} kB\n", read_ms,
+               crop_ms, build_ms, 1e-3 * static_cast<double>(field.bytes()));
   }
 
   Ball region;
@@ -296,94 +317,104 @@ struct Part {
   double crop_ms = 0.0, build_ms = 0.0;
 };
 
-// What is asked, with the truth for points; each once more 2 mm on.
-struct Questions {
-  explicit Questions(const Part& part) {
+// The queries, with exact distances of the points, and the same queries shifted by 2 mm.
+struct Queries {
+  explicit Queries(const Part& part) {
     for (const Vector3d& p : test::points_near(part.leaves, 6000, 0.5, 1))
       (test::brute_force_distance(part.leaves, p) > 0.0 ? points : inside).push_back(p);
     Rng rng(2);
     for (const Vector3d& p : points) {
       truth.push_back(test::brute_force_distance(part.leaves, p));
-      const Vector3d way = 0.002 * test::random_direction(rng);
-      moved.push_back(p + way);
+      const Vector3d shift = 0.002 * test::random_direction(rng);
+      moved.push_back(p + shift);
       truth_moved.push_back(test::brute_force_distance(part.leaves, moved.back()));
       const Vector3d end = p + rng.uniform(0.05, 0.4) * test::random_direction(rng);
       SegmentHit hit;
       const bool entered = part.field.nearest(p, end, infinity, hit) && hit.distance <= 0.0;
       (entered ? capsules_inside : capsules).push_back({p, end});
-      if (!entered) capsules_moved.push_back({p + way, end + way});
+      if (!entered) capsules_moved.push_back({p + shift, end + shift});
     }
   }
 
   std::vector<Vector3d> points, moved, inside;
   std::vector<double> truth, truth_moved;
-  std::vector<Capsule> capsules, capsules_moved, capsules_inside;
+  std::vector<Segment> capsules, capsules_moved, capsules_inside;
 };
 
-void line(const char* what, double ns) {
-  fmt::print("{:<34} {:>10} {:>12.0f}\n", what, "", ns);
+void line(const char* name, double ns) {
+  fmt::print("{:<34} {:>10} {:>12.0f}\n", name, "", ns);
 }
 
-void print_points(const Part& part, const Questions& asked) {
+void print_points(const Part& part, const Queries& queries) {
   const MapField& field = part.field;
-  const auto& points = asked.points;
+  const auto& points = queries.points;
   const double made_ms = part.crop_ms + part.build_ms;
   BoxHit hit;
-  (void)least_ns(points.size(),
-                 [&](std::size_t i) { (void)field.nearest(points[i], infinity, hit); });  // fills the table
-  row("hamelin, cold", made_ms, points, asked.truth,
-      [&](std::size_t i) { return field.nearest(points[i], infinity, hit) ? hit.distance : infinity; });
-  row("hamelin, cold, without the table", made_ms, points, asked.truth,
-      [&](std::size_t i) { return field.boxes().nearest(points[i], infinity, hit) ? hit.distance : infinity; });
+  (void)least_ns(points.size(), [&](std::size_t i) {
+    (void)field.nearest(points[i], infinity, hit);
+  });  // fills the table
+  row("hamelin, cold", made_ms, points, queries.truth, [&](std::size_t i) {
+    return field.nearest(points[i], infinity, hit) ? hit.distance : infinity;
+  });
+  row("hamelin, cold, without the table", made_ms, points, queries.truth, [&](std::size_t i) {
+    return field.boxes().nearest(points[i], infinity, hit) ? hit.distance : infinity;
+  });
   std::vector<std::int32_t> hints;
   for (const Vector3d& p : points) hints.push_back(field.nearest(p, infinity, hit) ? hit.box : -1);
-  const auto& moved = asked.moved;
-  row("hamelin, warm (2 mm on)", made_ms, moved, asked.truth_moved,
-      [&](std::size_t i) { return field.nearest(moved[i], infinity, hit, hints[i]) ? hit.distance : infinity; });
+  const auto& moved = queries.moved;
+  row("hamelin, warm (2 mm farther)", made_ms, moved, queries.truth_moved, [&](std::size_t i) {
+    return field.nearest(moved[i], infinity, hit, hints[i]) ? hit.distance : infinity;
+  });
   MapField::Scratch scratch(field);
   std::array<BoxHit, MapField::points_max> hits;
-  line("hamelin, 3 points within 0.1 m",
-       least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.1, scratch, hits); }));
-  line("hamelin, 3 points within 0.25 m",
-       least_ns(points.size(), [&](std::size_t i) { (void)field.several(points[i], 0.25, scratch, hits); }));
-  line("hamelin, depth of a point",
-       least_ns(asked.inside.size(), [&](std::size_t i) { (void)field.nearest(asked.inside[i], infinity, hit); }));
-  // 40 spheres at a time, each 2 mm on from where its hint is from
+  line("hamelin, 3 points within 0.1 m", least_ns(points.size(), [&](std::size_t i) {
+         (void)field.nearest_distinct(points[i], 0.1, scratch, hits);
+       }));
+  line("hamelin, 3 points within 0.25 m", least_ns(points.size(), [&](std::size_t i) {
+         (void)field.nearest_distinct(points[i], 0.25, scratch, hits);
+       }));
+  line("hamelin, depth of a point", least_ns(queries.inside.size(), [&](std::size_t i) {
+         (void)field.nearest(queries.inside[i], infinity, hit);
+       }));
+  // 40 spheres at a time, each 2 mm from the position of its hint
   std::vector<double> ticks;
   for (int pass = 0; pass < passes; ++pass)
     for (std::size_t first = 0; first + 40 <= moved.size(); first += 40) {
       const auto start = Clock::now();
-      for (std::size_t i = first; i < first + 40; ++i) (void)field.nearest(moved[i], infinity, hit, hints[i]);
+      for (std::size_t i = first; i < first + 40; ++i)
+        (void)field.nearest(moved[i], infinity, hit, hints[i]);
       ticks.push_back(1e6 * seconds_since(start));
     }
   std::sort(ticks.begin(), ticks.end());
-  fmt::print("{:<34} {:>10} p50 {:.1f} us, p99 {:.1f} us\n", "hamelin, 40 spheres, warm", "", ticks[ticks.size() / 2],
-             ticks[ticks.size() * 99 / 100]);
+  fmt::print("{:<34} {:>10} p50 {:.1f} us, p99 {:.1f} us\n", "hamelin, 40 spheres, warm", "",
+             ticks[ticks.size() / 2], ticks[ticks.size() * 99 / 100]);
 }
 
-void print_capsules(const MapField& field, const Questions& asked) {
-  const auto& capsules = asked.capsules;
+void print_capsules(const MapField& field, const Queries& queries) {
+  const auto& capsules = queries.capsules;
   SegmentHit hit;
   std::vector<std::int32_t> hints;
-  for (const Capsule& c : capsules) hints.push_back(field.nearest(c.a, c.b, infinity, hit) ? hit.box : -1);
+  for (const Segment& c : capsules)
+    hints.push_back(field.nearest(c.a, c.b, infinity, hit) ? hit.box : -1);
   line("hamelin, capsule, cold", least_ns(capsules.size(), [&](std::size_t i) {
          (void)field.nearest(capsules[i].a, capsules[i].b, infinity, hit);
        }));
-  const auto& moved = asked.capsules_moved;
+  const auto& moved = queries.capsules_moved;
   line("hamelin, capsule, warm", least_ns(moved.size(), [&](std::size_t i) {
          (void)field.nearest(moved[i].a, moved[i].b, infinity, hit, hints[i]);
        }));
   MapField::Scratch scratch(field);
   std::array<SegmentHit, MapField::points_max> hits;
   line("hamelin, capsule, 3 within 0.1 m", least_ns(capsules.size(), [&](std::size_t i) {
-         (void)field.several(capsules[i].a, capsules[i].b, 0.1, scratch, hits);
+         (void)field.nearest_distinct(capsules[i].a, capsules[i].b, 0.1, scratch, hits);
        }));
-  const auto& inside = asked.capsules_inside;
-  line("hamelin, depth of a capsule",
-       least_ns(inside.size(), [&](std::size_t i) { (void)field.nearest(inside[i].a, inside[i].b, infinity, hit); }));
+  const auto& inside = queries.capsules_inside;
+  line("hamelin, depth of a capsule", least_ns(inside.size(), [&](std::size_t i) {
+         (void)field.nearest(inside[i].a, inside[i].b, infinity, hit);
+       }));
 }
 
-// The part as a tree of its own, at the finest depth.
+// The cropped map as an OctoMap tree.
 std::shared_ptr<octomap::OcTree> tree_of(const Part& part) {
   auto tree = std::make_shared<octomap::OcTree>(part.map.resolution);
   const auto key = [](std::int32_t i) { return static_cast<octomap::key_type>(i + (1 << 15)); };
@@ -391,15 +422,16 @@ std::shared_ptr<octomap::OcTree> tree_of(const Part& part) {
     for (std::int32_t x = 0; x < cell.size; ++x)
       for (std::int32_t y = 0; y < cell.size; ++y)
         for (std::int32_t z = 0; z < cell.size; ++z)
-          tree->setNodeValue(octomap::OcTreeKey(key(cell.lo[0] + x), key(cell.lo[1] + y), key(cell.lo[2] + z)), 3.5F,
-                             true);
+          tree->setNodeValue(
+              octomap::OcTreeKey(key(cell.lo[0] + x), key(cell.lo[1] + y), key(cell.lo[2] + z)),
+              3.5F, true);
   tree->updateInnerOccupancy();
   tree->prune();
   return tree;
 }
 
 #ifdef HAMELIN_WITH_FCL
-void print_fcl(const std::shared_ptr<octomap::OcTree>& tree, const Questions& asked) {
+void print_fcl(const std::shared_ptr<octomap::OcTree>& tree, const Queries& queries) {
   const fcl::OcTreed octree(tree);
   const double radius = 1e-3;
   const fcl::Sphered sphere(radius);
@@ -409,57 +441,64 @@ void print_fcl(const std::shared_ptr<octomap::OcTree>& tree, const Questions& as
     fcl::distance(&octree, fcl::Transform3d::Identity(), &shape, pose, request, result);
     return result.min_distance > 0.0 ? result.min_distance + radius : 0.0;
   };
-  const std::vector<Vector3d> few(asked.points.begin(), asked.points.begin() + 100);
-  const std::vector<double> truth(asked.truth.begin(), asked.truth.begin() + 100);
+  const std::vector<Vector3d> few(queries.points.begin(), queries.points.begin() + 100);
+  const std::vector<double> truth(queries.truth.begin(), queries.truth.begin() + 100);
   row("FCL octree and sphere of 1 mm", 0.0, few, truth, [&](std::size_t i) {
     fcl::Transform3d pose = fcl::Transform3d::Identity();
     pose.translation() = few[i];
     return distance(sphere, pose);
   });
   line("FCL octree and capsule", least_ns(20, [&](std::size_t i) {
-         const Capsule& c = asked.capsules[i];
-         const Vector3d way = c.b - c.a;
+         const Segment& c = queries.capsules[i];
+         const Vector3d axis = c.b - c.a;
          fcl::Transform3d pose = fcl::Transform3d::Identity();
          pose.translation() = 0.5 * (c.a + c.b);
-         pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix();
-         (void)distance(fcl::Capsuled(radius, way.norm()), pose);
+         pose.linear() =
+             Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+         (void)distance(fcl::Capsuled(radius, axis.norm()), pose);
        }));
 }
 #else
-void print_fcl(const std::shared_ptr<octomap::OcTree>&, const Questions&) {
-  fmt::print("FCL was not found when this was built\n");
+void print_fcl(const std::shared_ptr<octomap::OcTree>&, const Queries&) {
+  fmt::print("FCL was not found when this program was built\n");
 }
 #endif
 
 #ifdef HAMELIN_WITH_EDT
-void print_edt(const std::shared_ptr<octomap::OcTree>& tree, const Ball& region, const Questions& asked) {
+void print_edt(const std::shared_ptr<octomap::OcTree>& tree, const Ball& region,
+               const Queries& queries) {
   const auto start = Clock::now();
-  const Vector3d lo = region.center.array() - region.radius - 0.5, hi = region.center.array() + region.radius + 0.5;
+  const Vector3d lo = region.center.array() - region.radius - 0.5,
+                 hi = region.center.array() + region.radius + 0.5;
   const auto point = [](const Vector3d& p) {
-    return octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    return octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                            static_cast<float>(p.z()));
   };
   DynamicEDTOctomap edt(1.0F, tree.get(), point(lo), point(hi), false);
   edt.update();
-  // Beyond its largest distance it answers that distance; a metre covers the points.
-  row("dynamicEDT3D", 1e3 * seconds_since(start), asked.points, asked.truth,
-      [&](std::size_t i) { return static_cast<double>(edt.getDistance(point(asked.points[i]))); });
+  // Its largest distance is one metre, which covers the points.
+  row("dynamicEDT3D", 1e3 * seconds_since(start), queries.points, queries.truth,
+      [&](std::size_t i) {
+        return static_cast<double>(edt.getDistance(point(queries.points[i])));
+      });
 }
 #else
-void print_edt(const std::shared_ptr<octomap::OcTree>&, const Ball&, const Questions&) {
-  fmt::print("dynamicEDT3D was not found when this was built\n");
+void print_edt(const std::shared_ptr<octomap::OcTree>&, const Ball&, const Queries&) {
+  fmt::print("dynamicEDT3D was not found when this program was built\n");
 }
 #endif
 
 void print_errors(const Part& part, const Command& command) {
-  const auto print = [](const char* what, const Errors& errors) {
-    fmt::print("{:<34} largest error outside {:.2g} m ({}), inside {:.2g} m ({})\n", what, errors.outside,
-               errors.n_outside, errors.inside, errors.n_inside);
+  const auto print = [](const char* name, const Errors& errors) {
+    fmt::print("{:<34} largest error outside {:.2g} m ({}), inside {:.2g} m ({})\n", name,
+               errors.outside, errors.n_outside, errors.inside, errors.n_inside);
   };
   const Voxels voxels(part.cells, part.map.resolution);
   print("brute force, points",
-        point_errors(part.field, part.leaves, voxels, test::points_near(part.leaves, command.points, 0.5, 3)));
+        point_errors(part.field, part.leaves, voxels,
+                     test::points_near(part.leaves, command.points, 0.5, 3)));
   Rng rng(2);
-  std::vector<Capsule> capsules;
+  std::vector<Segment> capsules;
   for (const Vector3d& p : test::points_near(part.leaves, command.capsules, 0.5, 4))
     capsules.push_back({p, p + rng.uniform(0.05, 0.4) * test::random_direction(rng)});
   print("brute force, capsules", capsule_errors(part.field, part.leaves, voxels, capsules));
@@ -469,20 +508,22 @@ int run(int argc, char** argv) {
   const auto command = command_of(argc, argv);
   if (!command) {
     fmt::print(stderr,
-               "usage: {} MAP X Y Z RADIUS [--scale S] [--points N] [--capsules N]   (crop in the map's frame, m)\n"
+               "usage: {} MAP X Y Z RADIUS [--scale S] [--points N] [--capsules N]   (crop in the "
+               "map's frame, m)\n"
                "example: {} map.bt 0.5 0 1 1.35\n",
                argv[0], argv[0]);
     return 2;
   }
   const Part part(*command);
-  const Questions asked(part);
-  fmt::print("{:<34} {:>10} {:>12} {:>12} {:>12}\n", "method", "build ms", "ns a query", "over mm", "under mm");
-  print_points(part, asked);
-  print_capsules(part.field, asked);
+  const Queries queries(part);
+  fmt::print("{:<34} {:>10} {:>12} {:>12} {:>12}\n", "method", "build ms", "ns per query",
+             "over mm", "under mm");
+  print_points(part, queries);
+  print_capsules(part.field, queries);
   print_changes(part.field, part.cells, part.map.resolution, part.region);
   const auto tree = tree_of(part);
-  print_fcl(tree, asked);
-  print_edt(tree, part.region, asked);
+  print_fcl(tree, queries);
+  print_edt(tree, part.region, queries);
   print_errors(part, *command);
   return 0;
 }

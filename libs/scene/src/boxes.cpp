@@ -33,25 +33,25 @@ void push_children(const Cell& cell, std::vector<Cell>& stack) {
   }
 }
 
-// Tells whether a box touches any of some rods, by the boxes around these first.
-class Rods {
+// Tells whether a box touches any of the capsules. Tests their bounding boxes first.
+class CapsuleSet {
  public:
-  explicit Rods(std::span<const Rod> rods) : rods_(rods) {
-    for (const Rod& rod : rods) {
+  explicit CapsuleSet(std::span<const Capsule> capsules) : capsules_(capsules) {
+    for (const Capsule& c : capsules) {
       hulls_.push_back(
-          {rod.from.cwiseMin(rod.to).array() - rod.radius, rod.from.cwiseMax(rod.to).array() + rod.radius});
+          {c.from.cwiseMin(c.to).array() - c.radius, c.from.cwiseMax(c.to).array() + c.radius});
       hull_ = {hull_.lo.cwiseMin(hulls_.back().lo), hull_.hi.cwiseMax(hulls_.back().hi)};
     }
   }
 
-  [[nodiscard]] bool touch(const Box& box) const {
+  [[nodiscard]] bool touches(const Box& box) const {
     if (apart(box, hull_)) return false;
-    for (std::size_t i = 0; i < rods_.size(); ++i) {
-      const Rod& rod = rods_[i];
+    for (std::size_t i = 0; i < capsules_.size(); ++i) {
+      const Capsule& c = capsules_[i];
       if (apart(box, hulls_[i])) continue;
-      const bool touches = rod.from == rod.to ? squared_distance(rod.from, box) <= rod.radius * rod.radius
-                                              : closest_on_box(rod.from, rod.to, box).distance <= rod.radius;
-      if (touches) return true;
+      const bool touching = c.from == c.to ? squared_distance(c.from, box) <= c.radius * c.radius
+                                           : closest_on_box(c.from, c.to, box).distance <= c.radius;
+      if (touching) return true;
     }
     return false;
   }
@@ -61,13 +61,15 @@ class Rods {
     return (a.lo.array() > b.hi.array()).any() || (b.lo.array() > a.hi.array()).any();
   }
 
-  std::span<const Rod> rods_;
+  std::span<const Capsule> capsules_;
   std::vector<Box> hulls_;
   Box hull_{Eigen::Vector3d::Constant(infinity), Eigen::Vector3d::Constant(-infinity)};
 };
 
-constexpr std::int32_t tile = 256;  // voxels; a multiple of every small cell's size, so that none straddles tiles
-constexpr std::int32_t wide = 32;   // cells from this size on are boxes already
+// In voxels. A tile is a multiple of the size of every small cell, so no cell is in two tiles.
+// Cells of size `wide` and larger are used as boxes.
+constexpr std::int32_t tile = 256;
+constexpr std::int32_t wide = 32;
 
 // Bits of one tile, x running fastest.
 class BitGrid {
@@ -87,7 +89,8 @@ class BitGrid {
     });
   }
   [[nodiscard]] bool row_is_full(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z) {
-    return each_word(x0, x1, y, z, [](std::uint64_t& word, std::uint64_t bits) { return (word & bits) == bits; });
+    return each_word(x0, x1, y, z,
+                     [](std::uint64_t& word, std::uint64_t bits) { return (word & bits) == bits; });
   }
   /// The first set x from x0 on, or `tile`.
   [[nodiscard]] std::int32_t next(std::int32_t x0, std::int32_t y, std::int32_t z) {
@@ -101,7 +104,8 @@ class BitGrid {
 
  private:
   static constexpr std::size_t words_per_row = tile / 64;
-  /// f of each word that the run [x0, x1) touches and of the bits in it, as long as it says so.
+  /// Calls f with each word that the run [x0, x1) touches and with the bits of the run in it, until
+  /// f returns false.
   template <class F>
   bool each_word(std::int32_t x0, std::int32_t x1, std::int32_t y, std::int32_t z, const F& f) {
     for (std::int32_t x = x0; x < x1;) {
@@ -119,9 +123,10 @@ class BitGrid {
   std::vector<std::uint64_t> words_;
 };
 
-// Takes blocks out of the grid: as long in x as the run goes, then as far in y, then in z. Leaves the grid empty.
-void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int32_t, 3>& origin,
-                 std::vector<VoxelBox>& boxes) {
+// Extracts blocks from the grid, extended as far as possible in x, then in y, then in z. The grid
+// is empty afterwards.
+void extract_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int32_t, 3>& origin,
+                    std::vector<VoxelBox>& boxes) {
   for (std::int32_t z = used.lo[2]; z < used.hi[2]; ++z) {
     for (std::int32_t y = used.lo[1]; y < used.hi[1]; ++y) {
       for (std::int32_t x = grid.next(used.lo[0], y, z); x < tile; x = grid.next(x, y, z)) {
@@ -136,17 +141,18 @@ void take_blocks(BitGrid& grid, const VoxelBox& used, const std::array<std::int3
         while (z1 < used.hi[2] && slice_is_full(z1)) ++z1;
         for (std::int32_t slice = z; slice < z1; ++slice)
           for (std::int32_t row = y; row < y1; ++row) grid.clear_row(x, x1, row, slice);
-        boxes.push_back(
-            {{origin[0] + x, origin[1] + y, origin[2] + z}, {origin[0] + x1, origin[1] + y1, origin[2] + z1}});
+        boxes.push_back({{origin[0] + x, origin[1] + y, origin[2] + z},
+                         {origin[0] + x1, origin[1] + y1, origin[2] + z1}});
       }
     }
   }
 }
 
-// Joins boxes that share a whole face across `axis`. Returns whether any were.
+// Joins boxes that share a whole face perpendicular to `axis`. Returns whether there were any.
 bool join(std::vector<VoxelBox>& boxes, std::size_t axis) {
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-  // Cross section, then place along the axis, as numbers that sort fast: a coordinate and 2²⁰ fit into 21 bits.
+  // Cross section, then position along the axis, as integers that sort fast: a coordinate plus 2²⁰
+  // fits into 21 bits.
   struct Key {
     std::uint64_t section, rest;
     std::uint32_t box;
@@ -166,8 +172,8 @@ bool join(std::vector<VoxelBox>& boxes, std::size_t axis) {
   joined.reserve(boxes.size());
   for (std::size_t k = 0; k < keys.size(); ++k) {
     const VoxelBox& box = boxes[keys[k].box];
-    if (k > 0 && keys[k - 1].section == keys[k].section && keys[k - 1].rest >> 21U == keys[k].rest >> 21U &&
-        joined.back().hi[axis] == box.lo[axis]) {
+    if (k > 0 && keys[k - 1].section == keys[k].section &&
+        keys[k - 1].rest >> 21U == keys[k].rest >> 21U && joined.back().hi[axis] == box.lo[axis]) {
       joined.back().hi[axis] = box.hi[axis];
     } else {
       joined.push_back(box);
@@ -188,15 +194,18 @@ std::vector<Cell> crop(const std::vector<Cell>& cells, double resolution, const 
   return kept;
 }
 
-std::size_t count_touched(const std::vector<Cell>& cells, double resolution, std::span<const Rod> rods) {
-  const Rods all(rods);
-  return static_cast<std::size_t>(std::count_if(
-      cells.begin(), cells.end(), [&](const Cell& cell) { return all.touch(to_metres(cell, resolution)); }));
+std::size_t count_touched(const std::vector<Cell>& cells, double resolution,
+                          std::span<const Capsule> capsules) {
+  const CapsuleSet all(capsules);
+  return static_cast<std::size_t>(std::count_if(cells.begin(), cells.end(), [&](const Cell& cell) {
+    return all.touches(to_metres(cell, resolution));
+  }));
 }
 
-CutOut cut_out(const std::vector<Cell>& cells, double resolution, std::span<const Rod> rods) {
+CutOut cut_out(const std::vector<Cell>& cells, double resolution,
+               std::span<const Capsule> capsules) {
   constexpr std::size_t more_max = std::size_t{1} << 22U;
-  const Rods all(rods);
+  const CapsuleSet all(capsules);
   CutOut cut;
   std::vector<Cell> stack;
   for (const Cell& leaf : cells) {
@@ -205,7 +214,7 @@ CutOut cut_out(const std::vector<Cell>& cells, double resolution, std::span<cons
     while (!stack.empty()) {
       const Cell cell = stack.back();
       stack.pop_back();
-      if (!all.touch(to_metres(cell, resolution))) {
+      if (!all.touches(to_metres(cell, resolution))) {
         cut.cells.push_back(cell);
       } else if (cell.size > 1) {
         push_children(cell, stack);
@@ -213,9 +222,11 @@ CutOut cut_out(const std::vector<Cell>& cells, double resolution, std::span<cons
         ++cut.voxels;
       }
       if (cut.cells.size() + cut.voxels > cells.size() + more_max)
-        throw Error(ErrorCode::invalid,
-                    fmt::format("voxels of {} m are too fine to take out what is touched: more than {} pieces",
-                                resolution, more_max));
+        throw Error(
+            ErrorCode::invalid,
+            fmt::format(
+                "voxels of {} m are too fine to cut shapes out of the map: more than {} pieces",
+                resolution, more_max));
     }
     cut.leaves += cut.voxels > before ? 1 : 0;
   }
@@ -225,7 +236,8 @@ CutOut cut_out(const std::vector<Cell>& cells, double resolution, std::span<cons
 double volume_inside(const std::vector<Cell>& cells, double resolution, const Ball& ball) {
   double voxels = 0.0;
   const double radius2 = ball.radius * ball.radius;
-  // Voxels count by the middle of the grain they are in, so that volumes add up however space is cut into cells.
+  // A voxel counts if the centre of its grain is in the ball. Then volumes add up however space is
+  // divided into cells.
   std::int32_t grain = 1;
   while (2.0 * grain * 128.0 * resolution <= ball.radius && grain < (1 << 15)) grain *= 2;
   std::vector<Cell> stack(cells.rbegin(), cells.rend());
@@ -256,11 +268,13 @@ std::vector<VoxelBox> merge(const std::vector<Cell>& cells) {
   std::map<std::array<std::int32_t, 3>, std::vector<Cell>> tiles;
   for (const Cell& cell : cells) {
     if (cell.size >= wide) {
-      boxes.push_back({cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}});
+      boxes.push_back(
+          {cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}});
       continue;
     }
     std::array<std::int32_t, 3> origin{};
-    for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = (cell.lo[axis] + (1 << 20)) / tile * tile - (1 << 20);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      origin[axis] = (cell.lo[axis] + (1 << 20)) / tile * tile - (1 << 20);
     tiles[origin].push_back(cell);
   }
   if (!tiles.empty()) {
@@ -275,9 +289,10 @@ std::vector<VoxelBox> merge(const std::vector<Cell>& cells) {
           used.hi[axis] = std::max(used.hi[axis], lo[axis] + cell.size);
         }
         for (std::int32_t z = lo[2]; z < lo[2] + cell.size; ++z)
-          for (std::int32_t y = lo[1]; y < lo[1] + cell.size; ++y) grid.set_row(lo[0], lo[0] + cell.size, y, z);
+          for (std::int32_t y = lo[1]; y < lo[1] + cell.size; ++y)
+            grid.set_row(lo[0], lo[0] + cell.size, y, z);
       }
-      take_blocks(grid, used, origin, boxes);
+      extract_blocks(grid, used, origin, boxes);
     }
   }
   join(boxes);  // blocks end at tiles and at wide cells
@@ -285,8 +300,9 @@ std::vector<VoxelBox> merge(const std::vector<Cell>& cells) {
 }
 
 void join(std::vector<VoxelBox>& boxes) {
-  // done when no axis has found any since its last turn
-  for (std::size_t axis = 0, idle = 0; idle < 3; axis = (axis + 1) % 3) idle = join(boxes, axis) ? 1 : idle + 1;
+  // done when no axis has joined any boxes since its last turn
+  for (std::size_t axis = 0, idle = 0; idle < 3; axis = (axis + 1) % 3)
+    idle = join(boxes, axis) ? 1 : idle + 1;
 }
 
 void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole) {
@@ -311,14 +327,16 @@ void subtract(std::vector<VoxelBox>& boxes, const VoxelBox& hole) {
       }
     }
   }
-  boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(kept), boxes.begin() + static_cast<std::ptrdiff_t>(count));
+  boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(kept),
+              boxes.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 std::vector<VoxelBox> surface(const std::vector<VoxelBox>& boxes) {
   std::vector<VoxelBox> faces;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t u = (axis + 1) % 3;
-    // Faces by plane, those of one side apart from those of the other; given a width of one, they overlap like boxes.
+    // Faces by plane, upper and lower ones separately. With a width of one voxel they overlap as
+    // boxes do.
     struct Side {
       std::vector<VoxelBox> up, down;
     };
@@ -370,8 +388,9 @@ Box to_metres(const VoxelBox& box, double resolution) {
 }
 
 Box to_metres(const Cell& cell, double resolution) {
-  return to_metres(VoxelBox{cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}},
-                   resolution);
+  return to_metres(
+      VoxelBox{cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}},
+      resolution);
 }
 
 VoxelBox to_voxels(const Box& box, double resolution) {

@@ -10,20 +10,22 @@
 
 namespace hamelin::scene {
 
-/// What a `.bt` says of a cell: the values are its codes. `parts`: its eight parts differ.
+/// The state of a cell; the values are the codes of a `.bt`. `parts`: its eight parts differ.
 enum class BtNode : unsigned { unknown = 0, free = 1, occupied = 2, parts = 3 };
 
-/// Writes the body of a `.bt`, pruned as OctoMap prunes, from an answer for each cell: never a tree in memory.
+/// Writes the body of a `.bt`, pruned as by OctoMap, from the answers of a function for each cell.
+/// There is never a tree in memory.
 class BtWriter {
  public:
-  static constexpr std::int32_t half = 1 << 15;  ///< voxels from the middle to the faces
+  static constexpr std::int32_t half = 1 << 15;  ///< voxels from the centre to the faces
 
-  /// @param ask `BtNode ask(const Cell&, const Context& above, Context& here)`, from the widest cell down to where it
-  ///        answers no `parts`; what it leaves in `here` it gets back as `above` for the cell's eight parts
-  template <typename Context, typename Ask>
-  explicit BtWriter(const Context& top, const Ask& ask) {
-    const BtNode root = add({{-half, -half, -half}, 2 * half}, top, ask);
-    // A root that is a leaf has no code: eight leaves say the same.
+  /// @param state_of `BtNode state_of(const Cell&, const Context& above, Context& here)`, called
+  ///        from the widest cell down to cells for which it does not return `parts`. The value that
+  ///        it stores in `here` is passed as `above` for the eight parts of the cell.
+  template <typename Context, typename StateOf>
+  explicit BtWriter(const Context& top, const StateOf& state_of) {
+    const BtNode root = add({{-half, -half, -half}, 2 * half}, top, state_of);
+    // A .bt cannot express a root that is a leaf; eight leaves are equivalent.
     if (root == BtNode::free || root == BtNode::occupied) {
       body_.assign(2, root == BtNode::free ? '\x55' : '\xaa');
       nodes_ = 8;
@@ -37,16 +39,16 @@ class BtWriter {
 
   /// The whole file. @param comment one line
   [[nodiscard]] std::string file(double resolution, std::string_view comment) const {
-    return fmt::format("# Octomap OcTree binary file\n# {}\n#\nid OcTree\nsize {}\nres {}\ndata\n", comment, nodes_,
-                       resolution) +
+    return fmt::format("# Octomap OcTree binary file\n# {}\n#\nid OcTree\nsize {}\nres {}\ndata\n",
+                       comment, nodes_, resolution) +
            body_;
   }
 
  private:
-  template <typename Context, typename Ask>
-  BtNode add(const Cell& cell, const Context& above, const Ask& ask) {
+  template <typename Context, typename StateOf>
+  BtNode add(const Cell& cell, const Context& above, const StateOf& state_of) {
     Context here{};
-    const BtNode node = ask(cell, above, here);
+    const BtNode node = state_of(cell, above, here);
     if (node != BtNode::parts) {
       const auto edge = static_cast<std::size_t>(cell.size);
       voxels_[static_cast<std::size_t>(node)] += edge * edge * edge;
@@ -57,10 +59,11 @@ class BtWriter {
     unsigned code = 0;
     for (unsigned part = 0; part < 8; ++part) {
       Cell inner{cell.lo, cell.size / 2};
-      for (unsigned axis = 0; axis < 3; ++axis) inner.lo[axis] += (part >> axis) & 1U ? inner.size : 0;
-      const BtNode answer = add(inner, here, ask);
-      code |= static_cast<unsigned>(answer) << (2U * part);
-      nodes_ += answer != BtNode::unknown ? 1 : 0;
+      for (unsigned axis = 0; axis < 3; ++axis)
+        inner.lo[axis] += (part >> axis) & 1U ? inner.size : 0;
+      const BtNode child = add(inner, here, state_of);
+      code |= static_cast<unsigned>(child) << (2U * part);
+      nodes_ += child != BtNode::unknown ? 1 : 0;
     }
     const unsigned first = code & 3U;
     if (first != 3 && code == first * 0x5555U) {

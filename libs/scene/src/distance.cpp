@@ -29,9 +29,10 @@ float round_up(double x) {
   return static_cast<double>(f) < x ? std::nextafter(f, float_infinity) : f;
 }
 
-// ---- the tree: cut by the surface area heuristic over 16 bins of the box centres on each axis ----
+// ---- the tree: split by the surface area heuristic over 16 bins of the box centres on each axis,
+// see docs/theory.md
 
-// What the builder moves about.
+// A box with its original index, sorted by the builder.
 struct Item {
   Box box;
   std::int32_t index;
@@ -55,7 +56,7 @@ struct Bounds {
 struct Group {
   std::span<Item> items;
   Bounds bounds;
-  double cost = 0.0;  // the more, the sooner it is cut
+  double cost = 0.0;  // the group of largest cost is split first
 
   explicit Group(std::span<Item> of = {}) : items(of) {
     for (const Item& item : items) bounds.add(item.box);
@@ -67,8 +68,8 @@ double twice_center(const Item& item, int axis) {
   return item.box.lo[axis] + item.box.hi[axis];
 }
 
-// Where to cut a group in two; in the middle of their order where the heuristic finds nothing (or the tree grows too
-// deep). Sorts the items accordingly.
+// Splits a group in two and sorts the items accordingly; in the middle of their order if the
+// heuristic finds no split, or if `halve` is set. @return the size of the first part
 std::size_t split(std::span<Item> items, bool halve) {
   constexpr std::size_t bins = 16;
   constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -87,11 +88,12 @@ std::size_t split(std::span<Item> items, bool halve) {
     std::array<Bounds, bins> bounds;
     const double scale = double{bins} / spread[axis];
     for (const Item& item : items) {
-      const auto bin = std::min(bins - 1, static_cast<std::size_t>((twice_center(item, axis) - low[axis]) * scale));
+      const auto bin = std::min(
+          bins - 1, static_cast<std::size_t>((twice_center(item, axis) - low[axis]) * scale));
       bounds[bin].add(item.box);
       ++count[bin];
     }
-    // costs of what lies left of each cut, then of what lies right
+    // costs of the boxes to the left of each cut, then of those to the right
     std::array<double, bins> cost{};
     const auto sweep = [&](auto cut_after, std::size_t from, std::size_t step) {
       Bounds all;
@@ -112,9 +114,11 @@ std::size_t split(std::span<Item> items, bool halve) {
     }
   }
   if (best_axis >= 0) {
-    const auto middle = std::partition(items.begin(), items.end(),
-                                       [&](const Item& item) { return twice_center(item, best_axis) < best_cut; });
-    if (middle != items.begin() && middle != items.end()) return static_cast<std::size_t>(middle - items.begin());
+    const auto middle = std::partition(items.begin(), items.end(), [&](const Item& item) {
+      return twice_center(item, best_axis) < best_cut;
+    });
+    if (middle != items.begin() && middle != items.end())
+      return static_cast<std::size_t>(middle - items.begin());
   }
   int axis = 0;
   spread.maxCoeff(&axis);
@@ -128,11 +132,11 @@ std::size_t split(std::span<Item> items, bool halve) {
 
 constexpr std::size_t width = kernel::TreeNode::width;
 
-// Appends the node of these items and all below it. @return its index
+// Appends the node of these items and all nodes below it. @return its index
 std::int32_t build(std::span<Item> items, int depth, const Eigen::Vector3d& origin,
                    std::vector<kernel::TreeNode>& nodes) {
-  // Cutting in the middle below this depth keeps the traversal's stack within its fixed size.
-  constexpr int depth_of_free_cuts = 10;
+  // Splits in the middle below this depth keep the traversal's stack within its fixed size.
+  constexpr int heuristic_depth = 10;
   std::array<Group, width> groups;
   std::size_t count = 1;
   if (items.size() <= width) {
@@ -142,11 +146,12 @@ std::int32_t build(std::span<Item> items, int depth, const Eigen::Vector3d& orig
     groups[0] = Group(items);
   }
   while (count < width) {
-    auto* const costliest = std::max_element(groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(count),
-                                             [](const Group& a, const Group& b) { return a.cost < b.cost; });
+    auto* const costliest =
+        std::max_element(groups.begin(), groups.begin() + static_cast<std::ptrdiff_t>(count),
+                         [](const Group& a, const Group& b) { return a.cost < b.cost; });
     if (costliest->cost < 0.0) break;
     const std::span<Item> group = costliest->items;
-    const std::size_t cut = split(group, depth >= depth_of_free_cuts);
+    const std::size_t cut = split(group, depth >= heuristic_depth);
     *costliest = Group(group.first(cut));
     groups[count++] = Group(group.subspan(cut));
   }
@@ -157,23 +162,28 @@ std::int32_t build(std::span<Item> items, int depth, const Eigen::Vector3d& orig
   for (std::size_t slot = 0; slot < width; ++slot) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<Eigen::Index>(axis);
-      node.lo[axis][slot] = slot < count ? round_down(groups[slot].bounds.lo[a] - origin[a]) : float_infinity;
-      node.hi[axis][slot] = slot < count ? round_up(groups[slot].bounds.hi[a] - origin[a]) : float_infinity;
+      node.lo[axis][slot] =
+          slot < count ? round_down(groups[slot].bounds.lo[a] - origin[a]) : float_infinity;
+      node.hi[axis][slot] =
+          slot < count ? round_up(groups[slot].bounds.hi[a] - origin[a]) : float_infinity;
     }
     if (slot >= count) continue;
-    node.child[slot] = groups[slot].items.size() == 1 ? -1 - groups[slot].items.front().index
-                                                      : build(groups[slot].items, depth + 1, origin, nodes);
+    node.child[slot] = groups[slot].items.size() == 1
+                           ? -1 - groups[slot].items.front().index
+                           : build(groups[slot].items, depth + 1, origin, nodes);
   }
   nodes[self] = node;
   return static_cast<std::int32_t>(self);
 }
 
-// Appends the tree of these boxes and puts them into its order: what is near in space is near in memory.
-// @param first index of the first of them
+// Appends the tree of these boxes and sorts them in its order, so that boxes near in space are near
+// in memory.
+// @param first index of the first box
 void build_tree(std::vector<Box>& boxes, std::size_t first, const Eigen::Vector3d& origin,
                 std::vector<kernel::TreeNode>& nodes, std::vector<std::int32_t>& slot_of) {
   std::vector<Item> items(boxes.size());
-  for (std::size_t i = 0; i < items.size(); ++i) items[i] = {boxes[i], static_cast<std::int32_t>(i)};
+  for (std::size_t i = 0; i < items.size(); ++i)
+    items[i] = {boxes[i], static_cast<std::int32_t>(i)};
   const std::size_t root = nodes.size();
   nodes.reserve(root + boxes.size() / 3 + 1);
   build(items, 0, origin, nodes);
@@ -193,6 +203,7 @@ void build_tree(std::vector<Box>& boxes, std::size_t first, const Eigen::Vector3
 
 }  // namespace
 
+// docs/theory.md (11.1)–(11.3)
 BoxHit closest_on_box(const Eigen::Vector3d& p, const Box& box) {
   BoxHit hit;
   hit.point = p.cwiseMax(box.lo).cwiseMin(box.hi);
@@ -221,10 +232,12 @@ SegmentHit closest_on_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b, co
   SegmentHit hit;
   hit.along = kernel::nearest_along(axis, box.lo.data(), box.hi.data());
   hit.axis_point = a + hit.along * (b - a);
-  // where it is as near as this the axis enters, but for rounding
-  constexpr double hair = 1e-12;
-  if (kernel::squared_distance(axis, box.lo.data(), box.hi.data(), hit.along) <= hair * hair) {
-    // The depth is the least of six linear functions. Where it is greatest two of them cross, or the axis ends.
+  // an axis nearer than this enters the box, except for rounding
+  constexpr double entered = 1e-12;
+  if (kernel::squared_distance(axis, box.lo.data(), box.hi.data(), hit.along) <=
+      entered * entered) {
+    // docs/theory.md (11.11): the depth is the least of six linear functions; it is greatest where
+    // two of them cross, or at an end.
     const auto depth_at = [&](double t) {
       const Eigen::Vector3d p = a + t * (b - a);
       return (p - box.lo).cwiseMin(box.hi - p).minCoeff();
@@ -237,20 +250,22 @@ SegmentHit closest_on_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b, co
     };
     consider(0.0);
     consider(1.0);
-    const auto face = [&](int i) {  // value at a and slope
+    const auto face = [&](int i) {  // α and β: value at a and slope
       return std::array<double, 2>{i < 3 ? a[i] - box.lo[i] : box.hi[i - 3] - a[i - 3],
                                    i < 3 ? b[i] - a[i] : a[i - 3] - b[i - 3]};
     };
     for (int i = 0; i < 6; ++i)
       for (int j = i + 1; j < 6; ++j)
-        if (face(i)[1] != face(j)[1]) consider((face(j)[0] - face(i)[0]) / (face(i)[1] - face(j)[1]));
+        if (face(i)[1] != face(j)[1])
+          consider((face(j)[0] - face(i)[0]) / (face(i)[1] - face(j)[1]));
     hit.axis_point = a + hit.along * (b - a);
   }
   static_cast<BoxHit&>(hit) = closest_on_box(hit.axis_point, box);
   return hit;
 }
 
-BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin) : boxes_(std::move(boxes)), origin_(origin) {
+BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin)
+    : boxes_(std::move(boxes)), origin_(origin) {
   if (!boxes_.empty()) build_all();
 }
 
@@ -267,22 +282,24 @@ void BoxField::build_all() {
 void BoxField::change(std::span<const std::int32_t> removed, std::span<const Box> added) {
   const Box nowhere{Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()),
                     Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
-  // From here on boxes may be many more than the tree that they hang on was made for.
+  // With more added boxes than this, and a quarter of the first ones, the tree is built again.
   constexpr std::size_t few = 1024;
   for (const std::int32_t box : removed) {
     boxes_[static_cast<std::size_t>(box)] = nowhere;
-    if (static_cast<std::size_t>(box) >= first_added_) continue;  // goes with its tree
+    if (static_cast<std::size_t>(box) >= first_added_) continue;  // its tree is replaced below
     const std::int32_t place = slot_of_[static_cast<std::size_t>(box)];
     kernel::TreeNode& node = nodes_[static_cast<std::size_t>(place) / width];
     for (std::size_t axis = 0; axis < 3; ++axis)
-      node.lo[axis][static_cast<std::size_t>(place) % width] = node.hi[axis][static_cast<std::size_t>(place) % width] =
-          float_infinity;
+      node.lo[axis][static_cast<std::size_t>(place) % width] =
+          node.hi[axis][static_cast<std::size_t>(place) % width] = float_infinity;
   }
-  const bool anew = first_added_ == 0 || added.size() > few + first_added_ / 4;
-  if (anew) {
+  const bool rebuild = first_added_ == 0 || added.size() > few + first_added_ / 4;
+  if (rebuild) {
     boxes_.resize(first_added_);
     boxes_.erase(std::remove_if(boxes_.begin(), boxes_.end(),
-                                [](const Box& box) { return !(box.lo.x() < std::numeric_limits<double>::infinity()); }),
+                                [](const Box& box) {
+                                  return !(box.lo.x() < std::numeric_limits<double>::infinity());
+                                }),
                  boxes_.end());
     boxes_.insert(boxes_.end(), added.begin(), added.end());
     nodes_.clear();
@@ -291,12 +308,13 @@ void BoxField::change(std::span<const std::int32_t> removed, std::span<const Box
     if (!boxes_.empty()) build_all();
     return;
   }
-  // The first root goes behind the tree's nodes and makes room for one above both trees.
+  // The first tree's root moves behind its nodes, to make room for a root above both trees.
   if (nodes_.size() == first_added_node_) {
     nodes_.push_back(nodes_.front());
     for (std::size_t slot = 0; slot < static_cast<std::size_t>(nodes_.back().count); ++slot)
       if (const std::int32_t child = nodes_.back().child[slot]; child < 0)
-        slot_of_[static_cast<std::size_t>(-1 - child)] = static_cast<std::int32_t>(first_added_node_ * width + slot);
+        slot_of_[static_cast<std::size_t>(-1 - child)] =
+            static_cast<std::int32_t>(first_added_node_ * width + slot);
   }
   nodes_.resize(first_added_node_ + 1);
   boxes_.resize(first_added_);
@@ -306,27 +324,27 @@ void BoxField::change(std::span<const std::int32_t> removed, std::span<const Box
     std::fill(std::begin(root.lo[axis]), std::end(root.lo[axis]), float_infinity);
     std::fill(std::begin(root.hi[axis]), std::end(root.hi[axis]), float_infinity);
   }
-  const auto hang = [&](std::size_t from) {
+  const auto attach = [&](std::size_t from) {
     const kernel::TreeNode& node = nodes_[from];
     const auto slot = static_cast<std::size_t>(root.count++);
     root.child[slot] = static_cast<std::int32_t>(from);
     const auto count = static_cast<std::size_t>(node.count);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       root.lo[axis][slot] = *std::min_element(node.lo[axis], node.lo[axis] + count);
-      // slots of what is gone lie at infinity, on both sides
+      // both bounds of removed boxes are at infinity
       float high = -float_infinity;
       for (std::size_t i = 0; i < count; ++i)
         if (node.lo[axis][i] < float_infinity) high = std::max(high, node.hi[axis][i]);
       root.hi[axis][slot] = root.lo[axis][slot] < float_infinity ? high : float_infinity;
     }
   };
-  hang(first_added_node_);
+  attach(first_added_node_);
   if (!added.empty()) {
     std::vector<Box> own(added.begin(), added.end());
     const std::size_t at = nodes_.size();
     build_tree(own, first_added_, origin_, nodes_, slot_of_);
     boxes_.insert(boxes_.end(), own.begin(), own.end());
-    hang(at);
+    attach(at);
   }
   nodes_.front() = root;
 }
@@ -368,7 +386,8 @@ kernel::Tree BoxField::tree() const noexcept {
 
 namespace {
 
-// A point or an axis, as kernels take it (see TreeKernels) and as it meets a box that they found.
+// A point or an axis: the arguments of the kernels (see TreeKernels) and the exact result for a box
+// that they found.
 struct Point {
   const Eigen::Vector3d& p;
   [[nodiscard]] const double* first() const { return p.data(); }
@@ -383,7 +402,7 @@ struct Axis {
 };
 
 template <class From, class Hit>
-void meet(const From& from, const std::vector<Box>& boxes, std::int32_t box, Hit& hit) {
+void evaluate(const From& from, const std::vector<Box>& boxes, std::int32_t box, Hit& hit) {
   hit = from.on(boxes[static_cast<std::size_t>(box)]);
   hit.box = box;
 }
@@ -393,47 +412,52 @@ bool nearest_of(const From& from, const kernel::TreeKernels& kernels, const kern
                 const std::vector<Box>& boxes, double limit, std::int32_t hint, Hit& hit) {
   kernel::Found found{0.0, hint};
   if (!kernels.nearest(tree, from.first(), from.second(), limit, found)) return false;
-  meet(from, boxes, found.box, hit);
+  evaluate(from, boxes, found.box, hit);
   return true;
 }
 
 template <class From, class Hit>
-std::size_t several_of(const From& from, const kernel::TreeKernels& kernels, const kernel::Tree& tree,
-                       const std::vector<Box>& boxes, double limit, double cone_cosine, kernel::Waiting* room,
-                       std::span<Hit> out) {
-  std::array<kernel::Found, BoxField::several_max> found;
-  const auto count = static_cast<std::size_t>(
-      kernels.several(tree, from.first(), from.second(), limit, cone_cosine, room, found.data(),
-                      static_cast<int>(std::min(out.size(), BoxField::several_max))));
-  for (std::size_t i = 0; i < count; ++i) meet(from, boxes, found[i].box, out[i]);
+std::size_t nearest_distinct_of(const From& from, const kernel::TreeKernels& kernels,
+                                const kernel::Tree& tree, const std::vector<Box>& boxes,
+                                double limit, double cone_cosine, kernel::QueueEntry* queue,
+                                std::span<Hit> out) {
+  std::array<kernel::Found, BoxField::distinct_max> found;
+  const auto count = static_cast<std::size_t>(kernels.nearest_distinct(
+      tree, from.first(), from.second(), limit, cone_cosine, queue, found.data(),
+      static_cast<int>(std::min(out.size(), BoxField::distinct_max))));
+  for (std::size_t i = 0; i < count; ++i) evaluate(from, boxes, found[i].box, out[i]);
   return count;
 }
 
 }  // namespace
 
-bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std::int32_t hint) const {
-  if (boxes_.empty() || !(limit >= 0.0)) return false;
-  return nearest_of(Point{p}, *kernels_, tree(), boxes_, limit, usable(hint), hit);
-}
-
-bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, SegmentHit& hit,
+bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
                        std::int32_t hint) const {
   if (boxes_.empty() || !(limit >= 0.0)) return false;
-  return nearest_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, usable(hint), hit);
+  return nearest_of(Point{p}, *kernels_, tree(), boxes_, limit, valid_hint(hint), hit);
 }
 
-std::size_t BoxField::several(const Eigen::Vector3d& p, double limit, double cone_cosine, Scratch& scratch,
-                              std::span<BoxHit> out) const {
-  if (boxes_.empty() || !(limit >= 0.0)) return 0;
-  scratch.fit(*this);
-  return several_of(Point{p}, *kernels_, tree(), boxes_, limit, cone_cosine, scratch.room_.data(), out);
+bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                       SegmentHit& hit, std::int32_t hint) const {
+  if (boxes_.empty() || !(limit >= 0.0)) return false;
+  return nearest_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, valid_hint(hint), hit);
 }
 
-std::size_t BoxField::several(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, double cone_cosine,
-                              Scratch& scratch, std::span<SegmentHit> out) const {
+std::size_t BoxField::nearest_distinct(const Eigen::Vector3d& p, double limit, double cone_cosine,
+                                       Scratch& scratch, std::span<BoxHit> out) const {
   if (boxes_.empty() || !(limit >= 0.0)) return 0;
   scratch.fit(*this);
-  return several_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, cone_cosine, scratch.room_.data(), out);
+  return nearest_distinct_of(Point{p}, *kernels_, tree(), boxes_, limit, cone_cosine,
+                             scratch.queue_.data(), out);
+}
+
+std::size_t BoxField::nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                       double limit, double cone_cosine, Scratch& scratch,
+                                       std::span<SegmentHit> out) const {
+  if (boxes_.empty() || !(limit >= 0.0)) return 0;
+  scratch.fit(*this);
+  return nearest_distinct_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, cone_cosine,
+                             scratch.queue_.data(), out);
 }
 
 NearTable::NearTable(const Ball& region, double edge) {
@@ -441,34 +465,35 @@ NearTable::NearTable(const Ball& region, double edge) {
   if (!(region.radius > 0.0)) return;
   count_ = static_cast<std::size_t>(std::ceil(std::min(2.0 * region.radius / edge, cells_max)));
   edge_ = std::max(edge, 2.0 * region.radius / static_cast<double>(count_));
-  per_edge_ = 1.0 / edge_;
+  inverse_edge_ = 1.0 / edge_;
   low_ = region.center - Eigen::Vector3d::Constant(0.5 * edge_ * static_cast<double>(count_));
   cells_.resize(count_ * count_ * count_);
 }
 
-void NearTable::forget() {
+void NearTable::clear() {
   std::fill(cells_.begin(), cells_.end(), std::uint64_t{0});
 }
 
-NearTable::Answer NearTable::ask(const BoxField& field, const Eigen::Vector3d& p) const {
-  constexpr double hair = 1e-6;  // far above the rounding of points, cells and floats [m]
-  constexpr float nothing = -float_infinity;
-  if (cells_.empty() || field.empty()) return {nothing, -1};
-  const Eigen::Vector3d at = (p - low_) * per_edge_;
+// docs/theory.md (11.24)
+NearTable::Answer NearTable::query(const BoxField& field, const Eigen::Vector3d& p) const {
+  constexpr double margin = 1e-6;  // far above the rounding of points, cells and floats [m]
+  constexpr float no_bound = -float_infinity;
+  if (cells_.empty() || field.empty()) return {no_bound, -1};
+  const Eigen::Vector3d at = (p - low_) * inverse_edge_;
   for (int axis = 0; axis < 3; ++axis)
-    if (!(at[axis] >= 0.0 && at[axis] < static_cast<double>(count_))) return {nothing, -1};
+    if (!(at[axis] >= 0.0 && at[axis] < static_cast<double>(count_))) return {no_bound, -1};
   const auto x = static_cast<std::size_t>(at.x()), y = static_cast<std::size_t>(at.y()),
              z = static_cast<std::size_t>(at.z());
   const Eigen::Vector3d middle =
-      low_ +
-      edge_ * Eigen::Vector3d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, static_cast<double>(z) + 0.5);
+      low_ + edge_ * Eigen::Vector3d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5,
+                                     static_cast<double>(z) + 0.5);
   const std::atomic_ref<std::uint64_t> cell(cells_[(x * count_ + y) * count_ + z]);
   std::uint64_t known = cell.load(std::memory_order_relaxed);
   if (known == 0) {
     BoxHit hit;
     (void)field.nearest(middle, std::numeric_limits<double>::infinity(), hit);
     known = (static_cast<std::uint64_t>(hit.box + 1) << 32U) |
-            std::bit_cast<std::uint32_t>(round_down(hit.distance - hair));
+            std::bit_cast<std::uint32_t>(round_down(hit.distance - margin));
     cell.store(known, std::memory_order_relaxed);
   }
   const auto bound = static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(known)));

@@ -14,12 +14,14 @@ namespace hamelin::scene {
 
 namespace {
 
-// Points of a capsule's axis this share of its length apart are different places.
-constexpr double elsewhere_share = 1.0 / 3.0;
+// Points of a capsule's axis are distinct if they are farther apart than this share of its length.
+constexpr double distinct_share = 1.0 / 3.0;
 
-// `at`: a sphere's centre, a capsule's nearest axis point; `distance` is from there.
-Contact contact_of(const Shapes& arm, std::size_t shape, int obstacle, const Eigen::Vector3d& at, double distance,
-                   const Eigen::Vector3d& point, const Eigen::Vector3d& direction, const Eigen::Vector3d& velocity) {
+// docs/theory.md (11.8). `at`: a sphere's centre or a capsule's nearest axis point; `distance` is
+// measured from there.
+Contact contact_of(const Shapes& arm, std::size_t shape, int obstacle, const Eigen::Vector3d& at,
+                   double distance, const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+                   const Eigen::Vector3d& velocity) {
   return {static_cast<int>(shape),
           obstacle,
           distance - arm.radii[shape],
@@ -29,15 +31,17 @@ Contact contact_of(const Shapes& arm, std::size_t shape, int obstacle, const Eig
           velocity};
 }
 
-// The nearest of those found, as many as there is room for, by shape and distance.
-void hand_out(const std::vector<Contact>& found, std::vector<std::size_t>& order, std::span<Contact> out) {
+// Writes the nearest contacts, as many as fit into `out`, in the order of shapes and distances.
+void write_nearest(const std::vector<Contact>& found, std::vector<std::size_t>& order,
+                   std::span<Contact> out) {
   const auto nearer = [&](std::size_t a, std::size_t b) {
     return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
   };
   order.resize(found.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (out.size() < found.size()) {
-    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()), order.end(), nearer);
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()),
+                     order.end(), nearer);
     order.resize(out.size());
   }
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -48,10 +52,12 @@ void hand_out(const std::vector<Contact>& found, std::vector<std::size_t>& order
 
 }  // namespace
 
-Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
-                         double reach, double influence, const RobotAtStart& robot)
+Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles,
+                         const geometry::SE3& base, double reach, double influence,
+                         const RobotAtStart& robot)
     : obstacles_(std::move(obstacles)) {
-  for (const Obstacle& obstacle : obstacles_) check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
+  for (const Obstacle& obstacle : obstacles_)
+    check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
   summary_.obstacles = obstacles_.size();
   if (!map) return;
   const MapRegion region = read_region(*map, base, reach, influence, robot);
@@ -62,22 +68,24 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   unknown_ = MapField(region.unknown, region.resolution_m, region.reachable);
   summary_.boxes = map_.boxes().boxes().size();
   summary_.unknown_boxes = unknown_.boxes().boxes().size();
-  for (const MapChangeSpec& change : map->changes) changes_.push_back(read_change(change, *map, region));
+  for (const MapChangeSpec& change : map->changes)
+    changes_.push_back(read_change(change, *map, region));
 }
 
 std::string Environment::advance(double time_s) {
-  std::string said;
-  for (; next_change_ < changes_.size() && changes_[next_change_].time_s <= time_s + 1e-9; ++next_change_) {
+  std::string message;
+  for (; next_change_ < changes_.size() && changes_[next_change_].time_s <= time_s + 1e-9;
+       ++next_change_) {
     const MapChange& change = changes_[next_change_];
     const MapField::Changed changed = map_.change(change.occupied, change.free);
     if (summary_.unknown != UnknownPolicy::free) {
       unknown_.change({}, change.free);
       unknown_.change({}, change.occupied);
     }
-    said += fmt::format("{}the map changes: {} voxels are occupied now, {} free", said.empty() ? "" : "; ",
-                        changed.added, changed.removed);
+    message += fmt::format("{}the map changes: {} voxels are occupied now, {} free",
+                           message.empty() ? "" : "; ", changed.added, changed.removed);
   }
-  return said;
+  return message;
 }
 
 Environment::Scratch::Scratch(const Environment& environment, std::size_t shapes)
@@ -90,18 +98,19 @@ std::size_t Environment::contacts_max(std::size_t shapes) const noexcept {
   return shapes * (2 * points_per_sphere + 3 * obstacles_.size());
 }
 
-std::string Environment::words(int obstacle) const {
+std::string Environment::describe(int obstacle) const {
   if (obstacle == Contact::map) return "the map";
   if (obstacle == Contact::unknown) return "unknown space";
   return fmt::format("obstacle '{}'", obstacles_[static_cast<std::size_t>(obstacle)].name);
 }
 
-std::string Environment::words(const Contact& contact, const model::Model& model) const {
-  return fmt::format("{} is {:.2g} mm inside {}", model.words(model.shapes()[static_cast<std::size_t>(contact.sphere)]),
-                     -1e3 * contact.distance, words(contact.obstacle));
+std::string Environment::describe(const Contact& contact, const model::Model& model) const {
+  return fmt::format("{} is {:.2g} mm inside {}",
+                     model.describe(model.shapes()[static_cast<std::size_t>(contact.sphere)]),
+                     -1e3 * contact.distance, describe(contact.obstacle));
 }
 
-std::string way_out(const Contact& contact) {
+std::string describe_exit_direction(const Contact& contact) {
   constexpr double digits = 100.0;
   const auto rounded = [](double x) { return std::round(digits * x) / digits + 0.0; };  // no "-0"
   const Eigen::Vector3d& n = contact.direction;
@@ -113,7 +122,8 @@ bool Environment::has_obstacles() const noexcept {
          (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
 }
 
-double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s, double limit) {
+double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s,
+                                 double limit) {
   const Eigen::Vector3d at = position_at(obstacle, time_s);
   const double ball = bounding_radius(obstacle);
   double smallest = limit;
@@ -128,63 +138,74 @@ double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, do
   return smallest;
 }
 
-bool Environment::shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const {
+bool Environment::in_view(std::size_t obstacle, double time_s, View view,
+                          std::span<const std::uint8_t> seen) const {
   const Obstacle& o = obstacles_[obstacle];
   if (!exists(o, time_s)) return false;
-  const bool told = !o.judge_only && (o.known || (obstacle < seen.size() && seen[obstacle] != 0));
-  return view == View::judge || told == (view == View::planner);
+  const bool known = !o.judge_only && (o.known || (obstacle < seen.size() && seen[obstacle] != 0));
+  return view == View::judge || known == (view == View::planner);
 }
 
-int Environment::see(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const {
+int Environment::reveal_visible(const Shapes& arm, double time_s,
+                                std::span<std::uint8_t> seen) const {
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     const Obstacle& o = obstacles_[k];
-    if (o.known || o.judge_only || !o.visible_within_m || seen[k] != 0 || !exists(o, time_s)) continue;
-    // any limit above visible_within_m will do
-    if (!visible(o, time_s, clearance_to(o, arm, time_s, 2.0 * *o.visible_within_m + 1.0))) continue;
+    if (o.known || o.judge_only || !o.visible_within_m || seen[k] != 0 || !exists(o, time_s))
+      continue;
+    // any limit above visible_within_m is enough
+    if (!visible(o, time_s, clearance_to(o, arm, time_s, 2.0 * *o.visible_within_m + 1.0)))
+      continue;
     seen[k] = 1;
     return static_cast<int>(k);
   }
   return -1;
 }
 
-std::size_t Environment::closest(const Shapes& arm, double influence, double time_s, Scratch& scratch,
-                                 std::span<Contact> out, View view, std::span<const std::uint8_t> seen) const {
+std::size_t Environment::closest(const Shapes& arm, double influence, double time_s,
+                                 Scratch& scratch, std::span<Contact> out, View view,
+                                 std::span<const std::uint8_t> seen) const {
   scratch.found_.clear();
   if (view != View::hidden) {
-    find_in(map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
+    add_map_contacts(map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
     if (summary_.unknown == UnknownPolicy::block)
-      find_in(unknown_, Contact::unknown, arm, influence, scratch.unknown_, scratch.found_);
+      add_map_contacts(unknown_, Contact::unknown, arm, influence, scratch.unknown_,
+                       scratch.found_);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (shown(k, time_s, view, seen)) find_on(k, arm, influence, time_s, scratch.found_);
-  hand_out(scratch.found_, scratch.order_, out);
+    if (in_view(k, time_s, view, seen))
+      add_obstacle_contacts(k, arm, influence, time_s, scratch.found_);
+  write_nearest(scratch.found_, scratch.order_, out);
   return scratch.found_.size();
 }
 
-void Environment::find_in(const MapField& field, int id, const Shapes& arm, double influence, MapField::Scratch& room,
-                          std::vector<Contact>& found) const {
+void Environment::add_map_contacts(const MapField& field, int id, const Shapes& arm,
+                                   double influence, MapField::Scratch& scratch,
+                                   std::vector<Contact>& found) const {
   if (field.empty()) return;
   std::array<BoxHit, points_per_sphere> hits;
   std::array<SegmentHit, points_per_sphere> axis_hits;
   for (std::size_t shape = 0; shape < arm.size(); ++shape) {
     const double limit = influence + arm.radii[shape];
     const bool capsule = arm.is_capsule(shape);
-    const std::size_t count = capsule ? field.several(map_pose_inverse_ * arm.from(shape),
-                                                      map_pose_inverse_ * arm.to(shape), limit, room, axis_hits)
-                                      : field.several(map_pose_inverse_ * arm.centers[shape], limit, room, hits);
+    const std::size_t count =
+        capsule
+            ? field.nearest_distinct(map_pose_inverse_ * arm.from(shape),
+                                     map_pose_inverse_ * arm.to(shape), limit, scratch, axis_hits)
+            : field.nearest_distinct(map_pose_inverse_ * arm.centers[shape], limit, scratch, hits);
     for (std::size_t i = 0; i < count; ++i) {
       const BoxHit& hit = capsule ? axis_hits[i] : hits[i];
       const Eigen::Vector3d at = capsule ? map_pose_ * axis_hits[i].axis_point : arm.centers[shape];
-      found.push_back(contact_of(arm, shape, id, at, hit.distance, map_pose_ * hit.point, map_pose_.R() * hit.direction,
-                                 Eigen::Vector3d::Zero()));
+      found.push_back(contact_of(arm, shape, id, at, hit.distance, map_pose_ * hit.point,
+                                 map_pose_.R() * hit.direction, Eigen::Vector3d::Zero()));
     }
   }
 }
 
-void Environment::find_on(std::size_t k, const Shapes& arm, double influence, double time_s,
-                          std::vector<Contact>& found) const {
+void Environment::add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence,
+                                        double time_s, std::vector<Contact>& found) const {
   const Obstacle& obstacle = obstacles_[k];
-  const Eigen::Vector3d at = position_at(obstacle, time_s), velocity = velocity_at(obstacle, time_s);
+  const Eigen::Vector3d at = position_at(obstacle, time_s),
+                        velocity = velocity_at(obstacle, time_s);
   const double ball = bounding_radius(obstacle);
   for (std::size_t shape = 0; shape < arm.size(); ++shape) {
     const bool capsule = arm.is_capsule(shape);
@@ -193,20 +214,21 @@ void Environment::find_on(std::size_t k, const Shapes& arm, double influence, do
     if ((arm.centers[shape] - at).squaredNorm() > near * near) continue;
     const auto add = [&](const SurfacePoint& hit, const Eigen::Vector3d& from) {
       if (hit.distance <= limit)
-        found.push_back(
-            contact_of(arm, shape, static_cast<int>(k), from, hit.distance, hit.point, hit.direction, velocity));
+        found.push_back(contact_of(arm, shape, static_cast<int>(k), from, hit.distance, hit.point,
+                                   hit.direction, velocity));
     };
     if (!capsule) {
       add(closest_on(obstacle, at, arm.centers[shape]), arm.centers[shape]);
       continue;
     }
-    // a capsule that lies along an obstacle is near it at its ends, too
+    // a capsule that lies along an obstacle is near it at both of its ends
     const Eigen::Vector3d from = arm.from(shape), to = arm.to(shape);
     const AxisPoint nearest = closest_on(obstacle, at, from, to);
     add(nearest, nearest.axis_point);
-    const double elsewhere = elsewhere_share * 2.0 * arm.half_axes[shape].norm();
+    const double apart = distinct_share * 2.0 * arm.half_axes[shape].norm();
     for (const Eigen::Vector3d& end : {from, to})
-      if ((end - nearest.axis_point).squaredNorm() > elsewhere * elsewhere) add(closest_on(obstacle, at, end), end);
+      if ((end - nearest.axis_point).squaredNorm() > apart * apart)
+        add(closest_on(obstacle, at, end), end);
   }
 }
 
@@ -219,10 +241,12 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
     if (field.empty() || view == View::hidden) return;
     std::int32_t hint = -1;
     for (std::size_t i = 0; i < arm.size(); ++i) {
-      // Beyond contact the search must not end at a shape's radius: a deeper one may follow.
+      // In contact, smallest + radius may be negative, but a deeper contact may follow: the limit
+      // must not be below zero.
       const double near = std::max(0.0, smallest + arm.radii[i]);
       if (arm.is_capsule(i)) {
-        if (!field.nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i), near, axis_hit, hint))
+        if (!field.nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i), near,
+                           axis_hit, hint))
           continue;
         hit = axis_hit;
       } else if (!field.nearest(map_pose_inverse_ * arm.centers[i], near, hit, hint)) {
@@ -235,7 +259,8 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
   consider(map_);
   if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (shown(k, time_s, view, seen)) smallest = clearance_to(obstacles_[k], arm, time_s, smallest);
+    if (in_view(k, time_s, view, seen))
+      smallest = clearance_to(obstacles_[k], arm, time_s, smallest);
   return smallest;
 }
 
@@ -244,9 +269,10 @@ bool Environment::in_slow_space(const Shapes& arm) const {
   BoxHit hit;
   SegmentHit axis_hit;
   for (std::size_t i = 0; i < arm.size(); ++i) {
-    const bool touches = arm.is_capsule(i) ? unknown_.nearest(map_pose_inverse_ * arm.from(i),
-                                                              map_pose_inverse_ * arm.to(i), arm.radii[i], axis_hit)
-                                           : unknown_.nearest(map_pose_inverse_ * arm.centers[i], arm.radii[i], hit);
+    const bool touches =
+        arm.is_capsule(i) ? unknown_.nearest(map_pose_inverse_ * arm.from(i),
+                                             map_pose_inverse_ * arm.to(i), arm.radii[i], axis_hit)
+                          : unknown_.nearest(map_pose_inverse_ * arm.centers[i], arm.radii[i], hit);
     if (touches) return true;
   }
   return false;

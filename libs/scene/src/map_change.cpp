@@ -12,9 +12,10 @@ namespace hamelin::scene {
 
 namespace {
 
-// The voxels that boxes touch, faces not counted, as far as they lie in the cube around the ball.
+// The voxels that share volume with the boxes, within the cube around the ball.
 std::vector<VoxelBox> touched(const std::vector<Box>& boxes, double resolution, const Ball& ball) {
-  constexpr double hair = 1e-9;  // of a voxel: a face at 0.3 m is that of a voxel of 0.1 m
+  // In voxels: a face at 0.3 m is the face of a voxel of 0.1 m in spite of rounding.
+  constexpr double tolerance = 1e-9;
   std::vector<VoxelBox> voxels;
   for (const Box& box : boxes) {
     VoxelBox out;
@@ -25,8 +26,8 @@ std::vector<VoxelBox> touched(const std::vector<Box>& boxes, double resolution, 
                    hi = std::min(box.hi[a], ball.center[a] + ball.radius + resolution) / resolution;
       any = any && hi > lo;
       if (!any) break;
-      out.lo[axis] = static_cast<std::int32_t>(std::floor(lo + hair));
-      out.hi[axis] = static_cast<std::int32_t>(std::ceil(hi - hair));
+      out.lo[axis] = static_cast<std::int32_t>(std::floor(lo + tolerance));
+      out.hi[axis] = static_cast<std::int32_t>(std::ceil(hi - tolerance));
       any = out.hi[axis] > out.lo[axis];
     }
     if (any) voxels.push_back(out);
@@ -44,15 +45,16 @@ MapChange read_change(const MapChangeSpec& change, const MapSpec& map, const Map
     options.keep_free = true;
     const MapData data = read_map(*change.file, options);
     if (std::abs(data.resolution - region.resolution_m) > 1e-9 * region.resolution_m)
-      throw Error(ErrorCode::invalid, fmt::format("{}: resolution {} m, expected {} m as the map that it changes",
-                                                  change.file->string(), data.resolution, region.resolution_m));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: resolution {} m, expected {} m as in the map that it changes",
+                              change.file->string(), data.resolution, region.resolution_m));
     out.free = merge(crop(data.free, data.resolution, region.ball));
     out.occupied = merge(crop(data.occupied, data.resolution, region.ball));
   }
   const auto append = [&](const std::vector<Box>& boxes, std::vector<VoxelBox>& to) {
     for (const VoxelBox& box : touched(boxes, region.resolution_m, region.ball)) {
       std::vector<VoxelBox> pieces{box};
-      for (const VoxelBox& there : to) subtract(pieces, there);
+      for (const VoxelBox& present : to) subtract(pieces, present);
       to.insert(to.end(), pieces.begin(), pieces.end());
     }
   };

@@ -13,43 +13,50 @@ namespace hamelin::scene {
 
 namespace {
 
-// Cells in the file's order are in the order of this number: each axis' bits taken in turn.
-std::uint64_t place_of(const Cell& cell) {
-  std::uint64_t place = 0;
+// The Morton code of a cell: the bits of its coordinates, interleaved. It sorts cells in the order
+// of the file.
+std::uint64_t morton_code(const Cell& cell) {
+  std::uint64_t code = 0;
   for (unsigned axis = 0; axis < 3; ++axis)
     for (unsigned bit = 0; bit < 16; ++bit)
-      place |= ((static_cast<std::uint64_t>(cell.lo[axis] + BtWriter::half) >> bit) & 1U) << (3U * bit + axis);
-  return place;
+      code |= ((static_cast<std::uint64_t>(cell.lo[axis] + BtWriter::half) >> bit) & 1U)
+              << (3U * bit + axis);
+  return code;
 }
 
 struct Leaf {
-  std::uint64_t place = 0;
+  std::uint64_t code = 0;
   std::int32_t size = 1;
   BtNode node = BtNode::unknown;
 };
 
-void take(const std::vector<Cell>& cells, BtNode node, const CropOptions& options, double resolution,
-          std::vector<Leaf>& leaves) {
+void append_leaves(const std::vector<Cell>& cells, BtNode node, const CropOptions& options,
+                   double resolution, std::vector<Leaf>& leaves) {
   const auto keep = [&](const Cell& cell) {
     const Box box = to_metres(cell, resolution);
     if (const auto* ball = std::get_if<Ball>(&options.region))
-      return (box.lo - ball->center).cwiseMax(ball->center - box.hi).cwiseMax(0.0).norm() <= ball->radius;
+      return (box.lo - ball->center).cwiseMax(ball->center - box.hi).cwiseMax(0.0).norm() <=
+             ball->radius;
     const Box& region = std::get<Box>(options.region);
-    return (box.lo.array() <= region.hi.array()).all() && (region.lo.array() <= box.hi.array()).all();
+    return (box.lo.array() <= region.hi.array()).all() &&
+           (region.lo.array() <= box.hi.array()).all();
   };
   for (const Cell& cell : cells)
-    if (keep(cell)) leaves.push_back({place_of(cell), cell.size, node});
+    if (keep(cell)) leaves.push_back({morton_code(cell), cell.size, node});
 }
 
 void check_region(const CropOptions& options) {
-  const auto invalid = [](const std::string& what) { throw Error(ErrorCode::invalid, what); };
+  const auto invalid = [](const std::string& message) { throw Error(ErrorCode::invalid, message); };
   if (const auto* ball = std::get_if<Ball>(&options.region)) {
     if (!(ball->center.allFinite() && ball->radius > 0.0 && std::isfinite(ball->radius)))
-      invalid(fmt::format("crop: radius {} m, expected a number above 0 and a finite center", ball->radius));
+      invalid(fmt::format("crop: radius {} m, expected a number above 0 and a finite centre",
+                          ball->radius));
   } else {
     const Box& box = std::get<Box>(options.region);
     if (!(box.lo.allFinite() && box.hi.allFinite() && (box.lo.array() < box.hi.array()).all()))
-      invalid("crop: the box's first corner must be below the second on each axis");
+      invalid(
+          "crop: the first corner of the box is not below the second, expected it to be on each "
+          "axis");
   }
 }
 
@@ -60,39 +67,43 @@ CropReport crop_map(const CropOptions& options) {
   std::error_code ignored;
   if (std::filesystem::equivalent(options.map, options.output, ignored))
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: is the map itself, expected another file to write", options.output.string()));
+                fmt::format("{}: is the map itself, expected another file to write",
+                            options.output.string()));
   if (options.output.extension() != ".bt")
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: expected a name that ends in .bt, the format written", options.output.string()));
+                fmt::format("{}: expected a name that ends in .bt, the format written",
+                            options.output.string()));
   const std::string bytes = read_file(options.map);
   ReadMapOptions read = options.read;
   read.keep_free = true;
   const MapData map = map_from_bytes(bytes, options.map.string(), read);
   std::vector<Leaf> leaves;
-  take(map.occupied, BtNode::occupied, options, map.resolution, leaves);
+  append_leaves(map.occupied, BtNode::occupied, options, map.resolution, leaves);
   CropReport report;
   report.occupied_leaves = leaves.size();
-  take(map.free, BtNode::free, options, map.resolution, leaves);
-  if (options.unknown_is_free) take(map.unknown, BtNode::free, options, map.resolution, leaves);
+  append_leaves(map.free, BtNode::free, options, map.resolution, leaves);
+  if (options.unknown_is_free)
+    append_leaves(map.unknown, BtNode::free, options, map.resolution, leaves);
   report.free_leaves = leaves.size() - report.occupied_leaves;
   if (leaves.empty())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: nothing of the map is in the region: is it in the map's own frame, "
-                            "in metres?",
-                            options.map.string()));
-  std::sort(leaves.begin(), leaves.end(), [](const Leaf& a, const Leaf& b) { return a.place < b.place; });
+    throw Error(ErrorCode::invalid, fmt::format("{}: nothing of the map is in the region, expected "
+                                                "a region in the map's own frame, in metres",
+                                                options.map.string()));
+  std::sort(leaves.begin(), leaves.end(),
+            [](const Leaf& a, const Leaf& b) { return a.code < b.code; });
 
   struct Range {
     std::size_t begin = 0, end = 0;
   };
-  const BtWriter writer(Range{0, leaves.size()}, [&](const Cell& cell, const Range& above, Range& here) {
+  const BtWriter writer(Range{0, leaves.size()}, [&](const Cell& cell, const Range& above,
+                                                     Range& here) {
     const auto edge = static_cast<std::uint64_t>(cell.size);
-    const std::uint64_t first = place_of(cell), last = first + edge * edge * edge;
-    const auto at = [&](std::uint64_t place, std::size_t from) {
+    const std::uint64_t first = morton_code(cell), last = first + edge * edge * edge;
+    const auto at = [&](std::uint64_t code, std::size_t from) {
       const auto begin = leaves.begin();
-      const auto found =
-          std::lower_bound(begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(above.end),
-                           place, [](const Leaf& leaf, std::uint64_t p) { return leaf.place < p; });
+      const auto found = std::lower_bound(
+          begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(above.end),
+          code, [](const Leaf& leaf, std::uint64_t c) { return leaf.code < c; });
       return static_cast<std::size_t>(found - begin);
     };
     here.begin = at(first, above.begin);
@@ -101,7 +112,7 @@ CropReport crop_map(const CropOptions& options) {
     return leaves[here.begin].size == cell.size ? leaves[here.begin].node : BtNode::parts;
   });
   const std::string out = writer.file(map.resolution, "cropped by hamelin");
-  write_file_aside(options.output, out);
+  write_file_atomically(options.output, out);
   report.sha256 = sha256_hex(out);
   report.bytes_before = bytes.size();
   report.bytes = out.size();

@@ -24,7 +24,8 @@ std::size_t volume(const std::vector<VoxelBox>& boxes) {
   std::size_t voxels = 0;
   for (const VoxelBox& box : boxes) {
     std::size_t product = 1;
-    for (std::size_t axis = 0; axis < 3; ++axis) product *= static_cast<std::size_t>(box.hi[axis] - box.lo[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      product *= static_cast<std::size_t>(box.hi[axis] - box.lo[axis]);
     voxels += product;
   }
   return voxels;
@@ -47,31 +48,34 @@ std::vector<VoxelBox> MapField::voxel_boxes(std::size_t from) const {
   return voxels;
 }
 
-MapField::Changed MapField::change(const std::vector<VoxelBox>& add, const std::vector<VoxelBox>& remove) {
+MapField::Changed MapField::change(const std::vector<VoxelBox>& add,
+                                   const std::vector<VoxelBox>& remove) {
   Changed changed;
   const std::size_t first_added = boxes_.first_added();
   const auto voxels_of = [&](std::int32_t box) {
     return to_voxels(boxes_.boxes()[static_cast<std::size_t>(box)], resolution_);
   };
-  // What is cut by which hole, box by box, and what is left of it.
+  // For each box that is cut: the boxes to subtract from it, and the pieces that remain.
   std::vector<std::int32_t> near, cut;
   std::vector<std::pair<std::int32_t, const VoxelBox*>> cuts;
   for (const VoxelBox& hole : remove) {
     boxes_.overlapping(to_metres(hole, resolution_), near);
     for (const std::int32_t box : near) cuts.emplace_back(box, &hole);
   }
-  std::stable_sort(cuts.begin(), cuts.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
+  std::stable_sort(cuts.begin(), cuts.end(),
+                   [](const auto& x, const auto& y) { return x.first < y.first; });
   std::vector<std::vector<VoxelBox>> rest;
-  for (const auto& one : cuts) {
-    if (cut.empty() || cut.back() != one.first) {
-      cut.push_back(one.first);
-      rest.push_back({voxels_of(one.first)});
+  for (const auto& [box, hole] : cuts) {
+    if (cut.empty() || cut.back() != box) {
+      cut.push_back(box);
+      rest.push_back({voxels_of(box)});
       changed.removed += volume(rest.back());
     }
-    subtract(rest.back(), *one.second);
+    subtract(rest.back(), *hole);
   }
   for (const auto& pieces : rest) changed.removed -= volume(pieces);
-  // What was added before, as far as it is whole, is put together with these rests and with what is new.
+  // The second tree gets the boxes of earlier additions that were not cut, the remaining pieces,
+  // and the new boxes.
   std::vector<VoxelBox> added;
   for (std::size_t box = first_added; box < boxes_.boxes().size(); ++box)
     if (!std::binary_search(cut.begin(), cut.end(), static_cast<std::int32_t>(box)))
@@ -80,23 +84,25 @@ MapField::Changed MapField::change(const std::vector<VoxelBox>& add, const std::
   for (const VoxelBox& box : add) {
     std::vector<VoxelBox> pieces{box};
     boxes_.overlapping(to_metres(box, resolution_), near);
-    for (const std::int32_t there : near) {
-      const auto at = std::lower_bound(cut.begin(), cut.end(), there);
-      if (at == cut.end() || *at != there) {
-        subtract(pieces, voxels_of(there));
+    for (const std::int32_t other : near) {
+      const auto at = std::lower_bound(cut.begin(), cut.end(), other);
+      if (at == cut.end() || *at != other) {
+        subtract(pieces, voxels_of(other));
         continue;
       }
-      for (const VoxelBox& piece : rest[static_cast<std::size_t>(at - cut.begin())]) subtract(pieces, piece);
+      for (const VoxelBox& piece : rest[static_cast<std::size_t>(at - cut.begin())])
+        subtract(pieces, piece);
     }
     changed.added += volume(pieces);
     added.insert(added.end(), pieces.begin(), pieces.end());
   }
   if (changed.added == 0 && changed.removed == 0) return changed;
   join(added);
-  cut.erase(std::lower_bound(cut.begin(), cut.end(), static_cast<std::int32_t>(first_added)), cut.end());
+  cut.erase(std::lower_bound(cut.begin(), cut.end(), static_cast<std::int32_t>(first_added)),
+            cut.end());
   boxes_.change(cut, in_metres(added, resolution_));
   if (near_.bytes() == 0) near_ = NearTable(reachable_, table_edge_m);
-  if (changed.added > 0) near_.forget();
+  if (changed.added > 0) near_.clear();
   surface_ = std::make_unique<Surface>();
   return changed;
 }
@@ -108,7 +114,8 @@ const BoxField& MapField::faces() const {
   return surface_->faces;
 }
 
-void MapField::find_way_out(const Eigen::Vector3d& p, BoxHit& hit) const {
+// docs/theory.md (11.5)
+void MapField::find_exit(const Eigen::Vector3d& p, BoxHit& hit) const {
   BoxHit face;
   if (!faces().nearest(p, infinity, face)) return;
   const double depth = std::abs(face.distance);
@@ -117,7 +124,7 @@ void MapField::find_way_out(const Eigen::Vector3d& p, BoxHit& hit) const {
   hit.direction = -face.direction;
   constexpr double on_surface = 1e-9;
   if (depth > on_surface) return;
-  // the normal, towards where half a voxel on nothing is
+  // the normal of the rectangle, towards the side that is not in the union half a voxel farther on
   const Box& flat = faces().boxes()[static_cast<std::size_t>(face.box)];
   int axis = 0;
   (flat.hi - flat.lo).minCoeff(&axis);
@@ -127,21 +134,21 @@ void MapField::find_way_out(const Eigen::Vector3d& p, BoxHit& hit) const {
   hit.direction = up ? normal : Eigen::Vector3d(-normal);
 }
 
-void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, SegmentHit& hit) const {
-  // The depth at t is the least of the distances to the faces, each of which is convex in t: between two points it is
-  // no more than the chords of any two of them. The interval with the greatest such bound is cut where the chords
-  // cross.
+void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                            SegmentHit& hit) const {
+  // Branch and bound for the greatest depth: docs/theory.md (11.12)–(11.14). The interval with the
+  // greatest bound is divided where its chords cross.
   struct Sample {
     double t, depth;
     std::int32_t face;
   };
   struct Interval {
     Sample left, right;
-    double bound, cut;
+    double bound, cut;  // greatest depth there can be, and where to divide
   };
   constexpr double tolerance = 1e-10;
   constexpr int samples_max = 500;
-  constexpr std::size_t room = 64;
+  constexpr std::size_t intervals_max = 64;
   const auto at = [&](double t) { return Eigen::Vector3d(a + t * (b - a)); };
   const auto sample = [&](double t) {
     BoxHit face, inside;
@@ -151,25 +158,28 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
   };
   const auto interval = [&](const Sample& left, const Sample& right) {
     const auto distance = [&](const Sample& of, const Sample& to) {
-      return std::abs(closest_on_box(at(to.t), faces().boxes()[static_cast<std::size_t>(of.face)]).distance);
+      return std::abs(
+          closest_on_box(at(to.t), faces().boxes()[static_cast<std::size_t>(of.face)]).distance);
     };
     const double a0 = std::abs(left.depth), a1 = distance(left, right), b0 = distance(right, left),
                  b1 = std::abs(right.depth);
-    // where the chords a0..a1 and b0..b1 cross; b0 ≥ a0 and a1 ≥ b1, as each is the nearest at its own end
+    // where the chords a0..a1 and b0..b1 cross; b0 ≥ a0 and a1 ≥ b1, because each face is the
+    // nearest at its own end
     const double apart = (b0 - a0) + (a1 - b1);
     const double share = apart > 0.0 ? (b0 - a0) / apart : 0.5;
     Interval out{left, right, a0 + share * (a1 - a0), left.t + share * (right.t - left.t)};
     out.bound = std::max({out.bound, a0, b1});
     const double width = right.t - left.t;
-    // and depth changes no faster than the place
+    // the depth changes no faster than the position
     out.bound = std::min(out.bound, 0.5 * (left.depth + right.depth + width * (b - a).norm()));
-    // outside the chords say little: halving is faster
+    // outside of the union the chords are loose bounds, and halving is faster
     const bool entered = left.depth >= 0.0 && right.depth >= 0.0;
-    out.cut = entered ? std::clamp(out.cut, left.t + 0.05 * width, right.t - 0.05 * width) : left.t + 0.5 * width;
+    out.cut = entered ? std::clamp(out.cut, left.t + 0.05 * width, right.t - 0.05 * width)
+                      : left.t + 0.5 * width;
     return out;
   };
   Sample best = sample(hit.along);
-  std::array<Interval, room> waiting;
+  std::array<Interval, intervals_max> waiting;
   std::size_t count = 0;
   const std::array<double, 3> starts{0.0, hit.along, 1.0};
   Sample last = sample(0.0);
@@ -179,9 +189,10 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
     if (next.t > last.t) waiting[count++] = interval(last, next);
     last = next;
   }
-  for (int samples = 0; samples < samples_max && count > 0 && count < room; ++samples) {
-    auto* const widest = std::max_element(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(count),
-                                          [](const Interval& x, const Interval& y) { return x.bound < y.bound; });
+  for (int samples = 0; samples < samples_max && count > 0 && count < intervals_max; ++samples) {
+    auto* const widest =
+        std::max_element(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(count),
+                         [](const Interval& x, const Interval& y) { return x.bound < y.bound; });
     if (widest->bound <= best.depth + tolerance) break;
     const Interval open = *widest;
     *widest = waiting[--count];
@@ -193,25 +204,26 @@ void MapField::find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
   }
   hit.along = best.t;
   hit.axis_point = at(best.t);
-  find_way_out(hit.axis_point, hit);
+  find_exit(hit.axis_point, hit);
 }
 
-bool MapField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit, std::int32_t hint) const {
-  // with a hint and no limit the table has nothing to tell
+bool MapField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
+                       std::int32_t hint) const {
+  // with a hint and without a limit the table cannot help
   if (hint < 0 || limit < infinity) {
-    const NearTable::Answer near = near_.ask(boxes_, p);
+    const NearTable::Answer near = near_.query(boxes_, p);
     if (static_cast<double>(near.lower) > limit) return false;
     if (hint < 0) hint = near.hint;
   }
   if (!boxes_.nearest(p, limit, hit, hint)) return false;
-  if (hit.distance <= 0.0) find_way_out(p, hit);
+  if (hit.distance <= 0.0) find_exit(p, hit);
   return true;
 }
 
-bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, SegmentHit& hit,
-                       std::int32_t hint) const {
+bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                       SegmentHit& hit, std::int32_t hint) const {
   if (hint < 0 || limit < infinity) {
-    const NearTable::Answer near = near_.ask(boxes_, 0.5 * (a + b));
+    const NearTable::Answer near = near_.query(boxes_, 0.5 * (a + b));
     if (static_cast<double>(near.lower) > limit + 0.5 * (b - a).norm()) return false;
     if (hint < 0) hint = near.hint;
   }
@@ -220,19 +232,21 @@ bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doubl
   return true;
 }
 
-std::size_t MapField::several(const Eigen::Vector3d& p, double limit, Scratch& scratch,
-                              std::span<BoxHit, points_max> out) const {
-  if (static_cast<double>(near_.ask(boxes_, p).lower) > limit) return 0;
-  const std::size_t count = boxes_.several(p, limit, cone_cosine, scratch.boxes_, out);
+std::size_t MapField::nearest_distinct(const Eigen::Vector3d& p, double limit, Scratch& scratch,
+                                       std::span<BoxHit, points_max> out) const {
+  if (static_cast<double>(near_.query(boxes_, p).lower) > limit) return 0;
+  const std::size_t count = boxes_.nearest_distinct(p, limit, cone_cosine, scratch.boxes_, out);
   if (count == 0 || out[0].distance > 0.0) return count;
-  find_way_out(p, out[0]);
+  find_exit(p, out[0]);
   return 1;
 }
 
-std::size_t MapField::several(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit, Scratch& scratch,
-                              std::span<SegmentHit, points_max> out) const {
-  if (static_cast<double>(near_.ask(boxes_, 0.5 * (a + b)).lower) > limit + 0.5 * (b - a).norm()) return 0;
-  const std::size_t count = boxes_.several(a, b, limit, cone_cosine, scratch.boxes_, out);
+std::size_t MapField::nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                       double limit, Scratch& scratch,
+                                       std::span<SegmentHit, points_max> out) const {
+  if (static_cast<double>(near_.query(boxes_, 0.5 * (a + b)).lower) > limit + 0.5 * (b - a).norm())
+    return 0;
+  const std::size_t count = boxes_.nearest_distinct(a, b, limit, cone_cosine, scratch.boxes_, out);
   if (count == 0 || out[0].distance > 0.0) return count;
   find_deepest(a, b, out[0]);
   return 1;

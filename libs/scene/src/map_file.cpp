@@ -19,54 +19,61 @@ constexpr std::size_t max_depth = 16;
 constexpr std::string_view first_line_bt = "# Octomap OcTree binary file";
 constexpr std::string_view first_line_ot = "# Octomap OcTree file";
 constexpr double resolution_min = 1e-5, resolution_max = 1e4;
-// OctoMap clamps at ±3.5 unless told otherwise; a hundred is already certainty to 43 digits.
+// OctoMap clamps at ±3.5 by default. A log-odds of 100 is certainty to 43 digits.
 constexpr float log_odds_max = 100.0F;
 
-[[noreturn]] void refuse(const std::string& where, const std::string& place, const std::string& what) {
-  throw Error(ErrorCode::parse, fmt::format("{}: {}: {}", where, place, what));
+[[noreturn]] void refuse(const std::string& where, const std::string& place,
+                         const std::string& message) {
+  throw Error(ErrorCode::parse, fmt::format("{}: {}: {}", where, place, message));
 }
 
-// The bytes may be anything: what is shown of them is short and printable.
-std::string shown(std::string_view text) {
+// A short, printable form of arbitrary bytes.
+std::string printable(std::string_view text) {
   std::string out;
   for (const char c : text.substr(0, 40)) out += (c >= ' ' && c < '\x7f') ? c : '?';
   return text.size() > 40 ? out + "..." : out;
 }
 
-// Files from before OctoMap had headers begin with the tree's type, 3, as four bytes, then the resolution as a double.
+// Files of the time before OctoMap had headers begin with the tree's type, 3, as four bytes, then
+// the resolution as a double.
 [[noreturn]] void refuse_legacy(std::string_view bytes, const std::string& where) {
   constexpr std::size_t header_size = 4 + 8 + 4;
   double resolution = 0.0;
   std::uint32_t nodes = 0;
   if (bytes.size() <= header_size)
-    refuse(where, "byte 0", "a legacy file without header lines, and cut off, expected an OctoMap");
+    refuse(where, "byte 0", "a truncated legacy file without header lines, expected an OctoMap");
   std::memcpy(&resolution, bytes.data() + 4, sizeof resolution);
   std::memcpy(&nodes, bytes.data() + 12, sizeof nodes);
   if (!(resolution >= resolution_min && resolution <= resolution_max))
     refuse(where, "byte 4",
-           fmt::format("a legacy file without header lines, of resolution {}, expected an OctoMap", resolution));
+           fmt::format("a legacy file without header lines, of resolution {}, expected an OctoMap",
+                       resolution));
   refuse(where, "byte 0",
-         fmt::format("a legacy file without header lines (resolution {}, {} nodes), expected '{}' or '{}': OctoMap's "
-                     "convert_octree makes one of it",
+         fmt::format("a legacy file without header lines (resolution {}, {} nodes), expected '{}' "
+                     "or '{}': convert it "
+                     "with OctoMap's convert_octree",
                      resolution, nodes, first_line_bt, first_line_ot));
 }
 
 MapFormat format_of(std::string_view bytes, const std::string& where) {
   const auto starts = [&](std::string_view head) { return bytes.substr(0, head.size()) == head; };
   if (bytes.empty()) refuse(where, "byte 0", "the file is empty, expected an OctoMap");
-  if (starts("\x1f\x8b")) refuse(where, "byte 0", "gzip-compressed, expected an OctoMap: gunzip it first");
+  if (starts("\x1f\x8b"))
+    refuse(where, "byte 0", "gzip-compressed, expected an OctoMap: gunzip it first");
   if (starts("version https://git-lfs"))
     refuse(where, "byte 0", "a Git LFS pointer, expected an OctoMap: run 'git lfs pull' first");
   if (starts(std::string_view("\3\0\0\0", 4))) refuse_legacy(bytes, where);
   const std::string_view line = bytes.substr(0, bytes.find('\n'));
   if (starts(first_line_bt) || starts(first_line_ot)) {
     if (line.back() == '\r')
-      refuse(where, "header line 1", "ends in CR LF: the file was transferred as text, expected it byte by byte");
+      refuse(where, "header line 1",
+             "ends in CR LF, expected LF: the file was transferred as text");
     if (line == first_line_bt) return MapFormat::bt;
     if (line == first_line_ot) return MapFormat::ot;
   }
-  refuse(where, "header line 1",
-         fmt::format("is '{}', expected '{}' or '{}'", shown(line), first_line_bt, first_line_ot));
+  refuse(
+      where, "header line 1",
+      fmt::format("is '{}', expected '{}' or '{}'", printable(line), first_line_bt, first_line_ot));
 }
 
 template <typename T>
@@ -85,24 +92,28 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
   auto& header = stated.header;
   header.format = format_of(bytes, where);
   const auto ending = std::filesystem::path(where).extension();
-  if ((ending == ".bt" && header.format == MapFormat::ot) || (ending == ".ot" && header.format == MapFormat::bt))
+  if ((ending == ".bt" && header.format == MapFormat::ot) ||
+      (ending == ".ot" && header.format == MapFormat::bt))
     refuse(where, "header line 1",
-           fmt::format("is that of the other format, expected '{}' in a {} file",
+           fmt::format("belongs to the other format, expected '{}' in a {} file",
                        ending == ".bt" ? first_line_bt : first_line_ot, ending.string()));
   bool has_id = false, has_size = false, has_resolution = false;
   std::size_t at = bytes.find('\n') + 1;
   for (int number = 2;; ++number) {
     const std::string place = fmt::format("header line {}", number);
-    const std::size_t end = at == 0 || at >= bytes.size() ? std::string_view::npos : bytes.find('\n', at);
+    const std::size_t end =
+        at == 0 || at >= bytes.size() ? std::string_view::npos : bytes.find('\n', at);
     if (end == std::string_view::npos) refuse(where, place, "the file ends before the line 'data'");
     const std::string_view line = bytes.substr(at, end - at);
     at = end + 1;
     if (line == "data") break;
     if (line.empty() || line.front() == '#') continue;
-    if (line.back() == '\r') refuse(where, place, "ends in CR LF, expected LF: the file was transferred as text");
+    if (line.back() == '\r')
+      refuse(where, place, "ends in CR LF, expected LF: the file was transferred as text");
     const std::size_t space = line.find(' ');
     const std::string_view key = line.substr(0, space);
-    const std::string_view value = space == std::string_view::npos ? std::string_view{} : line.substr(space + 1);
+    const std::string_view value =
+        space == std::string_view::npos ? std::string_view{} : line.substr(space + 1);
     const auto once = [&](bool& seen) {
       if (seen) refuse(where, place, fmt::format("'{}' is given twice", key));
       seen = true;
@@ -111,23 +122,28 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
       once(has_id);
       header.colored = value == "ColorOcTree";
       if (value != "OcTree" && !header.colored)
-        refuse(where, place, fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree", shown(value)));
+        refuse(where, place,
+               fmt::format("tree type '{}' is not known, expected OcTree or ColorOcTree",
+                           printable(value)));
     } else if (key == "size") {
       once(has_size);
       stated.size_line = number;
       if (!parse_number(value, header.node_count))
-        refuse(where, place, fmt::format("size '{}' is no node count, expected a whole number", shown(value)));
-      if (header.node_count == 0) refuse(where, place, "size 0: the map has no nodes, expected at least one");
+        refuse(where, place,
+               fmt::format("size '{}' is not a node count, expected an integer", printable(value)));
+      if (header.node_count == 0)
+        refuse(where, place, "size 0: the map has no nodes, expected at least one");
     } else if (key == "res") {
       once(has_resolution);
       if (!parse_number(value, header.resolution))
-        refuse(where, place, fmt::format("res '{}' is no number", shown(value)));
+        refuse(where, place, fmt::format("res '{}' is not a number", printable(value)));
       if (!(header.resolution >= resolution_min && header.resolution <= resolution_max))
-        refuse(
-            where, place,
-            fmt::format("res '{}' is out of range, expected {} to {}", shown(value), resolution_min, resolution_max));
+        refuse(where, place,
+               fmt::format("res '{}' is out of range, expected {} to {}", printable(value),
+                           resolution_min, resolution_max));
     } else {
-      refuse(where, place, fmt::format("'{}' is not known, expected id, size, res or data", shown(line)));
+      refuse(where, place,
+             fmt::format("'{}' is not known, expected id, size, res or data", printable(line)));
     }
   }
   const char* missing = !has_id ? "id" : !has_size ? "size" : !has_resolution ? "res" : nullptr;
@@ -136,10 +152,11 @@ StatedHeader read_header(std::string_view bytes, const std::string& where) {
   return stated;
 }
 
-enum class Holds { unknown, free, occupied };
+enum class CellState { unknown, free, occupied };
 
-// Walks the body depth first, as it is stored, without recursion, and checks every byte on the way. `visit(Holds,
-// Cell)` is called for each leaf and for each child that an inner node lacks. Returns the number of nodes.
+// Traverses the body depth first, in the order of the file, without recursion, and checks every
+// byte. `visit(CellState, Cell)` is called for each leaf and for each missing child of an inner
+// node. Returns the number of nodes.
 class Body {
  public:
   Body(std::string_view bytes, const MapHeader& header, float threshold, const std::string& where)
@@ -149,19 +166,20 @@ class Body {
   std::size_t walk(const Visit& visit) {
     at_ = header_.data_offset;
     const std::size_t nodes = header_.format == MapFormat::bt ? walk_bt(visit) : walk_ot(visit);
-    if (at_ != bytes_.size()) fail(at_, fmt::format("{} bytes behind the end of the tree", bytes_.size() - at_));
+    if (at_ != bytes_.size())
+      fail(at_, fmt::format("{} bytes after the end of the tree", bytes_.size() - at_));
     return nodes;
   }
 
  private:
   struct Level {
-    unsigned children = 0;  // a .bt's code, two bits each, or a .ot's mask
+    unsigned children = 0;  // code of a .bt, two bits per child, or mask of a .ot
     unsigned next = 0;
     std::array<std::int32_t, 3> lo{};
   };
   static constexpr std::int32_t half = 1 << (max_depth - 1);
 
-  // Only inner nodes are stored: two bytes, of which each child has two bits.
+  // A .bt stores inner nodes only: two bytes each, with two bits per child.
   template <typename Visit>
   std::size_t walk_bt(const Visit& visit) {
     std::size_t nodes = 1, depth = 0;
@@ -177,7 +195,10 @@ class Body {
       ++level.next;
       nodes += bits != 0 ? 1 : 0;
       if (bits != 3) {
-        visit(bits == 0 ? Holds::unknown : bits == 1 ? Holds::free : Holds::occupied, cell);
+        visit(bits == 0   ? CellState::unknown
+              : bits == 1 ? CellState::free
+                          : CellState::occupied,
+              cell);
       } else {
         if (++depth == max_depth) fail(at_, too_deep);
         levels_[depth] = {code(), 0, cell.lo};
@@ -185,19 +206,19 @@ class Body {
     }
   }
 
-  // Every node is stored: its log-odds, its colour if it has one, a bit for each child.
+  // A .ot stores every node: its log-odds, its colour in a ColorOcTree, one bit per child.
   template <typename Visit>
   std::size_t walk_ot(const Visit& visit) {
     std::size_t nodes = 0, depth = 0;
     const auto enter = [&](const Cell& cell) {
       ++nodes;
-      const Holds holds = log_odds() >= threshold_ ? Holds::occupied : Holds::free;
+      const CellState state = log_odds() >= threshold_ ? CellState::occupied : CellState::free;
       if (header_.colored)
         for (int i = 0; i < 3; ++i) byte();
       levels_[depth] = {byte(), 0, cell.lo};
       if (levels_[depth].children == 0) {
         levels_[depth].next = 8;
-        visit(holds, cell);
+        visit(state, cell);
       }
     };
     enter({{-half, -half, -half}, 2 * half});
@@ -210,7 +231,7 @@ class Body {
       if (depth == max_depth) fail(at_, too_deep);
       const Cell cell = child_of(level, depth);
       if (((level.children >> level.next++) & 1U) == 0) {
-        visit(Holds::unknown, cell);
+        visit(CellState::unknown, cell);
       } else {
         ++depth;
         enter(cell);
@@ -220,7 +241,8 @@ class Body {
 
   static Cell child_of(const Level& level, std::size_t depth) {
     Cell cell{level.lo, half >> depth};
-    for (unsigned axis = 0; axis < 3; ++axis) cell.lo[axis] += (level.next >> axis) & 1U ? cell.size : 0;
+    for (unsigned axis = 0; axis < 3; ++axis)
+      cell.lo[axis] += (level.next >> axis) & 1U ? cell.size : 0;
     return cell;
   }
 
@@ -237,7 +259,8 @@ class Body {
     for (unsigned i = 0; i < 4; ++i) word |= byte() << (8U * i);
     const float value = std::bit_cast<float>(word);
     if (!(std::abs(value) <= log_odds_max))
-      fail(begin, fmt::format("log-odds {} of a node, expected a number within ±{}", value, log_odds_max));
+      fail(begin,
+           fmt::format("log-odds {} of a node, expected a number within ±{}", value, log_odds_max));
     return value;
   }
 
@@ -246,8 +269,8 @@ class Body {
     return static_cast<unsigned char>(bytes_[at_++]);
   }
 
-  [[noreturn]] void fail(std::size_t offset, const std::string& what) const {
-    refuse(where_, fmt::format("byte {}", offset), what);
+  [[noreturn]] void fail(std::size_t offset, const std::string& message) const {
+    refuse(where_, fmt::format("byte {}", offset), message);
   }
 
   static constexpr const char* too_deep = "the tree is deeper than 16 levels";
@@ -260,7 +283,7 @@ class Body {
   std::array<Level, max_depth + 1> levels_{};
 };
 
-// As OctoMap rounds it.
+// Rounded to single precision as OctoMap does.
 float log_odds_of(double probability) {
   return static_cast<float>(std::log(probability / (1.0 - probability)));
 }
@@ -273,13 +296,15 @@ void check_count(const StatedHeader& stated, std::size_t nodes, const std::strin
 
 void warn(MapData& map) {
   if (map.resolution > 0.5)
-    map.warnings.push_back(fmt::format("resolution {} m is above 0.5 m: is the scale right?", map.resolution));
+    map.warnings.push_back(
+        fmt::format("resolution {} m is above 0.5 m: is the scale right?", map.resolution));
   if (map.resolution < 0.001)
-    map.warnings.push_back(fmt::format("resolution {} m is below 0.001 m: is the scale right?", map.resolution));
+    map.warnings.push_back(
+        fmt::format("resolution {} m is below 0.001 m: is the scale right?", map.resolution));
   if (map.occupied.empty()) {
     map.warnings.push_back("no occupied leaf: the map has no obstacles");
   } else if (map.free_leaves == 0) {
-    map.warnings.push_back("no free leaf: all that is not occupied is unknown");
+    map.warnings.push_back("no free leaf: everything that is not occupied is unknown");
   }
   constexpr double huge_m = 10.0;
   std::size_t huge = 0;
@@ -289,21 +314,24 @@ void warn(MapData& map) {
     largest = std::max(largest, cell.size);
   }
   if (huge > 0)
-    map.warnings.push_back(fmt::format("{} occupied leaves are wider than {} m, the widest {} m: kept as single boxes",
-                                       huge, huge_m, largest * map.resolution));
+    map.warnings.push_back(
+        fmt::format("{} occupied leaves are wider than {} m, the widest {} m: kept as single boxes",
+                    huge, huge_m, largest * map.resolution));
 }
 
 }  // namespace
 
 MapHeader check_map_bytes(std::string_view bytes, const std::string& where) {
   const StatedHeader stated = read_header(bytes, where);
-  check_count(stated, Body(bytes, stated.header, 0.0F, where).walk([](Holds, const Cell&) {}), where);
+  check_count(stated, Body(bytes, stated.header, 0.0F, where).walk([](CellState, const Cell&) {}),
+              where);
   return stated.header;
 }
 
-MapData map_from_bytes(std::string_view bytes, const std::string& where, const ReadMapOptions& options) {
-  const auto invalid = [&](const std::string& what) {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, what));
+MapData map_from_bytes(std::string_view bytes, const std::string& where,
+                       const ReadMapOptions& options) {
+  const auto invalid = [&](const std::string& message) {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", where, message));
   };
   if (options.scale && !(*options.scale > 0.0 && std::isfinite(*options.scale)))
     invalid(fmt::format("scale {} is not allowed, expected a number above 0", *options.scale));
@@ -313,36 +341,43 @@ MapData map_from_bytes(std::string_view bytes, const std::string& where, const R
   const StatedHeader stated = read_header(bytes, where);
   const MapHeader& header = stated.header;
   Body body(bytes, header, log_odds_of(options.occupancy_threshold), where);
-  // Once for the checks and to count, so that a bad file takes no memory and a good one no more than it needs.
+  // The first pass checks and counts: a bad file allocates nothing, and a good one exactly what it
+  // needs.
   std::array<std::size_t, 3> count{};
-  check_count(stated, body.walk([&](Holds holds, const Cell&) { ++count[static_cast<std::size_t>(holds)]; }), where);
+  check_count(stated, body.walk([&](CellState state, const Cell&) {
+    ++count[static_cast<std::size_t>(state)];
+  }),
+              where);
   if (header.resolution > 0.5 && !options.scale)
-    invalid(fmt::format(
-        "resolution {} is above 0.5: expected an explicit scale, metres per unit of the file (0.001 if it is in "
-        "millimetres, 1 if it is meant so)",
-        header.resolution));
+    invalid(
+        fmt::format("resolution {} is above 0.5, expected an explicit scale, metres per unit of "
+                    "the file (0.001 for millimetres, 1 for "
+                    "metres)",
+                    header.resolution));
 
   MapData map;
   map.file = where;
   map.sha256 = sha256_hex(bytes);
   map.resolution = header.resolution * options.scale.value_or(1.0);
   if (!(map.resolution >= resolution_min && map.resolution <= resolution_max))
-    invalid(fmt::format("resolution {} times scale {} is {} m, expected {} to {}", header.resolution,
-                        options.scale.value_or(1.0), map.resolution, resolution_min, resolution_max));
+    invalid(fmt::format("resolution {} times scale {} is {} m, expected {} to {}",
+                        header.resolution, options.scale.value_or(1.0), map.resolution,
+                        resolution_min, resolution_max));
   map.node_count = header.node_count;
-  map.free_leaves = count[static_cast<std::size_t>(Holds::free)];
-  map.occupied.reserve(count[static_cast<std::size_t>(Holds::occupied)]);
-  map.unknown.reserve(count[static_cast<std::size_t>(Holds::unknown)]);
+  map.free_leaves = count[static_cast<std::size_t>(CellState::free)];
+  map.occupied.reserve(count[static_cast<std::size_t>(CellState::occupied)]);
+  map.unknown.reserve(count[static_cast<std::size_t>(CellState::unknown)]);
   if (options.keep_free) map.free.reserve(map.free_leaves);
-  body.walk([&](Holds holds, const Cell& cell) {
-    if (holds == Holds::occupied) map.occupied.push_back(cell);
-    if (holds == Holds::unknown) map.unknown.push_back(cell);
-    if (holds == Holds::free && options.keep_free) map.free.push_back(cell);
+  body.walk([&](CellState state, const Cell& cell) {
+    if (state == CellState::occupied) map.occupied.push_back(cell);
+    if (state == CellState::unknown) map.unknown.push_back(cell);
+    if (state == CellState::free && options.keep_free) map.free.push_back(cell);
   });
   warn(map);
   if (header.format == MapFormat::bt && options.occupancy_threshold != 0.5)
-    map.warnings.push_back(fmt::format("the occupancy threshold {} has no effect: a .bt tells occupied from free only",
-                                       options.occupancy_threshold));
+    map.warnings.push_back(fmt::format(
+        "the occupancy threshold {} has no effect: a .bt distinguishes only occupied and free",
+        options.occupancy_threshold));
   return map;
 }
 

@@ -27,86 +27,95 @@ namespace {
 
 constexpr std::int32_t tree_half = 1 << 15;  // voxels from the octree's middle to its faces
 
-// In voxels, a whole number: so that differences are exact.
+// Volume in voxels, rounded to an integer so that differences are exact.
 double inside(const std::vector<Cell>& cells, const MapData& map, const Ball& ball) {
-  return std::round(volume_inside(cells, map.resolution, ball) / (map.resolution * map.resolution * map.resolution));
+  return std::round(volume_inside(cells, map.resolution, ball) /
+                    (map.resolution * map.resolution * map.resolution));
 }
 
-std::vector<Rod> rods_of(const Shapes& shapes, const geometry::SE3& map_from_world, double padding) {
-  std::vector<Rod> rods;
+std::vector<Capsule> capsules_of(const Shapes& shapes, const geometry::SE3& map_from_world,
+                                 double padding) {
+  std::vector<Capsule> capsules;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const bool capsule = shapes.is_capsule(i);
-    rods.push_back({map_from_world * (capsule ? shapes.from(i) : shapes.centers[i]),
-                    map_from_world * (capsule ? shapes.to(i) : shapes.centers[i]), shapes.radii[i] + padding});
+    capsules.push_back({map_from_world * (capsule ? shapes.from(i) : shapes.centers[i]),
+                        map_from_world * (capsule ? shapes.to(i) : shapes.centers[i]),
+                        shapes.radii[i] + padding});
   }
-  return rods;
+  return capsules;
 }
 
-// Takes the robot out of the map, or counts what of the map is inside it.
-void filter_robot(const MapSpec& map, const RobotAtStart& robot, const geometry::SE3& map_from_world,
-                  MapRegion& region) {
+// Removes the robot from the map, or counts the leaves that it touches.
+void filter_robot(const MapSpec& map, const RobotAtStart& robot,
+                  const geometry::SE3& map_from_world, MapRegion& region) {
   MapSummary& summary = region.summary;
   summary.self_filter_padding_m = map.self_filter_padding_m;
   if (!map.self_filter_padding_m) {
-    const auto arm = rods_of(robot.arm, map_from_world, 0.0);
+    const auto arm = capsules_of(robot.arm, map_from_world, 0.0);
     summary.leaves_in_arm = count_touched(region.occupied, region.resolution_m, arm);
     if (summary.leaves_in_arm > 0)
       summary.warnings.push_back(
-          fmt::format("the map may contain the robot itself: {} occupied leaves touch the arm at its start; see the "
+          fmt::format("the map may contain the robot itself: {} occupied leaves touch the arm at "
+                      "its start; see the "
                       "scene's map.self_filter",
                       summary.leaves_in_arm));
     return;
   }
-  auto rods = rods_of(robot.arm, map_from_world, *map.self_filter_padding_m);
-  const auto base = rods_of(robot.base, map_from_world, *map.self_filter_padding_m);
-  rods.insert(rods.end(), base.begin(), base.end());
-  if (rods.empty())
-    throw Error(ErrorCode::invalid, "self_filter: the robot has no collision shapes, expected some to filter by");
-  CutOut occupied = cut_out(region.occupied, region.resolution_m, rods);
+  auto shapes = capsules_of(robot.arm, map_from_world, *map.self_filter_padding_m);
+  const auto base = capsules_of(robot.base, map_from_world, *map.self_filter_padding_m);
+  shapes.insert(shapes.end(), base.begin(), base.end());
+  if (shapes.empty())
+    throw Error(ErrorCode::invalid,
+                "self_filter: the robot has no collision shapes, expected at least one");
+  CutOut occupied = cut_out(region.occupied, region.resolution_m, shapes);
   summary.self_filter_voxels = occupied.voxels;
   summary.self_filter_leaves = occupied.leaves;
   region.occupied = std::move(occupied.cells);
-  CutOut unknown = cut_out(region.unknown, region.resolution_m, rods);
+  CutOut unknown = cut_out(region.unknown, region.resolution_m, shapes);
   summary.self_filter_unknown_voxels = unknown.voxels;
   region.unknown = std::move(unknown.cells);
-  summary.warnings.push_back(fmt::format(
-      "the self-filter took {} occupied voxels ({} leaves) and {} unknown ones within {:.3g} m of the robot at its "
-      "start out of the map",
-      summary.self_filter_voxels, summary.self_filter_leaves, summary.self_filter_unknown_voxels,
-      *map.self_filter_padding_m));
+  summary.warnings.push_back(
+      fmt::format("the self-filter removed {} occupied voxels ({} leaves) and {} unknown voxels "
+                  "within {:.3g} m of the robot at "
+                  "its start",
+                  summary.self_filter_voxels, summary.self_filter_leaves,
+                  summary.self_filter_unknown_voxels, *map.self_filter_padding_m));
 }
 
-// Unknown space that is an obstacle, or slow, in a map that knows of no free space.
-void judge_unknown(const MapSpec& map, MapSummary& summary) {
+// Refuses or warns where unknown space matters and most of the reachable ball is unknown.
+void check_unknown_share(const MapSpec& map, MapSummary& summary) {
   const Shares& shares = summary.within_reach;
   if (map.unknown == UnknownPolicy::free || shares.unknown <= 0.5) return;
   const double percent = 100.0 * shares.unknown;
   if (shares.free > 0.0) {
     summary.warnings.push_back(
-        fmt::format("unknown space is {:.0f} % of what is within reach, and \"{}\"", percent, to_string(map.unknown)));
+        fmt::format("unknown space is {:.0f} % of what is within reach, and its policy is \"{}\"",
+                    percent, to_string(map.unknown)));
     return;
   }
-  const std::string what =
-      fmt::format("{} is free within reach, {:.0f} % of it is unknown",
-                  summary.free_leaves == 0 ? "the map has no free leaf: nothing" : "nothing", percent);
+  const std::string finding = fmt::format(
+      "{} is free within reach, {:.0f} % of it is unknown",
+      summary.free_leaves == 0 ? "the map has no free leaf: nothing" : "nothing", percent);
   if (map.unknown == UnknownPolicy::block)
-    throw Error(
-        ErrorCode::invalid,
-        fmt::format("{}, and \"block\" makes that an obstacle; expected a map that knows free space, or unknown "
-                    "\"free\" or \"slow\"",
-                    what));
-  summary.warnings.push_back(what + ": \"slow\" slows all motion down");
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}, and \"block\" makes unknown space an obstacle; expected a map "
+                            "with free space, or the policy "
+                            "\"free\" or \"slow\"",
+                            finding));
+  summary.warnings.push_back(finding + ": \"slow\" slows all motion down");
 }
 
 }  // namespace
 
+// docs/theory.md (11.38)
 Shares shares_within(const MapData& map, const Ball& ball) {
   const double analytic = 4.0 / 3.0 * std::numbers::pi * ball.radius * ball.radius * ball.radius;
   if (!(analytic > 0.0)) return {};
   const std::vector<Cell> tree{{{-tree_half, -tree_half, -tree_half}, 2 * tree_half}};
   const double in_tree = inside(tree, map, ball), edge = tree_half * map.resolution;
   const bool reaches_out = (ball.center.array().abs() + ball.radius > edge).any();
-  // The same voxels are counted in each volume, so what is wholly known has no unknown share at all.
+  // The same voxels are counted in each volume, so a ball without unknown cells has no unknown
+  // share at all.
   const double voxel = map.resolution * map.resolution * map.resolution;
   const double all = reaches_out ? std::max(in_tree, analytic / voxel) : in_tree;
   if (!(all > 0.0)) return {};
@@ -118,8 +127,9 @@ Shares shares_within(const MapData& map, const Ball& ball) {
 MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence,
                       const RobotAtStart& robot) {
   if (!(reach >= 0.0 && influence >= 0.0 && std::isfinite(reach) && std::isfinite(influence)))
-    throw Error(ErrorCode::usage, fmt::format("{}: reach {} m and influence {} m, expected finite numbers from 0 up",
-                                              map.file.string(), reach, influence));
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: reach {} m and influence {} m, expected finite numbers from 0 up",
+                            map.file.string(), reach, influence));
   MapData data = read_map(map.file, {map.scale, map.occupancy_threshold});
   const geometry::SE3 map_from_world = map.pose.inverse();
   const Eigen::Vector3d center = map_from_world * base.p();
@@ -142,14 +152,17 @@ MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reac
   region.occupied = crop(data.occupied, data.resolution, region.ball);
   summary.leaves_cropped = region.occupied.size();
   if (!data.occupied.empty() && region.occupied.empty())
-    summary.warnings.push_back(fmt::format(
-        "no occupied leaf within {:.3g} m of the base: are base, map pose and scale right?", region.ball.radius));
-  if (map.unknown != UnknownPolicy::free) region.unknown = crop(data.unknown, data.resolution, region.ball);
+    summary.warnings.push_back(
+        fmt::format("no occupied leaf within {:.3g} m of the base: check the base, the map's pose "
+                    "and its scale",
+                    region.ball.radius));
+  if (map.unknown != UnknownPolicy::free)
+    region.unknown = crop(data.unknown, data.resolution, region.ball);
   try {
-    judge_unknown(map, summary);
+    check_unknown_share(map, summary);
     filter_robot(map, robot, map_from_world, region);
     if (map.keep_out_radius_m > 0.0) {
-      const std::array<Rod, 1> keep_out{{{center, center, map.keep_out_radius_m}}};
+      const std::array<Capsule, 1> keep_out{{{center, center, map.keep_out_radius_m}}};
       region.unknown = cut_out(region.unknown, data.resolution, keep_out).cells;
     }
   } catch (const Error& e) {

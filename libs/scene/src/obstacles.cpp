@@ -14,7 +14,7 @@ namespace hamelin::scene {
 
 namespace {
 
-// In the obstacle's own frame.
+// In the obstacle's own frame, docs/theory.md (11.25).
 SurfacePoint on_sphere(double radius, const Eigen::Vector3d& p) {
   const double rho = p.norm();
   const Eigen::Vector3d direction = rho > 0.0 ? Eigen::Vector3d(p / rho) : Eigen::Vector3d::UnitZ();
@@ -26,9 +26,11 @@ SurfacePoint on_box(const Eigen::Vector3d& size, const Eigen::Vector3d& p) {
   return {hit.distance, hit.point, hit.direction};
 }
 
+// docs/theory.md (11.26)
 SurfacePoint on_cylinder(double radius, double length, const Eigen::Vector3d& p) {
   const double rho = std::hypot(p.x(), p.y());
-  const Eigen::Vector3d radial = rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d radial =
+      rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d::UnitX();
   const double half = 0.5 * length, side = rho - radius, end = std::abs(p.z()) - half;
   const Eigen::Vector3d axial = (p.z() < 0.0 ? -1.0 : 1.0) * Eigen::Vector3d::UnitZ();
   if (side > 0.0 && end > 0.0) {
@@ -39,11 +41,11 @@ SurfacePoint on_cylinder(double radius, double length, const Eigen::Vector3d& p)
   return {end, rho * radial + half * axial, axial};
 }
 
-// A signed distance of a convex body, with its gradient at every point of the axis, is convex along the axis: two
-// tangents bound the minimum between them from below.
+// Minimises the signed distance of a convex body along an axis: docs/theory.md (11.28), (11.29).
 template <class PointDistance>
-AxisPoint along_axis(const PointDistance& nearest, double size, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  struct Place {
+AxisPoint nearest_along(const PointDistance& nearest, double size, const Eigen::Vector3d& a,
+                        const Eigen::Vector3d& b) {
+  struct Sample {
     double t;
     SurfacePoint hit;
     double slope;
@@ -51,30 +53,32 @@ AxisPoint along_axis(const PointDistance& nearest, double size, const Eigen::Vec
   const Eigen::Vector3d axis = b - a;
   const auto at = [&](double t) {
     const SurfacePoint hit = nearest(a + t * axis);
-    return Place{t, hit, hit.direction.dot(axis)};
+    return Sample{t, hit, hit.direction.dot(axis)};
   };
-  Place low = at(0.0), high = at(1.0);
-  const auto answer = [&](const Place& best) { return AxisPoint{best.hit, a + best.t * axis}; };
+  Sample low = at(0.0), high = at(1.0);
+  const auto answer = [&](const Sample& best) { return AxisPoint{best.hit, a + best.t * axis}; };
   if (low.slope >= 0.0) return answer(low);
   if (high.slope <= 0.0) return answer(high);
   const double gap = 1e-13 * (1.0 + size + axis.norm());
   constexpr int rounds_max = 100;
   for (int round = 0; round < rounds_max; ++round) {
-    const Place& best = low.hit.distance < high.hit.distance ? low : high;
+    const Sample& best = low.hit.distance < high.hit.distance ? low : high;
     const double interval = high.t - low.t;
     const double step = (low.hit.distance - high.hit.distance + high.slope * interval) /
-                        (high.slope - low.slope);  // to where they cross
+                        (high.slope - low.slope);  // to where the tangents cross
     if (best.hit.distance - (low.hit.distance + low.slope * step) <= gap) return answer(best);
-    // halving now and then: tangents alone may creep up from one side
-    const double t = low.t + (round % 3 == 2 ? 0.5 * interval : std::clamp(step, 0.01 * interval, 0.99 * interval));
+    // every third time halve the interval: tangents alone may converge slowly from one side
+    const double t = low.t + (round % 3 == 2 ? 0.5 * interval
+                                             : std::clamp(step, 0.01 * interval, 0.99 * interval));
     if (!(t > low.t && t < high.t)) return answer(best);
-    const Place middle = at(t);
+    const Sample middle = at(t);
     (middle.slope < 0.0 ? low : high) = middle;
   }
   return answer(low.hit.distance < high.hit.distance ? low : high);
 }
 
-// The axis's point nearest to the centre; where the axis passes through it, the way out is across the axis.
+// The axis point nearest to the centre, docs/theory.md (11.27). If it is the centre, the exit
+// direction is perpendicular to the axis.
 AxisPoint on_sphere(double radius, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const Eigen::Vector3d axis = b - a;
   const double square = axis.squaredNorm();
@@ -102,12 +106,15 @@ std::string_view to_string(Shape shape) noexcept {
   return "unknown";
 }
 
+// docs/theory.md (11.30), (11.31)
 Eigen::Vector3d position_at(const Obstacle& obstacle, double time_s) {
   if (!obstacle.motion) return obstacle.pose.p();
   if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion))
-    return obstacle.pose.p() + std::sin(2.0 * std::numbers::pi * time_s / sine->period_s) * sine->amplitude_m;
+    return obstacle.pose.p() +
+           std::sin(2.0 * std::numbers::pi * time_s / sine->period_s) * sine->amplitude_m;
   const auto& line = std::get<LinearMotion>(*obstacle.motion);
-  return obstacle.pose.p() + std::clamp(time_s - line.start_s, 0.0, line.duration_s) * line.velocity_m_s;
+  return obstacle.pose.p() +
+         std::clamp(time_s - line.start_s, 0.0, line.duration_s) * line.velocity_m_s;
 }
 
 Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s) {
@@ -140,7 +147,8 @@ double bounding_radius(const Obstacle& obstacle) {
   return 0.0;
 }
 
-SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, const Eigen::Vector3d& p) {
+SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
+                        const Eigen::Vector3d& p) {
   const Eigen::Matrix3d& R = obstacle.pose.R();
   const Eigen::Vector3d local = R.transpose() * (p - center);
   SurfacePoint hit;
@@ -158,8 +166,8 @@ SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
   return {hit.distance, R * hit.point + center, R * hit.direction};
 }
 
-AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, const Eigen::Vector3d& a,
-                     const Eigen::Vector3d& b) {
+AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
+                     const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const Eigen::Matrix3d& R = obstacle.pose.R();
   const Eigen::Vector3d from = R.transpose() * (a - center), to = R.transpose() * (b - center);
   AxisPoint hit;
@@ -168,13 +176,17 @@ AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center, co
       hit = on_sphere(obstacle.radius_m, from, to);
       break;
     case Shape::box: {
-      const SegmentHit on = closest_on_box(from, to, Box{-0.5 * obstacle.size_m, 0.5 * obstacle.size_m});
+      const SegmentHit on =
+          closest_on_box(from, to, Box{-0.5 * obstacle.size_m, 0.5 * obstacle.size_m});
       hit = {{on.distance, on.point, on.direction}, on.axis_point};
       break;
     }
     case Shape::cylinder:
-      hit = along_axis([&](const Eigen::Vector3d& p) { return on_cylinder(obstacle.radius_m, obstacle.length_m, p); },
-                       obstacle.radius_m + obstacle.length_m, from, to);
+      hit = nearest_along(
+          [&](const Eigen::Vector3d& p) {
+            return on_cylinder(obstacle.radius_m, obstacle.length_m, p);
+          },
+          obstacle.radius_m + obstacle.length_m, from, to);
       break;
   }
   return {{hit.distance, R * hit.point + center, R * hit.direction}, R * hit.axis_point + center};
@@ -189,18 +201,24 @@ void check(const Obstacle& obstacle, const std::string& where) {
   const auto positive = [&](const char* key, double value) {
     if (!(value > 0.0 && std::isfinite(value)))
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: a {} needs {} above 0, not {}", where, to_string(obstacle.shape), key, value));
+                  fmt::format("{}: {} of the {} is {}, expected a number above 0", where, key,
+                              to_string(obstacle.shape), value));
   };
   if (obstacle.shape != Shape::box) positive("radius_m", obstacle.radius_m);
   if (obstacle.shape == Shape::cylinder) positive("length_m", obstacle.length_m);
   if (obstacle.shape == Shape::box)
     for (int axis = 0; axis < 3; ++axis) positive("size_m", obstacle.size_m[axis]);
   if (!obstacle.motion) return;
-  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion); sine != nullptr && !(sine->period_s > 0.0))
-    throw Error(ErrorCode::invalid, fmt::format("{}: motion needs period_s above 0, not {}", where, sine->period_s));
-  if (const auto* line = std::get_if<LinearMotion>(&*obstacle.motion); line != nullptr && !(line->duration_s > 0.0))
+  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion);
+      sine != nullptr && !(sine->period_s > 0.0))
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: motion needs duration_s above 0, not {}", where, line->duration_s));
+                fmt::format("{}: period_s of the motion is {}, expected a number above 0", where,
+                            sine->period_s));
+  if (const auto* line = std::get_if<LinearMotion>(&*obstacle.motion);
+      line != nullptr && !(line->duration_s > 0.0))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: duration_s of the motion is {}, expected a number above 0", where,
+                            line->duration_s));
 }
 
 }  // namespace hamelin::scene

@@ -13,7 +13,7 @@ namespace hamelin::scene {
 
 namespace {
 
-// Reads one JSON object whose form the schema has already vouched for; null is the same as absent.
+// Reads one JSON object that was already checked against the schema; null is the same as absent.
 class Reader {
  public:
   Reader(const Json& object, std::string place) : object_(object), place_(std::move(place)) {}
@@ -24,9 +24,9 @@ class Reader {
     return it == object_.end() || it->is_null() ? nullptr : &*it;
   }
   template <typename T>
-  [[nodiscard]] T get(const char* key, T otherwise) const {
+  [[nodiscard]] T get(const char* key, T fallback) const {
     const Json* value = find(key);
-    return value != nullptr ? value->get<T>() : otherwise;
+    return value != nullptr ? value->get<T>() : fallback;
   }
   template <typename T>
   [[nodiscard]] std::optional<T> maybe(const char* key) const {
@@ -45,20 +45,24 @@ class Reader {
     for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
       read(Reader((*list)[i], fmt::format("{}/{}", place_of(key), i)));
   }
-  [[nodiscard]] std::string place_of(const char* key) const { return fmt::format("{}/{}", place_, key); }
+  [[nodiscard]] std::string place_of(const char* key) const {
+    return fmt::format("{}/{}", place_, key);
+  }
 
-  [[nodiscard]] Eigen::Vector3d vector(const char* key, const Eigen::Vector3d& otherwise) const {
+  [[nodiscard]] Eigen::Vector3d vector(const char* key, const Eigen::Vector3d& fallback) const {
     const Json* value = find(key);
-    if (value == nullptr) return otherwise;
+    if (value == nullptr) return fallback;
     return {(*value)[0].get<double>(), (*value)[1].get<double>(), (*value)[2].get<double>()};
   }
   [[nodiscard]] Eigen::VectorXd joints(const char* key) const {
     if (const Json* value = find(key); value != nullptr)
       for (std::size_t i = 0; i < value->size(); ++i)
         if (!(*value)[i].is_number())
-          fail(fmt::format("{}/{}", key, i).c_str(), "is a list, expected a number: lists make a goal of type path");
+          fail(fmt::format("{}/{}", key, i).c_str(),
+               "is a list, expected a number (way-points belong to a goal of type path)");
     const auto values = get<std::vector<double>>(key, {});
-    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+    return Eigen::Map<const Eigen::VectorXd>(values.data(),
+                                             static_cast<Eigen::Index>(values.size()));
   }
   // Way-points as columns.
   [[nodiscard]] Eigen::MatrixXd joint_path(const char* key) const {
@@ -73,7 +77,8 @@ class Reader {
       const auto size = static_cast<Eigen::Index>(q.size());
       if (i == 0) path.resize(size, static_cast<Eigen::Index>(points.size()));
       if (size != path.rows())
-        fail(place.c_str(), fmt::format("{} numbers given, expected {} as in the first way-point", size, path.rows()));
+        fail(place.c_str(), fmt::format("{} values given, expected {} as in the first way-point",
+                                        size, path.rows()));
       path.col(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::VectorXd>(q.data(), size);
     }
     return path;
@@ -90,14 +95,14 @@ class Reader {
   [[nodiscard]] geometry::SE3 pose() const {
     return {rotation_of(quaternion()), vector("position_m", Eigen::Vector3d::Zero())};
   }
-  [[noreturn]] void fail(const char* key, const std::string& what) const {
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place_of(key), what));
+  [[noreturn]] void fail(const char* key, const std::string& message) const {
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", place_of(key), message));
   }
-  void need(const char* key, std::string_view kind) const {
-    if (find(key) == nullptr) fail(key, fmt::format("is missing, a {} needs it", kind));
+  void require(const char* key, std::string_view kind) const {
+    if (find(key) == nullptr) fail(key, fmt::format("is missing, expected for a {}", kind));
   }
   void refuse(const char* key, std::string_view kind) const {
-    if (find(key) != nullptr) fail(key, fmt::format("is not allowed, a {} has none", kind));
+    if (find(key) != nullptr) fail(key, fmt::format("is not allowed for a {}", kind));
   }
 
  private:
@@ -111,9 +116,9 @@ Obstacle read_obstacle(const Reader& in) {
   const auto type = in.get<std::string>("type", "");
   o.shape = type == "sphere" ? Shape::sphere : type == "box" ? Shape::box : Shape::cylinder;
   const bool box = o.shape == Shape::box, cylinder = o.shape == Shape::cylinder;
-  box ? in.need("size_m", type) : in.refuse("size_m", type);
-  box ? in.refuse("radius_m", type) : in.need("radius_m", type);
-  cylinder ? in.need("length_m", type) : in.refuse("length_m", type);
+  box ? in.require("size_m", type) : in.refuse("size_m", type);
+  box ? in.refuse("radius_m", type) : in.require("radius_m", type);
+  cylinder ? in.require("length_m", type) : in.refuse("length_m", type);
   o.radius_m = in.get("radius_m", 0.0);
   o.length_m = in.get("length_m", 0.0);
   o.size_m = in.vector("size_m", Eigen::Vector3d::Zero());
@@ -122,14 +127,16 @@ Obstacle read_obstacle(const Reader& in) {
   if (in.find("motion") != nullptr) {
     const Reader motion = in.child("motion");
     if (motion.get<std::string>("type", "") == "sine") {
-      motion.need("amplitude_m", "sine");
-      motion.need("period_s", "sine");
+      motion.require("amplitude_m", "sine");
+      motion.require("period_s", "sine");
       for (const char* key : {"velocity_m_s", "start_s", "duration_s"}) motion.refuse(key, "sine");
-      o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()), motion.get("period_s", 0.0)};
+      o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()),
+                            motion.get("period_s", 0.0)};
     } else {
-      motion.need("velocity_m_s", "linear motion");
+      motion.require("velocity_m_s", "linear motion");
       for (const char* key : {"amplitude_m", "period_s"}) motion.refuse(key, "linear motion");
-      o.motion = LinearMotion{motion.vector("velocity_m_s", Eigen::Vector3d::Zero()), motion.get("start_s", 0.0),
+      o.motion = LinearMotion{motion.vector("velocity_m_s", Eigen::Vector3d::Zero()),
+                              motion.get("start_s", 0.0),
                               motion.get("duration_s", std::numeric_limits<double>::infinity())};
     }
   }
@@ -140,27 +147,29 @@ Obstacle read_obstacle(const Reader& in) {
   return o;
 }
 
-// @param not_before the time of the change before [s]
-MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder, double not_before) {
+// @param not_before the time of the previous change [s]
+MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder,
+                              double not_before) {
   MapChangeSpec change;
   change.time_s = in.get("time_s", 0.0);
   if (change.time_s < not_before)
-    in.fail("time_s",
-            fmt::format("{} s is before the change at {} s, expected changes by time", change.time_s, not_before));
+    in.fail("time_s", fmt::format("{} s is before the change at {} s, expected changes by time",
+                                  change.time_s, not_before));
   if (const auto file = in.maybe<std::string>("file")) change.file = resolve_path(folder, *file);
   const auto boxes = [&](const char* key, std::vector<Box>& out) {
     for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
       const Box box{{six[0], six[1], six[2]}, {six[3], six[4], six[5]}};
       if (!(box.lo.array() < box.hi.array()).all())
-        in.fail(fmt::format("{}/{}", key, out.size()).c_str(),
-                "its low corner is not below its high one, expected [x, y, z, x, y, z]");
+        in.fail(
+            fmt::format("{}/{}", key, out.size()).c_str(),
+            "the low corner is not below the high one on each axis, expected [x, y, z, x, y, z]");
       out.push_back(box);
     }
   };
   boxes("free_boxes_m", change.free_m);
   boxes("occupied_boxes_m", change.occupied_m);
   if (!change.file && change.free_m.empty() && change.occupied_m.empty())
-    in.fail("file", "is missing, a change needs a file, free_boxes_m or occupied_boxes_m");
+    in.fail("file", "is missing, expected a file, free_boxes_m or occupied_boxes_m");
   return change;
 }
 
@@ -168,12 +177,14 @@ Goal read_goal(const Reader& in) {
   Goal goal;
   const auto type = in.get<std::string>("type", "");
   const bool path = type == "path";
-  goal.type = type == "joint" || path ? GoalType::joint : type == "position" ? GoalType::position : GoalType::pose;
+  goal.type = type == "joint" || path ? GoalType::joint
+              : type == "position"    ? GoalType::position
+                                      : GoalType::pose;
   const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose;
   const std::string kind = type + " goal";
-  joint ? in.need("q", kind) : in.refuse("q", kind);
-  joint ? in.refuse("position_m", kind) : in.need("position_m", kind);
-  pose ? in.need("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
+  joint ? in.require("q", kind) : in.refuse("q", kind);
+  joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
+  pose ? in.require("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
   if (joint) in.refuse("tolerance_m", kind);
   if (joint) in.refuse("tip_speed_max_m_s", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
@@ -192,9 +203,9 @@ Goal read_goal(const Reader& in) {
   return goal;
 }
 
-JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers otherwise) {
+JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers fallback) {
   const Json* given = in.find(key);
-  if (given == nullptr) return otherwise;
+  if (given == nullptr) return fallback;
   JointNumbers numbers;
   if (given->is_string()) numbers.from_robot = true;
   if (given->is_number()) numbers.values = {given->get<double>()};
@@ -236,15 +247,18 @@ Actuation read_actuation(const Reader& in, double step_s) {
   actuation.coulomb_friction_share = in.get("coulomb_friction_share", 0.0);
   const double steps = actuation.control_period_s / step_s;
   if (!(std::round(steps) >= 1.0 && std::abs(steps - std::round(steps)) <= 1e-9 * steps))
-    in.fail("control_period_s", fmt::format("{} s is {} steps of {} s, expected a whole number",
-                                            actuation.control_period_s, steps, step_s));
-  if (actuation.type == ActuationType::ideal && std::round(steps) != 1.0)
-    in.fail("control_period_s", fmt::format("{} s is not allowed, ideal actuation has one tick a step ({} s)",
+    in.fail("control_period_s", fmt::format("{} s is not an integer multiple of the step {} s",
                                             actuation.control_period_s, step_s));
+  if (actuation.type == ActuationType::ideal && std::round(steps) != 1.0)
+    in.fail("control_period_s",
+            fmt::format("{} s is not allowed, ideal actuation has one tick per step ({} s)",
+                        actuation.control_period_s, step_s));
   if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
-    in.fail("delay_s", fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
+    in.fail("delay_s",
+            fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
   if (actuation.type == ActuationType::ideal && actuation.torque_rate_max_Nm_s)
-    in.fail("torque_rate_max_Nm_s", "is not allowed, only sampled actuation has torques that change from tick to tick");
+    in.fail("torque_rate_max_Nm_s",
+            "is not allowed, expected sampled actuation, whose torques change from tick to tick");
   return actuation;
 }
 
@@ -253,7 +267,8 @@ RobotRef read_robot_ref(const Reader& in, const std::filesystem::path& folder) {
     const auto text = in.maybe<std::string>(key);
     return text ? std::optional(resolve_path(folder, *text)) : std::nullopt;
   };
-  return {path("file").value_or(folder), in.maybe<std::string>("tip"), path("spheres"), path("srdf")};
+  return {path("file").value_or(folder), in.maybe<std::string>("tip"), path("spheres"),
+          path("srdf")};
 }
 
 MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
@@ -269,9 +284,11 @@ MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
                                      : UnknownPolicy::free;
   map.keep_out_radius_m = in.get("keep_out_radius_m", 0.0);
   if (const Json* filter = in.find("self_filter"); filter != nullptr && *filter != Json(false))
-    map.self_filter_padding_m = in.child("self_filter").get("padding_m", default_self_filter_padding_m);
+    map.self_filter_padding_m =
+        in.child("self_filter").get("padding_m", default_self_filter_padding_m);
   in.each("changes", [&](const Reader& change) {
-    map.changes.push_back(read_map_change(change, folder, map.changes.empty() ? 0.0 : map.changes.back().time_s));
+    map.changes.push_back(
+        read_map_change(change, folder, map.changes.empty() ? 0.0 : map.changes.back().time_s));
   });
   return map;
 }
@@ -282,7 +299,8 @@ Obstacle obstacle_from_json(const Json& document, const std::string& where) {
   return read_obstacle({document, where});
 }
 
-Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir, const std::string& where) {
+Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
+                      const std::string& where) {
   check_shipped_schema(document, "scene", where);
   const Reader in(document, where + ": ");
   Scene scene;
@@ -290,23 +308,27 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.robot = read_robot_ref(in.child("robot"), base_dir);
   scene.base = in.child("base").pose();
   scene.base_quaternion_wxyz = in.child("base").quaternion();
-  if (in.find("gravity_m_s2") != nullptr) scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
+  if (in.find("gravity_m_s2") != nullptr)
+    scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
   scene.start_q = in.child("start").joints("q");
   scene.start_v = in.child("start").joints("v");
   in.each("goals", [&](const Reader& goal) { scene.goals.push_back(read_goal(goal)); });
-  in.each("obstacles", [&](const Reader& obstacle) { scene.obstacles.push_back(read_obstacle(obstacle)); });
+  in.each("obstacles",
+          [&](const Reader& obstacle) { scene.obstacles.push_back(read_obstacle(obstacle)); });
   if (in.find("map") != nullptr) scene.map = read_map_spec(in.child("map"), base_dir);
   scene.model = read_model(in.child("model"));
   if (in.find("planner") != nullptr) {
     const Reader planner = in.child("planner");
-    scene.planner = Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
+    scene.planner =
+        Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
   }
   const Reader integrator = in.child("integrator");
   scene.integrator = {integrator.get<std::string>("name", "hamel-variational"),
                       integrator.get<Json>("params", Json::object())};
   if (in.find("stall") != nullptr) {
     const Reader stall = in.child("stall");
-    scene.stall = StallRule{stall.get("speed_m_s", 0.002), stall.get("distance_m", 0.2), stall.get("hold_s", 1.0)};
+    scene.stall = StallRule{stall.get("speed_m_s", 0.002), stall.get("distance_m", 0.2),
+                            stall.get("hold_s", 1.0)};
   }
   scene.step_s = in.get("step_s", 0.001);
   scene.duration_s = in.get("duration_s", 10.0);

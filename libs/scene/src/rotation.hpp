@@ -5,7 +5,8 @@
 
 namespace hamelin::scene {
 
-/// The rotation of a quaternion as a file has it, whose norm is one to what its digits say.
+/// The rotation of a quaternion from a file, whose norm is one to within the precision of its
+/// digits.
 [[nodiscard]] inline Eigen::Matrix3d rotation_of(const Quaternion& wxyz) {
   return Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
 }

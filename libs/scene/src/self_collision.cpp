@@ -17,8 +17,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The shape about whose centre the ball around all of a part's is smallest. It is known wherever the arm is.
-void draw_ball(SelfField::Part& part, const std::vector<Vector3d>& centers, const std::vector<double>& radii) {
+// Sets the smallest bounding ball of a part about the centre of one of its shapes:
+// docs/theory.md (11.36). It does not depend on the configuration.
+void set_bounding_ball(SelfField::Part& part, const std::vector<Vector3d>& centers,
+                       const std::vector<double>& radii) {
   part.radius = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < centers.size(); ++i) {
     double reach = 0.0;
@@ -31,7 +33,7 @@ void draw_ball(SelfField::Part& part, const std::vector<Vector3d>& centers, cons
   }
 }
 
-// Where on the axis c + u h, u from −1 to 1, the point nearest to p is.
+// The u from −1 to 1 of the point c + u h of an axis that is nearest to p.
 double nearest_on_axis(const Vector3d& center, const Vector3d& half, const Vector3d& p) {
   const double square = half.squaredNorm();
   return square > 0.0 ? std::clamp(half.dot(p - center) / square, -1.0, 1.0) : 0.0;
@@ -51,14 +53,17 @@ AxisPair nearest_on_axes(const Vector3d& center_a, const Vector3d& half_a, const
   };
   const double aa = half_a.squaredNorm(), bb = half_b.squaredNorm(), ab = half_a.dot(half_b);
   const Vector3d apart = center_a - center_b;
-  const double across = half_a.cross(half_b).squaredNorm();  // aa bb − ab², without its cancellation
-  // the lines' nearest points; each of the two is then put where it is nearest to the other
+  // aa bb − ab², without its cancellation
+  const double across = half_a.cross(half_b).squaredNorm();
+  // docs/theory.md (11.35): the nearest points of the lines, each projected onto the other axis
   if (across > 0.0) {
-    const double a = std::clamp((ab * half_b.dot(apart) - bb * half_a.dot(apart)) / across, -1.0, 1.0);
+    const double a =
+        std::clamp((ab * half_b.dot(apart) - bb * half_a.dot(apart)) / across, -1.0, 1.0);
     const double on_b = nearest_on_axis(center_b, half_b, center_a + a * half_a);
     consider(nearest_on_axis(center_a, half_a, center_b + on_b * half_b), on_b);
   }
-  // an end of one and a point of the other: all there is where the axes are parallel or points
+  // an end of one axis and a point of the other: the only candidates if the axes are parallel or
+  // points
   for (const double end : {-1.0, 1.0}) {
     consider(end, nearest_on_axis(center_b, half_b, center_a + end * half_a));
     consider(nearest_on_axis(center_a, half_a, center_b + end * half_b), end);
@@ -81,12 +86,14 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
     const auto& shape = model.shapes()[i];
     const auto& link = robot.links[static_cast<std::size_t>(shape.link)];
     const auto index = static_cast<std::size_t>(shape.index_in_link);
-    const std::string& part = shape.is_capsule ? link.segments[index].part : link.spheres[index].part;
+    const std::string& part =
+        shape.is_capsule ? link.segments[index].part : link.spheres[index].part;
     part_named(part.empty() ? link.name : part, shape.link).shapes.push_back(static_cast<int>(i));
     radii_.push_back(shape.radius);
     half_lengths_.push_back(shape.half_axis.norm());
   }
-  const auto add_to_base = [&](const std::string& part, const Vector3d& center, const Vector3d& half, double radius) {
+  const auto add_to_base = [&](const std::string& part, const Vector3d& center,
+                               const Vector3d& half, double radius) {
     part_named(part, -1).shapes.push_back(-1 - static_cast<int>(base_centers_.size()));
     base_centers_.push_back(model.base() * center);
     base_half_axes_.push_back(model.base().R() * half);
@@ -96,18 +103,18 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
   for (const auto& sphere : robot.base_spheres)
     add_to_base(sphere.part, sphere.center_m, Vector3d::Zero(), sphere.radius_m);
   for (const auto& capsule : robot.base_segments)
-    add_to_base(capsule.part, 0.5 * (capsule.from_m + capsule.to_m), 0.5 * (capsule.to_m - capsule.from_m),
-                capsule.radius_m);
+    add_to_base(capsule.part, 0.5 * (capsule.from_m + capsule.to_m),
+                0.5 * (capsule.to_m - capsule.from_m), capsule.radius_m);
   for (Part& part : parts_) {
     std::vector<Vector3d> centers;
     std::vector<double> radii;
     for (const int shape : part.shapes) {
-      // any frame that keeps them apart as they are will do
+      // any frame in which all shapes of the part are fixed is suitable
       centers.push_back(shape >= 0 ? model.shapes()[static_cast<std::size_t>(shape)].center
                                    : base_centers_[static_cast<std::size_t>(-1 - shape)]);
       radii.push_back(radius(shape) + half_length(shape));
     }
-    draw_ball(part, centers, radii);
+    set_bounding_ball(part, centers, radii);
   }
 
   std::set<std::pair<std::string, std::string>> disabled;
@@ -116,7 +123,7 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
     disabled.emplace(b, a);
   }
   std::string left_out;
-  // moving parts come first, link by link, and the base's last
+  // moving parts come first, in the order of links, then those of the base
   for (std::size_t a = 0; a < parts_.size(); ++a)
     for (std::size_t b = a + 1; b < parts_.size(); ++b) {
       const Part &x = parts_[a], &y = parts_[b];
@@ -129,11 +136,12 @@ SelfField::SelfField(const model::Model& model) : has_capsules_(model.has_capsul
     }
   if (!left_out.empty())
     note_ = fmt::format(
-        "the robot lists no pairs that may touch (self_collision_disabled), so neighbouring links are not checked: {}",
+        "the robot lists no pairs that may touch (self_collision_disabled), so neighbouring links "
+        "are not checked: {}",
         left_out);
 }
 
-std::string SelfField::words(int pair) const {
+std::string SelfField::describe(int pair) const {
   const Pair& both = pairs_[static_cast<std::size_t>(pair)];
   return fmt::format("'{}' and '{}'", parts_[static_cast<std::size_t>(both.part_a)].name,
                      parts_[static_cast<std::size_t>(both.part_b)].name);
@@ -146,8 +154,9 @@ std::string self_contact_remedy(const RobotRef& robot) {
   if (robot.srdf) command += fmt::format(" --srdf {}", robot.srdf->string());
   std::filesystem::path target = robot.spheres.value_or(robot.file);
   target.replace_extension(robot.spheres ? ".checked.json" : ".checked.srdf");
-  return fmt::format("if they always touch, `{} --write {}` disables the pair; then name that file as /robot/{}",
-                     command, target.string(), robot.spheres ? "spheres" : "srdf");
+  return fmt::format(
+      "if they always touch, `{} --write {}` disables the pair; then name that file as /robot/{}",
+      command, target.string(), robot.spheres ? "spheres" : "srdf");
 }
 
 Vector3d SelfField::half_axis(int shape, const Shapes& arm) const {
@@ -155,11 +164,13 @@ Vector3d SelfField::half_axis(int shape, const Shapes& arm) const {
   return arm.half_axes.empty() ? Vector3d::Zero() : arm.half_axes[static_cast<std::size_t>(shape)];
 }
 
+// docs/theory.md (11.34)
 template <bool capsules>
-bool SelfField::nearer(const Pair& pair, const Shapes& arm, Nearest& best) const {
-  const Part &a = parts_[static_cast<std::size_t>(pair.part_a)], &b = parts_[static_cast<std::size_t>(pair.part_b)];
+bool SelfField::update_nearest(const Pair& pair, const Shapes& arm, Nearest& best) const {
+  const Part &a = parts_[static_cast<std::size_t>(pair.part_a)],
+             &b = parts_[static_cast<std::size_t>(pair.part_b)];
   const Vector3d &ball_a = center(a.center, arm), &ball_b = center(b.center, arm);
-  // Whether two balls are at least `best` apart; a hair wider than that, for what rounding can do.
+  // docs/theory.md (11.37): whether two balls are at least `best` apart, with a margin for rounding
   const auto apart = [&](const Vector3d& p, const Vector3d& q, double radii) {
     const double near = (best.distance + radii) * (1.0 + 1e-12);
     return near <= 0.0 || (p - q).squaredNorm() > near * near;
@@ -196,7 +207,7 @@ std::size_t SelfField::closest(const Shapes& arm, double limit, std::span<SelfCo
   };
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     Nearest best{limit, 0, 0};
-    if (!nearer(pairs_[k], arm, best)) continue;
+    if (!update_nearest(pairs_[k], arm, best)) continue;
     ++found;
     SelfContact contact;
     contact.pair = static_cast<int>(k);
@@ -212,7 +223,7 @@ std::size_t SelfField::closest(const Shapes& arm, double limit, std::span<SelfCo
       across = half_p.cross(half_q);
     }
     const double between = (p - q).norm();
-    // axes that cross part across both
+    // axes that intersect separate along their common normal
     contact.direction = between > 0.0        ? Vector3d((p - q) / between)
                         : across.isZero(0.0) ? Vector3d(Vector3d::UnitZ())
                                              : Vector3d(across.normalized());
@@ -226,13 +237,14 @@ std::size_t SelfField::closest(const Shapes& arm, double limit, std::span<SelfCo
     }
   }
   if (found > out.size())
-    std::sort(out.begin(), out.end(), [](const SelfContact& x, const SelfContact& y) { return x.pair < y.pair; });
+    std::sort(out.begin(), out.end(),
+              [](const SelfContact& x, const SelfContact& y) { return x.pair < y.pair; });
   return found;
 }
 
 double SelfField::distance(std::size_t pair, const Shapes& arm, double limit) const {
   Nearest best{limit, 0, 0};
-  (void)nearer(pairs_[pair], arm, best);
+  (void)update_nearest(pairs_[pair], arm, best);
   return best.distance;
 }
 

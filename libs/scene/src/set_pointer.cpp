@@ -12,29 +12,30 @@ namespace hamelin::scene {
 
 namespace {
 
-/// "/json/pointer=VALUE" taken apart.
+/// A parsed "/json/pointer=VALUE".
 struct Assignment {
-  std::string shown;  ///< opens each message
+  std::string text;  ///< prefix of each message, printable
   std::vector<std::string> keys;
   Json value;
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(ErrorCode::usage, fmt::format("{}: {}", shown, what));
+  [[noreturn]] void fail(const std::string& message) const {
+    throw Error(ErrorCode::usage, fmt::format("{}: {}", text, message));
   }
 };
 
 Assignment read_assignment(std::string_view text) {
   Assignment assignment;
-  assignment.shown = text.substr(0, 200);
-  for (char& c : assignment.shown) c = c < ' ' && c >= 0 ? ' ' : c;
+  assignment.text = text.substr(0, 200);
+  for (char& c : assignment.text) c = c < ' ' && c >= 0 ? ' ' : c;
   const auto equals = text.find('=');
   if (text.empty() || text.front() != '/' || equals == std::string_view::npos)
     assignment.fail("expected /json/pointer=VALUE");
   try {
-    for (Json::json_pointer rest{std::string(text.substr(0, equals))}; !rest.empty(); rest.pop_back())
+    for (Json::json_pointer rest{std::string(text.substr(0, equals))}; !rest.empty();
+         rest.pop_back())
       assignment.keys.insert(assignment.keys.begin(), rest.back());
   } catch (const Json::exception&) {
-    assignment.fail("the part before '=' is no JSON pointer");
+    assignment.fail("the part before '=' is not a JSON pointer");
   }
   const std::string value(text.substr(equals + 1));
   assignment.value = Json::parse(value, nullptr, false);
@@ -46,7 +47,7 @@ Json& element_of(Json& list, const std::string& key, const Assignment& assignmen
   std::size_t index = 0;
   const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
   if (error != std::errc{} || end != key.data() + key.size() || index >= list.size())
-    assignment.fail(fmt::format("no element '{}', the list has {}", key, list.size()));
+    assignment.fail(fmt::format("no element '{}', expected an index below {}", key, list.size()));
   return list[index];
 }
 
@@ -55,9 +56,9 @@ void check_known(const Json& properties, const std::string& key, const Assignmen
   std::vector<std::string> known;
   for (const auto& item : properties.items()) known.push_back(item.key());
   const auto near = nearest_name(key, known);
-  assignment.fail(
-      fmt::format("unknown key '{}', expected {}", key,
-                  near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'", near)));
+  assignment.fail(fmt::format(
+      "unknown key '{}', expected {}", key,
+      near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'", near)));
 }
 
 }  // namespace
@@ -65,7 +66,7 @@ void check_known(const Json& properties, const std::string& key, const Assignmen
 void set_pointer(Json& document, std::string_view text) {
   Assignment assignment = read_assignment(text);
   const Json schema = Json::parse(schema_text("scene"));
-  const Json* rule = &schema;  // of what `at` points to; null where the schema says nothing
+  const Json* rule = &schema;  // of the value that `at` points to; null where the schema has none
   Json changed = document;
   Json* at = &changed;
   for (const std::string& key : assignment.keys) {
@@ -75,7 +76,8 @@ void set_pointer(Json& document, std::string_view text) {
       continue;
     }
     if (!at->is_object() && !at->is_null())
-      assignment.fail(fmt::format("nothing stands under '{}': its parent is a plain value", key));
+      assignment.fail(
+          fmt::format("'{}' cannot be set: its parent is a plain value, expected an object", key));
     const bool has_properties = rule != nullptr && rule->contains("properties");
     if (has_properties) check_known((*rule)["properties"], key, assignment);
     if (at->is_null()) *at = Json::object();

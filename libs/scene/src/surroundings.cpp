@@ -8,10 +8,10 @@ namespace hamelin::scene {
 
 namespace {
 
-// The robot as it stands when the scene starts; its shapes live as long as this.
-class StandingRobot {
+// Owns the shapes of the robot in the scene's start configuration.
+class RobotShapesAtStart {
  public:
-  StandingRobot(const Scene& scene, const model::Model& model);
+  RobotShapesAtStart(const Scene& scene, const model::Model& model);
   [[nodiscard]] RobotAtStart view() const { return {arm_.view(), {centers_, radii_, half_axes_}}; }
 
  private:
@@ -20,11 +20,14 @@ class StandingRobot {
   std::vector<double> radii_;
 };
 
-StandingRobot::StandingRobot(const Scene& scene, const model::Model& model) : arm_(model) {
-  const Eigen::VectorXd q = scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
+RobotShapesAtStart::RobotShapesAtStart(const Scene& scene, const model::Model& model)
+    : arm_(model) {
+  const Eigen::VectorXd q =
+      scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
   if (q.size() != model.dof())
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: /start/q: {} numbers given, expected {}", scene.name, q.size(), model.dof()));
+                fmt::format("{}: /start/q: {} values given, expected {} (one per joint)",
+                            scene.name, q.size(), model.dof()));
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q);
   arm_.place(model, ws);
@@ -33,20 +36,23 @@ StandingRobot::StandingRobot(const Scene& scene, const model::Model& model) : ar
     half_axes_.push_back(model.base().R() * (0.5 * (to - from)));
     radii_.push_back(radius);
   };
-  for (const auto& sphere : model.robot().base_spheres) add(sphere.center_m, sphere.center_m, sphere.radius_m);
-  for (const auto& capsule : model.robot().base_segments) add(capsule.from_m, capsule.to_m, capsule.radius_m);
+  for (const auto& sphere : model.robot().base_spheres)
+    add(sphere.center_m, sphere.center_m, sphere.radius_m);
+  for (const auto& capsule : model.robot().base_segments)
+    add(capsule.from_m, capsule.to_m, capsule.radius_m);
 }
 
 }  // namespace
 
 MapRegion make_region(const Scene& scene, const model::Model& model, double influence) {
-  if (!scene.map) throw Error(ErrorCode::usage, fmt::format("{}: /map: is missing", scene.name));
-  const StandingRobot robot(scene, model);
+  if (!scene.map)
+    throw Error(ErrorCode::usage, fmt::format("{}: /map: is missing, expected a map", scene.name));
+  const RobotShapesAtStart robot(scene, model);
   return read_region(*scene.map, scene.base, model.reach(), influence, robot.view());
 }
 
 Environment make_environment(const Scene& scene, const model::Model& model, double influence) {
-  const StandingRobot robot(scene, model);
+  const RobotShapesAtStart robot(scene, model);
   return {scene.map, scene.obstacles, scene.base, model.reach(), influence, robot.view()};
 }
 

@@ -45,7 +45,8 @@ Json goal_json(const Goal& goal) {
     out["q"] = array(goal.q);
   } else {
     out["position_m"] = array(goal.pose.p());
-    if (goal.type == GoalType::pose) out["quaternion_wxyz"] = quaternion_json(goal.pose.R(), goal.quaternion_wxyz);
+    if (goal.type == GoalType::pose)
+      out["quaternion_wxyz"] = quaternion_json(goal.pose.R(), goal.quaternion_wxyz);
     out["tolerance_m"] = goal.tolerance_m;
   }
   if (goal.type != GoalType::position) out["tolerance_rad"] = goal.tolerance_rad;
@@ -152,7 +153,8 @@ std::string_view to_string(ActuationType type) noexcept {
 
 Json motion_json(const std::variant<SineMotion, LinearMotion>& motion) {
   if (const auto* sine = std::get_if<SineMotion>(&motion))
-    return {{"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
+    return {
+        {"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
   const auto& line = std::get<LinearMotion>(motion);
   return {{"type", "linear"},
           {"velocity_m_s", array(line.velocity_m_s)},

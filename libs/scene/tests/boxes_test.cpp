@@ -26,7 +26,8 @@ double volume(const std::vector<Cell>& cells) {
 double volume(const std::vector<VoxelBox>& boxes) {
   double sum = 0.0;
   for (const VoxelBox& box : boxes)
-    sum += static_cast<double>(box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) * (box.hi[2] - box.lo[2]);
+    sum += static_cast<double>(box.hi[0] - box.lo[0]) * (box.hi[1] - box.lo[1]) *
+           (box.hi[2] - box.lo[2]);
   return sum;
 }
 
@@ -40,12 +41,14 @@ VoxelBox box_of(const Cell& cell) {
   return {cell.lo, {cell.lo[0] + cell.size, cell.lo[1] + cell.size, cell.lo[2] + cell.size}};
 }
 
-// Volumes are whole numbers: equal volumes, disjoint boxes and every box's voxels inside cells make the unions equal.
+// Volumes are integers: if they are equal, boxes are disjoint and all their voxels are in cells,
+// the unions are equal.
 void check_same_union(const std::vector<Cell>& cells, const std::vector<VoxelBox>& boxes) {
   REQUIRE(volume(boxes) == volume(cells));
   std::size_t overlaps = 0;
   for (std::size_t i = 0; i < boxes.size(); ++i)
-    for (std::size_t j = i + 1; j < boxes.size(); ++j) overlaps += share_volume(boxes[i], boxes[j]) ? 1 : 0;
+    for (std::size_t j = i + 1; j < boxes.size(); ++j)
+      overlaps += share_volume(boxes[i], boxes[j]) ? 1 : 0;
   CHECK(overlaps == 0);
   double inside = 0.0;
   for (const VoxelBox& box : boxes) {
@@ -97,7 +100,8 @@ void check_merged(const std::filesystem::path& file, const Ball& region) {
 }  // namespace
 
 TEST_CASE("merged boxes of our maps have the leaves' union", "[scene][unit]") {
-  for (const char* name : {"shelf.bt", "clutter.bt"}) check_merged(test::data / "maps" / name, {{0.4, 0.0, 0.5}, 0.8});
+  for (const char* name : {"shelf.bt", "clutter.bt"})
+    check_merged(test::data / "maps" / name, {{0.4, 0.0, 0.5}, 0.8});
 }
 
 TEST_CASE("merged boxes of real maps have the leaves' union", "[scene][unit]") {
@@ -126,21 +130,24 @@ TEST_CASE("a cell of a kilometre is never expanded", "[scene][unit]") {
   CHECK(crop(cells, 0.05, {{-1.0, 0.02, 0.02}, 1.1}).size() == 2);
 }
 
-TEST_CASE("the volume inside a ball is the ball's, to the voxels at its surface", "[scene][unit]") {
+TEST_CASE("the volume inside a ball is that of the ball, to the voxels at its surface",
+          "[scene][unit]") {
   const std::vector<Cell> all{{{-32768, -32768, -32768}, 65536}};
   const double radius = 0.85, resolution = 0.02;
   const double ball = 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
-  CHECK(volume_inside(all, resolution, {{0.013, 0.004, -0.3}, radius}) == Approx(ball).epsilon(0.002));
+  CHECK(volume_inside(all, resolution, {{0.013, 0.004, -0.3}, radius}) ==
+        Approx(ball).epsilon(0.002));
   const std::vector<Cell> half{{{-32768, -32768, -32768}, 32768}};
-  CHECK(volume_inside(half, resolution, {{0.0, 0.0, 0.0}, radius}) == Approx(ball / 8.0).epsilon(0.01));
+  CHECK(volume_inside(half, resolution, {{0.0, 0.0, 0.0}, radius}) ==
+        Approx(ball / 8.0).epsilon(0.01));
 }
 
-TEST_CASE("cutting out a ball leaves no voxel that touches it and takes no other", "[scene][unit]") {
+TEST_CASE("cutting out a ball removes every voxel that touches it and no other", "[scene][unit]") {
   const std::vector<Cell> cells{{{-32, -32, -32}, 64}};
   const Ball ball{{0.02, -0.03, 0.01}, 0.13};
   const double resolution = 0.02;
-  const std::vector<Rod> rods{{ball.center, ball.center, ball.radius}};
-  const auto [kept, voxels, leaves] = cut_out(cells, resolution, rods);
+  const std::vector<Capsule> capsules{{ball.center, ball.center, ball.radius}};
+  const auto [kept, voxels, leaves] = cut_out(cells, resolution, capsules);
   const auto distance = [&](const VoxelBox& voxel) {
     const Box box = to_metres(voxel, resolution);
     return (box.lo - ball.center).cwiseMax(ball.center - box.hi).cwiseMax(0.0).norm();

@@ -34,7 +34,8 @@ std::vector<Box> random_boxes(Rng& rng, std::size_t count) {
   while (cells.size() < count) {
     Cell cell{{}, std::int32_t{1} << rng.below(4)};
     for (auto& lo : cell.lo) lo = static_cast<std::int32_t>(rng.below(120)) - 60;
-    if (std::all_of(cells.begin(), cells.end(), [&](const Cell& other) { return apart(cell, other); }))
+    if (std::all_of(cells.begin(), cells.end(),
+                    [&](const Cell& other) { return apart(cell, other); }))
       cells.push_back(cell);
   }
   std::vector<Box> boxes;
@@ -42,15 +43,16 @@ std::vector<Box> random_boxes(Rng& rng, std::size_t count) {
   return boxes;
 }
 
-// What several() promises, from its definition and all boxes.
-std::vector<BoxHit> several_by_definition(const std::vector<Box>& boxes, const Vector3d& p, double limit, double cosine,
-                                          std::size_t most) {
+// The result of nearest_distinct(), from its definition and all boxes.
+std::vector<BoxHit> distinct_by_definition(const std::vector<Box>& boxes, const Vector3d& p,
+                                           double limit, double cosine, std::size_t most) {
   std::vector<BoxHit> all, kept;
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     all.push_back(closest_on_box(p, boxes[i]));
     all.back().box = static_cast<std::int32_t>(i);
   }
-  std::stable_sort(all.begin(), all.end(), [](const BoxHit& a, const BoxHit& b) { return a.distance < b.distance; });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const BoxHit& a, const BoxHit& b) { return a.distance < b.distance; });
   for (const BoxHit& hit : all) {
     if (hit.distance > limit || kept.size() == most) break;
     if (std::none_of(kept.begin(), kept.end(),
@@ -106,11 +108,13 @@ void check_closest(const std::filesystem::path& file, double scale, Ball region)
       continue;
     }
     hint = warm.box;
-    worst = std::max({worst, std::abs(std::max(cold.distance, 0.0) - truth), std::abs(warm.distance - cold.distance)});
+    worst = std::max({worst, std::abs(std::max(cold.distance, 0.0) - truth),
+                      std::abs(warm.distance - cold.distance)});
     inside += cold.distance < 0.0 ? 1 : 0;
-    // The point is on the union's boxes, and as far away as it says.
+    // The point lies on a box of the union, at the distance that was returned.
     const double off = test::brute_force_distance(leaves, cold.point);
-    wrong_point += off > 1e-9 || std::abs((p - cold.point).norm() - std::abs(cold.distance)) > 1e-9 ? 1 : 0;
+    wrong_point +=
+        off > 1e-9 || std::abs((p - cold.point).norm() - std::abs(cold.distance)) > 1e-9 ? 1 : 0;
   }
   CHECK(missing == 0);
   CHECK(wrong_point == 0);
@@ -125,7 +129,8 @@ TEST_CASE("closest points equal brute force over all leaf boxes of our maps", "[
     check_closest(test::data / "maps" / name, 1.0, {{0.4, 0.0, 0.5}, 0.8});
 }
 
-TEST_CASE("closest points equal brute force over all leaf boxes of three real maps", "[scene][unit]") {
+TEST_CASE("closest points equal brute force over all leaf boxes of three real maps",
+          "[scene][unit]") {
   const auto directory = test::shared_data("maps");
   if (!directory) return;
   check_closest(*directory / "velma_hanas.bt", 1.0, {{0.5, 0.0, 1.0}, 1.35});
@@ -133,7 +138,8 @@ TEST_CASE("closest points equal brute force over all leaf boxes of three real ma
   check_closest(*directory / "coal_env.bt", 0.001, {{0.0, 0.0, 0.0}, 1.0});
 }
 
-TEST_CASE("nearest obeys its limit exactly and a hint changes nothing", "[scene][property]") {
+TEST_CASE("nearest respects its limit exactly and a hint does not change the result",
+          "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -143,7 +149,8 @@ TEST_CASE("nearest obeys its limit exactly and a hint changes nothing", "[scene]
     BoxHit hit, hinted;
     REQUIRE(field.nearest(p, infinity, hit));
     CHECK(std::max(0.0, hit.distance) == Approx(truth).margin(1e-12));
-    REQUIRE(field.nearest(p, 1.0, hinted, static_cast<std::int32_t>(rng.below(field.boxes().size()))));
+    REQUIRE(
+        field.nearest(p, 1.0, hinted, static_cast<std::int32_t>(rng.below(field.boxes().size()))));
     CHECK(hinted.box == hit.box);
     CHECK(hinted.distance == hit.distance);
     if (truth > 1e-6) {
@@ -153,7 +160,7 @@ TEST_CASE("nearest obeys its limit exactly and a hint changes nothing", "[scene]
   }
 }
 
-TEST_CASE("several returns what its definition says", "[scene][property]") {
+TEST_CASE("nearest_distinct returns what its definition says", "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -163,8 +170,8 @@ TEST_CASE("several returns what its definition says", "[scene][property]") {
   for (const Vector3d& p : test::points_near(field.boxes(), 100, 0.3, seed)) {
     const double limit = rng.uniform(0.0, 0.4);
     std::array<BoxHit, 3> hits;
-    const std::size_t count = field.several(p, limit, cosine, scratch, hits);
-    const auto expected = several_by_definition(field.boxes(), p, limit, cosine, hits.size());
+    const std::size_t count = field.nearest_distinct(p, limit, cosine, scratch, hits);
+    const auto expected = distinct_by_definition(field.boxes(), p, limit, cosine, hits.size());
     REQUIRE(count == expected.size());
     for (std::size_t i = 0; i < count; ++i) {
       CHECK(hits[i].box == expected[i].box);
@@ -175,7 +182,8 @@ TEST_CASE("several returns what its definition says", "[scene][property]") {
 }
 
 TEST_CASE(
-    "a segment's nearest point of a box is the least of a convex function, its deepest the greatest of a concave one",
+    "a segment's nearest point of a box minimises a convex function, its deepest point maximises a "
+    "concave one",
     "[scene][property]") {
   Rng rng(21);
   int entered = 0, clear = 0;
@@ -188,8 +196,10 @@ TEST_CASE(
     Vector3d a, b;
     for (int axis = 0; axis < 3; ++axis) {
       a[axis] = rng.uniform(-1.0, 1.0);
-      b[axis] = rng.below(5) == 0 ? a[axis] : rng.uniform(-1.0, 1.0);  // often parallel to faces, now and then a point
-      if (rng.below(10) == 0) a[axis] = box.lo[axis];                  // and often in their planes
+      b[axis] = rng.below(5) == 0
+                    ? a[axis]
+                    : rng.uniform(-1.0, 1.0);          // often parallel to faces, sometimes a point
+      if (rng.below(10) == 0) a[axis] = box.lo[axis];  // and often in their planes
     }
     if (i % 3 == 0) b = box.lo + rng.uniform() * (box.hi - box.lo);
     const SegmentHit hit = closest_on_box(a, b, box);
@@ -199,7 +209,7 @@ TEST_CASE(
     const BoxHit from_there = closest_on_box(hit.axis_point, box);
     CHECK(hit.distance == from_there.distance);
     CHECK(hit.point == from_there.point);
-    // golden section on the distance outside, and on the depth where that is nothing
+    // golden section on the distance outside, and on the depth where the distance is zero
     const auto least = [&](const auto& f) {
       double left = 0.0, right = 1.0;
       for (int k = 0; k < 100; ++k) {
@@ -232,8 +242,10 @@ TEST_CASE(
   CHECK(entered > 500);
 }
 
-TEST_CASE("several of a rugged floor is what its definition says, from near and far", "[scene][property]") {
-  // many small boxes around a point: nodes are large and near, and most of what they hold is in a cone
+TEST_CASE("nearest_distinct of a rugged floor is what its definition says, from near and far",
+          "[scene][property]") {
+  // many small boxes around a point: nodes are large and near, and most of their boxes are in one
+  // cone
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{6}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -247,10 +259,11 @@ TEST_CASE("several of a rugged floor is what its definition says, from near and 
   BoxField::Scratch scratch(field);
   for (int i = 0; i < 150; ++i) {
     const Vector3d p(rng.uniform(-0.1, 0.7), rng.uniform(-0.1, 0.7), rng.uniform(-0.05, 0.4));
-    const double cosine = rng.below(4) == 0 ? rng.uniform(-0.5, 0.99) : std::cos(std::acos(-1.0) / 6.0);
+    const double cosine =
+        rng.below(4) == 0 ? rng.uniform(-0.5, 0.99) : std::cos(std::acos(-1.0) / 6.0);
     std::array<BoxHit, 5> hits;
-    const std::size_t count = field.several(p, 0.3, cosine, scratch, hits);
-    const auto expected = several_by_definition(field.boxes(), p, 0.3, cosine, hits.size());
+    const std::size_t count = field.nearest_distinct(p, 0.3, cosine, scratch, hits);
+    const auto expected = distinct_by_definition(field.boxes(), p, 0.3, cosine, hits.size());
     REQUIRE(count == expected.size());
     for (std::size_t k = 0; k < count; ++k) {
       CHECK(hits[k].distance == expected[k].distance);
@@ -259,7 +272,7 @@ TEST_CASE("several of a rugged floor is what its definition says, from near and 
   }
 }
 
-TEST_CASE("nearest and several of a segment are those of all boxes", "[scene][property]") {
+TEST_CASE("nearest and nearest_distinct of a segment are those of all boxes", "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -270,27 +283,31 @@ TEST_CASE("nearest and several of a segment are those of all boxes", "[scene][pr
     const Vector3d b = a + rng.uniform(0.0, 0.5) * test::random_direction(rng);
     std::vector<SegmentHit> all;
     for (const Box& box : field.boxes()) all.push_back(closest_on_box(a, b, box));
-    const auto nearer = [](const SegmentHit& x, const SegmentHit& y) { return x.distance < y.distance; };
+    const auto nearer = [](const SegmentHit& x, const SegmentHit& y) {
+      return x.distance < y.distance;
+    };
     const SegmentHit least = *std::min_element(all.begin(), all.end(), nearer);
     SegmentHit hit;
     REQUIRE(field.nearest(a, b, infinity, hit));
     CHECK(std::max(hit.distance, 0.0) == Approx(std::max(least.distance, 0.0)).margin(1e-12));
-    if (least.distance <= 0.0) continue;  // which of the entered boxes is not promised
+    if (least.distance <= 0.0) continue;  // which of the entered boxes is returned is not defined
     CHECK_FALSE(field.nearest(a, b, least.distance * (1.0 - 1e-9), hit));
     SegmentHit hinted;
-    REQUIRE(field.nearest(a, b, infinity, hinted, static_cast<std::int32_t>(rng.below(all.size()))));
+    REQUIRE(
+        field.nearest(a, b, infinity, hinted, static_cast<std::int32_t>(rng.below(all.size()))));
     CHECK(hinted.box == hit.box);
     std::stable_sort(all.begin(), all.end(), nearer);
     std::vector<SegmentHit> expected;
     for (const SegmentHit& other : all) {
       if (other.distance > 0.25 || expected.size() == 3) break;
       if (std::none_of(expected.begin(), expected.end(), [&](const SegmentHit& kept) {
-            return kept.direction.dot(other.direction) > cosine && std::abs(kept.along - other.along) < 1.0 / 3.0;
+            return kept.direction.dot(other.direction) > cosine &&
+                   std::abs(kept.along - other.along) < 1.0 / 3.0;
           }))
         expected.push_back(other);
     }
     std::array<SegmentHit, 3> hits;
-    REQUIRE(field.several(a, b, 0.25, cosine, scratch, hits) == expected.size());
+    REQUIRE(field.nearest_distinct(a, b, 0.25, cosine, scratch, hits) == expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
       CHECK(hits[i].distance == Approx(expected[i].distance).margin(1e-12));
       CHECK((hits[i].point - expected[i].point).norm() <= 1e-9);
@@ -299,7 +316,8 @@ TEST_CASE("nearest and several of a segment are those of all boxes", "[scene][pr
 }
 
 TEST_CASE(
-    "a near table's bounds are below the distance, no looser than its cells, and the same for any order of asking",
+    "a near table's bounds are below the distance, no looser than its cells, and independent of "
+    "the order of queries",
     "[scene][property]") {
   Rng rng(11);
   const std::vector<Box> boxes = random_boxes(rng, 100);
@@ -307,11 +325,12 @@ TEST_CASE(
   const Ball region{{0.3, -0.2, 0.1}, 1.0};
   const NearTable table(region, 0.05), again(region, 0.05);
   std::vector<Vector3d> points;
-  for (int i = 0; i < 3000; ++i) points.push_back(region.center + 1.2 * rng.uniform() * test::random_direction(rng));
+  for (int i = 0; i < 3000; ++i)
+    points.push_back(region.center + 1.2 * rng.uniform() * test::random_direction(rng));
   std::vector<NearTable::Answer> answers;
   int known = 0;
   for (const Vector3d& p : points) {
-    const NearTable::Answer answer = table.ask(field, p);
+    const NearTable::Answer answer = table.query(field, p);
     answers.push_back(answer);
     if (answer.hint < 0) {
       CHECK((p - region.center).norm() >= 1.0);
@@ -327,12 +346,12 @@ TEST_CASE(
   }
   CHECK(known > 1000);
   for (std::size_t i = points.size(); i-- > 0;) {
-    const NearTable::Answer answer = again.ask(field, points[i]);
+    const NearTable::Answer answer = again.query(field, points[i]);
     CHECK(answer.lower == answers[i].lower);
     CHECK(answer.hint == answers[i].hint);
   }
-  CHECK(NearTable().ask(field, region.center).hint == -1);
-  CHECK(table.ask(BoxField(), region.center).hint == -1);
+  CHECK(NearTable().query(field, region.center).hint == -1);
+  CHECK(table.query(BoxField(), region.center).hint == -1);
 }
 
 TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
@@ -347,7 +366,7 @@ TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
   std::vector<double> first;
   for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4}) {
     if (!is_available(isa)) {
-      WARN("this machine has no " << name_of(isa) << ": not compared");
+      WARN("this machine does not support " << name_of(isa) << ": not compared");
       continue;
     }
     set_default_isa(isa);
@@ -363,9 +382,11 @@ TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
       SegmentHit segment;
       if (field.nearest(points[i], ends[i], 1.0, segment))
         all.insert(all.end(), {segment.distance, segment.along, static_cast<double>(segment.box)});
-      const std::size_t n = field.several(points[i], 0.5, 0.8, scratch, hits);
-      for (std::size_t k = 0; k < n; ++k) all.insert(all.end(), {hits[k].distance, static_cast<double>(hits[k].box)});
-      const std::size_t m = field.several(points[i], ends[i], 0.5, 0.8, scratch, segment_hits);
+      const std::size_t n = field.nearest_distinct(points[i], 0.5, 0.8, scratch, hits);
+      for (std::size_t k = 0; k < n; ++k)
+        all.insert(all.end(), {hits[k].distance, static_cast<double>(hits[k].box)});
+      const std::size_t m =
+          field.nearest_distinct(points[i], ends[i], 0.5, 0.8, scratch, segment_hits);
       for (std::size_t k = 0; k < m; ++k)
         all.insert(all.end(), {segment_hits[k].distance, static_cast<double>(segment_hits[k].box)});
     }
@@ -376,11 +397,13 @@ TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
   CHECK(first.size() > 1000);
 }
 
-TEST_CASE("queries far from the origin, on wide boxes and on none stay exact", "[scene][unit]") {
+TEST_CASE("queries far from the origin, on wide boxes and on an empty field are exact",
+          "[scene][unit]") {
   const BoxField none;
   BoxHit hit;
   CHECK_FALSE(none.nearest({0.0, 0.0, 0.0}, infinity, hit));
-  const std::vector<Box> boxes{{{0.0, 0.0, 0.0}, {1638.4, 1638.4, 1638.4}}, {{-0.05, 0.0, 0.0}, {0.0, 0.05, 0.05}}};
+  const std::vector<Box> boxes{{{0.0, 0.0, 0.0}, {1638.4, 1638.4, 1638.4}},
+                               {{-0.05, 0.0, 0.0}, {0.0, 0.05, 0.05}}};
   const BoxField field(boxes, {-1.0, 0.0, 0.0});
   REQUIRE(field.nearest({-0.3, 0.01, 0.01}, 1.0, hit));
   CHECK(hit.distance == Approx(0.25).epsilon(1e-15));

@@ -38,7 +38,8 @@ Obstacle block(const Vector3d& size, const Vector3d& at) {
   return o;
 }
 
-// A 0.4 m cube at (0.6, 0, 0) in a room of known space, 1.5 m wide; removed with the object.
+// A map of a 0.4 m cube at (0.6, 0, 0) in known space 1.5 m wide. The file is deleted with the
+// object.
 struct RoomMap {
   RoomMap() {
     MakeMapOptions options;
@@ -55,12 +56,13 @@ struct RoomMap {
 
 }  // namespace
 
-TEST_CASE("contacts of a map come back in the world frame", "[scene][unit]") {
+TEST_CASE("contacts of a map are in the world frame", "[scene][unit]") {
   const RoomMap room;
   // The map is turned by 90° about z and shifted: the cube's centre goes to (1, 0.6, 2).
   MapSpec spec;
   spec.file = room.file;
-  spec.pose = {Eigen::AngleAxisd(std::acos(0.0), Vector3d::UnitZ()).toRotationMatrix(), {1.0, 0.0, 2.0}};
+  spec.pose = {Eigen::AngleAxisd(std::acos(0.0), Vector3d::UnitZ()).toRotationMatrix(),
+               {1.0, 0.0, 2.0}};
   const Environment environment(spec, {}, {Eigen::Matrix3d::Identity(), {1.0, 0.0, 2.0}}, 0.8, 0.3);
   CHECK(environment.has_obstacles());
   CHECK(environment.summary().boxes == 1);
@@ -80,7 +82,7 @@ TEST_CASE("contacts of a map come back in the world frame", "[scene][unit]") {
   CHECK(environment.clearance({centers, radii}, 0.0, 0.1) == 0.1);
 }
 
-TEST_CASE("unknown space is free, slow or an obstacle, as stated", "[scene][unit]") {
+TEST_CASE("unknown space is free, slow or an obstacle by its policy", "[scene][unit]") {
   const RoomMap room;
   MapSpec spec;
   spec.file = room.file;
@@ -92,8 +94,8 @@ TEST_CASE("unknown space is free, slow or an obstacle, as stated", "[scene][unit
     spec.unknown = policy;
     const Environment environment(spec, {}, {}, 1.0, 0.2);
     Environment::Scratch scratch(environment, 1);
-    // The voxels reach to ±0.76. Of the unit ball, what is outside them is unknown: six caps of height h = 0.24, with
-    // π h² (3 − h)/3 each.
+    // The voxels reach to ±0.76. Of the unit ball, what is outside them is unknown: six caps of
+    // height h = 0.24, with π h² (3 − h)/3 each.
     CHECK(environment.summary().within_reach.unknown ==
           Approx(6.0 * 0.24 * 0.24 * 2.76 / 3.0 / (4.0 / 3.0)).epsilon(0.01));
     CHECK(environment.in_slow_space({outside, radii}) == (policy == UnknownPolicy::slow));
@@ -105,15 +107,19 @@ TEST_CASE("unknown space is free, slow or an obstacle, as stated", "[scene][unit
       CHECK(out[0].distance == Approx(0.76 - 0.65 - 0.05).epsilon(1e-9));
       CHECK(out[0].direction.x() == Approx(1.0));
     }
-    CHECK((environment.clearance({outside, radii}, 0.0, 1.0) <= 0.0) == (policy == UnknownPolicy::block));
+    CHECK((environment.clearance({outside, radii}, 0.0, 1.0) <= 0.0) ==
+          (policy == UnknownPolicy::block));
   }
 }
 
-TEST_CASE("a map changes when its time has come, and what was unknown there is known", "[scene][unit]") {
+TEST_CASE("a map changes when a change is due, and changed voxels are known", "[scene][unit]") {
   MapSpec spec;
   spec.file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "shelf.bt";
   spec.unknown = UnknownPolicy::block;
-  spec.changes = {{1.0, std::nullopt, {{{-0.2, -0.2, 0.9}, {0.2, 0.2, 1.3}}}, {{{0.05, 0.05, 1.0}, {0.1, 0.1, 1.05}}}}};
+  spec.changes = {{1.0,
+                   std::nullopt,
+                   {{{-0.2, -0.2, 0.9}, {0.2, 0.2, 1.3}}},
+                   {{{0.05, 0.05, 1.0}, {0.1, 0.1, 1.05}}}}};
   Environment environment(spec, {}, {}, 0.9, 0.2);
   const std::vector<Vector3d> centers{{0.075, 0.075, 1.15}};
   const std::vector<double> radii{0.02};
@@ -126,11 +132,13 @@ TEST_CASE("a map changes when its time has come, and what was unknown there is k
   CHECK(environment.advance(9.0).empty());
 
   // a change by file must be of the same grid
-  spec.changes = {{1.0, std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "clutter.bt", {}, {}}};
-  CHECK_THROWS_WITH(Environment(spec, {}, {}, 0.9, 0.2), Catch::Contains("clutter.bt: resolution 0.02 m"));
+  spec.changes = {
+      {1.0, std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "maps" / "clutter.bt", {}, {}}};
+  CHECK_THROWS_WITH(Environment(spec, {}, {}, 0.9, 0.2),
+                    Catch::Contains("clutter.bt: resolution 0.02 m"));
 }
 
-TEST_CASE("the keep-out frees unknown space around the base", "[scene][unit]") {
+TEST_CASE("the keep-out ball frees unknown space around the base", "[scene][unit]") {
   const RoomMap room;
   MapSpec spec;
   spec.file = room.file;
@@ -140,12 +148,14 @@ TEST_CASE("the keep-out frees unknown space around the base", "[scene][unit]") {
   const std::vector<double> radii{0.05};
   CHECK(Environment(spec, {}, base, 1.0, 0.2).clearance({centers, radii}, 0.0, 1.0) < 0.0);
   spec.keep_out_radius_m = 0.2;
-  const double clearance = Environment(spec, {}, base, 1.0, 0.2).clearance({centers, radii}, 0.0, 1.0);
+  const double clearance =
+      Environment(spec, {}, base, 1.0, 0.2).clearance({centers, radii}, 0.0, 1.0);
   CHECK(clearance > 0.15 - 1e-12);
   CHECK(clearance < 0.15 + 0.02 * std::sqrt(3.0));
 }
 
-TEST_CASE("obstacles come with index, velocity and time of appearance", "[scene][unit]") {
+TEST_CASE("obstacle contacts have index and velocity, and none before the time of appearance",
+          "[scene][unit]") {
   Obstacle moving = ball(0.1, {1.0, 0.0, 0.0});
   moving.motion = SineMotion{{0.0, 0.3, 0.0}, 2.0};
   Obstacle late = ball(0.1, {0.0, 0.5, 0.0});
@@ -164,7 +174,8 @@ TEST_CASE("obstacles come with index, velocity and time of appearance", "[scene]
   REQUIRE(environment.closest({centers, radii}, 0.6, 1.0, scratch, out) == 2);
   CHECK(out[0].obstacle == 0);
   CHECK(out[1].obstacle == 1);
-  CHECK(environment.clearance({centers, radii}, 0.5, infinity) == Approx(std::hypot(0.5, 0.3) - 0.2));
+  CHECK(environment.clearance({centers, radii}, 0.5, infinity) ==
+        Approx(std::hypot(0.5, 0.3) - 0.2));
 }
 
 TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
@@ -181,15 +192,15 @@ TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
   CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out) == 0);
   CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::judge) == 2);
   CHECK(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::hidden) == 2);
-  // nobody sees what he only thinks of
+  // a query at a configuration does not reveal obstacles
   CHECK(environment.closest({near, radii}, 0.5, 0.0, scratch, out) == 0);
   std::array<std::uint8_t, 2> seen{};
-  CHECK(environment.see({far, radii}, 0.0, seen) == -1);
+  CHECK(environment.reveal_visible({far, radii}, 0.0, seen) == -1);
   CHECK(environment.closest({near, radii}, 0.5, 0.0, scratch, out, View::planner, seen) == 0);
-  // what came near is remembered
-  CHECK(environment.see({near, radii}, 0.0, seen) == 1);
-  CHECK(environment.see({near, radii}, 0.0, seen) == -1);
-  CHECK(environment.see({far, radii}, 0.0, seen) == -1);
+  // an obstacle that was near is remembered
+  CHECK(environment.reveal_visible({near, radii}, 0.0, seen) == 1);
+  CHECK(environment.reveal_visible({near, radii}, 0.0, seen) == -1);
+  CHECK(environment.reveal_visible({far, radii}, 0.0, seen) == -1);
   REQUIRE(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::planner, seen) == 1);
   CHECK(out[0].obstacle == 1);
   REQUIRE(environment.closest({far, radii}, 0.5, 0.0, scratch, out, View::hidden, seen) == 1);
@@ -199,9 +210,11 @@ TEST_CASE("the judge sees what the planner does not", "[scene][unit]") {
   CHECK(environment.clearance({far, radii}, 0.0, infinity, View::planner) == infinity);
 }
 
-TEST_CASE("a full output keeps the nearest and tells how many there are", "[scene][unit]") {
+TEST_CASE("a full output keeps the nearest contacts and the call returns their number",
+          "[scene][unit]") {
   std::vector<Obstacle> balls;
-  for (int i = 0; i < 6; ++i) balls.push_back(ball(0.05, {0.2 + 0.05 * ((i * 5) % 6), 0.3 * (i % 3 - 1), 0.0}));
+  for (int i = 0; i < 6; ++i)
+    balls.push_back(ball(0.05, {0.2 + 0.05 * ((i * 5) % 6), 0.3 * (i % 3 - 1), 0.0}));
   const Environment environment(std::nullopt, balls, {}, 1.0, 0.5);
   Environment::Scratch scratch(environment, 2);
   const std::vector<Vector3d> centers{{0.0, 0.0, 0.0}, {0.0, 0.1, 0.0}};
@@ -259,7 +272,8 @@ TEST_CASE("contacts and clearance do not allocate", "[scene][unit]") {
   MapSpec spec;
   spec.file = room.file;
   spec.unknown = UnknownPolicy::block;
-  const Environment environment(spec, {ball(0.1, {0.2, 0.2, 0.2}), ball(0.1, {-0.2, 0.2, 0.2})}, {}, 0.9, 0.4);
+  const Environment environment(spec, {ball(0.1, {0.2, 0.2, 0.2}), ball(0.1, {-0.2, 0.2, 0.2})}, {},
+                                0.9, 0.4);
   Rng rng(6);
   std::vector<Vector3d> centers;
   std::vector<double> radii;
@@ -270,7 +284,8 @@ TEST_CASE("contacts and clearance do not allocate", "[scene][unit]") {
   Environment::Scratch scratch(environment, centers.size());
   std::vector<Contact> out(100);
   std::size_t count = 0;
-  double clearance = environment.clearance({centers, radii}, 0.0, 0.4);  // the first to be inside makes the surface
+  double clearance = environment.clearance({centers, radii}, 0.0,
+                                           0.4);  // the first query inside computes the surface
   const long allocations = test::allocations_in([&] {
     for (int i = 0; i < 20; ++i) {
       count += environment.closest({centers, radii}, 0.4, 0.1 * i, scratch, out);
@@ -282,10 +297,11 @@ TEST_CASE("contacts and clearance do not allocate", "[scene][unit]") {
   CHECK(clearance < 0.0);
 }
 
-TEST_CASE("what an environment cannot use is refused in one line", "[scene][unit]") {
+TEST_CASE("an environment refuses what it cannot use in one line", "[scene][unit]") {
   MapSpec spec;
   spec.file = "absent.bt";
-  CHECK_THROWS_WITH(Environment(spec, {}, {}, 1.0, 0.1), Catch::Matchers::StartsWith("absent.bt: "));
+  CHECK_THROWS_WITH(Environment(spec, {}, {}, 1.0, 0.1),
+                    Catch::Matchers::StartsWith("absent.bt: "));
   CHECK_THROWS_WITH(Environment(std::nullopt, {ball(-1.0, {0.0, 0.0, 0.0})}, {}, 1.0, 0.1),
                     Catch::Matchers::Contains("'ball'"));
   const RoomMap room;

@@ -40,7 +40,8 @@ Voxels voxels_of(const std::vector<Cell>& cells) {
 
 }  // namespace
 
-TEST_CASE("a made map marks the voxels whose centre or any part a sphere holds", "[scene][unit]") {
+TEST_CASE("a made map marks the voxels whose centre a sphere contains, or that it touches",
+          "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.05;
   options.output = test::temporary("hamelin_scene_made.bt");
@@ -61,7 +62,8 @@ TEST_CASE("a made map marks the voxels whose centre or any part a sphere holds",
         for (int z = -20; z < 20; ++z) {
           const Vector3d middle = 0.05 * Vector3d(x + 0.5, y + 0.5, z + 0.5);
           const Vector3d off = (middle - ball.pose.p()).cwiseAbs();
-          const double distance = mark == Mark::centre ? off.norm() : (off.array() - 0.025).max(0.0).matrix().norm();
+          const double distance =
+              mark == Mark::centre ? off.norm() : (off.array() - 0.025).max(0.0).matrix().norm();
           if (distance <= ball.radius_m) expected.insert({x, y, z});
         }
     CHECK(voxels_of(map.occupied) == expected);
@@ -84,7 +86,8 @@ TEST_CASE("touch is exact for turned boxes and cylinders", "[scene][property]") 
     Obstacle o = make_clutter(clutter).front();
     o.shape = shape;
     const Box cube{{-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}};
-    // Nearest of a fine grid of the cube's points: an upper bound of the gap, at most half a grid diagonal too large.
+    // The nearest point of a fine grid in the cube: an upper bound of the gap, too large by half a
+    // grid diagonal at most.
     double sampled = 1.0;
     const int n = 20;
     for (int x = 0; x <= n; ++x)
@@ -106,7 +109,7 @@ TEST_CASE("touch is exact for turned boxes and cylinders", "[scene][property]") 
   CHECK(apart > 20);
 }
 
-TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene][property]") {
+TEST_CASE("a made map has the voxels that a test of each single voxel marks", "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{6}));
   CAPTURE(seed);
   MakeMapOptions options;
@@ -121,7 +124,7 @@ TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene]
   clutter.bounds = {{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}};
   clutter.seed = seed;
   options.clutter = clutter;
-  Obstacle slab;  // its faces are a hair beyond voxels' faces
+  Obstacle slab;  // its faces are slightly beyond faces of voxels
   slab.shape = Shape::box;
   slab.size_m = Vector3d(0.6, 0.3, 0.06).array() + 2e-7;
   slab.pose = {Eigen::Matrix3d::Identity(), {0.12, -0.21, 0.72 + 0.03 * static_cast<double>(seed)}};
@@ -137,7 +140,8 @@ TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene]
         const Box cube = to_metres(Cell{{x, y, z}, 1}, options.resolution_m);
         const Vector3d middle = 0.5 * (cube.lo + cube.hi);
         const bool marked = std::any_of(made.begin(), made.end(), [&](const Obstacle& o) {
-          return options.mark == Mark::touch ? touches(o, cube) : closest_on(o, o.pose.p(), middle).distance <= 0.0;
+          return options.mark == Mark::touch ? touches(o, cube)
+                                             : closest_on(o, o.pose.p(), middle).distance <= 0.0;
         });
         const bool inside = (middle.array() >= options.free_bounds->lo.array()).all() &&
                             (middle.array() <= options.free_bounds->hi.array()).all();
@@ -151,7 +155,7 @@ TEST_CASE("a made map has the voxels of every one looked at by itself", "[scene]
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("a map that is all one kind is written so that OctoMap reads it", "[scene][unit]") {
+TEST_CASE("a map of a single kind of space is written so that OctoMap reads it", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.5;
   options.output = test::temporary("hamelin_scene_whole.bt");
@@ -166,7 +170,7 @@ TEST_CASE("a map that is all one kind is written so that OctoMap reads it", "[sc
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
+TEST_CASE("everything outside of the free bounds is unknown", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.1;
   options.free_bounds = Box{{-1.0, -1.0, 0.0}, {1.0, 1.0, 1.0}};
@@ -183,7 +187,7 @@ TEST_CASE("free bounds leave the rest unknown", "[scene][unit]") {
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("clutter keeps out of balls and the same seed gives the same bytes", "[scene][unit]") {
+TEST_CASE("clutter avoids keep-out balls and the same seed gives the same bytes", "[scene][unit]") {
   MakeMapOptions options;
   options.resolution_m = 0.04;
   options.output = test::temporary("hamelin_scene_clutter.bt");
@@ -207,7 +211,7 @@ TEST_CASE("clutter keeps out of balls and the same seed gives the same bytes", "
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("what cannot be made is refused", "[scene][unit]") {
+TEST_CASE("maps that cannot be made are refused", "[scene][unit]") {
   MakeMapOptions options;
   options.output = test::temporary("hamelin_scene_none.bt");
   CHECK_THROWS_WITH(make_map(options), Catch::Matchers::Contains("empty"));
@@ -266,7 +270,7 @@ void check_problem(const std::filesystem::path& source) {
   REQUIRE(scene.map);
   // The map is marked by touch, so it holds every primitive: their centres are in contact.
   const model::Model model(description::read_robot(options.robot, {options.tip, options.spheres}));
-  const auto environment = make_environment(scene, model, 2.0);  // some stand out of the arm's reach
+  const auto environment = make_environment(scene, model, 2.0);  // some are beyond the arm's reach
   CHECK(environment.summary().warnings.empty());
   CHECK(environment.summary().within_reach.unknown == 0.0);
   CHECK(environment.summary().within_reach.free > 0.9);
@@ -292,7 +296,8 @@ TEST_CASE("problems of MotionBenchMaker become scenes that read back", "[scene][
     check_problem(*problems / name);
 }
 
-TEST_CASE("what is no problem is refused with its place, and nothing is written", "[scene][unit]") {
+TEST_CASE("a document that is not a problem is refused by key, and nothing is written",
+          "[scene][unit]") {
   const auto directory = test::temporary("hamelin_scene_no_problem");
   std::filesystem::create_directories(directory);
   ProblemOptions options;
@@ -300,7 +305,8 @@ TEST_CASE("what is no problem is refused with its place, and nothing is written"
   options.tip = "panda_grasptarget";
   options.resolution_m = 0.04;
   options.output = directory / "scene.json";
-  const Json good = Json::parse(R"({"start": [0, -0.785, 0, -2.356, 0, 1.571, 0.785], "goal": [1, 0, 0, -1, 0, 1, 0],
+  const Json good = Json::parse(
+      R"({"start": [0, -0.785, 0, -2.356, 0, 1.571, 0.785], "goal": [1, 0, 0, -1, 0, 1, 0],
     "obstacles": [{"name": "a", "type": "sphere", "position": [0.5, 0, 0.5], "radius": 0.1},
                   {"type": "box", "position": [0.5, 0, 0.1], "quaternion_wxyz": [1, 0, 0, 0], "size": [1, 1, 0.1]},
                   {"type": "cylinder", "position": [0.5, 0, 0.1], "radius": 0.1, "length": 0.2}]})");
@@ -308,7 +314,7 @@ TEST_CASE("what is no problem is refused with its place, and nothing is written"
     Json document = good;
     document[Json::json_pointer(pointer)] = value;
     const auto file = directory / "problem.json";
-    write_file_aside(file, document.dump());
+    write_file_atomically(file, document.dump());
     try {
       make_scene_from_problem(file, options);
     } catch (const Error& e) {
@@ -324,24 +330,31 @@ TEST_CASE("what is no problem is refused with its place, and nothing is written"
   using Catch::Matchers::StartsWith;
   CHECK(refusal("/name", "whatever") == "");
   CHECK_THAT(refusal("/units", "mm,deg"), StartsWith("/units: are \"mm,deg\""));
-  CHECK_THAT(refusal("/start", {1, 2, 3}), StartsWith("/start: is a list of 3, expected 7 numbers"));
+  CHECK_THAT(refusal("/start", {1, 2, 3}),
+             StartsWith("/start: is a list of 3, expected 7 numbers"));
   CHECK_THAT(refusal("/goal", nullptr), StartsWith("/goal: is missing"));
   CHECK_THAT(refusal("/goal/3", "x"), StartsWith("/goal: is a list of 7, expected 7 numbers"));
   CHECK_THAT(refusal("/obstacles", 3), StartsWith("/obstacles: is missing"));
   CHECK_THAT(refusal("/obstacles/1", 3), StartsWith("/obstacles/1: is 3, expected a primitive"));
-  CHECK_THAT(refusal("/obstacles/0/type", "mesh"), StartsWith("/obstacles/0/type: is \"mesh\", expected \"sphere\""));
-  CHECK_THAT(refusal("/obstacles/0/pose", {0, 0, 0, 1, 0, 0, 0}), StartsWith("/obstacles/0/pose: is not known"));
-  CHECK_THAT(refusal("/obstacles/0/length", 1), StartsWith("/obstacles/0/length: is not known, a sphere has"));
-  CHECK_THAT(refusal("/obstacles/0/radius", -1), StartsWith("/obstacles/0/radius: is -1, expected a length above 0"));
+  CHECK_THAT(refusal("/obstacles/0/type", "mesh"),
+             StartsWith("/obstacles/0/type: is \"mesh\", expected \"sphere\""));
+  CHECK_THAT(refusal("/obstacles/0/pose", {0, 0, 0, 1, 0, 0, 0}),
+             StartsWith("/obstacles/0/pose: is not known"));
+  CHECK_THAT(refusal("/obstacles/0/length", 1),
+             StartsWith("/obstacles/0/length: is not known, a sphere has"));
+  CHECK_THAT(refusal("/obstacles/0/radius", -1),
+             StartsWith("/obstacles/0/radius: is -1, expected a length above 0"));
   CHECK_THAT(refusal("/obstacles/1/size", {1, 0, 1}), StartsWith("/obstacles/1/size: is 0"));
-  CHECK_THAT(refusal("/obstacles/1/size", nullptr), StartsWith("/obstacles/1/size: is null, expected 3 numbers"));
-  CHECK_THAT(refusal("/obstacles/2/position", {1, 2}), StartsWith("/obstacles/2/position: is a list of 2"));
+  CHECK_THAT(refusal("/obstacles/1/size", nullptr),
+             StartsWith("/obstacles/1/size: is null, expected 3 numbers"));
+  CHECK_THAT(refusal("/obstacles/2/position", {1, 2}),
+             StartsWith("/obstacles/2/position: is a list of 2"));
   CHECK_THAT(refusal("/obstacles/1/quaternion_wxyz", {2, 0, 0, 0}),
              StartsWith("/obstacles/1/quaternion_wxyz: the norm is 2"));
   std::filesystem::remove_all(directory);
 }
 
-TEST_CASE("a problem's goal may be asked for as where the tip is then", "[scene][unit]") {
+TEST_CASE("a problem's goal can be converted to the position or pose of the tip", "[scene][unit]") {
   const auto directory = test::temporary("hamelin_scene_goal");
   std::filesystem::create_directories(directory);
   ProblemOptions options;

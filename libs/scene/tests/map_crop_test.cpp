@@ -46,7 +46,8 @@ std::filesystem::path clutter_map() {
 
 }  // namespace
 
-TEST_CASE("inside the region a cropped map is the map, to OctoMap and in distances", "[scene][property]") {
+TEST_CASE("inside the region a cropped map equals the map, to OctoMap and in distances",
+          "[scene][property]") {
   CropOptions options;
   options.map = clutter_map();
   options.output = test::temporary("hamelin_scene_cropped.bt");
@@ -73,13 +74,13 @@ TEST_CASE("inside the region a cropped map is the map, to OctoMap and in distanc
   int kinds[128] = {}, near = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vector3d p(rng.uniform(-0.4, 0.8), rng.uniform(-0.6, 0.4), rng.uniform(-0.1, 0.9));
-    const double depth =
-        as_ball ? ball.radius - (p - ball.center).norm() : (p - box.lo).cwiseMin(box.hi - p).minCoeff();
+    const double depth = as_ball ? ball.radius - (p - ball.center).norm()
+                                 : (p - box.lo).cwiseMin(box.hi - p).minCoeff();
     if (depth <= 0.0) continue;
     const char kind = kind_at(whole, p);
     ++kinds[static_cast<std::size_t>(kind)];
     REQUIRE(kind_at(part, p) == kind);
-    // What is within the region is found at the same distance.
+    // Obstacles within the region are found at the same distance.
     BoxHit a, b;
     const bool found = far_field.nearest(p, depth, a);
     REQUIRE(near_field.nearest(p, depth, b) == found);
@@ -114,27 +115,29 @@ void check_whole_crop(const std::filesystem::path& map) {
 
 }  // namespace
 
-TEST_CASE("a crop to more than the map gives the map's own tree", "[scene][unit]") {
+TEST_CASE("a crop to a region larger than the map gives the tree of the map", "[scene][unit]") {
   for (const char* name : {"shelf.bt", "clutter.bt"}) check_whole_crop(test::data / "maps" / name);
 }
 
-TEST_CASE("a crop to more than a real map gives the map's own tree", "[scene][unit]") {
+TEST_CASE("a crop to a region larger than a real map gives the tree of the map", "[scene][unit]") {
   const auto directory = test::shared_data("maps");
   if (!directory) return;
   for (const char* name : {"aurora.bt", "octomap_python_test.bt", "velma_world1.bt", "geb079.bt"})
     check_whole_crop(*directory / name);
 }
 
-TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space as asked", "[scene][unit]") {
+TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space as requested",
+          "[scene][unit]") {
   CropOptions options;
   options.output = test::temporary("hamelin_scene_huge_crop.bt");
   options.region = Ball{{-0.3, -0.3, -0.3}, 0.1};
   options.map = test::temporary("hamelin_scene_occupied_root.ot");
-  write_file_aside(options.map, test::occupied_root());
+  write_file_atomically(options.map, test::occupied_root());
   crop_map(options);
-  CHECK(read_map(options.output).occupied.size() == 8);  // a .bt has no root that is a leaf
+  CHECK(read_map(options.output).occupied.size() ==
+        8);  // a .bt cannot express a root that is a leaf
   options.map = test::temporary("hamelin_scene_occupied_octant.bt");
-  write_file_aside(options.map, test::occupied_octant());
+  write_file_atomically(options.map, test::occupied_octant());
   options.region = Ball{{0.0, 0.0, 0.0}, 1.0};
   crop_map(options);
   const MapData kept = read_map(options.output);
@@ -145,7 +148,7 @@ TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space
   CHECK(crop_map(options).free_leaves == 7);
   CHECK(read_map(options.output).unknown.empty());
   options.map = test::temporary("hamelin_scene_millimetre_map.bt");
-  write_file_aside(options.map, test::millimetre_map());
+  write_file_atomically(options.map, test::millimetre_map());
   CHECK_THROWS_WITH(crop_map(options), Catch::Contains("scale"));
   options.read.scale = 0.001;
   options.region = Ball{{0.0, 0.0, 0.0}, 10.0};
@@ -156,7 +159,7 @@ TEST_CASE("a crop is in metres, keeps huge leaves whole and writes unknown space
   std::filesystem::remove(options.output);
 }
 
-TEST_CASE("what cannot be cropped is refused and nothing is written", "[scene][unit]") {
+TEST_CASE("a crop that is not possible is refused and nothing is written", "[scene][unit]") {
   CropOptions options;
   options.map = clutter_map();
   const std::string bytes = read_file(options.map);

@@ -18,13 +18,14 @@ using Eigen::Vector3d;
 
 constexpr double voxel_m = 0.05;
 
-// Voxels [0, n)³ by hand: what is occupied, and the exact signed distance to it by looking at all of them and at a rim
-// of free ones around.
+// Voxels [0, n)³ with a rim of free ones, and the exact signed distance by a loop over all of them.
 class Grid {
  public:
   static constexpr std::int32_t n = 14, rim = 2;
 
-  void set(const std::array<std::int32_t, 3>& voxel, bool occupied) { cells_[index(voxel)] = occupied; }
+  void set(const std::array<std::int32_t, 3>& voxel, bool occupied) {
+    cells_[index(voxel)] = occupied;
+  }
   void flip_block(Rng& rng, bool occupied, std::vector<Cell>& into) {
     std::array<std::int32_t, 3> lo{}, hi{};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -62,13 +63,15 @@ class Grid {
   void each(const F& f) const {
     for (std::int32_t x = -rim; x < n + rim; ++x)
       for (std::int32_t y = -rim; y < n + rim; ++y)
-        for (std::int32_t z = -rim; z < n + rim; ++z) f(std::array<std::int32_t, 3>{x, y, z}, cells_[index({x, y, z})]);
+        for (std::int32_t z = -rim; z < n + rim; ++z)
+          f(std::array<std::int32_t, 3>{x, y, z}, cells_[index({x, y, z})]);
   }
   static std::size_t index(const std::array<std::int32_t, 3>& v) {
     constexpr std::int32_t side = n + 2 * rim;
     return static_cast<std::size_t>(((v[0] + rim) * side + v[1] + rim) * side + v[2] + rim);
   }
-  std::vector<bool> cells_ = std::vector<bool>(static_cast<std::size_t>((n + 2 * rim) * (n + 2 * rim) * (n + 2 * rim)));
+  std::vector<bool> cells_ =
+      std::vector<bool>(static_cast<std::size_t>((n + 2 * rim) * (n + 2 * rim) * (n + 2 * rim)));
 };
 
 const Ball reachable{Vector3d::Constant(0.35), 0.8};
@@ -77,7 +80,7 @@ Vector3d random_point(Rng& rng) {
   return {rng.uniform(-0.1, 0.8), rng.uniform(-0.1, 0.8), rng.uniform(-0.1, 0.8)};
 }
 
-// Every other one in an occupied voxel.
+// A random point; every other one in an occupied voxel.
 Vector3d random_point(Rng& rng, const Grid& grid) {
   const std::vector<Cell> cells = grid.occupied();
   if (cells.empty() || rng.below(2) == 0) return random_point(rng);
@@ -97,7 +100,8 @@ void check_point(const MapField& field, const Grid& grid, const Vector3d& p) {
   BoxHit hit;
   REQUIRE(field.nearest(p, infinity, hit));
   CHECK(hit.distance == Approx(truth).margin(1e-12));
-  // The nearest point lies on the surface, along the direction, which points away from what is occupied.
+  // The nearest point lies on the surface, along the direction, which points away from what is
+  // occupied.
   CHECK((hit.point + hit.distance * hit.direction - p).norm() <= 1e-12);
   CHECK(hit.direction.norm() == Approx(1.0));
   CHECK(std::abs(grid.signed_distance(hit.point)) <= 1e-12);
@@ -105,8 +109,10 @@ void check_point(const MapField& field, const Grid& grid, const Vector3d& p) {
 
 }  // namespace
 
-TEST_CASE("a map's distance is signed: inside it is minus that to the nearest free voxel, with the way out",
-          "[scene][property]") {
+TEST_CASE(
+    "a map's distance is signed: inside it is minus that to the nearest free voxel, in the exit "
+    "direction",
+    "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{8}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -118,7 +124,7 @@ TEST_CASE("a map's distance is signed: inside it is minus that to the nearest fr
     const Vector3d p = random_point(rng, grid);
     check_point(field, grid, p);
     std::array<BoxHit, MapField::points_max> hits;
-    const std::size_t count = field.several(p, 0.3, scratch, hits);
+    const std::size_t count = field.nearest_distinct(p, 0.3, scratch, hits);
     const double truth = grid.signed_distance(p);
     CHECK((count > 0) == (truth <= 0.3));
     if (count > 0) CHECK(hits[0].distance == Approx(truth).margin(1e-12));
@@ -141,13 +147,14 @@ TEST_CASE("on the surface the direction is the normal that leads out", "[scene][
   CHECK(direction({1.5, 1.0, 2.0}) == Vector3d::UnitZ());
   CHECK(direction({0.0, 1.0, 1.5}) == -Vector3d::UnitX());
   CHECK(direction({2.5, 0.5, 1.0}) == Vector3d::UnitZ());
-  // where the boxes touch is no surface
+  // there is no surface where the boxes touch
   REQUIRE(field.nearest({2.0, 0.5, 0.5}, 0.0, hit));
   CHECK(hit.distance == Approx(-0.5));
   CHECK(std::abs(hit.direction.x()) <= 1e-12);
 }
 
-TEST_CASE("a capsule's axis is as deep as its deepest point, and as near as its nearest", "[scene][property]") {
+TEST_CASE("a capsule's axis is as deep as its deepest point, and as near as its nearest",
+          "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{8}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -165,17 +172,20 @@ TEST_CASE("a capsule's axis is as deep as its deepest point, and as near as its 
     constexpr int samples = 400;
     double least = infinity;
     for (int k = 0; k <= samples; ++k)
-      least = std::min(least, grid.signed_distance(a + (static_cast<double>(k) / samples) * (b - a)));
+      least =
+          std::min(least, grid.signed_distance(a + (static_cast<double>(k) / samples) * (b - a)));
     CHECK(hit.distance <= least + 1e-9);
     CHECK(hit.distance >= least - (b - a).norm() / samples);
     inside += hit.distance < 0.0 ? 1 : 0;
     std::array<SegmentHit, MapField::points_max> hits;
-    if (field.several(a, b, 1.0, scratch, hits) > 0) CHECK(hits[0].distance == hit.distance);
+    if (field.nearest_distinct(a, b, 1.0, scratch, hits) > 0)
+      CHECK(hits[0].distance == hit.distance);
   }
   CHECK(inside > 0);
 }
 
-TEST_CASE("a map that changed answers as one made anew", "[scene][property]") {
+TEST_CASE("a map that changed gives the distances of a map built in that state",
+          "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{8}));
   CAPTURE(seed);
   Rng rng(seed);
@@ -183,40 +193,43 @@ TEST_CASE("a map that changed answers as one made anew", "[scene][property]") {
   MapField field(grid.occupied(), voxel_m, reachable);
   for (int round = 0; round < 12; ++round) {
     CAPTURE(round);
-    // seen before the change, so that the table knows the old state
+    // queried before the change, so that the table contains the old state
     for (int i = 0; i < 20; ++i) {
       BoxHit hit;
-      (void)field.nearest(random_point(rng), infinity, hit, static_cast<std::int32_t>(rng.below(50)));
+      (void)field.nearest(random_point(rng), infinity, hit,
+                          static_cast<std::int32_t>(rng.below(50)));
     }
     const Grid before = grid;
     std::vector<Cell> add, remove;
     if (round % 3 != 1) grid.flip_block(rng, false, remove);
     if (round % 3 != 2) grid.flip_block(rng, true, add);
     const MapField::Changed changed = field.change(merge(add), merge(remove));
-    // as many as are there now and were not, what was taken out and put back counting for both
+    // voxels that are occupied now and were not before; those removed and added again count for
+    // both
     Grid without = before;
     for (const Cell& cell : remove) without.set(cell.lo, false);
     CHECK(changed.removed == before.count() - without.count());
     CHECK(changed.added == grid.count() - without.count());
-    const MapField anew(grid.occupied(), voxel_m, reachable);
-    MapField::Scratch scratch(field), scratch_anew(anew);
+    const MapField rebuilt(grid.occupied(), voxel_m, reachable);
+    MapField::Scratch scratch(field), scratch_rebuilt(rebuilt);
     for (int i = 0; i < 15; ++i) {
       const Vector3d p = random_point(rng, grid), q = random_point(rng);
       if (grid.count() == 0) continue;
       check_point(field, grid, p);
-      SegmentHit hit, hit_anew;
+      SegmentHit hit, hit_rebuilt;
       REQUIRE(field.nearest(p, q, infinity, hit));
-      REQUIRE(anew.nearest(p, q, infinity, hit_anew));
-      CHECK(hit.distance == Approx(hit_anew.distance).margin(1e-9));
-      std::array<BoxHit, MapField::points_max> hits, hits_anew;
-      const std::size_t count = field.several(p, 0.3, scratch, hits);
-      REQUIRE((count > 0) == (anew.several(p, 0.3, scratch_anew, hits_anew) > 0));
-      if (count > 0) CHECK(hits[0].distance == Approx(hits_anew[0].distance).margin(1e-12));
+      REQUIRE(rebuilt.nearest(p, q, infinity, hit_rebuilt));
+      CHECK(hit.distance == Approx(hit_rebuilt.distance).margin(1e-9));
+      std::array<BoxHit, MapField::points_max> hits, hits_rebuilt;
+      const std::size_t count = field.nearest_distinct(p, 0.3, scratch, hits);
+      REQUIRE((count > 0) == (rebuilt.nearest_distinct(p, 0.3, scratch_rebuilt, hits_rebuilt) > 0));
+      if (count > 0) CHECK(hits[0].distance == Approx(hits_rebuilt[0].distance).margin(1e-12));
     }
   }
 }
 
-TEST_CASE("what is taken out wholly leaves nothing, and many additions build all anew", "[scene][unit]") {
+TEST_CASE("a field whose boxes are all removed is empty, and many additions rebuild the tree",
+          "[scene][unit]") {
   MapField field({{{0, 0, 0}, 8}}, 0.1, {{0.0, 0.0, 0.0}, 2.0});
   BoxHit hit;
   CHECK(field.change({}, {{{0, 0, 0}, {8, 8, 8}}}).removed == 512);
@@ -227,7 +240,8 @@ TEST_CASE("what is taken out wholly leaves nothing, and many additions build all
     for (std::int32_t j = 0; j < 40; ++j) dust.push_back({{2 * i, 2 * j, (i + j) % 7 * 2}, 1});
   CHECK(field.change(merge(dust), {}).added == dust.size());
   for (const Cell& cell : dust) {
-    REQUIRE(field.nearest(0.1 * Vector3d(cell.lo[0] + 0.5, cell.lo[1] + 0.5, cell.lo[2] + 1.2), infinity, hit));
+    REQUIRE(field.nearest(0.1 * Vector3d(cell.lo[0] + 0.5, cell.lo[1] + 0.5, cell.lo[2] + 1.2),
+                          infinity, hit));
     CHECK(hit.distance == Approx(0.02));
   }
 }

@@ -41,7 +41,7 @@ std::string refusal(const std::filesystem::path& file, const ReadMapOptions& opt
 
 std::filesystem::path write_temporary(const std::string& name, const std::string& bytes) {
   const auto file = test::temporary(name);
-  write_file_aside(file, bytes);
+  write_file_atomically(file, bytes);
   return file;
 }
 
@@ -58,17 +58,19 @@ TEST_CASE("every damaged map is refused in one line that names file and place", 
       ++refused;
       CHECK(message.rfind(file.string() + ": ", 0) == 0);
       CHECK(message.find('\n') == std::string::npos);
-      const bool placed = message.find("byte ") != std::string::npos || message.find("header") != std::string::npos ||
+      const bool placed = message.find("byte ") != std::string::npos ||
+                          message.find("header") != std::string::npos ||
                           message.find("resolution 50 ") != std::string::npos;
       CHECK(placed);
-      CHECK_THAT(message, Catch::Contains(map.says));
+      CHECK_THAT(message, Catch::Contains(map.message));
     }
     std::filesystem::remove(file);
   }
   CHECK(refused >= 35);
 }
 
-TEST_CASE("every map of the collection of corrupt ones ends as wanted", "[scene][unit]") {
+TEST_CASE("every map of the collection of corrupt ones is accepted or refused as expected",
+          "[scene][unit]") {
   const auto directory = test::shared_data("bad_maps");
   if (!directory) return;
   std::ifstream index(*directory / "INDEX.tsv");
@@ -80,20 +82,22 @@ TEST_CASE("every map of the collection of corrupt ones ends as wanted", "[scene]
     std::istringstream fields(line);
     for (std::string field; std::getline(fields, field, '\t');) columns.push_back(field);
     if (columns.size() < 2) continue;
-    const std::string &name = columns.front(), &wanted = columns.back();
-    CAPTURE(name, wanted);
+    const std::string &name = columns.front(), &expected = columns.back();
+    CAPTURE(name, expected);
     ++seen;
     const std::string message = refusal(*directory / name);
-    const bool accept = wanted.rfind("reject", 0) != 0;
+    const bool accept = expected.rfind("reject", 0) != 0;
     CHECK(message.empty() == accept);
     if (accept) continue;
     CAPTURE(message);
     CHECK(message.rfind((*directory / name).string() + ": ", 0) == 0);
     CHECK(message.find('\n') == std::string::npos);
-    const bool placed = message.find("byte ") != std::string::npos || message.find("header") != std::string::npos ||
+    const bool placed = message.find("byte ") != std::string::npos ||
+                        message.find("header") != std::string::npos ||
                         message.find("resolution 50 ") != std::string::npos;
     CHECK(placed);
-    if (wanted.find("convert_octree") != std::string::npos) CHECK(message.find("convert_octree") != std::string::npos);
+    if (expected.find("convert_octree") != std::string::npos)
+      CHECK(message.find("convert_octree") != std::string::npos);
     if (name.rfind("e_legacy", 0) == 0) CHECK(message.find("legacy") != std::string::npos);
   }
   CHECK(seen == 47);
@@ -124,8 +128,9 @@ TEST_CASE("a map above 0.5 m resolution is read only with an explicit scale", "[
   CHECK_FALSE(read_map(file, {1.0, 0.5}).warnings.empty());
   CHECK(refusal(file, {-1.0, 0.5}).find("scale -1") != std::string::npos);
   const auto tiny = read_map(file, {1e-6, 0.5});
-  CHECK(std::any_of(tiny.warnings.begin(), tiny.warnings.end(),
-                    [](const std::string& w) { return w.find("below 0.001") != std::string::npos; }));
+  CHECK(std::any_of(tiny.warnings.begin(), tiny.warnings.end(), [](const std::string& w) {
+    return w.find("below 0.001") != std::string::npos;
+  }));
   std::filesystem::remove(file);
 }
 
@@ -152,12 +157,15 @@ void check_against_octomap(const std::filesystem::path& file, double scale) {
       continue;
     }
     const auto key = leaf.getIndexKey();
-    theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
+    theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768,
+                        1 << (16 - leaf.getDepth()));
   }
-  for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
+  for (const Cell& cell : map.occupied)
+    ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
   CHECK((ours == theirs));
   CHECK(map.free.empty());
-  CHECK(map.occupied.capacity() + map.unknown.capacity() == map.occupied.size() + map.unknown.size());
+  CHECK(map.occupied.capacity() + map.unknown.capacity() ==
+        map.occupied.size() + map.unknown.size());
   const auto whole = read_map(file, {scale, 0.5, true});
   CHECK(whole.free.size() == free_leaves);
   CHECK(whole.occupied.size() == map.occupied.size());
@@ -174,7 +182,8 @@ void check_against_octomap(const std::filesystem::path& file, double scale) {
 
 }  // namespace
 
-TEST_CASE("leaves of our maps are those of OctoMap's own reader, as .bt and as .ot", "[scene][unit]") {
+TEST_CASE("leaves of our maps are those of OctoMap's own reader, as .bt and as .ot",
+          "[scene][unit]") {
   for (const char* name : {"shelf.bt", "clutter.bt"}) {
     const auto file = test::data / "maps" / name;
     check_against_octomap(file, 1.0);
@@ -195,7 +204,7 @@ TEST_CASE("leaves of the real maps are those of OctoMap's own reader", "[scene][
   for (const auto& [name, scale] : maps) check_against_octomap(*directory / name, scale);
 }
 
-TEST_CASE("the occupancy threshold grades a .ot", "[scene][unit]") {
+TEST_CASE("the occupancy threshold decides which leaves of a .ot are occupied", "[scene][unit]") {
   octomap::OcTree tree(0.1);
   // Log-odds 0, 0.1, …, 1.9: the i-th leaf's probability is 1/(1 + exp(−i/10)).
   for (int i = 0; i < 20; ++i)
@@ -210,18 +219,20 @@ TEST_CASE("the occupancy threshold grades a .ot", "[scene][unit]") {
   CHECK(read_map(file, {std::nullopt, 0.95}).occupied.empty());
   CHECK(read_map(file, {std::nullopt, 0.95}).free_leaves == 20);
   for (const double threshold : {1.5, 1.0, 0.0, -0.5, std::nan("")})
-    CHECK(refusal(file, {std::nullopt, threshold}).find("occupancy threshold") != std::string::npos);
+    CHECK(refusal(file, {std::nullopt, threshold}).find("occupancy threshold") !=
+          std::string::npos);
   std::filesystem::remove(file);
 }
 
-TEST_CASE("at any occupancy threshold a .ot's leaves are graded as OctoMap grades them", "[scene][property]") {
+TEST_CASE("at any occupancy threshold the occupied leaves of a .ot are those of OctoMap",
+          "[scene][property]") {
   octomap::OcTree tree(0.1);
   Rng rng(5);
   std::vector<double> thresholds{1e-9, 0.1192, 0.5, 0.7, 0.971, 1.0 - 1e-9};
   for (int i = 0; i < 200; ++i) {
     const double threshold = rng.uniform(0.02, 0.98);
     thresholds.push_back(threshold);
-    // On the very threshold, and a rounding step to either side of it.
+    // Exactly at the threshold, and one rounding step to either side of it.
     const float at = octomap::logodds(threshold);
     for (const float value : {at, std::nextafter(at, -10.0F), std::nextafter(at, 10.0F)})
       tree.setNodeValue(octomap::OcTreeKey(static_cast<octomap::key_type>(rng.below(65536)),
@@ -236,11 +247,12 @@ TEST_CASE("at any occupancy threshold a .ot's leaves are graded as OctoMap grade
     std::size_t occupied = 0;
     for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf)
       occupied += tree.isNodeOccupied(*leaf) ? 1 : 0;
-    CHECK(map_from_bytes(out.str(), "graded.ot", {std::nullopt, threshold}).occupied.size() == occupied);
+    CHECK(map_from_bytes(out.str(), "graded.ot", {std::nullopt, threshold}).occupied.size() ==
+          occupied);
   }
 }
 
-TEST_CASE("a .bt has no grades: no occupancy threshold changes it", "[scene][unit]") {
+TEST_CASE("an occupancy threshold has no effect on a .bt", "[scene][unit]") {
   octomap::OcTree tree(0.1);
   tree.updateNode(octomap::point3d(0.05F, 0.05F, 0.05F), true);
   tree.updateNode(octomap::point3d(0.55F, 0.05F, 0.05F), false);
@@ -254,11 +266,12 @@ TEST_CASE("a .bt has no grades: no occupancy threshold changes it", "[scene][uni
   }
 }
 
-TEST_CASE("a coloured tree is read in both its forms, as OctoMap reads it", "[scene][property]") {
+TEST_CASE("a coloured tree is read from both formats, as OctoMap reads it", "[scene][property]") {
   octomap::ColorOcTree tree(0.05);
   Rng rng(9);
   for (int i = 0; i < 400; ++i) {
-    const octomap::point3d p(static_cast<float>(rng.uniform(-1.0, 1.0)), static_cast<float>(rng.uniform(-1.0, 1.0)),
+    const octomap::point3d p(static_cast<float>(rng.uniform(-1.0, 1.0)),
+                             static_cast<float>(rng.uniform(-1.0, 1.0)),
                              static_cast<float>(rng.uniform(0.0, 0.3)));
     tree.updateNode(p, rng.below(3) != 0);
     const auto shade = static_cast<std::uint8_t>(rng.below(256));
@@ -277,11 +290,13 @@ TEST_CASE("a coloured tree is read in both its forms, as OctoMap reads it", "[sc
     for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
       const auto key = leaf.getIndexKey();
       if (tree.isNodeOccupied(*leaf))
-        theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768, 1 << (16 - leaf.getDepth()));
+        theirs.emplace_back(key[0] - 32768, key[1] - 32768, key[2] - 32768,
+                            1 << (16 - leaf.getDepth()));
       else
         ++free_leaves;
     }
-    for (const Cell& cell : map.occupied) ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
+    for (const Cell& cell : map.occupied)
+      ours.emplace_back(cell.lo[0], cell.lo[1], cell.lo[2], cell.size);
     CHECK(ours.size() > 100);
     CHECK((ours == theirs));
     CHECK(map.free_leaves == free_leaves);
@@ -299,7 +314,8 @@ TEST_CASE("other trees are refused by name", "[scene][unit]") {
   stamped.write(out);
   std::string bytes = out.str();
   CHECK_THROWS_WITH(map_from_bytes(bytes, "tree.ot"),
-                    "tree.ot: header line 4: tree type 'OcTreeStamped' is not known, expected OcTree or ColorOcTree");
+                    "tree.ot: header line 4: tree type 'OcTreeStamped' is not known, expected "
+                    "OcTree or ColorOcTree");
   bytes.replace(bytes.find("OcTreeStamped"), 13, "SemanticOcTree");
   CHECK_THROWS_WITH(map_from_bytes(bytes, "tree.ot"), Catch::Contains("'SemanticOcTree'"));
 }
@@ -308,8 +324,9 @@ TEST_CASE("a truncation anywhere in a map is refused", "[scene][property]") {
   for (const bool binary : {true, false}) {
     octomap::OcTree tree(0.1);
     for (int i = 0; i < 40; ++i)
-      tree.updateNode(octomap::point3d(0.1F * static_cast<float>(i % 7), 0.2F * static_cast<float>(i), -0.3F),
-                      i % 3 != 0);
+      tree.updateNode(
+          octomap::point3d(0.1F * static_cast<float>(i % 7), 0.2F * static_cast<float>(i), -0.3F),
+          i % 3 != 0);
     tree.updateInnerOccupancy();
     std::ostringstream out;
     binary ? tree.writeBinary(out) : tree.write(out);

@@ -23,18 +23,21 @@ Obstacle example(Shape shape, Rng& rng) {
   o.radius_m = 0.11;
   o.length_m = 0.3;
   o.size_m = {0.2, 0.35, 0.1};
-  o.pose = {Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_direction(rng)).toRotationMatrix(),
-            Vector3d{rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)}};
+  o.pose = {
+      Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_direction(rng)).toRotationMatrix(),
+      Vector3d{rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)}};
   return o;
 }
 
-// Points all over the surface, in the world, some `step` apart.
+// Points all over the surface, in the world, about `step` apart.
 std::vector<Vector3d> surface(const Obstacle& o, double step) {
   std::vector<Vector3d> local;
   const auto grid = [&](double half_u, double half_v, const auto& add) {
-    const int nu = 1 + static_cast<int>(2.0 * half_u / step), nv = 1 + static_cast<int>(2.0 * half_v / step);
+    const int nu = 1 + static_cast<int>(2.0 * half_u / step),
+              nv = 1 + static_cast<int>(2.0 * half_v / step);
     for (int i = 0; i <= nu; ++i)
-      for (int j = 0; j <= nv; ++j) add(-half_u + 2.0 * half_u * i / nu, -half_v + 2.0 * half_v * j / nv);
+      for (int j = 0; j <= nv; ++j)
+        add(-half_u + 2.0 * half_u * i / nu, -half_v + 2.0 * half_v * j / nv);
   };
   const double turn = 2.0 * std::numbers::pi;
   if (o.shape == Shape::box) {
@@ -49,15 +52,17 @@ std::vector<Vector3d> surface(const Obstacle& o, double step) {
     for (int i = 0; i <= n; ++i)
       for (int j = 0; j < n; ++j) {
         const double a = std::numbers::pi * i / n, b = turn * j / n;
-        local.emplace_back(o.radius_m * Vector3d(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a)));
+        local.emplace_back(o.radius_m * Vector3d(std::sin(a) * std::cos(b),
+                                                 std::sin(a) * std::sin(b), std::cos(a)));
       }
   } else {
-    const int n = static_cast<int>(turn * o.radius_m / step), m = static_cast<int>(o.length_m / step),
-              r = static_cast<int>(o.radius_m / step);
+    const int n = static_cast<int>(turn * o.radius_m / step),
+              m = static_cast<int>(o.length_m / step), r = static_cast<int>(o.radius_m / step);
     for (int j = 0; j < n; ++j) {
       const Vector3d radial(std::cos(turn * j / n), std::sin(turn * j / n), 0.0);
       for (int i = 0; i <= m; ++i)
-        local.emplace_back(o.radius_m * radial + o.length_m * (static_cast<double>(i) / m - 0.5) * Vector3d::UnitZ());
+        local.emplace_back(o.radius_m * radial +
+                           o.length_m * (static_cast<double>(i) / m - 0.5) * Vector3d::UnitZ());
       for (int i = 0; i <= r; ++i)
         for (const double side : {-0.5, 0.5})
           local.emplace_back(o.radius_m * i / r * radial + side * o.length_m * Vector3d::UnitZ());
@@ -67,7 +72,7 @@ std::vector<Vector3d> surface(const Obstacle& o, double step) {
   return local;
 }
 
-bool holds(const Obstacle& o, const Vector3d& world) {
+bool contains(const Obstacle& o, const Vector3d& world) {
   const Vector3d p = o.pose.R().transpose() * (world - o.pose.p());
   switch (o.shape) {
     case Shape::sphere:
@@ -96,9 +101,9 @@ TEST_CASE("closest points of primitives agree with their sampled surfaces", "[sc
     double sampled = std::numeric_limits<double>::infinity();
     for (const Vector3d& s : samples) sampled = std::min(sampled, (s - p).norm());
     CAPTURE(i);
-    CHECK((hit.distance < 0.0) == holds(o, p));
+    CHECK((hit.distance < 0.0) == contains(o, p));
     inside += hit.distance < 0.0 ? 1 : 0;
-    // Samples lie on the surface, so they are never nearer, and one is within a step of the nearest point.
+    // Samples lie on the surface, so none is nearer, and one is within a step of the nearest point.
     CHECK(std::abs(hit.distance) <= sampled + 1e-12);
     CHECK(std::abs(hit.distance) >= sampled - step);
     CHECK((p - hit.point - hit.distance * hit.direction).norm() < 1e-12);
@@ -122,9 +127,10 @@ TEST_CASE("the direction is the gradient of the distance", "[scene][property]") 
     for (int axis = 0; axis < 3; ++axis) {
       const Vector3d d = h * Vector3d::Unit(axis);
       gradient[axis] =
-          (closest_on(o, o.pose.p(), p + d).distance - closest_on(o, o.pose.p(), p - d).distance) / (2.0 * h);
+          (closest_on(o, o.pose.p(), p + d).distance - closest_on(o, o.pose.p(), p - d).distance) /
+          (2.0 * h);
     }
-    if (gradient.norm() < 1.0 - 1e-6) continue;  // across a ridge inside
+    if (gradient.norm() < 1.0 - 1e-6) continue;  // at a ridge of the depth
     ++checked;
     CHECK((gradient - hit.direction).norm() < 1e-4);
   }
@@ -142,7 +148,8 @@ TEST_CASE("centres and axes have a defined direction", "[scene][unit]") {
   CHECK(closest_on(o, o.pose.p(), Vector3d::Zero()).direction == Vector3d::UnitX());
 }
 
-TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative", "[scene][unit]") {
+TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative",
+          "[scene][unit]") {
   Obstacle o;
   o.radius_m = 0.06;
   o.pose = {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.5}};
@@ -158,7 +165,7 @@ TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative
   }
 }
 
-TEST_CASE("an obstacle on a line moves while it should, at its speed", "[scene][unit]") {
+TEST_CASE("an obstacle on a line moves in its time span, at its speed", "[scene][unit]") {
   Obstacle o;
   o.radius_m = 0.06;
   o.pose = {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.5}};
@@ -191,11 +198,12 @@ TEST_CASE("what a planner sees depends on time and clearance", "[scene][unit]") 
   CHECK_FALSE(visible(o, 3.0, 0.0));
 }
 
-TEST_CASE("sizes that make no sense are refused by name", "[scene][unit]") {
+TEST_CASE("sizes out of range are refused by name", "[scene][unit]") {
   Obstacle o;
   o.shape = Shape::cylinder;
   o.radius_m = 0.1;
-  CHECK_THROWS_WITH(check(o, "here"), Catch::Matchers::StartsWith("here: ") && Catch::Matchers::Contains("length_m"));
+  CHECK_THROWS_WITH(check(o, "here"),
+                    Catch::Matchers::StartsWith("here: ") && Catch::Matchers::Contains("length_m"));
   o.shape = Shape::box;
   CHECK_THROWS_WITH(check(o, "here"), Catch::Matchers::Contains("size_m"));
   o.shape = Shape::sphere;

@@ -20,7 +20,7 @@ using namespace hamelin;
 using namespace hamelin::scene;
 using Eigen::Vector3d;
 
-// One of everything the format knows.
+// A document with every kind of value of the format.
 Json full_document() {
   return Json::parse(R"({
     "schema": "hamelin.scene/1",
@@ -138,11 +138,11 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.seed == 9007199254740991ULL);
 }
 
-TEST_CASE("what a scene does not name is not modelled, and null says the same", "[scene][unit]") {
+TEST_CASE("what a scene does not name is not modelled, and null means the same", "[scene][unit]") {
   Json document = small_document();
   const Json absent = resolved_json(scene_from_json(document, ".", "x.json"));
-  for (const char* key :
-       {"gravity_m_s2", "start", "goals", "map", "obstacles", "model", "actuation", "planner", "stall"})
+  for (const char* key : {"gravity_m_s2", "start", "goals", "map", "obstacles", "model",
+                          "actuation", "planner", "stall"})
     document[key] = nullptr;
   CHECK(resolved_json(scene_from_json(document, ".", "x.json")) == absent);
   const Scene scene = scene_from_json(document, ".", "x.json");
@@ -156,36 +156,42 @@ TEST_CASE("what a scene does not name is not modelled, and null says the same", 
   CHECK(scene.integrator.name == "hamel-variational");
 }
 
-TEST_CASE("paths of a scene lead through links as the system follows them", "[scene][unit]") {
+TEST_CASE("paths of a scene follow symbolic links as the system does", "[scene][unit]") {
   const test::TemporaryFolder folder;
   const std::filesystem::path& root = folder.path();
   std::filesystem::create_directories(root / "project" / "scenes");
   std::filesystem::create_directory(root / "mine");
   // mine/scenes links to project/scenes, so mine/scenes/../robots is project/robots
   std::filesystem::create_directory_symlink(root / "project" / "scenes", root / "mine" / "scenes");
-  const Json document{{"schema", "hamelin.scene/1"},
-                      {"robot", {{"file", "../robots/a.json"}, {"spheres", "../robots/s.json"}}},
-                      {"map", {{"file", "../maps/m.bt"}, {"changes", {{{"time_s", 1}, {"file", "../maps/c.bt"}}}}}}};
+  const Json document{
+      {"schema", "hamelin.scene/1"},
+      {"robot", {{"file", "../robots/a.json"}, {"spheres", "../robots/s.json"}}},
+      {"map",
+       {{"file", "../maps/m.bt"}, {"changes", {{{"time_s", 1}, {"file", "../maps/c.bt"}}}}}}};
   for (const char* folder : {"robots", "maps"})
-    for (const char* side : {"project", "mine"}) std::filesystem::create_directory(root / side / folder);
+    for (const char* side : {"project", "mine"})
+      std::filesystem::create_directory(root / side / folder);
   for (const char* file : {"robots/a.json", "robots/s.json", "maps/m.bt", "maps/c.bt"})
-    for (const char* side : {"project", "mine"}) write_file_aside(root / side / file, side);
+    for (const char* side : {"project", "mine"}) write_file_atomically(root / side / file, side);
   const Scene scene = scene_from_json(document, root / "mine" / "scenes", "x.json");
   for (const auto& file : input_files(scene)) {
     CAPTURE(file);
     CHECK(read_file(file) == "project");
   }
   CHECK(input_files(scene).size() == 4);
-  CHECK(scene_from_json(document, root / "project" / "scenes", "x.json").map->file == root / "project/maps/m.bt");
+  CHECK(scene_from_json(document, root / "project" / "scenes", "x.json").map->file ==
+        root / "project/maps/m.bt");
 }
 
 TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
   for (const Json& document : {full_document(), small_document()}) {
     const Json resolved = resolved_json(scene_from_json(document, "a/b", "x.json"));
     CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
-    for (const char* key : {"file", "tip", "spheres", "srdf"}) CHECK(resolved["robot"].contains(key));
+    for (const char* key : {"file", "tip", "spheres", "srdf"})
+      CHECK(resolved["robot"].contains(key));
     CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")).dump() == resolved.dump());
-    CHECK(scene_from_json(resolved, ".", "x.json").base == scene_from_json(document, "a/b", "x.json").base);
+    CHECK(scene_from_json(resolved, ".", "x.json").base ==
+          scene_from_json(document, "a/b", "x.json").base);
   }
   // A pose changed by the program is written as it is now.
   Scene scene = scene_from_json(full_document(), ".", "x.json");
@@ -193,7 +199,7 @@ TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
   CHECK(resolved_json(scene)["base"]["quaternion_wxyz"] == Json{1.0, 0.0, 0.0, 0.0});
 }
 
-TEST_CASE("the scenes of data are read", "[scene][unit]") {
+TEST_CASE("the scenes in data are read", "[scene][unit]") {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(test::data / "scenes")) {
     CAPTURE(entry.path());
@@ -205,7 +211,8 @@ TEST_CASE("the scenes of data are read", "[scene][unit]") {
   CHECK(count >= 6);
 }
 
-TEST_CASE("bad scenes are refused in one line that names file, place and what was expected", "[scene][unit]") {
+TEST_CASE("bad scenes are refused in one line that names file, place and what was expected",
+          "[scene][unit]") {
   const auto with = [](const std::string& pointer, const Json& value) {
     Json document = full_document();
     document[Json::json_pointer(pointer)] = value;
@@ -245,8 +252,8 @@ TEST_CASE("bad scenes are refused in one line that names file, place and what wa
       {with("/map/occupancy_threshold", 1), "/map/occupancy_threshold"},
       {with("/map/scale", 0), "/map/scale"},
       {with("/model/joint_damping", "file"), "/model/joint_damping"},
-      {with("/actuation/control_period_s", 0.0015), "whole number"},
-      {with("/actuation/type", "ideal"), "one tick a step"},
+      {with("/actuation/control_period_s", 0.0015), "integer multiple"},
+      {with("/actuation/type", "ideal"), "one tick per step"},
       {with("/planner", Json::object()), "name"},
   };
   for (const auto& [document, expected] : cases) {
@@ -278,8 +285,9 @@ TEST_CASE("a self-filter may be true, false or a padding", "[scene][unit]") {
     document["map"]["self_filter"] = value;
     const Scene scene = scene_from_json(document, ".", "x.json");
     const Json resolved = resolved_json(scene)["map"]["self_filter"];
-    CHECK(resolved ==
-          (scene.map->self_filter_padding_m ? Json{{"padding_m", *scene.map->self_filter_padding_m}} : Json()));
+    CHECK(resolved == (scene.map->self_filter_padding_m
+                           ? Json{{"padding_m", *scene.map->self_filter_padding_m}}
+                           : Json()));
     return scene.map->self_filter_padding_m;
   };
   CHECK(padding(true) == default_self_filter_padding_m);
@@ -293,7 +301,7 @@ TEST_CASE("a self-filter may be true, false or a padding", "[scene][unit]") {
   CHECK(refusal(document).find("'padding_m'") != std::string::npos);
 }
 
-TEST_CASE("set_pointer changes what the schema knows and nothing else", "[scene][unit]") {
+TEST_CASE("set_pointer sets keys that the schema defines and nothing else", "[scene][unit]") {
   Json document = full_document();
   set_pointer(document, "/step_s=0.002");
   set_pointer(document, "/map/unknown=slow");
@@ -314,17 +322,18 @@ TEST_CASE("set_pointer changes what the schema knows and nothing else", "[scene]
   CHECK(scene_from_json(bare, ".", "x.json").planner->name == "apf");
 }
 
-TEST_CASE("set_pointer refuses in one line and leaves the document alone", "[scene][unit]") {
-  const std::vector<std::pair<std::string, std::string>> cases{{"/stepp_s=1", "'step_s'"},
-                                                               {"/map/unknwon=free", "'unknown'"},
-                                                               {"/goals/7/q=[1]", "no element '7'"},
-                                                               {"/goals/x=1", "no element 'x'"},
-                                                               {"/step_s", "=VALUE"},
-                                                               {"step_s=1", "=VALUE"},
-                                                               {"", "=VALUE"},
-                                                               {"/step_s/deep=1", "plain value"},
-                                                               {"/a~2b=1", "pointer"},
-                                                               {"/obstacles/0/motion/speed=1", "speed"}};
+TEST_CASE("set_pointer refuses in one line and leaves the document unchanged", "[scene][unit]") {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"/stepp_s=1", "'step_s'"},
+      {"/map/unknwon=free", "'unknown'"},
+      {"/goals/7/q=[1]", "no element '7'"},
+      {"/goals/x=1", "no element 'x'"},
+      {"/step_s", "=VALUE"},
+      {"step_s=1", "=VALUE"},
+      {"", "=VALUE"},
+      {"/step_s/deep=1", "plain value"},
+      {"/a~2b=1", "pointer"},
+      {"/obstacles/0/motion/speed=1", "speed"}};
   for (const auto& [assignment, expected] : cases) {
     const std::string message = set_refusal(assignment);
     CAPTURE(message, expected);
@@ -336,7 +345,8 @@ TEST_CASE("set_pointer refuses in one line and leaves the document alone", "[sce
 
 TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[scene][unit]") {
   Json document = small_document();
-  document["goals"] = {{{"type", "path"}, {"q", {{0.1, 0.2}, {0.3, 0.4}, {0.5, 0.75}}}, {"tolerance_rad", 0.1}}};
+  document["goals"] = {
+      {{"type", "path"}, {"q", {{0.1, 0.2}, {0.3, 0.4}, {0.5, 0.75}}}, {"tolerance_rad", 0.1}}};
   const Scene scene = scene_from_json(document, ".", "x.json");
   const Goal& goal = scene.goals.at(0);
   CHECK(goal.type == GoalType::joint);
@@ -360,15 +370,18 @@ TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[sce
     }
     return "no error";
   };
-  CHECK_THAT(refusal({{"type", "path"}, {"q", Json::array()}}), Catch::Contains("/goals/0/q: is empty"));
-  CHECK_THAT(refusal({{"type", "path"}, {"q", {0.1, 0.2}}}), Catch::Contains("/goals/0/q/0: expected a way-point"));
+  CHECK_THAT(refusal({{"type", "path"}, {"q", Json::array()}}),
+             Catch::Contains("/goals/0/q: is empty"));
+  CHECK_THAT(refusal({{"type", "path"}, {"q", {0.1, 0.2}}}),
+             Catch::Contains("/goals/0/q/0: expected a way-point"));
   CHECK_THAT(refusal({{"type", "path"}, {"q", {{0.1, 0.2}, {0.3}}}}),
-             Catch::Contains("/goals/0/q/1: 1 numbers given, expected 2"));
-  CHECK_THAT(refusal({{"type", "joint"}, {"q", {{0.1, 0.2}}}}), Catch::Contains("/goals/0/q/0: is a list"));
+             Catch::Contains("/goals/0/q/1: 1 values given, expected 2"));
+  CHECK_THAT(refusal({{"type", "joint"}, {"q", {{0.1, 0.2}}}}),
+             Catch::Contains("/goals/0/q/0: is a list"));
   CHECK_THAT(refusal({{"type", "path"}}), Catch::Contains("/goals/0/q: is missing"));
 }
 
-TEST_CASE("a tip's largest speed at its goal is read, and read back", "[scene][unit]") {
+TEST_CASE("the largest tip speed at a goal is read, and read back", "[scene][unit]") {
   Json document = full_document();
   document["goals"][1]["tip_speed_max_m_s"] = 0.05;
   document["goals"][2]["tip_speed_max_m_s"] = nullptr;
@@ -382,18 +395,21 @@ TEST_CASE("a tip's largest speed at its goal is read, and read back", "[scene][u
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
 }
 
-TEST_CASE("friction and a torque's rate are read, and read back", "[scene][unit]") {
+TEST_CASE("friction and the torque rate limit are read, and read back", "[scene][unit]") {
   Json document = small_document();
-  document["actuation"] = {{"type", "sampled"}, {"torque_rate_max_Nm_s", 1000.0}, {"coulomb_friction_share", 0.05}};
+  document["actuation"] = {
+      {"type", "sampled"}, {"torque_rate_max_Nm_s", 1000.0}, {"coulomb_friction_share", 0.05}};
   const Scene scene = scene_from_json(document, ".", "x.json");
   CHECK(scene.actuation.torque_rate_max_Nm_s == 1000.0);
   CHECK(scene.actuation.coulomb_friction_share == 0.05);
   const Json resolved = resolved_json(scene);
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
   document["actuation"]["coulomb_friction_share"] = 1.5;
-  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("coulomb_friction_share"));
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
+                    Catch::Matchers::Contains("coulomb_friction_share"));
   document["actuation"] = {{"torque_rate_max_Nm_s", 1000.0}};
-  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("torque_rate_max_Nm_s"));
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
+                    Catch::Matchers::Contains("torque_rate_max_Nm_s"));
 }
 
 TEST_CASE("dry friction and rotor inertia are read, and read back", "[scene][unit]") {
@@ -412,9 +428,13 @@ TEST_CASE("dry friction and rotor inertia are read, and read back", "[scene][uni
   document["model"] = {{"friction", "robot"}, {"armature", 0}};
   CHECK(scene_from_json(document, ".", "x.json").model.friction.from_robot);
   CHECK_FALSE(scene_from_json(document, ".", "x.json").model.armature.from_robot);
-  for (const auto& [key, bad] : std::vector<std::pair<std::string, Json>>{
-           {"friction", -1.0}, {"friction", "file"}, {"friction_speed", 0.0}, {"armature", {0.1, -0.1}}}) {
+  for (const auto& [key, bad] :
+       std::vector<std::pair<std::string, Json>>{{"friction", -1.0},
+                                                 {"friction", "file"},
+                                                 {"friction_speed", 0.0},
+                                                 {"armature", {0.1, -0.1}}}) {
     document["model"] = {{key, bad}};
-    CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"), Catch::Matchers::Contains("/model/" + key));
+    CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
+                      Catch::Matchers::Contains("/model/" + key));
   }
 }

@@ -26,34 +26,37 @@ struct Named {
   double radius;
 };
 
-// All spheres in the world, by the product of exponentials over the robot's own numbers.
-std::vector<Named> placed(const model::Robot& robot, const geometry::SE3& base, const Eigen::VectorXd& q) {
+// All spheres in the world, by the product of exponentials over the robot's screws.
+std::vector<Named> placed(const model::Robot& robot, const geometry::SE3& base,
+                          const Eigen::VectorXd& q) {
   std::vector<Named> spheres;
   geometry::SE3 moved = base;
   for (int i = 0; i < robot.dof(); ++i) {
     const auto& link = robot.links[static_cast<std::size_t>(i)];
     moved = moved * geometry::SE3::exp(link.joint.screw * q[i]);
     for (const auto& sphere : link.spheres)
-      spheres.push_back(
-          {sphere.part.empty() ? link.name : sphere.part, i, moved * (link.com * sphere.center_m), sphere.radius_m});
+      spheres.push_back({sphere.part.empty() ? link.name : sphere.part, i,
+                         moved * (link.com * sphere.center_m), sphere.radius_m});
   }
   for (const auto& sphere : robot.base_spheres)
     spheres.push_back({sphere.part, -1, base * sphere.center_m, sphere.radius_m});
   return spheres;
 }
 
-// Smallest distance of every pair of parts that may collide, by name.
-std::map<std::pair<std::string, std::string>, double> brute_force(const model::Robot& robot,
-                                                                  const std::vector<Named>& spheres) {
+// Smallest distance of each pair of parts that is checked, by name.
+std::map<std::pair<std::string, std::string>, double> brute_force(
+    const model::Robot& robot, const std::vector<Named>& spheres) {
   std::map<std::pair<std::string, std::string>, double> nearest;
   for (const auto& x : spheres)
     for (const auto& y : spheres) {
       if (x.body == y.body || !(x.part < y.part)) continue;
-      const bool disabled = std::any_of(
-          robot.self_collision_disabled.begin(), robot.self_collision_disabled.end(), [&](const auto& pair) {
-            return (pair.first == x.part && pair.second == y.part) || (pair.first == y.part && pair.second == x.part);
-          });
-      if (disabled || (robot.self_collision_disabled.empty() && std::abs(x.body - y.body) == 1)) continue;
+      const bool disabled = std::any_of(robot.self_collision_disabled.begin(),
+                                        robot.self_collision_disabled.end(), [&](const auto& pair) {
+                                          return (pair.first == x.part && pair.second == y.part) ||
+                                                 (pair.first == y.part && pair.second == x.part);
+                                        });
+      if (disabled || (robot.self_collision_disabled.empty() && std::abs(x.body - y.body) == 1))
+        continue;
       const double distance = (x.center - y.center).norm() - x.radius - y.radius;
       const auto [at, is_new] = nearest.emplace(std::make_pair(x.part, y.part), distance);
       if (!is_new) at->second = std::min(at->second, distance);
@@ -79,8 +82,9 @@ std::pair<std::string, std::string> names(const SelfField& field, std::size_t pa
 }
 
 void check_against_brute_force(const model::Robot& robot) {
-  const geometry::SE3 base(Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
-                           Vector3d(0.3, -0.2, 0.5));
+  const geometry::SE3 base(
+      Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+      Vector3d(0.3, -0.2, 0.5));
   const model::Model model(robot, base);
   const SelfField field(model);
   dynamics::Workspace ws(model);
@@ -105,21 +109,25 @@ void check_against_brute_force(const model::Robot& robot) {
       const auto pair = static_cast<std::size_t>(contact.pair);
       CHECK(contact.distance == Approx(expected.at(names(field, pair))).margin(1e-12));
       CHECK(field.distance(pair, {centers}, limit) == contact.distance);
-      // the points lie on the named spheres, that distance apart along the direction
+      // the points lie on the named spheres, at that distance along the direction
       const auto a = static_cast<std::size_t>(contact.sphere_a);
       CHECK((contact.point_a - centers[a]).norm() == Approx(model.shapes()[a].radius));
-      CHECK((contact.point_b + contact.distance * contact.direction - contact.point_a).norm() < 1e-12);
+      CHECK((contact.point_b + contact.distance * contact.direction - contact.point_a).norm() <
+            1e-12);
       const int body_b = field.parts()[static_cast<std::size_t>(field.pairs()[pair].part_b)].body;
       CHECK((contact.sphere_b == SelfContact::base) == (body_b < 0));
-      if (body_b >= 0) CHECK(model.shapes()[static_cast<std::size_t>(contact.sphere_b)].link == body_b);
+      if (body_b >= 0)
+        CHECK(model.shapes()[static_cast<std::size_t>(contact.sphere_b)].link == body_b);
       touching += contact.distance <= 0.0 ? 1 : 0;
     }
     near += found;
     // a short list keeps the nearest, in order
     if (found < 3) continue;
-    std::vector<SelfContact> few(2), all(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found));
+    std::vector<SelfContact> few(2),
+        all(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(found));
     CHECK(field.closest({centers}, limit, few) == found);
-    std::stable_sort(all.begin(), all.end(), [](const auto& x, const auto& y) { return x.distance < y.distance; });
+    std::stable_sort(all.begin(), all.end(),
+                     [](const auto& x, const auto& y) { return x.distance < y.distance; });
     CHECK(few[0].pair < few[1].pair);
     CHECK(std::min(few[0].distance, few[1].distance) == all[0].distance);
     CHECK(std::max(few[0].distance, few[1].distance) == all[1].distance);
@@ -130,11 +138,13 @@ void check_against_brute_force(const model::Robot& robot) {
 
 }  // namespace
 
-TEST_CASE("distances of the arm to itself are those of all sphere pairs, the Panda with its base and hand",
-          "[scene][self]") {
+TEST_CASE(
+    "distances of the arm to itself are those of all sphere pairs, the Panda with its base and "
+    "hand",
+    "[scene][self]") {
   const fs::path robots = test::third_party_robots;
-  const model::Robot robot =
-      description::read_robot(robots / "panda.urdf", {"panda_grasptarget", robots / "panda_spheres.json"});
+  const model::Robot robot = description::read_robot(
+      robots / "panda.urdf", {"panda_grasptarget", robots / "panda_spheres.json"});
   check_against_brute_force(robot);
   const SelfField field{model::Model(robot)};
   CHECK(field.note().empty());
@@ -151,8 +161,9 @@ TEST_CASE("distances of the arm to itself are those of all sphere pairs, the Pan
   CHECK(base == 1);
 }
 
-TEST_CASE("a robot that lists no disabled pairs is checked but for neighbouring links, which is said",
-          "[scene][self]") {
+TEST_CASE(
+    "a robot that lists no disabled pairs is checked except for neighbouring links, with a note",
+    "[scene][self]") {
   const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
   const model::Robot robot =
       description::read_robot(robots / "arm7.urdf", {std::nullopt, robots / "arm7.spheres.json"});

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using namespace hamelin;
 using namespace hamelin::scene;
 
-// The least of a function that is convex on [0, 1], by sections; an independent way to what closest_on does.
+// The minimum of a convex function on [0, 1] by interval sections, independent of closest_on.
 template <class F>
 double least(F&& f) {
   double low = 0.0, high = 1.0;
@@ -49,7 +49,7 @@ Obstacle random_obstacle(Rng& rng, Shape shape) {
   return o;
 }
 
-/// Two links, a capsule and a sphere on each, on a base with a capsule.
+/// Two links with a capsule and a sphere each, on a base with a capsule.
 model::Robot two_links() {
   model::Robot robot = test::random_robot(5, 2);
   for (auto& link : robot.links) {
@@ -62,7 +62,8 @@ model::Robot two_links() {
 
 }  // namespace
 
-TEST_CASE("an obstacle's distance from a segment is the least of its points'", "[scene][unit]") {
+TEST_CASE("an obstacle's distance from a segment is the least distance of its points",
+          "[scene][unit]") {
   Rng rng(3);
   for (const Shape shape : {Shape::sphere, Shape::box, Shape::cylinder})
     for (int i = 0; i < 2000; ++i) {
@@ -71,17 +72,20 @@ TEST_CASE("an obstacle's distance from a segment is the least of its points'", "
       const Vector3d a = center + test::random_vector(rng, 0.7);
       // some short, some along an axis of the obstacle, some through its centre
       Vector3d b = a + std::pow(10.0, rng.uniform(-9.0, 0.0)) * test::random_direction(rng);
-      if (i % 4 == 1) b = a + rng.uniform(-1.0, 1.0) * o.pose.R().col(static_cast<Eigen::Index>(rng.below(3)));
+      if (i % 4 == 1)
+        b = a + rng.uniform(-1.0, 1.0) * o.pose.R().col(static_cast<Eigen::Index>(rng.below(3)));
       if (i % 4 == 2) b = 2.0 * center - a;
       CAPTURE(to_string(shape), i);
-      const double expected = least([&](double t) { return closest_on(o, center, a + t * (b - a)).distance; });
+      const double expected =
+          least([&](double t) { return closest_on(o, center, a + t * (b - a)).distance; });
       const AxisPoint hit = closest_on(o, center, a, b);
-      // sections stop where rounding hides the slope: the answer may be that much less
+      // sections stop where rounding hides the slope, so the result may be slightly less
       REQUIRE(hit.distance <= expected + 1e-12);
       REQUIRE(hit.distance >= expected - 1e-9);
-      // it is what its axis point says, and that lies on the segment
+      // the axis point has that distance and lies on the segment
       CHECK(std::abs(closest_on(o, center, hit.axis_point).distance - hit.distance) < 1e-12);
-      const double t = (b - a).norm() > 0.0 ? (hit.axis_point - a).dot(b - a) / (b - a).squaredNorm() : 0.0;
+      const double t =
+          (b - a).norm() > 0.0 ? (hit.axis_point - a).dot(b - a) / (b - a).squaredNorm() : 0.0;
       CHECK((t > -1e-6 && t < 1.0 + 1e-6));
       CHECK((a + t * (b - a) - hit.axis_point).norm() < 1e-12);
       CHECK((hit.point + hit.distance * hit.direction - hit.axis_point).norm() < 1e-12);
@@ -89,7 +93,8 @@ TEST_CASE("an obstacle's distance from a segment is the least of its points'", "
     }
 }
 
-TEST_CASE("two segments' nearest points are found, parallel, crossing and degenerate ones too", "[scene][unit]") {
+TEST_CASE("two segments' nearest points are found, parallel, crossing and degenerate ones too",
+          "[scene][unit]") {
   Rng rng(8);
   for (int i = 0; i < 4000; ++i) {
     const Vector3d c = test::random_vector(rng), h = test::random_vector(rng, 0.5);
@@ -119,7 +124,8 @@ TEST_CASE("two segments' nearest points are found, parallel, crossing and degene
     const auto at = [&](double u, double w) { return (c + u * h - d - w * g).squaredNorm(); };
     const double expected = std::sqrt(least([&](double t) {
       const Vector3d p = c + (2.0 * t - 1.0) * h - d;
-      const double w = g.squaredNorm() > 0.0 ? std::clamp(p.dot(g) / g.squaredNorm(), -1.0, 1.0) : 0.0;
+      const double w =
+          g.squaredNorm() > 0.0 ? std::clamp(p.dot(g) / g.squaredNorm(), -1.0, 1.0) : 0.0;
       return at(2.0 * t - 1.0, w);
     }));
     const AxisPair on = nearest_on_axes(c, h, d, g);
@@ -127,19 +133,20 @@ TEST_CASE("two segments' nearest points are found, parallel, crossing and degene
     REQUIRE(std::abs(on.on_b) <= 1.0);
     const double found = std::sqrt(at(on.on_a, on.on_b));
     REQUIRE(found <= expected + 1e-8);
-    REQUIRE(found >= expected - 1e-7);  // sections find a zero only to the root of their rounding
+    REQUIRE(found >= expected - 1e-7);  // sections find a zero only to the square root of rounding
   }
-  const AxisPair points = nearest_on_axes(Vector3d::Zero(), Vector3d::Zero(), Vector3d::Ones(), Vector3d::Zero());
+  const AxisPair points =
+      nearest_on_axes(Vector3d::Zero(), Vector3d::Zero(), Vector3d::Ones(), Vector3d::Zero());
   CHECK(points.on_a == 0.0);
   CHECK(points.on_b == 0.0);
 }
 
-TEST_CASE("shapes come link by link, spheres first, and lines are none", "[scene][unit]") {
+TEST_CASE("shapes are ordered by link, spheres first, and lines are not shapes", "[scene][unit]") {
   const model::Model model(two_links());
   REQUIRE(model.shapes().size() == 4);
   CHECK(model.has_capsules());
-  CHECK(model.words(model.shapes()[1]) == "capsule 0 of link 'link0'");
-  CHECK(model.words(model.shapes()[2]) == "sphere 0 of link 'link1'");
+  CHECK(model.describe(model.shapes()[1]) == "capsule 0 of link 'link0'");
+  CHECK(model.describe(model.shapes()[2]) == "sphere 0 of link 'link1'");
   dynamics::Workspace ws(model);
   PlacedShapes arm(model);
   const Eigen::Vector2d q(0.4, -0.9);
@@ -150,28 +157,34 @@ TEST_CASE("shapes come link by link, spheres first, and lines are none", "[scene
     const auto& link = model.robot().links[static_cast<std::size_t>(shape.link)];
     CHECK(arm.view().is_capsule(i) == (i % 2 == 1));
     if (i % 2 == 0) {
-      CHECK((arm.view().centers[i] - dynamics::point_position(model, ws, shape.link, link.spheres[0].center_m)).norm() <
-            1e-14);
+      CHECK((arm.view().centers[i] -
+             dynamics::point_position(model, ws, shape.link, link.spheres[0].center_m))
+                .norm() < 1e-14);
       continue;
     }
-    CHECK((arm.view().from(i) - dynamics::point_position(model, ws, shape.link, link.segments[0].from_m)).norm() <
-          1e-14);
-    CHECK((arm.view().to(i) - dynamics::point_position(model, ws, shape.link, link.segments[0].to_m)).norm() < 1e-14);
+    CHECK((arm.view().from(i) -
+           dynamics::point_position(model, ws, shape.link, link.segments[0].from_m))
+              .norm() < 1e-14);
+    CHECK(
+        (arm.view().to(i) - dynamics::point_position(model, ws, shape.link, link.segments[0].to_m))
+            .norm() < 1e-14);
     CHECK(arm.view().radii[i] == 0.03);
   }
-  // an arm of spheres has no axes at all
+  // an arm of spheres has no axes
   CHECK(PlacedShapes(model::Model(test::random_robot(5, 2))).view().half_axes.empty());
 }
 
 TEST_CASE("a capsule is as near to obstacles as the nearest sphere along it", "[scene][unit]") {
   Rng rng(21);
-  std::vector<Obstacle> obstacles{random_obstacle(rng, Shape::sphere), random_obstacle(rng, Shape::box),
+  std::vector<Obstacle> obstacles{random_obstacle(rng, Shape::sphere),
+                                  random_obstacle(rng, Shape::box),
                                   random_obstacle(rng, Shape::cylinder)};
   const Environment environment(std::nullopt, obstacles, geometry::SE3{}, 2.0, 1.0);
   Environment::Scratch scratch(environment, 1);
   std::vector<Contact> out(environment.contacts_max(1));
   for (int i = 0; i < 300; ++i) {
-    const std::vector<Vector3d> center{test::random_vector(rng, 0.6)}, half{test::random_vector(rng, 0.3)};
+    const std::vector<Vector3d> center{test::random_vector(rng, 0.6)},
+        half{test::random_vector(rng, 0.3)};
     const std::vector<double> radius{rng.uniform(0.01, 0.1)};
     const Shapes capsule{center, radius, half};
     double nearest = infinity;
@@ -189,16 +202,20 @@ TEST_CASE("a capsule is as near to obstacles as the nearest sphere along it", "[
     CHECK(out[0].distance == clearance);
     for (std::size_t k = 0; k < count; ++k) {
       const Contact& c = out[k];
-      // the arm's point is on the capsule, that far from the obstacle's along the direction
+      // the arm's point is on the capsule, at that distance from the obstacle's point along the
+      // direction
       const Vector3d on_axis = c.arm_point + radius[0] * c.direction;
-      const double t = std::clamp((on_axis - center[0]).dot(half[0]) / half[0].squaredNorm(), -1.0, 1.0);
+      const double t =
+          std::clamp((on_axis - center[0]).dot(half[0]) / half[0].squaredNorm(), -1.0, 1.0);
       CHECK((center[0] + t * half[0] - on_axis).norm() < 1e-12);
       CHECK((c.obstacle_point + c.distance * c.direction - c.arm_point).norm() < 1e-12);
     }
-    // moved along its nearest contact's way out, it is farther by as much
+    // a shift along the direction of its nearest contact increases the clearance by the length of
+    // the shift
     const std::vector<Vector3d> moved{center[0] + 1e-6 * out[0].direction};
     if (out[0].distance > 0.0 && out[0].distance + 1e-4 < out[1].distance)
-      CHECK(environment.clearance({moved, radius, half}, 0.0, infinity) - clearance == Approx(1e-6).epsilon(1e-3));
+      CHECK(environment.clearance({moved, radius, half}, 0.0, infinity) - clearance ==
+            Approx(1e-6).epsilon(1e-3));
   }
 }
 
@@ -219,7 +236,8 @@ TEST_CASE("a capsule along a wall has contacts at both its ends", "[scene][unit]
   CHECK(out[1].direction.isApprox(Vector3d::UnitY(), 1e-12));
 }
 
-TEST_CASE("parts with capsules are as far apart as the nearest spheres along them", "[scene][self]") {
+TEST_CASE("parts with capsules are as far apart as the nearest spheres along them",
+          "[scene][self]") {
   model::Robot robot = two_links();
   for (auto& link : robot.links) link.spheres.clear();
   robot.links[1].segments[0].part = "tool";
@@ -227,7 +245,7 @@ TEST_CASE("parts with capsules are as far apart as the nearest spheres along the
   const model::Model model(std::move(robot));
   const SelfField field(model);
   REQUIRE(field.pairs().size() == 2);  // either link's capsule and the pedestal
-  CHECK(field.words(1) == "'tool' and 'pedestal'");
+  CHECK(field.describe(1) == "'tool' and 'pedestal'");
   dynamics::Workspace ws(model);
   PlacedShapes arm(model);
   Rng rng(2);
@@ -243,7 +261,7 @@ TEST_CASE("parts with capsules are as far apart as the nearest spheres along the
       for (int a = -parts; a <= parts; ++a)
         for (int b = -parts; b <= parts; b += parts / 20) {
           const Vector3d p = shapes.centers[k] + (1.0 * a / parts) * shapes.half_axes[k];
-          // the pedestal stands upright: its nearest height is known
+          // the pedestal is upright, so the nearest height is known
           const Vector3d on_pedestal{0.0, 0.0, std::clamp(p.z(), -0.2, 0.2)};
           expected = std::min(expected, (p - on_pedestal).norm() - 0.08);
         }

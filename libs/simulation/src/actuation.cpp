@@ -20,21 +20,25 @@ using Eigen::VectorXd;
 
 control::TorqueLimits torque_limits(const scene::Scene& scene, const model::Model& model) {
   return {model,
-          scene.model.torque_limits ? control::joint_limits(model.robot(), &model::Joint::effort_max, infinity)
-                                    : VectorXd(),
+          scene.model.torque_limits
+              ? control::joint_limits(model.robot(), &model::Joint::effort_max, infinity)
+              : VectorXd(),
           scene.actuation.torque_rate_max_Nm_s};
 }
 
-/// Each channel acts as it is: the potential as half-kicks at both nodes of a step, damping and gyroscopic terms at the
-/// step's own velocity, the node velocity at once.
+/// Each channel acts directly: the potential as half-kicks at both nodes of a step, damping and
+/// gyroscopic terms at the step's own velocity, the node velocity at once: docs/theory.md
+/// (8.1)–(8.3).
 class IdealActuation final : public Actuation {
  public:
   IdealActuation(const scene::Scene& scene, const model::Model& model)
       : step_s_(scene.step_s), limits_(torque_limits(scene, model)) {
-    gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ = VectorXd::Zero(model.dof());
+    gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ =
+        VectorXd::Zero(model.dof());
   }
 
-  // The closing half-kick of the last step is made with the gradient before; book() makes it good.
+  // The closing half-kick of the last step uses the previous gradient; book() corrects it,
+  // docs/theory.md (8.4).
   void reach_node(SimulatedArm& arm) override {
     if (kicked_) {
       impulse_ = -0.5 * step_s_ * gradient_before_;
@@ -45,7 +49,8 @@ class IdealActuation final : public Actuation {
 
   bool asks_planner(long) const override { return true; }
 
-  void book(SimulatedArm& arm, const planning::CommandBuffers& answer, EnergyAudit& audit) override {
+  void book(SimulatedArm& arm, const planning::CommandBuffers& answer,
+            EnergyAudit& audit) override {
     gradient_ = answer.potential_gradient();
     if (kicked_) {
       impulse_ = 0.5 * step_s_ * (gradient_before_ - gradient_);
@@ -56,7 +61,8 @@ class IdealActuation final : public Actuation {
     audit.book_node(arm, answer.raw().potential_J);
   }
 
-  void act(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd&, EnergyAudit& audit) override {
+  void apply(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd&,
+             EnergyAudit& audit) override {
     auto& channels = arm.channels;
     channels.held_torque = answer.held_torque();
     channels.damping = answer.damping();
@@ -82,7 +88,8 @@ class IdealActuation final : public Actuation {
     return departure_;
   }
 
-  void torques(SimulatedArm& arm, const planning::CommandBuffers& answer, VectorXd& sum, Json& by_channel) override {
+  void torques(SimulatedArm& arm, const planning::CommandBuffers& answer, VectorXd& sum,
+               Json& by_channel) override {
     sum = arm.channels.held_torque;
     if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
     const auto add = [&](const char* channel, const VectorXd& torque) {
@@ -92,11 +99,12 @@ class IdealActuation final : public Actuation {
     if (!gradient_.isZero(0.0)) add("potential", -gradient_);
     if (!answer.damping().isZero(0.0)) add("damping", -answer.damping().cwiseProduct(arm.v));
     if (!arm.channels.gyroscopic.empty()) {
-      dynamics::gyroscopic_torque(arm.model, arm.ws, arm.state.q, arm.v, arm.channels.gyroscopic, impulse_);
+      dynamics::gyroscopic_torque(arm.model, arm.ws, arm.state.q, arm.v, arm.channels.gyroscopic,
+                                  impulse_);
       add("gyroscopic", impulse_);
     }
     if (answer.raw().has_node_velocity != 0) {
-      // what would bring the node's change of velocity about within one step: M (x − v) / h
+      // The torque that would make the node's change of velocity within one step: M (x − v) / h.
       departure_ = (node_velocity_ - arm.v) / step_s_;
       dynamics::momentum(arm.model, arm.ws, arm.state.q, departure_, impulse_);
       add("node", impulse_);
@@ -111,10 +119,11 @@ class IdealActuation final : public Actuation {
     return answer.raw().potential_J != 0.0 || !gradient_.isZero(0.0);
   }
 
-  void set_node_velocity(SimulatedArm& arm, const planning::CommandBuffers& answer, EnergyAudit& audit) {
+  void set_node_velocity(SimulatedArm& arm, const planning::CommandBuffers& answer,
+                         EnergyAudit& audit) {
     departure_ = answer.node_velocity() - arm.v;
-    const double share =
-        limits_.share_of_velocity_change(arm.ws, arm.state.q, departure_, step_s_, arm.channels.held_torque);
+    const double share = limits_.share_of_velocity_change(arm.ws, arm.state.q, departure_, step_s_,
+                                                          arm.channels.held_torque);
     if (share < 1.0) {
       saturated_ = true;
       node_velocity_ += share * departure_;
@@ -129,22 +138,23 @@ class IdealActuation final : public Actuation {
   double step_s_;
   control::TorqueLimits limits_;
   VectorXd gradient_, gradient_before_, impulse_, departure_;
-  VectorXd node_velocity_;  ///< what the node's velocity really becomes
-  bool kicked_ = false;     ///< a closing half-kick is owed
+  VectorXd node_velocity_;  ///< the node's velocity after limits
+  bool kicked_ = false;     ///< whether a closing half-kick is due
   bool saturated_ = false;
 };
 
-/// What a sampled controller can do: one torque, made of all channels at the tick, held over the control period, late.
+/// A sampled controller: one torque, made of all channels at the tick, held over the control period
+/// and delayed: docs/theory.md (8.7).
 class SampledActuation final : public Actuation {
  public:
-  SampledActuation(const scene::Scene& scene, SimulatedArm& arm, long period_steps, long delay_periods,
-                   std::size_t gyroscopic_terms)
+  SampledActuation(const scene::Scene& scene, SimulatedArm& arm, long period_steps,
+                   long delay_periods, std::size_t gyroscopic_terms)
       : period_steps_(period_steps),
         period_s_(static_cast<double>(period_steps) * scene.step_s),
         mass_scale_(scene.actuation.planner_mass_scale),
         limits_(torque_limits(scene, arm.model)),
         channels_(arm.model, gyroscopic_terms) {
-    // until the first torque arrives the arm is held against gravity
+    // Until the first torque arrives the arm is held against gravity.
     VectorXd torque = VectorXd::Zero(arm.model.dof());
     dynamics::gravity_torque(arm.model, arm.ws, arm.state.q, torque);
     limits_.start_from(torque);
@@ -158,22 +168,23 @@ class SampledActuation final : public Actuation {
     audit.book_node(arm, 0.0);
   }
 
-  void act(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd& q_measured,
-           EnergyAudit& audit) override {
+  void apply(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd& q_measured,
+             EnergyAudit& audit) override {
     if (!asks_planner(arm.state.k)) return;
     const long tick = arm.state.k / period_steps_;
     VectorXd& torque = slot(tick);
     channels_.sum(arm.ws, answer, arm.state.q, arm.v, q_measured, period_s_, mass_scale_, torque);
     if (answer.raw().has_node_velocity != 0) audit.book_filter(answer.raw());
     saturated_ = limits_.limit(torque, period_s_);
-    // the slot written delay ticks ago is the next one round
+    // The next slot of the ring was written `delay` ticks ago.
     arm.channels.held_torque = slot(tick + 1);
   }
 
   bool needs_answer_at_end() const override { return false; }
   const VectorXd& departure_velocity(SimulatedArm& arm) override { return arm.v; }
 
-  void torques(SimulatedArm& arm, const planning::CommandBuffers&, VectorXd& sum, Json& by_channel) override {
+  void torques(SimulatedArm& arm, const planning::CommandBuffers&, VectorXd& sum,
+               Json& by_channel) override {
     sum = arm.channels.held_torque;
     if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
   }
@@ -192,11 +203,12 @@ class SampledActuation final : public Actuation {
   bool saturated_ = false;
 };
 
-long whole_multiple(double value, double unit, const std::string& where, const char* what) {
+long integer_multiple(double value, double unit, const std::string& where, const char* what) {
   const double count = std::round(value / unit);
   if (std::abs(value / unit - count) > 1e-9 * std::max(1.0, count))
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: /actuation/{}: {} s is no whole number of {} s", where, what, value, unit));
+                fmt::format("{}: /actuation/{}: {} s is not an integer multiple of {} s", where,
+                            what, value, unit));
   return static_cast<long>(count);
 }
 
@@ -204,13 +216,17 @@ long whole_multiple(double value, double unit, const std::string& where, const c
 
 long steps_per_tick(const scene::Scene& scene) {
   if (scene.actuation.type == scene::ActuationType::ideal) return 1;
-  return std::max(1L, whole_multiple(scene.actuation.control_period_s, scene.step_s, scene.name, "control_period_s"));
+  return std::max(1L, integer_multiple(scene.actuation.control_period_s, scene.step_s, scene.name,
+                                       "control_period_s"));
 }
 
-std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm, std::size_t gyroscopic_terms) {
-  if (scene.actuation.type == scene::ActuationType::ideal) return std::make_unique<IdealActuation>(scene, arm.model);
+std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm,
+                                          std::size_t gyroscopic_terms) {
+  if (scene.actuation.type == scene::ActuationType::ideal)
+    return std::make_unique<IdealActuation>(scene, arm.model);
   const long period_steps = steps_per_tick(scene);
-  const long delay = whole_multiple(scene.actuation.delay_s, scene.actuation.control_period_s, scene.name, "delay_s");
+  const long delay = integer_multiple(scene.actuation.delay_s, scene.actuation.control_period_s,
+                                      scene.name, "delay_s");
   return std::make_unique<SampledActuation>(scene, arm, period_steps, delay, gyroscopic_terms);
 }
 

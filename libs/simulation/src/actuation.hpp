@@ -11,7 +11,7 @@
 
 namespace hamelin::simulation {
 
-/// How a planner's answers become motion.
+/// How a planner's commands become motion.
 class Actuation {
  public:
   Actuation() = default;
@@ -19,33 +19,35 @@ class Actuation {
   Actuation& operator=(const Actuation&) = delete;
   virtual ~Actuation() = default;
 
-  /// The arm's velocity at a node, into arm.v, with what is known before the planner is asked.
+  /// Computes the arm's velocity at a node, into arm.v, before the planner is called.
   virtual void reach_node(SimulatedArm& arm) = 0;
-  /// Whether the planner is asked at node k.
+  /// Whether the planner is called at node k.
   [[nodiscard]] virtual bool asks_planner(long k) const = 0;
-  /// Books the node's energies with the planner's answer there.
-  virtual void book(SimulatedArm& arm, const planning::CommandBuffers& answer, EnergyAudit& audit) = 0;
-  /// Puts the answer into the channels and the state; it acts until the next node.
-  /// @param q_measured where the planner saw the arm
-  virtual void act(SimulatedArm& arm, const planning::CommandBuffers& answer, const Eigen::VectorXd& q_measured,
-                   EnergyAudit& audit) = 0;
-  /// Whether the last node's account needs one more answer of the planner.
+  /// Books the node's energies with the planner's answer at the node.
+  virtual void book(SimulatedArm& arm, const planning::CommandBuffers& answer,
+                    EnergyAudit& audit) = 0;
+  /// Puts the answer into the channels and the state. It acts until the next node.
+  /// @param q_measured joint positions that the planner was given
+  virtual void apply(SimulatedArm& arm, const planning::CommandBuffers& answer,
+                     const Eigen::VectorXd& q_measured, EnergyAudit& audit) = 0;
+  /// Whether the account of the last node needs one more answer of the planner.
   [[nodiscard]] virtual bool needs_answer_at_end() const = 0;
   /// Velocity with which the motion leaves the node.
   [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity(SimulatedArm& arm) = 0;
   /// Torque of each channel that acts from this node on, and their sum, for the log.
-  virtual void torques(SimulatedArm& arm, const planning::CommandBuffers& answer, Eigen::VectorXd& sum,
-                       Json& channels) = 0;
-  /// Whether a limit cut the answer that acts now.
+  virtual void torques(SimulatedArm& arm, const planning::CommandBuffers& answer,
+                       Eigen::VectorXd& sum, Json& channels) = 0;
+  /// Whether a limit cut the current answer.
   [[nodiscard]] virtual bool saturated() const = 0;
   /// Whether the scene limits torques.
   [[nodiscard]] virtual bool limited() const = 0;
 };
 
-/// The one that the scene asks for.
-/// @param gyroscopic_terms so many a planner answers with at most
+/// The actuation of a scene.
+/// @param gyroscopic_terms the most that a planner may return
 /// @throws Error invalid for periods and delays that are not integer multiples of the step
-[[nodiscard]] std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm,
+[[nodiscard]] std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene,
+                                                        SimulatedArm& arm,
                                                         std::size_t gyroscopic_terms);
 
 /// Steps between two ticks of the planner. @throws Error invalid

@@ -22,10 +22,10 @@ namespace {
 
 using Eigen::VectorXd;
 
-// Obstacles are looked for this far where neither planner nor anything else says more.
+// Obstacles are searched within this distance if the planner gives no other.
 constexpr double default_influence_m = 0.2;
 
-// What another library refuses, with the scene's name in front.
+// Prefixes errors of another library with the scene's name.
 template <class F>
 auto in_scene(const scene::Scene& scene, const char* place, F&& f) {
   try {
@@ -40,7 +40,8 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
   if (scene.map) {
     inputs.push_back({"map", scene.map->file});
     for (std::size_t i = 0; i < scene.map->changes.size(); ++i)
-      if (const auto& file = scene.map->changes[i].file) inputs.push_back({fmt::format("map_change_{}", i), *file});
+      if (const auto& file = scene.map->changes[i].file)
+        inputs.push_back({fmt::format("map_change_{}", i), *file});
   }
   inputs.push_back({"plugin", plugin.file()});
   return inputs;
@@ -52,7 +53,7 @@ model::Model load_checked(const scene::Scene& scene) {
   return model;
 }
 
-/// CPU time of a tick, its writing to the log left out.
+/// CPU time of a tick without writing its log line.
 class TickTimer {
  public:
   void pause() { spent_ += thread_cpu_s() - since_; }
@@ -65,7 +66,8 @@ class TickTimer {
 
 }  // namespace
 
-ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories)
+ClosedLoop::ClosedLoop(const scene::Scene& scene,
+                       const std::vector<std::filesystem::path>& plugin_directories)
     : scene_(scene),
       model_(load_checked(scene)),
       options_(integrator_options(scene.integrator.params, scene.name + ": /integrator/params")),
@@ -75,9 +77,10 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene, const std::vector<std::filesys
       q_measured_(VectorXd::Zero(model_.dof())) {
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = find_planner(scene, plugin_directories);
-  planner_params_ =
-      in_scene(scene, "/planner/params", [&] { return planning::check_params(plugin, scene.planner->params); });
-  steps_ = in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
+  planner_params_ = in_scene(scene, "/planner/params",
+                             [&] { return planning::check_params(plugin, scene.planner->params); });
+  steps_ =
+      in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
   const double influence = plugin.influence_m(planner_params_).value_or(default_influence_m);
   world_ = std::make_unique<control::WorldView>(scene, model_, influence);
   if (world_->has_self() && !world_->self_field()->note().empty())
@@ -92,8 +95,10 @@ void ClosedLoop::make_planner(const planning::Plugin& plugin) {
   const auto create = [&](const model::Model& nominal) {
     planner_ = std::make_unique<control::PlannerHost>(
         plugin,
-        control::planner_setup(scene_, nominal, *world_, static_cast<double>(steps_per_tick(scene_)) * scene_.step_s),
-        planner_params_, *world_, [this](std::int32_t level, std::string_view line) { take_line(level, line); });
+        control::planner_setup(scene_, nominal, *world_,
+                               static_cast<double>(steps_per_tick(scene_)) * scene_.step_s),
+        planner_params_, *world_,
+        [this](std::int32_t level, std::string_view line) { log_planner_message(level, line); });
   };
   const double mass_scale = scene_.actuation.planner_mass_scale;
   if (mass_scale == 1.0)
@@ -102,21 +107,24 @@ void ClosedLoop::make_planner(const planning::Plugin& plugin) {
     create(scaled_masses(model_, mass_scale));
 }
 
-void ClosedLoop::take_line(std::int32_t level, std::string_view line) {
+void ClosedLoop::log_planner_message(std::int32_t level, std::string_view line) {
   const bool warning = level == HAMELIN_LOG_WARNING;
-  if (!warning && recorder_ && !recorder_->logging() && !diagnosed(spdlog::level::debug)) return;  // nobody reads it
+  // Such a message would be written nowhere.
+  if (!warning && recorder_ && !recorder_->logging() && !has_diagnostics(spdlog::level::debug))
+    return;
   std::string text = fmt::format("{}: {}", scene_.planner->name, line);
   if (warning) result_.warnings.push_back(text);
-  if (!recorder_) return early_lines_.push_back({warning, std::move(text)});
-  tell(warning, text);
+  if (!recorder_) return early_messages_.push_back({warning, std::move(text)});
+  report_event(warning, text);
 }
 
-void ClosedLoop::tell(bool warning, const std::string& text) {
+void ClosedLoop::report_event(bool warning, const std::string& text) {
   recorder_->event(arm_.state.time_s, text);
-  if (watch_->diagnostics) watch_->diagnostics->log(warning ? spdlog::level::warn : spdlog::level::debug, text);
+  if (watch_->diagnostics)
+    watch_->diagnostics->log(warning ? spdlog::level::warn : spdlog::level::debug, text);
 }
 
-bool ClosedLoop::diagnosed(int level) const {
+bool ClosedLoop::has_diagnostics(int level) const {
   return watch_ != nullptr && watch_->diagnostics &&
          watch_->diagnostics->should_log(static_cast<spdlog::level::level_enum>(level));
 }
@@ -125,11 +133,13 @@ void ClosedLoop::start(const Watch& watch) {
   watch_ = &watch;
   recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator);
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
-  audit_ = std::make_unique<EnergyAudit>(*recorder_, ideal && arm_.integrator->name() == "hamel-variational");
+  audit_ = std::make_unique<EnergyAudit>(*recorder_,
+                                         ideal && arm_.integrator->name() == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
-  if (recorder_->logging()) log_->header(scene_, planner_->plugin(), planner_params_, result_.provenance, steps_);
-  for (const auto& line : early_lines_) tell(line.warning, line.text);
+  if (recorder_->logging())
+    log_->header(scene_, planner_->plugin(), planner_params_, result_.provenance, steps_);
+  for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = world_->influence_m();
   min_self_clearance_ = world_->self_influence_m();
   warn_of_goals_in_contact(watch);
@@ -139,13 +149,13 @@ log::Result ClosedLoop::run(const Watch& watch) {
   start(watch);
   while (!done_) {
     TickTimer timer;
-    look();
-    decide();
+    observe_node();
+    check_outcome();
     if (done_)
-      settle();
+      book_last_node();
     else if (actuation_->asks_planner(arm_.state.k))
       ask_planner();
-    if (!done_) act();
+    if (!done_) apply_answer();
     timer.pause();
     write_tick();
     timer.resume();
@@ -158,13 +168,14 @@ log::Result ClosedLoop::run(const Watch& watch) {
   return result_;
 }
 
-void ClosedLoop::look() {
+void ClosedLoop::observe_node() {
   actuation_->reach_node(arm_);
   world_->look(arm_.state.q, arm_.state.time_s);
   for (const int found : world_->revealed())
-    recorder_->event(arm_.state.time_s,
-                     fmt::format("obstacle '{}' comes into sight",
-                                 world_->environment().obstacles()[static_cast<std::size_t>(found)].name));
+    recorder_->event(
+        arm_.state.time_s,
+        fmt::format("obstacle '{}' becomes visible",
+                    world_->environment().obstacles()[static_cast<std::size_t>(found)].name));
   min_clearance_ = std::min(min_clearance_, world_->clearance_m());
   min_self_clearance_ = std::min(min_self_clearance_, world_->self_clearance_m());
   touching_ = world_->touching();
@@ -179,37 +190,45 @@ void ClosedLoop::certify() {
   certified_ = verdict.certified;
   ++checked_steps_;
   if (certified_) ++certified_steps_;
-  result_.tightest_step_m = std::min(result_.tightest_step_m.value_or(verdict.margin_m), verdict.margin_m);
+  result_.tightest_step_m =
+      std::min(result_.tightest_step_m.value_or(verdict.margin_m), verdict.margin_m);
   if (!verdict.contact || touching_) return;
   const std::string parts =
-      verdict.self_pair < 0 ? "" : fmt::format("of {} ", world_->self_field()->words(verdict.self_pair));
-  finish(log::Outcome::collision,
-         fmt::format("contact {}between the nodes {} and {}", parts, arm_.state.k - 1, arm_.state.k));
+      verdict.self_pair < 0
+          ? ""
+          : fmt::format("of {} ", world_->self_field()->describe(verdict.self_pair));
+  finish(log::Outcome::collision, fmt::format("contact {}between the nodes {} and {}", parts,
+                                              arm_.state.k - 1, arm_.state.k));
 }
 
-// What led here met the map as it was; what follows meets the new one.
+// The step that led here was checked against the old map; what follows is checked against the new
+// one.
 void ClosedLoop::change_map() {
   const std::string change = world_->advance_map();
   if (change.empty()) return;
-  tell(false, change);
+  report_event(false, change);
   world_->look(arm_.state.q, arm_.state.time_s);
   min_clearance_ = std::min(min_clearance_, world_->clearance_m());
   touching_ = touching_ || world_->clearance_m() <= 0.0;
 }
 
-void ClosedLoop::decide() {
+void ClosedLoop::check_outcome() {
   const auto& state = arm_.state;
   if (!arm_.v.allFinite() || !state.q.allFinite())
-    return finish(log::Outcome::diverged, fmt::format("step {} left the finite numbers", state.k));
+    return finish(log::Outcome::diverged,
+                  fmt::format("step {}: the state is no longer finite", state.k));
   if (touching_ && state.k > 0) return finish(log::Outcome::collision, world_->describe_contact());
   if (touching_) return refuse();
   if (done_) return;
   while (goals_.advance(world_->poses(), state.q, arm_.v))
-    recorder_->event(state.time_s, fmt::format("goal {} of {} reached", goals_.index(), goals_.size()));
+    recorder_->event(state.time_s,
+                     fmt::format("goal {} of {} reached", goals_.index(), goals_.size()));
   if (goals_.all_reached())
     finish(log::Outcome::reached, "");
-  else if (!planner_->has_own_stall_rule() && goals_.stalled(world_->poses(), arm_.v, scene_.step_s))
-    finish(log::Outcome::stalled, fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
+  else if (!planner_->has_own_stall_rule() &&
+           goals_.stalled(world_->poses(), arm_.v, scene_.step_s))
+    finish(log::Outcome::stalled,
+           fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
   else if (state.k == steps_)
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(state.k))
@@ -218,36 +237,40 @@ void ClosedLoop::decide() {
 
 void ClosedLoop::refuse() {
   std::string cause = world_->describe_contact();
-  if (world_->clearance_m() > 0.0) cause += fmt::format("; {}", scene::self_contact_remedy(scene_.robot));
+  if (world_->clearance_m() > 0.0)
+    cause += fmt::format("; {}", scene::self_contact_remedy(scene_.robot));
   finish(log::Outcome::refused, std::move(cause));
 }
 
 bool ClosedLoop::call_planner() {
   q_measured_ = arm_.state.q;
-  if (scene_.actuation.joint_noise_rad > 0.0 && scene_.actuation.type == scene::ActuationType::sampled)
+  if (scene_.actuation.joint_noise_rad > 0.0 &&
+      scene_.actuation.type == scene::ActuationType::sampled)
     for (auto& angle : q_measured_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
   return planner_->tick(arm_.state.k, arm_.state.time_s, q_measured_, arm_.v, goals_.index());
 }
 
 void ClosedLoop::ask_planner() {
   if (!call_planner())
-    finish(log::Outcome::defect,
-           fmt::format("planner '{}' at step {}: {}", scene_.planner->name, arm_.state.k, planner_->error()));
+    finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
+                                             arm_.state.k, planner_->error()));
   else if (planner_->gave_up())
     finish(log::Outcome::stalled, planner_->command().raw().cause);
-  if (done_ && !actuation_->needs_answer_at_end()) settle();
+  if (done_ && !actuation_->needs_answer_at_end()) book_last_node();
 }
 
-void ClosedLoop::act() {
+void ClosedLoop::apply_answer() {
   actuation_->book(arm_, planner_->command(), *audit_);
   finish_if(audit_->fault(arm_));
   const std::string fault = audit_->fault_of_planner(planner_->command().raw());
-  if (!fault.empty()) finish_if(fmt::format("planner '{}' at step {}: {}", scene_.planner->name, arm_.state.k, fault));
-  if (!done_) actuation_->act(arm_, planner_->command(), q_measured_, *audit_);
+  if (!fault.empty())
+    finish_if(
+        fmt::format("planner '{}' at step {}: {}", scene_.planner->name, arm_.state.k, fault));
+  if (!done_) actuation_->apply(arm_, planner_->command(), q_measured_, *audit_);
 }
 
-// A control potential's value and its gradient for the closing half-kick are the planner's to know.
-void ClosedLoop::settle() {
+// Only the planner knows a control potential's value and its gradient for the closing half-kick.
+void ClosedLoop::book_last_node() {
   if (arm_.state.k == 0 || result_.outcome == log::Outcome::diverged) return;
   if (!actuation_->needs_answer_at_end())
     audit_->book_node(arm_);
@@ -269,7 +292,8 @@ void ClosedLoop::step() {
   const bool converged = arm_.step(scene_.step_s);
   recorder_->step(arm_.report);
   if (!converged) {
-    finish(log::Outcome::diverged, fmt::format("step {} of {} s found no root", arm_.state.k + 1, scene_.step_s));
+    finish(log::Outcome::diverged,
+           fmt::format("step {} of {} s found no root", arm_.state.k + 1, scene_.step_s));
     if (recorder_->logging()) log_->tick(certified_, nullptr);
     return;
   }
@@ -298,18 +322,20 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
       if (watch.diagnostics) watch.diagnostics->info(result_.warnings.back());
     };
     if (!world_->has_obstacles() && !world_->has_self()) return;
-    const scene::Shapes there = of_joints ? world_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
+    const scene::Shapes placed =
+        of_joints ? world_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
     scene::Contact deepest;
-    if (world_->deepest_at_start(there, deepest))
-      warn(fmt::format("{}; the way out is {}",
-                       of_joints ? environment.words(deepest, model_)
-                                 : fmt::format("its tip is {:.2g} mm inside {}", -1e3 * deepest.distance,
-                                               environment.words(deepest.obstacle)),
-                       scene::way_out(deepest)));
+    if (world_->deepest_at_start(placed, deepest))
+      warn(fmt::format("{}; the exit direction is {}",
+                       of_joints
+                           ? environment.describe(deepest, model_)
+                           : fmt::format("its tip is {:.2g} mm inside {}", -1e3 * deepest.distance,
+                                         environment.describe(deepest.obstacle)),
+                       scene::describe_exit_direction(deepest)));
     scene::SelfContact worst;
-    if (of_joints && world_->deepest_self(there, worst))
+    if (of_joints && world_->deepest_self(placed, worst))
       warn(fmt::format("the arm touches itself: {} are {:.2g} mm inside each other",
-                       world_->self_field()->words(worst.pair), -1e3 * worst.distance));
+                       world_->self_field()->describe(worst.pair), -1e3 * worst.distance));
   }
 }
 
@@ -333,13 +359,17 @@ void ClosedLoop::fill_result() {
   out.error_rad = error.radians;
   result_.goal = out;
   if (checked_steps_ > 0)
-    result_.certified_share = static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
-  for (const auto& warning : world_->environment().summary().warnings) result_.warnings.push_back(warning);
+    result_.certified_share =
+        static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
+  for (const auto& warning : world_->environment().summary().warnings)
+    result_.warnings.push_back(warning);
   if (actuation_->limited() && arm_.state.k > 0) {
-    result_.saturated_share = static_cast<double>(saturated_steps_) / static_cast<double>(arm_.state.k);
+    result_.saturated_share =
+        static_cast<double>(saturated_steps_) / static_cast<double>(arm_.state.k);
     if (saturated_steps_ > 0)
       result_.warnings.push_back(
-          fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_steps_, arm_.state.k));
+          fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_steps_,
+                      arm_.state.k));
   }
 }
 

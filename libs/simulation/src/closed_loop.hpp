@@ -16,39 +16,41 @@
 
 namespace hamelin::simulation {
 
-/// A scene made ready to run: the control half (world, planner, goals), the arm that is simulated, and what carries
-/// answers out. One object a run.
+/// A scene that is ready to run: the control part (world, planner, goals), the simulated arm, and
+/// the actuation that carries out the planner's answers. One object per run.
 class ClosedLoop {
  public:
   /// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
-  ClosedLoop(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories);
+  ClosedLoop(const scene::Scene& scene,
+             const std::vector<std::filesystem::path>& plugin_directories);
   [[nodiscard]] log::Result run(const Watch& watch);
 
  private:
   void make_planner(const planning::Plugin& plugin);
-  /// A line of the planner.
-  void take_line(std::int32_t level, std::string_view line);
-  /// An event, to the log and to whoever reads diagnostics.
-  void tell(bool warning, const std::string& text);
-  [[nodiscard]] bool diagnosed(int level) const;
+  /// Logs a message of the planner.
+  void log_planner_message(std::int32_t level, std::string_view line);
+  /// Reports an event to the log and to diagnostics.
+  void report_event(bool warning, const std::string& text);
+  [[nodiscard]] bool has_diagnostics(int level) const;
   void start(const Watch& watch);
   void warn_of_goals_in_contact(const Watch& watch);
 
-  /// Where the last step led: velocity, surroundings, proof of the way there, and the map's changes that are due.
-  void look();
+  /// Observes the node that the last step reached: velocity, surroundings, proof that the step
+  /// stayed clear, and changes of the map that are due.
+  void observe_node();
   void certify();
   void change_map();
-  /// Whether the run is over at this node.
-  void decide();
+  /// Ends the run at this node if an outcome applies.
+  void check_outcome();
   /// Ends a run whose start is in contact.
   void refuse();
-  /// The planner's answer for this node. @return false if it failed
+  /// Calls the planner at this node. @return false if it failed
   bool call_planner();
   void ask_planner();
-  /// Books the node and puts the answer into effect.
-  void act();
-  /// Nothing acts any more, but the last node's energies still belong to the account.
-  void settle();
+  /// Books the node and applies the answer.
+  void apply_answer();
+  /// Books the last node: nothing acts any more, but its energies belong to the account.
+  void book_last_node();
   void write_tick();
   void step();
 
@@ -71,17 +73,17 @@ class ClosedLoop {
   Rng noise_;
   Eigen::VectorXd q_measured_;
 
-  // of a run
+  // State of the run.
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<EnergyAudit> audit_;
   std::unique_ptr<TickLog> log_;
   const Watch* watch_ = nullptr;
-  struct Line {
+  struct Message {
     bool warning;
     std::string text;
   };
-  std::vector<Line> early_lines_;  ///< what the planner said before the log was open
-  bool certified_ = true;          ///< of the step that led to this node
+  std::vector<Message> early_messages_;  ///< of the planner, before the log was open
+  bool certified_ = true;                ///< whether the step that led to this node was certified
   bool touching_ = false;
   bool done_ = false;
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;

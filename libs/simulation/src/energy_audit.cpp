@@ -8,11 +8,12 @@ namespace hamelin::simulation {
 
 namespace {
 
-// Figures that must be zero are so up to this share of the kinetic energy and 1 J: far above rounding, far below what
-// matters.
+// Sums that must be zero may reach this share of kinetic energy plus 1 J: far above rounding, far
+// below any effect.
 constexpr double rounding_share = 1e-9;
-// What the energy account is off by is the scheme's own: a second-order step that resolves the motion at all (h times
-// its frequency below 0.5) errs by (0.5)²/12 = 2 % of the energy in motion or exchanged.
+// The error of the energy account is the scheme's own: a second-order step that resolves the motion
+// (frequency times h below 0.5) errs by (0.5)²/12 = 2 % of the kinetic and exchanged energy,
+// docs/theory.md (8.13).
 constexpr double account_share = 0.02;
 
 }  // namespace
@@ -24,7 +25,8 @@ void EnergyAudit::book_node(SimulatedArm& arm, double control_J) {
   ledger_.control = control_J;
   const Ledger& last = recorder_.last_node();
   if (arm.state.k > 0)
-    for (const auto account : {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
+    for (const auto account :
+         {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
       exchanged_J_ += std::abs(ledger_.*account - last.*account);
   recorder_.node(ledger_);
 }
@@ -41,13 +43,17 @@ void EnergyAudit::book_filter(const hamelin_command& answer) noexcept {
 
 std::string EnergyAudit::fault(const SimulatedArm& arm) const {
   if (!closes_ || arm.state.k == 0) return {};
-  const double turned = arm.report.gyroscopic_work_J;
-  if (std::abs(turned) > rounding_share * (ledger_.kinetic + 1.0))
-    return fmt::format("step {}: steering did {:.3g} J of work, expected none", arm.state.k, turned);
-  if (has_potential_ || !(recorder_.energy_error() > account_share * (exchanged_J_ + ledger_.kinetic))) return {};
+  const double gyroscopic_work = arm.report.gyroscopic_work_J;
+  if (std::abs(gyroscopic_work) > rounding_share * (ledger_.kinetic + 1.0))
+    return fmt::format("step {}: gyroscopic terms did {:.3g} J of work, expected none", arm.state.k,
+                       gyroscopic_work);
+  if (has_potential_ ||
+      !(recorder_.energy_error() > account_share * (exchanged_J_ + ledger_.kinetic)))
+    return {};
   return fmt::format(
-      "step {}: the energy account is off by {:.3g} J, with {:.3g} J in motion and {:.3g} J exchanged; expected less "
-      "than {} of them: a smaller step?",
+      "step {}: the energy account is off by {:.3g} J, with {:.3g} J of kinetic energy and {:.3g} "
+      "J exchanged; "
+      "expected less than {} of their sum; try a smaller step",
       arm.state.k, recorder_.energy_error(), ledger_.kinetic, exchanged_J_, account_share);
 }
 
@@ -55,8 +61,9 @@ std::string EnergyAudit::fault_of_planner(const hamelin_command& answer) const {
   if (!closes_) return {};
   const double rounding = rounding_share * (ledger_.kinetic + 1.0);
   if (answer.filter_work_J > rounding)
-    return fmt::format("its filter added {:.3g} J where standing still was admitted, expected none",
-                       answer.filter_work_J);
+    return fmt::format(
+        "its filter added {:.3g} J, expected none because standing still is admissible",
+        answer.filter_work_J);
   if (answer.recovery_work_J < -rounding)
     return fmt::format("its recovery took out {:.3g} J, expected none", -answer.recovery_work_J);
   return {};

@@ -7,8 +7,8 @@
 
 namespace hamelin::simulation {
 
-/// Books the energies of a run node by node, and checks what must hold where the accounts close by construction:
-/// ideal actuation with hamel-variational.
+/// Books the energies of a run node by node and checks them where the accounts close by
+/// construction: under ideal actuation with hamel-variational. docs/theory.md (8.11), (8.13).
 class EnergyAudit {
  public:
   /// @param closes whether the scheme's gyroscopic work is zero and its account closes
@@ -18,16 +18,17 @@ class EnergyAudit {
   void book_node(SimulatedArm& arm, double control_J);
   /// As book_node, with the control potential's last known value.
   void book_node(SimulatedArm& arm) { book_node(arm, ledger_.control); }
-  /// A control potential acted: how it changes in time is the planner's own, so the balance is only reported from then.
+  /// Notes that a control potential acted. The planner may change it over time, so from then on the
+  /// balance is reported but not checked.
   void note_potential() noexcept { has_potential_ = true; }
-  /// Work of a node velocity, and the planner's split of it.
+  /// Books the work of a node velocity, docs/theory.md (8.6), and how the planner splits it.
   void book_node_velocity(double work_J, const hamelin_command& answer) noexcept;
   void book_filter(const hamelin_command& answer) noexcept;
   void book_step(const integration::StepReport& report) noexcept { ledger_.book(report); }
 
-  /// What is wrong with the node's account or the last step's gyroscopic work; empty if nothing is.
+  /// What is wrong with the node's account or the last step's gyroscopic work; empty if nothing.
   [[nodiscard]] std::string fault(const SimulatedArm& arm) const;
-  /// What is wrong with the planner's own accounts; empty if nothing is.
+  /// What is wrong with the planner's own accounts; empty if nothing.
   [[nodiscard]] std::string fault_of_planner(const hamelin_command& answer) const;
 
   [[nodiscard]] const Ledger& ledger() const noexcept { return ledger_; }
@@ -36,7 +37,7 @@ class EnergyAudit {
   Recorder& recorder_;
   bool closes_;
   bool has_potential_ = false;
-  double exchanged_J_ = 1.0;  ///< 1 J and all that ever went from one account to another
+  double exchanged_J_ = 1.0;  ///< 1 J plus all energy exchanged between accounts so far
   Ledger ledger_;
 };
 

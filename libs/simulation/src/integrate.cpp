@@ -40,25 +40,29 @@ FreeMotion free_motion(const scene::Scene& given, const model::Model& model) {
 
 namespace {
 
-// How many lines a log may get where step control chooses: by the first step, for want of better.
+// Under step control the number of log lines is unknown. It is estimated by the first step.
 long first_steps_in(double duration_s, double step_s) {
-  if (!(step_s > 0.0) || !(duration_s > 0.0) || !std::isfinite(duration_s) || !std::isfinite(step_s))
+  if (!(step_s > 0.0) || !(duration_s > 0.0) || !std::isfinite(duration_s) ||
+      !std::isfinite(step_s))
     throw Error(ErrorCode::usage,
-                fmt::format("step {} s and duration {} s: both must be positive and finite", step_s, duration_s));
+                fmt::format("step {} s and duration {} s: both must be positive and finite", step_s,
+                            duration_s));
   return static_cast<long>(std::min(std::ceil(duration_s / step_s), 1e10));
 }
 
-// An unconverged state is never used: the result stands at the node before.
-std::string what_failed(const FreeMotion& motion, const integration::Integrator& integrator, long step) {
-  if (integrator.adaptive()) return fmt::format("step {}: no length of it meets the tolerances", step);
+// A state that did not converge is never used; the result is that of the node before.
+std::string failure_cause(const FreeMotion& motion, const integration::Integrator& integrator,
+                          long step) {
+  if (integrator.adaptive())
+    return fmt::format("step {}: no step length meets the tolerances", step);
   const auto* scheme = integration::find_scheme(motion.integrator);
   if (scheme->solvers.empty() && !scheme->iterates)
-    return fmt::format("step {} of {} s left the finite numbers", step, motion.step_s);
+    return fmt::format("step {} of {} s: the state is no longer finite", step, motion.step_s);
   return fmt::format("step {} of {} s found no root, halved down to {:.3g} s", step, motion.step_s,
                      motion.step_s / static_cast<double>(1 << integrator.max_halvings()));
 }
 
-/// One free motion from its first node to its last: a look at every node, then a step.
+/// One free motion from its first node to its last: each node is observed, then a step is made.
 class FreeRun {
  public:
   FreeRun(const model::Model& model, const FreeMotion& motion, const Watch& watch);
@@ -66,18 +70,20 @@ class FreeRun {
 
  private:
   void write_header(const Watch& watch);
-  [[nodiscard]] bool arrived() const { return controlled_ ? state_.time_s == motion_.duration_s : state_.k == steps_; }
-  /// The node's energy, and its line in the log; `last` ones are always written.
-  void look(bool last);
+  [[nodiscard]] bool finished() const {
+    return controlled_ ? state_.time_s == motion_.duration_s : state_.k == steps_;
+  }
+  /// Books the node's energy and writes its line in the log. The last node is always written.
+  void observe_node(bool last);
   void log_tick();
-  /// One step. If it found no root the state stays, and the result says what failed.
+  /// Makes one step. If it finds no root, the state is unchanged and the result says what failed.
   bool step();
   void close();
 
   const model::Model& model_;
   const FreeMotion& motion_;
   const std::unique_ptr<integration::Integrator> integrator_;
-  const bool controlled_;  ///< step control takes what steps it likes, so any duration will do
+  const bool controlled_;  ///< under step control any duration is allowed
   const long steps_;
   log::Result result_;
   Recorder recorder_;
@@ -102,7 +108,7 @@ FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watc
   channels_.coulomb = motion.coulomb;
   channels_.coulomb_speed = motion.coulomb_speed;
   if (controlled_) state_.step_next = motion.step_s;
-  report_.step_s = motion.step_s;  // for the look at the first node
+  report_.step_s = motion.step_s;  // for the observation of the first node
   write_header(watch);
 }
 
@@ -120,20 +126,20 @@ void FreeRun::write_header(const Watch& watch) {
 
 log::Result FreeRun::run() {
   for (;;) {
-    const bool last = arrived() || recorder_.stopped(state_.k);
-    look(last);
+    const bool last = finished() || recorder_.stopped(state_.k);
+    observe_node(last);
     if (last || !step()) break;
   }
   close();
   return std::move(result_);
 }
 
-void FreeRun::look(bool last) {
+void FreeRun::observe_node(bool last) {
   const auto energy = integrator_->energy(state_);
   ledger_.kinetic = energy.kinetic_J;
   ledger_.potential = energy.potential_J;
   recorder_.node(ledger_);
-  if (!recorder_.logging()) return;  // the velocity costs a sweep, and nothing else here asks for it
+  if (!recorder_.logging()) return;  // the velocity costs a sweep and is needed for the log only
   integrator_->velocity(state_, v_);
   recorder_.observe(infinity, true, v_, report_.step_s);
   if (recorder_.wants_tick(state_.k) || last) log_tick();
@@ -162,20 +168,22 @@ bool FreeRun::step() {
   recorder_.progress(state_.k, state_.time_s, motion_.duration_s);
   if (report_.converged) return true;
   result_.outcome = log::Outcome::diverged;
-  result_.cause = what_failed(motion_, *integrator_, state_.k + 1);
+  result_.cause = failure_cause(motion_, *integrator_, state_.k + 1);
   if (recorder_.logging()) log_tick();
   return false;
 }
 
 void FreeRun::close() {
-  if (result_.outcome == log::Outcome::completed && !arrived()) result_.outcome = log::Outcome::interrupted;
+  if (result_.outcome == log::Outcome::completed && !finished())
+    result_.outcome = log::Outcome::interrupted;
   result_.time_s = state_.time_s;
   result_.steps = state_.k;
   result_.q = state_.q;
   integrator_->velocity(state_, v_);
   result_.v = v_;
-  // not looked at without a log, so not with one either
-  for (auto* largest : {&result_.v_abs_max, &result_.a_abs_max, &result_.jerk_abs_max}) largest->resize(0);
+  // Without a log these are not observed, so results with a log leave them out, too.
+  for (auto* largest : {&result_.v_abs_max, &result_.a_abs_max, &result_.jerk_abs_max})
+    largest->resize(0);
   recorder_.close(ledger_);
 }
 
@@ -184,8 +192,8 @@ void FreeRun::close() {
 log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch) {
   const auto sized = [&](const Eigen::VectorXd& x, const char* what) {
     if (x.size() != model.dof() || !x.allFinite())
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: {} numbers given, expected {} finite ones", what, x.size(), model.dof()));
+      throw Error(ErrorCode::usage, fmt::format("{}: {} values given, expected {} finite ones",
+                                                what, x.size(), model.dof()));
   };
   sized(motion.q0, "q0");
   sized(motion.v0, "v0");

@@ -18,10 +18,13 @@ integration::Parameters integrator_options(const Json& params, const std::string
   check_shipped_schema(params, "integrator", where);
   integration::Parameters options;
   take(params, "alpha", options.alpha);
-  if (params.contains("start")) options.start = params["start"] == "published" ? Start::published : Start::consistent;
+  if (params.contains("start"))
+    options.start = params["start"] == "published" ? Start::published : Start::consistent;
   if (params.contains("solver")) {
     const std::string solver = params["solver"];
-    options.solver = solver == "newton" ? Solver::newton : solver == "riqn" ? Solver::riqn : Solver::feedback;
+    options.solver = solver == "newton" ? Solver::newton
+                     : solver == "riqn" ? Solver::riqn
+                                        : Solver::feedback;
   }
   take(params, "tolerance", options.tolerance);
   take(params, "feedback_tolerance", options.feedback_tolerance);

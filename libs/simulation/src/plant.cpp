@@ -10,7 +10,8 @@ namespace hamelin::simulation {
 
 namespace {
 
-// A body fixed to the tip becomes part of the link that carries it: masses add, COM and inertia follow (parallel axes).
+// A body fixed to the tip becomes part of the link that carries it: masses add, COM and inertia
+// follow by the parallel-axis theorem.
 void add_payload(model::Robot& robot, const scene::Payload& payload) {
   auto& link = robot.links[static_cast<std::size_t>(robot.tip.link)];
   const geometry::SE3 tip_in_com = link.com.inverse() * robot.tip.pose;
@@ -31,9 +32,10 @@ void add_payload(model::Robot& robot, const scene::Payload& payload) {
   }
 }
 
-// One number a joint, as the scene gives them; empty for none.
-Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& given, const char* key,
-                              const model::Robot& robot, double model::Joint::*member) {
+// One number per joint, from the scene; empty: none.
+Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& given,
+                              const char* key, const model::Robot& robot,
+                              double model::Joint::*member) {
   const int n = robot.dof();
   if (given.from_robot) {
     Eigen::VectorXd values(n);
@@ -43,28 +45,31 @@ Eigen::VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbe
   if (given.values.empty()) return {};
   if (given.values.size() == 1) return Eigen::VectorXd::Constant(n, given.values[0]);
   if (given.values.size() != static_cast<std::size_t>(n))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /model/{}: {} numbers given, expected 1 or {}", scene.name, key,
-                                                given.values.size(), n));
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/{}: {} values given, expected 1 or {}",
+                                                scene.name, key, given.values.size(), n));
   return Eigen::Map<const Eigen::VectorXd>(given.values.data(), n);
 }
 
 }  // namespace
 
 model::Model load_model(const scene::Scene& scene) {
-  model::Robot robot =
-      description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
+  model::Robot robot = description::read_robot(
+      scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   if (scene.model.payload) add_payload(robot, *scene.model.payload);
   if (!scene.model.armature.from_robot) {
     const Eigen::VectorXd armature =
         joint_numbers(scene, scene.model.armature, "armature", robot, &model::Joint::armature);
     for (int i = 0; i < robot.dof(); ++i)
-      robot.links[static_cast<std::size_t>(i)].joint.armature = armature.size() > 0 ? armature[i] : 0.0;
+      robot.links[static_cast<std::size_t>(i)].joint.armature =
+          armature.size() > 0 ? armature[i] : 0.0;
   }
-  return model::Model(std::move(robot), scene.base, scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
+  return model::Model(std::move(robot), scene.base,
+                      scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
 }
 
 Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& robot) {
-  return joint_numbers(scene, scene.model.joint_damping, "joint_damping", robot, &model::Joint::damping);
+  return joint_numbers(scene, scene.model.joint_damping, "joint_damping", robot,
+                       &model::Joint::damping);
 }
 
 Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot) {

@@ -5,17 +5,18 @@
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
 
-/// What is checked and chosen before a planner is made.
+/// Checks and choices before a planner is created.
 namespace hamelin::simulation {
 
-/// Checks that start, goals and limits fit the robot. @throws Error invalid, naming the place in the scene
+/// Checks that start, goals and limits fit the robot. @throws Error invalid, naming the place in
+/// the scene
 void check_numbers(const scene::Scene& scene, const model::Model& model);
 
 /// The planner that the scene names. @throws Error invalid or plugin
 [[nodiscard]] planning::Plugin find_planner(const scene::Scene& scene,
                                             const std::vector<std::filesystem::path>& directories);
 
-/// The same arm with all masses and inertias scaled alike.
+/// The same arm with all masses and inertias scaled by one factor.
 [[nodiscard]] model::Model scaled_masses(const model::Model& arm, double scale);
 
 }  // namespace hamelin::simulation

@@ -11,15 +11,16 @@ namespace hamelin::simulation {
 
 namespace {
 
-// Largest magnitude of each number so far.
-void grow(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
+// Raises `largest` to the magnitude of v, number by number.
+void raise_to_magnitude(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
   if (largest.size() == 0) largest.setZero(v.size());
   largest = largest.cwiseMax(v.cwiseAbs());
 }
 
 }  // namespace
 
-Recorder::Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator)
+Recorder::Recorder(log::Result& result, const Watch& watch,
+                   const integration::Integrator& integrator)
     : result_(result), watch_(watch) {
   result_.integrator = integrator.name();
   result_.solver.criterion = integrator.criterion();
@@ -31,11 +32,13 @@ void Recorder::header(Json fields, const model::Robot& robot, long steps) {
   fields["every"] = watch_.every;
   fields["joints"] = Json::array();
   for (const auto& link : robot.links)
-    fields["joints"].push_back({{"name", link.joint.name},
-                                {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"}});
+    fields["joints"].push_back(
+        {{"name", link.joint.name},
+         {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"}});
   watch_.log->write("header", fields);
   if (watch_.announce)
-    watch_.announce(std::ceil(static_cast<double>(steps) / static_cast<double>(watch_.every)), robot.dof());
+    watch_.announce(std::ceil(static_cast<double>(steps) / static_cast<double>(watch_.every)),
+                    robot.dof());
 }
 
 void Recorder::node(const Ledger& ledger) {
@@ -51,15 +54,16 @@ void Recorder::node(const Ledger& ledger) {
 }
 
 void Recorder::observe(double clearance_m, bool certified, const Eigen::VectorXd& v, double h) {
-  grow(result_.v_abs_max, v);
+  raise_to_magnitude(result_.v_abs_max, v);
   if (observed_ == 0) {
     result_.a_abs_max.setZero(v.size());
     result_.jerk_abs_max.setZero(v.size());
     a_.setZero(v.size());
   } else {
     a_ = (v - v_last_) / h;
-    grow(result_.a_abs_max, a_);
-    if (observed_ > 1) result_.jerk_abs_max = result_.jerk_abs_max.cwiseMax(((a_ - a_last_) / h).cwiseAbs());
+    raise_to_magnitude(result_.a_abs_max, a_);
+    if (observed_ > 1)
+      result_.jerk_abs_max = result_.jerk_abs_max.cwiseMax(((a_ - a_last_) / h).cwiseAbs());
   }
   v_last_ = v;
   a_last_ = a_;
@@ -67,7 +71,7 @@ void Recorder::observe(double clearance_m, bool certified, const Eigen::VectorXd
   if (!logging()) return;
   since_.clearance_m = std::min(since_.clearance_m, clearance_m);
   since_.certified = since_.certified && certified;
-  grow(since_.v_abs, v);
+  raise_to_magnitude(since_.v_abs, v);
 }
 
 void Recorder::step(const integration::StepReport& report) {
@@ -99,10 +103,11 @@ void Recorder::tick(long k, Json fields) {
   if (k == last_logged_) return;
   last_logged_ = k;
   if (watch_.every > 1 && k > 0) {
-    fields["extrema"] = {{"clearance_m", nullptr},         {"energy_error_J", since_.energy_error_J},
-                         {"v_abs", to_json(since_.v_abs)}, {"updates", since_.updates},
-                         {"residual", since_.residual},    {"halvings", since_.halvings},
-                         {"certified", since_.certified}};
+    fields["extrema"] = {
+        {"clearance_m", nullptr},         {"energy_error_J", since_.energy_error_J},
+        {"v_abs", to_json(since_.v_abs)}, {"updates", since_.updates},
+        {"residual", since_.residual},    {"halvings", since_.halvings},
+        {"certified", since_.certified}};
     if (std::isfinite(since_.clearance_m)) fields["extrema"]["clearance_m"] = since_.clearance_m;
     if (since_.tick_us > 0.0) fields["timing"]["tick_us_max"] = since_.tick_us;
   }
@@ -132,7 +137,8 @@ void Recorder::close(const Ledger& ledger) {
   write_waiting_tick();
   result_.cpu_s = thread_cpu_s() - started_cpu_s_;
   if (tick_us_.count() > 0)
-    result_.tick_us = log::Result::TickTime{tick_us_.quantile(0.5), tick_us_.quantile(0.99), tick_us_.largest()};
+    result_.tick_us =
+        log::Result::TickTime{tick_us_.quantile(0.5), tick_us_.quantile(0.99), tick_us_.largest()};
   if (watch_.log != nullptr) watch_.log->write("result", log::to_json(result_));
 }
 
@@ -151,7 +157,8 @@ Json energy_json(const Ledger& ledger) {
 }
 
 Json solver_json(const integration::StepReport& report) {
-  return {{"updates", report.updates}, {"residual", report.residual}, {"halvings", report.halvings}};
+  return {
+      {"updates", report.updates}, {"residual", report.residual}, {"halvings", report.halvings}};
 }
 
 long step_count(double duration_s, double step_s) {
@@ -159,12 +166,15 @@ long step_count(double duration_s, double step_s) {
   const double whole = std::round(steps);
   if (!(step_s > 0.0) || !(duration_s > 0.0) || !std::isfinite(steps))
     throw Error(ErrorCode::usage,
-                fmt::format("step {} s and duration {} s: both must be positive and finite", step_s, duration_s));
+                fmt::format("step {} s and duration {} s: both must be positive and finite", step_s,
+                            duration_s));
   if (whole > 1e10)
-    throw Error(ErrorCode::usage, fmt::format("{:.3g} steps are too many, expected at most 1e10", whole));
+    throw Error(ErrorCode::usage,
+                fmt::format("{:.3g} steps are too many, expected at most 1e10", whole));
   if (std::abs(steps - whole) > 1e-9 * std::max(1.0, whole) || whole < 1.0)
-    throw Error(ErrorCode::usage, fmt::format("duration {} s is no whole number of steps of {} s (it is {} of them)",
-                                              duration_s, step_s, steps));
+    throw Error(ErrorCode::usage,
+                fmt::format("duration {} s is not an integer multiple of the step {} s (ratio {})",
+                            duration_s, step_s, steps));
   return static_cast<long>(whole);
 }
 

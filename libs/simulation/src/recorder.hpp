@@ -17,13 +17,13 @@ namespace hamelin::simulation {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// Energies and works up to a node [J]. Kinetic + potential + control − booked stays at its first value but for the
-/// scheme's own error.
+/// Energies and works up to a node [J]. Kinetic + potential + control − booked work stays at its
+/// first value except for the scheme's own error, docs/theory.md (8.11).
 struct Ledger {
   double kinetic = 0.0, potential = 0.0, control = 0.0;
   double gyroscopic = 0.0, held = 0.0, dissipated = 0.0;  ///< dissipated counts positive
-  double node = 0.0;                                      ///< by node velocities: law, filter and recovery together
-  double filter = 0.0, recovery = 0.0;                    ///< of these, as the planner accounts for them
+  double node = 0.0;                    ///< of node velocities: law, filter and recovery together
+  double filter = 0.0, recovery = 0.0;  ///< parts of `node`, by the planner's account
 
   void book(const integration::StepReport& report) noexcept {
     gyroscopic += report.gyroscopic_work_J;
@@ -35,28 +35,28 @@ struct Ledger {
   }
 };
 
-/// Gathers a run's figures and writes its log.
+/// Collects the figures of a run and writes its log.
 class Recorder {
  public:
   Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator);
 
-  /// @param ticks how many steps there can be
+  /// @param steps the largest number of steps
   void header(Json fields, const model::Robot& robot, long steps);
-  /// The node's balance enters energy_error_max_J.
+  /// Books a node; its balance counts for energy_error_max_J, docs/theory.md (8.12).
   void node(const Ledger& ledger);
   /// |balance − first balance| at the last node [J].
   [[nodiscard]] double energy_error() const noexcept { return energy_error_; }
-  /// As it was then: a node velocity's work comes after it.
+  /// The ledger at the last node, before the work of its node velocity.
   [[nodiscard]] const Ledger& last_node() const noexcept { return last_node_; }
   void step(const integration::StepReport& report);
-  /// What is looked at besides, at every node; h is the step between nodes.
+  /// Records other figures of a node; h is the step between nodes.
   void observe(double clearance_m, bool certified, const Eigen::VectorXd& v, double h);
-  /// The tick's own time is known last; with it the tick's line is written.
+  /// The tick's time is known last. The tick's line is written with it.
   void tick_time(double seconds);
   [[nodiscard]] bool wants_tick(long k) const noexcept {
     return watch_.log != nullptr && (k % watch_.every == 0 || k == 0);
   }
-  /// The line of a tick, once a node; it waits for tick_time() or close().
+  /// The line of a tick, once per node. It is written by tick_time() or close().
   void tick(long k, Json fields);
   void write_waiting_tick();
   void event(double time_s, const std::string& text);
@@ -73,9 +73,10 @@ class Recorder {
   [[nodiscard]] bool logging() const noexcept { return watch_.log != nullptr; }
 
  private:
-  /// Extrema of what happened since the last tick line, so that a log with few lines hides nothing.
+  /// Extrema since the last tick line, so that a log with few lines hides nothing.
   struct Extrema {
-    double clearance_m = std::numeric_limits<double>::infinity(), energy_error_J = 0.0, residual = 0.0, tick_us = 0.0;
+    double clearance_m = std::numeric_limits<double>::infinity(), energy_error_J = 0.0,
+           residual = 0.0, tick_us = 0.0;
     int updates = 0;
     long halvings = 0;
     bool certified = true;
@@ -100,7 +101,8 @@ class Recorder {
 [[nodiscard]] Json energy_json(const Ledger& ledger);
 [[nodiscard]] Json solver_json(const integration::StepReport& report);
 
-/// Whole number of steps in a duration. @throws Error usage if there is none to 1e-9 steps, or it is zero or too many
+/// Number of steps in a duration. @throws Error usage if it is not an integer to 1e-9 steps, zero,
+/// or too large
 [[nodiscard]] long step_count(double duration_s, double step_s);
 
 }  // namespace hamelin::simulation

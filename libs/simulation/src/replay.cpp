@@ -23,16 +23,18 @@ std::string short_hash(const std::string& sha256) {
   return sha256.substr(0, 12);
 }
 
-// Where an input is now, and its hash; empty if it is nowhere.
+// Where an input is now, and its hash; empty if it was not found.
 struct Found {
   fs::path file;
   std::string sha256;
 };
 
-// The first of the places that has the very file; else the first that has one of that name.
-Found find_input(const fs::path& named, const std::string& sha256, const fs::path& cwd, const fs::path& log) {
+// The first place with a file of this hash, else the first with a file of this name.
+Found find_input(const fs::path& named, const std::string& sha256, const fs::path& cwd,
+                 const fs::path& log) {
   Found first;
-  for (const auto& place : {named, cwd / named, log.parent_path() / named, log.parent_path() / named.filename()}) {
+  for (const auto& place :
+       {named, cwd / named, log.parent_path() / named, log.parent_path() / named.filename()}) {
     std::error_code ec;
     if (!fs::is_regular_file(place, ec)) continue;
     Found here{place, sha256_hex(read_file(place))};
@@ -42,7 +44,7 @@ Found find_input(const fs::path& named, const std::string& sha256, const fs::pat
   return first;
 }
 
-// Text of a value at a pointer of a document, "" where there is none.
+// Text of the value at a pointer of a document, "" if there is none.
 std::string text_at(const Json& document, const char* pointer) {
   const Json::json_pointer at(pointer);
   if (!document.contains(at)) return "";
@@ -50,47 +52,52 @@ std::string text_at(const Json& document, const char* pointer) {
   return value.is_string() ? value.get<std::string>() : value.is_null() ? "" : value.dump();
 }
 
-// The SHA-256 of the input with that role; empty if there was none.
+// The SHA-256 of the input with this role; empty if there is none.
 std::string logged_hash(const Json& header, std::string_view role) {
   for (const auto& input : header["provenance"].value("inputs", Json::array()))
     if (text_at(input, "/role") == role) return text_at(input, "/sha256");
   return "";
 }
 
-std::vector<std::string> differences_of_build(const Json& then) {
+std::vector<std::string> build_differences(const Json& then) {
   std::vector<std::string> lines;
   const Json now = log::provenance({});
-  const std::pair<const char*, const char*> bits_depend_on[] = {{"/build/id", "build"},
-                                                                {"/isa", "instruction set"},
-                                                                {"/versions/libc", "C library"},
-                                                                {"/host/fma", "fused operations in the C library"}};
-  for (const auto& [pointer, what] : bits_depend_on) {
+  const std::pair<const char*, const char*> bits_depend_on[] = {
+      {"/build/id", "build"},
+      {"/isa", "instruction set"},
+      {"/versions/libc", "C library"},
+      {"/host/fma", "fused operations in the C library"}};
+  for (const auto& [pointer, name] : bits_depend_on) {
     const auto before = text_at(then, pointer), here = text_at(now, pointer);
     if (before != here)
-      lines.push_back(fmt::format("{}: {} then, {} now", what, before.empty() ? "unknown" : before,
+      lines.push_back(fmt::format("{}: {} in the log, {} now", name,
+                                  before.empty() ? "unknown" : before,
                                   here.empty() ? "unknown" : here));
   }
   return lines;
 }
 
-// Where a run's configuration names its files, by their role among the inputs.
-std::vector<std::pair<std::string, std::string>> places_of_files(const Json& config) {
-  std::vector<std::pair<std::string, std::string>> places{
-      {"robot", "/robot/file"}, {"spheres", "/robot/spheres"}, {"srdf", "/robot/srdf"}, {"map", "/map/file"}};
+// Roles of a run's input files, and the pointers at which its configuration names them.
+std::vector<std::pair<std::string, std::string>> file_pointers(const Json& config) {
+  std::vector<std::pair<std::string, std::string>> places{{"robot", "/robot/file"},
+                                                          {"spheres", "/robot/spheres"},
+                                                          {"srdf", "/robot/srdf"},
+                                                          {"map", "/map/file"}};
   const Json::json_pointer changes("/map/changes");
   for (std::size_t i = 0; config.contains(changes) && i < config[changes].size(); ++i)
     places.emplace_back(fmt::format("map_change_{}", i), fmt::format("/map/changes/{}/file", i));
   return places;
 }
 
-// What the run was made from; a file's place may differ, its content is checked by its hash.
-void forget_places(Json& header) {
+// Removes the paths of input files: these may differ, as their contents are checked by hash.
+void remove_paths(Json& header) {
   if (!header.contains("config")) return;
-  for (const auto& place : places_of_files(header["config"]))
-    if (const Json::json_pointer at(place.second); header["config"].contains(at)) header["config"][at] = nullptr;
+  for (const auto& place : file_pointers(header["config"]))
+    if (const Json::json_pointer at(place.second); header["config"].contains(at))
+      header["config"][at] = nullptr;
 }
 
-std::string shown(const Json& value) {
+std::string abbreviated(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > 80) text = text.substr(0, 77) + "...";
   return text;
@@ -102,21 +109,22 @@ class Comparison final : public log::LineSink {
   Comparison(const fs::path& log, double tolerance) : reader_(log), tolerance_(tolerance) {}
 
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
-  /// To be called at the end: whether the log has more to say.
+  /// To be called at the end: checks that the log has no further lines.
   void finish() {
     Json logged;
-    if (!enough_ && reader_.next(logged)) differ("", logged, Json("the run had ended"), logged);
+    if (!enough_ && reader_.next(logged))
+      record_difference("", logged, Json("the repeated run ended here"), logged);
   }
 
  private:
   void take(Json replayed) override {
     Json logged;
     if (enough_) return;
-    if (!reader_.next(logged)) {  // an unfinished log: so far, so good
+    if (!reader_.next(logged)) {  // the end of an unfinished log
       enough_ = true;
       return;
     }
-    // What the log says is not trusted: the place is the replayed line's.
+    // The logged line is not trusted: step and time are those of the replayed line.
     if (replayed["type"] == "tick") {
       k_ = replayed["k"].get<long>();
       time_s_ = replayed["time_s"].get<double>();
@@ -124,7 +132,7 @@ class Comparison final : public log::LineSink {
     for (Json* line : {&logged, &replayed}) {
       line->erase("timing");
       line->erase("provenance");
-      if (line->value("type", Json()) == "header") forget_places(*line);
+      if (line->value("type", Json()) == "header") remove_paths(*line);
     }
     compare("", logged, replayed, logged);
     if (enough_) return;
@@ -140,32 +148,38 @@ class Comparison final : public log::LineSink {
         if (b.contains(key))
           compare(fmt::format("{}/{}", at, key), value, b[key], line);
         else
-          differ(fmt::format("{}/{}", at, key), value, Json("missing"), line);
+          record_difference(fmt::format("{}/{}", at, key), value, Json("missing"), line);
       for (const auto& [key, value] : b.items())
-        if (!a.contains(key)) differ(fmt::format("{}/{}", at, key), Json("missing"), value, line);
+        if (!a.contains(key))
+          record_difference(fmt::format("{}/{}", at, key), Json("missing"), value, line);
     } else if (a.is_array() && b.is_array() && a.size() == b.size()) {
-      for (std::size_t i = 0; i < a.size(); ++i) compare(fmt::format("{}/{}", at, i), a[i], b[i], line);
+      for (std::size_t i = 0; i < a.size(); ++i)
+        compare(fmt::format("{}/{}", at, i), a[i], b[i], line);
     } else if (a.is_number_float() && b.is_number_float()) {
       const double x = a.get<double>(), y = b.get<double>();
       if (std::bit_cast<std::uint64_t>(x) == std::bit_cast<std::uint64_t>(y)) return;
       const double error = std::abs(x - y) / std::max(1.0, std::abs(x));
       verdict_.largest = std::max(verdict_.largest, error);
-      differ(at, a, b, line, error <= tolerance_);
+      record_difference(at, a, b, line, error <= tolerance_);
     } else if (a != b) {
-      differ(at, a, b, line);
+      record_difference(at, a, b, line);
     }
   }
 
-  void differ(const std::string& field, const Json& logged, const Json& replayed, const Json& line,
-              bool tolerated = false) {
+  void record_difference(const std::string& field, const Json& logged, const Json& replayed,
+                         const Json& line, bool tolerated = false) {
     if (enough_) return;
     const Json type = line.value("type", Json());
-    const Verdict::Difference found{
-        reader_.lines(), type.is_string() ? type.get<std::string>() : "line", k_, time_s_, field, shown(logged),
-        shown(replayed)};
-    if (!verdict_.to_the_bit) verdict_.to_the_bit = found;
+    const Verdict::Difference found{reader_.lines(),
+                                    type.is_string() ? type.get<std::string>() : "line",
+                                    k_,
+                                    time_s_,
+                                    field,
+                                    abbreviated(logged),
+                                    abbreviated(replayed)};
+    if (!verdict_.first_difference) verdict_.first_difference = found;
     if (tolerated && tolerance_ > 0.0) return;
-    verdict_.beyond = found;
+    verdict_.beyond_tolerance = found;
     enough_ = true;
   }
 
@@ -176,19 +190,20 @@ class Comparison final : public log::LineSink {
   std::optional<double> time_s_;
 };
 
-// Bits are promised on one instruction set only, so the run is repeated on its own, where this machine has it and the
-// caller names no other.
-void take_instruction_set(const Json& header) {
+// Equal bits are promised on one instruction set only, so the run is repeated on the logged one if
+// this machine has it and the caller names no other.
+void use_logged_isa(const Json& header) {
   if (default_isa_is_set()) return;
   try {
-    set_default_isa(isa_from_name(text_at(header.value("provenance", Json::object()), "/isa"), "/provenance/isa"));
+    set_default_isa(isa_from_name(text_at(header.value("provenance", Json::object()), "/isa"),
+                                  "/provenance/isa"));
   } catch (const Error&) {
-    // not here: differences_of_build says so, and the comparison is within the tolerance
+    // Not available: build_differences reports it, and the comparison uses the tolerance.
   }
 }
 
-// The step at which the log says that the run was stopped.
-std::optional<long> stopped_at(const fs::path& log) {
+// The step at which the logged run was stopped.
+std::optional<long> logged_stop_step(const fs::path& log) {
   log::LogReader reader(log);
   std::string last;
   for (std::string_view line; reader.next_text(line);) last = line;
@@ -205,31 +220,35 @@ std::optional<long> stopped_at(const fs::path& log) {
 Recorded read_header(const Json& header, const fs::path& log) {
   const std::string where = log.string() + ": line 1";
   if (header.value("type", Json()) != "header")
-    throw Error(ErrorCode::invalid, fmt::format("{}: is no header, expected a log of hamelin", where));
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: is not a header, expected a log of hamelin", where));
   log::check_line(header, where);
 
   Recorded recorded;
-  recorded.program = header["program"] == "integrate" ? Recorded::Program::integrate : Recorded::Program::run;
+  recorded.program =
+      header["program"] == "integrate" ? Recorded::Program::integrate : Recorded::Program::run;
   recorded.every = header["every"].get<long>();
   const Json& provenance = header["provenance"];
-  recorded.other_build = differences_of_build(provenance);
+  recorded.other_build = build_differences(provenance);
 
   Json config = header["config"];
   const fs::path cwd = text_at(provenance, "/cwd");
-  for (const auto& [role, pointer] : places_of_files(config)) {
+  for (const auto& [role, pointer] : file_pointers(config)) {
     const Json::json_pointer at(pointer);
     if (!config.contains(at) || !config[at].is_string()) continue;
     const std::string sha256 = logged_hash(header, role);
     const std::string named = config[at].get<std::string>();
     const Found found = find_input(named, sha256, cwd, log);
     if (found.file.empty()) {
-      recorded.changed.push_back({role, fmt::format("{}: is missing, expected the {} of this log", named, role)});
+      recorded.changed.push_back(
+          {role, fmt::format("{}: is missing, expected the {} of this log", named, role)});
     } else {
       if (found.sha256 != sha256)
         recorded.changed.push_back(
-            {role, fmt::format("{}: has changed since the log was written: SHA-256 {}..., expected {}...",
-                               found.file.string(), short_hash(found.sha256),
-                               sha256.empty() ? "one in the header" : short_hash(sha256))});
+            {role,
+             fmt::format("{}: has changed since the log was written: SHA-256 {}..., expected {}...",
+                         found.file.string(), short_hash(found.sha256),
+                         sha256.empty() ? "one in the header" : short_hash(sha256))});
       config[at] = found.file.string();
     }
   }
@@ -242,22 +261,27 @@ Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_di
   log::LogReader reader(log);
   Json header;
   if (!reader.next(header))
-    throw Error(ErrorCode::invalid, fmt::format("{}: has no whole line, expected a log of hamelin", log.string()));
-  take_instruction_set(header);
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has no complete line, expected a log of hamelin", log.string()));
+  use_logged_isa(header);
   Recorded recorded = read_header(header, log);
   if (recorded.program == Recorded::Program::run && recorded.scene.planner) {
     const auto plugin = planning::find_plugin(recorded.scene.planner->name, plugin_directories);
-    const std::string then = logged_hash(header, "plugin"), now = sha256_hex(read_file(plugin.file()));
+    const std::string then = logged_hash(header, "plugin"),
+                      now = sha256_hex(read_file(plugin.file()));
     if (then != now)
       recorded.other_build.push_back(
-          fmt::format("planner '{}': SHA-256 {}... then, {}... now", plugin.name(), short_hash(then), short_hash(now)));
+          fmt::format("planner '{}': SHA-256 {}... in the log, {}... now", plugin.name(),
+                      short_hash(then), short_hash(now)));
   }
   return recorded;
 }
 
-log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories, const Watch& watch) {
+log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories,
+                   const Watch& watch) {
   if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front().text);
-  if (recorded.program == Recorded::Program::run) return run(recorded.scene, plugin_directories, watch);
+  if (recorded.program == Recorded::Program::run)
+    return run(recorded.scene, plugin_directories, watch);
   const model::Model model = load_model(recorded.scene);
   return integrate(model, free_motion(recorded.scene, model), watch);
 }
@@ -268,7 +292,7 @@ Verdict verify(const Recorded& recorded, const fs::path& log, double tolerance,
   Watch compared = watch;
   compared.log = &comparison;
   compared.every = recorded.every;
-  compared.stop_at = stopped_at(log);
+  compared.stop_at = logged_stop_step(log);
   compared.announce = nullptr;
   (void)repeat(recorded, plugin_directories, compared);
   comparison.finish();

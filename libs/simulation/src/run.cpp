@@ -4,17 +4,18 @@
 
 namespace hamelin::simulation {
 
-log::Result run(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories,
-                const Watch& watch) {
+log::Result run(const scene::Scene& scene,
+                const std::vector<std::filesystem::path>& plugin_directories, const Watch& watch) {
   return ClosedLoop(scene, plugin_directories).run(watch);
 }
 
-Json full_config(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories) {
+Json full_config(const scene::Scene& scene,
+                 const std::vector<std::filesystem::path>& plugin_directories) {
   (void)integrator_options(scene.integrator.params, scene.name + ": /integrator/params");
   Json config = resolved_config(scene);
   if (scene.planner)
-    config["planner"]["params"] =
-        planning::check_params(planning::find_plugin(scene.planner->name, plugin_directories), scene.planner->params);
+    config["planner"]["params"] = planning::check_params(
+        planning::find_plugin(scene.planner->name, plugin_directories), scene.planner->params);
   return config;
 }
 

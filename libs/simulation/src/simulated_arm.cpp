@@ -7,7 +7,8 @@ namespace hamelin::simulation {
 
 using Eigen::VectorXd;
 
-SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, const integration::Parameters& options)
+SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm,
+                           const integration::Parameters& options)
     : model(arm),
       ws(arm),
       integrator(integration::make_integrator(scene.integrator.name, arm, options)),
@@ -18,8 +19,8 @@ SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm, c
   channels.coulomb_speed = scene.model.friction_speed;
   if (scene.actuation.coulomb_friction_share > 0.0) {
     if (channels.coulomb.size() == 0) channels.coulomb = zero;
-    channels.coulomb +=
-        scene.actuation.coulomb_friction_share * control::joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
+    channels.coulomb += scene.actuation.coulomb_friction_share *
+                        control::joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
   }
   channels.held_torque = zero;
   channels.damping = own_damping.size() > 0 ? own_damping : zero;

@@ -7,23 +7,24 @@
 
 namespace hamelin::simulation {
 
-/// The arm that is simulated: its integrator, its state, and what acts on it during the next step.
+/// The simulated arm: its integrator, its state, and the channels that act during the next step.
 struct SimulatedArm {
-  /// At the scene's start. Friction and damping of the scene are among the channels.
+  /// At the scene's start. The channels include friction and damping of the scene.
   /// @throws Error invalid for numbers that do not fit the robot, usage for an unknown integrator
-  SimulatedArm(const scene::Scene& scene, const model::Model& model, const integration::Parameters& options);
+  SimulatedArm(const scene::Scene& scene, const model::Model& model,
+               const integration::Parameters& options);
 
-  /// Advances by one step. @return whether it converged; else the state is as it was
+  /// Advances by one step. @return whether it converged; if not, the state is unchanged
   [[nodiscard]] bool step(double step_s);
 
   const model::Model& model;
   dynamics::Workspace ws;
   std::unique_ptr<integration::Integrator> integrator;
-  Eigen::VectorXd own_damping;  ///< viscous, of the joints themselves; of size zero for none
+  Eigen::VectorXd own_damping;  ///< viscous, of the joints themselves; size zero: none
   integration::State state;
   integration::Channels channels;
   integration::StepReport report;  ///< of the last step
-  Eigen::VectorXd v;               ///< at the node, as the planner sees it
+  Eigen::VectorXd v;               ///< at the node, as the planner is given it
 };
 
 }  // namespace hamelin::simulation

@@ -27,7 +27,10 @@ void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, 
               {"generator", Rng::name},
               {"config", std::move(config)},
               {"robot_notes", arm_.model.robot().notes},
-              {"plugin", {{"name", plugin.name()}, {"version", plugin.version()}, {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
+              {"plugin",
+               {{"name", plugin.name()},
+                {"version", plugin.version()},
+                {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
               {"provenance", provenance}};
   recorder_.header(std::move(fields), arm_.model.robot(), steps);
 }

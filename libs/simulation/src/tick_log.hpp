@@ -9,19 +9,20 @@
 
 namespace hamelin::simulation {
 
-/// Writes what a run in closed loop logs: header and ticks.
+/// Writes the header and ticks of a run in closed loop.
 class TickLog {
  public:
-  TickLog(Recorder& recorder, SimulatedArm& arm, const control::WorldView& world, const control::GoalTracker& goals,
-          Actuation& actuation)
+  TickLog(Recorder& recorder, SimulatedArm& arm, const control::WorldView& world,
+          const control::GoalTracker& goals, Actuation& actuation)
       : recorder_(recorder), arm_(arm), world_(world), goals_(goals), actuation_(actuation) {
     torque_.setZero(arm.model.dof());
   }
 
   /// @param params the planner's, with defaults
-  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params, const Json& provenance,
-              long steps);
-  /// The line of this node. @param answer the planner's, which acts from here on; null at a last node
+  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
+              const Json& provenance, long steps);
+  /// Writes the line of this node. @param answer the planner's, which acts from here on; null at
+  /// the last node
   void tick(bool certified, const planning::CommandBuffers* answer);
 
  private:
@@ -30,7 +31,7 @@ class TickLog {
   const control::WorldView& world_;
   const control::GoalTracker& goals_;
   Actuation& actuation_;
-  Eigen::VectorXd torque_;  ///< of the last node at which something acted
+  Eigen::VectorXd torque_;  ///< of the last node with an answer
 };
 
 }  // namespace hamelin::simulation

@@ -42,18 +42,22 @@ TEST_CASE("damping is booked, so that the energy account still closes", "[simula
   CHECK(result.energy_error_max_J < 1e-3);
 }
 
-TEST_CASE("a duration that is no whole number of steps, and vectors of the wrong size, are refused",
-          "[simulation][input]") {
+TEST_CASE(
+    "a duration that is not a multiple of the step, and vectors of the wrong size, are refused",
+    "[simulation][input]") {
   const model::Model arm(test::planar3());
-  CHECK_THROWS_WITH(simulation::integrate(arm, rest(3, 0.003, 0.01), {}), Catch::Contains("no whole number of steps"));
+  CHECK_THROWS_WITH(simulation::integrate(arm, rest(3, 0.003, 0.01), {}),
+                    Catch::Contains("not an integer multiple of the step"));
   CHECK_THROWS_WITH(simulation::integrate(arm, rest(2, 0.001, 0.01), {}),
-                    Catch::Contains("q0: 2 numbers given, expected 3"));
+                    Catch::Contains("q0: 2 values given, expected 3"));
   CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.0, 1.0), {}), Error);
   CHECK_THROWS_AS(simulation::integrate(arm, rest(3, 0.001, -1.0), {}), Error);
-  CHECK(simulation::integrate(arm, rest(3, 0.1, 0.3), {}).steps == 3);  // 0.3/0.1 is not 3 in doubles
+  // 0.3/0.1 is not 3 in floating point.
+  CHECK(simulation::integrate(arm, rest(3, 0.1, 0.3), {}).steps == 3);
 }
 
-TEST_CASE("under step control the last step ends at the duration, whatever it is", "[simulation][step-control]") {
+TEST_CASE("under step control the last step ends exactly at any duration",
+          "[simulation][step-control]") {
   const model::Model arm(test::planar3());
   auto motion = rest(3, 0.01, 10.0 + 1.0 / 3.0);
   motion.integrator = "dop853";
@@ -65,11 +69,11 @@ TEST_CASE("under step control the last step ends at the duration, whatever it is
   CHECK(result.steps < 100);
   CHECK(result.solver.evaluations == 12 * result.steps + 11 * result.solver.rejected);
   CHECK(result.energy_error_max_J < 1e-7);
-  motion.step_s = 5.0;  // far too long for a first step: taken back
+  motion.step_s = 5.0;  // far too long for a first step: rejected
   CHECK(simulation::integrate(arm, motion, {}).solver.rejected > 0);
 }
 
-TEST_CASE("an explicit scheme that leaves the finite numbers ends as diverged, naming the step",
+TEST_CASE("an explicit scheme whose state becomes infinite ends as diverged and names the step",
           "[simulation][outcome]") {
   const model::Model arm(test::spatial_chain(7));
   auto motion = rest(7, 0.5, 500.0);
@@ -78,7 +82,7 @@ TEST_CASE("an explicit scheme that leaves the finite numbers ends as diverged, n
   motion.integrator = "rk4";
   const auto result = simulation::integrate(arm, motion, {});
   CHECK(result.outcome == log::Outcome::diverged);
-  CHECK_THAT(result.cause, Catch::Contains("left the finite numbers"));
+  CHECK_THAT(result.cause, Catch::Contains("the state is no longer finite"));
 }
 
 TEST_CASE("free motion can be stopped from outside", "[simulation][outcome]") {

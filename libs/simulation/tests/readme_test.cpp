@@ -7,7 +7,8 @@
 
 using namespace hamelin;
 
-TEST_CASE("the README's example runs a second and logs every hundredth step", "[simulation][unit]") {
+TEST_CASE("the README's example runs a second and logs every hundredth step",
+          "[simulation][unit]") {
   const auto file = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "simulation_readme.jsonl";
   std::filesystem::remove(file);
   // clang-format off

@@ -8,7 +8,7 @@
 
 using hamelin::simulation::TimeHistogram;
 
-TEST_CASE("quantiles of tick times are those of all times, to the stated error; the largest is exact",
+TEST_CASE("quantiles of tick times are correct to the stated error; the largest is exact",
           "[simulation][unit]") {
   hamelin::Rng rng(3);
   for (const std::size_t count : {1U, 2U, 3U, 99U, 100U, 101U, 20000U}) {
@@ -29,7 +29,7 @@ TEST_CASE("quantiles of tick times are those of all times, to the stated error; 
   }
 }
 
-TEST_CASE("times beyond a histogram's bounds are counted at the bounds", "[simulation][unit]") {
+TEST_CASE("times outside the histogram's bounds are counted at the bounds", "[simulation][unit]") {
   TimeHistogram histogram;
   for (const double duration : {0.0, -1.0, 1e-9}) histogram.add(duration);
   CHECK(histogram.quantile(1.0) <= 1e-3);

@@ -21,8 +21,10 @@ DirectoryLock::DirectoryLock(const std::filesystem::path& directory)
   const int reason = errno;
   ::close(descriptor_);
   if (reason == EWOULDBLOCK)
-    throw Error(ErrorCode::io,
-                fmt::format("{}: another sweep command is using it, expected one at a time in a directory", name_));
+    throw Error(
+        ErrorCode::io,
+        fmt::format("{}: another sweep command is using it, expected one at a time per directory",
+                    name_));
   errno = reason;
   fail();
 }

@@ -4,11 +4,11 @@
 
 namespace hamelin::sweep {
 
-/// Keeps other processes from planning or running in a sweep's directory: an exclusive lock on its file of records,
-/// which is made if there is none.
+/// Keeps other processes from planning or running a sweep in a directory, by an exclusive lock on
+/// its file of records. The file is created if it does not exist.
 class DirectoryLock {
  public:
-  /// @throws Error io if the file cannot be opened, or another process has the lock
+  /// @throws Error io if the file cannot be opened, or if another process holds the lock
   explicit DirectoryLock(const std::filesystem::path& directory);
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;
@@ -17,7 +17,7 @@ class DirectoryLock {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   /// Open for writing.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
-  /// Throws what `errno` says of the file.
+  /// Throws an Error with the file's name and the message of `errno`.
   [[noreturn]] void fail() const;
 
  private:

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Uniform configurations of the scene's arm, and whether they are clear.
+/// Draws uniform configurations of the scene's arm and checks whether they are clear.
 class Sampler {
  public:
   Sampler(const scene::Scene& scene, const PairOptions& options)
@@ -30,22 +30,24 @@ class Sampler {
         arm_(model_) {
     if (scene.model.self_collision) self_.emplace(model_);
     if (environment_.has_obstacles() && model_.shapes().empty())
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /robot: '{}' has no collision spheres or capsules, expected some "
-                              "where there are obstacles",
-                              scene.name, model_.robot().name));
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format(
+              "{}: /robot: '{}' has no collision spheres or capsules, expected at least one "
+              "in a scene with obstacles",
+              scene.name, model_.robot().name));
     for (int i = 0; i < model_.dof(); ++i) {
       const auto& joint = model_.robot().links[static_cast<std::size_t>(i)].joint;
       if (!joint.lower || !joint.upper)
-        throw Error(
-            ErrorCode::invalid,
-            fmt::format("{}: /robot: joint '{}' has no position limits, expected both to draw configurations between",
-                        scene.name, joint.name));
+        throw Error(ErrorCode::invalid, fmt::format("{}: /robot: joint '{}' has no position "
+                                                    "limits, expected a lower and an upper limit",
+                                                    scene.name, joint.name));
       lower_[i] = *joint.lower;
       upper_[i] = *joint.upper;
     }
   }
 
+  // docs/theory.md (13.25)
   void draw(VectorXd& q) {
     q.resize(lower_.size());
     for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = rng_.uniform(lower_[i], upper_[i]);
@@ -54,11 +56,12 @@ class Sampler {
   [[nodiscard]] bool clear(const VectorXd& q) {
     dynamics::forward_kinematics(model_, ws_, q);
     arm_.place(model_, ws_);
-    return environment_.clearance(arm_.view(), 0.0, min_clearance_) >= min_clearance_ && clear_of_itself();
+    return environment_.clearance(arm_.view(), 0.0, min_clearance_) >= min_clearance_ &&
+           free_of_self_contact();
   }
 
  private:
-  [[nodiscard]] bool clear_of_itself() const {
+  [[nodiscard]] bool free_of_self_contact() const {
     for (std::size_t pair = 0; self_ && pair < self_->pairs().size(); ++pair)
       if (self_->distance(pair, arm_.view(), min_clearance_) <= 0.0) return false;
     return true;
@@ -67,7 +70,7 @@ class Sampler {
   model::Model model_;
   dynamics::Workspace ws_;
   scene::Environment environment_;
-  std::optional<scene::SelfField> self_;  ///< where the scene models it
+  std::optional<scene::SelfField> self_;  ///< if the scene models self-collision
   double min_clearance_;
   Rng rng_;
   VectorXd lower_, upper_;
@@ -75,13 +78,14 @@ class Sampler {
 };
 
 void check(const PairOptions& options) {
-  if (options.count == 0) throw Error(ErrorCode::usage, "0 pairs asked for, expected at least 1");
+  if (options.count == 0) throw Error(ErrorCode::usage, "0 pairs requested, expected at least 1");
   if (!(options.min_clearance_m > 0.0 && std::isfinite(options.min_clearance_m)))
-    throw Error(ErrorCode::usage,
-                fmt::format("smallest clearance {} m, expected a positive number", options.min_clearance_m));
+    throw Error(ErrorCode::usage, fmt::format("smallest clearance {} m, expected a positive number",
+                                              options.min_clearance_m));
   if (!(options.min_distance_rad >= 0.0 && std::isfinite(options.min_distance_rad)))
     throw Error(ErrorCode::usage,
-                fmt::format("smallest distance {} rad, expected a number from 0 up", options.min_distance_rad));
+                fmt::format("smallest distance {} rad, expected 0 or a positive number",
+                            options.min_distance_rad));
 }
 
 }  // namespace
@@ -96,8 +100,9 @@ DrawnPairs draw_pairs(const scene::Scene& scene, const PairOptions& options) {
     if (drawn.draws == options.max_draws)
       throw Error(
           ErrorCode::invalid,
-          fmt::format("{}: only {} of {} pairs found in {} draws, {} of them nearer than {} m to something, {} goals "
-                      "nearer than {} rad to their start; expected room for more",
+          fmt::format("{}: only {} of {} pairs found in {} draws, {} of them nearer than {} m to "
+                      "something, {} goals "
+                      "nearer than {} rad to their start; expected enough free space for all pairs",
                       scene.name, drawn.pairs.size(), options.count, drawn.draws, drawn.near_draws,
                       options.min_clearance_m, drawn.close_goals, options.min_distance_rad));
     VectorXd& q = have_start ? pair.goal : pair.start;

@@ -21,24 +21,28 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-// Leaves this much beyond the nearest are kept with it: they serve until the ball has moved half as far.
+// With the nearest leaf all leaves are kept that are at most this much farther away. They contain
+// the nearest leaf until the ball has moved half this distance.
 constexpr double nearby_m = 0.04;
 
-// Points on a capsule's axis about which balls of its radius leave less than `capsule_gap_m` of it out.
-std::vector<Vector3d> along(const model::Segment& capsule) {
+// Points on a capsule's axis; balls of its radius around them leave gaps of less than
+// `capsule_gap_m` at its surface. docs/theory.md (13.18).
+std::vector<Vector3d> ball_centers(const model::Segment& capsule) {
   const Vector3d axis = capsule.to_m - capsule.from_m;
-  // a gap s between centres leaves r − √(r² − s²/4) < s²/4r out
-  const auto parts =
-      static_cast<int>(std::ceil(axis.norm() / std::sqrt(4.0 * capsule.radius_m * JudgedArm::capsule_gap_m)));
+  // a spacing s of the centres leaves a gap of r − √(r² − s²/4) < s²/4r, where r is the radius
+  const auto parts = static_cast<int>(
+      std::ceil(axis.norm() / std::sqrt(4.0 * capsule.radius_m * JudgedArm::capsule_gap_m)));
   std::vector<Vector3d> points{capsule.from_m};
-  for (int i = 1; i <= parts; ++i) points.emplace_back(capsule.from_m + (static_cast<double>(i) / parts) * axis);
+  for (int i = 1; i <= parts; ++i)
+    points.emplace_back(capsule.from_m + (static_cast<double>(i) / parts) * axis);
   return points;
 }
 
-// Positive outside, negative inside, of a body that is the product of intervals |x_i| <= h_i.
+// Signed distance from a product of intervals |x_i| <= h_i, negative inside. `excess` is |x_i| −
+// h_i. docs/theory.md (13.21).
 template <typename Vector>
-double distance_from_block(const Vector& outside) {
-  return outside.cwiseMax(0.0).norm() + std::min(outside.maxCoeff(), 0.0);
+double distance_from_block(const Vector& excess) {
+  return excess.cwiseMax(0.0).norm() + std::min(excess.maxCoeff(), 0.0);
 }
 
 Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
@@ -50,7 +54,7 @@ Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
   return rest + line.velocity_m_s * std::min(std::max(time_s - line.start_s, 0.0), line.duration_s);
 }
 
-double radius_around(const scene::Obstacle& obstacle) {
+double radius_around_center(const scene::Obstacle& obstacle) {
   switch (obstacle.shape) {
     case scene::Shape::sphere:
       return obstacle.radius_m;
@@ -65,8 +69,8 @@ double radius_around(const scene::Obstacle& obstacle) {
 }  // namespace
 
 JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
-  const model::Robot robot =
-      description::read_robot(scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
+  const model::Robot robot = description::read_robot(
+      scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
   std::vector<std::string> parts;  // of each ball
   std::map<std::string, int> counts;
   const auto add = [&](const std::string& part, int link, const Vector3d& center, double radius) {
@@ -77,18 +81,20 @@ JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
     const auto& link = robot.links[i];
     joints_.push_back({link.parent, link.joint.screw.head<3>(), link.joint.screw.tail<3>()});
     for (const auto& sphere : link.spheres)
-      add(sphere.part.empty() ? link.name : sphere.part, static_cast<int>(i), isometry(link.com) * sphere.center_m,
-          sphere.radius_m);
+      add(sphere.part.empty() ? link.name : sphere.part, static_cast<int>(i),
+          isometry(link.com) * sphere.center_m, sphere.radius_m);
     for (const auto& segment : link.segments)
       if (segment.is_capsule())
-        for (const Vector3d& point : along(segment))
-          add(segment.part.empty() ? link.name : segment.part, static_cast<int>(i), isometry(link.com) * point,
-              segment.radius_m);
+        for (const Vector3d& point : ball_centers(segment))
+          add(segment.part.empty() ? link.name : segment.part, static_cast<int>(i),
+              isometry(link.com) * point, segment.radius_m);
   }
   const std::size_t moving = balls_.size();
-  for (const auto& sphere : robot.base_spheres) add(sphere.part, -1, sphere.center_m, sphere.radius_m);
+  for (const auto& sphere : robot.base_spheres)
+    add(sphere.part, -1, sphere.center_m, sphere.radius_m);
   for (const auto& capsule : robot.base_segments)
-    for (const Vector3d& point : along(capsule)) add(capsule.part, -1, point, capsule.radius_m);
+    for (const Vector3d& point : ball_centers(capsule))
+      add(capsule.part, -1, point, capsule.radius_m);
   base_balls_.assign(balls_.begin() + static_cast<std::ptrdiff_t>(moving), balls_.end());
   if (!scene.model.self_collision) {
     balls_.resize(moving);
@@ -96,16 +102,21 @@ JudgedArm::JudgedArm(const scene::Scene& scene) : base_(isometry(scene.base)) {
   }
   std::set<std::pair<std::string, std::string>> disabled;
   for (const auto& [a, b] : robot.self_collision_disabled) disabled.insert(std::minmax(a, b));
-  const auto parent = [&](int link) { return link < 0 ? -1 : robot.links[static_cast<std::size_t>(link)].parent; };
+  const auto parent = [&](int link) {
+    return link < 0 ? -1 : robot.links[static_cast<std::size_t>(link)].parent;
+  };
   for (std::size_t a = 0; a < balls_.size(); ++a)
     for (std::size_t b = a + 1; b < balls_.size(); ++b) {
       const int i = balls_[a].link, j = balls_[b].link;
       const bool neighbours = parent(i) == j || parent(j) == i;
-      if (i == j || (disabled.empty() && neighbours) || disabled.contains(std::minmax(parts[a], parts[b]))) continue;
+      if (i == j || (disabled.empty() && neighbours) ||
+          disabled.contains(std::minmax(parts[a], parts[b])))
+        continue;
       self_pairs_.emplace_back(a, b);
     }
 }
 
+// docs/theory.md (13.19), (13.20)
 void JudgedArm::place(const Eigen::VectorXd& q, std::vector<Vector3d>& centers) const {
   std::vector<Isometry3d> moved(joints_.size());
   for (std::size_t i = 0; i < joints_.size(); ++i) {
@@ -115,17 +126,20 @@ void JudgedArm::place(const Eigen::VectorXd& q, std::vector<Vector3d>& centers) 
     if (joint.axis.isZero()) {
       step.translation() = angle * joint.moment;
     } else {
-      // a point of the axis is ω × v; what of v lies along the axis is the screw's pitch
+      // ω × v is a point of the axis, and ω · v is the pitch of the screw
       const Vector3d on_axis = joint.axis.cross(joint.moment);
       step.linear() = Eigen::AngleAxisd(angle, joint.axis).toRotationMatrix();
-      step.translation() = on_axis - step.linear() * on_axis + angle * joint.axis.dot(joint.moment) * joint.axis;
+      step.translation() =
+          on_axis - step.linear() * on_axis + angle * joint.axis.dot(joint.moment) * joint.axis;
     }
-    const Isometry3d before = joint.parent < 0 ? base_ : moved[static_cast<std::size_t>(joint.parent)];
+    const Isometry3d before =
+        joint.parent < 0 ? base_ : moved[static_cast<std::size_t>(joint.parent)];
     moved[i] = before * step;
   }
   centers.resize(balls_.size());
   for (std::size_t k = 0; k < balls_.size(); ++k)
-    centers[k] = (balls_[k].link < 0 ? base_ : moved[static_cast<std::size_t>(balls_[k].link)]) * balls_[k].center;
+    centers[k] = (balls_[k].link < 0 ? base_ : moved[static_cast<std::size_t>(balls_[k].link)]) *
+                 balls_[k].center;
 }
 
 double distance_from(const scene::Obstacle& obstacle, double time_s, const Vector3d& p) {
@@ -136,15 +150,18 @@ double distance_from(const scene::Obstacle& obstacle, double time_s, const Vecto
     case scene::Shape::box:
       return distance_from_block(Vector3d(local.cwiseAbs() - 0.5 * obstacle.size_m));
     case scene::Shape::cylinder:
-      return distance_from_block(
-          Eigen::Vector2d(local.head<2>().norm() - obstacle.radius_m, std::abs(local.z()) - 0.5 * obstacle.length_m));
+      return distance_from_block(Eigen::Vector2d(local.head<2>().norm() - obstacle.radius_m,
+                                                 std::abs(local.z()) - 0.5 * obstacle.length_m));
   }
   return infinity;
 }
 
 Json to_json(const Verdict& v) {
   const auto closest = [](const std::optional<Closest>& c) {
-    return c ? Json{{"clearance_m", c->clearance_m}, {"time_s", c->time_s}, {"sphere", c->ball}, {"other", c->other}}
+    return c ? Json{{"clearance_m", c->clearance_m},
+                    {"time_s", c->time_s},
+                    {"sphere", c->ball},
+                    {"other", c->other}}
              : Json(nullptr);
   };
   return {{"contact", v.contact()},
@@ -154,89 +171,101 @@ Json to_json(const Verdict& v) {
 }
 
 Judge::Judge(const scene::Scene& scene)
-    : arm_(scene), obstacles_(scene.obstacles), best_(infinity), best_self_(infinity) {
-  for (const auto& obstacle : obstacles_) bounds_.push_back(radius_around(obstacle));
-  const bool exact = std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
+    : arm_(scene),
+      obstacles_(scene.obstacles),
+      min_clearance_(infinity),
+      min_self_clearance_(infinity) {
+  for (const auto& obstacle : obstacles_) bounding_radii_.push_back(radius_around_center(obstacle));
+  const bool exact =
+      std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
   if (scene.map && (!exact || !scene.map->changes.empty())) map_ = JudgedMap(scene, arm_);
   if (exact) map_.clear();
   nearby_.resize(arm_.balls().size());
 }
 
-void Judge::node(double time_s, const Eigen::VectorXd& q) {
+// docs/theory.md (13.22)
+void Judge::add_node(double time_s, const Eigen::VectorXd& q) {
   if (!q.allFinite()) return;  // the run ends as diverged
   int parts = 1;
   if (last_q_.size() > 0)
-    parts = std::max(1, static_cast<int>(std::ceil((q - last_q_).lpNorm<Eigen::Infinity>() / step_rad)));
+    parts = std::max(
+        1, static_cast<int>(std::ceil((q - last_q_).lpNorm<Eigen::Infinity>() / step_rad)));
   for (int i = 1; i < parts; ++i) {
     const double share = static_cast<double>(i) / parts;
-    look(last_time_s_ + share * (time_s - last_time_s_), last_q_ + share * (q - last_q_));
+    check(last_time_s_ + share * (time_s - last_time_s_), last_q_ + share * (q - last_q_));
   }
-  look(time_s, q);
+  check(time_s, q);
   last_time_s_ = time_s;
   last_q_ = q;
 }
 
-void Judge::look(double time_s, const Eigen::VectorXd& q) {
+void Judge::check(double time_s, const Eigen::VectorXd& q) {
   ++verdict_.configurations;
   arm_.place(q, centers_);
   if (map_.advance(time_s))
-    for (Nearby& nearby : nearby_) nearby.known = false;
+    for (NearbyLeaves& nearby : nearby_) nearby.valid = false;
   const auto& balls = arm_.balls();
-  const auto found = [&](double clearance, std::size_t ball, const std::string& what) {
-    if (!(clearance < best_)) return;
-    best_ = clearance;
-    verdict_.obstacles = {clearance, time_s, balls[ball].name, what};
+  const auto update = [&](double clearance, std::size_t ball, const std::string& other) {
+    if (!(clearance < min_clearance_)) return;
+    min_clearance_ = clearance;
+    verdict_.obstacles = {clearance, time_s, balls[ball].name, other};
   };
   for (std::size_t k = 0; k < balls.size(); ++k) {
-    if (balls[k].link < 0) continue;  // the base stands where it stands
+    if (balls[k].link < 0) continue;  // the base does not move
     for (std::size_t i = 0; i < obstacles_.size(); ++i) {
       const auto& obstacle = obstacles_[i];
       if (time_s < obstacle.appears_s) continue;
-      const double at_least = (centers_[k] - center_at(obstacle, time_s)).norm() - bounds_[i] - balls[k].radius;
-      if (at_least < best_) found(distance_from(obstacle, time_s, centers_[k]) - balls[k].radius, k, obstacle.name);
+      const double lower_bound =
+          (centers_[k] - center_at(obstacle, time_s)).norm() - bounding_radii_[i] - balls[k].radius;
+      if (lower_bound < min_clearance_)
+        update(distance_from(obstacle, time_s, centers_[k]) - balls[k].radius, k, obstacle.name);
     }
-    if (!map_.leaves().empty()) found(map_distance(k, best_) - balls[k].radius, k, "map");
+    if (!map_.leaves().empty()) update(map_distance(k, min_clearance_) - balls[k].radius, k, "map");
   }
   for (const auto& [a, b] : arm_.self_pairs()) {
     const double clearance = (centers_[a] - centers_[b]).norm() - balls[a].radius - balls[b].radius;
-    if (!(clearance < best_self_)) continue;
-    best_self_ = clearance;
+    if (!(clearance < min_self_clearance_)) continue;
+    min_self_clearance_ = clearance;
     verdict_.self = {clearance, time_s, balls[a].name, balls[b].name};
   }
 }
 
-// Distances change by no more than the way moved: so what was found before tells when the ball cannot be nearer than
-// `enough`, and when the leaves gathered then still hold the nearest one.
+// A distance changes by no more than the ball moves. The stored distance therefore bounds the
+// present one from below, which is sufficient if the bound is at least `enough`, and it decides
+// whether the stored leaves still contain the nearest one. docs/theory.md (13.23).
 double Judge::map_distance(std::size_t ball, double enough) {
-  Nearby& nearby = nearby_[ball];
+  NearbyLeaves& nearby = nearby_[ball];
   const Vector3d& p = centers_[ball];
-  const double moved = (p - nearby.at).norm();
-  if (nearby.known) {
-    if (nearby.distance - moved - arm_.balls()[ball].radius >= enough) return nearby.distance - moved;
-    if (2.0 * moved <= nearby_m) return distance_from_boxes(nearby.leaves, map_.local(p));
+  const double moved = (p - nearby.position).norm();
+  if (nearby.valid) {
+    if (nearby.distance - moved - arm_.balls()[ball].radius >= enough)
+      return nearby.distance - moved;
+    if (2.0 * moved <= nearby_m) return distance_from_boxes(nearby.leaves, map_.to_map_frame(p));
   }
-  nearby.at = p;
+  nearby.position = p;
   nearby.distance = map_.distance(p);
-  nearby.leaves = map_.near(p, nearby.distance + nearby_m);
-  nearby.known = true;
+  nearby.leaves = map_.leaves_within(p, nearby.distance + nearby_m);
+  nearby.valid = true;
   return nearby.distance;
 }
 
 namespace {
 
-/// A configuration's smallest distance from anything [m], and from what.
+/// The smallest distance of a configuration from obstacles, map and itself [m], and where it
+/// occurs.
 struct Nearest {
   double distance = infinity;
-  std::string what;
+  std::string place;
 };
 
-Nearest nearest_at(const scene::Scene& scene, const JudgedArm& arm, const JudgedMap& map, const Eigen::VectorXd& q) {
+Nearest nearest_at(const scene::Scene& scene, const JudgedArm& arm, const JudgedMap& map,
+                   const Eigen::VectorXd& q) {
   std::vector<Vector3d> centers;
   arm.place(q, centers);
   Nearest nearest;
   const auto& balls = arm.balls();
-  const auto add = [&](double distance, const std::string& what) {
-    if (distance < nearest.distance) nearest = {distance, what};
+  const auto add = [&](double distance, const std::string& place) {
+    if (distance < nearest.distance) nearest = {distance, place};
   };
   for (std::size_t k = 0; k < balls.size() && balls[k].link >= 0; ++k) {
     add(map.distance(centers[k]) - balls[k].radius, balls[k].name + " in the map");
@@ -252,7 +281,7 @@ Nearest nearest_at(const scene::Scene& scene, const JudgedArm& arm, const Judged
 }
 
 /// The map at time 0, and after each change within the scene's duration.
-std::vector<JudgedMap> maps_in_force(const scene::Scene& scene, const JudgedArm& arm) {
+std::vector<JudgedMap> maps_over_time(const scene::Scene& scene, const JudgedArm& arm) {
   std::vector<JudgedMap> maps;
   maps.push_back(scene.map ? JudgedMap(scene, arm) : JudgedMap());
   maps.back().advance(0.0);
@@ -269,23 +298,28 @@ std::vector<JudgedMap> maps_in_force(const scene::Scene& scene, const JudgedArm&
 
 Feasibility feasibility(const scene::Scene& scene, const std::vector<Eigen::VectorXd>& goals_q) {
   const JudgedArm arm(scene);
-  const auto maps = maps_in_force(scene, arm);
+  const auto maps = maps_over_time(scene, arm);
   const auto dof = static_cast<Eigen::Index>(arm.dof());
-  const auto check = [&](const std::string& name, const Eigen::VectorXd& q, std::size_t map_count) -> Feasibility {
+  const auto check = [&](const std::string& name, const Eigen::VectorXd& q,
+                         std::size_t map_count) -> Feasibility {
     if (q.size() != dof)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: {}: {} numbers given, expected {}", scene.name, name, q.size(), arm.dof()));
+      throw Error(ErrorCode::invalid, fmt::format("{}: {}: {} values given, expected {}",
+                                                  scene.name, name, q.size(), arm.dof()));
     Nearest best{-infinity, ""};
     for (std::size_t i = 0; i < map_count && best.distance <= 0.0; ++i)
-      if (Nearest here = nearest_at(scene, arm, maps[i], q); here.distance > best.distance) best = std::move(here);
+      if (Nearest here = nearest_at(scene, arm, maps[i], q); here.distance > best.distance)
+        best = std::move(here);
     if (best.distance > 0.0) return {};
-    return {false, fmt::format("{}: {}, {:.4f} m deep", name, best.what, -best.distance)};
+    return {false, fmt::format("{}: {}, {:.4f} m deep", name, best.place, -best.distance)};
   };
-  Feasibility found = check("start", scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(dof), 1);
+  Feasibility found =
+      check("start", scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(dof), 1);
   for (std::size_t i = 0; i < scene.goals.size() && found.feasible; ++i)
     if (scene.goals[i].type == scene::GoalType::joint)
-      found = check(scene.goals.size() > 1 ? fmt::format("goal {}", i) : "goal", scene.goals[i].q, maps.size());
-  for (std::size_t i = 0; i < goals_q.size() && found.feasible; ++i) found = check("goal", goals_q[i], maps.size());
+      found = check(scene.goals.size() > 1 ? fmt::format("goal {}", i) : "goal", scene.goals[i].q,
+                    maps.size());
+  for (std::size_t i = 0; i < goals_q.size() && found.feasible; ++i)
+    found = check("goal", goals_q[i], maps.size());
   return found;
 }
 

@@ -6,7 +6,7 @@
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/scene/scene.hpp"
 
-/// What the judge's arm and map share.
+/// Geometry that the judge's arm and map share.
 namespace hamelin::sweep {
 
 [[nodiscard]] inline Eigen::Isometry3d isometry(const geometry::SE3& g) {
@@ -20,7 +20,8 @@ namespace hamelin::sweep {
   return (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).norm();
 }
 
-[[nodiscard]] inline double distance_from_boxes(const std::vector<scene::Box>& boxes, const Eigen::Vector3d& p) {
+[[nodiscard]] inline double distance_from_boxes(const std::vector<scene::Box>& boxes,
+                                                const Eigen::Vector3d& p) {
   double nearest = infinity;
   for (const auto& box : boxes)
     nearest = std::min(nearest, (box.lo - p).cwiseMax(p - box.hi).cwiseMax(0.0).squaredNorm());

@@ -23,29 +23,30 @@ namespace {
 namespace fs = std::filesystem;
 using Labels = std::map<std::string, std::string>;
 
-// Gain sets: spheres this far apart stand for a link's segment; 0.25 m from the obstacle's centre the nearest of them
-// is at most 0.02²/(8 · 0.25) m = 0.2 mm farther than the segment. Their radius is nothing beside that.
+// Gain sets model the segment of a link by spheres with this spacing s. At a distance d = 0.25 m
+// from the obstacle's centre the nearest sphere is at most s²/8d = 0.02²/(8 · 0.25) m = 0.2 mm
+// farther than the segment. The radius is negligible in comparison. docs/theory.md (13.17).
 constexpr double segment_spacing_m = 0.02, segment_radius_m = 1e-4;
-// Gain sets: the tip is slower than this on arrival (SPEC §4).
+// Gain sets: on arrival the tip must be slower than this. The README gives the reason.
 constexpr double arrival_tip_speed_m_s = 0.05;
 
-/// A scene file of the plan and what is said of its runs.
-struct Made {
-  std::string name;  ///< opens the ids of its runs
+/// A scene file of the plan, with the labels of its runs.
+struct SceneEntry {
+  std::string name;  ///< prefix of the ids of its runs
   PlannedScene scene;
   Labels labels;
-  bool gains = false;      ///< takes gain sets
-  bool reference = false;  ///< is there for comparison: without the obstacle
+  bool gains = false;      ///< is combined with gain sets
+  bool reference = false;  ///< is the reference without the obstacle
 };
 
-/// "NAME:key=value,…" as a planner and assignments.
+/// A planner with assignments, parsed from "NAME:key=value,…".
 struct Variant {
   std::string label;
   std::optional<std::string> planner;
   std::vector<std::string> set;
 };
 
-// At the commas that are in no brackets, braces or quotes.
+// Splits at commas outside of brackets, braces and quotes.
 std::vector<std::string> split_values(const std::string& text) {
   std::vector<std::string> parts(1);
   int depth = 0;
@@ -62,42 +63,48 @@ std::vector<std::string> split_values(const std::string& text) {
   return parts;
 }
 
-Variant variant_of(const std::string& text) {
+Variant parse_variant(const std::string& text) {
   const auto colon = text.find(':');
   Variant variant{text, text.substr(0, colon), {}};
   if (variant.planner->empty())
-    throw Error(ErrorCode::usage, fmt::format("--planner {}: no name, expected NAME or NAME:key=value,...", text));
+    throw Error(ErrorCode::usage,
+                fmt::format("--planner {}: no name, expected NAME or NAME:key=value,...", text));
   if (colon == std::string::npos) return variant;
   for (const auto& part : split_values(text.substr(colon + 1))) {
     const auto equals = part.find('=');
     if (equals == 0 || equals == std::string::npos)
-      throw Error(ErrorCode::usage, fmt::format("--planner {}: '{}' is no parameter, expected key=value", text, part));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("--planner {}: '{}' is not a parameter, expected key=value", text, part));
     variant.set.push_back("/planner/params/" + part);
   }
   return variant;
 }
 
-std::vector<Variant> variants_of(const PlanOptions& options, const std::vector<std::string>& otherwise) {
+std::vector<Variant> parse_variants(const PlanOptions& options,
+                                    const std::vector<std::string>& defaults) {
   std::vector<Variant> variants;
-  for (const auto& text : options.planners.empty() ? otherwise : options.planners) variants.push_back(variant_of(text));
+  for (const auto& text : options.planners.empty() ? defaults : options.planners)
+    variants.push_back(parse_variant(text));
   if (variants.empty()) variants.push_back({"", std::nullopt, {}});
   return variants;
 }
 
-/// Each combination of the varied values.
+/// All combinations of the varied values.
 std::vector<std::vector<std::string>> combinations(const std::vector<std::string>& vary) {
   std::vector<std::vector<std::string>> all{{}};
   for (const auto& text : vary) {
     const auto equals = text.find('=');
     if (text.empty() || text.front() != '/' || equals == std::string::npos)
-      throw Error(ErrorCode::usage, fmt::format("--vary {}: expected /json/pointer=VALUE,VALUE,...", text));
-    std::vector<std::vector<std::string>> more;
-    for (const auto& before : all)
+      throw Error(ErrorCode::usage,
+                  fmt::format("--vary {}: expected /json/pointer=VALUE,VALUE,...", text));
+    std::vector<std::vector<std::string>> extended;
+    for (const auto& combination : all)
       for (const auto& value : split_values(text.substr(equals + 1))) {
-        more.push_back(before);
-        more.back().push_back(text.substr(0, equals + 1) + value);
+        extended.push_back(combination);
+        extended.back().push_back(text.substr(0, equals + 1) + value);
       }
-    all = std::move(more);
+    all = std::move(extended);
   }
   return all;
 }
@@ -110,48 +117,55 @@ Json array(const Eigen::VectorXd& x) {
   return std::vector<double>(x.data(), x.data() + x.size());
 }
 
-Eigen::VectorXd joints(const Json& values) {
+Eigen::VectorXd joint_vector(const Json& values) {
   const auto list = values.get<std::vector<double>>();
   return Eigen::Map<const Eigen::VectorXd>(list.data(), static_cast<Eigen::Index>(list.size()));
 }
 
-/// The plan while it is made.
-class Maker {
+/// Builds a plan.
+class PlanBuilder {
  public:
-  Maker(const fs::path& directory, const PlanOptions& options) : directory_(directory), options_(options) {
+  PlanBuilder(const fs::path& directory, const PlanOptions& options)
+      : directory_(directory), options_(options) {
     if (options.files.empty() && options.clutter.maps == 0 && options.gains.sets == 0)
-      throw Error(ErrorCode::usage, "nothing to plan, expected problems, scenes, --clutter or --gain-sets");
+      throw Error(ErrorCode::usage,
+                  "nothing to plan, expected problems, scenes, --clutter or --gain-sets");
     if ((options.clutter.maps > 0 || options.gains.sets > 0) && !options.base)
-      throw Error(ErrorCode::usage, "--clutter and --gain-sets need --base, a scene whose arm is used");
-    if (options.seeds.empty()) throw Error(ErrorCode::usage, "no seeds given, expected at least one");
+      throw Error(ErrorCode::usage,
+                  "--clutter and --gain-sets need --base, the scene with the arm");
+    if (options.seeds.empty())
+      throw Error(ErrorCode::usage, "no seeds given, expected at least one");
     if (options.clutter.maps > 0 && options.clutter.pairs == 0)
-      throw Error(ErrorCode::usage, "0 pairs a clutter, expected at least 1");
+      throw Error(ErrorCode::usage, "0 pairs per clutter map, expected at least 1");
     std::error_code ec;
     fs::create_directories(scenes(), ec);
-    if (ec) throw Error(ErrorCode::io, fmt::format("{}: cannot be made: {}", scenes().string(), ec.message()));
+    if (ec)
+      throw Error(ErrorCode::io,
+                  fmt::format("{}: cannot be created: {}", scenes().string(), ec.message()));
     lock_.emplace(directory);
   }
 
-  Plan make() {
-    const std::size_t all = options_.files.size() + options_.clutter.maps + (options_.gains.sets > 0 ? 1U : 0U);
+  Plan build() {
+    const std::size_t all =
+        options_.files.size() + options_.clutter.maps + (options_.gains.sets > 0 ? 1U : 0U);
     std::size_t done = 0;
-    const auto one_more = [&] {
+    const auto report_progress = [&] {
       if (options_.on_scene) options_.on_scene(++done, all);
     };
     for (const auto& file : options_.files) {
       add_file(file);
-      one_more();
+      report_progress();
     }
     for (std::size_t i = 0; i < options_.clutter.maps; ++i) {
       add_clutter(i);
-      one_more();
+      report_progress();
     }
     if (options_.gains.sets > 0) {
       add_gain_scenes();
-      one_more();
+      report_progress();
     }
     Plan plan;
-    for (const auto& made : made_) plan.scenes.push_back(made.scene);
+    for (const auto& entry : entries_) plan.scenes.push_back(entry.scene);
     add_runs(plan);
     check(plan);
     add_inputs(plan);
@@ -165,7 +179,7 @@ class Maker {
   void add_scene(const std::string& name, const Json& document, Labels labels, bool gains = false,
                  bool reference = false) {
     const fs::path file = scenes() / (name + ".json");
-    write_file_aside(file, document.dump(2) + "\n");
+    write_file_atomically(file, document.dump(2) + "\n");
     add_scene_file(name, file, std::move(labels), std::nullopt, gains, reference);
   }
 
@@ -174,31 +188,39 @@ class Maker {
                       bool reference = false) {
     if (!names_.insert(name).second)
       throw Error(ErrorCode::usage,
-                  fmt::format("{}: another file is named '{}' too, expected names that differ", file.string(), name));
-    Made made{name, {}, std::move(labels), gains, reference};
+                  fmt::format("{}: another file also has the name '{}', expected unique names",
+                              file.string(), name));
+    SceneEntry entry{name, {}, std::move(labels), gains, reference};
     const Feasibility found = known ? *known : feasibility(scene::read_scene(file), {});
-    made.scene.feasible = found.feasible;
-    made.scene.reason = found.reason;
-    made.scene.file = fs::proximate(file, directory_).generic_string();
-    made.scene.sha256 = sha256_hex(read_file(file));
-    made_.push_back(std::move(made));
+    entry.scene.feasible = found.feasible;
+    entry.scene.reason = found.reason;
+    entry.scene.file = fs::proximate(file, directory_).generic_string();
+    entry.scene.sha256 = sha256_hex(read_file(file));
+    entries_.push_back(std::move(entry));
   }
 
   void add_file(const fs::path& file) {
     const Json document = read_json(file);
     if (document.is_object() && document.value("schema", Json()) == "hamelin.scene/1") {
       if (options_.sphere_on_path)
-        throw Error(ErrorCode::usage,
-                    fmt::format("{}: is a scene, expected problems where spheres are put on paths", file.string()));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("{}: is a scene, expected problems when spheres are placed on paths",
+                        file.string()));
       const scene::Scene scene = scene::read_scene(file);
       const std::string name = file.stem().string();
-      const std::string goal = scene.goals.empty() ? "none" : std::string(scene::type_name(scene.goals.front()));
-      add_scene_file(name, file, {{"family", name}, {"problem", name}, {"goal", goal}, {"map", map_label(scene)}});
-    } else if (document.is_object() && !document.contains("schema") && document.contains("obstacles")) {
+      const std::string goal =
+          scene.goals.empty() ? "none" : std::string(scene::type_name(scene.goals.front()));
+      add_scene_file(
+          name, file,
+          {{"family", name}, {"problem", name}, {"goal", goal}, {"map", map_label(scene)}});
+    } else if (document.is_object() && !document.contains("schema") &&
+               document.contains("obstacles")) {
       add_problem(file, document);
     } else {
       throw Error(ErrorCode::invalid,
-                  fmt::format("{}: is neither a scene nor a problem with start, goal and obstacles", file.string()));
+                  fmt::format("{}: is neither a scene nor a problem with start, goal and obstacles",
+                              file.string()));
     }
   }
 
@@ -208,37 +230,45 @@ class Maker {
 
   void add_problem(const fs::path& file, const Json& problem) {
     if (options_.problem.robot.empty())
-      throw Error(ErrorCode::usage, fmt::format("{}: is a problem, it needs --robot", file.string()));
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: is a problem, expected --robot", file.string()));
     const std::string name = file.stem().string();
     scene::ProblemOptions options = options_.problem;
     options.output = scenes() / (name + ".json");
-    const std::string map = fmt::format("{} m {}", options.resolution_m, scene::to_string(options.mark));
-    const std::string family =
-        problem.contains("family") && problem["family"].is_string() ? problem["family"].get<std::string>() : name;
+    const std::string map =
+        fmt::format("{} m {}", options.resolution_m, scene::to_string(options.mark));
+    const std::string family = problem.contains("family") && problem["family"].is_string()
+                                   ? problem["family"].get<std::string>()
+                                   : name;
     const Labels labels{{"family", family}, {"problem", name}, {"map", map}};
     if (options_.sphere_on_path) return add_sphere_on_path(file, options, labels);
     std::optional<Feasibility> found;
-    for (const auto type : options_.goals.empty() ? std::vector{scene::GoalType::joint} : options_.goals) {
+    for (const auto type :
+         options_.goals.empty() ? std::vector{scene::GoalType::joint} : options_.goals) {
       const std::string goal(scene::to_string(type));
       options.goal = type;
       scene::make_scene_from_problem(file, options);  // the map is the same each time
-      if (!found) found = feasibility(scene::read_scene(options.output), {joints(problem.at("goal"))});
-      const fs::path made = scenes() / fmt::format("{}-{}.json", name, goal);
-      fs::rename(options.output, made);
+      if (!found)
+        found = feasibility(scene::read_scene(options.output), {joint_vector(problem.at("goal"))});
+      const fs::path scene_file = scenes() / fmt::format("{}-{}.json", name, goal);
+      fs::rename(options.output, scene_file);
       Labels all = labels;
       all["goal"] = goal;
-      add_scene_file(made.stem().string(), made, std::move(all), found);
+      add_scene_file(scene_file.stem().string(), scene_file, std::move(all), found);
     }
   }
 
-  void add_sphere_on_path(const fs::path& file, const scene::ProblemOptions& problem, Labels labels) {
-    const SphereOnPath& wanted = *options_.sphere_on_path;
+  void add_sphere_on_path(const fs::path& file, const scene::ProblemOptions& problem,
+                          Labels labels) {
+    const SphereOnPath& sphere_options = *options_.sphere_on_path;
     scene::make_scene_from_problem(file, problem);
-    const PathWithSphere found = put_sphere_on_path(problem.output, wanted, options_.plugin_directories);
+    const PathWithSphere found =
+        place_sphere_on_path(problem.output, sphere_options, options_.plugin_directories);
     Json document = read_json(problem.output);
     fs::remove(problem.output);
     if (!found.reason.empty()) {
-      if (options_.on_note) options_.on_note(fmt::format("{}: is left out: {}", file.string(), found.reason));
+      if (options_.on_note)
+        options_.on_note(fmt::format("{}: is left out: {}", file.string(), found.reason));
       return;
     }
     Json points = Json::array();
@@ -246,32 +276,36 @@ class Maker {
     document["goals"] = {{{"type", "path"}, {"q", std::move(points)}}};
     Json sphere{{"name", "on the path"},
                 {"type", "sphere"},
-                {"radius_m", wanted.radius_m},
+                {"radius_m", sphere_options.radius_m},
                 {"position_m", {found.center.x(), found.center.y(), found.center.z()}}};
-    if (wanted.visible_within_m) {
+    if (sphere_options.visible_within_m) {
       sphere["known"] = false;
-      sphere["visible_within_m"] = *wanted.visible_within_m;
+      sphere["visible_within_m"] = *sphere_options.visible_within_m;
     }
     document["obstacles"].push_back(std::move(sphere));
     labels["goal"] = "path";
-    labels["sphere"] = wanted.visible_within_m ? fmt::format("seen at {} m", *wanted.visible_within_m) : "known";
+    labels["sphere"] = sphere_options.visible_within_m
+                           ? fmt::format("seen at {} m", *sphere_options.visible_within_m)
+                           : "known";
     add_scene(labels.at("problem") + "-path", document, labels);
   }
 
-  // The base scene's document with its files as seen from the scenes' directory.
+  // The document of the base scene, with file names relative to the directory of the scenes.
   [[nodiscard]] Json base_document() const {
     Json document = read_json(*options_.base);
-    const scene::Scene scene = scene::scene_from_json(document, options_.base->parent_path(), options_.base->string());
+    const scene::Scene scene =
+        scene::scene_from_json(document, options_.base->parent_path(), options_.base->string());
     document["robot"]["file"] = fs::proximate(scene.robot.file, scenes()).generic_string();
     if (scene.robot.spheres)
       document["robot"]["spheres"] = fs::proximate(*scene.robot.spheres, scenes()).generic_string();
-    if (scene.robot.srdf) document["robot"]["srdf"] = fs::proximate(*scene.robot.srdf, scenes()).generic_string();
+    if (scene.robot.srdf)
+      document["robot"]["srdf"] = fs::proximate(*scene.robot.srdf, scenes()).generic_string();
     return document;
   }
 
   void add_clutter(std::size_t index) {
-    const ClutterScenes& wanted = options_.clutter;
-    scene::Clutter clutter = wanted.clutter;
+    const ClutterScenes& clutter_options = options_.clutter;
+    scene::Clutter clutter = clutter_options.clutter;
     clutter.seed += index;
     const std::string name = fmt::format("clutter_{:04}", clutter.seed);
     scene::MakeMapOptions map;
@@ -287,17 +321,18 @@ class Maker {
     for (auto primitive : map.primitives) {
       primitive.judge_only = true;
       Json obstacle = scene::to_json(primitive);
-      for (auto it = obstacle.begin(); it != obstacle.end();) it = it->is_null() ? obstacle.erase(it) : std::next(it);
+      for (auto it = obstacle.begin(); it != obstacle.end();)
+        it = it->is_null() ? obstacle.erase(it) : std::next(it);
       document["obstacles"].push_back(std::move(obstacle));
     }
-    PairOptions draw = wanted.draw;
-    draw.count = wanted.pairs;
+    PairOptions draw = clutter_options.draw;
+    draw.count = clutter_options.pairs;
     draw.seed += index;
     const auto drawn = draw_pairs(scene::scene_from_json(document, scenes(), name), draw);
     for (std::size_t k = 0; k < drawn.pairs.size(); ++k) {
       document["start"] = {{"q", array(drawn.pairs[k].start)}};
       document["goals"] = {{{"type", "joint"}, {"q", array(drawn.pairs[k].goal)}}};
-      add_scene(wanted.pairs == 1 ? name : fmt::format("{}-{:03}", name, k + 1), document,
+      add_scene(clutter_options.pairs == 1 ? name : fmt::format("{}-{:03}", name, k + 1), document,
                 {{"family", "clutter"},
                  {"problem", name},
                  {"goal", "joint"},
@@ -305,36 +340,40 @@ class Maker {
     }
   }
 
-  // Links as rows of tiny spheres; the set-up of SPEC §4.
+  // Adds the scene with the obstacle and its reference without. The README describes the set-up.
   void add_gain_scenes() {
     const scene::Scene base = scene::read_scene(*options_.base);
-    model::Robot robot =
-        description::read_robot(base.robot.file, {base.robot.tip, base.robot.spheres, base.robot.srdf});
+    model::Robot robot = description::read_robot(
+        base.robot.file, {base.robot.tip, base.robot.spheres, base.robot.srdf});
     for (auto& link : robot.links) {
       if (link.segments.empty())
-        throw Error(ErrorCode::invalid,
-                    fmt::format("{}: link '{}' has no segments, gain sets need the links as segments",
-                                base.robot.file.string(), link.name));
+        throw Error(
+            ErrorCode::invalid,
+            fmt::format("{}: link '{}' has no segments, expected at least one for gain sets",
+                        base.robot.file.string(), link.name));
       link.spheres.clear();
       for (auto& segment : link.segments) {
         const double length = (segment.to_m - segment.from_m).norm();
-        const int parts = std::max(1, static_cast<int>(std::ceil(length / segment_spacing_m - 1e-9)));
+        const int parts =
+            std::max(1, static_cast<int>(std::ceil(length / segment_spacing_m - 1e-9)));
         for (int i = 0; i <= parts; ++i) {
           model::Sphere sphere;
-          sphere.center_m = segment.from_m + (static_cast<double>(i) / parts) * (segment.to_m - segment.from_m);
+          sphere.center_m =
+              segment.from_m + (static_cast<double>(i) / parts) * (segment.to_m - segment.from_m);
           sphere.radius_m = std::max(segment.radius_m, segment_radius_m);
           link.spheres.push_back(sphere);
         }
-        segment.radius_m = 0.0;  // a line: the row collides for it
+        segment.radius_m = 0.0;  // collisions are those of the row of spheres
       }
     }
     const std::string robot_file = fmt::format("{}_segments.json", robot.name);
-    write_file_aside(scenes() / robot_file, description::robot_to_json(robot).dump(1) + "\n");
+    write_file_atomically(scenes() / robot_file, description::robot_to_json(robot).dump(1) + "\n");
     Json document = read_json(*options_.base);
     document["robot"] = {{"file", robot_file}};
     document.erase("gravity_m_s2");
     document.erase("planner");
-    // half of the sets damp no joint: these go on moving while the tip rests at the goal
+    // half of the sets do not damp the joints, which then keep moving while the tip rests at the
+    // goal
     for (auto& goal : document["goals"]) {
       goal.erase("speed_max");
       goal["tip_speed_max_m_s"] = arrival_tip_speed_m_s;
@@ -344,7 +383,8 @@ class Maker {
     document["duration_s"] = 40;
     document["stall"] = {{"speed_m_s", 0.002}, {"distance_m", 0.2}, {"hold_s", 1}};
     const auto labels = [](const char* problem) {
-      return Labels{{"family", "example 5.2"}, {"problem", problem}, {"goal", "position"}, {"map", "none"}};
+      return Labels{
+          {"family", "example 5.2"}, {"problem", problem}, {"goal", "position"}, {"map", "none"}};
     };
     add_scene("gains", document, labels("obstacle"), true);
     document.erase("obstacles");
@@ -352,37 +392,41 @@ class Maker {
   }
 
   void add_runs(Plan& plan) const {
-    const auto variants = variants_of(options_, {}), gain_variants = variants_of(options_, {"apf", "gyro", "hybrid"});
+    const auto variants = parse_variants(options_, {}),
+               gain_variants = parse_variants(options_, {"apf", "gyro", "hybrid"});
     const auto varied = combinations(options_.vary);
     const auto sets = draw_gains(options_.gains.sets, options_.gains.seed);
-    for (const auto& made : made_) {
-      if (!made.gains) {
+    for (const auto& entry : entries_) {
+      if (!entry.gains) {
         for (const auto& variant : variants)
-          for (const auto& values : varied) add_seeds(plan, made, variant, values, {}, "");
+          for (const auto& values : varied) add_run_per_seed(plan, entry, variant, values, {}, "");
         continue;
       }
       for (std::size_t i = 0; i < sets.size(); ++i) {
         const std::string name = fmt::format("gains{:04}", i + 1);
-        for (const auto& variant : made.reference ? std::vector{variant_of("apf")} : gain_variants)
-          for (const auto& values : varied) add_seeds(plan, made, variant, values, sets[i], name);
+        for (const auto& variant :
+             entry.reference ? std::vector{parse_variant("apf")} : gain_variants)
+          for (const auto& values : varied)
+            add_run_per_seed(plan, entry, variant, values, sets[i], name);
       }
     }
   }
 
-  void add_seeds(Plan& plan, const Made& made, const Variant& variant, const std::vector<std::string>& values,
-                 const std::optional<Gains>& gains, const std::string& gains_name) const {
+  void add_run_per_seed(Plan& plan, const SceneEntry& entry, const Variant& variant,
+                        const std::vector<std::string>& values, const std::optional<Gains>& gains,
+                        const std::string& gains_name) const {
     for (const auto seed : options_.seeds) {
       PlannedRun run;
-      run.scene = made.scene.file;
+      run.scene = entry.scene.file;
       run.seed = seed;
       run.planner = variant.planner;
-      run.labels = made.labels;
+      run.labels = entry.labels;
       std::string planner = variant.label;
-      if (planner.empty()) planner = own_planner(made);
-      if (made.reference) planner += " without the obstacle";
+      if (planner.empty()) planner = planner_of(entry);
+      if (entry.reference) planner += " without the obstacle";
       run.labels["planner"] = planner;
       run.labels["seed"] = fmt::format("{}", seed);
-      run.id = made.name + "/" + planner;
+      run.id = entry.name + "/" + planner;
       if (gains) {
         run.labels["gains"] = gains_name;
         run.id += "/" + gains_name;
@@ -402,13 +446,16 @@ class Maker {
     }
   }
 
-  // Ids are unique; the first run of each planner and values stands for all.
+  // Checks that ids are unique, and resolves the first run of each combination of planner and
+  // values.
   void check(const Plan& plan) const {
     std::set<std::string> ids, seen;
     for (const auto& run : plan.runs) {
       if (!ids.insert(run.id).second)
-        throw Error(ErrorCode::usage,
-                    fmt::format("run '{}' is planned twice, expected planners, values and seeds that differ", run.id));
+        throw Error(
+            ErrorCode::usage,
+            fmt::format("run '{}' is planned twice, expected distinct planners, values and seeds",
+                        run.id));
       const auto values = run.labels.find("values");
       const std::string kind = fmt::format("{} {} {}", run.labels.at("planner"), run.gains.empty(),
                                            values == run.labels.end() ? "" : values->second);
@@ -417,7 +464,8 @@ class Maker {
     }
   }
 
-  // Runs of one scene read the same files unless values set others.
+  // Runs of one scene with the same values and planner read the same files; planner parameters name
+  // no files.
   void add_inputs(Plan& plan) const {
     std::set<std::string> seen;
     std::set<fs::path> files;
@@ -428,24 +476,30 @@ class Maker {
         if (!assignment.starts_with("/planner/params/")) kind.append("\n").append(assignment);
       if (!seen.insert(std::move(kind)).second) continue;
       const scene::Scene scene = read_scene(run, directory_);
-      for (const auto& file : scene::input_files(scene)) files.insert(fs::proximate(file, directory_));
+      for (const auto& file : scene::input_files(scene))
+        files.insert(fs::proximate(file, directory_));
       if (scene.planner) planners.insert(scene.planner->name);
     }
     for (const auto& file : files)
-      plan.inputs.push_back({file.generic_string(), sha256_hex(read_file(resolve_path(directory_, file)))});
+      plan.inputs.push_back(
+          {file.generic_string(), sha256_hex(read_file(resolve_path(directory_, file)))});
     for (const auto& name : planners)
-      plan.plugins.push_back(
-          {name, sha256_hex(read_file(planning::find_plugin_file(name, options_.plugin_directories)))});
+      plan.plugins.push_back({name, sha256_hex(read_file(planning::find_plugin_file(
+                                        name, options_.plugin_directories)))});
   }
 
-  // Each planner has the gains under names of its own.
+  // Each planner has its own names for the gains.
   static void add_gains(PlannedRun& run, const Gains& g) {
-    run.gains = {
-        {"k_p", g.k_p}, {"k_v", g.k_v}, {"joint_damping", g.joint_damping}, {"eta", g.eta}, {"k_obs", g.k_obs}};
+    run.gains = {{"k_p", g.k_p},
+                 {"k_v", g.k_v},
+                 {"joint_damping", g.joint_damping},
+                 {"eta", g.eta},
+                 {"k_obs", g.k_obs}};
     const auto set = [&](const char* name, double value) {
       run.set.push_back(fmt::format("/planner/params/{}={}", name, value));
     };
-    // the rule is for planners without one, and hybrid stands still while it thinks
+    // the host's stall rule is for planners without a rule of their own; hybrid does not move while
+    // it searches
     if (run.planner == "hybrid") run.set.emplace_back("/stall=null");
     set("k_p", g.k_p);
     set("k_v", g.k_v);
@@ -456,28 +510,32 @@ class Maker {
       set(run.planner == "hybrid" ? "steering_gain" : "k_obs", g.k_obs);
   }
 
-  [[nodiscard]] std::string own_planner(const Made& made) const {
-    const scene::Scene scene = scene::read_scene(directory_ / made.scene.file);
+  // The planner that the scene itself names.
+  [[nodiscard]] std::string planner_of(const SceneEntry& entry) const {
+    const scene::Scene scene = scene::read_scene(directory_ / entry.scene.file);
     return scene.planner ? scene.planner->name : "none";
   }
 
   fs::path directory_;
   std::optional<DirectoryLock> lock_;
   const PlanOptions& options_;
-  std::vector<Made> made_;
+  std::vector<SceneEntry> entries_;
   std::set<std::string> names_;
 };
 
 }  // namespace
 
+// docs/theory.md (13.24)
 std::vector<Gains> draw_gains(std::size_t count, std::uint64_t seed) {
   Rng rng(seed);
-  const auto power = [&](double low, double high) { return std::pow(10.0, rng.uniform(low, high)); };
+  const auto power = [&](double low, double high) {
+    return std::pow(10.0, rng.uniform(low, high));
+  };
   std::vector<Gains> sets(count);
   for (auto& g : sets) {
     g.k_p = power(-0.5, 1.5);
     g.k_v = 2.0 * std::sqrt(g.k_p) * power(-0.6, 0.6);
-    // both are drawn, so that the numbers after them stay the same
+    // both numbers are always drawn: the numbers drawn later do not depend on `damped`
     const bool damped = rng.uniform() >= 0.5;
     const double damping = power(-1.5, 0.5);
     g.joint_damping = damped ? damping : 0.0;
@@ -488,7 +546,7 @@ std::vector<Gains> draw_gains(std::size_t count, std::uint64_t seed) {
 }
 
 Plan make_plan(const fs::path& directory, const PlanOptions& options) {
-  return Maker(directory, options).make();
+  return PlanBuilder(directory, options).build();
 }
 
 }  // namespace hamelin::sweep

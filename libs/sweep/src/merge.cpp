@@ -14,8 +14,8 @@ namespace hamelin::sweep {
 
 namespace {
 
-/// What a group gathers before it is summed up.
-struct Gathered {
+/// Values that a group collects before they are summarized.
+struct GroupData {
   Group group;
   std::vector<double> clearances, self_clearances, shares, times, p50, p99, recovery, filter;
 };
@@ -25,15 +25,17 @@ std::optional<double> number_at(const Json& object, const char* key) {
   return object[key].get<double>();
 }
 
-void push(std::vector<double>& values, const std::optional<double>& value) {
+void append(std::vector<double>& values, const std::optional<double>& value) {
   if (value) values.push_back(*value);
 }
 
 std::string text_at(const Json& object, const char* key) {
-  return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : "";
+  return object.is_object() && object.contains(key) && object[key].is_string()
+             ? object[key].get<std::string>()
+             : "";
 }
 
-// Numbers in a cause, such as a depth or a time, differ from run to run.
+// Replaces numbers in a cause, such as a depth or a time, by N: they differ from run to run.
 std::string without_numbers(const std::string& cause) {
   std::string out;
   bool word = false;
@@ -46,7 +48,8 @@ std::string without_numbers(const std::string& cause) {
       out += 'N';
       continue;
     }
-    word = (*at >= 'a' && *at <= 'z') || (*at >= 'A' && *at <= 'Z') || *at == '_' || (word && digit);
+    word =
+        (*at >= 'a' && *at <= 'z') || (*at >= 'A' && *at <= 'Z') || *at == '_' || (word && digit);
     out += *at++;
   }
   return out;
@@ -56,8 +59,8 @@ bool contact_seen(const Json& record) {
   return record["judge"].is_object() && record["judge"].value("contact", false);
 }
 
-void take(Gathered& into, const MergedRun& merged) {
-  Group& g = into.group;
+void add_run(GroupData& data, const MergedRun& merged) {
+  Group& g = data.group;
   ++g.planned;
   if (merged.record.is_null()) return;
   const Json &record = merged.record, &result = record["result"], &judge = record["judge"];
@@ -70,65 +73,70 @@ void take(Gathered& into, const MergedRun& merged) {
   g.reached_all += reached ? 1U : 0U;
   g.contacts += contact_seen(record) ? 1U : 0U;
   if (judge.is_object()) {
-    push(into.clearances, number_at(judge.value("obstacles", Json()), "clearance_m"));
-    push(into.self_clearances, number_at(judge.value("self", Json()), "clearance_m"));
+    append(data.clearances, number_at(judge.value("obstacles", Json()), "clearance_m"));
+    append(data.self_clearances, number_at(judge.value("self", Json()), "clearance_m"));
     g.judged += judge["obstacles"].is_object() || judge["self"].is_object() ? 1U : 0U;
   }
-  push(into.shares, number_at(result, "certified_share"));
-  push(into.recovery, number_at(result, "recovery_work_J"));
-  push(into.filter, number_at(result, "filter_work_J"));
-  if (reached) push(into.times, number_at(result, "time_s"));
+  append(data.shares, number_at(result, "certified_share"));
+  append(data.recovery, number_at(result, "recovery_work_J"));
+  append(data.filter, number_at(result, "filter_work_J"));
+  if (reached) append(data.times, number_at(result, "time_s"));
   if (result.is_object() && result.contains("timing")) {
     const Json tick = result["timing"].value("tick_us", Json());
-    push(into.p50, number_at(tick, "p50"));
-    push(into.p99, number_at(tick, "p99"));
+    append(data.p50, number_at(tick, "p50"));
+    append(data.p99, number_at(tick, "p99"));
   }
   if (result.is_object() && result.contains("escape") && result["escape"].is_object())
     for (const auto& [name, value] : result["escape"].items())
       if (value.is_number()) g.escapes[name] += value.get<double>();
   if (!reached) {
     const std::string cause = text_at(record, "cause");
-    const bool as_it_is = outcome == "crashed" || outcome == "timeout";
-    ++g.causes[cause.empty() ? outcome : fmt::format("{}: {}", outcome, as_it_is ? cause : without_numbers(cause))];
+    const bool keep_numbers = outcome == "crashed" || outcome == "timeout";
+    ++g.causes[cause.empty()
+                   ? outcome
+                   : fmt::format("{}: {}", outcome, keep_numbers ? cause : without_numbers(cause))];
   }
 }
 
-// Who made a result: the program and its planner, each by name with its build.
-std::vector<std::pair<std::string, std::string>> makers_of(const Json& result) {
+// The builds that made a result: (name, build) of the program and of its planner.
+std::vector<std::pair<std::string, std::string>> builds_of(const Json& result) {
   const Json provenance = result.value("provenance", Json::object());
-  std::vector<std::pair<std::string, std::string>> makers;
-  if (provenance.contains("build")) makers.emplace_back("the program", provenance["build"].value("id", Json()).dump());
+  std::vector<std::pair<std::string, std::string>> builds;
+  if (provenance.contains("build"))
+    builds.emplace_back("the program", provenance["build"].value("id", Json()).dump());
   if (provenance.contains("inputs"))
     for (const Json& input : provenance["inputs"])
       if (input.value("role", Json()) == "plugin")
-        makers.emplace_back(fmt::format("planner {}", text_at(result, "planner")), input["sha256"].dump());
-  return makers;
+        builds.emplace_back(fmt::format("planner {}", text_at(result, "planner")),
+                            input["sha256"].dump());
+  return builds;
 }
 
-Group summed_up(Gathered&& from) {
-  Group g = std::move(from.group);
-  g.reached_interval = wilson(g.reached, g.feasible);
-  g.min_clearance_m = smallest(from.clearances);
-  g.min_self_clearance_m = smallest(from.self_clearances);
-  g.certified_share_mean = mean(from.shares);
-  g.certified_share_min = smallest(from.shares);
-  g.reached_time_s_median = median(from.times);
-  g.tick_us_p50_median = median(from.p50);
-  g.tick_us_p99_median = median(from.p99);
-  g.filter_work_J_max = largest(from.filter).value_or(0.0);
-  g.recovery_work_J_median = median(from.recovery);
+Group make_group(GroupData&& data) {
+  Group g = std::move(data.group);
+  g.reached_interval = wilson_interval(g.reached, g.feasible);
+  g.min_clearance_m = smallest(data.clearances);
+  g.min_self_clearance_m = smallest(data.self_clearances);
+  g.certified_share_mean = mean(data.shares);
+  g.certified_share_min = smallest(data.shares);
+  g.reached_time_s_median = median(data.times);
+  g.tick_us_p50_median = median(data.p50);
+  g.tick_us_p99_median = median(data.p99);
+  g.filter_work_J_max = largest(data.filter).value_or(0.0);
+  g.recovery_work_J_median = median(data.recovery);
   return g;
 }
 
 }  // namespace
 
-Interval wilson(std::size_t hits, std::size_t all) {
-  if (all == 0) return {};
+// docs/theory.md (13.13)
+Interval wilson_interval(std::size_t successes, std::size_t trials) {
+  if (trials == 0) return {};
   constexpr double z = 1.959963984540054;
-  const double n = static_cast<double>(all), p = static_cast<double>(hits) / n, z2 = z * z;
+  const double n = static_cast<double>(trials), p = static_cast<double>(successes) / n, z2 = z * z;
   const double center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
   const double half = z / (1.0 + z2 / n) * std::sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n));
-  return {hits == 0 ? 0.0 : center - half, hits == all ? 1.0 : center + half};
+  return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
 }
 
 std::vector<MergedRun> read_sweeps(const std::vector<std::filesystem::path>& directories) {
@@ -145,7 +153,8 @@ std::vector<MergedRun> read_sweeps(const std::vector<std::filesystem::path>& dir
     for (const auto& run : plan.runs) {
       const PlannedScene& scene = *scenes.at(run.scene);
       const auto record = records.find(run.id);
-      runs.push_back({run, directory, scene.feasible, scene.reason, record == records.end() ? Json() : record->second});
+      runs.push_back({run, directory, scene.feasible, scene.reason,
+                      record == records.end() ? Json() : record->second});
     }
   }
   return runs;
@@ -153,28 +162,28 @@ std::vector<MergedRun> read_sweeps(const std::vector<std::filesystem::path>& dir
 
 std::vector<Group> group(const std::vector<MergedRun>& runs, const std::vector<std::string>& by) {
   for (const auto& label : by) {
-    const bool known =
-        std::any_of(runs.begin(), runs.end(), [&](const MergedRun& r) { return r.run.labels.contains(label); });
+    const bool known = std::any_of(
+        runs.begin(), runs.end(), [&](const MergedRun& r) { return r.run.labels.contains(label); });
     if (known || runs.empty()) continue;
     std::vector<std::string> names;
     for (const auto& [name, value] : runs.front().run.labels) names.push_back(name);
-    throw Error(ErrorCode::usage,
-                fmt::format("--by {}: no run has that label, expected some of {}", label, fmt::join(names, ", ")));
+    throw Error(ErrorCode::usage, fmt::format("--by {}: no run has that label, expected one of {}",
+                                              label, fmt::join(names, ", ")));
   }
-  std::map<std::vector<std::string>, Gathered> gathered;
+  std::map<std::vector<std::string>, GroupData> all;
   for (const auto& merged : runs) {
     std::vector<std::string> key;
     for (const auto& label : by) {
       const auto found = merged.run.labels.find(label);
       key.push_back(found == merged.run.labels.end() ? "" : found->second);
     }
-    Gathered& into = gathered[key];
-    into.group.key = key;
-    take(into, merged);
+    GroupData& data = all[key];
+    data.group.key = key;
+    add_run(data, merged);
   }
   std::vector<Group> groups;
-  groups.reserve(gathered.size());
-  for (auto& [key, from] : gathered) groups.push_back(summed_up(std::move(from)));
+  groups.reserve(all.size());
+  for (auto& [key, data] : all) groups.push_back(make_group(std::move(data)));
   return groups;
 }
 
@@ -183,7 +192,9 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
     return std::vector{r.directory.string(), r.run.labels.at("gains"), r.run.labels.at("seed"),
                        r.run.labels.contains("values") ? r.run.labels.at("values") : std::string()};
   };
-  const auto is_reference = [](const MergedRun& r) { return r.run.labels.at("problem") == no_obstacle; };
+  const auto is_reference = [](const MergedRun& r) {
+    return r.run.labels.at("problem") == no_obstacle;
+  };
   std::set<std::vector<std::string>> references, stalled;
   for (const auto& r : runs) {
     if (r.run.gains.empty() || r.record.is_null()) continue;
@@ -198,7 +209,8 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
     if (r.run.gains.empty() || r.record.is_null() || is_reference(r)) continue;
     GainGroup& g = groups[r.run.labels.at("planner")];
     g.planner = r.run.labels.at("planner");
-    const bool reached = r.record["outcome"] == "reached", reference = references.contains(set_of(r)),
+    const bool reached = r.record["outcome"] == "reached",
+               reference = references.contains(set_of(r)),
                apf_stalled = stalled.contains(set_of(r));
     ++g.sets;
     g.reached += reached ? 1U : 0U;
@@ -211,13 +223,14 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
   std::vector<GainGroup> all;
   all.reserve(groups.size());
   for (auto& [planner, g] : groups) {
-    g.interval = wilson(g.reached_of_reference, g.reference);
+    g.interval = wilson_interval(g.reached_of_reference, g.reference);
     all.push_back(std::move(g));
   }
   return all;
 }
 
-Merged merge(const std::vector<std::filesystem::path>& directories, const std::vector<std::string>& by) {
+Merged merge(const std::vector<std::filesystem::path>& directories,
+             const std::vector<std::string>& by) {
   Merged merged{read_sweeps(directories), by, {}, {}, {}};
   merged.groups = group(merged.runs, by);
   merged.gains = group_gains(merged.runs);
@@ -226,18 +239,23 @@ Merged merge(const std::vector<std::filesystem::path>& directories, const std::v
   for (const auto& r : merged.runs) {
     if (r.record.is_null()) ++missing;
     if (r.record.is_null() || r.record["result"].is_null()) continue;
-    for (const auto& [name, build] : makers_of(r.record["result"])) builds[name].insert(build);
+    for (const auto& [name, build] : builds_of(r.record["result"])) builds[name].insert(build);
   }
-  if (missing > 0) merged.notes.push_back(fmt::format("{} of {} runs have no record yet", missing, merged.runs.size()));
+  if (missing > 0)
+    merged.notes.push_back(
+        fmt::format("{} of {} runs have no record yet", missing, merged.runs.size()));
   for (const auto& [name, all] : builds)
-    if (all.size() > 1) merged.notes.push_back(fmt::format("the records come from {} builds of {}", all.size(), name));
+    if (all.size() > 1)
+      merged.notes.push_back(
+          fmt::format("the records come from {} builds of {}", all.size(), name));
   return merged;
 }
 
 Json to_json(const Merged& merged) {
   Json all = Json::array(), gains = Json::array();
   for (const auto& g : merged.groups) {
-    Json labels = Json::object(), outcomes = Json::object(), causes = Json::object(), escapes = Json::object();
+    Json labels = Json::object(), outcomes = Json::object(), causes = Json::object(),
+         escapes = Json::object();
     for (std::size_t i = 0; i < merged.by.size(); ++i) labels[merged.by[i]] = g.key[i];
     for (const auto& [name, count] : g.outcomes) outcomes[name] = count;
     for (const auto& [name, count] : g.causes) causes[name] = count;
@@ -292,18 +310,21 @@ std::vector<std::string> table_row(const Group& g) {
     const auto found = g.outcomes.find(name);
     return found == g.outcomes.end() ? std::size_t{0} : found->second;
   };
-  const std::size_t stalled = count("stalled"), timeout = count("timeout"), collided = count("collision");
+  const std::size_t stalled = count("stalled"), timeout = count("timeout"),
+                    collided = count("collision");
   std::vector<std::string> row = g.key;
-  row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs) : fmt::format("{}/{}", g.runs, g.planned));
+  row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs)
+                                    : fmt::format("{}/{}", g.runs, g.planned));
   row.push_back(fmt::format("{}", g.feasible));
   row.push_back(g.feasible > 0 ? fmt::format("{} ({:.1f} %)", g.reached,
-                                             100.0 * static_cast<double>(g.reached) / static_cast<double>(g.feasible))
+                                             100.0 * static_cast<double>(g.reached) /
+                                                 static_cast<double>(g.feasible))
                                : "-");
-  row.push_back(g.feasible > 0
-                    ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low, 100.0 * g.reached_interval.high)
-                    : "-");
-  for (const std::size_t runs :
-       {stalled, timeout, collided, g.runs - g.reached_all - stalled - timeout - collided, g.contacts})
+  row.push_back(g.feasible > 0 ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low,
+                                             100.0 * g.reached_interval.high)
+                               : "-");
+  for (const std::size_t runs : {stalled, timeout, collided,
+                                 g.runs - g.reached_all - stalled - timeout - collided, g.contacts})
     row.push_back(fmt::format("{}", runs));
   row.push_back(shown(g.min_clearance_m, 1e3, 2));
   row.push_back(shown(g.min_self_clearance_m, 1e3, 2));
@@ -315,8 +336,8 @@ std::vector<std::string> table_row(const Group& g) {
   return row;
 }
 
-/// Rows as lines of columns; the first `words` of them to the left, the others to the right.
-std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t words) {
+/// Rows as aligned columns: the first `text_columns` columns to the left, the others to the right.
+std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t text_columns) {
   std::vector<std::size_t> widths(rows.front().size(), 0);
   for (const auto& row : rows)
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
@@ -324,7 +345,8 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size
   for (const auto& row : rows) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i)
-      line += i < words ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+      line += i < text_columns ? fmt::format("{:<{}}  ", row[i], widths[i])
+                               : fmt::format("{:>{}}  ", row[i], widths[i]);
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + "\n";
   }
@@ -332,9 +354,11 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size
 }
 
 std::string causes_text(const Group& g) {
-  std::string text = fmt::format("\n{}: did not reach\n", fmt::join(g.key, ", "));
+  std::string text =
+      fmt::format("\n{}: runs that did not reach the goal\n", fmt::join(g.key, ", "));
   std::vector<std::pair<std::string, std::size_t>> causes(g.causes.begin(), g.causes.end());
-  std::stable_sort(causes.begin(), causes.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::stable_sort(causes.begin(), causes.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
   for (const auto& [cause, count] : causes) text += fmt::format("{:>5}  {}\n", count, cause);
   return text;
 }
@@ -343,15 +367,17 @@ std::string causes_text(const Group& g) {
 
 std::string to_table(const Merged& merged) {
   std::vector<std::vector<std::string>> rows(1, merged.by);
-  for (const char* head : {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
-                           "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
+  for (const char* head :
+       {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
+        "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
     rows.front().emplace_back(head);
   for (const auto& g : merged.groups) rows.push_back(table_row(g));
   std::string text = aligned(rows, merged.by.size());
   for (const auto& g : merged.gains)
     text += fmt::format(
-        "\n{}, gain sets: reached {} of {}; {} of {} that reach without the obstacle ({:.1f}-{:.1f} %); {} of {} with "
-        "which apf stalls; {} contacts",
+        "\n{}, gain sets: reached {} of {}; {} of {} that reach the goal without the obstacle "
+        "({:.1f}-{:.1f} %); "
+        "{} of {} with which apf stalls; {} contacts",
         g.planner, g.reached, g.sets, g.reached_of_reference, g.reference, 100.0 * g.interval.low,
         100.0 * g.interval.high, g.reached_of_apf_stalled, g.apf_stalled, g.contacts);
   if (!merged.gains.empty()) text += "\n";

@@ -10,7 +10,7 @@ namespace hamelin::sweep {
 
 namespace {
 
-/// A word as a shell takes it.
+/// A word, quoted for a shell if necessary.
 std::string quoted(const std::string& word) {
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
@@ -19,7 +19,7 @@ std::string quoted(const std::string& word) {
   if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
   std::string out(1, '\'');
   for (const char c : word) {
-    if (c == '\'') out += "'\\'";  // closes, writes one, and opens again with the one below
+    if (c == '\'') out += "'\\'";  // gives '\'', which closes the quotes, adds one and reopens them
     out += c;
   }
   return out + '\'';
@@ -27,15 +27,18 @@ std::string quoted(const std::string& word) {
 
 std::string command_of(const MergedRun& merged) {
   std::string command = "hamelin run";
-  for (const auto& word : run_arguments(merged.run, merged.directory)) command += fmt::format(" {}", quoted(word));
+  for (const auto& word : run_arguments(merged.run, merged.directory))
+    command += fmt::format(" {}", quoted(word));
   return command;
 }
 
-/// Why a run did not reach: its own cause, what the judge saw, and whether it was feasible at all.
+/// Why a run did not reach its goal: its own cause, contact that the judge saw, and infeasibility.
 std::string cause_of(const MergedRun& merged) {
   const Json& record = merged.record;
   std::string cause = record["cause"].is_string() ? record["cause"].get<std::string>() : "";
-  const auto add = [&cause](const std::string& more) { cause += fmt::format("{}{}", cause.empty() ? "" : "; ", more); };
+  const auto add = [&cause](const std::string& text) {
+    cause += fmt::format("{}{}", cause.empty() ? "" : "; ", text);
+  };
   for (const char* kind : {"obstacles", "self"}) {
     const Json closest = record["judge"].is_object() ? record["judge"].at(kind) : Json();
     if (closest.is_object() && closest.value("clearance_m", 1.0) <= 0.0)
@@ -50,15 +53,18 @@ Json failures(const Merged& merged) {
   Json all = Json::array();
   for (const auto& r : merged.runs)
     if (!r.record.is_null() && r.record["outcome"] != "reached")
-      all.push_back(
-          {{"run", r.run.id}, {"outcome", r.record["outcome"]}, {"cause", cause_of(r)}, {"command", command_of(r)}});
+      all.push_back({{"run", r.run.id},
+                     {"outcome", r.record["outcome"]},
+                     {"cause", cause_of(r)},
+                     {"command", command_of(r)}});
   return all;
 }
 
 Json gain_sets(const Merged& merged) {
   Json all = Json::array();
   for (const auto& r : merged.runs) {
-    if (r.run.gains.empty() || r.record.is_null() || r.run.labels.at("problem") == no_obstacle) continue;
+    if (r.run.gains.empty() || r.record.is_null() || r.run.labels.at("problem") == no_obstacle)
+      continue;
     Json gains = Json::object();
     for (const auto& [name, value] : r.run.gains) gains[name] = value;
     all.push_back({{"planner", r.run.labels.at("planner")},
@@ -75,8 +81,8 @@ Json gain_sets(const Merged& merged) {
 Json page_json(const Merged& merged) {
   std::set<std::string> directories;
   for (const auto& r : merged.runs) directories.insert(r.directory.string());
-  const auto recorded =
-      std::count_if(merged.runs.begin(), merged.runs.end(), [](const MergedRun& r) { return !r.record.is_null(); });
+  const auto recorded = std::count_if(merged.runs.begin(), merged.runs.end(),
+                                      [](const MergedRun& r) { return !r.record.is_null(); });
   return {{"format", "hamelin.sweep-page/1"},
           {"generator", fmt::format("hamelin {}", version())},
           {"directories", directories},

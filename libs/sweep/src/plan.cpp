@@ -27,12 +27,15 @@ Json to_json(const Plan& plan) {
                 {"plugins", Json::array()},
                 {"runs", Json::array()}};
   for (const auto& scene : plan.scenes)
-    document["scenes"].push_back({{"file", scene.file},
-                                  {"sha256", scene.sha256},
-                                  {"feasible", scene.feasible},
-                                  {"reason", scene.reason.empty() ? Json(nullptr) : Json(scene.reason)}});
-  for (const auto& [file, sha256] : plan.inputs) document["inputs"].push_back({{"file", file}, {"sha256", sha256}});
-  for (const auto& [name, sha256] : plan.plugins) document["plugins"].push_back({{"name", name}, {"sha256", sha256}});
+    document["scenes"].push_back(
+        {{"file", scene.file},
+         {"sha256", scene.sha256},
+         {"feasible", scene.feasible},
+         {"reason", scene.reason.empty() ? Json(nullptr) : Json(scene.reason)}});
+  for (const auto& [file, sha256] : plan.inputs)
+    document["inputs"].push_back({{"file", file}, {"sha256", sha256}});
+  for (const auto& [name, sha256] : plan.plugins)
+    document["plugins"].push_back({{"name", name}, {"sha256", sha256}});
   for (const auto& run : plan.runs) {
     Json labels = Json::object(), gains = Json::object();
     for (const auto& [name, value] : run.labels) labels[name] = value;
@@ -52,25 +55,31 @@ void write_plan(Plan& plan, const fs::path& directory) {
   const std::string text = to_json(plan).dump(1) + "\n";
   const fs::path file = plan_file(directory), records = records_file(directory);
   std::error_code ec;
-  if (fs::exists(records, ec) && fs::file_size(records, ec) > 0 && (!fs::exists(file, ec) || read_file(file) != text))
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: holds records of another plan, expected a directory without any", records.string()));
-  write_file_aside(file, text);
+  if (fs::exists(records, ec) && fs::file_size(records, ec) > 0 &&
+      (!fs::exists(file, ec) || read_file(file) != text))
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{}: holds records of another plan, expected a directory without records",
+                    records.string()));
+  write_file_atomically(file, text);
   plan.sha256 = sha256_hex(text);
 }
 
 namespace {
 
-// Whether a line has what the code that sums up relies on; `hamelin validate` holds it against the whole schema.
+// Whether a line has the members that the code in this library reads; `hamelin validate` checks the
+// whole schema.
 bool is_record(const Json& line) {
   const auto has = [&](const char* key) { return line.contains(key); };
   const auto text = [&](const char* key) { return has(key) && line[key].is_string(); };
   const auto object_or_null = [&](const char* key) {
     return has(key) && (line[key].is_object() || line[key].is_null());
   };
-  return line.is_object() && line.value("schema", Json()) == "hamelin.record/1" && text("plan") && text("id") &&
-         text("outcome") && has("cause") && object_or_null("result") && object_or_null("judge") &&
-         (line["judge"].is_null() || (line["judge"].contains("obstacles") && line["judge"].contains("self")));
+  return line.is_object() && line.value("schema", Json()) == "hamelin.record/1" && text("plan") &&
+         text("id") && text("outcome") && has("cause") && object_or_null("result") &&
+         object_or_null("judge") &&
+         (line["judge"].is_null() ||
+          (line["judge"].contains("obstacles") && line["judge"].contains("self")));
 }
 
 }  // namespace
@@ -79,7 +88,8 @@ Plan read_plan(const fs::path& directory) {
   std::error_code ec;
   if (!fs::is_directory(directory, ec))
     throw Error(ErrorCode::io,
-                fmt::format("{}: is no directory, expected one that holds plan.json", directory.string()));
+                fmt::format("{}: is not a directory, expected a directory with plan.json",
+                            directory.string()));
   return read_plan_file(plan_file(directory));
 }
 
@@ -90,13 +100,15 @@ Plan read_plan_file(const fs::path& file) {
   Plan plan;
   plan.sha256 = sha256_hex(text);
   std::set<std::string> scenes, ids;
-  const auto text_of = [](const Json& value) { return value.is_null() ? std::string() : value.get<std::string>(); };
+  const auto text_of = [](const Json& value) {
+    return value.is_null() ? std::string() : value.get<std::string>();
+  };
   for (const Json& scene : document["scenes"]) {
-    plan.scenes.push_back(
-        {scene["file"], scene["sha256"], scene["feasible"].get<bool>(), text_of(scene.value("reason", Json()))});
+    plan.scenes.push_back({scene["file"], scene["sha256"], scene["feasible"].get<bool>(),
+                           text_of(scene.value("reason", Json()))});
     scenes.insert(plan.scenes.back().file);
   }
-  // plans of earlier versions have no such lists
+  // plans of earlier versions do not have these two lists
   for (const Json& input : document.value("inputs", Json::array()))
     plan.inputs.push_back({input["file"], input["sha256"]});
   for (const Json& plugin : document.value("plugins", Json::array()))
@@ -109,14 +121,17 @@ Plan read_plan_file(const fs::path& file) {
     if (!scenes.contains(run.scene))
       throw Error(
           ErrorCode::invalid,
-          fmt::format("{}: /runs/{}/scene: '{}' is not among the scenes, expected one of them", where, i, run.scene));
+          fmt::format("{}: /runs/{}/scene: '{}' is not among the scenes, expected one of them",
+                      where, i, run.scene));
     if (!ids.insert(run.id).second)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /runs/{}/id: '{}' is there twice, expected one run of each id", where, i, run.id));
+      throw Error(
+          ErrorCode::invalid,
+          fmt::format("{}: /runs/{}/id: '{}' occurs twice, expected unique ids", where, i, run.id));
     if (!from["planner"].is_null()) run.planner = from["planner"].get<std::string>();
     run.set = from["set"].get<std::vector<std::string>>();
     run.seed = from["seed"].get<std::uint64_t>();
-    for (const auto& [name, value] : from["labels"].items()) run.labels[name] = value.get<std::string>();
+    for (const auto& [name, value] : from["labels"].items())
+      run.labels[name] = value.get<std::string>();
     if (from.contains("gains") && from["gains"].is_object())
       for (const auto& [name, value] : from["gains"].items()) run.gains[name] = value.get<double>();
     plan.runs.push_back(std::move(run));
@@ -127,7 +142,7 @@ Plan read_plan_file(const fs::path& file) {
 scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   const fs::path file = resolve_path(directory, run.scene);
   Json document = read_json(file);
-  // another planner does not know the parameters of the scene's
+  // the parameters of the scene's planner are not valid for another planner
   if (run.planner && (!document.contains("planner") || !document["planner"].is_object() ||
                       document["planner"].value("name", Json()) != *run.planner))
     document["planner"] = {{"name", *run.planner}};
@@ -136,14 +151,14 @@ scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
-void check_unchanged(const Plan& plan, const fs::path& directory, const std::vector<fs::path>& plugin_directories) {
+void check_unchanged(const Plan& plan, const fs::path& directory,
+                     const std::vector<fs::path>& plugin_directories) {
   const auto check = [&](const fs::path& file, const std::string& planned) {
     if (const std::string now = sha256_hex(read_file(file)); now != planned)
-      throw Error(
-          ErrorCode::invalid,
-          fmt::format("{}: has changed since the sweep was planned: SHA-256 {}, expected {}; plan it again, in a "
-                      "new directory if there are records",
-                      file.string(), now, planned));
+      throw Error(ErrorCode::invalid, fmt::format("{}: has changed since the sweep was planned: "
+                                                  "SHA-256 {}, expected {}; plan it again, in a "
+                                                  "new directory if there are records",
+                                                  file.string(), now, planned));
   };
   for (const auto& scene : plan.scenes) check(resolve_path(directory, scene.file), scene.sha256);
   for (const auto& input : plan.inputs) check(resolve_path(directory, input.file), input.sha256);
@@ -159,25 +174,29 @@ Records read_records(const fs::path& directory, const Plan& plan) {
   const std::string text = read_file(file);
   std::set<std::string> planned, seen;
   for (const auto& run : plan.runs) planned.insert(run.id);
-  while (records.good_bytes < text.size()) {
-    const auto end = text.find('\n', records.good_bytes);
+  while (records.complete_bytes < text.size()) {
+    const auto end = text.find('\n', records.complete_bytes);
     if (end == std::string::npos) break;
     const std::string where = fmt::format("{}: line {}", file.string(), records.lines.size() + 1);
-    Json record = parse_json(text.substr(records.good_bytes, end - records.good_bytes), where);
+    Json record =
+        parse_json(text.substr(records.complete_bytes, end - records.complete_bytes), where);
     if (!is_record(record))
-      throw Error(ErrorCode::invalid, fmt::format("{}: is no record, expected hamelin.record/1", where));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: is not a record, expected hamelin.record/1", where));
     if (record["plan"] != plan.sha256)
-      throw Error(ErrorCode::invalid, fmt::format("{}: is of another plan, expected records of {} as it is now", where,
-                                                  plan_file(directory).string()));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: belongs to another plan, expected records of the current {}",
+                              where, plan_file(directory).string()));
     const std::string id = record["id"];
     if (!planned.contains(id) || !seen.insert(id).second)
-      throw Error(ErrorCode::invalid, fmt::format("{}: run '{}' is {}", where, id,
-                                                  planned.contains(id) ? "recorded twice, expected once"
-                                                                       : "not in the plan, expected one that is"));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: run '{}' is {}", where, id,
+                              planned.contains(id) ? "recorded twice, expected once"
+                                                   : "not in the plan, expected a planned run"));
     records.lines.push_back(std::move(record));
-    records.good_bytes = end + 1;
+    records.complete_bytes = end + 1;
   }
-  records.cut = records.good_bytes < text.size();
+  records.truncated = records.complete_bytes < text.size();
   return records;
 }
 

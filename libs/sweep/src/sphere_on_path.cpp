@@ -18,37 +18,42 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// The balls of the arm that move, in an order that differs from problem to problem.
-std::vector<std::size_t> moving_balls(const JudgedArm& arm, std::uint64_t seed, const std::string& name) {
+// The moving balls of the arm, in an order that depends on the seed and the name of the problem.
+std::vector<std::size_t> moving_balls(const JudgedArm& arm, std::uint64_t seed,
+                                      const std::string& name) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < arm.balls().size(); ++k)
     if (arm.balls()[k].link >= 0) order.push_back(k);
-  constexpr std::size_t digits = 15;  // what fits into 64 bits
+  constexpr std::size_t digits = 15;  // hexadecimal digits that fit into 64 bits
   Rng rng(seed + std::stoull(sha256_hex(name).substr(0, digits), nullptr, 16));
   for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[rng.below(k)]);
   return order;
 }
 
 // Indices 0 … count − 1, the middle one first and the ends last.
-std::vector<std::size_t> from_the_middle(std::size_t count) {
+std::vector<std::size_t> order_from_middle(std::size_t count) {
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto off = [&](std::size_t i) { return 2 * i > count ? 2 * i - count : count - 2 * i; };
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return off(a) < off(b); });
+  const auto offset = [&](std::size_t i) { return 2 * i > count ? 2 * i - count : count - 2 * i; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return offset(a) < offset(b); });
   return order;
 }
 
-std::optional<Vector3d> place_for_sphere(const JudgedArm& arm, const std::vector<VectorXd>& path,
-                                         const std::vector<std::size_t>& order, const SphereOnPath& wanted) {
+std::optional<Vector3d> sphere_position(const JudgedArm& arm, const std::vector<VectorXd>& path,
+                                        const std::vector<std::size_t>& order,
+                                        const SphereOnPath& options) {
   std::vector<Vector3d> at_start, at_goal, centers;
   arm.place(path.front(), at_start);
   arm.place(path.back(), at_goal);
   const auto clear = [&](const std::vector<Vector3d>& balls, const Vector3d& center) {
     for (std::size_t k = 0; k < balls.size(); ++k)
-      if ((balls[k] - center).norm() < arm.balls()[k].radius + wanted.radius_m + wanted.clearance_m) return false;
+      if ((balls[k] - center).norm() <
+          arm.balls()[k].radius + options.radius_m + options.clearance_m)
+        return false;
     return true;
   };
-  for (const std::size_t i : from_the_middle(path.size())) {
+  for (const std::size_t i : order_from_middle(path.size())) {
     arm.place(path[i], centers);
     for (const std::size_t k : order)
       if (clear(at_start, centers[k]) && clear(at_goal, centers[k])) return centers[k];
@@ -58,7 +63,8 @@ std::optional<Vector3d> place_for_sphere(const JudgedArm& arm, const std::vector
 
 }  // namespace
 
-std::vector<VectorXd> thinned(const std::vector<VectorXd>& nodes, double spacing) {
+// docs/theory.md (13.26)
+std::vector<VectorXd> thin_path(const std::vector<VectorXd>& nodes, double spacing) {
   std::vector<VectorXd> kept;
   for (std::size_t i = 0; i < nodes.size();) {
     kept.push_back(nodes[i]);
@@ -70,8 +76,9 @@ std::vector<VectorXd> thinned(const std::vector<VectorXd>& nodes, double spacing
   return kept;
 }
 
-PathWithSphere put_sphere_on_path(const std::filesystem::path& scene_file, const SphereOnPath& wanted,
-                                  const std::vector<std::filesystem::path>& plugin_directories) {
+PathWithSphere place_sphere_on_path(const std::filesystem::path& scene_file,
+                                    const SphereOnPath& options,
+                                    const std::vector<std::filesystem::path>& plugin_directories) {
   scene::Scene scene = scene::read_scene(scene_file);
   PathWithSphere found;
   if (const auto feasible = feasibility(scene, {}); !feasible.feasible) {
@@ -79,7 +86,7 @@ PathWithSphere put_sphere_on_path(const std::filesystem::path& scene_file, const
     return found;
   }
   scene.planner = scene::Choice{"hybrid", {{"escape", "tree"}}};
-  scene.seed = wanted.seed;
+  scene.seed = options.seed;
   std::vector<VectorXd> nodes;
   simulation::Watch watch;
   watch.at_node = [&nodes](double, const VectorXd& q) { nodes.push_back(q); };
@@ -90,15 +97,16 @@ PathWithSphere put_sphere_on_path(const std::filesystem::path& scene_file, const
     return found;
   }
   nodes.push_back(scene.goals.front().q);
-  found.path = thinned(nodes, wanted.spacing_rad);
+  found.path = thin_path(nodes, options.spacing_rad);
   const JudgedArm arm(scene);
-  const auto order = moving_balls(arm, wanted.seed, scene_file.stem().string());
-  const auto center = place_for_sphere(arm, found.path, order, wanted);
+  const auto order = moving_balls(arm, options.seed, scene_file.stem().string());
+  const auto center = sphere_position(arm, found.path, order, options);
   if (!center)
-    found.reason = fmt::format("no place on the path keeps start and goal {} m clear", wanted.clearance_m);
+    found.reason = fmt::format("no position on the path leaves start and goal a clearance of {} m",
+                               options.clearance_m);
   else
     found.center = *center;
-  found.path.erase(found.path.begin());  // the arm is there
+  found.path.erase(found.path.begin());  // the start is not a waypoint
   return found;
 }
 

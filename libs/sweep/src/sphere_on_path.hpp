@@ -8,22 +8,26 @@
 
 namespace hamelin::sweep {
 
-/// A path in joints with a place for a sphere on it.
+/// A path in joint space with the position of a sphere that blocks it.
 struct PathWithSphere {
-  std::vector<Eigen::VectorXd> path;                 ///< way-points after the start, the goal last [rad or m]
+  std::vector<Eigen::VectorXd> path;  ///< waypoints after the start, the goal last [rad or m]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the sphere, world [m]
-  std::string reason;                                ///< why there is none; empty if there is
+  std::string reason;  ///< why there is no sphere; empty if there is one
 };
 
-/// Takes nodes of a motion from its end backwards: no step of a joint is larger than `spacing`, and where the motion
-/// came back to within `spacing` of an earlier node, what it did in between is left out. The first and last node stay.
-[[nodiscard]] std::vector<Eigen::VectorXd> thinned(const std::vector<Eigen::VectorXd>& nodes, double spacing);
+/// Thins the nodes of a motion: each node is followed by the last one within `spacing` of it in
+/// every joint, or by the next node if there is none. This omits detours that return to within
+/// `spacing` of an earlier node. The first and the last node are kept.
+[[nodiscard]] std::vector<Eigen::VectorXd> thin_path(const std::vector<Eigen::VectorXd>& nodes,
+                                                     double spacing);
 
-/// Runs a scene with one joint goal by hybrid, thins its motion, and looks for a sphere's place on it: the centre of a
-/// moving ball of the arm on its way, from the middle outwards, balls in an order by seed and scene name, so that start
-/// and goal keep their clearance from it.
+/// Runs a scene with one joint goal by hybrid, thins its motion, and searches a position for a
+/// sphere on it. Candidates are the centres of the arm's moving balls, from the middle of the path
+/// outwards, with the balls in an order that depends on the seed and the name of the scene. The
+/// first candidate is taken that keeps the clearance of start and goal.
 /// @throws Error as simulation::run
-[[nodiscard]] PathWithSphere put_sphere_on_path(const std::filesystem::path& scene_file, const SphereOnPath& wanted,
-                                                const std::vector<std::filesystem::path>& plugin_directories);
+[[nodiscard]] PathWithSphere place_sphere_on_path(
+    const std::filesystem::path& scene_file, const SphereOnPath& options,
+    const std::vector<std::filesystem::path>& plugin_directories);
 
 }  // namespace hamelin::sweep

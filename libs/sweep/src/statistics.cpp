@@ -5,6 +5,7 @@
 
 namespace hamelin::sweep {
 
+// docs/theory.md (13.14)
 std::optional<double> median(std::vector<double> values) {
   if (values.empty()) return std::nullopt;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
@@ -13,11 +14,13 @@ std::optional<double> median(std::vector<double> values) {
 }
 
 std::optional<double> smallest(const std::vector<double>& values) {
-  return values.empty() ? std::nullopt : std::optional(*std::min_element(values.begin(), values.end()));
+  return values.empty() ? std::nullopt
+                        : std::optional(*std::min_element(values.begin(), values.end()));
 }
 
 std::optional<double> largest(const std::vector<double>& values) {
-  return values.empty() ? std::nullopt : std::optional(*std::max_element(values.begin(), values.end()));
+  return values.empty() ? std::nullopt
+                        : std::optional(*std::max_element(values.begin(), values.end()));
 }
 
 std::optional<double> mean(const std::vector<double>& values) {

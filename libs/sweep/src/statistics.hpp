@@ -6,7 +6,7 @@
 
 namespace hamelin::sweep {
 
-/// The lower of the two in the middle of an even count.
+/// The middle value; of an even number of values, the lower of the two in the middle.
 [[nodiscard]] std::optional<double> median(std::vector<double> values);
 [[nodiscard]] std::optional<double> smallest(const std::vector<double>& values);
 [[nodiscard]] std::optional<double> largest(const std::vector<double>& values);

@@ -35,9 +35,11 @@ namespace fs = std::filesystem;
 const fs::path source_dir = HAMELIN_SOURCE_DIR;
 
 scene::Scene scene_of(const Json& more) {
-  Json document{
-      {"schema", "hamelin.scene/1"},
-      {"robot", {{"file", "data/robots/arm7.urdf"}, {"tip", "flange"}, {"spheres", "data/robots/arm7.spheres.json"}}}};
+  Json document{{"schema", "hamelin.scene/1"},
+                {"robot",
+                 {{"file", "data/robots/arm7.urdf"},
+                  {"tip", "flange"},
+                  {"spheres", "data/robots/arm7.spheres.json"}}}};
   document.update(more);
   return scene::scene_from_json(document, source_dir, "scene");
 }
@@ -51,7 +53,7 @@ VectorXd random_q(const model::Model& model, Rng& rng) {
   return q;
 }
 
-/// Centres of the moving spheres, by the library that planners and runs use.
+/// Centres of the moving spheres, computed by the library that planners and runs use.
 std::vector<Vector3d> centers_of(const model::Model& model, const VectorXd& q) {
   dynamics::Workspace ws(model);
   std::vector<Vector3d> centers(model.shapes().size());
@@ -62,9 +64,10 @@ std::vector<Vector3d> centers_of(const model::Model& model, const VectorXd& q) {
 
 }  // namespace
 
-TEST_CASE("the judge places spheres where the dynamics place them, on a turned base too", "[sweep][unit]") {
-  const auto scene =
-      scene_of({{"base", {{"position_m", {0.3, -0.2, 0.5}}, {"quaternion_wxyz", {0.8, 0.0, 0.6, 0.0}}}}});
+TEST_CASE("the judge places spheres where the dynamics place them, also on a rotated base",
+          "[sweep][unit]") {
+  const auto scene = scene_of(
+      {{"base", {{"position_m", {0.3, -0.2, 0.5}}, {"quaternion_wxyz", {0.8, 0.0, 0.6, 0.0}}}}});
   const model::Model model = simulation::load_model(scene);
   const JudgedArm arm(scene);
   REQUIRE(arm.balls().size() == model.shapes().size());
@@ -74,7 +77,8 @@ TEST_CASE("the judge places spheres where the dynamics place them, on a turned b
     const VectorXd q = random_q(model, rng);
     const auto expected = centers_of(model, q);
     arm.place(q, centers);
-    for (std::size_t k = 0; k < centers.size(); ++k) CHECK((centers[k] - expected[k]).norm() < 1e-12);
+    for (std::size_t k = 0; k < centers.size(); ++k)
+      CHECK((centers[k] - expected[k]).norm() < 1e-12);
   }
 }
 
@@ -83,7 +87,7 @@ namespace {
 
 using Geometry = std::shared_ptr<fcl::CollisionGeometryd>;
 
-/// Primitives of all shapes around the arm, turned at random, some of them moving.
+/// Primitives of all shapes around the arm, rotated at random, some of them moving.
 Json random_obstacles(std::size_t count, std::uint64_t seed) {
   scene::Clutter clutter;
   clutter.count = count;
@@ -96,7 +100,8 @@ Json random_obstacles(std::size_t count, std::uint64_t seed) {
     obstacle.judge_only = true;
     if (all.size() % 3 == 0) obstacle.motion = scene::SineMotion{{0.2, -0.1, 0.05}, 2.0};
     Json json = scene::to_json(obstacle);
-    for (auto it = json.begin(); it != json.end();) it = it->is_null() ? json.erase(it) : std::next(it);
+    for (auto it = json.begin(); it != json.end();)
+      it = it->is_null() ? json.erase(it) : std::next(it);
     all.push_back(json);
   }
   return all;
@@ -104,7 +109,7 @@ Json random_obstacles(std::size_t count, std::uint64_t seed) {
 
 std::optional<Closest> judged(const scene::Scene& scene, double time_s, const VectorXd& q) {
   Judge judge(scene);
-  judge.node(time_s, q);
+  judge.add_node(time_s, q);
   return judge.verdict().obstacles;
 }
 
@@ -121,7 +126,7 @@ Geometry shape_of(const scene::Obstacle& o) {
   return std::make_shared<fcl::Cylinderd>(o.radius_m, o.length_m);
 }
 
-/// FCL's smallest distance of the spheres from a body; −1 in contact.
+/// FCL's smallest distance of the spheres from a body; −1 if they are in contact.
 double fcl_distance(const std::vector<Vector3d>& centers, const model::Model& model,
                     const fcl::CollisionGeometryd& body, const fcl::Transform3d& pose) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -142,8 +147,9 @@ double fcl_distance(const std::vector<Vector3d>& centers, const model::Model& mo
 
 }  // namespace
 
-TEST_CASE("by FCL's account the judge is right about contact and distance of random primitives, moving ones too",
-          "[sweep][unit]") {
+TEST_CASE(
+    "the judge agrees with FCL on contact and distance of random primitives, also of moving ones",
+    "[sweep][unit]") {
   Rng rng(17);
   int contacts = 0, clear = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
@@ -156,13 +162,13 @@ TEST_CASE("by FCL's account the judge is right about contact and distance of ran
       double nearest = std::numeric_limits<double>::infinity();
       for (const auto& o : scene.obstacles) {
         const Geometry shape = shape_of(o);
-        nearest =
-            std::min(nearest, fcl_distance(centers, model, *shape, at(scene::position_at(o, time_s), o.pose.R())));
+        nearest = std::min(nearest, fcl_distance(centers, model, *shape,
+                                                 at(scene::position_at(o, time_s), o.pose.R())));
       }
       const auto found = judged(scene, time_s, q);
       REQUIRE(found.has_value());
       CAPTURE(seed, i, found->clearance_m, nearest);
-      // GJK's own error, and FCL gives no depth
+      // FCL's GJK has an error of this size, and FCL reports no depth
       if (std::abs(found->clearance_m) < 1e-6) continue;
       CHECK((found->clearance_m <= 0.0) == (nearest < 0.0));
       if (nearest < 0.0) {
@@ -177,10 +183,11 @@ TEST_CASE("by FCL's account the judge is right about contact and distance of ran
   CHECK(clear > 10);
 }
 
-TEST_CASE("by FCL's account the judge is right about a map's leaves", "[sweep][unit]") {
+TEST_CASE("the judge agrees with FCL on contact with and distance from a map", "[sweep][unit]") {
   const auto scene = scene_of({{"map", {{"file", "data/maps/clutter.bt"}}}});
   const model::Model model = simulation::load_model(scene);
-  const auto tree = std::make_shared<octomap::OcTree>((source_dir / "data/maps/clutter.bt").string());
+  const auto tree =
+      std::make_shared<octomap::OcTree>((source_dir / "data/maps/clutter.bt").string());
   const fcl::OcTreed octree(tree);
   Rng rng(5);
   int contacts = 0, clear = 0;
@@ -189,7 +196,8 @@ TEST_CASE("by FCL's account the judge is right about a map's leaves", "[sweep][u
     const auto found = judged(scene, 0.0, q);
     REQUIRE(found.has_value());
     CHECK(found->other == "map");
-    const double nearest = fcl_distance(centers_of(model, q), model, octree, fcl::Transform3d::Identity());
+    const double nearest =
+        fcl_distance(centers_of(model, q), model, octree, fcl::Transform3d::Identity());
     CHECK((found->clearance_m <= 0.0) == (nearest < 0.0));
     if (nearest >= 0.0) CHECK(found->clearance_m == Approx(nearest).margin(1e-5));
     ++(nearest < 0.0 ? contacts : clear);
@@ -199,7 +207,7 @@ TEST_CASE("by FCL's account the judge is right about a map's leaves", "[sweep][u
 }
 #endif
 
-TEST_CASE("what the judge remembers of the map changes nothing along a motion", "[sweep][unit]") {
+TEST_CASE("the judge's stored leaves do not change its distances along a motion", "[sweep][unit]") {
   const auto scene = scene_of({{"map", {{"file", "data/maps/clutter.bt"}}}});
   const model::Model model = simulation::load_model(scene);
   const JudgedMap map(*scene.map);
@@ -210,7 +218,7 @@ TEST_CASE("what the judge remembers of the map changes nothing along a motion", 
     double nearest = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= 100; ++i) {
       const VectorXd q = from + 0.01 * i * (to - from);
-      judge.node(0.001 * i, q);
+      judge.add_node(0.001 * i, q);
       const auto centers = centers_of(model, q);
       for (std::size_t k = 0; k < centers.size(); ++k)
         nearest = std::min(nearest, map.distance(centers[k]) - model.shapes()[k].radius);
@@ -220,29 +228,33 @@ TEST_CASE("what the judge remembers of the map changes nothing along a motion", 
   }
 }
 
-TEST_CASE("between two nodes the judge looks at every hundredth of a radian, with obstacles where they are then",
-          "[sweep][unit]") {
+TEST_CASE(
+    "between two nodes the judge checks every hundredth of a radian, with obstacles at their "
+    "position at that time",
+    "[sweep][unit]") {
   const JudgedArm arm(scene_of(Json::object()));
   std::vector<Vector3d> centers;
   VectorXd q = VectorXd::Zero(7);
   q[1] = 1.2;
   const auto tip = [&](double angle) {
-    VectorXd turned = q;
-    turned[0] = angle;
-    arm.place(turned, centers);
+    VectorXd rotated = q;
+    rotated[0] = angle;
+    arm.place(rotated, centers);
     return centers.back();
   };
-  // a small ball in the way of the last sphere, halfway between two nodes 0.8 rad apart
+  // a small ball on the path of the last sphere, halfway between two nodes that are 0.8 rad apart
   const Vector3d middle = tip(0.4);
-  Json ball{
-      {"name", "pin"}, {"type", "sphere"}, {"radius_m", 0.004}, {"position_m", {middle.x(), middle.y(), middle.z()}}};
+  Json ball{{"name", "pin"},
+            {"type", "sphere"},
+            {"radius_m", 0.004},
+            {"position_m", {middle.x(), middle.y(), middle.z()}}};
   const auto verdict = [&](const Json& obstacle) {
     Judge judge(scene_of({{"obstacles", {obstacle}}}));
-    judge.node(0.0, q);
+    judge.add_node(0.0, q);
     CHECK_FALSE(judge.verdict().contact());
     VectorXd end = q;
     end[0] = 0.8;
-    judge.node(2.0, end);
+    judge.add_node(2.0, end);
     CHECK(judge.verdict().configurations == 81);
     return judge.verdict();
   };
@@ -254,22 +266,23 @@ TEST_CASE("between two nodes the judge looks at every hundredth of a radian, wit
   Json late = ball;
   late["appears_s"] = 1.9;
   CHECK_FALSE(verdict(late).contact());
-  // it stands in the way at first, and is gone when the arm comes
+  // this ball is on the path at first and has moved away when the arm arrives
   Json moving = ball;
   moving["motion"] = {{"type", "sine"}, {"amplitude_m", {0.0, 0.0, 2.0}}, {"period_s", 4.0}};
   CHECK_FALSE(verdict(moving).contact());
 }
 
-TEST_CASE("the judge's pairs of the arm itself and their distances are those of the other implementation",
+TEST_CASE("the judge's self-collision pairs and their distances equal those of libs/scene",
           "[sweep][unit]") {
   std::vector<scene::Scene> scenes{scene_of({{"model", {{"self_collision", true}}}})};
-  scenes.push_back(scene::scene_from_json({{"schema", "hamelin.scene/1"},
-                                           {"robot",
-                                            {{"file", (test::third_party_robots / "panda.urdf").string()},
-                                             {"tip", "panda_grasptarget"},
-                                             {"spheres", (test::third_party_robots / "panda_spheres.json").string()}}},
-                                           {"model", {{"self_collision", true}}}},
-                                          source_dir, "panda"));
+  scenes.push_back(scene::scene_from_json(
+      {{"schema", "hamelin.scene/1"},
+       {"robot",
+        {{"file", (test::third_party_robots / "panda.urdf").string()},
+         {"tip", "panda_grasptarget"},
+         {"spheres", (test::third_party_robots / "panda_spheres.json").string()}}},
+       {"model", {{"self_collision", true}}}},
+      source_dir, "panda"));
   for (const auto& scene : scenes) {
     CAPTURE(scene.name);
     const model::Model model = simulation::load_model(scene);
@@ -283,7 +296,7 @@ TEST_CASE("the judge's pairs of the arm itself and their distances are those of 
       for (std::size_t pair = 0; pair < field.pairs().size(); ++pair)
         nearest = std::min(nearest, field.distance(pair, {centers}, 10.0));
       Judge judge(scene);
-      judge.node(0.0, q);
+      judge.add_node(0.0, q);
       REQUIRE(judge.verdict().self.has_value());
       CHECK_FALSE(judge.verdict().obstacles.has_value());
       CHECK(judge.verdict().self->clearance_m == Approx(nearest).margin(1e-12));
@@ -295,7 +308,10 @@ TEST_CASE("the judge's pairs of the arm itself and their distances are those of 
   }
 }
 
-TEST_CASE("a scene is feasible if start and goal are free of the map, whatever the primitives", "[sweep][unit]") {
+TEST_CASE(
+    "a scene is feasible if start and goal are free of the map and of obstacles that are not "
+    "judge_only",
+    "[sweep][unit]") {
   const fs::path directory = source_dir / "data/scenes";
   const scene::Scene shelf = scene::read_scene(directory / "shelf.json");
   CHECK(feasibility(shelf, {}).feasible);
@@ -303,12 +319,12 @@ TEST_CASE("a scene is feasible if start and goal are free of the map, whatever t
   into << 0.0, 1.2, 0.0, -0.4, 0.0, 1.6, 0.0;
   const Feasibility blocked = feasibility(shelf, {into});
   CHECK_FALSE(blocked.feasible);
-  CHECK_THAT(blocked.reason,
-             Catch::StartsWith("goal: ") && Catch::Contains(" in the map, ") && Catch::EndsWith(" m deep"));
+  CHECK_THAT(blocked.reason, Catch::StartsWith("goal: ") && Catch::Contains(" in the map, ") &&
+                                 Catch::EndsWith(" m deep"));
   scene::Scene start = shelf;
   start.start_q = into;
   CHECK_THAT(feasibility(start, {}).reason, Catch::StartsWith("start: "));
-  // a primitive for the judge alone is what the map was made of
+  // judge_only primitives do not count: the map was made from them
   scene::Obstacle wall;
   wall.shape = scene::Shape::box;
   wall.size_m = Vector3d::Constant(5.0);
@@ -318,12 +334,13 @@ TEST_CASE("a scene is feasible if start and goal are free of the map, whatever t
   CHECK(feasibility(start, {}).feasible);
   start.obstacles[0].judge_only = false;
   CHECK_FALSE(feasibility(start, {}).feasible);
-  CHECK_THROWS_WITH(feasibility(shelf, {VectorXd::Zero(3)}), Catch::Contains("goal: 3 numbers given, expected 7"));
+  CHECK_THROWS_WITH(feasibility(shelf, {VectorXd::Zero(3)}),
+                    Catch::Contains("goal: 3 values given, expected 7"));
 }
 
 namespace {
 
-/// arm7 at rest somewhere, and a box of the map's frame that holds its last ball and nothing of its base.
+/// A configuration of arm7, and boxes in the map's frame around its last ball.
 struct Rest {
   VectorXd q = VectorXd::Zero(7);
   Vector3d ball;
@@ -343,11 +360,12 @@ Json map_with(const Json& changes) {
   return {{"map", {{"file", "data/maps/clutter.bt"}, {"changes", changes}}}};
 }
 
-std::vector<double> distances(const scene::Scene& scene, const std::vector<double>& times, const VectorXd& q) {
+std::vector<double> distances(const scene::Scene& scene, const std::vector<double>& times,
+                              const VectorXd& q) {
   std::vector<double> found;
   for (const double time_s : times) {
     Judge judge(scene);
-    judge.node(time_s, q);
+    judge.add_node(time_s, q);
     const auto& nearest = judge.verdict().obstacles;
     found.push_back(nearest ? nearest->clearance_m : std::numeric_limits<double>::infinity());
   }
@@ -356,38 +374,41 @@ std::vector<double> distances(const scene::Scene& scene, const std::vector<doubl
 
 }  // namespace
 
-TEST_CASE("the judge sees the map as its changes leave it at that time", "[sweep][unit]") {
+TEST_CASE("the judge sees the map with the changes up to the present time", "[sweep][unit]") {
   const Rest rest;
-  const auto scene = scene_of(map_with({{{"time_s", 1.0}, {"occupied_boxes_m", {rest.box(0.05)}}},
-                                        {{"time_s", 2.0}, {"free_boxes_m", {rest.box(1.5)}}},
-                                        {{"time_s", 3.0}, {"occupied_boxes_m", {rest.box(0.01)}}}}));
+  const auto scene =
+      scene_of(map_with({{{"time_s", 1.0}, {"occupied_boxes_m", {rest.box(0.05)}}},
+                         {{"time_s", 2.0}, {"free_boxes_m", {rest.box(1.5)}}},
+                         {{"time_s", 3.0}, {"occupied_boxes_m", {rest.box(0.01)}}}}));
   const auto found = distances(scene, {0.0, 0.999, 1.0, 1.999, 2.0, 2.5, 3.0, 9.0}, rest.q);
   CHECK(found[0] > 0.0);
   CHECK(found[1] == found[0]);
   CHECK(found[2] < 0.0);
   CHECK(found[3] == found[2]);
-  CHECK(found[4] > found[0]);  // what was there at first is free too
+  CHECK(found[4] > found[0]);  // leaves of the original map are freed as well
   CHECK(found[5] == found[4]);
   CHECK(found[6] < 0.0);
   CHECK(found[7] == found[6]);
-  // what it remembers of the map is forgotten at a change
+  // stored leaves are discarded at a change
   Judge judge(scene);
-  for (int i = 0; i <= 100; ++i) judge.node(0.01 * i - 0.005, rest.q);
+  for (int i = 0; i <= 100; ++i) judge.add_node(0.01 * i - 0.005, rest.q);
   CHECK_FALSE(judge.verdict().contact());
-  judge.node(1.0, rest.q);
+  judge.add_node(1.0, rest.q);
   CHECK(judge.verdict().contact());
   CHECK(judge.verdict().obstacles->time_s == 1.0);
   CHECK(judge.verdict().obstacles->other == "map");
 }
 
-TEST_CASE("changed maps are, by the judge's own code, what runs see", "[sweep][unit]") {
+TEST_CASE("the judge's own code changes maps as runs do", "[sweep][unit]") {
   const Rest rest;
   Json free_boxes = Json::array(), occupied_boxes = Json::array();
   Rng rng(29);
   for (int i = 0; i < 12; ++i) {
     const Vector3d lo{rng.uniform(-0.7, 0.6), rng.uniform(-0.7, 0.6), rng.uniform(0.0, 0.9)};
-    const Vector3d hi = lo + Vector3d(rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3));
-    (i % 2 == 0 ? free_boxes : occupied_boxes).push_back({lo.x(), lo.y(), lo.z(), hi.x(), hi.y(), hi.z()});
+    const Vector3d hi =
+        lo + Vector3d(rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3));
+    (i % 2 == 0 ? free_boxes : occupied_boxes)
+        .push_back({lo.x(), lo.y(), lo.z(), hi.x(), hi.y(), hi.z()});
   }
   scene::MakeMapOptions other;
   other.resolution_m = 0.02;
@@ -435,25 +456,33 @@ TEST_CASE("changed maps are, by the judge's own code, what runs see", "[sweep][u
   CHECK(clear > 10);
 }
 
-TEST_CASE("with exact primitives the judge sees of the map only what changes occupy", "[sweep][unit]") {
+TEST_CASE("with exact primitives the judge sees of the map only what changes occupy",
+          "[sweep][unit]") {
   const Rest rest;
   Json document = map_with({{{"time_s", 1.0}, {"occupied_boxes_m", {rest.box(0.05)}}}});
-  document["obstacles"] = {
-      {{"type", "sphere"}, {"radius_m", 0.1}, {"position_m", {5.0, 5.0, 5.0}}, {"judge_only", true}}};
+  document["obstacles"] = {{{"type", "sphere"},
+                            {"radius_m", 0.1},
+                            {"position_m", {5.0, 5.0, 5.0}},
+                            {"judge_only", true}}};
   const auto found = distances(scene_of(document), {0.0, 1.0}, rest.q);
   CHECK(found[0] > 4.0);
   CHECK(found[1] < 0.0);
 }
 
-TEST_CASE("a start must be clear in the map at time 0, a goal in some map while the scene lasts", "[sweep][unit]") {
+TEST_CASE(
+    "a start must be clear in the map at time 0, a goal in one of the maps within the scene's "
+    "duration",
+    "[sweep][unit]") {
   const Rest rest;
   const std::vector<double> away(7, 0.0), there(rest.q.begin(), rest.q.end());
-  const Json block{{"occupied_boxes_m", {rest.box(0.05)}}}, unblock{{"free_boxes_m", {rest.box(0.5)}}};
+  const Json block{{"occupied_boxes_m", {rest.box(0.05)}}},
+      unblock{{"free_boxes_m", {rest.box(0.5)}}};
   const auto at = [](double time_s, Json change) {
     change["time_s"] = time_s;
     return change;
   };
-  const auto judged = [&](const std::vector<double>& start, const std::vector<double>& goal, const Json& changes) {
+  const auto judged = [&](const std::vector<double>& start, const std::vector<double>& goal,
+                          const Json& changes) {
     Json document = map_with(changes);
     document["start"] = {{"q", start}};
     document["goals"] = {{{"type", "joint"}, {"q", goal}}};
@@ -462,12 +491,13 @@ TEST_CASE("a start must be clear in the map at time 0, a goal in some map while 
   };
   REQUIRE(judged(away, there, Json::array()).feasible);
   REQUIRE(judged(there, away, Json::array()).feasible);
-  CHECK_THAT(judged(there, away, Json::array({at(0.0, block)})).reason, Catch::StartsWith("start: "));
+  CHECK_THAT(judged(there, away, Json::array({at(0.0, block)})).reason,
+             Catch::StartsWith("start: "));
   CHECK(judged(there, away, Json::array({at(0.001, block)})).feasible);
   CHECK_FALSE(judged(there, away, Json::array({at(0.0, block), at(0.001, unblock)})).feasible);
   CHECK_THAT(judged(away, there, Json::array({at(0.0, block)})).reason,
              Catch::StartsWith("goal: ") && Catch::Contains("in the map"));
-  CHECK(judged(away, there, Json::array({at(1.0, block)})).feasible);  // it may be there before
+  CHECK(judged(away, there, Json::array({at(1.0, block)})).feasible);  // the arm may arrive before
   CHECK(judged(away, there, Json::array({at(0.0, block), at(5.0, unblock)})).feasible);
   CHECK_FALSE(judged(away, there, Json::array({at(0.0, block), at(5.1, unblock)})).feasible);
 }

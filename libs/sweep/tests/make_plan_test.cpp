@@ -29,11 +29,13 @@ namespace fs = std::filesystem;
 const fs::path source_dir = HAMELIN_SOURCE_DIR;
 const std::vector<fs::path> plugin_directories{HAMELIN_TEST_PLUGIN_DIR};
 
-/// A directory with two small problems for arm7: one that it can solve, one with a wall where the goal is.
+/// A directory with two small problems for arm7: one that hybrid can solve, and one whose goal is
+/// inside a wall.
 class Bench {
  public:
   Bench() {
-    const Json home{0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785}, away{1.2, -0.4, 0.0, -2.0, 0.0, 1.571, 0.785};
+    const Json home{0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785},
+        away{1.2, -0.4, 0.0, -2.0, 0.0, 1.571, 0.785};
     const auto box = [](const Json& at) {
       return Json{{"name", "wall"},
                   {"type", "box"},
@@ -52,7 +54,9 @@ class Bench {
                          {"goal", away},
                          {"obstacles", {box({0.12, 0.31, 0.55}), box({0.2, 0.5, 0.5})}}});
   }
-  void put(const std::string& file, const Json& document) const { folder_.put(file, document.dump()); }
+  void put(const std::string& file, const Json& document) const {
+    folder_.put(file, document.dump());
+  }
   [[nodiscard]] PlanOptions problems() const {
     PlanOptions options;
     options.files = {root_ / "free.json", root_ / "blocked.json"};
@@ -74,7 +78,8 @@ class Bench {
 std::map<std::string, std::string> bytes_below(const fs::path& directory) {
   std::map<std::string, std::string> all;
   for (const auto& entry : fs::recursive_directory_iterator(directory))
-    if (entry.is_regular_file()) all[entry.path().lexically_relative(directory).string()] = read_file(entry.path());
+    if (entry.is_regular_file())
+      all[entry.path().lexically_relative(directory).string()] = read_file(entry.path());
   return all;
 }
 
@@ -89,7 +94,8 @@ std::string message_of(const fs::path& directory, const PlanOptions& options) {
 
 }  // namespace
 
-TEST_CASE("a plan has each problem, goal, planner, combination of values and seed once", "[sweep][unit]") {
+TEST_CASE("a plan has each problem, goal, planner, combination of values and seed once",
+          "[sweep][unit]") {
   Bench bench;
   PlanOptions options = bench.problems();
   options.goals = {scene::GoalType::joint, scene::GoalType::pose};
@@ -116,9 +122,10 @@ TEST_CASE("a plan has each problem, goal, planner, combination of values and see
   const PlannedRun& last = plan.runs.back();
   CHECK(last.id == "blocked-pose/apf:k_p=3,law=wang2018//step_s=0.002 /model/joint_damping=2/s2");
   CHECK(last.planner == "apf");
-  CHECK(last.set == std::vector<std::string>{"/planner/params/k_p=3", "/planner/params/law=wang2018",
-                                             "/model/self_collision=false", "/duration_s=5", "/step_s=0.002",
-                                             "/model/joint_damping=2"});
+  CHECK(last.set == std::vector<std::string>{"/planner/params/k_p=3",
+                                             "/planner/params/law=wang2018",
+                                             "/model/self_collision=false", "/duration_s=5",
+                                             "/step_s=0.002", "/model/joint_damping=2"});
   CHECK(to_json(read_plan(bench.dir("a"))) == to_json(plan));
 }
 
@@ -138,11 +145,13 @@ TEST_CASE("the same options give the same bytes", "[sweep][unit]") {
   CHECK(a == bytes_below(bench.dir("b")));
 }
 
-TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will read", "[sweep][unit]") {
+TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will read",
+          "[sweep][unit]") {
   Bench bench;
   const fs::path work = bench.dir("inputs");
   fs::create_directory(work);
-  for (const char* file : {"robots/arm7.urdf", "robots/arm7.spheres.json", "maps/clutter.bt", "maps/shelf.bt"})
+  for (const char* file :
+       {"robots/arm7.urdf", "robots/arm7.spheres.json", "maps/clutter.bt", "maps/shelf.bt"})
     fs::copy_file(source_dir / "data" / file, work / fs::path(file).filename());
   std::ofstream(work / "scene.json") << Json{
       {"schema", "hamelin.scene/1"},
@@ -164,22 +173,24 @@ TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will re
     expected[std::string("../inputs/") + name] = sha256_hex(read_file(work / name));
   CHECK(inputs == expected);
   for (const char* name : {"apf", "hybrid"})
-    CHECK(plugins.at(name) ==
-          sha256_hex(read_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) / (std::string(name) + ".hamelin.so"))));
+    CHECK(plugins.at(name) == sha256_hex(read_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) /
+                                                   (std::string(name) + ".hamelin.so"))));
   CHECK(plugins.size() == 2);
   CHECK_NOTHROW(check_unchanged(plan, bench.dir("a"), plugin_directories));
   for (const char* name : {"arm7.spheres.json", "arm7.urdf", "clutter.bt", "shelf.bt"}) {
     const std::string bytes = read_file(work / name);
     std::ofstream(work / name, std::ios::app) << " ";
     CHECK_THROWS_WITH(check_unchanged(plan, bench.dir("a"), plugin_directories),
-                      Catch::Contains(std::string("inputs/") + name + ": has changed since the sweep was planned"));
+                      Catch::Contains(std::string("inputs/") + name +
+                                      ": has changed since the sweep was planned"));
     std::ofstream(work / name, std::ios::binary) << bytes;
   }
   CHECK_THROWS_WITH(check_unchanged(plan, bench.dir("a"), {bench.dir("a")}),
                     Catch::Contains("planner 'apf': not found"));
 }
 
-TEST_CASE("values that a planner does not take are refused before a plan is written", "[sweep][unit]") {
+TEST_CASE("parameters that a planner does not have are refused before a plan is written",
+          "[sweep][unit]") {
   Bench bench;
   PlanOptions options = bench.problems();
   options.planners = {"hybrid", "apf:k_q=1"};
@@ -187,7 +198,8 @@ TEST_CASE("values that a planner does not take are refused before a plan is writ
   CHECK_FALSE(fs::exists(plan_file(bench.dir("a"))));
 }
 
-TEST_CASE("a plan in a linked folder names the same scenes as one beside its target", "[sweep][unit]") {
+TEST_CASE("a plan in a symbolically linked folder names the scenes by paths that resolve",
+          "[sweep][unit]") {
   Bench bench;
   fs::create_directories(bench.dir("deep/er"));
   fs::create_directory_symlink(bench.dir("deep/er"), bench.dir("link"));
@@ -200,8 +212,10 @@ TEST_CASE("a plan in a linked folder names the same scenes as one beside its tar
   CHECK_NOTHROW(check_unchanged(plan, bench.dir("link"), plugin_directories));
 }
 
-TEST_CASE("feasibility follows the map and is one for all goals of a problem; a pose goal is the tip's at the goal",
-          "[sweep][unit]") {
+TEST_CASE(
+    "all goal types of a problem share its feasibility; a pose goal is the pose of the tip at the "
+    "joint goal",
+    "[sweep][unit]") {
   Bench bench;
   PlanOptions options = bench.problems();
   options.goals = {scene::GoalType::pose, scene::GoalType::joint, scene::GoalType::position};
@@ -210,9 +224,12 @@ TEST_CASE("feasibility follows the map and is one for all goals of a problem; a 
   for (std::size_t i = 0; i < 3; ++i) {
     CHECK(plan.scenes[i].feasible);
     CHECK_FALSE(plan.scenes[3 + i].feasible);
-    CHECK_THAT(plan.scenes[3 + i].reason, Catch::StartsWith("goal: ") && Catch::Contains(" in the map, "));
+    CHECK_THAT(plan.scenes[3 + i].reason,
+               Catch::StartsWith("goal: ") && Catch::Contains(" in the map, "));
   }
-  const auto scene_at = [&](std::size_t i) { return scene::read_scene(bench.dir("a") / plan.scenes[i].file); };
+  const auto scene_at = [&](std::size_t i) {
+    return scene::read_scene(bench.dir("a") / plan.scenes[i].file);
+  };
   const scene::Scene pose = scene_at(0), joint = scene_at(1);
   CHECK(pose.map->file == joint.map->file);
   CHECK(pose.obstacles.at(0).judge_only);
@@ -223,7 +240,8 @@ TEST_CASE("feasibility follows the map and is one for all goals of a problem; a 
   CHECK(scene_at(2).goals.at(0).type == scene::GoalType::position);
 }
 
-TEST_CASE("clutter scenes have their pairs clear of map and primitives and apart", "[sweep][unit]") {
+TEST_CASE("pairs of clutter scenes are clear of map and primitives, with start and goal apart",
+          "[sweep][unit]") {
   Bench bench;
   PlanOptions options;
   options.plugin_directories = plugin_directories;
@@ -252,20 +270,21 @@ TEST_CASE("clutter scenes have their pairs clear of map and primitives and apart
     CHECK(starts.insert(read_json(bench.dir("a") / found.file)["start"].dump()).second);
     for (const auto& q : {scene.start_q, scene.goals[0].q}) {
       Judge primitives(scene);
-      primitives.node(0.0, q);
+      primitives.add_node(0.0, q);
       CHECK(primitives.verdict().obstacles->clearance_m >= 0.02);
       scene::Scene map_only = scene;
       map_only.obstacles.clear();
       Judge leaves(map_only);
-      leaves.node(0.0, q);
+      leaves.add_node(0.0, q);
       CHECK(leaves.verdict().obstacles->clearance_m >= 0.02);
     }
   }
   CHECK(maps.size() == 2);
 }
 
-TEST_CASE("gain sets lie in the ranges of the set-up, and the first ones do not depend on their number",
-          "[sweep][unit]") {
+TEST_CASE(
+    "gain sets lie in the ranges of the set-up, and the first ones do not depend on their number",
+    "[sweep][unit]") {
   const auto sets = draw_gains(2000, 1), few = draw_gains(3, 1);
   std::size_t undamped = 0;
   double low = 1e9, high = 0.0;
@@ -287,13 +306,15 @@ TEST_CASE("gain sets lie in the ranges of the set-up, and the first ones do not 
   }
   CHECK(undamped > 900);
   CHECK(undamped < 1100);
-  CHECK(low < 0.33);  // the ranges are used to their ends
+  CHECK(low < 0.33);  // the whole range is used
   CHECK(high > 31.0);
   for (std::size_t i = 0; i < few.size(); ++i) CHECK(few[i].k_obs == sets[i].k_obs);
 }
 
-TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres and each planner's own names",
-          "[sweep][unit]") {
+TEST_CASE(
+    "runs of gain sets have the published set-up, links as rows of spheres and each planner's "
+    "parameter names",
+    "[sweep][unit]") {
   Bench bench;
   PlanOptions options;
   options.plugin_directories = plugin_directories;
@@ -312,8 +333,8 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
                            : run.planner == "gyro" ? "/planner/params/k_obs="
                                                    : "/planner/params/steering_gain="));
   }
-  CHECK(planners ==
-        std::map<std::string, std::size_t>{{"apf", 3}, {"apf without the obstacle", 3}, {"gyro", 3}, {"hybrid", 3}});
+  CHECK(planners == std::map<std::string, std::size_t>{
+                        {"apf", 3}, {"apf without the obstacle", 3}, {"gyro", 3}, {"hybrid", 3}});
   const scene::Scene scene = scene::read_scene(bench.dir("a") / plan.scenes[0].file);
   CHECK(scene.integrator.name == "semi-implicit-euler");
   CHECK(scene.step_s == 0.004);
@@ -323,7 +344,8 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
   CHECK(std::isinf(scene.goals.at(0).speed_max));
   CHECK(scene.obstacles.size() == 1);
   CHECK(scene::read_scene(bench.dir("a") / plan.scenes[1].file).obstacles.empty());
-  // along each segment a sphere is never farther than 1 cm, and hardly wider than the segment
+  // no point of a segment is farther than 1 cm from a sphere's centre, and the spheres are hardly
+  // wider than the segment
   const model::Model model = simulation::load_model(scene);
   for (const auto& link : model.robot().links)
     for (int i = 0; i <= 1000; ++i) {
@@ -331,20 +353,21 @@ TEST_CASE("gain runs take the set-up of the figures, links as rows of spheres an
       const auto& segment = link.segments.at(0);
       const Eigen::Vector3d p = segment.from_m + share * (segment.to_m - segment.from_m);
       double nearest = 1.0;
-      for (const auto& sphere : link.spheres) nearest = std::min(nearest, (sphere.center_m - p).norm());
+      for (const auto& sphere : link.spheres)
+        nearest = std::min(nearest, (sphere.center_m - p).norm());
       if (nearest > 0.01 + 1e-9) FAIL_CHECK(link.name << " at " << share);
     }
   CHECK(model.shapes().front().radius <= 1e-3);
 }
 
-TEST_CASE("a motion is thinned to a spacing, and loops are cut out of it", "[sweep][unit]") {
+TEST_CASE("a motion is thinned to a spacing, and loops are removed from it", "[sweep][unit]") {
   const auto at = [](double x, double y) { return Eigen::VectorXd(Eigen::Vector2d(x, y)); };
   std::vector<Eigen::VectorXd> nodes;
-  for (int i = 0; i <= 100; ++i) nodes.push_back(at(0.01 * i, 0.0));  // there
-  for (int i = 1; i <= 50; ++i) nodes.push_back(at(1.0, 0.01 * i));   // into a pocket
-  for (int i = 49; i >= 0; --i) nodes.push_back(at(1.0, 0.01 * i));   // and out again
+  for (int i = 0; i <= 100; ++i) nodes.push_back(at(0.01 * i, 0.0));
+  for (int i = 1; i <= 50; ++i) nodes.push_back(at(1.0, 0.01 * i));  // a detour
+  for (int i = 49; i >= 0; --i) nodes.push_back(at(1.0, 0.01 * i));  // and back
   for (int i = 1; i <= 100; ++i) nodes.push_back(at(1.0 + 0.01 * i, 0.0));
-  const auto path = thinned(nodes, 0.1 + 1e-9);
+  const auto path = thin_path(nodes, 0.1 + 1e-9);
   CHECK(path.front() == nodes.front());
   CHECK(path.back() == nodes.back());
   CHECK(path.size() == 21);
@@ -352,12 +375,13 @@ TEST_CASE("a motion is thinned to a spacing, and loops are cut out of it", "[swe
     CHECK((path[i] - path[i - 1]).lpNorm<Eigen::Infinity>() <= 0.1 + 1e-9);
     CHECK(path[i][1] == 0.0);
   }
-  CHECK(thinned({at(0.0, 0.0)}, 0.1).size() == 1);
-  // a step that is too long as it is stays one
-  CHECK(thinned({at(0.0, 0.0), at(1.0, 0.0)}, 0.1).size() == 2);
+  CHECK(thin_path({at(0.0, 0.0)}, 0.1).size() == 1);
+  // a step of the motion that is longer than the spacing is kept
+  CHECK(thin_path({at(0.0, 0.0), at(1.0, 0.0)}, 0.1).size() == 2);
 }
 
-TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start and goal", "[sweep]") {
+TEST_CASE("a sphere on a path touches the arm on its path, and is clear of start and goal",
+          "[sweep]") {
   Bench bench;
   PlanOptions options = bench.problems();
   options.sphere_on_path.emplace().visible_within_m = 0.15;
@@ -365,7 +389,8 @@ TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start 
   options.on_note = [&](const std::string& text) { notes.push_back(text); };
   const Plan plan = make_plan(bench.dir("a"), options);
   REQUIRE(notes.size() == 1);
-  CHECK_THAT(notes[0], Catch::Contains("blocked.json: is left out: goal: ") && Catch::EndsWith(" m deep"));
+  CHECK_THAT(notes[0],
+             Catch::Contains("blocked.json: is left out: goal: ") && Catch::EndsWith(" m deep"));
   REQUIRE(plan.scenes.size() == 1);
   CHECK(plan.scenes[0].feasible);
   CHECK(plan.runs.at(0).id == "free-path/hybrid/s1");
@@ -378,7 +403,7 @@ TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start 
   CHECK_FALSE(sphere.judge_only);
   const scene::Goal& goal = scene.goals.at(0);
   REQUIRE(goal.path.cols() > 2);
-  // where the arm is, by the kinematics that runs use
+  // with the kinematics that runs use
   const model::Model model = simulation::load_model(scene);
   dynamics::Workspace ws(model);
   std::vector<Eigen::Vector3d> centers(model.shapes().size());
@@ -387,7 +412,8 @@ TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start 
     dynamics::shape_centers(model, ws, centers);
     double nearest = 1e9;
     for (std::size_t i = 0; i < centers.size(); ++i)
-      nearest = std::min(nearest, (centers[i] - sphere.pose.p()).norm() - model.shapes()[i].radius - sphere.radius_m);
+      nearest = std::min(nearest, (centers[i] - sphere.pose.p()).norm() - model.shapes()[i].radius -
+                                      sphere.radius_m);
     return nearest;
   };
   CHECK(clearance(scene.start_q) >= 0.02);
@@ -402,30 +428,36 @@ TEST_CASE("a sphere on a path touches the arm on its way, and is clear of start 
   CHECK(nearest < -0.06);
 }
 
-TEST_CASE("options that make no plan are refused in one line", "[sweep][unit]") {
+TEST_CASE("invalid options of a plan are refused in one line", "[sweep][unit]") {
   Bench bench;
   CHECK_THAT(message_of(bench.dir("a"), {}), Catch::StartsWith("nothing to plan"));
   PlanOptions options = bench.problems();
   options.problem.robot.clear();
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("free.json: is a problem, it needs --robot"));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::Contains("free.json: is a problem, expected --robot"));
   options = bench.problems();
   options.planners = {":k=1"};
   CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--planner :k=1: no name"));
   options.planners = {"apf:k"};
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--planner apf:k: 'k' is no parameter"));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::StartsWith("--planner apf:k: 'k' is not a parameter"));
   options.planners = {"apf", "apf"};
   CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("is planned twice"));
   options = bench.problems();
   options.vary = {"step_s=1"};
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::StartsWith("--vary step_s=1: expected /json/pointer="));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::StartsWith("--vary step_s=1: expected /json/pointer="));
   options = bench.problems();
   options.files.push_back(options.files.front());
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("another file is named 'free-joint' too"));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::Contains("another file also has the name 'free-joint'"));
   options.files = {source_dir / "data/robots/planar3.json"};
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("planar3.json: is neither a scene nor a problem"));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::Contains("planar3.json: is neither a scene nor a problem"));
   options.files = {source_dir / "data/scenes/shelf.json"};
   options.sphere_on_path.emplace();
-  CHECK_THAT(message_of(bench.dir("a"), options), Catch::Contains("shelf.json: is a scene, expected problems"));
+  CHECK_THAT(message_of(bench.dir("a"), options),
+             Catch::Contains("shelf.json: is a scene, expected problems"));
   options.sphere_on_path.reset();
   options.files.clear();
   options.clutter.maps = 1;

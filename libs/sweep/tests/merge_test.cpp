@@ -16,8 +16,9 @@ using namespace hamelin::sweep;
 
 namespace {
 
-/// A run by hand.
-MergedRun made(const std::string& id, const std::string& planner, const Json& record, bool feasible = true) {
+/// A made-up run.
+MergedRun made(const std::string& id, const std::string& planner, const Json& record,
+               bool feasible = true) {
   MergedRun merged;
   merged.run.id = id;
   merged.run.scene = "scenes/a.json";
@@ -30,8 +31,10 @@ MergedRun made(const std::string& id, const std::string& planner, const Json& re
   return merged;
 }
 
-Json record(const std::string& outcome, double clearance, double time_s, double p50, const Json& cause = nullptr) {
-  Json closest{{"clearance_m", clearance}, {"time_s", 0.5}, {"sphere", "hand/3"}, {"other", "<can> & 'co'"}};
+Json record(const std::string& outcome, double clearance, double time_s, double p50,
+            const Json& cause = nullptr) {
+  Json closest{
+      {"clearance_m", clearance}, {"time_s", 0.5}, {"sphere", "hand/3"}, {"other", "<can> & 'co'"}};
   return {{"outcome", outcome},
           {"cause", cause},
           {"result",
@@ -41,21 +44,29 @@ Json record(const std::string& outcome, double clearance, double time_s, double 
             {"filter_work_J", -0.1 * p50},
             {"recovery_work_J", 0.5 * p50},
             {"escape", {{"count", 2}, {"strategy", "tree"}}},
-            {"timing", {{"cpu_s", 0.1}, {"tick_us", {{"p50", p50}, {"p99", 2.0 * p50}, {"max", 90.0}}}}}}},
-          {"judge", {{"contact", clearance <= 0.0}, {"obstacles", closest}, {"self", nullptr}, {"configurations", 9}}}};
+            {"timing",
+             {{"cpu_s", 0.1}, {"tick_us", {{"p50", p50}, {"p99", 2.0 * p50}, {"max", 90.0}}}}}}},
+          {"judge",
+           {{"contact", clearance <= 0.0},
+            {"obstacles", closest},
+            {"self", nullptr},
+            {"configurations", 9}}}};
 }
 
 std::vector<MergedRun> hand_made() {
-  const Json crashed{{"outcome", "crashed"}, {"cause", "signal 11"}, {"result", nullptr}, {"judge", nullptr}};
-  return {made("1", "hybrid", record("reached", 0.02, 4.0, 5.0)),
-          made("2", "hybrid", record("reached", 0.01, 6.0, 7.0)),
-          made("3", "hybrid", record("reached", 0.03, 5.0, 6.0), false),
-          made("4", "hybrid", record("stalled", 0.05, 9.0, 8.0, "joint limit")),
-          made("5", "hybrid", crashed),
-          made("6", "hybrid", Json()),
-          made("7", "apf", record("collision", -0.004, 2.0, 1.0, "ran <into> it, 1.5e-3 m deep at 2 s, at link4")),
-          made("8", "apf", record("stalled", 0.05, 9.0, 2.0, "joint limit")),
-          made("9", "apf", record("stalled", 0.05, 9.0, 3.0, "joint limit"))};
+  const Json crashed{
+      {"outcome", "crashed"}, {"cause", "signal 11"}, {"result", nullptr}, {"judge", nullptr}};
+  return {
+      made("1", "hybrid", record("reached", 0.02, 4.0, 5.0)),
+      made("2", "hybrid", record("reached", 0.01, 6.0, 7.0)),
+      made("3", "hybrid", record("reached", 0.03, 5.0, 6.0), false),
+      made("4", "hybrid", record("stalled", 0.05, 9.0, 8.0, "joint limit")),
+      made("5", "hybrid", crashed),
+      made("6", "hybrid", Json()),
+      made("7", "apf",
+           record("collision", -0.004, 2.0, 1.0, "ran <into> it, 1.5e-3 m deep at 2 s, at link4")),
+      made("8", "apf", record("stalled", 0.05, 9.0, 2.0, "joint limit")),
+      made("9", "apf", record("stalled", 0.05, 9.0, 3.0, "joint limit"))};
 }
 
 /// Ends of the interval of shares p for which |p̂ − p| ≤ z √(p(1 − p)/n), by bisection.
@@ -71,29 +82,30 @@ double wilson_end(double hits, double n, double toward) {
 
 }  // namespace
 
-TEST_CASE("Wilson's interval solves its defining inequality and agrees with published values", "[sweep][unit]") {
+TEST_CASE("Wilson's interval solves its defining inequality and agrees with published values",
+          "[sweep][unit]") {
   for (const std::size_t n : {1U, 2U, 7U, 60U, 700U})
     for (const std::size_t hits : {std::size_t{0}, n / 3, n / 2, n - 1, n}) {
       CAPTURE(hits, n);
-      const Interval interval = wilson(hits, n);
+      const Interval interval = wilson_interval(hits, n);
       const double h = static_cast<double>(hits), all = static_cast<double>(n);
       CHECK(interval.low == Approx(hits == 0 ? 0.0 : wilson_end(h, all, 0.0)).margin(1e-12));
       CHECK(interval.high == Approx(hits == n ? 1.0 : wilson_end(h, all, 1.0)).margin(1e-12));
     }
   // Newcombe, Statistics in Medicine 17 (1998), table I, method 3: 81/263, 15/148, 0/20, 1/29
   const auto published = [](std::size_t hits, std::size_t n, double low, double high) {
-    CHECK(wilson(hits, n).low == Approx(low).margin(5e-5));
-    CHECK(wilson(hits, n).high == Approx(high).margin(5e-5));
+    CHECK(wilson_interval(hits, n).low == Approx(low).margin(5e-5));
+    CHECK(wilson_interval(hits, n).high == Approx(high).margin(5e-5));
   };
   published(81, 263, 0.2553, 0.3662);
   published(15, 148, 0.0624, 0.1605);
   published(0, 20, 0.0, 0.1611);
   published(1, 29, 0.0061, 0.1718);
-  CHECK(wilson(0, 0).low == 0.0);
-  CHECK(wilson(0, 0).high == 1.0);
+  CHECK(wilson_interval(0, 0).low == 0.0);
+  CHECK(wilson_interval(0, 0).high == 1.0);
 }
 
-TEST_CASE("records made by hand are counted as they are", "[sweep][unit]") {
+TEST_CASE("made-up records are grouped and counted", "[sweep][unit]") {
   const auto groups = group(hand_made(), {"planner"});
   REQUIRE(groups.size() == 2);
   const Group &apf = groups[0], &hybrid = groups[1];
@@ -103,8 +115,9 @@ TEST_CASE("records made by hand are counted as they are", "[sweep][unit]") {
   CHECK(hybrid.feasible == 4);
   CHECK(hybrid.reached == 2);
   CHECK(hybrid.reached_all == 3);
-  CHECK(hybrid.reached_interval.low == wilson(2, 4).low);
-  CHECK(hybrid.outcomes == std::map<std::string, std::size_t>{{"crashed", 1}, {"reached", 3}, {"stalled", 1}});
+  CHECK(hybrid.reached_interval.low == wilson_interval(2, 4).low);
+  CHECK(hybrid.outcomes ==
+        std::map<std::string, std::size_t>{{"crashed", 1}, {"reached", 3}, {"stalled", 1}});
   CHECK(hybrid.judged == 4);
   CHECK(hybrid.contacts == 0);
   CHECK(hybrid.min_clearance_m == 0.01);
@@ -117,7 +130,8 @@ TEST_CASE("records made by hand are counted as they are", "[sweep][unit]") {
   CHECK(hybrid.filter_work_J_max == Approx(-0.5));
   CHECK(*hybrid.recovery_work_J_median == 3.0);
   CHECK(hybrid.escapes == std::map<std::string, double>{{"count", 8.0}});
-  CHECK(hybrid.causes == std::map<std::string, std::size_t>{{"crashed: signal 11", 1}, {"stalled: joint limit", 1}});
+  CHECK(hybrid.causes ==
+        std::map<std::string, std::size_t>{{"crashed: signal 11", 1}, {"stalled: joint limit", 1}});
   CHECK(apf.contacts == 1);
   CHECK(apf.min_clearance_m == -0.004);
   CHECK(apf.causes.at("stalled: joint limit") == 2);
@@ -125,17 +139,22 @@ TEST_CASE("records made by hand are counted as they are", "[sweep][unit]") {
   CHECK_FALSE(apf.reached_time_s_median.has_value());
 }
 
-TEST_CASE("grouping by a label that no run has is refused with those there are", "[sweep][unit]") {
-  CHECK_THROWS_WITH(group(hand_made(), {"colour"}),
-                    "--by colour: no run has that label, expected some of goal, planner, problem, seed");
+TEST_CASE("grouping by a label that no run has is refused with the list of labels",
+          "[sweep][unit]") {
+  CHECK_THROWS_WITH(
+      group(hand_made(), {"colour"}),
+      "--by colour: no run has that label, expected one of goal, planner, problem, seed");
 }
 
-TEST_CASE("gain sets are counted against those that reach without the obstacle and those with which apf stalls",
-          "[sweep][unit]") {
+TEST_CASE(
+    "gain sets are counted among those that reach the goal without the obstacle and those with "
+    "which apf stalls",
+    "[sweep][unit]") {
   std::vector<MergedRun> runs;
-  const auto add = [&](const std::string& set, const std::string& planner, const std::string& problem,
-                       const std::string& outcome) {
-    MergedRun run = made(set + planner, planner, record(outcome, outcome == "collision" ? -0.1 : 0.1, 1.0, 1.0));
+  const auto add = [&](const std::string& set, const std::string& planner,
+                       const std::string& problem, const std::string& outcome) {
+    MergedRun run = made(set + planner, planner,
+                         record(outcome, outcome == "collision" ? -0.1 : 0.1, 1.0, 1.0));
     run.run.labels["gains"] = set;
     run.run.labels["problem"] = problem;
     run.run.gains = {{"k_p", 1.0}, {"eta", 1.0}, {"k_obs", 1.0}};
@@ -161,13 +180,15 @@ TEST_CASE("gain sets are counted against those that reach without the obstacle a
   CHECK(gains[1].reached == 3);
   CHECK(gains[1].contacts == 1);
   CHECK(gains[1].reached_of_reference == 2);
-  CHECK(gains[1].interval.high == wilson(2, 3).high);
+  CHECK(gains[1].interval.high == wilson_interval(2, 3).high);
   CHECK(gains[1].apf_stalled == 3);
   CHECK(gains[1].reached_of_apf_stalled == 2);
 }
 
-TEST_CASE("the page's JSON has the summary, and each run that did not reach with its cause and its command",
-          "[sweep][unit]") {
+TEST_CASE(
+    "the page's JSON has the summary, and each run that did not reach with its cause and its "
+    "command",
+    "[sweep][unit]") {
   Merged merged{hand_made(), {"goal", "planner"}, {}, {}, {"a <note>"}};
   merged.runs[3].run.set = {"/planner/params/escape=it's"};
   merged.groups = group(merged.runs, merged.by);
@@ -186,14 +207,17 @@ TEST_CASE("the page's JSON has the summary, and each run that did not reach with
                                      "hamelin run sweep/scenes/a.json --planner hybrid --set "
                                      "'/planner/params/escape=it'\\''s' --seed 1"}});
   CHECK(page["failures"][1]["cause"] == "signal 11");
-  // as it is: the page makes text of it, never HTML
+  // not escaped: the page inserts it as text, never as HTML
   CHECK(page["failures"][2]["cause"] ==
-        "ran <into> it, 1.5e-3 m deep at 2 s, at link4; the judge saw hand/3 touch <can> & 'co' at 0.500 s");
+        "ran <into> it, 1.5e-3 m deep at 2 s, at link4; the judge saw hand/3 touch <can> & 'co' at "
+        "0.500 s");
   CHECK_THAT(to_table(merged), Catch::Contains("5/6"));
 }
 
-TEST_CASE("the page's JSON tells of failures that were not feasible, and has the gain sets with the obstacle",
-          "[sweep][unit]") {
+TEST_CASE(
+    "the page's JSON marks failures that were not feasible, and has the gain sets with the "
+    "obstacle",
+    "[sweep][unit]") {
   MergedRun set = made("g1", "apf", record("stalled", 0.1, 1.0, 1.0), false), free = set;
   set.run.gains = free.run.gains = {{"k_p", 2.0}, {"eta", 3.0}, {"k_obs", 4.0}};
   set.run.labels["gains"] = free.run.labels["gains"] = "g1";
@@ -208,7 +232,7 @@ TEST_CASE("the page's JSON tells of failures that were not feasible, and has the
   CHECK(page["failures"][0]["cause"] == "not feasible (goal 0: hand/1 in the map, 0.0010 m deep)");
 }
 
-TEST_CASE("a merge tells of runs that are missing and of records from several builds", "[sweep][unit]") {
+TEST_CASE("a merge reports missing runs and records from several builds", "[sweep][unit]") {
   const test::TemporaryFolder folder;
   const std::filesystem::path& directory = folder.path();
   Plan plan;
@@ -226,24 +250,25 @@ TEST_CASE("a merge tells of runs that are missing and of records from several bu
     Json line{{"schema", "hamelin.record/1"}, {"plan", plan.sha256}, {"id", id}};
     line.update(record("reached", 0.1, 1.0, 1.0));
     line["result"]["planner"] = "p";
-    line["result"]["provenance"] = {{"build", {{"id", "b"}}},
-                                    {"inputs", {{{"role", "plugin"}, {"path", "p"}, {"sha256", id}}}}};
+    line["result"]["provenance"] = {
+        {"build", {{"id", "b"}}},
+        {"inputs", {{{"role", "plugin"}, {"path", "p"}, {"sha256", id}}}}};
     out << line.dump() << "\n";
   }
   out.close();
   const Merged merged = merge({directory}, {"planner"});
   CHECK(merged.groups.at(0).planned == 3);
   CHECK(merged.groups.at(0).reached == 2);
-  CHECK(merged.notes ==
-        std::vector<std::string>{"1 of 3 runs have no record yet", "the records come from 2 builds of planner p"});
+  CHECK(merged.notes == std::vector<std::string>{"1 of 3 runs have no record yet",
+                                                 "the records come from 2 builds of planner p"});
 }
 
-TEST_CASE("the summary's JSON says what the groups say", "[sweep][unit]") {
+TEST_CASE("the summary's JSON has the values of the groups", "[sweep][unit]") {
   Merged merged{hand_made(), {"planner"}, {}, {}, {}};
   merged.groups = group(merged.runs, merged.by);
   const Json summary = to_json(merged);
   CHECK(summary["groups"][1]["labels"] == Json{{"planner", "hybrid"}});
   CHECK(summary["groups"][1]["reached"] == 2);
-  CHECK(summary["groups"][1]["reached_share_interval"][1] == wilson(2, 4).high);
+  CHECK(summary["groups"][1]["reached_share_interval"][1] == wilson_interval(2, 4).high);
   CHECK(summary["groups"][0]["min_clearance_m"] == -0.004);
 }

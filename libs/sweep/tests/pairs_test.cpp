@@ -17,26 +17,34 @@ namespace {
 
 const std::filesystem::path source_dir = HAMELIN_SOURCE_DIR;
 
-/// An arm of two upright links of 0.5 m that turn about z by at most ±2, with a ball of radius 0.05 at each link's end,
-/// and a pillar of radius 0.1 at (0.6, 0). Its geometry is simple enough to be worked out again below.
+/// An arm of two links of 0.5 m that rotate about z by at most ±2 rad, with a ball of radius 0.05 m
+/// at the end of each link, and a pillar of radius 0.1 m at (0.6, 0). pillar_clearance() computes
+/// the clearance independently.
 Json pillar_document() {
   const auto link = [](const char* name, const char* joint, double base_x) {
-    return std::string("<link name='") + name + "'><inertial><origin xyz='0.25 0 0'/><mass value='1'/>" +
+    return std::string("<link name='") + name +
+           "'><inertial><origin xyz='0.25 0 0'/><mass value='1'/>" +
            "<inertia ixx='0.01' iyy='0.02' izz='0.02' ixy='0' ixz='0' iyz='0'/></inertial>" +
-           "<collision><origin xyz='0.5 0 0'/><geometry><sphere radius='0.05'/></geometry></collision></link>" +
-           "<joint name='" + joint + "' type='revolute'><parent link='" + (base_x > 0.0 ? "a" : "base") +
-           "'/><child link='" + name + "'/><origin xyz='" + (base_x > 0.0 ? "0.5" : "0") +
-           " 0 0'/><axis xyz='0 0 1'/><limit lower='-2' upper='2' effort='50' velocity='3'/></joint>";
+           "<collision><origin xyz='0.5 0 0'/><geometry><sphere "
+           "radius='0.05'/></geometry></collision></link>" +
+           "<joint name='" + joint + "' type='revolute'><parent link='" +
+           (base_x > 0.0 ? "a" : "base") + "'/><child link='" + name + "'/><origin xyz='" +
+           (base_x > 0.0 ? "0.5" : "0") +
+           " 0 0'/><axis xyz='0 0 1'/><limit lower='-2' upper='2' effort='50' "
+           "velocity='3'/></joint>";
   };
   const auto file = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "sweep_pillar.urdf";
-  write_file_aside(file,
-                   "<robot name='two'><link name='base'/>" + link("a", "j1", 0.0) + link("b", "j2", 0.5) + "</robot>");
-  return {
-      {"schema", "hamelin.scene/1"},
-      {"robot", {{"file", file.string()}}},
-      {"obstacles", {{{"type", "cylinder"}, {"radius_m", 0.1}, {"length_m", 1.0}, {"position_m", {0.6, 0.0, 0.0}}}}},
-      {"planner", {{"name", "hybrid"}}},
-      {"duration_s", 10}};
+  write_file_atomically(file, "<robot name='two'><link name='base'/>" + link("a", "j1", 0.0) +
+                                  link("b", "j2", 0.5) + "</robot>");
+  return {{"schema", "hamelin.scene/1"},
+          {"robot", {{"file", file.string()}}},
+          {"obstacles",
+           {{{"type", "cylinder"},
+             {"radius_m", 0.1},
+             {"length_m", 1.0},
+             {"position_m", {0.6, 0.0, 0.0}}}}},
+          {"planner", {{"name", "hybrid"}}},
+          {"duration_s", 10}};
 }
 
 scene::Scene pillar() {
@@ -45,7 +53,8 @@ scene::Scene pillar() {
 
 double pillar_clearance(const Eigen::VectorXd& q) {
   const Eigen::Vector2d elbow{0.5 * std::cos(q[0]), 0.5 * std::sin(q[0])};
-  const Eigen::Vector2d tip = elbow + 0.5 * Eigen::Vector2d{std::cos(q[0] + q[1]), std::sin(q[0] + q[1])};
+  const Eigen::Vector2d tip =
+      elbow + 0.5 * Eigen::Vector2d{std::cos(q[0] + q[1]), std::sin(q[0] + q[1])};
   const Eigen::Vector2d axis{0.6, 0.0};
   return std::min((elbow - axis).norm(), (tip - axis).norm()) - 0.15;
 }
@@ -61,7 +70,7 @@ std::string message_of(const scene::Scene& scene, const PairOptions& options) {
 
 }  // namespace
 
-TEST_CASE("drawn pairs keep limits, clearance and distance", "[sweep][unit]") {
+TEST_CASE("drawn pairs satisfy limits, clearance and distance", "[sweep][unit]") {
   PairOptions options;
   options.count = 200;
   const DrawnPairs drawn = draw_pairs(pillar(), options);
@@ -78,7 +87,8 @@ TEST_CASE("drawn pairs keep limits, clearance and distance", "[sweep][unit]") {
   CHECK(drawn.close_goals > 0);
 }
 
-TEST_CASE("the seed fixes the pairs, and fewer are the first of more", "[sweep][unit]") {
+TEST_CASE("the seed determines the pairs, and the first ones do not depend on their number",
+          "[sweep][unit]") {
   PairOptions options;
   options.count = 12;
   const auto twelve = draw_pairs(pillar(), options).pairs;
@@ -93,17 +103,20 @@ TEST_CASE("the seed fixes the pairs, and fewer are the first of more", "[sweep][
   }
 }
 
-TEST_CASE("pairs that cannot be had are refused with the reason", "[sweep][unit]") {
+TEST_CASE("if no pairs can be found, the error names the reason", "[sweep][unit]") {
   PairOptions options;
   options.max_draws = 1000;
   options.min_distance_rad = 5.7;  // the limits' corners are 5.66 apart
-  CHECK_THAT(message_of(pillar(), options), Catch::Contains("pillar: only 0 of 60 pairs found in 1000 draws") &&
-                                                Catch::Contains("goals nearer than 5.7 rad to their start"));
+  CHECK_THAT(message_of(pillar(), options),
+             Catch::Contains("pillar: only 0 of 60 pairs found in 1000 draws") &&
+                 Catch::Contains("goals nearer than 5.7 rad to their start"));
   options.min_distance_rad = 1.5;
   options.min_clearance_m = 3.0;  // farther than the arm reaches from the pillar
-  CHECK_THAT(message_of(pillar(), options), Catch::Contains("1000 of them nearer than 3 m to something"));
+  CHECK_THAT(message_of(pillar(), options),
+             Catch::Contains("1000 of them nearer than 3 m to something"));
   options.min_clearance_m = 0.0;
-  CHECK_THAT(message_of(pillar(), options), Catch::Contains("smallest clearance 0 m, expected a positive number"));
+  CHECK_THAT(message_of(pillar(), options),
+             Catch::Contains("smallest clearance 0 m, expected a positive number"));
   options = {};
   options.count = 0;
   CHECK_THAT(message_of(pillar(), options), Catch::Contains("0 pairs"));
@@ -115,15 +128,16 @@ TEST_CASE("a joint without limits is refused by name", "[sweep][unit]") {
   std::string text = read_file(document["robot"]["file"].get<std::string>());
   const std::string second = "<joint name='j2' type='revolute'>";
   text.replace(text.find(second), second.size(), "<joint name='j2' type='continuous'>");
-  write_file_aside(unlimited, text);
+  write_file_atomically(unlimited, text);
   document["robot"]["file"] = unlimited.string();
   CHECK_THAT(message_of(scene::scene_from_json(document, source_dir, "pillar"), {}),
              Catch::Contains("pillar: /robot: joint 'j2' has no position limits"));
 }
 
-TEST_CASE("results come in the pairs' order and do not depend on the threads", "[sweep][unit]") {
+TEST_CASE("results come in the order of the pairs and do not depend on the number of threads",
+          "[sweep][unit]") {
   scene::Scene scene = pillar();
-  scene.obstacles.clear();  // so that each run ends at its own goal
+  scene.obstacles.clear();  // each run reaches its own goal
   PairOptions options;
   options.count = 6;
   const auto pairs = draw_pairs(scene, options).pairs;
@@ -131,10 +145,10 @@ TEST_CASE("results come in the pairs' order and do not depend on the threads", "
   runs.plugin_directories = {HAMELIN_TEST_PLUGIN_DIR};
   const auto alone = run_pairs(scene, pairs, runs);
   runs.jobs = 3;
-  std::vector<std::size_t> told;
-  runs.on_result = [&](std::size_t index, const log::Result&) { told.push_back(index); };
+  std::vector<std::size_t> reported;
+  runs.on_result = [&](std::size_t index, const log::Result&) { reported.push_back(index); };
   const auto threaded = run_pairs(scene, pairs, runs);
-  CHECK(told == std::vector<std::size_t>{0, 1, 2, 3, 4, 5});
+  CHECK(reported == std::vector<std::size_t>{0, 1, 2, 3, 4, 5});
   REQUIRE(alone.size() == pairs.size());
   REQUIRE(threaded.size() == pairs.size());
   const auto comparable = [](const log::Result& result) {
@@ -150,7 +164,7 @@ TEST_CASE("results come in the pairs' order and do not depend on the threads", "
   }
 }
 
-TEST_CASE("a raised stop flag begins no run", "[sweep][unit]") {
+TEST_CASE("no run is started once the stop flag is set", "[sweep][unit]") {
   const scene::Scene scene = pillar();
   const std::atomic<bool> stop = true;
   PairRuns runs;
@@ -169,11 +183,12 @@ TEST_CASE("an error of a run reaches the caller", "[sweep][unit]") {
   CHECK_THROWS_WITH(run_pairs(scene, pairs, runs), Catch::Contains("no_such_planner"));
 }
 
-TEST_CASE("a summary counts and takes medians, smallest and largest", "[sweep][unit]") {
+TEST_CASE("a summary has counts, medians, smallest and largest values", "[sweep][unit]") {
   std::vector<log::Result> results(4);
-  const std::vector<log::Outcome> outcomes{log::Outcome::reached, log::Outcome::reached, log::Outcome::stalled,
-                                           log::Outcome::reached};
-  const std::vector<double> times{3.0, 1.0, 9.0, 2.0}, clearances{0.05, 0.02, 0.01, 0.03}, shares{1.0, 1.0, 0.5, 1.0};
+  const std::vector<log::Outcome> outcomes{log::Outcome::reached, log::Outcome::reached,
+                                           log::Outcome::stalled, log::Outcome::reached};
+  const std::vector<double> times{3.0, 1.0, 9.0, 2.0}, clearances{0.05, 0.02, 0.01, 0.03},
+      shares{1.0, 1.0, 0.5, 1.0};
   for (std::size_t i = 0; i < results.size(); ++i) {
     results[i].outcome = outcomes[i];
     results[i].time_s = times[i];

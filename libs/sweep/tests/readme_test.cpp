@@ -5,7 +5,8 @@
 using namespace hamelin;
 
 TEST_CASE("the README's example runs, and none of its runs touches the shelf", "[sweep][unit]") {
-  const auto scene_file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" / "shelf.json";
+  const auto scene_file =
+      std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" / "shelf.json";
   const std::vector<std::filesystem::path> plugin_directories{HAMELIN_TEST_PLUGIN_DIR};
   // clang-format off
   // [example]

@@ -27,7 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A sweep of runs r0, r1, … of one scene, in a directory of its own, run by a shell script in place of the program.
+/// A sweep of runs r0, r1, … of one scene, in a temporary directory. A shell script takes the place
+/// of the program.
 class Bench {
  public:
   explicit Bench(std::size_t runs) {
@@ -45,14 +46,15 @@ class Bench {
       plan.runs.push_back(run);
     }
     write_plan(plan, root_);
-    // $4 is the planner's name; each call leaves a line
     script("");
   }
-  /// What a run does before it prints its line.
+  /// Sets the commands that a run executes before it prints its line. $3 is the planner's name.
+  /// Each call of the script appends a line to the file "calls".
   void script(const std::string& body) {
     put("program.sh",
         "echo \"$*\" >> '" + (root_ / "calls").string() + "'\n" + body +
-            "\necho '{\"result\": {\"outcome\": \"reached\", \"cause\": null, \"time_s\": 2.5}, \"judge\": "
+            "\necho '{\"result\": {\"outcome\": \"reached\", \"cause\": null, \"time_s\": 2.5}, "
+            "\"judge\": "
             "{\"contact\": false, \"obstacles\": null, \"self\": null, \"configurations\": 3}}'\n");
   }
   void put(const fs::path& file, const std::string& text) const { folder_.put(file, text); }
@@ -93,10 +95,11 @@ TEST_CASE("a plan reads back as it was written", "[sweep][unit]") {
   CHECK(to_json(read) == to_json(bench.plan));
   CHECK(read.sha256 == bench.plan.sha256);
   CHECK(run_arguments(read.runs[2], "dir") ==
-        std::vector<std::string>{"dir/scenes/a.json", "--planner", "p2", "--set", "/step_s=0.002", "--seed", "2"});
+        std::vector<std::string>{"dir/scenes/a.json", "--planner", "p2", "--set", "/step_s=0.002",
+                                 "--seed", "2"});
 }
 
-TEST_CASE("a plan that is wrong is refused with file and place", "[sweep][unit]") {
+TEST_CASE("an invalid plan is refused with file and place", "[sweep][unit]") {
   Bench bench(2);
   const auto message = [&](const Json& document) {
     bench.put("plan.json", document.dump());
@@ -113,23 +116,26 @@ TEST_CASE("a plan that is wrong is refused with file and place", "[sweep][unit]"
   elsewhere["runs"][0]["scene"] = "scenes/b.json";
   unfinished["runs"][0].erase("seed");
   CHECK_THAT(message(doubled),
-             Catch::EndsWith("plan.json: /runs/1/id: 'r0' is there twice, expected one run of each id"));
-  CHECK_THAT(message(elsewhere), Catch::Contains("plan.json: /runs/0/scene: 'scenes/b.json' is not among the scenes"));
+             Catch::EndsWith("plan.json: /runs/1/id: 'r0' occurs twice, expected unique ids"));
+  CHECK_THAT(message(elsewhere),
+             Catch::Contains("plan.json: /runs/0/scene: 'scenes/b.json' is not among the scenes"));
   CHECK_THAT(message(unfinished), Catch::Contains("plan.json: /runs/0"));
-  CHECK_THROWS_WITH(read_plan("/no/such/directory"), Catch::Contains("/no/such/directory: is no directory"));
+  CHECK_THROWS_WITH(read_plan("/no/such/directory"),
+                    Catch::Contains("/no/such/directory: is not a directory"));
 }
 
-TEST_CASE("each run of a plan is recorded once, and a second call has nothing to do", "[sweep][unit]") {
+TEST_CASE("each run of a plan is recorded once, and a second call has nothing to do",
+          "[sweep][unit]") {
   Bench bench(7);
-  std::size_t told = 0;
+  std::size_t reported = 0;
   RunOptions options = bench.options();
   options.on_done = [&](std::size_t done, std::size_t all) {
-    CHECK(done == ++told);
+    CHECK(done == ++reported);
     CHECK(all == 7);
   };
   const auto outcome = run_sweep(bench.root(), options);
   CHECK(outcome.run == 7);
-  CHECK(told == 7);
+  CHECK(reported == 7);
   const Records records = read_records(bench.root(), bench.plan);
   REQUIRE(records.lines.size() == 7);
   std::set<std::string> ids;
@@ -147,7 +153,7 @@ TEST_CASE("each run of a plan is recorded once, and a second call has nothing to
   CHECK(bench.lines("calls").size() == 7);
 }
 
-TEST_CASE("after a kill in mid-line the cut line's run is repeated and no other", "[sweep][unit]") {
+TEST_CASE("only the run of a truncated last line is repeated", "[sweep][unit]") {
   Bench bench(6);
   RunOptions some = bench.options();
   some.limit = 4;
@@ -156,22 +162,24 @@ TEST_CASE("after a kill in mid-line the cut line's run is repeated and no other"
   const fs::path file = records_file(bench.root());
   const std::string text = read_file(file);
   fs::resize_file(file, text.size() - 40);
-  CHECK(read_records(bench.root(), bench.plan).cut);
+  CHECK(read_records(bench.root(), bench.plan).truncated);
   const auto outcome = run_sweep(bench.root(), bench.options());
-  CHECK(outcome.dropped_cut_line);
+  CHECK(outcome.dropped_truncated_line);
   CHECK(outcome.recorded == 3);
   CHECK(outcome.run == 3);
   const Records records = read_records(bench.root(), bench.plan);
-  CHECK_FALSE(records.cut);
+  CHECK_FALSE(records.truncated);
   CHECK(records.lines.size() == 6);
   CHECK(bench.lines("calls").size() == 7);
   CHECK(read_file(file).substr(0, text.size() / 2) == text.substr(0, text.size() / 2));
 }
 
-TEST_CASE("a run that crashes is recorded with its signal or exit code, and the others go on", "[sweep][unit]") {
+TEST_CASE("a run that crashes is recorded with its signal or exit code, and the others continue",
+          "[sweep][unit]") {
   Bench bench(4);
   bench.script(
-      "case \"$3\" in p1) echo torn >&2; kill -SEGV $$;; p2) echo 'hamelin: internal error: oh' >&2; exit 3;; esac");
+      "case \"$3\" in p1) echo torn >&2; kill -SEGV $$;; p2) echo 'hamelin: internal error: oh' "
+      ">&2; exit 3;; esac");
   const auto outcome = run_sweep(bench.root(), bench.options());
   CHECK(outcome.run == 4);
   CHECK(outcome.crashed == 2);
@@ -186,10 +194,11 @@ TEST_CASE("a run that crashes is recorded with its signal or exit code, and the 
   }
 }
 
-TEST_CASE("bad input that a run finds ends the sweep and is no record", "[sweep][unit]") {
+TEST_CASE("bad input that a run finds ends the sweep and is not recorded", "[sweep][unit]") {
   Bench bench(5);
   bench.script(
-      "if [ \"$3\" = p2 ]; then echo 'hamelin: note: x' >&2; echo 'hamelin: a.json: /q: is bad' >&2; exit 2; fi");
+      "if [ \"$3\" = p2 ]; then echo 'hamelin: note: x' >&2; echo 'hamelin: a.json: /q: is bad' "
+      ">&2; exit 2; fi");
   RunOptions options = bench.options();
   options.jobs = 1;
   CHECK(bench.message(options) == "run 'r2': a.json: /q: is bad");
@@ -197,20 +206,22 @@ TEST_CASE("bad input that a run finds ends the sweep and is no record", "[sweep]
   CHECK(bench.lines("calls").size() == 3);
 }
 
-TEST_CASE("contact that the judge saw makes a collision of what had reached", "[sweep][unit]") {
+TEST_CASE("contact that the judge saw turns the outcome reached into collision", "[sweep][unit]") {
   Bench bench(1);
-  bench.put(
-      "program.sh",
-      "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": {\"contact\": true, \"obstacles\": "
-      "{\"clearance_m\": -0.01, \"time_s\": 1, \"sphere\": \"a/0\", \"other\": \"b\"}, \"self\": null, "
-      "\"configurations\": 3}}'\n");
+  bench.put("program.sh",
+            "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": "
+            "{\"contact\": true, \"obstacles\": "
+            "{\"clearance_m\": -0.01, \"time_s\": 1, \"sphere\": \"a/0\", \"other\": \"b\"}, "
+            "\"self\": null, "
+            "\"configurations\": 3}}'\n");
   (void)run_sweep(bench.root(), bench.options());
   const Json record = read_records(bench.root(), bench.plan).lines.at(0);
   CHECK(record["outcome"] == "collision");
   CHECK(record["result"]["outcome"] == "reached");
 }
 
-TEST_CASE("a stopped sweep ends its children, records none of them, and goes on later", "[sweep][unit]") {
+TEST_CASE("a stopped sweep terminates its children, does not record them, and can be resumed",
+          "[sweep][unit]") {
   Bench bench(4);
   bench.script("if [ \"$3\" != p0 ]; then exec sleep 60; fi");
   std::atomic<bool> stop{false};
@@ -225,7 +236,8 @@ TEST_CASE("a stopped sweep ends its children, records none of them, and goes on 
   CHECK(run_sweep(bench.root(), bench.options()).run == 3);
 }
 
-TEST_CASE("a run that takes too long is killed and recorded, and the others go on", "[sweep][unit]") {
+TEST_CASE("a run that takes too long is killed and recorded, and the others continue",
+          "[sweep][unit]") {
   Bench bench(3);
   bench.script("if [ \"$3\" = p1 ]; then exec sleep 600; fi");
   RunOptions options = bench.options();
@@ -241,9 +253,10 @@ TEST_CASE("a run that takes too long is killed and recorded, and the others go o
   }
 }
 
-TEST_CASE("a process that a run leaves behind does not keep the sweep waiting, and is ended", "[sweep][unit]") {
+TEST_CASE("a process that a run leaves behind does not delay the sweep, and is killed",
+          "[sweep][unit]") {
   Bench bench(2);
-  // it holds standard output and error open, as what a plugin forked would
+  // it keeps standard output and error open, as a process forked by a plugin would
   bench.script("sleep 600 & echo $! >> '" + (bench.root() / "left").string() + "'");
   const auto begin = std::chrono::steady_clock::now();
   const RunOutcome outcome = run_sweep(bench.root(), bench.options());
@@ -253,7 +266,7 @@ TEST_CASE("a process that a run leaves behind does not keep the sweep waiting, a
   const auto left = bench.lines("left");
   REQUIRE(left.size() == 2);
   for (const auto& pid : left) {
-    // killed; nobody may have reaped it yet
+    // the killed process may not have been reaped yet
     std::string state;
     for (int i = 0; i < 500; ++i) {
       std::ifstream status("/proc/" + pid + "/stat");
@@ -267,7 +280,8 @@ TEST_CASE("a process that a run leaves behind does not keep the sweep waiting, a
   }
 }
 
-TEST_CASE("a run that is killed for its time takes its own processes with it", "[sweep][unit]") {
+TEST_CASE("the processes of a run that is killed after its time limit are killed with it",
+          "[sweep][unit]") {
   Bench bench(1);
   bench.script("sleep 600 & sleep 600");
   RunOptions options = bench.options();
@@ -276,9 +290,9 @@ TEST_CASE("a run that is killed for its time takes its own processes with it", "
   CHECK(read_records(bench.root(), bench.plan).lines.at(0)["cause"] == "killed after 0.3 s");
 }
 
-TEST_CASE("all that a run writes before it ends is read", "[sweep][unit]") {
+TEST_CASE("everything that a run writes before it ends is read", "[sweep][unit]") {
   Bench bench(3);
-  // more than a pipe holds, with the line of JSON at its end
+  // more than a pipe holds, with the line of JSON at the end
   bench.put("program.sh",
             "head -c 200000 /dev/zero | tr '\\0' ' '\n"
             "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": null}'\n");
@@ -292,7 +306,8 @@ TEST_CASE("a plan is not made while a sweep runs in its directory", "[sweep][uni
   options.plugin_directories = {HAMELIN_TEST_PLUGIN_DIR};
   const std::string before = read_file(plan_file(bench.root()));
   const DirectoryLock lock(bench.root());
-  CHECK_THROWS_WITH(make_plan(bench.root(), options), Catch::Contains("another sweep command is using it"));
+  CHECK_THROWS_WITH(make_plan(bench.root(), options),
+                    Catch::Contains("another sweep command is using it"));
   CHECK(read_file(plan_file(bench.root())) == before);
 }
 
@@ -303,42 +318,47 @@ TEST_CASE("two sweeps at a time in one directory are refused", "[sweep][unit]") 
   std::string second;
   options.on_done = [&](std::size_t, std::size_t) { second = bench.message(bench.options()); };
   CHECK(run_sweep(bench.root(), options).run == 2);
-  CHECK_THAT(second, Catch::EndsWith(
-                         "records.jsonl: another sweep command is using it, expected one at a time in a directory"));
+  CHECK_THAT(second, Catch::EndsWith("records.jsonl: another sweep command is using it, expected "
+                                     "one at a time per directory"));
 }
 
-TEST_CASE("runs are chosen by a part of their id", "[sweep][unit]") {
+TEST_CASE("runs are selected by a part of their id", "[sweep][unit]") {
   Bench bench(12);
   RunOptions options = bench.options();
   options.only = "r1";
   CHECK(run_sweep(bench.root(), options).run == 3);  // r1, r10, r11
   options.only = "r99";
-  CHECK_THAT(bench.message(options), Catch::Contains("no run's id holds 'r99'"));
+  CHECK_THAT(bench.message(options), Catch::Contains("no run id contains 'r99'"));
 }
 
-TEST_CASE("records of another plan, doubled or broken ones, and changed scenes are refused with the reason",
-          "[sweep][unit]") {
+TEST_CASE(
+    "records of another plan, duplicate or broken records, and changed scenes are refused with the "
+    "reason",
+    "[sweep][unit]") {
   Bench bench(3);
   (void)run_sweep(bench.root(), bench.options());
   const auto message = [&] { return bench.message(bench.options()); };
   const std::string text = read_file(records_file(bench.root()));
   bench.put("records.jsonl", text + text.substr(0, text.find('\n') + 1));
-  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 4: run 'r") && Catch::Contains("recorded twice"));
+  CHECK_THAT(message(),
+             Catch::Contains("records.jsonl: line 4: run 'r") && Catch::Contains("recorded twice"));
   bench.put("records.jsonl", "{\"schema\": \"hamelin.record/1\"}\n" + text);
-  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is no record"));
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is not a record"));
   bench.put("records.jsonl", "{\n" + text);
   CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1"));
   bench.put("records.jsonl", text);
   Plan other = bench.plan;
   other.runs.pop_back();
-  CHECK_THROWS_WITH(write_plan(other, bench.root()), Catch::Contains("records.jsonl: holds records of another plan"));
+  CHECK_THROWS_WITH(write_plan(other, bench.root()),
+                    Catch::Contains("records.jsonl: holds records of another plan"));
   bench.put("plan.json", to_json(other).dump());
-  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is of another plan"));
+  CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: belongs to another plan"));
   RunOptions fresh = bench.options();
   fresh.fresh = true;
   CHECK(run_sweep(bench.root(), fresh).run == 2);
   bench.put("scenes/a.json", "another scene");
-  CHECK_THAT(bench.message(fresh), Catch::Contains("a.json: has changed since the sweep was planned: SHA-256 "));
+  CHECK_THAT(bench.message(fresh),
+             Catch::Contains("a.json: has changed since the sweep was planned: SHA-256 "));
 }
 
 TEST_CASE("a sweep is not resumed with inputs or planners that have changed", "[sweep][unit]") {
@@ -354,19 +374,21 @@ TEST_CASE("a sweep is not resumed with inputs or planners that have changed", "[
   some.limit = 1;
   CHECK(run_sweep(bench.root(), some).run == 1);
   bench.put("map.bt", "another map");
-  CHECK(bench.message(bench.options()) == (bench.root() / "map.bt").string() +
-                                              ": has changed since the sweep was planned: SHA-256 " +
-                                              sha256_hex("another map") + ", expected " + sha256_hex("a map") +
-                                              "; plan it again, in a new directory if there are records");
+  CHECK(bench.message(bench.options()) ==
+        (bench.root() / "map.bt").string() + ": has changed since the sweep was planned: SHA-256 " +
+            sha256_hex("another map") + ", expected " + sha256_hex("a map") +
+            "; plan it again, in a new directory if there are records");
   bench.put("map.bt", "a map");
   bench.put("quick.hamelin.so", "another planner");
-  CHECK_THAT(bench.message(bench.options()), Catch::StartsWith(planner + ": has changed since the sweep was planned"));
+  CHECK_THAT(bench.message(bench.options()),
+             Catch::StartsWith(planner + ": has changed since the sweep was planned"));
   bench.plan.plugins = {{"gone", sha256_hex("a planner")}};
   bench.put("quick.hamelin.so", "a planner");
   CHECK(run_sweep(bench.root(), bench.options()).run == 2);
 }
 
-TEST_CASE("the same plan gives the same records but for their order, whatever runs at the same time", "[sweep][unit]") {
+TEST_CASE("the same plan gives the same records in any order, independent of the number of jobs",
+          "[sweep][unit]") {
   std::vector<std::multiset<std::string>> found;
   for (const std::size_t jobs : {1U, 4U}) {
     Bench bench(9);

@@ -8,7 +8,9 @@ namespace {
 using Eigen::Vector3d;
 using namespace hamelin::planning;
 
-/// V(ρ) = ½ η (1/ρ − 1/ρ0)² and its force −V'(ρ), (18). Below ρ_min the force stays and V goes on as a straight line.
+/// The repulsion at the distance ρ: its potential V(ρ) = ½ η (1/ρ − 1/ρ0)² and its force −V'(ρ).
+/// Below ρ_min the force is constant and V continues as a straight line.
+/// docs/theory.md (9.2), (9.3)
 struct Repulsion {
   double eta, rho0, rho_min;
 
@@ -24,7 +26,9 @@ struct Repulsion {
 
 class Apf : public Planner {
  public:
-  static double influence_m(const hamelin::Json& params) { return params.at("rho0_m").get<double>(); }
+  static double influence_m(const hamelin::Json& params) {
+    return params.at("rho0_m").get<double>();
+  }
 
   Apf(const Host&, const Setup& setup, const hamelin::Json& params)
       : setup_(setup),
@@ -34,19 +38,20 @@ class Apf : public Planner {
         repulsion_{params.at("eta").get<double>(), params.at("rho0_m").get<double>(),
                    params.at("distance_min_m").get<double>()},
         joint_damping_(params.at("joint_damping").get<double>()),
-        by_potential_(params.at("mapping") == "potential"),
+        potential_mapping_(params.at("mapping") == "potential"),
         goal_scaled_(params.at("law") == "wang2018"),
         goal_exponent_(params.at("goal_exponent").get<double>()),
         gravity_compensation_(params.at("gravity_compensation").get<bool>()),
         tau_(setup.dof()) {
     if (repulsion_.rho_min > repulsion_.rho0)
-      throw hamelin::Error(hamelin::ErrorCode::invalid, "/distance_min_m: above rho0_m, expected at most rho0_m");
+      throw hamelin::Error(hamelin::ErrorCode::invalid,
+                           "/distance_min_m: above rho0_m, expected at most rho0_m");
   }
 
   void tick(const Tick& tick, Command& command) override {
     arm_.update(tick);
     command.damping().setConstant(joint_damping_);
-    if (by_potential_) {
+    if (potential_mapping_) {
       potential(tick, command);
     } else {
       operational(tick, command);
@@ -59,10 +64,12 @@ class Apf : public Planner {
   }
 
  private:
-  /// What wang2018 multiplies the repulsion's potential by, and that factor's gradient.
+  /// The factor by which the law wang2018 multiplies the repulsion's potential, and its gradient. r
+  /// is the distance |x_e − x_d| of the tip from the goal, for joint goals |q − q_d|, and n the
+  /// exponent. docs/theory.md (9.8), (9.9)
   struct GoalScale {
-    double value;      ///< r^n, r the tip's distance to the goal, for joint goals that of q
-    double pull_of_V;  ///< n r^(n−2): times x_e − x_d it is the gradient; at the goal itself zero
+    double value;            ///< r^n
+    double gradient_factor;  ///< n r^(n−2): the gradient is this times x_e − x_d; zero at the goal
   };
   [[nodiscard]] GoalScale goal_scale(double distance_squared) const {
     if (!goal_scaled_) return {1.0, 0.0};
@@ -72,44 +79,50 @@ class Apf : public Planner {
   }
 
   [[nodiscard]] double goal_distance_squared(const hamelin_goal& goal) const {
-    if (goal.type == HAMELIN_GOAL_JOINT) return (arm_.q() - ConstVectorMap(goal.q, arm_.q().size())).squaredNorm();
+    if (goal.type == HAMELIN_GOAL_JOINT)
+      return (arm_.q() - ConstVectorMap(goal.q, arm_.q().size())).squaredNorm();
     return (arm_.tip_position() - vec3(goal.position_world_m)).squaredNorm();
   }
 
-  /// (17), (18), each mapped by (21) at its own point.
+  /// Attraction and repulsion, each mapped at its own point: docs/theory.md (9.1), (9.2), (9.4).
   void operational(const Tick& tick, Command& command) {
-    const hamelin_goal& to = setup_.goal(tick.goal_index());
-    const GoalScale scale = goal_scale(goal_distance_squared(to));
-    double pull = k_p_ * tick.speed_scale();
+    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    const GoalScale scale = goal_scale(goal_distance_squared(goal));
+    double attraction = k_p_ * tick.speed_scale();
     tau_.setZero();
-    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
-      const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
-      arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
-      pull += scale.pull_of_V * repulsion_.potential(c.distance_m);
-    });
-    arm_.add_mapped_attraction(to, pull, k_v_, tau_);
+    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0,
+                     [&](const hamelin_contact& c, int link) {
+                       const Vector3d f =
+                           scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+                       arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
+                       attraction += scale.gradient_factor * repulsion_.potential(c.distance_m);
+                     });
+    arm_.add_mapped_attraction(goal, attraction, k_v_, tau_);
     command.held_torque() = tau_;
   }
 
-  /// V = ½ k_p |x_e − x_d|² + Σ V(ρ), for wang2018 Σ V(ρ) |x_e − x_d|^n, and its gradient in joint space.
+  /// The potential V = ½ k_p r² + Σ V(ρ), for wang2018 with the sum multiplied by r^n, and its
+  /// gradient in joint space: docs/theory.md (9.7), (9.8).
   void potential(const Tick& tick, Command& command) {
-    const hamelin_goal& to = setup_.goal(tick.goal_index());
-    const double away = goal_distance_squared(to), k_p = k_p_ * tick.speed_scale();
-    const GoalScale scale = goal_scale(away);
-    double pull = k_p, value = 0.5 * k_p * away;
+    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    const double distance_squared = goal_distance_squared(goal), k_p = k_p_ * tick.speed_scale();
+    const GoalScale scale = goal_scale(distance_squared);
+    double attraction = k_p, value = 0.5 * k_p * distance_squared;
     tau_.setZero();  // −∂V
-    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
-      const double V = repulsion_.potential(c.distance_m);
-      const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
-      arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
-      pull += scale.pull_of_V * V;
-      value += scale.value * V;
-    });
-    if (to.type == HAMELIN_GOAL_JOINT) {
-      tau_ -= pull * (arm_.q() - ConstVectorMap(to.q, arm_.q().size()));
+    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0,
+                     [&](const hamelin_contact& c, int link) {
+                       const double V = repulsion_.potential(c.distance_m);
+                       const Vector3d f =
+                           scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+                       arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
+                       attraction += scale.gradient_factor * V;
+                       value += scale.value * V;
+                     });
+    if (goal.type == HAMELIN_GOAL_JOINT) {
+      tau_ -= attraction * (arm_.q() - ConstVectorMap(goal.q, arm_.q().size()));
     } else {
       const Vector3d tip = arm_.tip_position();
-      arm_.add_force(arm_.tip_link(), tip, -pull * (tip - vec3(to.position_world_m)), tau_);
+      arm_.add_force(arm_.tip_link(), tip, -attraction * (tip - vec3(goal.position_world_m)), tau_);
     }
     command.set_potential(value);
     command.potential_gradient() = -tau_;
@@ -120,7 +133,7 @@ class Apf : public Planner {
   double k_p_, k_v_;
   Repulsion repulsion_;
   double joint_damping_;
-  bool by_potential_, goal_scaled_;
+  bool potential_mapping_, goal_scaled_;
   double goal_exponent_;
   bool gravity_compensation_;
   Eigen::VectorXd tau_;
@@ -129,4 +142,5 @@ class Apf : public Planner {
 }  // namespace
 
 HAMELIN_PLANNER_PLUGIN(Apf, "apf", "0.1.0",
-                       "Artificial potential field: attraction (17), repulsion (18), mapped by (21)", params_schema);
+                       "Artificial potential field: the goal attracts, obstacles repel",
+                       params_schema);

@@ -6,8 +6,8 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
-#include "hamelin/test/bare_tick.hpp"
 #include "hamelin/test/robots.hpp"
+#include "hamelin/test/single_tick.hpp"
 
 using namespace hamelin;
 
@@ -22,7 +22,8 @@ test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4(
 /// A spatial arm of four joints among three balls, two of them near.
 test::ArmLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
   params["rho0_m"] = 5.0;
-  return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, test::three_balls, gravity};
+  return {plugin_file,      std::move(params), test::random_robot(11, 4),
+          {0.3, 0.4, -0.2}, test::three_balls, gravity};
 }
 
 }  // namespace
@@ -36,10 +37,14 @@ TEST_CASE("apf rests far from the goal in example 5.2", "[apf]") {
   CHECK(result.clearance_m > 0.0);
 }
 
-TEST_CASE("apf rests 1.32 m from the goal with the published measurement's gains and links as segments", "[apf]") {
-  // Spheres of 2.5 mm side by side stand for segments. Figure: SPEC §4, an independent implementation.
+TEST_CASE(
+    "apf rests 1.32 m from the goal with the published measurement's gains and links as segments",
+    "[apf]") {
+  // Spheres of 2.5 mm side by side replace segments. The figure is from an independent
+  // implementation.
   const auto result =
-      example_52(Json{{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}, {"eta", 1.84}}, test::planar4(200, 0.0025))
+      example_52(Json{{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}, {"eta", 1.84}},
+                 test::planar4(200, 0.0025))
           .run(40.0);
   CHECK_FALSE(result.reached);
   CHECK(result.speed_m_s < 2e-3);
@@ -47,18 +52,23 @@ TEST_CASE("apf rests 1.32 m from the goal with the published measurement's gains
 }
 
 TEST_CASE("apf reaches the goal of example 5.2 when the ball is out of the way", "[apf]") {
-  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52, {{{-3.0, -3.0, 0.0}, 0.25}});
+  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                     {{{-3.0, -3.0, 0.0}, 0.25}});
   CHECK(loop.run(40.0).reached);
 }
 
 TEST_CASE("the gradient of apf's potential is the difference quotient of its value", "[apf]") {
-  const auto [law, exponent] =
-      GENERATE(table<std::string, double>({{"khatib", 2.0}, {"wang2018", 1.0}, {"wang2018", 2.0}, {"wang2018", 3.5}}));
+  const auto [law, exponent] = GENERATE(table<std::string, double>(
+      {{"khatib", 2.0}, {"wang2018", 1.0}, {"wang2018", 2.0}, {"wang2018", 3.5}}));
   const bool joint_goal = GENERATE(false, true);
   INFO(law << " " << exponent << " " << joint_goal);
   test::ArmLoop loop(
       plugin_file,
-      Json{{"mapping", "potential"}, {"law", law}, {"goal_exponent", exponent}, {"joint_damping", 0}, {"rho0_m", 5.0}},
+      Json{{"mapping", "potential"},
+           {"law", law},
+           {"goal_exponent", exponent},
+           {"joint_damping", 0},
+           {"rho0_m", 5.0}},
       test::random_robot(11, 4), {0.3, 0.4, -0.2}, test::three_balls, Eigen::Vector3d::Zero(),
       joint_goal ? Eigen::VectorXd(Eigen::Vector4d(0.5, -0.2, 0.1, 1.0)) : Eigen::VectorXd());
   loop.q << 0.3, -0.5, 0.8, 0.4;
@@ -80,9 +90,10 @@ TEST_CASE("the gradient of apf's potential is the difference quotient of its val
   }
 }
 
-TEST_CASE("both mappings of wang2018 take Ge and Cui's forces: as they are, or as accelerations by (21)", "[apf]") {
-  // F_rep1 = η (1/ρ − 1/ρ0) (1/ρ²) r^n away from the obstacle, at the link's point; F_rep2 = (n/2) η (1/ρ − 1/ρ0)²
-  // r^(n−1) towards the goal, at the tip; r = |x_e − x_d|.
+TEST_CASE("both mappings of wang2018 apply Ge and Cui's forces, as forces or as accelerations",
+          "[apf]") {
+  // docs/theory.md (9.9): F_rep1 = η (1/ρ − 1/ρ0) (1/ρ²) r^n away from the obstacle, at the link's
+  // point; F_rep2 = (n/2) η (1/ρ − 1/ρ0)² r^(n−1) towards the goal, at the tip; r = |x_e − x_d|.
   const double n = GENERATE(1.0, 2.0, 3.0), eta = 2.0, rho0 = 5.0;
   CAPTURE(n);
   const Eigen::Vector3d goal(0.3, 0.4, -0.2);
@@ -90,8 +101,8 @@ TEST_CASE("both mappings of wang2018 take Ge and Cui's forces: as they are, or a
   dynamics::Workspace ws(model);
   for (const std::string mapping : {"operational", "potential"}) {
     CAPTURE(mapping);
-    auto loop =
-        spatial(Json{{"law", "wang2018"}, {"goal_exponent", n}, {"eta", eta}, {"k_p", 0}, {"mapping", mapping}});
+    auto loop = spatial(Json{
+        {"law", "wang2018"}, {"goal_exponent", n}, {"eta", eta}, {"k_p", 0}, {"mapping", mapping}});
     loop.q << 0.3, -0.5, 0.8, 0.4;
     REQUIRE(loop.tick());
     dynamics::forward_kinematics(model, ws, loop.q);
@@ -100,45 +111,51 @@ TEST_CASE("both mappings of wang2018 take Ge and Cui's forces: as they are, or a
     const auto add = [&](int link, const Eigen::Vector3d& x, const Eigen::Vector3d& f) {
       dynamics::point_jacobian(model, ws, link, x, J);
       const Eigen::Vector3d force =
-          mapping == "operational" ? Eigen::Vector3d(dynamics::operational_inertia(model, ws, loop.q, J) * f) : f;
+          mapping == "operational"
+              ? Eigen::Vector3d(dynamics::operational_inertia(model, ws, loop.q, J) * f)
+              : f;
       expected += J.transpose() * force;
     };
-    const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p(), to_goal = (goal - tip).normalized();
+    const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p(),
+                          to_goal = (goal - tip).normalized();
     const double r = (goal - tip).norm();
-    for (const auto& c : loop.contacts()) {  // one sphere a link, so each is its link's nearest
+    for (const auto& c : loop.contacts()) {  // one sphere per link, so each is its link's nearest
       const double s = 1.0 / c.distance_m - 1.0 / rho0;
       const Eigen::Vector3d away = Eigen::Map<const Eigen::Vector3d>(c.direction_world);
       add(c.sphere, Eigen::Map<const Eigen::Vector3d>(c.arm_point_world_m),
           eta * s / (c.distance_m * c.distance_m) * std::pow(r, n) * away);
       add(model.robot().tip.link, tip, 0.5 * n * eta * s * s * std::pow(r, n - 1.0) * to_goal);
     }
-    const Eigen::VectorXd got =
-        mapping == "operational" ? loop.buffers.held_torque() : Eigen::VectorXd(-loop.buffers.potential_gradient());
+    const Eigen::VectorXd got = mapping == "operational"
+                                    ? loop.buffers.held_torque()
+                                    : Eigen::VectorXd(-loop.buffers.potential_gradient());
     CHECK((got - expected).norm() < 1e-11 * expected.norm());
   }
 }
 
-TEST_CASE("below distance_min_m the repulsion stays what it is there", "[apf]") {
-  // A ball beside the middle of the last link; k_p is off, so the force is the repulsion's alone.
+TEST_CASE("below distance_min_m the repulsion is constant", "[apf]") {
+  // A ball beside the middle of the last link; k_p is zero, so only the repulsion acts.
   const auto at = [](double x) {
-    test::ArmLoop loop(plugin_file,
-                       Json{{"mapping", "potential"}, {"k_p", 0}, {"rho0_m", 0.2}, {"distance_min_m", 0.05}},
-                       test::planar4(), test::goal_52, {{{3.5, x, 0.0}, 0.1}});
+    test::ArmLoop loop(
+        plugin_file,
+        Json{{"mapping", "potential"}, {"k_p", 0}, {"rho0_m", 0.2}, {"distance_min_m", 0.05}},
+        test::planar4(), test::goal_52, {{{3.5, x, 0.0}, 0.1}});
     REQUIRE(loop.tick());
-    return std::pair(loop.buffers.raw().potential_J, Eigen::VectorXd(loop.buffers.potential_gradient()));
+    return std::pair(loop.buffers.raw().potential_J,
+                     Eigen::VectorXd(loop.buffers.potential_gradient()));
   };
   const auto [far_value, far] = at(0.1 + 0.02 + 0.05);
   const auto [near_value, near] = at(0.1 + 0.02 + 0.01);
   const auto [inside_value, inside] = at(0.1 + 0.02 - 0.01);
   CHECK((near - far).norm() < 1e-9 * far.norm());
   CHECK((inside - far).norm() < 1e-9 * far.norm());
-  // and the value goes on along that slope: V' = −η (1/ρ − 1/ρ0)/ρ²
+  // The value continues along that slope: V' = −η (1/ρ − 1/ρ0)/ρ², docs/theory.md (9.3).
   const double force = 13.0 * (1.0 / 0.05 - 1.0 / 0.2) / (0.05 * 0.05);
   CHECK(near_value - far_value == Approx(force * 0.04).epsilon(1e-9));
   CHECK(inside_value - far_value == Approx(force * 0.06).epsilon(1e-9));
 }
 
-TEST_CASE("gravity compensation holds the arm at the goal's place, and can be left out", "[apf]") {
+TEST_CASE("gravity compensation holds the arm at rest, and can be switched off", "[apf]") {
   const Eigen::Vector3d gravity{1.0, -9.0, 2.0};
   auto with = spatial(Json{{"k_p", 0}, {"eta", 0}}, gravity);
   auto without = spatial(Json{{"k_p", 0}, {"eta", 0}, {"gravity_compensation", false}}, gravity);
@@ -153,10 +170,11 @@ TEST_CASE("gravity compensation holds the arm at the goal's place, and can be le
   CHECK(without.buffers.held_torque().isZero(0.0));
 }
 
-TEST_CASE("(21) turns the attraction (17) into that acceleration of the tip, as far as the damping of M_x lets it",
+TEST_CASE("the operational mapping accelerates the tip by the attraction, up to the damping of M_x",
           "[apf]") {
-  // No repulsion, at rest, no gravity: the tip's acceleration is Λ⁻¹ M_x f with Λ⁻¹ = J M⁻¹ Jᵀ, and M_x has the
-  // eigenvalues d/(d² + λ²), so each direction keeps the share d²/(d² + λ²) of f.
+  // No repulsion, at rest, no gravity: the tip's acceleration is Λ⁻¹ M_x f with Λ⁻¹ = J M⁻¹ Jᵀ, and
+  // M_x has the eigenvalues d/(d² + λ²), so each direction keeps the share d²/(d² + λ²) of f:
+  // docs/theory.md (9.5).
   auto loop = spatial(Json{{"eta", 0}});
   loop.q << 0.3, -0.5, 0.8, 0.4;
   REQUIRE(loop.tick());
@@ -169,22 +187,24 @@ TEST_CASE("(21) turns the attraction (17) into that acceleration of the tip, as 
   Eigen::MatrixXd M(4, 4);
   dynamics::mass_matrix(model, ws, loop.q, M);
   const Eigen::MatrixXd inverse = M.inverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(Eigen::Matrix3d(J * inverse * J.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
+      Eigen::Matrix3d(J * inverse * J.transpose()));
   const Eigen::Array3d d2 = eigen.eigenvalues().array().square();
   const Eigen::Vector3d f = -11.0 * (tip - Eigen::Vector3d(0.3, 0.4, -0.2));
   const Eigen::Vector3d kept = (d2 / (d2 + 1e-6)).matrix();
-  const Eigen::Vector3d expected = eigen.eigenvectors() * kept.asDiagonal() * eigen.eigenvectors().transpose() * f;
+  const Eigen::Vector3d expected =
+      eigen.eigenvectors() * kept.asDiagonal() * eigen.eigenvectors().transpose() * f;
   const Eigen::Vector3d acceleration = J * inverse * loop.buffers.held_torque();
   CHECK((acceleration - expected).norm() < 1e-10 * f.norm());
   CHECK((expected - f).norm() < 0.1 * f.norm());
 }
 
-TEST_CASE("a joint goal pulls every joint with k_p times its error", "[apf]") {
+TEST_CASE("a joint goal attracts every joint with k_p times its error", "[apf]") {
   const Eigen::Vector4d to(0.5, -0.2, 0.1, 1.0), q(0.3, -0.5, 0.8, 0.4);
   const auto answer = [&](const char* mapping) {
-    auto loop = std::make_unique<test::ArmLoop>(plugin_file, Json{{"mapping", mapping}, {"k_p", 2}},
-                                                test::random_robot(11, 4), Eigen::Vector3d::Zero(),
-                                                std::vector<test::Ball>{}, Eigen::Vector3d::Zero(), to);
+    auto loop = std::make_unique<test::ArmLoop>(
+        plugin_file, Json{{"mapping", mapping}, {"k_p", 2}}, test::random_robot(11, 4),
+        Eigen::Vector3d::Zero(), std::vector<test::Ball>{}, Eigen::Vector3d::Zero(), to);
     loop->q = q;
     REQUIRE(loop->tick());
     return loop;
@@ -216,7 +236,7 @@ TEST_CASE("wang2018's repulsion vanishes at the goal, khatib's does not", "[apf]
     return loop.buffers.held_torque().norm();
   };
   CHECK(torque("wang2018", 2.0) < 1e-12);
-  CHECK(torque("wang2018", 1.5) < 1e-4);  // |x_e − x_d| is 1e-16 or nothing here
+  CHECK(torque("wang2018", 1.5) < 1e-4);  // |x_e − x_d| is 1e-16 or zero here
   CHECK(std::isfinite(torque("wang2018", 1.0)));
   CHECK(torque("khatib", 2.0) > 1.0);
 }
@@ -235,9 +255,11 @@ TEST_CASE("apf refuses parameters that contradict each other", "[apf]") {
   CHECK_THROWS_WITH(example_52(Json{{"mapping", "potentail"}}), Catch::Contains("/mapping"));
 }
 
-TEST_CASE("apf goes to the end of a path, to a pose by its position, and past self contacts", "[apf]") {
-  const std::string mapping = GENERATE("operational", "potential"), law = GENERATE("khatib", "wang2018");
+TEST_CASE("apf uses only the end of a path and the position of a pose, and ignores self contacts",
+          "[apf]") {
+  const std::string mapping = GENERATE("operational", "potential"),
+                    law = GENERATE("khatib", "wang2018");
   const Json params{{"mapping", mapping}, {"law", law}};
   CAPTURE(params);
-  test::check_goes_by_goals_alone(plugin_file, params);
+  test::check_ignores_path_and_self_contacts(plugin_file, params);
 }

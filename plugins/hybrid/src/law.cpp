@@ -11,15 +11,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A rotation by one radian weighs as much as this length [m], so that one damped inverse serves both.
+// The length ℓ [m] that makes a rotation by one radian comparable with a displacement.
 constexpr double rotation_length = 0.25;
-// Damping of (J Jᵀ + λ²)⁻¹, relative to the trace: keeps joint speeds bounded near singular poses.
+// Damping of (J Jᵀ)⁻¹ relative to the trace of J Jᵀ: bounds joint speeds near singular postures.
 constexpr double relative_damping = 0.004, projection_damping = 1e-7;
-constexpr double passing_far = 0.02;  // a via that is passed is given its full speed down to here
-// Distances to the goal between which margins shrink: joint space, tip [m].
+constexpr double passing_distance = 0.02;  // passed vias keep full speed beyond it
+// Distances from the goal between which margins shrink: joint space [rad or m], tip [m].
 constexpr double joint_near = 0.25, joint_far = 1.0, tip_near_m = 0.02, tip_far_m = 0.12;
-constexpr double via_gain = 4.0;       // [1/s] near a via
-constexpr double centring_gain = 0.3;  // [1/s] of the null space towards the middle of the limits
+constexpr double via_gain = 4.0;       // near a via [1/s]
+constexpr double centring_gain = 0.3;  // towards the middle of the limits, in the null space [1/s]
 
 }  // namespace
 
@@ -28,27 +28,29 @@ Law::Law(const planning::Setup& setup, const model::Model& model, const LawParam
       J_(6, model.dof()),
       Jp_(3, model.dof()),
       JpW_(3, model.dof()),
-      null_(model.dof()),
+      centring_(model.dof()),
       scratch_(model.dof()) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
 
-void Law::task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal,
-                     Vector3d& position, Vector3d& rotation) const {
+void Law::task_error(const model::Model& model, const dynamics::Workspace& ws,
+                     const hamelin_goal& goal, Vector3d& position, Vector3d& rotation) const {
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
   position = planning::vec3(goal.position_world_m) - tip.p();
   rotation.setZero();
   if (goal.type != HAMELIN_GOAL_POSE) return;
   const auto& q = goal.quaternion_wxyz;
-  const Eigen::AngleAxisd turn(Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix() * tip.R().transpose());
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix() *
+                               tip.R().transpose());
   rotation = turn.axis() * turn.angle();
 }
 
-double Law::distance(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                     const Target& target) {
+double Law::distance(const model::Model& model, const dynamics::Workspace& ws,
+                     const Eigen::VectorXd& q, const Target& target) {
   if (target.via != nullptr) return (*target.via - q).norm();
-  if (target.goal->type == HAMELIN_GOAL_JOINT) return (planning::ConstVectorMap(target.goal->q, q.size()) - q).norm();
+  if (target.goal->type == HAMELIN_GOAL_JOINT)
+    return (planning::ConstVectorMap(target.goal->q, q.size()) - q).norm();
   Vector3d position, rotation;
   task_error(model, ws, *target.goal, position, rotation);
   return 2.0 * position.norm() + 0.5 * rotation.norm();
@@ -57,68 +59,75 @@ double Law::distance(const model::Model& model, const dynamics::Workspace& ws, c
 bool Law::within(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                  const hamelin_goal& goal, double share) const {
   if (goal.type == HAMELIN_GOAL_JOINT)
-    return (planning::ConstVectorMap(goal.q, q.size()) - q).lpNorm<Eigen::Infinity>() < share * goal.tolerance_rad;
+    return (planning::ConstVectorMap(goal.q, q.size()) - q).lpNorm<Eigen::Infinity>() <
+           share * goal.tolerance_rad;
   Vector3d position, rotation;
   task_error(model, ws, goal, position, rotation);
   return position.norm() < share * goal.tolerance_m &&
          (goal.type != HAMELIN_GOAL_POSE || rotation.norm() < share * goal.tolerance_rad);
 }
 
-double Law::away(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                 const hamelin_goal& goal) const {
+double Law::margin_weight(const model::Model& model, const dynamics::Workspace& ws,
+                          const Eigen::VectorXd& q, const hamelin_goal& goal) const {
   if (goal.type == HAMELIN_GOAL_JOINT) {
-    const double off = (planning::ConstVectorMap(goal.q, q.size()) - q).norm();
-    return std::clamp((off - joint_near) / (joint_far - joint_near), 0.0, 1.0);
+    const double error = (planning::ConstVectorMap(goal.q, q.size()) - q).norm();
+    return std::clamp((error - joint_near) / (joint_far - joint_near), 0.0, 1.0);
   }
-  const double off = (planning::vec3(goal.position_world_m) - dynamics::tip_pose(model, ws).p()).norm();
-  return std::clamp((off - tip_near_m) / (tip_far_m - tip_near_m), 0.0, 1.0);
+  const double error =
+      (planning::vec3(goal.position_world_m) - dynamics::tip_pose(model, ws).p()).norm();
+  return std::clamp((error - tip_near_m) / (tip_far_m - tip_near_m), 0.0, 1.0);
 }
 
-double Law::attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                    const Target& target, Eigen::VectorXd& u) {
+double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
+                    const Eigen::VectorXd& q, const Target& target, Eigen::VectorXd& u) {
   if (target.via != nullptr || target.goal->type == HAMELIN_GOAL_JOINT) {
     if (target.via != nullptr)
       u = *target.via - q;
     else
       u = planning::ConstVectorMap(target.goal->q, q.size()) - q;
-    const double far = u.norm();
+    const double error = u.norm();
     if (target.passing)
-      u *= params_.cruise_speed / std::max(far, passing_far);
-    else if (far > 0.0)
-      u *= std::min(target.via != nullptr ? via_gain : params_.joint_gain, params_.cruise_speed / far);
+      u *= params_.cruise_speed / std::max(error, passing_distance);
+    else if (error > 0.0)
+      u *= std::min(target.via != nullptr ? via_gain : params_.joint_gain,
+                    params_.cruise_speed / error);
     return u.norm();
   }
   Vector3d position, rotation;
   task_error(model, ws, *target.goal, position, rotation);
-  dynamics::frame_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(), J_);
-  const bool turns = target.goal->type == HAMELIN_GOAL_POSE;
-  Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();
-  if (turns) {
+  dynamics::frame_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(),
+                           J_);
+  const bool rotates = target.goal->type == HAMELIN_GOAL_POSE;
+  Eigen::Matrix<double, 6, 1> desired = Eigen::Matrix<double, 6, 1>::Zero();
+  if (rotates) {
     J_.topRows<3>() *= rotation_length;
     const double angle = rotation.norm();
     if (angle > 0.0)
-      wanted.head<3>() = rotation_length * rotation * std::min(params_.tip_gain, params_.tip_turn / angle);
+      desired.head<3>() =
+          rotation_length * rotation * std::min(params_.tip_gain, params_.tip_turn / angle);
   } else {
     J_.topRows<3>().setZero();
   }
-  const double far = position.norm();
-  if (far > 0.0) wanted.tail<3>() = position * std::min(params_.tip_gain, params_.tip_speed / far);
-  const double rate = 2.0 * wanted.tail<3>().norm() + 0.5 / rotation_length * wanted.head<3>().norm();
+  const double error = position.norm();
+  if (error > 0.0)
+    desired.tail<3>() = position * std::min(params_.tip_gain, params_.tip_speed / error);
+  const double rate =
+      2.0 * desired.tail<3>().norm() + 0.5 / rotation_length * desired.head<3>().norm();
   Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
   const double scale = std::max(1e-6, G.trace());
   G.diagonal().array() += relative_damping * scale;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(G);
-  u.noalias() = J_.transpose() * factor.solve(wanted).eval();
-  const double fast = u.norm(), limit = 1.5 * params_.cruise_speed;
-  if (fast > limit) u *= limit / fast;
+  u.noalias() = J_.transpose() * factor.solve(desired).eval();
+  const double speed = u.norm(), limit = 1.5 * params_.cruise_speed;
+  if (speed > limit) u *= limit / speed;
   if (middle_.size() == 0) return rate;
-  null_ = centring_gain * (middle_ - q);
-  // The centring must not push the tip off its goal, so this projection is all but undamped.
+  centring_ = centring_gain * (middle_ - q);
+  // Centring must not push the tip off its goal, so this projection is almost undamped.
   G.diagonal().array() -= (relative_damping - projection_damping) * scale;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> projector(G);
-  const Eigen::Matrix<double, 6, 1> disturbs = J_ * null_;
-  scratch_.noalias() = J_.transpose() * projector.solve(disturbs).eval();
-  u += null_ - scratch_;
+  const Eigen::Matrix<double, 6, 1> tip_motion = J_ * centring_;
+  scratch_.noalias() = J_.transpose() * projector.solve(tip_motion).eval();
+  u += centring_ - scratch_;
   return rate;
 }
 
@@ -132,31 +141,37 @@ void Law::repel(std::span<const NearPoint> points, double strength, Eigen::Vecto
   }
 }
 
-void Law::steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
-                const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command) {
+void Law::steer(const model::Model& model, const dynamics::Workspace& ws,
+                std::span<const NearPoint> points, const Eigen::MatrixXd& W,
+                const Eigen::VectorXd& v, double strength, planning::Command& command) {
   if (strength * params_.steering_gain <= 0.0) return;
   int last_link = -1;
   for (const auto& point : points) {
     const double h = std::max(point.distance - point.margin, 0.01);
-    // the nearest point of a link says where to turn; its neighbours would only repeat it
+    // Contacts are sorted by distance. A point is skipped if the last steered point belongs to its
+    // link.
     if (h >= params_.steering_range || point.link == last_link) continue;
     const Vector3d velocity = dynamics::point_velocity(model, ws, point.link, point.arm_point, v);
     const double speed = velocity.norm();
     if (speed < 1e-3) continue;
-    const Vector3d ahead = velocity / speed;
-    const double approach = -ahead.dot(point.direction);
+    const Vector3d heading = velocity / speed;
+    const double approach = -heading.dot(point.direction);
     if (approach <= 0.0) continue;
-    Vector3d side = ahead.cross(point.direction);
-    side = side.norm() > 0.05 ? Vector3d(side.normalized()) : Vector3d(point.direction.unitOrthogonal());
+    Vector3d axis = heading.cross(point.direction);
+    axis = axis.norm() > 0.05 ? Vector3d(axis.normalized())
+                              : Vector3d(point.direction.unitOrthogonal());
     dynamics::point_jacobian(model, ws, point.link, point.arm_point, Jp_);
     JpW_.noalias() = Jp_ * W;
-    // The lightest direction: no other turns faster than the rate that is meant.
+    // The trace bounds the largest mobility, so no direction turns faster than `rate`.
     const double mobility = JpW_.cwiseProduct(Jp_).sum();
     if (mobility < 1e-9) continue;
-    const double rate = strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
-    // side × ahead points to the obstacle's far side: its part along the direction is the sine of the angle, so ≥ 0
-    command.add_gyroscopic(point.link, dynamics::link_pose(model, ws, point.link).inverse() * point.arm_point,
-                           side * (rate / mobility));
+    const double rate =
+        strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
+    // (axis × heading)·n is the sine of the angle between heading and n, so the force does not push
+    // towards the obstacle. docs/theory.md (10.8)
+    command.add_gyroscopic(point.link,
+                           dynamics::link_pose(model, ws, point.link).inverse() * point.arm_point,
+                           axis * (rate / mobility));
     last_link = point.link;
   }
 }

@@ -7,56 +7,64 @@
 
 namespace hamelin::hybrid {
 
-/// What the law aims at: the goal, or an escape's way-point in joint space.
+/// The target of the law: the goal, or a way-point in joint space.
 struct Target {
   const hamelin_goal* goal = nullptr;
-  const Eigen::VectorXd* via = nullptr;  ///< set: a joint vector to go to instead
-  bool passing = false;                  ///< the via is on the way: it is passed at full speed
+  const Eigen::VectorXd* via = nullptr;  ///< a joint vector that replaces the goal, or null
+  bool passing = false;                  ///< whether the via is passed at full speed
 };
 
 struct LawParams {
-  double joint_gain, tip_gain;  ///< near a target of the joints, of the tip [1/s]
+  double joint_gain, tip_gain;  ///< near a target of the joints and of the tip [1/s]
   double cruise_speed, tip_speed, tip_turn;
   double repulsion_range, repulsion_speed;
   double steering_gain, steering_range;
 };
 
-/// The desired joint velocity without regard to limits: attraction, short repulsion, and gyroscopic terms that steer
-/// around what is approached without doing work.
+/// The desired joint velocity without regard to limits: attraction, short repulsion, and gyroscopic
+/// terms that steer around approached obstacles without doing work.
 class Law {
  public:
   Law(const planning::Setup& setup, const model::Model& model, const LawParams& params);
 
-  /// How far off the target is: joint distance, or 2 |position error| + ½ |rotation angle|.
-  [[nodiscard]] double distance(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                                const Target& target);
-  /// Whether q is at the goal, by this share of its tolerances. A joint goal: its largest |error|.
-  [[nodiscard]] bool within(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                            const hamelin_goal& goal, double share) const;
-  /// How far from the goal, as margins see it: 0 at it, 1 away from it.
-  [[nodiscard]] double away(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                            const hamelin_goal& goal) const;
-  /// u = attraction to the target. Poses at q must stand in ws.
-  /// @return how fast it means to shorten distance()
+  /// The distance of q from the target: |q* − q| for a joint vector q*, for the tip
+  /// 2 |position error| + ½ |rotation angle|. docs/theory.md (10.24)
+  [[nodiscard]] double distance(const model::Model& model, const dynamics::Workspace& ws,
+                                const Eigen::VectorXd& q, const Target& target);
+  /// Whether q is at the goal, within this share of its tolerances. For a joint goal the largest
+  /// |error| counts.
+  [[nodiscard]] bool within(const model::Model& model, const dynamics::Workspace& ws,
+                            const Eigen::VectorXd& q, const hamelin_goal& goal, double share) const;
+  /// The weight w of the full margins: 0 at the goal, 1 far from it. docs/theory.md (10.2)
+  [[nodiscard]] double margin_weight(const model::Model& model, const dynamics::Workspace& ws,
+                                     const Eigen::VectorXd& q, const hamelin_goal& goal) const;
+  /// Sets u to the attraction to the target, docs/theory.md (10.3), (10.4), (10.5). ws must
+  /// contain the forward kinematics at q.
+  /// @return the speed at which the attraction shortens distance()
   double attract(const model::Model& model, const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                  const Target& target, Eigen::VectorXd& u);
-  /// u += a (1 − h/range) speed / max(1, |a|²) per point within the range of its margin, h = distance − margin,
-  /// weighted by `strength`.
+  /// Adds the short repulsion, docs/theory.md (10.6): for each point within the range of its margin
+  /// u += strength · speed (1 − h/range)/max(0.05, |a|²) · a, with the row a and
+  /// h = max(distance − margin, 0).
   void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
-  /// Gyroscopic terms w = m k (v̂ × n)^ for approached points, k = gain α (1/max(h, 1 cm) − 1/range), α = −v̂·n,
-  /// m = 1/tr(J M⁻¹ Jᵀ): the force w × v turns the velocity away from the obstacle. All weighted by `strength`.
-  void steer(const model::Model& model, const dynamics::Workspace& ws, std::span<const NearPoint> points,
-             const Eigen::MatrixXd& W, const Eigen::VectorXd& v, double strength, planning::Command& command);
+  /// Adds gyroscopic terms that turn approaching points away from the obstacle without work,
+  /// docs/theory.md (10.8): w = κ unit(v̂ × n)/tr(J W Jᵀ), κ = strength · gain α (1/h − 1/range),
+  /// α = −v̂·n, h = max(distance − margin, 1 cm).
+  /// @param W inverse of the mass matrix
+  void steer(const model::Model& model, const dynamics::Workspace& ws,
+             std::span<const NearPoint> points, const Eigen::MatrixXd& W, const Eigen::VectorXd& v,
+             double strength, planning::Command& command);
 
  private:
-  void task_error(const model::Model& model, const dynamics::Workspace& ws, const hamelin_goal& goal,
-                  Eigen::Vector3d& position, Eigen::Vector3d& rotation) const;
+  void task_error(const model::Model& model, const dynamics::Workspace& ws,
+                  const hamelin_goal& goal, Eigen::Vector3d& position,
+                  Eigen::Vector3d& rotation) const;
 
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;
   dynamics::Matrix3Xd Jp_, JpW_;
-  Eigen::VectorXd null_, scratch_;
+  Eigen::VectorXd centring_, scratch_;
 };
 
 }  // namespace hamelin::hybrid

@@ -11,39 +11,45 @@ constexpr double smallest_margin_m = 0.001;
 }  // namespace
 
 Margins::Margins(const planning::Setup& setup, const MarginParams& params)
-    : params_(params), dof_(setup.dof()), self_at_goal_(params.self_m), clearance_at_goal_(setup.spheres().size()) {}
+    : params_(params),
+      dof_(setup.dof()),
+      self_at_goal_(params.self_m),
+      clearance_at_goal_(setup.spheres().size()) {}
 
-void Margins::take_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius) {
+void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius) {
   joint_goal_ = goal.type == HAMELIN_GOAL_JOINT;
   std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), radius);
   self_at_goal_ = params_.self_m;
   if (!joint_goal_) return;
-  surroundings.look(planning::ConstVectorMap(goal.q, dof_), radius, 2.0 * params_.self_m + params_.slack_m);
+  surroundings.query(planning::ConstVectorMap(goal.q, dof_), radius,
+                     2.0 * params_.self_m + params_.slack_m);
   for (const auto& contact : surroundings.contacts()) {
     auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contact.sphere)];
     clearance = std::min(clearance, contact.distance_m);
   }
   for (const auto& contact : surroundings.self_contacts())
-    self_at_goal_ = std::min(self_at_goal_, std::max(smallest_margin_m, contact.distance_m - params_.slack_m));
+    self_at_goal_ =
+        std::min(self_at_goal_, std::max(smallest_margin_m, contact.distance_m - params_.slack_m));
 }
 
 double Margins::at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_;
   if (!joint_goal_) return params_.goal_m;
-  const double leaves = clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - params_.slack_m;
-  return std::min(params_.away_m, std::max(smallest_margin_m, leaves));
+  const double remaining =
+      clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - params_.slack_m;
+  return std::min(params_.full_m, std::max(smallest_margin_m, remaining));
 }
 
-void Margins::set(std::span<NearPoint> points, double away) const {
+void Margins::set(std::span<NearPoint> points, double weight) const {
   for (auto& point : points) {
-    const double whole = point.obstacle == NearPoint::self ? params_.self_m : params_.away_m;
-    point.margin = (1.0 - away) * at_goal(point) + away * whole;
+    const double full = point.obstacle == NearPoint::self ? params_.self_m : params_.full_m;
+    point.margin = (1.0 - weight) * at_goal(point) + weight * full;
   }
 }
 
 bool Margins::tight_at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_ < params_.self_m;
-  return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.sphere)] < params_.away_m;
+  return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.sphere)] < params_.full_m;
 }
 
 }  // namespace hamelin::hybrid

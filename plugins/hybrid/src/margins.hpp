@@ -7,23 +7,24 @@
 namespace hamelin::hybrid {
 
 struct MarginParams {
-  double away_m;   ///< from obstacles, away from the goal
-  double goal_m;   ///< near a goal of the tip
-  double slack_m;  ///< how much less than its own clearance a joint goal leaves
-  double self_m;   ///< within the arm
+  double full_m;   ///< from obstacles, far from the goal
+  double goal_m;   ///< from obstacles, at a goal of the tip
+  double slack_m;  ///< by how much the margin at a joint goal is less than the clearance there
+  double self_m;   ///< between parts of the arm
 };
 
-/// Margins that shrink near the goal. A joint goal often stands nearer to something than one wants to be elsewhere: by
-/// its side each sphere's margin is what the goal's own pose leaves of clearance, less `slack_m`, but at least 1 mm.
-/// For a tip goal it is `goal_m`.
+/// Margins that shrink near the goal, docs/theory.md (10.2), because goals are often closer to
+/// something than the arm should come elsewhere. At a joint goal the margin of a shape is its
+/// clearance there less `slack_m`, at least 1 mm and at most the full margin. At a goal of the tip
+/// it is `goal_m`.
 class Margins {
  public:
   Margins(const planning::Setup& setup, const MarginParams& params);
-  /// @param radius how far clearances matter [m]
-  void take_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius);
-  /// Sets each point's margin. @param away as Law::away: 0 at the goal, 1 far from it
-  void set(std::span<NearPoint> points, double away) const;
-  /// Whether the goal's own pose leaves this sphere less than the whole margin.
+  /// Measures the clearances at the goal. @param radius clearances up to this one are measured [m]
+  void set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius);
+  /// Sets the margin of each point. @param weight Law::margin_weight: 0 at the goal, 1 far from it
+  void set(std::span<NearPoint> points, double weight) const;
+  /// Whether the clearance of this point's shape at a joint goal is less than the full margin.
   [[nodiscard]] bool tight_at_goal(const NearPoint& point) const;
   [[nodiscard]] const MarginParams& params() const noexcept { return params_; }
 

@@ -8,18 +8,19 @@
 
 namespace hamelin::hybrid {
 
-/// Escape by memory: way-points drawn around the arm, far from where it stalled before and not far from the goal.
+/// Escape by memory: random way-points around the arm that are far from its earlier stalls and not
+/// far from the goal.
 class Memory {
  public:
   Memory(const planning::Setup& setup, const JointBox& box, int max_escapes);
 
   [[nodiscard]] int count() const noexcept { return count_; }
   [[nodiscard]] const Eigen::VectorXd& via() const noexcept { return via_; }
-  /// Forgets all stalls, e.g. at a new goal.
-  void restart() { crumbs_ = 0, count_ = 0; }
-  /// Draws the next way-point after a stall at q.
-  /// @param distance how far a way-point is from what is aimed at
-  /// @param clear whether the arm may stand at a way-point; asked for the best few only
+  /// Forgets all stalls, for instance at a new goal.
+  void restart() { visited_count_ = 0, count_ = 0; }
+  /// Chooses the next way-point after a stall at q, by the score of docs/theory.md (10.28).
+  /// @param distance function: distance of a way-point from the target
+  /// @param clear function: whether a way-point is clear of obstacles; called for the best few only
   template <class Distance, class Clear>
   void next(const Eigen::VectorXd& q, Distance&& distance, Clear&& clear) {
     draw_all(q);
@@ -31,7 +32,7 @@ class Memory {
     scores_.maxCoeff(&best);
     const Eigen::Index first = best;
     bool found = false;
-    for (int tried = 0; tried < asked && !found; ++tried) {
+    for (int checked = 0; checked < max_checked && !found; ++checked) {
       scores_.maxCoeff(&best);
       via_ = drawn_.col(best);
       found = clear(via_);
@@ -42,18 +43,19 @@ class Memory {
   }
 
  private:
-  static constexpr int candidates = 64, asked = 8;
+  static constexpr int candidates = 64, max_checked = 8;
   void remember(const Eigen::VectorXd& q);
-  /// Counts the stall at q, draws the candidates and scores them by how far they are from all that is remembered.
+  /// Counts the stall at q, draws the candidates and scores them by their distance from all visited
+  /// configurations.
   void draw_all(const Eigen::VectorXd& q);
 
   const JointBox& box_;
   Rng rng_;
   Eigen::VectorXd via_, draw_;
-  Eigen::MatrixXd drawn_;  ///< one column a candidate
+  Eigen::MatrixXd drawn_;  ///< one column per candidate
   Eigen::VectorXd scores_;
-  Eigen::MatrixXd crumb_;  ///< where it stalled, and where it went from there
-  int crumbs_ = 0, count_ = 0;
+  Eigen::MatrixXd visited_;  ///< configurations of stalls, and the way-points chosen there
+  int visited_count_ = 0, count_ = 0;
 };
 
 }  // namespace hamelin::hybrid

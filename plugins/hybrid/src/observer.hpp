@@ -5,38 +5,42 @@
 
 namespace hamelin::hybrid {
 
-/// The acceleration that the nominal model does not know of (wrong masses, friction), from how the velocity differs
-/// from what was predicted a tick ago; a first-order filter of `bandwidth`. Knows that a torque acts some ticks late.
+/// Estimates the acceleration that the nominal model does not explain (wrong masses, friction) from
+/// the difference between the velocity and its prediction one tick ago, filtered with `bandwidth`:
+/// docs/theory.md (10.23). It accounts for the delay of the torque.
 class Observer {
  public:
-  /// @param late how many control periods after it is asked for a torque acts
-  Observer(Eigen::Index dof, double period_s, int late)
+  /// @param delay_periods the delay of the torque, in control periods
+  Observer(Eigen::Index dof, double period_s, int delay_periods)
       : period_s_(period_s),
         gain_(1.0 - std::exp(-bandwidth * period_s)),
-        issued_(static_cast<std::size_t>(late) + 1, Eigen::VectorXd::Zero(dof)),
+        issued_(static_cast<std::size_t>(delay_periods) + 1, Eigen::VectorXd::Zero(dof)),
         disturbance_(Eigen::VectorXd::Zero(dof)),
         predicted_(Eigen::VectorXd::Zero(dof)),
         scratch_(Eigen::VectorXd::Zero(dof)) {}
 
-  /// What the model misses [rad/s² or m/s²].
+  /// The estimate δ of the unexplained acceleration [rad/s² or m/s²].
   [[nodiscard]] const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }
-  /// The torque asked for last.
-  [[nodiscard]] const Eigen::VectorXd& last() const { return issued_[(next_ + issued_.size() - 1) % issued_.size()]; }
-  /// Whether anything was asked for yet.
+  /// The torque issued last.
+  [[nodiscard]] const Eigen::VectorXd& last() const {
+    return issued_[(next_ + issued_.size() - 1) % issued_.size()];
+  }
+  /// Whether any torque was issued yet.
   [[nodiscard]] bool ready() const noexcept { return ready_; }
-  /// Learns from the velocity at a tick.
+  /// Updates the estimate with the velocity at a tick.
   void update(const Eigen::VectorXd& v) {
     if (ready_) disturbance_ += gain_ / period_s_ * (v - predicted_);
   }
-  /// The torque asked for at this tick, before the first one all that were: `bias`.
+  /// Records the torque issued at this tick and predicts the next velocity. The first call assumes
+  /// that `bias` was issued before.
   /// @param M_inv, bias of the nominal model at this tick's state
   void issue(const Eigen::VectorXd& torque, const Eigen::VectorXd& v, const Eigen::MatrixXd& M_inv,
              const Eigen::VectorXd& bias) {
     if (!ready_)
-      for (auto& old : issued_) old = bias;
+      for (auto& previous : issued_) previous = bias;
     issued_[next_] = torque;
     next_ = (next_ + 1) % issued_.size();
-    // the oldest is the one that acts now
+    // The oldest torque acts now.
     scratch_ = issued_[next_ % issued_.size()] - bias;
     predicted_.noalias() = M_inv * scratch_;
     predicted_ = v + period_s_ * (predicted_ + disturbance_);

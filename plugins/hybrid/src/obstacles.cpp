@@ -18,11 +18,14 @@ Obstacles::Obstacles(const planning::Setup& setup, double radius)
   near_.reserve(setup.spheres().size() * 32 + 64);
 }
 
-// Nearest first. A link of many spheres has many points that say the same: one that lies by a nearer one of its link
-// and looks the same way is left out, so that none is that looks another way.
+// Nearest first. The spheres of a link have many contacts with almost the same row. A contact is
+// left out if it is close to a nearer one of its link and obstacle and has almost the same
+// direction.
 void Obstacles::select(std::span<const hamelin_contact> contacts) {
   const auto nearer = [&](std::size_t a, std::size_t b) {
-    return contacts[a].distance_m != contacts[b].distance_m ? contacts[a].distance_m < contacts[b].distance_m : a < b;
+    return contacts[a].distance_m != contacts[b].distance_m
+               ? contacts[a].distance_m < contacts[b].distance_m
+               : a < b;
   };
   near_.clear();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -30,20 +33,24 @@ void Obstacles::select(std::span<const hamelin_contact> contacts) {
     if (contacts[i].distance_m <= radius_ && near_.size() < near_.capacity()) near_.push_back(i);
   }
   std::sort(near_.begin(), near_.end(), nearer);
-  const auto link_of = [&](const hamelin_contact& c) { return sphere_link_[static_cast<std::size_t>(c.sphere)]; };
+  const auto link_of = [&](const hamelin_contact& c) {
+    return sphere_link_[static_cast<std::size_t>(c.sphere)];
+  };
   chosen_.clear();
   for (const std::size_t i : near_) {
     if (count_ + chosen_.size() == points_.size()) return;
     const hamelin_contact& contact = contacts[i];
-    bool said = false;
-    for (std::size_t j = 0; j < chosen_.size() && !said; ++j) {
+    bool redundant = false;
+    for (std::size_t j = 0; j < chosen_.size() && !redundant; ++j) {
       const hamelin_contact& other = contacts[chosen_[j]];
       if (link_of(other) != link_of(contact) || other.obstacle != contact.obstacle) continue;
-      const auto n = planning::vec3(contact.direction_world), m = planning::vec3(other.direction_world);
-      const auto p = planning::vec3(contact.arm_point_world_m), r = planning::vec3(other.arm_point_world_m);
-      said = n.dot(m) > same_direction && (p - r).squaredNorm() < same_place_m * same_place_m;
+      const auto n = planning::vec3(contact.direction_world),
+                 m = planning::vec3(other.direction_world);
+      const auto p = planning::vec3(contact.arm_point_world_m),
+                 r = planning::vec3(other.arm_point_world_m);
+      redundant = n.dot(m) > same_direction && (p - r).squaredNorm() < same_place_m * same_place_m;
     }
-    if (!said) chosen_.push_back(i);
+    if (!redundant) chosen_.push_back(i);
   }
 }
 
@@ -59,15 +66,18 @@ void Obstacles::add_self(const model::Model& model, const dynamics::Workspace& w
   point.arm_point = planning::vec3(contact.point_a_world_m);
   point.direction = planning::vec3(contact.direction_world);
   point.obstacle_speed = 0.0;
-  dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction, point.row);
+  dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction,
+                                     point.row);
   if (contact.sphere_b == HAMELIN_SPHERE_OF_BASE) return;
-  dynamics::point_jacobian_transpose(model, ws, sphere_link_[static_cast<std::size_t>(contact.sphere_b)],
-                                     planning::vec3(contact.point_b_world_m), point.direction, row_);
+  dynamics::point_jacobian_transpose(
+      model, ws, sphere_link_[static_cast<std::size_t>(contact.sphere_b)],
+      planning::vec3(contact.point_b_world_m), point.direction, row_);
   point.row -= row_;
 }
 
 void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
-                       std::span<const hamelin_contact> contacts, std::span<const hamelin_self_contact> self_contacts) {
+                       std::span<const hamelin_contact> contacts,
+                       std::span<const hamelin_self_contact> self_contacts) {
   clearance_ = radius_;
   count_ = 0;
   for (const auto& contact : self_contacts) add_self(model, ws, contact);
@@ -82,7 +92,8 @@ void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
     point.arm_point = planning::vec3(contact.arm_point_world_m);
     point.direction = planning::vec3(contact.direction_world);
     point.obstacle_speed = point.direction.dot(planning::vec3(contact.obstacle_velocity_world_m_s));
-    dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction, point.row);
+    dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction,
+                                       point.row);
   }
 }
 

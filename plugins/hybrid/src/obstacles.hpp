@@ -7,36 +7,41 @@
 
 namespace hamelin::hybrid {
 
-/// One near point, of an obstacle or of another part of the arm, as the law and the filter use it.
+/// A point of the arm that is near an obstacle or another part of the arm, with its row a for the
+/// law and the safety filter: docs/theory.md (10.1).
 struct NearPoint {
-  static constexpr int self = -100;  ///< `obstacle`: another part of the arm
+  static constexpr int self = -100;  ///< value of `obstacle`: another part of the arm
   int sphere = 0, link = 0;
   int obstacle = HAMELIN_OBSTACLE_MAP;
   double distance = 0.0;                 ///< [m]
-  double margin = 0.0;                   ///< wanted here [m]
-  double obstacle_speed = 0.0;           ///< n · v_obs: the obstacle comes this fast [m/s]
-  Eigen::Vector3d arm_point, direction;  ///< world; direction from the obstacle to the arm
-  Eigen::VectorXd row;  ///< a = Jᵀ n: a · v is the rate of the distance but for the obstacle's own motion
+  double margin = 0.0;                   ///< distance to keep [m]
+  double obstacle_speed = 0.0;           ///< n·v_obs: speed at which the obstacle approaches [m/s]
+  Eigen::Vector3d arm_point, direction;  ///< world; direction n from the obstacle to the arm
+  Eigen::VectorXd row;                   ///< a = Jᵀ n: the distance's rate is a·v − n·v_obs
 };
 
-/// The points that count at a configuration, bounded in number: the nearest pairs of the arm's own parts, and of each
-/// link the nearest points in each place and direction.
+/// The near points at a configuration, at most max_points: the nearest pairs of the arm's own
+/// parts, and for each link the nearest points at different places and in different directions.
 class Obstacles {
  public:
   static constexpr int max_points = 64;
-  static constexpr double self_radius_m = 0.10;  ///< self contacts farther than this do not count
+  static constexpr double self_radius_m = 0.10;  ///< self contacts beyond this distance are ignored
 
   Obstacles(const planning::Setup& setup, double radius);
-  /// Selects from the contacts at a configuration and computes the rows; poses at q must stand in ws.
-  void update(const model::Model& model, const dynamics::Workspace& ws, std::span<const hamelin_contact> contacts,
+  /// Selects near points from the contacts at a configuration q and computes their rows. ws must
+  /// contain the forward kinematics at q.
+  void update(const model::Model& model, const dynamics::Workspace& ws,
+              std::span<const hamelin_contact> contacts,
               std::span<const hamelin_self_contact> self_contacts);
   [[nodiscard]] std::span<NearPoint> points() noexcept { return {points_.data(), count_}; }
-  /// The smallest distance to an obstacle or of the arm to itself, or the radius if all is farther [m].
+  /// The smallest distance [m] to an obstacle or between parts of the arm, or the radius if all
+  /// distances exceed it.
   [[nodiscard]] double clearance() const noexcept { return clearance_; }
 
  private:
   void select(std::span<const hamelin_contact> contacts);
-  void add_self(const model::Model& model, const dynamics::Workspace& ws, const hamelin_self_contact& contact);
+  void add_self(const model::Model& model, const dynamics::Workspace& ws,
+                const hamelin_self_contact& contact);
 
   double radius_, clearance_ = 0.0;
   std::vector<int> sphere_link_;

@@ -7,27 +7,29 @@
 
 namespace hamelin::hybrid {
 
-/// The law under the safety filter, run ahead from any configuration: kinematics only, unit inertia, long steps. What
-/// it reaches the arm can reach, for the arm is driven by the same law under the same rows.
+/// Runs a simplified form of the law under the safety filter ahead from any configuration:
+/// kinematics only, unit inertia, long steps, docs/theory.md (10.26), (10.27). The arm follows the
+/// result with the same kind of law and rows.
 class Rollout {
  public:
-  Rollout(const planning::Setup& setup, const model::Model& model, const LawParams& law, const Margins& margins,
-          Surroundings& surroundings);
+  Rollout(const planning::Setup& setup, const model::Model& model, const LawParams& law,
+          const Margins& margins, Surroundings& surroundings);
 
-  /// The goal of the run, by which margins shrink.
-  void take_goal(const hamelin_goal& goal) { goal_ = &goal; }
-  /// Starts at q towards a joint vector. @param tolerance arrival, largest |error| of a joint
+  /// Sets the goal near which margins shrink.
+  void set_goal(const hamelin_goal& goal) { goal_ = &goal; }
+  /// Starts at q towards a joint vector. @param tolerance largest |error| of a joint on arrival
   void begin(const Eigen::VectorXd& q, const Eigen::VectorXd& to, int steps, double tolerance);
   /// Starts at q towards the goal itself.
   void begin(const Eigen::VectorXd& q, int steps);
 
   enum class Step { moved, arrived, ended, touched };
-  /// Looks at q() and, unless it is over, moves on. `touched`: q() is no place to be.
+  /// Checks q() and takes one step, unless the rollout ends here. `touched` means that q() is in
+  /// contact.
   [[nodiscard]] Step step();
   [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
-  /// How far off the target q() was, when last looked at.
+  /// The distance from the target at the last checked configuration.
   [[nodiscard]] double distance() const noexcept { return distance_; }
-  /// How far off the goal a configuration is, as Law::distance.
+  /// The distance of a configuration from the goal, as Law::distance.
   [[nodiscard]] double goal_distance(const Eigen::VectorXd& q);
 
  private:
@@ -48,7 +50,7 @@ class Rollout {
   Eigen::VectorXd q_, to_, u_, lower_, upper_;
   const hamelin_goal* goal_ = nullptr;
   bool to_goal_ = false;
-  int left_ = 0, idle_ = 0;
+  int steps_left_ = 0, idle_ = 0;
   double tolerance_ = 0.0, distance_ = 0.0, best_ = 0.0;
 };
 

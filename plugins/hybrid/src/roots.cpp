@@ -9,15 +9,16 @@ namespace hamelin::hybrid {
 
 namespace {
 
-// Tip goals: Newton-like steps along the law's own pull.
+// Tip goals: Newton-like steps along the law's attraction.
 constexpr int attempts = 60, iterations = 40;
 constexpr double newton_step = 0.25;
-constexpr double share = 0.6;  // of the goal's tolerances
-// A root keeps this share of the margins that the goal itself may keep.
+constexpr double tolerance_share = 0.6;  // of the goal's tolerances, kept by roots
+// Smallest distances of a root from obstacles and between parts of the arm [m].
 constexpr double clear_m = 0.003, clear_self_m = 0.001;
-// Paths: looked at in such steps; roots so far behind the exit of what is blocked [rad or m].
+// Paths: step of the search, and offsets of the roots behind the exit of the blocked stretch [rad
+// or m].
 constexpr double path_step = 0.02;
-constexpr std::array<double, 3> behind = {0.1, 0.4, 0.9};
+constexpr std::array<double, 3> exit_offsets = {0.1, 0.4, 0.9};
 
 }  // namespace
 
@@ -34,14 +35,15 @@ void JointBox::draw(Rng& rng, Eigen::VectorXd& q) const {
   for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = rng.uniform(lower[i], upper[i]);
 }
 
-void JointBox::draw_near(Rng& rng, const Eigen::VectorXd& center, double radius, Eigen::VectorXd& q) const {
+void JointBox::draw_near(Rng& rng, const Eigen::VectorXd& center, double radius,
+                         Eigen::VectorXd& q) const {
   for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = rng.normal() * weights[i];
   q *= radius / std::max(1e-9, q.norm());
   q = (center + q).cwiseMax(lower).cwiseMin(upper);
 }
 
-Roots::Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law, const JointBox& box,
-             Surroundings& surroundings)
+Roots::Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law,
+             const JointBox& box, Surroundings& surroundings)
     : model_(model),
       box_(box),
       surroundings_(surroundings),
@@ -50,17 +52,18 @@ Roots::Roots(const planning::Setup& setup, const model::Model& model, const LawP
       start_(setup.dof()),
       x_(setup.dof()),
       u_(setup.dof()),
-      q_(setup.dof(), most) {
-  along_.reserve(most);
+      q_(setup.dof(), max_count) {
+  arc_lengths_.reserve(max_count);
 }
 
-void Roots::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* path, double from) {
+void Roots::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* path,
+                  double from) {
   goal_ = &goal;
   path_ = path;
   start_ = q;
   count_ = attempt_ = iteration_ = 0;
-  along_.clear();
-  met_block_ = done_ = false;
+  arc_lengths_.clear();
+  found_block_ = done_ = false;
   s_ = from;
   x_ = q;
   if (path_ == nullptr && goal.type == HAMELIN_GOAL_JOINT) {
@@ -69,17 +72,17 @@ void Roots::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way*
   }
 }
 
-void Roots::add(const Eigen::Ref<const Eigen::VectorXd>& q, double along) {
-  if (count_ == most) return;
+void Roots::add(const Eigen::Ref<const Eigen::VectorXd>& q, double arc_length) {
+  if (count_ == max_count) return;
   q_.col(count_++) = q;
-  along_.push_back(along);
+  arc_lengths_.push_back(arc_length);
 }
 
 int Roots::advance(int units, Rng& rng) {
   int used = 0;
   for (; used < units && !done_; ++used) {
     if (path_ != nullptr)
-      follow_path();
+      search_path();
     else
       solve_tip(rng);
   }
@@ -88,43 +91,44 @@ int Roots::advance(int units, Rng& rng) {
 
 void Roots::solve_tip(Rng& rng) {
   dynamics::forward_kinematics(model_, ws_, x_);
-  const bool there = law_.within(model_, ws_, x_, *goal_, share);
-  if (!there && iteration_++ < iterations) {
+  const bool reached = law_.within(model_, ws_, x_, *goal_, tolerance_share);
+  if (!reached && iteration_++ < iterations) {
     law_.attract(model_, ws_, x_, {goal_, nullptr}, u_);
     x_ = (x_ + newton_step * u_).cwiseMax(box_.lower).cwiseMin(box_.upper);
     return;
   }
-  if (there && surroundings_.clear(x_, clear_m, clear_self_m)) add(x_, 0.0);
+  if (reached && surroundings_.is_clear(x_, clear_m, clear_self_m)) add(x_, 0.0);
   iteration_ = 0;
-  if (++attempt_ == attempts || count_ == most) return finish();
+  if (++attempt_ == attempts || count_ == max_count) return finish();
   box_.draw(rng, x_);
 }
 
-// The first stretch that is blocked from here on, its exit, and some places behind that.
-void Roots::follow_path() {
+// Finds the next blocked stretch of the path, its exit, and the roots behind it.
+void Roots::search_path() {
   path_->at(s_, x_);
   const bool last = s_ >= path_->length();
   if (last) {
-    add(x_, s_);  // the goal, whatever it leaves of clearance
+    add(x_, s_);  // the goal is a root even without clearance
     done_ = true;
     return;
   }
-  if (!surroundings_.clear(x_, clear_m, clear_self_m)) {
-    met_block_ = true;
+  if (!surroundings_.is_clear(x_, clear_m, clear_self_m)) {
+    found_block_ = true;
     if (count_ == 0) exit_ = s_;
-  } else if (met_block_) {
+  } else if (found_block_) {
     const auto known = static_cast<std::size_t>(count_);
-    if (known < behind.size() && s_ >= exit_ + behind[known]) add(x_, s_);
+    if (known < exit_offsets.size() && s_ >= exit_ + exit_offsets[known]) add(x_, s_);
   }
-  // the end is a root of its own, so places behind the exit may not use up all room
-  if (count_ == static_cast<int>(behind.size())) s_ = path_->length();
+  // The end of the path is always a root; after the other roots the search continues there.
+  if (count_ == static_cast<int>(exit_offsets.size())) s_ = path_->length();
   s_ = std::min(s_ + path_step, path_->length());
 }
 
 void Roots::finish() {
-  // nearest first; there are few
+  // Insertion sort, nearest first.
   for (int i = 1; i < count_; ++i)
-    for (int j = i; j > 0 && (q_.col(j) - start_).squaredNorm() < (q_.col(j - 1) - start_).squaredNorm(); --j)
+    for (int j = i;
+         j > 0 && (q_.col(j) - start_).squaredNorm() < (q_.col(j - 1) - start_).squaredNorm(); --j)
       q_.col(j).swap(q_.col(j - 1));
   done_ = true;
 }

@@ -2,44 +2,49 @@
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
+#include "joint_path.hpp"
 #include "law.hpp"
 #include "rollout.hpp"
-#include "way.hpp"
 
 namespace hamelin::hybrid {
 
-/// A box in joint space to draw from: the joint limits, or a turn where a joint has none.
+/// The box in joint space from which random joint vectors are drawn: the joint limits, ±π where
+/// there are none.
 struct JointBox {
   explicit JointBox(const planning::Setup& setup, const Eigen::VectorXd& weights);
   void draw(Rng& rng, Eigen::VectorXd& q) const;
-  /// Around a centre, at most `radius` away; joints that move little are drawn less widely.
+  /// Draws around a centre, at a distance of at most `radius`. Joints with a small weight vary
+  /// less.
   void draw_near(Rng& rng, const Eigen::VectorXd& center, double radius, Eigen::VectorXd& q) const;
   Eigen::VectorXd lower, upper, weights;
 };
 
-/// Joint vectors at which a search may end: the goal's own, solutions of a tip goal that stand clear, or places of a
-/// path behind the stretch that is blocked. Found a little at a time.
+/// Joint vectors at which a search may end: the joint goal, collision-free solutions of a tip goal,
+/// or places on the goal's path behind its blocked stretch. They are found in small increments.
 class Roots {
  public:
-  static constexpr int most = 6;
-  Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law, const JointBox& box,
-        Surroundings& surroundings);
+  static constexpr int max_count = 6;
+  Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law,
+        const JointBox& box, Surroundings& surroundings);
 
-  /// @param path the goal's path, or null; `from` is how far along it the arm is
-  void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* path, double from);
-  /// Works for so many configurations, at most; returns how many were used.
+  /// Starts to look for roots from q.
+  /// @param path the goal's path, or null
+  /// @param from the arc length at which the arm is on it
+  void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* path,
+             double from);
+  /// Checks up to `units` configurations and returns how many it checked.
   int advance(int units, Rng& rng);
   [[nodiscard]] bool done() const noexcept { return done_; }
   [[nodiscard]] int count() const noexcept { return count_; }
-  /// Nearest to where it began first.
+  /// Root i. The roots of a tip goal are sorted by their distance from the start.
   [[nodiscard]] auto q(int i) const { return q_.col(i); }
-  /// How far along the path root i is.
-  [[nodiscard]] double along(int i) const { return along_[static_cast<std::size_t>(i)]; }
+  /// The arc length of root i on the goal's path.
+  [[nodiscard]] double arc_length(int i) const { return arc_lengths_[static_cast<std::size_t>(i)]; }
 
  private:
-  void add(const Eigen::Ref<const Eigen::VectorXd>& q, double along);
+  void add(const Eigen::Ref<const Eigen::VectorXd>& q, double arc_length);
   void solve_tip(Rng& rng);
-  void follow_path();
+  void search_path();
   void finish();
 
   const model::Model& model_;
@@ -48,13 +53,13 @@ class Roots {
   dynamics::Workspace ws_;
   Law law_;
   const hamelin_goal* goal_ = nullptr;
-  const Way* path_ = nullptr;
-  bool done_ = true, met_block_ = false;
+  const JointPath* path_ = nullptr;
+  bool done_ = true, found_block_ = false;
   int count_ = 0, attempt_ = 0, iteration_ = 0;
   double s_ = 0.0, exit_ = 0.0;
   Eigen::VectorXd start_, x_, u_;
   Eigen::MatrixXd q_;
-  std::vector<double> along_;
+  std::vector<double> arc_lengths_;
 };
 
 }  // namespace hamelin::hybrid

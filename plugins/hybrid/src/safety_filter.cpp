@@ -8,27 +8,29 @@ namespace hamelin::hybrid {
 
 namespace {
 
-// A pass that moves x by less than this in the metric changes nothing that matters [√J].
+// The passes end when none moves x by more than this in the metric [√J].
 constexpr double settled = 1e-6;
 
-// Raises or lowers one multiplier by what its row lacks; returns the change.
-double relax(double& lambda, double lack, double weight) {
-  const double next = std::max(0.0, lambda + lack * weight);
+// Updates one multiplier by the violation of its row, docs/theory.md (10.14), and returns the
+// change.
+double relax(double& lambda, double violation, double weight) {
+  const double next = std::max(0.0, lambda + violation * weight);
   const double change = next - lambda;
   lambda = next;
   return change;
 }
 
-// One pass over a box: `number` is what bound k holds, `move` changes it along its row. metric(k, k) is the row's size.
-template <class Number, class Move>
-double pass(SafetyFilter::Box& box, const Eigen::MatrixXd& metric, Number number, Move move) {
+// One pass over a box. value(k) is the number that joint k's bounds limit, move(k, change) moves x
+// along the row, and metric(k, k) is the squared norm of the row.
+template <class Value, class Move>
+double pass(SafetyFilter::Box& box, const Eigen::MatrixXd& metric, Value value, Move move) {
   double moved = 0.0;
   for (Eigen::Index k = 0; k < box.lower.size(); ++k) {
     const double weight = 1.0 / metric(k, k);
     for (const bool low : {true, false}) {
-      const double lack = low ? box.lower[k] - number(k) : number(k) - box.upper[k];
-      if (!std::isfinite(lack)) continue;
-      const double change = relax(low ? box.lambda_low[k] : box.lambda_high[k], lack, weight);
+      const double violation = low ? box.lower[k] - value(k) : value(k) - box.upper[k];
+      if (!std::isfinite(violation)) continue;
+      const double change = relax(low ? box.lambda_low[k] : box.lambda_high[k], violation, weight);
       if (change == 0.0) continue;
       move(k, low ? change : -change);
       moved = std::max(moved, change * change / weight);
@@ -42,7 +44,8 @@ double pass(SafetyFilter::Box& box, const Eigen::MatrixXd& metric, Number number
 SafetyFilter::SafetyFilter(int dof, int max_rows)
     : a_(dof, max_rows), Wa_(dof, max_rows), rows_(static_cast<std::size_t>(max_rows)) {
   for (Box* box : {&box_, &momentum_box_})
-    for (auto* x : {&box->lower, &box->upper, &box->lambda_low, &box->lambda_high}) *x = Eigen::VectorXd::Zero(dof);
+    for (auto* x : {&box->lower, &box->upper, &box->lambda_low, &box->lambda_high})
+      *x = Eigen::VectorXd::Zero(dof);
   for (auto* x : {&Mx_, &step_, &Mfrom_}) *x = Eigen::VectorXd::Zero(dof);
 }
 
@@ -51,9 +54,9 @@ void SafetyFilter::begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W) {
   W_ = &W;
   count_ = 0;
   has_momentum_box_ = false;
-  constexpr double none = std::numeric_limits<double>::infinity();
-  box_.lower.setConstant(-none);
-  box_.upper.setConstant(none);
+  constexpr double unbounded = std::numeric_limits<double>::infinity();
+  box_.lower.setConstant(-unbounded);
+  box_.upper.setConstant(unbounded);
 }
 
 bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
@@ -61,7 +64,7 @@ bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
   a_.col(count_) = a;
   Wa_.col(count_).noalias() = *W_ * a;
   const double size = a.dot(Wa_.col(count_));
-  // A row that no joint moves can neither be kept nor broken.
+  // No joint can change the distance of such a point, so its row is left out.
   if (size > 1e-12) rows_[static_cast<std::size_t>(count_++)] = {b, floor, 1.0 / size, 0.0};
   return true;
 }
@@ -77,9 +80,10 @@ void SafetyFilter::set_momentum_box(const Eigen::VectorXd& lower, const Eigen::V
   has_momentum_box_ = true;
 }
 
-double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from) {
+double SafetyFilter::braking_room(const Eigen::VectorXd& a, const Eigen::VectorXd& from) {
   const auto n = a.size();
-  // The largest share of a step that keeps one number within its bounds; a number already outside may not go on.
+  // The largest share of a step that keeps x within its bounds; zero if x is outside and the step
+  // leads further out.
   const auto share = [](double x, double step, double low, double high) {
     if (step > 0.0) return std::max(0.0, high - x) / step;
     if (step < 0.0) return std::max(0.0, x - low) / -step;
@@ -92,7 +96,8 @@ double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from)
   for (Eigen::Index k = 0; k < n; ++k) {
     along = std::min(along, share(from[k], step_[k], box_.lower[k], box_.upper[k]));
     if (has_momentum_box_)
-      along = std::min(along, share(Mfrom_[k], a[k], momentum_box_.lower[k], momentum_box_.upper[k]));
+      along =
+          std::min(along, share(Mfrom_[k], a[k], momentum_box_.lower[k], momentum_box_.upper[k]));
   }
   const double size = a.dot(step_), by_row = size > 0.0 ? along * size : 0.0;
 
@@ -103,8 +108,8 @@ double SafetyFilter::room(const Eigen::VectorXd& a, const Eigen::VectorXd& from)
   if (!step_.allFinite()) return by_row;
   double to_corner = 1.0;
   for (Eigen::Index k = 0; has_momentum_box_ && k < n; ++k)
-    to_corner =
-        std::min(to_corner, share(Mfrom_[k], M_->col(k).dot(step_), momentum_box_.lower[k], momentum_box_.upper[k]));
+    to_corner = std::min(to_corner, share(Mfrom_[k], M_->col(k).dot(step_), momentum_box_.lower[k],
+                                          momentum_box_.upper[k]));
   return std::max(by_row, to_corner * a.dot(step_));
 }
 
@@ -112,7 +117,8 @@ SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
   Report report;
   Mx_.noalias() = *M_ * x;
   report.energy_before_J = 0.5 * x.dot(Mx_);
-  for (auto* lambda : {&box_.lambda_low, &box_.lambda_high, &momentum_box_.lambda_low, &momentum_box_.lambda_high})
+  for (auto* lambda :
+       {&box_.lambda_low, &box_.lambda_high, &momentum_box_.lambda_low, &momentum_box_.lambda_high})
     lambda->setZero();
   for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
 
@@ -127,7 +133,8 @@ SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
   for (int i = 0; i < count_; ++i) {
     const auto& row = rows_[static_cast<std::size_t>(i)];
     const double along = a_.col(i).dot(x);
-    if (row.floor <= 0.0 && along < row.floor) report.scale = std::min(report.scale, row.floor / along);
+    if (row.floor <= 0.0 && along < row.floor)
+      report.scale = std::min(report.scale, row.floor / along);
   }
   report.recovery_J = recovery();
   if (report.scale < 1.0) x *= report.scale;
@@ -157,7 +164,7 @@ double SafetyFilter::pass_box(Eigen::VectorXd& x) {
 double SafetyFilter::pass_momentum_box(Eigen::VectorXd& x) {
   return pass(
       momentum_box_, *M_, [&](Eigen::Index k) { return M_->col(k).dot(x); },
-      [&](Eigen::Index k, double change) { x[k] += change; });  // M⁻¹ (M e_k)
+      [&](Eigen::Index k, double change) { x[k] += change; });  // M⁻¹ (M e_k) = e_k
 }
 
 double SafetyFilter::recovery() const {

@@ -6,7 +6,8 @@
 
 namespace hamelin::hybrid {
 
-/// Asks the host what is near at configurations the arm is not at. Allocates only when made.
+/// Contacts at configurations other than the arm's present one, queried from the host. Only the
+/// constructor allocates.
 class Surroundings {
  public:
   Surroundings(const planning::Host& host, const planning::Setup& setup)
@@ -15,20 +16,25 @@ class Surroundings {
         contacts_(setup.spheres().size() * 4 + 16),
         self_contacts_(self_collision_ ? setup.spheres().size() * 4 + 16 : 0) {}
 
-  /// Takes what is near q, up to `radius` from obstacles and `self_radius` within the arm [m].
-  void look(const Eigen::VectorXd& q, double radius, double self_radius) {
+  /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
+  /// `self_radius` [m].
+  void query(const Eigen::VectorXd& q, double radius, double self_radius) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
     count_ = std::min(host_.closest_points(at, radius, contacts_), contacts_.size());
     self_count_ = 0;
     if (self_collision_)
-      self_count_ = std::min(host_.closest_self(at, self_radius, self_contacts_), self_contacts_.size());
+      self_count_ =
+          std::min(host_.closest_self(at, self_radius, self_contacts_), self_contacts_.size());
   }
-  [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {contacts_.data(), count_}; }
+  [[nodiscard]] std::span<const hamelin_contact> contacts() const {
+    return {contacts_.data(), count_};
+  }
   [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
     return {self_contacts_.data(), self_count_};
   }
-  /// Whether nothing is nearer than this at q [m].
-  [[nodiscard]] bool clear(const Eigen::VectorXd& q, double margin, double self_margin) {
+  /// Whether all obstacles are farther than `margin` and all parts of the arm farther from each
+  /// other than `self_margin` at q [m].
+  [[nodiscard]] bool is_clear(const Eigen::VectorXd& q, double margin, double self_margin) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
     if (host_.closest_points(at, margin, {}) > 0) return false;
     return !self_collision_ || host_.closest_self(at, self_margin, {}) == 0;

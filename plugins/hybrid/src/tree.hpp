@@ -6,36 +6,37 @@
 
 namespace hamelin::hybrid {
 
-/// Two trees of rollouts, from where the arm stands and from where it may end, grown towards random joint vectors and
-/// towards each other until they meet; then the way is straightened where lines are clear. What it finds the law can
-/// follow, for its edges are the law's own rollouts.
+/// Grows two trees of rollouts, one from the arm's configuration and one from the roots, towards
+/// random joint vectors and towards each other until they meet. Then it shortens the path where
+/// straight lines are clear. The law can follow the path because its edges are rollouts of the law.
 class Tree final : public Search {
  public:
-  Tree(const planning::Setup& setup, Rollout& rollout, Roots& roots, const JointBox& box, const Margins& margins,
-       Surroundings& surroundings, int budget);
+  Tree(const planning::Setup& setup, Rollout& rollout, Roots& roots, const JointBox& box,
+       const Margins& margins, Surroundings& surroundings, int budget);
 
-  void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* path, double from) override;
+  void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* goal_path,
+             double from) override;
   [[nodiscard]] bool advance(int units) override;
-  [[nodiscard]] const Way& way() const override { return way_; }
-  [[nodiscard]] bool arrives() const override { return !way_.empty(); }
-  [[nodiscard]] double along() const override { return along_; }
+  [[nodiscard]] const JointPath& path() const override { return path_; }
+  [[nodiscard]] bool arrives() const override { return !path_.empty(); }
+  [[nodiscard]] double rejoin_arc_length() const override { return rejoin_arc_length_; }
   [[nodiscard]] long units() const override { return units_; }
 
  private:
   struct Branches {
-    Eigen::MatrixXd q;        ///< one column a node
+    Eigen::MatrixXd q;        ///< one column per node
     std::vector<int> parent;  ///< −1: a root
     [[nodiscard]] int size() const { return static_cast<int>(parent.size()); }
   };
-  enum class Phase { roots, direct, extend, connect, straighten, over };
+  enum class Phase { roots, direct, extend, connect, straighten, done };
 
   int add(int side, const Eigen::Ref<const Eigen::VectorXd>& q, int parent);
   [[nodiscard]] int nearest(int side, const Eigen::VectorXd& q) const;
   void start_direct();
   void start_extension();
-  /// One look of the rollout under way; when that is over decides what comes next.
-  void roll();
-  void rolled(bool arrived);
+  /// Takes one step of the current rollout; at its end finish_rollout() starts the next phase.
+  void advance_rollout();
+  void finish_rollout(bool arrived);
   void join(int node, int other_node);
   void straighten();
   void next_cut();
@@ -48,12 +49,12 @@ class Tree final : public Search {
   Rng rng_;
   int budget_;
   std::array<Branches, 2> trees_;  ///< from the arm; from the roots
-  Way way_;
+  JointPath path_;
   Eigen::VectorXd via_, point_, from_, to_;
-  Phase phase_ = Phase::over;
-  int side_ = 0, node_ = 0, first_node_ = 0, other_ = 0, direct_ = 0, rounds_ = 0, left_ = 0;
+  Phase phase_ = Phase::done;
+  int side_ = 0, node_ = 0, first_node_ = 0, other_ = 0, direct_ = 0, rounds_ = 0, budget_left_ = 0;
   int cuts_ = 0, cut_step_ = 0, cut_steps_ = 0;
-  double cut_a_ = 0.0, cut_b_ = 0.0, along_ = 0.0;
+  double cut_a_ = 0.0, cut_b_ = 0.0, rejoin_arc_length_ = 0.0;
   bool local_ = false;
   long units_ = 0;
 };

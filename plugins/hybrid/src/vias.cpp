@@ -6,11 +6,11 @@ namespace hamelin::hybrid {
 
 namespace {
 
-constexpr int most_vias = 64, most_targets = 3, most_legs = 4, via_steps = 25, target_steps = 60;
-constexpr Eigen::Index most_points = Eigen::Index{most_legs} * (via_steps + target_steps + 4);
+constexpr int max_vias = 64, max_targets = 3, max_legs = 4, via_steps = 25, target_steps = 60;
+constexpr Eigen::Index max_path_points = Eigen::Index{max_legs} * (via_steps + target_steps + 4);
 constexpr double target_tolerance = 0.04;
 constexpr double via_global_share = 0.25;
-constexpr double worth = 0.05;  // nearer to the goal by this much, a way that does not arrive is taken
+constexpr double min_improvement = 0.05;  // of the distance, by rollouts that do not arrive
 
 }  // namespace
 
@@ -19,35 +19,37 @@ Vias::Vias(const planning::Setup& setup, Rollout& rollout, Roots& roots, const J
       rollout_(rollout),
       roots_(roots),
       rng_(setup.seed() ^ 0x76696173ULL),
-      trial_(setup.dof(), most_points),
-      best_(setup.dof(), most_points),
+      trial_(setup.dof(), max_path_points),
+      best_(setup.dof(), max_path_points),
       start_(setup.dof()),
       via_(setup.dof()),
       point_(setup.dof()),
       to_(setup.dof()) {}
 
-void Vias::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const Way* path, double from) {
+void Vias::begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* goal_path,
+                 double from) {
   goal_ = &goal;
   start_ = q;
-  path_ = path != nullptr;
-  rollout_.take_goal(goal);
+  follows_path_ = goal_path != nullptr;
+  rollout_.set_goal(goal);
   best_.clear();
-  arrives_ = nearer_ = false;
+  arrives_ = improved_ = false;
   tried_ = 0;
   ++stalls_;
-  if (path_) {
-    roots_.begin(goal, q, path, from);
+  if (follows_path_) {
+    roots_.begin(goal, q, goal_path, from);
     phase_ = Phase::roots;
   } else {
-    best_distance_ = rollout_.goal_distance(q) - worth;
-    next_via();
+    best_distance_ = rollout_.goal_distance(q) - min_improvement;
+    start_via_rollout();
   }
 }
 
-void Vias::next_via() {
-  if (tried_++ == most_vias) return over(false);
-  // half of the trials go on from the best end so far
-  if (nearer_ && best_.size() + via_steps + target_steps + 4 < best_.capacity() && rng_.uniform() < 0.5) {
+void Vias::start_via_rollout() {
+  if (tried_++ == max_vias) return finish(false);
+  // Half of the trials continue from the best end so far.
+  if (improved_ && best_.size() + via_steps + target_steps + 4 < best_.capacity() &&
+      rng_.uniform() < 0.5) {
     trial_ = best_;
   } else {
     trial_.clear();
@@ -64,65 +66,67 @@ void Vias::next_via() {
   rollout_.begin(point_, via_, via_steps, via_tolerance);
 }
 
-void Vias::head_for_target() {
+void Vias::start_target_rollout() {
   phase_ = Phase::to_target;
   trial_.keep(via_end_);
   point_ = trial_.end();
-  if (!path_) return rollout_.begin(point_, target_steps);
+  if (!follows_path_) return rollout_.begin(point_, target_steps);
   to_ = roots_.q(target_);
   rollout_.begin(point_, to_, target_steps, target_tolerance);
 }
 
-void Vias::over(bool arrived) {
+void Vias::finish(bool arrived) {
   arrives_ = arrived;
-  phase_ = Phase::over;
+  phase_ = Phase::done;
 }
 
 bool Vias::advance(int units) {
-  while (units > 0 && phase_ != Phase::over) {
+  while (units > 0 && phase_ != Phase::done) {
     if (phase_ == Phase::roots) {
       const int used = roots_.advance(units, rng_);
       units -= used;
       units_ += used;
       if (!roots_.done()) break;
       if (roots_.count() == 0) {
-        over(false);
+        finish(false);
       } else {
-        best_distance_ = (roots_.q(0) - start_).norm() - worth;
-        next_via();
+        best_distance_ = (roots_.q(0) - start_).norm() - min_improvement;
+        start_via_rollout();
       }
     } else {
       --units;
       ++units_;
-      roll();
+      advance_rollout();
     }
   }
-  return phase_ == Phase::over;
+  return phase_ == Phase::done;
 }
 
-void Vias::roll() {
+void Vias::advance_rollout() {
   using Step = Rollout::Step;
   const Step step = rollout_.step();
   if (step == Step::moved) return trial_.add(rollout_.q());
-  if (step == Step::touched) return next_via();
+  if (step == Step::touched) return start_via_rollout();
   if (phase_ == Phase::to_via) {
-    if (trial_.size() < begin_ + 2) return next_via();
-    // the last resort, where nothing comes of any: the first that leads away from here
+    if (trial_.size() < begin_ + 2) return start_via_rollout();
+    // The first rollout that leads away from the start is used if no other succeeds.
     if (best_.empty()) best_ = trial_;
     via_end_ = trial_.size();
-    return head_for_target();
+    return start_target_rollout();
   }
   const bool arrived = step == Step::arrived;
   if (arrived || rollout_.distance() < best_distance_) {
-    best_distance_ = std::min(best_distance_, rollout_.distance() - (arrived ? 0.0 : worth));
+    best_distance_ =
+        std::min(best_distance_, rollout_.distance() - (arrived ? 0.0 : min_improvement));
     best_ = trial_;
-    nearer_ = true;
-    along_ = path_ ? roots_.along(target_) : 0.0;
-    if (arrived) return over(true);
+    improved_ = true;
+    rejoin_arc_length_ = follows_path_ ? roots_.arc_length(target_) : 0.0;
+    if (arrived) return finish(true);
   }
-  // a path has several places to come back to
-  if (path_ && ++target_ < std::min(roots_.count(), most_targets)) return head_for_target();
-  next_via();
+  // A path has several roots.
+  if (follows_path_ && ++target_ < std::min(roots_.count(), max_targets))
+    return start_target_rollout();
+  start_via_rollout();
 }
 
 }  // namespace hamelin::hybrid

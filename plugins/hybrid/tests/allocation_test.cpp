@@ -14,8 +14,9 @@ using test::allocations_in;
 
 namespace {
 
-// A new search after an earlier one, to its end.
-long allocations_of(hybrid::Search& search, const hamelin_goal& goal, const hybrid::Way* path = nullptr) {
+// Runs two searches to their ends, one after the other.
+long allocations_of(hybrid::Search& search, const hamelin_goal& goal,
+                    const hybrid::JointPath* path = nullptr) {
   const VectorXd start = test::below_ball();
   return allocations_in([&] {
     for (int again = 0; again < 2; ++again) {
@@ -34,11 +35,12 @@ test::Task round_ball(bool self_collision = true) {
 
 }  // namespace
 
-TEST_CASE("projecting does not allocate, nor asking for room", "[hybrid][allocation]") {
+TEST_CASE("the safety filter does not allocate", "[hybrid][allocation]") {
   if (!test::counts_allocations()) return;
   Rng rng(1);
   const MatrixXd M = test::random_mass(rng, 7), W = M.inverse();
-  const VectorXd a = test::random_numbers(rng, 7), low = VectorXd::Constant(7, -1.0), high = VectorXd::Constant(7, 1.0);
+  const VectorXd a = test::random_numbers(rng, 7), low = VectorXd::Constant(7, -1.0),
+                 high = VectorXd::Constant(7, 1.0);
   VectorXd x = test::random_numbers(rng, 7, 3.0);
   const VectorXd from = 0.1 * x;
   hybrid::SafetyFilter filter(7, 8);
@@ -47,7 +49,7 @@ TEST_CASE("projecting does not allocate, nor asking for room", "[hybrid][allocat
           (void)filter.add_row(a, -0.1, -0.2);
           filter.set_box(low, high);
           filter.set_momentum_box(low, high);
-          (void)filter.room(a, from);
+          (void)filter.braking_room(a, from);
           (void)filter.project(x, 12);
         }) == 0);
 }
@@ -86,7 +88,7 @@ TEST_CASE("searches do not allocate", "[hybrid][allocation]") {
   }
   SECTION("back to a path") {
     test::Scene scene(round_ball());
-    hybrid::Way path(4, 2);
+    hybrid::JointPath path(4, 2);
     path.add(test::below_ball());
     path.add(test::above_ball());
     auto tree = scene.tree(3000);
@@ -94,18 +96,18 @@ TEST_CASE("searches do not allocate", "[hybrid][allocation]") {
     CHECK(allocations_of(tree, scene.goal(), &path) == 0);
     CHECK(allocations_of(vias, scene.goal(), &path) == 0);
   }
-  SECTION("in vain") {
+  SECTION("without a solution") {
     auto task = test::joint_task(VectorXd::Zero(4), test::ball_between);
     test::Scene scene(task);
     auto tree = scene.tree(1000);
     auto vias = scene.vias();
     CHECK(allocations_of(tree, scene.goal()) == 0);
-    CHECK(tree.way().empty());
+    CHECK(tree.path().empty());
     CHECK(allocations_of(vias, scene.goal()) == 0);
   }
 }
 
-TEST_CASE("remembering stalls does not allocate", "[hybrid][allocation]") {
+TEST_CASE("the memory of stalls does not allocate", "[hybrid][allocation]") {
   if (!test::counts_allocations()) return;
   test::Scene scene(round_ball());
   hybrid::Memory memory(scene.setup, scene.box, 5);
@@ -114,6 +116,6 @@ TEST_CASE("remembering stalls does not allocate", "[hybrid][allocation]") {
           for (int i = 0; i < 20; ++i)
             memory.next(
                 stall, [&](const VectorXd& q) { return (q - goal).norm(); },
-                [&](const VectorXd& q) { return scene.surroundings.clear(q, 0.01, 0.005); });
+                [&](const VectorXd& q) { return scene.surroundings.is_clear(q, 0.01, 0.005); });
         }) == 0);
 }

@@ -11,10 +11,11 @@
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/test/arm_loop.hpp"
 
-/// An arm among balls, asked through the C border as a planner asks its host, but with distances by formula.
+/// An arm among balls, queried through the C interface as a planner queries its host, with
+/// distances in closed form.
 namespace hamelin::test {
 
-/// Four links of 0.25 m along x that turn about z, five spheres on each.
+/// Four links of 0.25 m along x that turn about z, with five spheres each.
 inline model::Robot short_planar4() {
   constexpr double length = 0.25;
   model::Robot robot;
@@ -25,17 +26,20 @@ inline model::Robot short_planar4() {
     link.parent = i - 1;
     link.joint.name = fmt::format("j{}", i + 1);
     link.joint.screw << 0.0, 0.0, 1.0, 0.0, -length * i, 0.0;
-    link.com = geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{length * (i + 0.5), 0.0, 0.0}};
+    link.com =
+        geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{length * (i + 0.5), 0.0, 0.0}};
     link.mass_kg = 1.0;
     link.inertia_kg_m2 = 0.01 * Eigen::Matrix3d::Identity();
-    for (int k = 0; k < 5; ++k) link.spheres.push_back({Eigen::Vector3d{length * (0.2 * k - 0.4), 0.0, 0.0}, 0.025});
+    for (int k = 0; k < 5; ++k)
+      link.spheres.push_back({Eigen::Vector3d{length * (0.2 * k - 0.4), 0.0, 0.0}, 0.025});
     robot.links.push_back(link);
   }
-  robot.tip = {"tip", 3, geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{4.0 * length, 0.0, 0.0}}};
+  robot.tip = {"tip", 3,
+               geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{4.0 * length, 0.0, 0.0}}};
   return robot;
 }
 
-/// What a Scene is made of.
+/// The parameters of a Scene.
 struct Task {
   std::vector<Ball> balls{};
   hamelin_goal goal{};
@@ -44,7 +48,7 @@ struct Task {
   model::Robot robot = short_planar4();
   bool self_collision = false;
   std::uint64_t seed = 1;
-  double joint_limit = 0.0;  ///< of every joint, both ways; none if zero
+  double joint_limit = 0.0;  ///< ± limit of every joint; none if zero
 };
 
 inline Task joint_task(const Eigen::VectorXd& q, std::vector<Ball> balls = {}) {
@@ -70,7 +74,7 @@ inline constexpr hybrid::LawParams law_params{4.0, 3.0, 2.0, 0.5, 1.5, 0.02, 0.1
 inline constexpr hybrid::MarginParams margin_params{0.01, 0.003, 0.003, 0.005};
 inline constexpr double contact_radius = 0.15;
 
-/// A planner's surroundings without the planner.
+/// The parts of the hybrid planner with the host that they query.
 class Scene {
  public:
   explicit Scene(const Task& task)
@@ -87,14 +91,16 @@ class Scene {
         box(setup, Eigen::VectorXd::Ones(model.dof())),
         rollout(setup, model, law_params, margins, surroundings),
         roots(setup, model, law_params, box, surroundings) {
-    margins.take_goal(surroundings, goal(), contact_radius);
-    rollout.take_goal(goal());
+    margins.set_goal(surroundings, goal(), contact_radius);
+    rollout.set_goal(goal());
   }
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
   [[nodiscard]] const hamelin_goal& goal() const { return setup.goals().front(); }
-  [[nodiscard]] hybrid::Tree tree(int budget) { return {setup, rollout, roots, box, margins, surroundings, budget}; }
+  [[nodiscard]] hybrid::Tree tree(int budget) {
+    return {setup, rollout, roots, box, margins, surroundings, budget};
+  }
   [[nodiscard]] hybrid::Vias vias() { return {setup, rollout, roots, box}; }
 
   /// World centre of a control sphere at q.
@@ -112,21 +118,22 @@ class Scene {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t s = 0; s < data_.spheres.size(); ++s)
       for (const auto& ball : balls_)
-        least = std::min(least, (placed(s) - ball.center).norm() - data_.spheres[s].radius_m - ball.radius);
+        least = std::min(
+            least, (placed(s) - ball.center).norm() - data_.spheres[s].radius_m - ball.radius);
     return least;
   }
-  /// The smallest distance on straight lines between the points of a way, looked at every `step`.
-  double clearance(const hybrid::Way& way, double step) {
+  /// The smallest distance along the straight lines of a path, checked every `step`.
+  double clearance(const hybrid::JointPath& path, double step) {
     double least = std::numeric_limits<double>::infinity();
     Eigen::VectorXd q(model.dof());
-    for (double s = 0.0; s < way.length() + step; s += step) {
-      way.at(s, q);
+    for (double s = 0.0; s < path.length() + step; s += step) {
+      path.at(s, q);
       least = std::min(least, clearance(q));
     }
     return least;
   }
-  /// Configurations that the host was asked about.
-  [[nodiscard]] long asked() const { return asked_; }
+  /// The number of queries to the host.
+  [[nodiscard]] long queries() const { return queries_; }
 
   const model::Model model;
 
@@ -154,10 +161,10 @@ class Scene {
     q_ = planning::ConstVectorMap(q, model.dof());
     dynamics::forward_kinematics(model, ws_, q_);
   }
-  static std::size_t closest_points(void* context, const double* q, double influence, hamelin_contact* out,
-                                    std::size_t capacity) {
+  static std::size_t closest_points(void* context, const double* q, double influence,
+                                    hamelin_contact* out, std::size_t capacity) {
     auto& self = *static_cast<Scene*>(context);
-    ++self.asked_;
+    ++self.queries_;
     self.place(q);
     std::size_t count = 0;
     for (std::size_t s = 0; s < self.data_.spheres.size(); ++s) {
@@ -165,8 +172,8 @@ class Scene {
       const double radius = self.data_.spheres[s].radius_m;
       for (std::size_t b = 0; b < self.balls_.size(); ++b) {
         const auto& ball = self.balls_[b];
-        const Eigen::Vector3d away = at - ball.center, n = away.normalized();
-        const double distance = away.norm() - radius - ball.radius;
+        const Eigen::Vector3d offset = at - ball.center, n = offset.normalized();
+        const double distance = offset.norm() - radius - ball.radius;
         if (distance > influence || count++ >= capacity) continue;
         hamelin_contact& contact = out[count - 1];
         contact = {};
@@ -180,9 +187,9 @@ class Scene {
     }
     return count;
   }
-  // Of each two links that share no joint the nearest pair of spheres.
-  static std::size_t closest_self(void* context, const double* q, double influence, hamelin_self_contact* out,
-                                  std::size_t capacity) {
+  // Finds the nearest pair of spheres for each two links that share no joint.
+  static std::size_t closest_self(void* context, const double* q, double influence,
+                                  hamelin_self_contact* out, std::size_t capacity) {
     auto& self = *static_cast<Scene*>(context);
     const auto& spheres = self.data_.spheres;
     self.place(q);
@@ -194,7 +201,8 @@ class Scene {
         for (std::size_t i = 0; i < spheres.size(); ++i)
           for (std::size_t j = 0; j < spheres.size(); ++j) {
             if (spheres[i].link != a || spheres[j].link != b) continue;
-            const Eigen::Vector3d at = self.placed(i), from = self.placed(j), n = (at - from).normalized();
+            const Eigen::Vector3d at = self.placed(i), from = self.placed(j),
+                                  n = (at - from).normalized();
             const double distance = (at - from).norm() - spheres[i].radius_m - spheres[j].radius_m;
             if (distance >= nearest.distance_m) continue;
             nearest.sphere_a = static_cast<std::int32_t>(i);
@@ -216,7 +224,7 @@ class Scene {
   planning::SetupData data_;
   hamelin_setup raw_setup_;
   hamelin_host raw_host_;
-  long asked_ = 0;
+  long queries_ = 0;
 
  public:
   const planning::Setup setup;
@@ -227,7 +235,7 @@ class Scene {
   hybrid::Roots roots;
 };
 
-/// A bar in front of the arm: it must fold to get from one side to the other.
+/// A ball in front of the arm, which must fold to get from one side to the other.
 inline const std::vector<Ball> ball_between{{{0.75, 0.0, 0.0}, 0.1}};
 inline Eigen::VectorXd below_ball() {
   return Eigen::Vector4d(-0.9, 0.0, 0.0, 0.0);

@@ -20,8 +20,8 @@ NearPoint of_sphere(int sphere, double distance = 0.05) {
   return point;
 }
 
-double margin(const Margins& margins, NearPoint point, double away) {
-  margins.set({&point, 1}, away);
+double margin(const Margins& margins, NearPoint point, double weight) {
+  margins.set({&point, 1}, weight);
   return point.margin;
 }
 
@@ -31,7 +31,7 @@ NearPoint within_arm() {
   return point;
 }
 
-// Stretched along x, with a ball beside the last sphere that leaves it so much.
+// An arm stretched along x, with a ball at the given clearance beside its last sphere.
 test::Task beside_ball(double clearance) {
   return test::joint_task(VectorXd::Zero(4), {{{0.975, 0.125 + clearance, 0.0}, 0.1}});
 }
@@ -39,28 +39,30 @@ constexpr int last_sphere = 19;
 
 }  // namespace
 
-TEST_CASE("margins shrink from the whole one to the goal's as the goal comes near", "[hybrid][margins]") {
+TEST_CASE("margins shrink from the full one to that of the goal on the approach",
+          "[hybrid][margins]") {
   test::Scene scene(beside_ball(0.006));
   const auto& margins = scene.margins;
   CHECK(margin(margins, of_sphere(last_sphere), 1.0) == 0.01);
   CHECK(margin(margins, of_sphere(last_sphere), 0.0) == Approx(0.003));  // 6 mm − 3 mm
-  double before = 0.0;
-  for (double away = 0.0; away <= 1.0; away += 0.125) {
-    const double here = margin(margins, of_sphere(last_sphere), away);
-    CHECK(here == Approx(0.003 + 0.007 * away));
-    CHECK(here > before);
-    before = here;
+  double previous = 0.0;
+  for (double weight = 0.0; weight <= 1.0; weight += 0.125) {
+    const double value = margin(margins, of_sphere(last_sphere), weight);
+    CHECK(value == Approx(0.003 + 0.007 * weight));
+    CHECK(value > previous);
+    previous = value;
   }
 }
 
-TEST_CASE("a sphere far from all at the goal keeps its whole margin there", "[hybrid][margins]") {
+TEST_CASE("a sphere without near obstacles at the goal keeps its full margin there",
+          "[hybrid][margins]") {
   test::Scene scene(beside_ball(0.006));
   CHECK(margin(scene.margins, of_sphere(0), 0.0) == 0.01);
   CHECK_FALSE(scene.margins.tight_at_goal(of_sphere(0)));
   CHECK(scene.margins.tight_at_goal(of_sphere(last_sphere)));
 }
 
-TEST_CASE("margins leave the pose of a joint goal admissible", "[hybrid][margins]") {
+TEST_CASE("margins keep the posture of a joint goal admissible", "[hybrid][margins]") {
   const double clearance = GENERATE(0.0011, 0.002, 0.0039, 0.004, 0.0041, 0.012, 0.013, 0.014, 0.1);
   CAPTURE(clearance);
   test::Scene scene(beside_ball(clearance));
@@ -68,7 +70,7 @@ TEST_CASE("margins leave the pose of a joint goal admissible", "[hybrid][margins
   hybrid::Obstacles obstacles(scene.setup, test::contact_radius);
   const VectorXd goal = VectorXd::Zero(4);
   dynamics::forward_kinematics(scene.model, ws, goal);
-  scene.surroundings.look(goal, test::contact_radius, 0.1);
+  scene.surroundings.query(goal, test::contact_radius, 0.1);
   obstacles.update(scene.model, ws, scene.surroundings.contacts(), {});
   REQUIRE(obstacles.clearance() == Approx(clearance));
   scene.margins.set(obstacles.points(), 0.0);
@@ -78,16 +80,16 @@ TEST_CASE("margins leave the pose of a joint goal admissible", "[hybrid][margins
     CHECK(point.margin >= 0.001);
     CHECK(point.margin <= 0.01);
   }
-  // as much as it can
+  // as large as possible
   CHECK(obstacles.points().front().margin == Approx(std::clamp(clearance - 0.003, 0.001, 0.01)));
 }
 
-TEST_CASE("a goal in contact leaves the smallest margin", "[hybrid][margins]") {
+TEST_CASE("a goal in contact has the smallest margin", "[hybrid][margins]") {
   test::Scene scene(beside_ball(-0.02));
   CHECK(margin(scene.margins, of_sphere(last_sphere), 0.0) == 0.001);
 }
 
-TEST_CASE("by a tip goal the margin is the smallest that is wanted, for all spheres", "[hybrid][margins]") {
+TEST_CASE("at a tip goal the margin of all spheres is that of the goal", "[hybrid][margins]") {
   test::Scene scene(test::tip_task({0.9, 0.0, 0.0}, {{{0.975, 0.2, 0.0}, 0.1}}));
   for (const int sphere : {0, last_sphere}) {
     CHECK(margin(scene.margins, of_sphere(sphere), 0.0) == 0.003);
@@ -96,29 +98,32 @@ TEST_CASE("by a tip goal the margin is the smallest that is wanted, for all sphe
   }
 }
 
-TEST_CASE("the margin within the arm gives way to a goal that is folded closer", "[hybrid][margins]") {
-  // joint 2 and 3 turned so far that link 4 comes near link 1
+TEST_CASE("the margin between parts of the arm shrinks for a goal that is folded closer",
+          "[hybrid][margins]") {
+  // Joints 2 and 3 bring link 4 close to link 1.
   auto task = test::joint_task(Vector4d(0.0, 2.0, 2.0, 0.0));
   task.self_collision = true;
   test::Scene scene(task);
-  scene.surroundings.look(task.q_goal, 0.01, 1.0);
+  scene.surroundings.query(task.q_goal, 0.01, 1.0);
   double nearest = 1.0;
-  for (const auto& contact : scene.surroundings.self_contacts()) nearest = std::min(nearest, contact.distance_m);
+  for (const auto& contact : scene.surroundings.self_contacts())
+    nearest = std::min(nearest, contact.distance_m);
 
-  SECTION("with room: the whole one") {
+  SECTION("at a sufficient distance it is the full margin") {
     REQUIRE(nearest > 0.008);
     CHECK(margin(scene.margins, within_arm(), 0.0) == 0.005);
     CHECK_FALSE(scene.margins.tight_at_goal(within_arm()));
   }
-  SECTION("without: what the goal leaves, but the whole one away from it") {
-    // the third joint folds the last two links back on the first; found by halving
+  SECTION("closer it depends on the goal, and is the full margin far from it") {
+    // The third joint folds the last two links back on the first. Bisection finds the angle.
     double open = 2.0, closed = 3.0;
     VectorXd q = task.q_goal;
     for (int i = 0; i < 60; ++i) {
       q[2] = 0.5 * (open + closed);
-      scene.surroundings.look(q, 0.01, 1.0);
+      scene.surroundings.query(q, 0.01, 1.0);
       nearest = 1.0;
-      for (const auto& contact : scene.surroundings.self_contacts()) nearest = std::min(nearest, contact.distance_m);
+      for (const auto& contact : scene.surroundings.self_contacts())
+        nearest = std::min(nearest, contact.distance_m);
       (nearest > 0.005 ? open : closed) = q[2];
     }
     REQUIRE(nearest == Approx(0.005));

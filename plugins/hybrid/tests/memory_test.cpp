@@ -9,7 +9,7 @@ using namespace hamelin;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 using hybrid::Memory;
-using hybrid::StallWatch;
+using hybrid::StallDetector;
 
 namespace {
 
@@ -25,24 +25,24 @@ test::Task limited(std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("way-points keep away from where the arm stalled and where it was sent", "[hybrid][memory]") {
-  // with the same seed the candidates are the same; what is remembered makes the difference
+TEST_CASE("way-points are far from earlier stalls and earlier way-points", "[hybrid][memory]") {
+  // The seed fixes the candidates, so only the memory makes a difference.
   test::Scene scene(limited(7));
   Memory memory(scene.setup, scene.box, 60);
-  std::vector<VectorXd> seen;
+  std::vector<VectorXd> visited;
   double nearest = 1e9;
   for (int i = 0; i < 12; ++i) {
     const VectorXd stall = VectorXd::Constant(4, 0.02 * i);
     memory.next(stall, no_distance, all_clear);
-    seen.push_back(stall);
-    for (const auto& q : seen) nearest = std::min(nearest, (memory.via() - q).norm());
-    seen.push_back(memory.via());
+    visited.push_back(stall);
+    for (const auto& q : visited) nearest = std::min(nearest, (memory.via() - q).norm());
+    visited.push_back(memory.via());
   }
   CHECK(memory.count() == 12);
   CHECK(nearest > 1.0);
 }
 
-TEST_CASE("among way-points equally far from what is known the one nearer to the goal is taken", "[hybrid][memory]") {
+TEST_CASE("way-points nearer to the goal are preferred", "[hybrid][memory]") {
   const VectorXd goal = Vector4d(1.5, 1.5, -1.5, 0.0);
   double with = 0.0, without = 0.0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -57,21 +57,21 @@ TEST_CASE("among way-points equally far from what is known the one nearer to the
   CHECK(with < 0.7 * without);
 }
 
-TEST_CASE("way-points stand clear where one of the best does, and within the limits", "[hybrid][memory]") {
+TEST_CASE("a way-point is clear if one of the best is, and within the limits", "[hybrid][memory]") {
   test::Scene scene(limited(3));
   Memory memory(scene.setup, scene.box, 60);
-  int asked = 0;
-  memory.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++asked == 3; });
-  CHECK(asked == 3);
+  int checked = 0;
+  memory.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++checked == 3; });
+  CHECK(checked == 3);
   CHECK(memory.via().lpNorm<Eigen::Infinity>() <= 2.0);
 
-  // none is clear: it asks no more than the best few, and takes the best
-  Memory other(scene.setup, scene.box, 60), unasked(scene.setup, scene.box, 60);
-  asked = 0;
-  other.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++asked < 0; });
-  CHECK(asked == 8);
-  unasked.next(VectorXd::Zero(4), no_distance, all_clear);
-  CHECK(other.via() == unasked.via());
+  // If none is clear, only the best few are checked and the best is taken.
+  Memory other(scene.setup, scene.box, 60), reference(scene.setup, scene.box, 60);
+  checked = 0;
+  other.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++checked < 0; });
+  CHECK(checked == 8);
+  reference.next(VectorXd::Zero(4), no_distance, all_clear);
+  CHECK(other.via() == reference.via());
 }
 
 TEST_CASE("the seed decides the way-points", "[hybrid][memory]") {
@@ -89,7 +89,7 @@ TEST_CASE("the seed decides the way-points", "[hybrid][memory]") {
   CHECK(vias(5) != vias(6));
 }
 
-TEST_CASE("at a new goal stalls are forgotten", "[hybrid][memory]") {
+TEST_CASE("a restart forgets all stalls", "[hybrid][memory]") {
   test::Scene scene(limited(3));
   Memory memory(scene.setup, scene.box, 60);
   memory.next(VectorXd::Zero(4), no_distance, all_clear);
@@ -101,55 +101,61 @@ TEST_CASE("at a new goal stalls are forgotten", "[hybrid][memory]") {
 
 namespace {
 
-constexpr double tick = 0.01, slow = 0.1, quick = 1.0, fast_law = 10.0;
+constexpr double tick = 0.01, slow = 0.1, fast = 1.0, fast_law = 10.0;
 
-/// When a watch that sees the same each tick, but a distance of its own, says that the arm stalled; −1 if it does not.
+/// The time at which a detector reports a stall, with constant arguments except for the distance;
+/// −1 without a stall.
 template <class Distance>
-double stalls_at(Distance&& distance, double speed, double wanted, bool held, double until_s = 20.0) {
-  StallWatch watch(0.3);
-  watch.restart(0.0);
+double stall_time(Distance&& distance, double speed, double closing_speed, bool held_back,
+                  double until_s = 20.0) {
+  StallDetector detector(0.3);
+  detector.restart(0.0);
   for (int i = 0; i * tick <= until_s; ++i)
-    if (watch.stalled(i * tick, distance(i * tick), speed, wanted, held)) return i * tick;
+    if (detector.stalled(i * tick, distance(i * tick), speed, closing_speed, held_back))
+      return i * tick;
   return -1.0;
 }
-const auto stands = [](double) { return 1.0; };
+const auto constant = [](double) { return 1.0; };
 
 }  // namespace
 
-TEST_CASE("an arm that is slow and held back stalls after the short time", "[hybrid][stall]") {
-  CHECK(stalls_at(stands, slow, fast_law, true) == Approx(0.3).margin(1.5 * tick));
+TEST_CASE("a slow arm that is held back stalls after the short time", "[hybrid][stall]") {
+  CHECK(stall_time(constant, slow, fast_law, true) == Approx(0.3).margin(1.5 * tick));
 }
 
-TEST_CASE("an arm that is not held back, or moves, stalls after the long time", "[hybrid][stall]") {
-  CHECK(stalls_at(stands, slow, fast_law, false) == Approx(1.5).margin(1.5 * tick));
-  CHECK(stalls_at(stands, quick, fast_law, true) == Approx(1.5).margin(1.5 * tick));
+TEST_CASE("an arm that is not held back, or moves fast, stalls after the long time",
+          "[hybrid][stall]") {
+  CHECK(stall_time(constant, slow, fast_law, false) == Approx(1.5).margin(1.5 * tick));
+  CHECK(stall_time(constant, fast, fast_law, true) == Approx(1.5).margin(1.5 * tick));
 }
 
 TEST_CASE("an arm that makes progress does not stall", "[hybrid][stall]") {
-  CHECK(stalls_at([](double t) { return 10.0 - 0.1 * t; }, slow, fast_law, true) == -1.0);
-  // too little of it is none
-  CHECK(stalls_at([](double t) { return 10.0 - 0.01 * t; }, slow, fast_law, true) > 0.0);
-  // going to and fro is none
-  CHECK(stalls_at([](double t) { return 1.0 + 0.5 * std::sin(20.0 * t); }, quick, fast_law, false) > 1.5);
-  CHECK(stalls_at([](double t) { return 1.0 + 0.5 * std::sin(20.0 * t); }, quick, fast_law, false) < 2.0);
+  CHECK(stall_time([](double t) { return 10.0 - 0.1 * t; }, slow, fast_law, true) == -1.0);
+  // Too little progress does not count.
+  CHECK(stall_time([](double t) { return 10.0 - 0.01 * t; }, slow, fast_law, true) > 0.0);
+  // Oscillation does not count.
+  CHECK(stall_time([](double t) { return 1.0 + 0.5 * std::sin(20.0 * t); }, fast, fast_law, false) >
+        1.5);
+  CHECK(stall_time([](double t) { return 1.0 + 0.5 * std::sin(20.0 * t); }, fast, fast_law, false) <
+        2.0);
 }
 
-TEST_CASE("where the law itself is slow more time is given", "[hybrid][stall]") {
-  // 0.01 at 0.05/s: three times 0.2 s
-  CHECK(stalls_at(stands, slow, 0.05, true) == Approx(0.3 + 0.6).margin(1.5 * tick));
-  CHECK(stalls_at(stands, slow, 0.05, false) == Approx(1.5 + 0.6).margin(1.5 * tick));
-  // but not without end
-  CHECK(stalls_at(stands, slow, 0.0, true) == Approx(0.3 + 8.0).margin(1.5 * tick));
-  CHECK(stalls_at(stands, slow, 0.0, false) == Approx(1.5 + 8.0).margin(1.5 * tick));
+TEST_CASE("a slow law extends the times", "[hybrid][stall]") {
+  // 0.01 at 0.05/s takes 0.2 s, three times that is added.
+  CHECK(stall_time(constant, slow, 0.05, true) == Approx(0.3 + 0.6).margin(1.5 * tick));
+  CHECK(stall_time(constant, slow, 0.05, false) == Approx(1.5 + 0.6).margin(1.5 * tick));
+  // The extension is limited.
+  CHECK(stall_time(constant, slow, 0.0, true) == Approx(0.3 + 8.0).margin(1.5 * tick));
+  CHECK(stall_time(constant, slow, 0.0, false) == Approx(1.5 + 8.0).margin(1.5 * tick));
 }
 
-TEST_CASE("a restarted watch waits anew, from a new best", "[hybrid][stall]") {
-  StallWatch watch(0.3);
-  watch.restart(0.0);
-  CHECK_FALSE(watch.stalled(0.0, 1.0, slow, fast_law, true));
-  CHECK(watch.stalled(0.4, 1.0, slow, fast_law, true));
-  watch.restart(0.4);
-  CHECK_FALSE(watch.stalled(0.5, 5.0, slow, fast_law, true));
-  CHECK_FALSE(watch.stalled(0.75, 5.0, slow, fast_law, true));
-  CHECK(watch.stalled(0.85, 5.0, slow, fast_law, true));
+TEST_CASE("a restarted detector starts again with a new best", "[hybrid][stall]") {
+  StallDetector detector(0.3);
+  detector.restart(0.0);
+  CHECK_FALSE(detector.stalled(0.0, 1.0, slow, fast_law, true));
+  CHECK(detector.stalled(0.4, 1.0, slow, fast_law, true));
+  detector.restart(0.4);
+  CHECK_FALSE(detector.stalled(0.5, 5.0, slow, fast_law, true));
+  CHECK_FALSE(detector.stalled(0.75, 5.0, slow, fast_law, true));
+  CHECK(detector.stalled(0.85, 5.0, slow, fast_law, true));
 }

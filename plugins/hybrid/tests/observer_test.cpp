@@ -14,30 +14,32 @@ namespace {
 
 constexpr double period = 0.002;
 
-/// A plant M v' = τ − bias + M d, its torque so many ticks late; returns what the observer makes of it after each tick.
+/// Simulates a plant M v̇ = τ − bias + M d whose torque acts delay_periods ticks late.
+/// @return the observer's estimate after each tick
 template <class Torque>
-std::vector<VectorXd> observe(int ticks, int late, const VectorXd& missed, Torque&& torque,
-                              double velocity_noise = 0.0) {
+std::vector<VectorXd> observe(int ticks, int delay_periods, const VectorXd& disturbance,
+                              Torque&& torque, double velocity_noise = 0.0) {
   Rng rng(4);
-  const auto n = missed.size();
+  const auto n = disturbance.size();
   const MatrixXd M = test::random_mass(rng, static_cast<int>(n)), M_inv = M.inverse();
   const VectorXd bias = test::random_numbers(rng, static_cast<int>(n), 5.0);
-  Observer observer(n, period, late);
-  std::vector<VectorXd> asked, seen;
+  Observer observer(n, period, delay_periods);
+  std::vector<VectorXd> issued, estimates;
   VectorXd v = VectorXd::Zero(n);
   for (int k = 0; k < ticks; ++k) {
     VectorXd measured = v;
     for (auto& one : measured) one += rng.uniform(-velocity_noise, velocity_noise);
     observer.update(measured);
-    seen.push_back(observer.disturbance());
-    asked.push_back(bias + torque(k));
-    observer.issue(asked.back(), measured, M_inv, bias);
+    estimates.push_back(observer.disturbance());
+    issued.push_back(bias + torque(k));
+    observer.issue(issued.back(), measured, M_inv, bias);
     REQUIRE(observer.ready());
-    REQUIRE(observer.last() == asked.back());
-    const VectorXd acts = k < late ? bias : asked[static_cast<std::size_t>(k - late)];
-    v += period * (M_inv * (acts - bias) + missed);
+    REQUIRE(observer.last() == issued.back());
+    const VectorXd acts =
+        k < delay_periods ? bias : issued[static_cast<std::size_t>(k - delay_periods)];
+    v += period * (M_inv * (acts - bias) + disturbance);
   }
-  return seen;
+  return estimates;
 }
 
 const auto shaking = [](int k) -> VectorXd {
@@ -46,26 +48,29 @@ const auto shaking = [](int k) -> VectorXd {
 
 }  // namespace
 
-TEST_CASE("where the model is right the observer sees nothing, however late torques act", "[hybrid][observer]") {
-  const int late = GENERATE(0, 1, 3);
-  CAPTURE(late);
-  for (const auto& seen : observe(200, late, VectorXd::Zero(3), shaking)) REQUIRE(seen.norm() < 1e-9);
+TEST_CASE("with an exact model the observer estimates zero for any delay", "[hybrid][observer]") {
+  const int delay_periods = GENERATE(0, 1, 3);
+  CAPTURE(delay_periods);
+  for (const auto& estimate : observe(200, delay_periods, VectorXd::Zero(3), shaking))
+    REQUIRE(estimate.norm() < 1e-9);
 }
 
-TEST_CASE("the observer finds what the model misses, at its bandwidth", "[hybrid][observer]") {
-  const int late = GENERATE(0, 1, 3);
-  CAPTURE(late);
-  const VectorXd missed = Eigen::Vector3d(1.0, -2.0, 0.5);
-  const auto seen = observe(200, late, missed, shaking);
-  CHECK(seen.front().norm() == 0.0);
-  CHECK((seen.back() - missed).norm() < 1e-6);
-  // a first-order lag of 100/s
-  for (std::size_t k = 0; k < seen.size(); ++k)
-    REQUIRE((seen[k] - (1.0 - std::exp(-100.0 * period * static_cast<double>(k))) * missed).norm() < 1e-9);
+TEST_CASE("the observer estimates a disturbance with its bandwidth", "[hybrid][observer]") {
+  const int delay_periods = GENERATE(0, 1, 3);
+  CAPTURE(delay_periods);
+  const VectorXd disturbance = Eigen::Vector3d(1.0, -2.0, 0.5);
+  const auto estimates = observe(200, delay_periods, disturbance, shaking);
+  CHECK(estimates.front().norm() == 0.0);
+  CHECK((estimates.back() - disturbance).norm() < 1e-6);
+  // A first-order lag of 100/s, docs/theory.md (10.23).
+  for (std::size_t k = 0; k < estimates.size(); ++k)
+    REQUIRE(
+        (estimates[k] - (1.0 - std::exp(-100.0 * period * static_cast<double>(k))) * disturbance)
+            .norm() < 1e-9);
 }
 
-TEST_CASE("an observer that takes torques for prompt mistakes their delay for a disturbance", "[hybrid][observer]") {
-  // the same run, told of no delay: shows that the claim above depends on it
+TEST_CASE("an observer without the delay mistakes it for a disturbance", "[hybrid][observer]") {
+  // The same run without the delay shows that the claim above depends on it.
   const MatrixXd one = MatrixXd::Identity(3, 3);
   Observer observer(3, period, 0);
   VectorXd v = VectorXd::Zero(3), acts = v;
@@ -73,10 +78,10 @@ TEST_CASE("an observer that takes torques for prompt mistakes their delay for a 
   for (int k = 0; k < 200; ++k) {
     observer.update(v);
     most = std::max(most, observer.disturbance().norm());
-    const VectorXd asked = shaking(k);
-    observer.issue(asked, v, one, VectorXd::Zero(3));
-    v += period * acts;  // a tick late
-    acts = asked;
+    const VectorXd issued = shaking(k);
+    observer.issue(issued, v, one, VectorXd::Zero(3));
+    v += period * acts;  // one tick late
+    acts = issued;
   }
   CHECK(most > 0.1);
 }

@@ -11,7 +11,7 @@ inline Eigen::VectorXd random_numbers(Rng& rng, int n, double size = 1.0) {
   return x;
 }
 
-/// Symmetric and positive definite.
+/// A random symmetric positive definite matrix.
 inline Eigen::MatrixXd random_mass(Rng& rng, int n) {
   Eigen::MatrixXd A(n, n);
   for (int j = 0; j < n; ++j) A.col(j) = random_numbers(rng, n);

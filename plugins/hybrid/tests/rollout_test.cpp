@@ -18,7 +18,7 @@ struct Ended {
   int steps;
 };
 
-/// Runs to the end; `each` sees every configuration that was moved to.
+/// Runs a rollout to its end and calls `each` with every configuration that it moves to.
 template <class Each>
 Ended run(hybrid::Rollout& rollout, Each&& each) {
   for (int steps = 0;; ++steps) {
@@ -63,10 +63,11 @@ TEST_CASE("in free space a rollout takes the tip to its goal", "[hybrid][rollout
   scene.rollout.begin(start, 300);
   CHECK(run(scene.rollout, nothing).step == Step::arrived);
   CHECK((scene.tip(scene.rollout.q()) - Vector3d(0.5, 0.5, 0.0)).norm() < 0.8 * 0.01);
-  CHECK(scene.rollout.goal_distance(start) == Approx(2.0 * (scene.tip(start) - Vector3d(0.5, 0.5, 0.0)).norm()));
+  CHECK(scene.rollout.goal_distance(start) ==
+        Approx(2.0 * (scene.tip(start) - Vector3d(0.5, 0.5, 0.0)).norm()));
 }
 
-TEST_CASE("a rollout ends when its steps are used up", "[hybrid][rollout]") {
+TEST_CASE("a rollout ends after its number of steps", "[hybrid][rollout]") {
   test::Scene scene(test::joint_task(VectorXd::Zero(4)));
   scene.rollout.begin(VectorXd::Zero(4), Vector4d(3.0, 0.0, 0.0, 0.0), 5, 0.01);
   int moved = 0;
@@ -80,28 +81,32 @@ TEST_CASE("a rollout keeps joint limits", "[hybrid][rollout]") {
   test::Scene scene(task);
   scene.rollout.begin(VectorXd::Zero(4), Vector4d(2.0, -2.0, 0.5, 0.0), 100, 0.01);
   double most = 0.0;
-  const auto end = run(scene.rollout, [&](const VectorXd& q) { most = std::max(most, q.lpNorm<Eigen::Infinity>()); });
+  const auto end = run(scene.rollout, [&](const VectorXd& q) {
+    most = std::max(most, q.lpNorm<Eigen::Infinity>());
+  });
   CHECK(end.step == Step::ended);
   CHECK(most <= 1.0);
   CHECK(most > 0.95);
 }
 
-TEST_CASE("in front of a wall a rollout stops", "[hybrid][rollout]") {
-  // the wall: a ball so large that it is flat, its face at x = 0.8
+TEST_CASE("a rollout stops in front of a wall", "[hybrid][rollout]") {
+  // The wall is a large ball with its surface at x = 0.8.
   test::Scene scene(test::joint_task(VectorXd::Zero(4), {{{100.8, 0.0, 0.0}, 100.0}}));
   const VectorXd start = Vector4d(1.4, 0.0, 0.0, 0.0);
   REQUIRE(scene.clearance(start) > 0.1);
   scene.rollout.begin(start, VectorXd::Zero(4), 200, 0.02);
   double least = 1.0;
-  const auto end = run(scene.rollout, [&](const VectorXd& q) { least = std::min(least, scene.clearance(q)); });
+  const auto end =
+      run(scene.rollout, [&](const VectorXd& q) { least = std::min(least, scene.clearance(q)); });
   CHECK(end.step == Step::ended);
   CHECK(end.steps < 200);
   CHECK(least > 0.0);
-  // it stands at its margin, not far from the wall
+  // It stops at its margin, close to the wall.
   CHECK(scene.clearance(scene.rollout.q()) < 0.02);
 }
 
-TEST_CASE("what a rollout keeps is never in contact", "[hybrid][rollout][property]") {
+TEST_CASE("configurations that a rollout keeps are never in contact",
+          "[hybrid][rollout][property]") {
   const bool to_goal = GENERATE(false, true);
   CAPTURE(to_goal);
   int arrived = 0, ended = 0, touched = 0;
@@ -110,8 +115,10 @@ TEST_CASE("what a rollout keeps is never in contact", "[hybrid][rollout][propert
     Rng rng(seed);
     std::vector<test::Ball> balls;
     for (int i = 0; i < 4; ++i) {
-      const double at = rng.uniform(-3.0, 3.0), far = rng.uniform(0.4, 0.95);  // leaves the base free
-      balls.push_back({Vector3d(far * std::cos(at), far * std::sin(at), 0.0), rng.uniform(0.05, 0.15)});
+      // The range of the radius leaves the base free.
+      const double at = rng.uniform(-3.0, 3.0), radius = rng.uniform(0.4, 0.95);
+      balls.push_back(
+          {Vector3d(radius * std::cos(at), radius * std::sin(at), 0.0), rng.uniform(0.05, 0.15)});
     }
     test::Scene scene(test::joint_task(random_joints(rng, 2.0), balls));
     VectorXd start = random_joints(rng, 2.0);
@@ -120,7 +127,7 @@ TEST_CASE("what a rollout keeps is never in contact", "[hybrid][rollout][propert
       scene.rollout.begin(start, 60);
     else
       scene.rollout.begin(start, random_joints(rng, 2.0), 60, 0.05);
-    // only the last can be in contact, and then it is said to be
+    // Only the last configuration can be in contact, and then it is reported.
     VectorXd last = start;
     bool clear = true;
     const auto end = run(scene.rollout, [&](const VectorXd& q) {
@@ -137,7 +144,7 @@ TEST_CASE("what a rollout keeps is never in contact", "[hybrid][rollout][propert
   CHECK(touched < 15);
 }
 
-TEST_CASE("a rollout that starts in contact says so at once", "[hybrid][rollout]") {
+TEST_CASE("a rollout that starts in contact reports it at once", "[hybrid][rollout]") {
   test::Scene scene(test::joint_task(VectorXd::Zero(4), {{{0.5, 0.0, 0.0}, 0.1}}));
   scene.rollout.begin(VectorXd::Zero(4), 10);
   CHECK(scene.rollout.step() == Step::touched);

@@ -17,9 +17,11 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// The nearest admissible point by trying every set of active rows: slow, and independent of the dual iteration.
-VectorXd nearest_by_active_sets(const MatrixXd& M, const VectorXd& wanted, const MatrixXd& rows, const VectorXd& b) {
-  const auto n = wanted.size(), m = rows.cols();
+// The nearest admissible point by enumeration of the sets of active rows, independent of the dual
+// iteration.
+VectorXd nearest_by_active_sets(const MatrixXd& M, const VectorXd& target, const MatrixXd& rows,
+                                const VectorXd& b) {
+  const auto n = target.size(), m = rows.cols();
   VectorXd best;
   double best_cost = infinite;
   for (unsigned set = 0; set < (1u << m); ++set) {
@@ -33,13 +35,13 @@ VectorXd nearest_by_active_sets(const MatrixXd& M, const VectorXd& wanted, const
       rhs[rhs.size() - 1] = b[i];
     }
     if (active.cols() > n) continue;
-    VectorXd x = wanted;
+    VectorXd x = target;
     if (active.cols() > 0) {
       const MatrixXd Wa = M.ldlt().solve(active);
-      x += Wa * (active.transpose() * Wa).ldlt().solve(rhs - active.transpose() * wanted);
+      x += Wa * (active.transpose() * Wa).ldlt().solve(rhs - active.transpose() * target);
     }
     if (((rows.transpose() * x - b).array() < -1e-9).any()) continue;
-    const double cost = (x - wanted).dot(M * (x - wanted));
+    const double cost = (x - target).dot(M * (x - target));
     if (cost < best_cost) best_cost = cost, best = x;
   }
   return best;
@@ -47,7 +49,8 @@ VectorXd nearest_by_active_sets(const MatrixXd& M, const VectorXd& wanted, const
 
 }  // namespace
 
-TEST_CASE("the filter finds the nearest admissible velocity in the kinetic metric", "[hybrid][property]") {
+TEST_CASE("the filter finds the nearest admissible velocity in the metric of kinetic energy",
+          "[hybrid][property]") {
   const auto seed = GENERATE(range(1u, 40u));
   CAPTURE(seed);
   Rng rng(seed);
@@ -62,16 +65,16 @@ TEST_CASE("the filter finds the nearest admissible velocity in the kinetic metri
     b[i] = -rng.uniform(0.0, 0.3);
     REQUIRE(filter.add_row(rows.col(i), b[i], -infinite));
   }
-  const VectorXd wanted = random_numbers(rng, n, 3.0);
-  VectorXd x = wanted;
+  const VectorXd target = random_numbers(rng, n, 3.0);
+  VectorXd x = target;
   const auto report = filter.project(x, 20000);
-  const VectorXd expected = nearest_by_active_sets(M, wanted, rows, b);
+  const VectorXd expected = nearest_by_active_sets(M, target, rows, b);
   REQUIRE(expected.size() == n);
   CHECK((x - expected).norm() < 1e-4 * (1.0 + expected.norm()));
   CHECK(report.recovery_J == 0.0);
 }
 
-TEST_CASE("kinetic energy never rises where standing still is admitted, after any number of passes",
+TEST_CASE("the filter adds no kinetic energy where rest is admissible, after any number of passes",
           "[hybrid][property]") {
   const int passes = GENERATE(1, 2, 5, 12);
   for (std::uint64_t seed = 1; seed <= 10000; ++seed) {
@@ -82,7 +85,7 @@ TEST_CASE("kinetic energy never rises where standing still is admitted, after an
     filter.begin(M, W);
     for (int i = 0; i < m; ++i)
       (void)filter.add_row(random_numbers(rng, n), -rng.uniform(0.0, 1.0), -rng.uniform(0.0, 0.5));
-    // boxes that hold zero, each joint's its own; some closed to one side
+    // boxes that contain zero, different for each joint; some bounds are zero
     const auto bound = [&] {
       VectorXd x(n);
       for (auto& one : x) one = rng.uniform() < 0.2 ? 0.0 : rng.uniform(0.0, 2.0);
@@ -101,14 +104,16 @@ TEST_CASE("kinetic energy never rises where standing still is admitted, after an
   }
 }
 
-TEST_CASE("what rows that demand motion add is no more than what is booked as recovery", "[hybrid][property]") {
+TEST_CASE("rows that demand motion add no more energy than is booked as recovery",
+          "[hybrid][property]") {
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
     Rng rng(seed);
     const int n = 1 + static_cast<int>(rng.below(7)), m = 1 + static_cast<int>(rng.below(10));
     const MatrixXd M = random_mass(rng, n), W = M.inverse();
     SafetyFilter filter(n, 32);
     filter.begin(M, W);
-    for (int i = 0; i < m; ++i) (void)filter.add_row(random_numbers(rng, n), rng.uniform(-0.5, 0.5), 1.0);
+    for (int i = 0; i < m; ++i)
+      (void)filter.add_row(random_numbers(rng, n), rng.uniform(-0.5, 0.5), 1.0);
     const double low = rng.uniform(-1.0, 0.5);
     filter.set_box(VectorXd::Constant(n, low), VectorXd::Constant(n, low + 1.0));
     VectorXd x = random_numbers(rng, n, 2.0);
@@ -140,11 +145,11 @@ TEST_CASE("floors hold after a single pass", "[hybrid][property]") {
   }
 }
 
-// ---- room
+// ---- braking room
 
 namespace {
 
-/// Boxes around `from`; some bounds are at it, some open.
+/// Boxes around `from`; some bounds coincide with it, some are infinite.
 struct Boxes {
   Boxes(Rng& rng, const MatrixXd& mass, const VectorXd& from)
       : M(mass), low(from), high(from), momentum_low(mass * from), momentum_high(momentum_low) {
@@ -153,13 +158,13 @@ struct Boxes {
       const double kind = rng.uniform();
       return kind < 0.1 ? 0.0 : kind < 0.2 && may_be_open ? infinite : rng.uniform(0.0, 1.0);
     };
-    // one box at least must be closed
+    // At least one box must be finite.
     for (auto& one : low) one -= gap(has_momentum);
     for (auto& one : high) one += gap(has_momentum);
     for (auto& one : momentum_low) one -= gap(false);
     for (auto& one : momentum_high) one += gap(false);
   }
-  [[nodiscard]] bool hold(const VectorXd& x) const {
+  [[nodiscard]] bool contains(const VectorXd& x) const {
     const VectorXd p = M * x;
     const auto within = [](const VectorXd& y, const VectorXd& lower, const VectorXd& upper) {
       return ((y - lower).array() >= -1e-12).all() && ((upper - y).array() >= -1e-12).all();
@@ -175,21 +180,21 @@ struct Boxes {
   bool has_momentum = false;
 };
 
-/// How far the boxes let one go from a point in a direction, by halving.
+/// The largest multiple of a step from a point that stays within the boxes, by bisection.
 double reach(const Boxes& boxes, const VectorXd& from, const VectorXd& step, double most) {
   double inside = 0.0, outside = most;
-  if (boxes.hold(from + most * step)) return most;
+  if (boxes.contains(from + most * step)) return most;
   for (int i = 0; i < 100; ++i) {
     const double middle = 0.5 * (inside + outside);
-    (boxes.hold(from + middle * step) ? inside : outside) = middle;
+    (boxes.contains(from + middle * step) ? inside : outside) = middle;
   }
   return inside;
 }
 
 }  // namespace
 
-TEST_CASE("the room that is promised can be had within the boxes", "[hybrid][property]") {
-  int some = 0;
+TEST_CASE("the braking room can be reached within the boxes", "[hybrid][property]") {
+  int positive = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     CAPTURE(seed);
     Rng rng(seed);
@@ -200,28 +205,29 @@ TEST_CASE("the room that is promised can be had within the boxes", "[hybrid][pro
     SafetyFilter filter(n, 4);
     filter.begin(M, W);
     boxes.set(filter);
-    const double room = filter.room(a, from);
+    const double room = filter.braking_room(a, from);
     REQUIRE(room >= 0.0);
     REQUIRE(std::isfinite(room));
 
-    // one of two points has it: straight along the row, or towards the corner of the box
+    // One of two points reaches it: along the row, or towards the corner of the box.
     const VectorXd along = M.ldlt().solve(a);
     VectorXd best = from + reach(boxes, from, along, 1e3) * along;
     VectorXd corner(n);
-    for (int k = 0; k < n; ++k) corner[k] = a[k] > 0.0 ? boxes.high[k] - from[k] : boxes.low[k] - from[k];
+    for (int k = 0; k < n; ++k)
+      corner[k] = a[k] > 0.0 ? boxes.high[k] - from[k] : boxes.low[k] - from[k];
     if (corner.allFinite()) {
       const VectorXd other = from + reach(boxes, from, corner, 1.0) * corner;
       if (a.dot(other) > a.dot(best)) best = other;
     }
-    REQUIRE(boxes.hold(best));
+    REQUIRE(boxes.contains(best));
     REQUIRE(a.dot(best) - a.dot(from) >= room - 1e-9);
-    if (room > 1e-6) ++some;
+    if (room > 1e-6) ++positive;
   }
-  CHECK(some > 1000);
+  CHECK(positive > 1000);
 }
 
-TEST_CASE("what has room is reached by the filter", "[hybrid][property]") {
-  // a row that asks for all the room is kept, with the boxes
+TEST_CASE("the filter reaches a row within the braking room", "[hybrid][property]") {
+  // A row that demands 0.9 of the room holds together with the boxes.
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     CAPTURE(seed);
     Rng rng(seed);
@@ -232,15 +238,15 @@ TEST_CASE("what has room is reached by the filter", "[hybrid][property]") {
     SafetyFilter filter(n, 4);
     filter.begin(M, W);
     boxes.set(filter);
-    const double wanted = a.dot(from) + 0.9 * filter.room(a, from);
-    REQUIRE(filter.add_row(a, wanted, infinite));
+    const double target = a.dot(from) + 0.9 * filter.braking_room(a, from);
+    REQUIRE(filter.add_row(a, target, infinite));
     VectorXd x = from;
     (void)filter.project(x, 20000);
-    CHECK(a.dot(x) > wanted - 1e-3);
+    CHECK(a.dot(x) > target - 1e-3);
   }
 }
 
-TEST_CASE("room is never negative, wherever it is asked for", "[hybrid][property]") {
+TEST_CASE("the braking room is never negative, at any point", "[hybrid][property]") {
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     CAPTURE(seed);
     Rng rng(seed);
@@ -250,16 +256,16 @@ TEST_CASE("room is never negative, wherever it is asked for", "[hybrid][property
     SafetyFilter filter(n, 4);
     filter.begin(M, W);
     boxes.set(filter);
-    REQUIRE(filter.room(random_numbers(rng, n), random_numbers(rng, n, 3.0)) >= 0.0);
+    REQUIRE(filter.braking_room(random_numbers(rng, n), random_numbers(rng, n, 3.0)) >= 0.0);
   }
 }
 
-TEST_CASE("a row that no joint moves has no room", "[hybrid]") {
+TEST_CASE("a row that no joint moves has no braking room", "[hybrid]") {
   const MatrixXd M = MatrixXd::Identity(3, 3);
   const VectorXd one = VectorXd::Ones(3), none = VectorXd::Zero(3);
   SafetyFilter filter(3, 4);
   filter.begin(M, M);
   filter.set_box(-one, one);
   filter.set_momentum_box(-one, one);
-  CHECK(filter.room(none, none) == 0.0);
+  CHECK(filter.braking_room(none, none) == 0.0);
 }

@@ -5,7 +5,7 @@ namespace {
 
 using namespace hamelin::planning;
 
-// Springs and dampers towards the goal, the nominal arm held against gravity; obstacles are not looked at.
+// Spring to the goal, damping of each joint, compensation of gravity. Obstacles are ignored.
 class Template : public Planner {
  public:
   Template(const Host& host, const Setup& setup, const hamelin::Json& params)
@@ -14,7 +14,7 @@ class Template : public Planner {
         stiffness_(params.at("stiffness").get<double>()),
         damping_(params.at("damping").get<double>()),
         tau_(setup.dof()) {
-    host.info("template: obstacles are not looked at");
+    host.info("template: obstacles are ignored");
   }
 
   void tick(const Tick& tick, Command& command) override {
@@ -41,5 +41,5 @@ class Template : public Planner {
 
 }  // namespace
 
-HAMELIN_PLANNER_PLUGIN(Template, "template", "0.1.0", "Springs to the goal, no avoidance: copy this one",
-                       params_schema);
+HAMELIN_PLANNER_PLUGIN(Template, "template", "0.1.0",
+                       "Spring to the goal without avoidance, an example to copy", params_schema);

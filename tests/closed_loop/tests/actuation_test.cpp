@@ -36,7 +36,8 @@ struct Logged {
   std::vector<Json> ticks, events;
 };
 
-Logged logged_run(const TemporaryFolder& folder, const Json& scene, const model::Robot& robot = test::planar4()) {
+Logged logged_run(const TemporaryFolder& folder, const Json& scene,
+                  const model::Robot& robot = test::planar4()) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -52,25 +53,31 @@ Logged logged_run(const TemporaryFolder& folder, const Json& scene, const model:
 
 }  // namespace
 
-TEST_CASE("a planner is told how its answer is carried out, and of a goal's path", "[simulation][actuation]") {
+TEST_CASE("a planner is given the actuation's settings and a goal's path",
+          "[simulation][actuation]") {
   const TemporaryFolder folder;
   Json scene = scene_of(Json::object(), "sampled");
-  scene["goals"] = {{{"type", "path"}, {"q", {{0.5, 0.0, 0.0, 0.0}, {0.2, 0.1, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}}}}};
-  scene["actuation"] = {
-      {"type", "sampled"}, {"control_period_s", 0.002}, {"delay_s", 0.004}, {"torque_rate_max_Nm_s", 750.0}};
+  scene["goals"] = {{{"type", "path"},
+                     {"q", {{0.5, 0.0, 0.0, 0.0}, {0.2, 0.1, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}}}}};
+  scene["actuation"] = {{"type", "sampled"},
+                        {"control_period_s", 0.002},
+                        {"delay_s", 0.004},
+                        {"torque_rate_max_Nm_s", 750.0}};
   const auto run = logged_run(folder, scene);
   REQUIRE_FALSE(run.events.empty());
   CHECK(run.events[0]["text"] == "probe: sampled 1, delay 0.004000, rate 750.000000, path 3");
-  // a path is reached at its end, where the arm is already
+  // A path is reached at its end, where the arm already is.
   CHECK(run.result.outcome == Outcome::reached);
   CHECK(run.result.goal->type == "path");
   CHECK(*run.result.goal->error_rad == 0.0);
 
   scene["goals"][0]["q"] = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/goals/0/q/0: 3 numbers given, expected 4"));
+  CHECK_THROWS_WITH(run_scene(folder, scene),
+                    Catch::Contains("/goals/0/q/0: 3 values given, expected 4"));
 }
 
-TEST_CASE("a held torque changes no faster than its rate limit, and that is counted", "[simulation][actuation]") {
+TEST_CASE("a held torque changes no faster than its rate limit, and that is counted",
+          "[simulation][actuation]") {
   const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {10.0, -3.0, 0.0, 0.5}}}, "sampled");
   scene["actuation"]["torque_rate_max_Nm_s"] = 1000.0;
@@ -79,17 +86,18 @@ TEST_CASE("a held torque changes no faster than its rate limit, and that is coun
   for (std::size_t k = 0; k + 1 < run.ticks.size(); ++k) {
     const Eigen::VectorXd tau = vector_of(run.ticks[k]["tau"]);
     CHECK((tau - before).lpNorm<Eigen::Infinity>() <= 1.0 + 1e-12);
-    CHECK(tau[3] == 0.5);  // what asks for less is not held back
+    CHECK(tau[3] == 0.5);  // a smaller torque is not limited
     CHECK(run.ticks[k]["saturated"] == (k < 9));
     before = tau;
   }
   CHECK(before[0] == Approx(10.0));
   CHECK(run.result.saturated_share == Approx(0.09));
   scene["actuation"]["type"] = "ideal";
-  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/actuation/torque_rate_max_Nm_s: is not allowed"));
+  CHECK_THROWS_WITH(run_scene(folder, scene),
+                    Catch::Contains("/actuation/torque_rate_max_Nm_s: is not allowed"));
 }
 
-TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes energy out only",
+TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and only takes energy out",
           "[simulation][actuation]") {
   const TemporaryFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
@@ -100,10 +108,11 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes en
   const auto held = run_scene(folder, scene, {}, strong(100.0));
   // 5 Nm tanh(v / 0.01) = 4 Nm
   const double creep = 0.01 * std::atanh(0.8);
-  CHECK((held.v - creep * Eigen::Vector4d(1.0, -1.0, 1.0, -1.0)).lpNorm<Eigen::Infinity>() < 0.02 * creep);
+  CHECK((held.v - creep * Eigen::Vector4d(1.0, -1.0, 1.0, -1.0)).lpNorm<Eigen::Infinity>() <
+        0.02 * creep);
   CHECK(held.dissipated_J > 0.0);
 
-  // one that swings comes to rest
+  // A swinging arm comes to rest.
   scene["planner"]["params"] = Json::object();
   scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
   scene["duration_s"] = 20.0;
@@ -111,11 +120,12 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and takes en
   CHECK(swung.v.lpNorm<Eigen::Infinity>() < 1e-3);
   CHECK(swung.dissipated_J == Approx(swung.energy_initial_J).epsilon(1e-3));
 
-  CHECK_THROWS_WITH(run_scene(folder, scene), Catch::Contains("/actuation/coulomb_friction_share") &&
-                                                  Catch::Contains("joint 'j1' of 'planar4' has none"));
+  CHECK_THROWS_WITH(run_scene(folder, scene),
+                    Catch::Contains("/actuation/coulomb_friction_share") &&
+                        Catch::Contains("joint 'j1' of 'planar4' has none"));
 }
 
-TEST_CASE("the model's dry friction is the same to the arm as one that actuation names, and both add up",
+TEST_CASE("dry friction of the model and of the actuation act alike and add up",
           "[simulation][actuation]") {
   const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {9.0, -4.0, 12.0, 1.0}}}, "ideal");
@@ -136,8 +146,10 @@ TEST_CASE("the model's dry friction is the same to the arm as one that actuation
   CHECK((named - final_q({{"friction", 5.0}, {"friction_speed", 0.5}}, 0.0)).norm() > 1e-5);
 }
 
-TEST_CASE("under sampled actuation a node velocity is made a torque by the planner's masses, not the true ones",
-          "[simulation][actuation]") {
+TEST_CASE(
+    "under sampled actuation a node velocity becomes a torque by the planner's masses, not the "
+    "true ones",
+    "[simulation][actuation]") {
   const TemporaryFolder folder;
   for (const double scale : {0.9, 1.0, 1.1}) {
     Json scene = scene_of({{"velocity", {0.02, -0.01, 0.03, 0.01}}}, "sampled");
@@ -150,7 +162,7 @@ TEST_CASE("under sampled actuation a node velocity is made a torque by the plann
   }
 }
 
-TEST_CASE("torque limits hold for a node velocity too: its change is cut as a whole, and counted",
+TEST_CASE("torque limits scale a node's change of velocity as a whole, and that is counted",
           "[simulation][actuation]") {
   const TemporaryFolder folder;
   const model::Robot robot = strong(10.0);
@@ -161,13 +173,14 @@ TEST_CASE("torque limits hold for a node velocity too: its change is cut as a wh
   scene["duration_s"] = 0.01;
   const auto run = logged_run(folder, scene, robot);
   Eigen::VectorXd asked(4);
-  dynamics::momentum(model, ws, Eigen::VectorXd::Zero(4), Eigen::Vector4d(1000.0, 0.0, 0.0, 0.0), asked);
+  dynamics::momentum(model, ws, Eigen::VectorXd::Zero(4), Eigen::Vector4d(1000.0, 0.0, 0.0, 0.0),
+                     asked);
   const Json& tick = run.ticks.at(0);
   CHECK(tick["saturated"] == true);
   const Eigen::VectorXd node = vector_of(tick["channels"]["node"]), tau = vector_of(tick["tau"]);
   CHECK(tau.lpNorm<Eigen::Infinity>() == Approx(10.0).epsilon(1e-9));
   CHECK((node - node[0] / asked[0] * asked).norm() < 1e-9 * node.norm());  // the direction is kept
-  CHECK(node[0] == Approx(8.0));                                           // the held torque comes first
+  CHECK(node[0] == Approx(8.0));  // the held torque has priority
   CHECK(run.result.saturated_share == 1.0);
   CHECK(run.result.node_work_J > 0.0);
   CHECK(run.result.energy_error_max_J < 1e-6);
@@ -179,12 +192,14 @@ TEST_CASE("torque limits hold for a node velocity too: its change is cut as a wh
   CHECK(vector_of(free.ticks.at(0)["channels"]["node"])[0] == Approx(asked[0]));
 }
 
-TEST_CASE("accounts that no filter may have are a defect under ideal actuation, and only reported elsewhere",
-          "[simulation][certificate]") {
+TEST_CASE(
+    "impossible accounts of a filter are a defect under ideal actuation and only reported "
+    "otherwise",
+    "[simulation][certificate]") {
   const TemporaryFolder folder;
-  const auto [key, value, text] =
-      GENERATE(table<std::string, double, std::string>({{"filter_work_J", 1e-3, "its filter added 0.001 J"},
-                                                        {"recovery_work_J", -1e-3, "its recovery took out 0.001 J"}}));
+  const auto [key, value, text] = GENERATE(table<std::string, double, std::string>(
+      {{"filter_work_J", 1e-3, "its filter added 0.001 J"},
+       {"recovery_work_J", -1e-3, "its recovery took out 0.001 J"}}));
   CAPTURE(key);
   Json scene = scene_of({{"velocity", {0.1, 0.0, 0.0, 0.0}}, {key, value}, {"books_at_tick", 5}});
   const auto broken = run_scene(folder, scene);
@@ -193,7 +208,7 @@ TEST_CASE("accounts that no filter may have are a defect under ideal actuation, 
   CHECK(broken.steps == 5);
   CHECK_THAT(broken.cause, Catch::Contains("planner 'probe' at step 5: " + text));
 
-  scene["planner"]["params"][key] = -value;  // what filters do
+  scene["planner"]["params"][key] = -value;  // the sign that filters may have
   CHECK(run_scene(folder, scene).outcome == Outcome::timeout);
   scene["planner"]["params"][key] = 1e-12 * value;  // rounding
   CHECK(run_scene(folder, scene).outcome == Outcome::timeout);
@@ -207,29 +222,33 @@ TEST_CASE("accounts that no filter may have are a defect under ideal actuation, 
   CHECK((key == "filter_work_J" ? sampled.filter_work_J : sampled.recovery_work_J) == value);
 }
 
-TEST_CASE("an energy account that does not close is a defect that names the step", "[simulation][certificate]") {
+TEST_CASE("an energy account that does not close is a defect that names the step",
+          "[simulation][certificate]") {
   const TemporaryFolder folder;
   Json scene = scene_of(Json::object());
   scene["start"] = {{"v", {6.0, -14.0, 10.0, -12.0}}};
   scene["duration_s"] = 2.0;
   const auto fine = run_scene(folder, scene);
   CHECK(fine.outcome == Outcome::timeout);
-  scene["step_s"] = 0.05;  // 0.7 rad a step
+  scene["step_s"] = 0.05;  // 0.7 rad per step
   const auto coarse = run_scene(folder, scene);
   CAPTURE(coarse.cause);
   CHECK(coarse.outcome == Outcome::defect);
-  CHECK_THAT(coarse.cause, Catch::Contains("step ") && Catch::Contains("the energy account is off by "));
-  scene["integrator"] = {{"name", "semi-implicit-euler"}};  // promises nothing
+  CHECK_THAT(coarse.cause,
+             Catch::Contains("step ") && Catch::Contains("the energy account is off by "));
+  scene["integrator"] = {{"name", "semi-implicit-euler"}};  // not checked
   CHECK(run_scene(folder, scene).outcome != Outcome::defect);
 }
 
-TEST_CASE("the largest acceleration and jerk are those of the logged velocities", "[simulation][log]") {
+TEST_CASE("the largest acceleration and jerk are those of the logged velocities",
+          "[simulation][log]") {
   const TemporaryFolder folder;
   Json scene = scene_of({{"torque", {3.0, -2.0, 1.0, 0.5}}, {"torque_until_s", 0.05}});
   const auto run = logged_run(folder, scene);
   Eigen::VectorXd a = Eigen::VectorXd::Zero(4), jerk = a, last;
   for (std::size_t k = 1; k < run.ticks.size(); ++k) {
-    const Eigen::VectorXd now = (vector_of(run.ticks[k]["v"]) - vector_of(run.ticks[k - 1]["v"])) / 0.001;
+    const Eigen::VectorXd now =
+        (vector_of(run.ticks[k]["v"]) - vector_of(run.ticks[k - 1]["v"])) / 0.001;
     a = a.cwiseMax(now.cwiseAbs());
     if (last.size() > 0) jerk = jerk.cwiseMax((now - last).cwiseAbs() / 0.001);
     last = now;
@@ -237,5 +256,5 @@ TEST_CASE("the largest acceleration and jerk are those of the logged velocities"
   CHECK(a.minCoeff() > 0.01);
   CHECK((run.result.a_abs_max - a).norm() < 1e-9 * a.norm());
   CHECK((run.result.jerk_abs_max - jerk).norm() < 1e-9 * jerk.norm());
-  CHECK(jerk[0] > 100.0);  // where the torque ends
+  CHECK(jerk[0] > 100.0);  // when the torque ends
 }

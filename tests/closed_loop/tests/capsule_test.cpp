@@ -21,7 +21,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-/// Example 5.2's arm with one capsule a link where it had a row of spheres.
+/// Example 5.2's arm with one capsule per link in place of a row of spheres.
 model::Robot capsule_arm() {
   model::Robot robot = test::planar4();
   for (auto& link : robot.links) {
@@ -34,13 +34,14 @@ model::Robot capsule_arm() {
 
 }  // namespace
 
-TEST_CASE("with every planner an arm of capsules arrives where one of spheres does, and touches nothing",
-          "[simulation][capsule]") {
+TEST_CASE(
+    "with every planner an arm of capsules arrives where one of spheres does, without contact",
+    "[simulation][capsule]") {
   const TemporaryFolder folder;
   for (const std::string planner : {"apf", "gyro", "hybrid"}) {
     CAPTURE(planner);
-    Json scene =
-        read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" / ("paper_52_" + planner + ".json"));
+    Json scene = read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" /
+                           ("paper_52_" + planner + ".json"));
     scene["robot"] = {{"file", "robot.json"}};
     const auto spheres = run_scene(folder, scene);
     const auto capsules = run_scene(folder, scene, {}, capsule_arm());
@@ -52,41 +53,48 @@ TEST_CASE("with every planner an arm of capsules arrives where one of spheres do
   }
 }
 
-TEST_CASE("a capsule at an obstacle is named with link, depth and way out, at start and goals",
-          "[simulation][capsule]") {
+TEST_CASE(
+    "a capsule at an obstacle is named with link, depth and exit direction, at start and goals",
+    "[simulation][capsule]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
-  // the arm lies along x; its second link's capsule is 20 mm thick
+  // The arm lies along x. Its second link's capsule has a radius of 20 mm.
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
   scene["obstacles"] = {ball("post", 1.5, 0.11, 0.1)};
   const auto refused = run_scene(folder, scene, {}, capsule_arm());
   CHECK(refused.outcome == Outcome::refused);
-  CHECK(refused.cause == "capsule 0 of link 'link2' is 10 mm inside obstacle 'post' at 0 s; the way out is (0, -1, 0)");
+  CHECK(refused.cause ==
+        "capsule 0 of link 'link2' is 10 mm inside obstacle 'post' at 0 s; the exit direction is "
+        "(0, -1, 0)");
 
   scene["start"] = {{"q", {0.3, 0.0, 0.0, 0.0}}};
   scene["goals"] = {{{"type", "joint"}, {"q", {0.0, 0.0, 0.0, 0.0}}},
                     {{"type", "position"}, {"position_m", {1.5, 0.17, 0.0}}},
                     {{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}}};
   scene["duration_s"] = 0.04;
-  std::ostringstream told;
+  std::ostringstream output;
   simulation::Watch watch;
-  watch.diagnostics = std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_st>(told));
+  watch.diagnostics = std::make_shared<spdlog::logger>(
+      "test", std::make_shared<spdlog::sinks::ostream_sink_st>(output));
   watch.diagnostics->set_pattern("%l: %v");
   const auto result = run_scene(folder, scene, watch, capsule_arm());
   const std::vector<std::string> expected{
-      "goal 1: capsule 0 of link 'link2' is 10 mm inside obstacle 'post'; the way out is (0, -1, 0)",
-      "goal 2: its tip is 40 mm inside obstacle 'post'; the way out is (0, 1, 0)"};
-  CHECK(told.str() == "info: " + expected[0] + "\ninfo: " + expected[1] + "\n");
+      "goal 1: capsule 0 of link 'link2' is 10 mm inside obstacle 'post'; the exit direction is "
+      "(0, -1, 0)",
+      "goal 2: its tip is 40 mm inside obstacle 'post'; the exit direction is (0, 1, 0)"};
+  CHECK(output.str() == "info: " + expected[0] + "\ninfo: " + expected[1] + "\n");
   CHECK(result.warnings == expected);
 
-  // what moves may be elsewhere by then
-  scene["obstacles"][0]["motion"] = {{"type", "sine"}, {"amplitude_m", {0.0, 0.5, 0.0}}, {"period_s", 5.0}};
-  told.str("");
+  // A moving obstacle may be elsewhere when the arm arrives.
+  scene["obstacles"][0]["motion"] = {
+      {"type", "sine"}, {"amplitude_m", {0.0, 0.5, 0.0}}, {"period_s", 5.0}};
+  output.str("");
   (void)run_scene(folder, scene, watch, capsule_arm());
-  CHECK(told.str().empty());
+  CHECK(output.str().empty());
 }
 
-TEST_CASE("the log's closest shape is counted link by link, spheres before capsules", "[simulation][capsule]") {
+TEST_CASE("the log's closest shape is counted link by link, spheres before capsules",
+          "[simulation][capsule]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
@@ -103,13 +111,14 @@ TEST_CASE("the log's closest shape is counted link by link, spheres before capsu
   for (const Json& line : lines)
     if (line["type"] == "tick" && line["k"] == 0) {
       seen = true;
-      CHECK(line["closest"]["sphere"] == 3);  // two spheres and a capsule of link1, then link2's capsule
+      // two spheres and a capsule of link1, then link2's capsule
+      CHECK(line["closest"]["sphere"] == 3);
       CHECK(line["clearance_m"] == Approx(0.2 - 0.1 - 0.02));
     }
   CHECK(seen);
 }
 
-TEST_CASE("an arm of capsules is kept off itself", "[simulation][capsule]") {
+TEST_CASE("an arm of capsules is kept clear of itself", "[simulation][capsule]") {
   const TemporaryFolder folder;
   model::Robot robot = capsule_arm();
   robot.self_collision_disabled.clear();
@@ -128,7 +137,7 @@ TEST_CASE("an arm of capsules is kept off itself", "[simulation][capsule]") {
   scene["duration_s"] = 3.0;
   const auto held = run_scene(folder, scene, {}, robot);
   CAPTURE(held.cause);
-  CHECK(held.outcome != Outcome::collision);  // the goal's tolerance leaves a place beside it
+  CHECK(held.outcome != Outcome::collision);  // the goal's tolerance allows a clear pose
   CHECK(*held.min_self_clearance_m > 0.0);
   CHECK(held.certified_share == 1.0);
 }

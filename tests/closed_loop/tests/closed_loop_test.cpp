@@ -18,7 +18,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-// The tip's spring of stiffness 1 N/m, undamped, held against nothing: E_0 = 6.5 J.
+// An undamped spring of stiffness 1 N/m pulls the tip: E_0 = 6.5 J.
 Json spring(double step_s, const std::string& actuation) {
   Json scene = scene_52();
   scene["goals"][0]["speed_max"] = 1e-9;
@@ -34,7 +34,7 @@ Json moving(Json obstacle, double x, double y) {
   return obstacle;
 }
 
-// Kinetic energy and the spring's at the end of a run, from its state alone.
+// Kinetic energy plus that of the spring at the end of a run, computed from its state alone.
 double spring_energy(const log::Result& result) {
   const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
@@ -43,7 +43,7 @@ double spring_energy(const log::Result& result) {
   return dynamics::kinetic_energy(model, ws, result.q, result.v) + 0.5 * away * away;
 }
 
-// The log's lines but for what depends on clock and machine.
+// The log's lines without the parts that depend on clock and machine.
 std::string fixed_part(const std::filesystem::path& file) {
   std::string text;
   for (Json line : log::read_log(file).lines) {
@@ -56,7 +56,8 @@ std::string fixed_part(const std::filesystem::path& file) {
 
 }  // namespace
 
-TEST_CASE("the energy account of a control potential closes with the square of the step", "[simulation][energy]") {
+TEST_CASE("the energy account of a control potential closes with the square of the step",
+          "[simulation][energy]") {
   const TemporaryFolder folder;
   std::vector<double> errors;
   for (const double h : {0.001, 0.002, 0.004}) {
@@ -76,10 +77,13 @@ TEST_CASE("the energy account of a control potential closes with the square of t
   CHECK(errors[2] / errors[1] == Approx(4.0).epsilon(0.2));
 }
 
-TEST_CASE("energy-neutral steering does no work at any step, and brings the arm of example 5.2 to its goal",
-          "[simulation][energy]") {
+TEST_CASE(
+    "energy-neutral steering does no work at any step, and brings the arm of example 5.2 to its "
+    "goal",
+    "[simulation][energy]") {
   const TemporaryFolder folder;
-  Json scene = read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" / "paper_52_gyro.json");
+  Json scene = read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "scenes" /
+                         "paper_52_gyro.json");
   scene["robot"]["file"] = "robot.json";
   for (const double h : {0.001, 0.004, 0.01}) {
     scene["step_s"] = h;
@@ -89,7 +93,7 @@ TEST_CASE("energy-neutral steering does no work at any step, and brings the arm 
     CHECK(std::abs(result.gyroscopic_work_J) <= 1e-10);
     REQUIRE(result.min_clearance_m.has_value());
     CHECK(*result.min_clearance_m > 0.0);
-    CHECK(*result.min_clearance_m < 0.5);  // it did steer
+    CHECK(*result.min_clearance_m < 0.5);  // near enough to steer
   }
 }
 
@@ -103,7 +107,7 @@ TEST_CASE("a start in contact is refused before the first step", "[simulation][o
   CHECK_THAT(result.cause, Catch::Contains("'link3'") && Catch::Contains("'post'"));
 }
 
-TEST_CASE("a goal inside an obstacle is never reached and never touched off the record", "[simulation][outcome]") {
+TEST_CASE("a goal inside an obstacle is never reached and never touched", "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("over the goal", 2.0, 3.0, 0.3)};
@@ -128,7 +132,8 @@ TEST_CASE("too little time ends as timeout at the last step", "[simulation][outc
   CHECK_FALSE(result.min_clearance_m.has_value());
 }
 
-TEST_CASE("a planner that breaks its promises ends the run as a defect that names the step", "[simulation][outcome]") {
+TEST_CASE("a planner that throws or answers NaN ends the run as a defect that names the step",
+          "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   for (const std::string how : {"throw", "nan"}) {
@@ -143,10 +148,11 @@ TEST_CASE("a planner that breaks its promises ends the run as a defect that name
   scene["planner"]["params"] = {{"at_tick", 10}, {"how", "give up"}};
   const auto result = run_scene(folder, scene);
   CHECK(result.outcome == Outcome::stalled);
-  CHECK(result.cause == "no way on");
+  CHECK(result.cause == "no path to the goal");
 }
 
-TEST_CASE("an obstacle that appears on the arm is a collision that names both", "[simulation][outcome]") {
+TEST_CASE("an obstacle that appears on the arm is a collision that names both",
+          "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["planner"] = {{"name", "breaking"}};  // the arm rests
@@ -159,7 +165,7 @@ TEST_CASE("an obstacle that appears on the arm is a collision that names both", 
   CHECK_THAT(result.cause, Catch::Contains("'link4'") && Catch::Contains("'ghost'"));
 }
 
-TEST_CASE("goals of every type are judged by their own measure", "[simulation][goal]") {
+TEST_CASE("goals of every type have their own error measure", "[simulation][goal]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   const auto position = run_scene(folder, scene);
@@ -179,7 +185,8 @@ TEST_CASE("goals of every type are judged by their own measure", "[simulation][g
     CHECK_FALSE(result.goal->error_m.has_value());
   }
   SECTION("pose: the angle decides where the position is met") {
-    // The planner pulls the position only, so the arm arrives as before, turned by the sum of its angles.
+    // The planner controls the position only, so the arm arrives as before, turned by the sum of
+    // its angles.
     const double turn = position.q.sum();
     const auto pose = [&](double angle) {
       Json goal{{"type", "pose"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}};
@@ -218,7 +225,7 @@ TEST_CASE("goals of every type are judged by their own measure", "[simulation][g
     CHECK(slow.time_s > fast.time_s);
     CHECK(*slow.goal->error_m < 0.02);
     CHECK(tip_speed(slow) < least);
-    // it arrives at the first node at which this holds: one step before it was faster
+    // It arrives at the first node at which this holds: one step before it was faster.
     CHECK(tip_speed(slow) > 0.98 * least);
   }
   SECTION("a list, in its order") {
@@ -239,13 +246,15 @@ TEST_CASE("goals of every type are judged by their own measure", "[simulation][g
   }
 }
 
-TEST_CASE("the same seed gives the same bytes but for clock and machine, another seed others",
+TEST_CASE("the same seed gives the same bytes except for clock and machine, another seed differs",
           "[simulation][determinism]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
-  scene["actuation"] = {
-      {"type", "sampled"}, {"control_period_s", 0.008}, {"delay_s", 0.008}, {"joint_noise_rad", 1e-4}};
+  scene["actuation"] = {{"type", "sampled"},
+                        {"control_period_s", 0.008},
+                        {"delay_s", 0.008},
+                        {"joint_noise_rad", 1e-4}};
   scene["duration_s"] = 1.0;
   const auto logged = [&](int seed, const char* name) {
     scene["seed"] = seed;
@@ -255,15 +264,16 @@ TEST_CASE("the same seed gives the same bytes but for clock and machine, another
     (void)run_scene(folder, scene, watch);
     return fixed_part(log.file());
   };
-  const std::string first = logged(7, "a.jsonl"), second = logged(7, "b.jsonl"), other = logged(8, "c.jsonl");
+  const std::string first = logged(7, "a.jsonl"), second = logged(7, "b.jsonl"),
+                    other = logged(8, "c.jsonl");
   CHECK(first.size() > 10000);
   CHECK(first == second);
-  // the seed itself stands in header and result; the motion must differ as well
+  // The seed itself is in header and result; the motion must differ as well.
   CHECK(log::read_log(folder.path() / "a.jsonl").lines[100]["q"] !=
         log::read_log(folder.path() / "c.jsonl").lines[100]["q"]);
 }
 
-TEST_CASE("a run's log fits its schemas, first line to last", "[simulation][log]") {
+TEST_CASE("every line of a run's log fits its schema", "[simulation][log]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
@@ -278,7 +288,7 @@ TEST_CASE("a run's log fits its schemas, first line to last", "[simulation][log]
   CHECK(summary.ticks == 5);  // steps 0, 30, 60, 90 and the last, 100
 }
 
-TEST_CASE("the largest number of steps needs no memory for each of them", "[simulation][outcome]") {
+TEST_CASE("memory does not grow with the number of steps", "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["duration_s"] = 4e7;  // 10^10 steps of 4 ms
@@ -293,7 +303,8 @@ TEST_CASE("the largest number of steps needs no memory for each of them", "[simu
   CHECK(result.tick_us->p99 <= result.tick_us->max);
 }
 
-TEST_CASE("a stop from outside ends the run as interrupted, with its record whole", "[simulation][outcome]") {
+TEST_CASE("a stop from outside ends the run as interrupted, with a complete log",
+          "[simulation][outcome]") {
   const TemporaryFolder folder;
   std::atomic<bool> stop = false;
   log::RunLog log(folder.path() / "run.jsonl");
@@ -309,7 +320,7 @@ TEST_CASE("a stop from outside ends the run as interrupted, with its record whol
   CHECK(log::check_log(log.file()).has_result);
 }
 
-TEST_CASE("an arm in space with gravity, integrated by each scheme, comes to the same place",
+TEST_CASE("a spatial arm under gravity reaches the same place with each scheme",
           "[simulation][integrator]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
@@ -345,12 +356,15 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][inp
     return "";
   };
   CHECK_THAT(refusal("/goals", Json::array()), Catch::Contains("scene.json: /goals"));
-  CHECK_THAT(refusal("/start/q", {1.0, 2.0}), Catch::Contains("/start/q: 2 numbers given, expected 4"));
+  CHECK_THAT(refusal("/start/q", {1.0, 2.0}),
+             Catch::Contains("/start/q: 2 values given, expected 4"));
   CHECK_THAT(refusal("/planner", nullptr), Catch::Contains("/planner"));
   CHECK_THAT(refusal("/planner/name", "apff"), Catch::Contains("apf"));
   CHECK_THAT(refusal("/planner/params/k_p", -1), Catch::Contains("k_p"));
-  CHECK_THAT(refusal("/model", {{"joint_damping", {1.0, 2.0}}}), Catch::Contains("/model/joint_damping"));
-  CHECK_THAT(refusal("/duration_s", 0.0037), Catch::Contains("no whole number of steps"));
+  CHECK_THAT(refusal("/model", {{"joint_damping", {1.0, 2.0}}}),
+             Catch::Contains("/model/joint_damping"));
+  CHECK_THAT(refusal("/duration_s", 0.0037),
+             Catch::Contains("not an integer multiple of the step"));
   CHECK_THAT(refusal("/actuation", {{"type", "sampled"}, {"control_period_s", 0.006}}),
              Catch::Contains("control_period_s"));
   CHECK_THAT(refusal("/integrator", {{"name", "euler"}}), Catch::Contains("euler"));
@@ -358,7 +372,8 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[simulation][inp
 
 namespace {
 
-// A planner's library, kept loaded: what the dynamic linker takes to load it again varies.
+// Keeps a planner's library loaded: the memory that the dynamic linker needs to load it again
+// varies.
 planning::Plugin keep_loaded(const std::string& planner) {
   for (const auto& directory : test::plugin_directories)
     if (const auto file = directory / (planner + ".hamelin.so"); std::filesystem::exists(file))
@@ -375,7 +390,8 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   CAPTURE(planner);
   const auto loaded = keep_loaded(planner);
   Json scene = scene_52();
-  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25), moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
+  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25),
+                        moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
   scene["model"] = {{"self_collision", true}};
   scene["planner"]["name"] = planner;
   if (planner == "hybrid") scene["planner"].erase("params");
@@ -386,11 +402,12 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
       CHECK(result.outcome == Outcome::timeout);
     });
   };
-  (void)allocations(0.2);  // what is made once a process
+  (void)allocations(0.2);  // allocations made once per process
   CHECK(allocations(2.0) == allocations(1.0));
 }
 
-TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation]") {
+TEST_CASE("a tick with everything that can be modelled does not allocate",
+          "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
   const TemporaryFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
@@ -406,9 +423,11 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   scene["model"] = {{"self_collision", true}, {"torque_limits", true}};
   scene["actuation"] = {{"type", actuation}, {"coulomb_friction_share", 0.1}};
   if (actuation == "sampled") scene["actuation"]["torque_rate_max_Nm_s"] = 100.0;
-  scene["planner"] = {
-      {"name", "probe"},
-      {"params", {{"velocity", {0.01, 0.0, 0.0, 0.02}}, {"think_of", {0.5, 0.5, 0.0, 0.0}}, {"influence_m", 10.0}}}};
+  scene["planner"] = {{"name", "probe"},
+                      {"params",
+                       {{"velocity", {0.01, 0.0, 0.0, 0.02}},
+                        {"think_of", {0.5, 0.5, 0.0, 0.0}},
+                        {"influence_m", 10.0}}}};
   const auto allocations = [&](double duration_s) {
     scene["duration_s"] = duration_s;
     return test::allocations_in([&] {
@@ -420,9 +439,9 @@ TEST_CASE("nor does one with all that can be modelled", "[simulation][allocation
   CHECK(allocations(2.0) == allocations(1.0));
 }
 
-TEST_CASE("nor does one of hybrid's while it searches", "[simulation][allocation]") {
+TEST_CASE("a tick of hybrid does not allocate while it searches", "[simulation][allocation]") {
   if (!test::counts_allocations()) return;
-  // the first link cannot turn past either ball, so no search finds a way
+  // The first link cannot turn past either ball, so no search finds a path.
   const TemporaryFolder folder;
   const auto loaded = keep_loaded("hybrid");
   Json scene = scene_52();

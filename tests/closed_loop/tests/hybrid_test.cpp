@@ -7,7 +7,8 @@ using namespace hamelin;
 namespace {
 
 log::Result run(const std::string& name, const std::vector<std::string>& settings = {}) {
-  const std::filesystem::path file = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes" / name;
+  const std::filesystem::path file =
+      std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes" / name;
   Json document = read_json(file);
   for (const auto& setting : settings) scene::set_pointer(document, setting);
   const auto scene = scene::scene_from_json(document, file.parent_path(), file.string());
@@ -16,8 +17,9 @@ log::Result run(const std::string& name, const std::vector<std::string>& setting
 
 }  // namespace
 
-TEST_CASE("hybrid reaches the goals in shelf and clutter, clear and certified, with its accounts in order",
-          "[hybrid][closed_loop]") {
+TEST_CASE(
+    "hybrid reaches the goals in shelf and clutter, clear and certified, with correct accounts",
+    "[hybrid][closed_loop]") {
   const auto scene = GENERATE(as<std::string>{}, "shelf.json", "clutter.json");
   CAPTURE(scene);
   const auto result = run(scene);
@@ -31,21 +33,24 @@ TEST_CASE("hybrid reaches the goals in shelf and clutter, clear and certified, w
   CHECK(result.energy_error_max_J < 1e-3);
 }
 
-TEST_CASE("hybrid gives up with a cause where it has no escape", "[hybrid][closed_loop]") {
-  // a goal inside the shelf's back wall: the margin holds the arm off
-  const auto result = run("shelf.json", {R"(/goals=[{"type": "position", "position_m": [0.91, 0.25, 0.45]}])",
-                                         "/planner/params/escape=none"});
+TEST_CASE("hybrid gives up with a cause if it has no escape path", "[hybrid][closed_loop]") {
+  // A goal inside the shelf's back wall: the margin keeps the arm away.
+  const auto result =
+      run("shelf.json", {R"(/goals=[{"type": "position", "position_m": [0.91, 0.25, 0.45]}])",
+                         "/planner/params/escape=none"});
   CHECK(result.outcome == log::Outcome::stalled);
   CAPTURE(result.cause);
   const std::string kind = result.cause.substr(0, result.cause.find(':'));
-  CHECK((kind == "force balance" || kind == "margin around the goal" || kind == "unreachable goal" ||
-         kind.starts_with("joint limit") || kind.starts_with("torque limit")));
+  CHECK((kind == "force balance" || kind == "margin around the goal" ||
+         kind == "unreachable goal" || kind.starts_with("joint limit") ||
+         kind.starts_with("torque limit")));
   CHECK(*result.min_clearance_m > 0.0);
 }
 
 TEST_CASE("hybrid keeps clear with other seeds, integrators and steps", "[hybrid][closed_loop]") {
-  const auto setting = GENERATE(as<std::string>{}, "/seed=2", "/step_s=0.002", "/integrator/name=rk4",
-                                "/integrator/name=semi-implicit-euler", "/integrator/name=hamel-midpoint");
+  const auto setting =
+      GENERATE(as<std::string>{}, "/seed=2", "/step_s=0.002", "/integrator/name=rk4",
+               "/integrator/name=semi-implicit-euler", "/integrator/name=hamel-midpoint");
   CAPTURE(setting);
   const auto result = run("shelf.json", {setting});
   CHECK(result.outcome == log::Outcome::reached);

@@ -23,7 +23,8 @@ Json logged_scene(const Json& planner) {
   return scene;
 }
 
-std::vector<Json> ticks_of(const TemporaryFolder& folder, const Json& scene, long every, Json* result = nullptr) {
+std::vector<Json> ticks_of(const TemporaryFolder& folder, const Json& scene, long every,
+                           Json* result = nullptr) {
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;
   watch.log = &log;
@@ -38,11 +39,12 @@ std::vector<Json> ticks_of(const TemporaryFolder& folder, const Json& scene, lon
   return ticks;
 }
 
-// What the docs say keeps its first value.
+// The sum that stays constant, see docs/logs.md.
 double balance(const Json& tick) {
   const auto energy = [&](const char* key) { return tick["energy"][key].get<double>(); };
-  return energy("kinetic_J") + energy("potential_J") + energy("control_J") - energy("gyroscopic_work_J") -
-         energy("held_work_J") + energy("dissipated_J") - energy("node_work_J");
+  return energy("kinetic_J") + energy("potential_J") + energy("control_J") -
+         energy("gyroscopic_work_J") - energy("held_work_J") + energy("dissipated_J") -
+         energy("node_work_J");
 }
 
 }  // namespace
@@ -52,7 +54,8 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
   const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
   const std::vector<std::pair<Json, std::vector<std::string>>> planners = {
-      {{{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}, {"joint_damping", 1.0}}}},
+      {{{"name", "apf"},
+        {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}, {"joint_damping", 1.0}}}},
        {"potential", "damping"}},
       {{{"name", "gyro"}}, {"held", "damping", "gyroscopic"}},
       {{{"name", "hybrid"}}, {"node"}}};
@@ -83,9 +86,11 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
   }
 }
 
-TEST_CASE("the energies in a log balance at every tick, the last too, in every channel", "[simulation][log]") {
+TEST_CASE("the energies in a log balance at every tick, including the last, in every channel",
+          "[simulation][log]") {
   const TemporaryFolder folder;
-  Json potential = {{"name", "apf"}, {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
+  Json potential = {{"name", "apf"},
+                    {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
   for (const Json& planner : {potential, Json{{"name", "gyro"}}, Json{{"name", "hybrid"}}}) {
     CAPTURE(planner);
     const auto ticks = ticks_of(folder, logged_scene(planner), 1);
@@ -100,7 +105,8 @@ TEST_CASE("the energies in a log balance at every tick, the last too, in every c
   }
 }
 
-TEST_CASE("a thinned log's extrema are those of the ticks between", "[simulation][log]") {
+TEST_CASE("the extrema in a log with fewer ticks are those of the ticks between",
+          "[simulation][log]") {
   const TemporaryFolder folder;
   const Json scene = logged_scene({{"name", "gyro"}});
   Json result;

@@ -15,7 +15,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-// The four links of the arm as a square, but for an angle its last link swings to close it.
+// The four links of the arm form a square, except for an angle that the last link's swing closes.
 Json closing_square(double speed, double open = 0.3) {
   Json scene = scene_52();
   const double right = 0.5 * std::acos(-1.0);
@@ -27,7 +27,8 @@ Json closing_square(double speed, double open = 0.3) {
   return scene;
 }
 
-// Smallest distance between links that are no neighbours, from the spheres of planar4 laid out by hand.
+// Smallest distance between links that are not neighbours, with the spheres of planar4 placed by
+// the test.
 double self_distance(const Eigen::VectorXd& q, double radius = 0.02) {
   std::vector<std::vector<Eigen::Vector2d>> links;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();
@@ -49,7 +50,8 @@ double self_distance(const Eigen::VectorXd& q, double radius = 0.02) {
 
 }  // namespace
 
-TEST_CASE("an arm that swings into itself ends in collision, and the cause names both parts", "[simulation][self]") {
+TEST_CASE("an arm that swings into itself ends in collision, and the cause names both parts",
+          "[simulation][self]") {
   const TemporaryFolder folder;
   Json scene = closing_square(0.5);
   double last_apart = 0.0;
@@ -62,7 +64,7 @@ TEST_CASE("an arm that swings into itself ends in collision, and the cause names
   CHECK(result.outcome == Outcome::collision);
   CHECK_THAT(result.cause, Catch::Contains("the arm touches itself: 'link1' and 'link4'"));
   CHECK(self_distance(result.q) <= 0.0);
-  CHECK(last_apart < 0.001);  // a step before it was not
+  CHECK(last_apart < 0.001);  // one step before it did not touch
   REQUIRE(result.min_self_clearance_m.has_value());
   CHECK(*result.min_self_clearance_m == Approx(self_distance(result.q)).margin(1e-12));
   CHECK_FALSE(result.min_clearance_m.has_value());
@@ -85,9 +87,11 @@ TEST_CASE("a start in which the arm touches itself is refused", "[simulation][se
   CHECK_THAT(result.cause, Catch::Contains("'link1' and 'link4'"));
 }
 
-TEST_CASE("a self-contact between two nodes is found, and motion that stays apart is certified", "[simulation][self]") {
+TEST_CASE("a self-contact between two nodes is found, and motion that stays apart is certified",
+          "[simulation][self]") {
   const TemporaryFolder folder;
-  // A ball at the tip, one where the first link begins, and 0.6 rad a step: before and behind it at the nodes.
+  // A ball at the tip, one at the start of the first link, and 0.6 rad per step: at the nodes the
+  // tip is before and behind it.
   model::Robot balls = test::planar4(0);
   balls.links[0].spheres = {{Eigen::Vector3d(-1.0, 0.0, 0.0), 0.05}};
   balls.links[3].spheres = {{Eigen::Vector3d::Zero(), 0.05}};
@@ -96,10 +100,11 @@ TEST_CASE("a self-contact between two nodes is found, and motion that stays apar
   const auto hit = run_scene(folder, fast, {}, balls);
   CAPTURE(hit.cause);
   CHECK(hit.outcome == Outcome::collision);
-  CHECK_THAT(hit.cause, Catch::Contains("contact of 'link1' and 'link4' between the nodes 0 and 1"));
+  CHECK_THAT(hit.cause,
+             Catch::Contains("contact of 'link1' and 'link4' between the nodes 0 and 1"));
 
   Json slow = closing_square(0.5);
-  slow["duration_s"] = 0.5;  // to 0.05 rad from the first link
+  slow["duration_s"] = 0.5;  // ends 0.05 rad from the first link
   const auto clear = run_scene(folder, slow);
   CHECK(clear.outcome == Outcome::timeout);
   CHECK(clear.certified_share == 1.0);
@@ -110,7 +115,8 @@ TEST_CASE("a self-contact between two nodes is found, and motion that stays apar
   CHECK(*clear.min_self_clearance_m < 0.04);
 }
 
-TEST_CASE("obstacles are told from the arm itself, each with its own clearance", "[simulation][self]") {
+TEST_CASE("clearances from obstacles and from the arm itself are reported separately",
+          "[simulation][self]") {
   const TemporaryFolder folder;
   Json scene = closing_square(0.5);
   scene["duration_s"] = 0.5;
@@ -122,7 +128,7 @@ TEST_CASE("obstacles are told from the arm itself, each with its own clearance",
   CHECK(*result.min_self_clearance_m < 0.04);
 }
 
-TEST_CASE("self-collision needs spheres", "[simulation][self]") {
+TEST_CASE("self-collision requires collision shapes", "[simulation][self]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(run_scene(folder, closing_square(0.5), {}, test::planar4(0)),
                     Catch::Contains("/model/self_collision: 'planar4' has no collision spheres"));

@@ -14,7 +14,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-// Free space around the arm's way with a box in it; all beyond is unknown.
+// Free space around the arm's path with a box in it. Everything outside is unknown.
 void make_map(const std::filesystem::path& file) {
   scene::Obstacle box;
   box.shape = scene::Shape::box;
@@ -47,7 +47,7 @@ std::vector<std::string> events_of(const TemporaryFolder& folder, const std::str
 
 }  // namespace
 
-TEST_CASE("a planner is told by name whether a contact is with the map, unknown space or an obstacle",
+TEST_CASE("a planner can distinguish contacts with the map, unknown space and obstacles",
           "[simulation][unit]") {
   STATIC_REQUIRE(HAMELIN_OBSTACLE_MAP == scene::Contact::map);
   STATIC_REQUIRE(HAMELIN_OBSTACLE_UNKNOWN == scene::Contact::unknown);
@@ -55,8 +55,9 @@ TEST_CASE("a planner is told by name whether a contact is with the map, unknown 
   const auto found = [&](const std::string& unknown, const std::string& line) {
     const auto events = events_of(folder, unknown);
     CAPTURE(unknown, events);
-    return std::any_of(events.begin(), events.end(),
-                       [&](const std::string& event) { return event.find(line) != std::string::npos; });
+    return std::any_of(events.begin(), events.end(), [&](const std::string& event) {
+      return event.find(line) != std::string::npos;
+    });
   };
   CHECK(found("block", "contacts with the map 1, unknown space 1, obstacles 1"));
   CHECK(found("free", "contacts with the map 1, unknown space 0, obstacles 1"));

@@ -14,7 +14,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-// A wall across the way of example 5.2's tip, from (4, 0) to (2, 3).
+// A wall across the path of example 5.2's tip, from (4, 0) to (2, 3).
 scene::Obstacle wall() {
   scene::Obstacle wall;
   wall.name = "wall";
@@ -24,7 +24,7 @@ scene::Obstacle wall() {
   return wall;
 }
 
-// Two maps of the same grid: the wall and nothing else known, and free space without it.
+// Two maps of the same grid: one knows only the wall, the other free space without it.
 void make_maps(const TemporaryFolder& folder) {
   scene::MakeMapOptions options;
   options.resolution_m = 0.05;
@@ -48,13 +48,13 @@ Json wall_scene(const std::string& planner) {
 
 struct Run {
   log::Result result;
-  std::optional<double> through_s;  // when the arm was first where the wall is, or is to be
+  std::optional<double> through_s;  // first time at which the arm was inside the wall's place
   bool changed = false;
 };
 
 Run run(const TemporaryFolder& folder, const Json& document) {
   const auto file = folder.path() / "scene.json";
-  write_file_aside(file, document.dump(1));
+  write_file_atomically(file, document.dump(1));
   const scene::Scene scene = scene::read_scene(file);
   const model::Model model(description::read_robot(scene.robot.file));
   const scene::Environment walls({}, {wall()}, {}, model.reach(), 0.1);
@@ -72,15 +72,18 @@ Run run(const TemporaryFolder& folder, const Json& document) {
   };
   out.result = simulation::run(scene, plugin_directories, watch);
   for (const auto& line : log::read_log(log.file()).lines)
-    out.changed = out.changed || (line["type"] == "event" &&
-                                  line["text"].get<std::string>().find("the map changes") != std::string::npos);
+    out.changed = out.changed ||
+                  (line["type"] == "event" &&
+                   line["text"].get<std::string>().find("the map changes") != std::string::npos);
   return out;
 }
 
 }  // namespace
 
-TEST_CASE("a wall known only from an OctoMap stops or turns every planner before it, also when it appears mid-run",
-          "[simulation][map]") {
+TEST_CASE(
+    "a wall known only from an OctoMap stops or diverts every planner, also when it appears during "
+    "the run",
+    "[simulation][map]") {
   const std::string planner = GENERATE("apf", "gyro", "hybrid");
   CAPTURE(planner);
   const TemporaryFolder folder;
@@ -88,7 +91,7 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
   Json scene = wall_scene(planner);
 
   const Run without = run(folder, scene);
-  REQUIRE(without.through_s);  // else the wall would prove nothing
+  REQUIRE(without.through_s);  // otherwise the wall would not be in the way
 
   const auto stays_clear = [&](const Run& with) {
     CAPTURE(log::to_string(with.result.outcome), with.result.cause);
@@ -106,13 +109,14 @@ TEST_CASE("a wall known only from an OctoMap stops or turns every planner before
   stays_clear(from_start);
   CHECK_FALSE(from_start.changed);
 
-  scene["map"] = {{"file", "free.bt"}, {"changes", {{{"time_s", 0.5 * *without.through_s}, {"file", "wall.bt"}}}}};
+  scene["map"] = {{"file", "free.bt"},
+                  {"changes", {{{"time_s", 0.5 * *without.through_s}, {"file", "wall.bt"}}}}};
   const Run mid_run = run(folder, scene);
   stays_clear(mid_run);
   CHECK(mid_run.changed);
 }
 
-TEST_CASE("a wall that is taken away is no longer there", "[simulation][map]") {
+TEST_CASE("a wall that a map change removes no longer blocks the arm", "[simulation][map]") {
   const TemporaryFolder folder;
   make_maps(folder);
   Json scene = wall_scene("apf");

@@ -7,13 +7,14 @@
 #include "../program.hpp"
 
 using namespace hamelin;
-using test::Bench;
+using test::Sandbox;
 
 namespace {
 
-Json run_scene(Bench& bench, const std::string& name, int exit_code, std::vector<std::string> more = {}) {
+Json run_scene(Sandbox& sandbox, const std::string& name, int exit_code,
+               std::vector<std::string> more = {}) {
   more.insert(more.begin(), {"run", "data/scenes/" + name + ".json"});
-  return test::run_json(bench, more, exit_code);
+  return test::run_json(sandbox, more, exit_code);
 }
 
 Json without_timing(Json line) {
@@ -24,15 +25,16 @@ Json without_timing(Json line) {
 
 }  // namespace
 
-TEST_CASE("in example 5.2 apf stalls and gyro and hybrid reach the goal clear of the obstacle", "[end_to_end]") {
-  Bench bench;
-  const Json apf = run_scene(bench, "paper_52_apf", 1);
+TEST_CASE("in example 5.2 apf stalls, and gyro and hybrid reach the goal without contact",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const Json apf = run_scene(sandbox, "paper_52_apf", 1);
   CHECK(apf["outcome"] == "stalled");
   CHECK(apf["cause"].is_string());
   CHECK(apf["goal"]["error_m"].get<double>() > 0.2);
   for (const char* name : {"paper_52_gyro", "paper_52_hybrid"}) {
     CAPTURE(name);
-    const Json result = run_scene(bench, name, 0);
+    const Json result = run_scene(sandbox, name, 0);
     CHECK(result["outcome"] == "reached");
     CHECK(result["min_clearance_m"].get<double>() > 0.0);
     CHECK(result["goal"]["error_m"].get<double>() <= 0.02);
@@ -40,100 +42,108 @@ TEST_CASE("in example 5.2 apf stalls and gyro and hybrid reach the goal clear of
 }
 
 TEST_CASE("energy-neutral steering does no work at any step size", "[end_to_end]") {
-  Bench bench;
+  Sandbox sandbox;
   for (const char* scene : {"paper_52_gyro", "paper_52_hybrid"})
     for (const char* step : {"0.001", "0.004", "0.01"}) {
       CAPTURE(scene, step);
-      const Json result = run_scene(bench, scene, 0, {"--step", step});
+      const Json result = run_scene(sandbox, scene, 0, {"--step", step});
       CHECK(std::abs(result["gyroscopic_work_J"].get<double>()) <= 1e-10);
     }
 }
 
-TEST_CASE("the arm reaches its goals in shelf and clutter, every step proved clear", "[end_to_end]") {
-  Bench bench;
+TEST_CASE("the arm reaches its goals in shelf and clutter, with every step proved clear",
+          "[end_to_end]") {
+  Sandbox sandbox;
   for (const char* name : {"shelf", "clutter"}) {
     CAPTURE(name);
-    const Json result = run_scene(bench, name, 0);
+    const Json result = run_scene(sandbox, name, 0);
     CHECK(result["outcome"] == "reached");
     CHECK(result["min_clearance_m"].get<double>() > 0.0);
     CHECK(result["certified_share"] == 1.0);
-    CHECK(result["goal"]["index"] == result["goal"]["count"]);  // all of them, one after the other
+    CHECK(result["goal"]["index"] == result["goal"]["count"]);  // all goals were reached
     CHECK(result["filter_work_J"].get<double>() <= 1e-9);
   }
 }
 
-TEST_CASE("results and logs fit their schemas, and a seed gives the same bytes but for timing and provenance",
+TEST_CASE("results and logs fit their schemas, and a seed determines all but timing and provenance",
           "[end_to_end]") {
-  Bench bench;
+  Sandbox sandbox;
   for (const std::string n : {"1", "2"}) {
-    const auto output = bench.run({"run", "data/scenes/clutter.json", "--seed", "5", "--every", "50", "--log",
-                                   n + ".jsonl", "--result", n + ".json"});
+    const auto output = sandbox.run({"run", "data/scenes/clutter.json", "--seed", "5", "--every",
+                                     "50", "--log", n + ".jsonl", "--result", n + ".json"});
     REQUIRE(output.exit_code == 0);
     CHECK_THAT(output.out, Catch::Contains("outcome     reached"));
-    const auto checked = bench.run({"validate", n + ".jsonl", n + ".json"});
+    const auto checked = sandbox.run({"validate", n + ".jsonl", n + ".json"});
     CAPTURE(checked.err);
     CHECK(checked.exit_code == 0);
   }
-  CHECK(without_timing(bench.json("1.json")).dump() == without_timing(bench.json("2.json")).dump());
-  const auto first = test::lines_of(bench.text("1.jsonl")), second = test::lines_of(bench.text("2.jsonl"));
+  CHECK(without_timing(sandbox.json("1.json")).dump() ==
+        without_timing(sandbox.json("2.json")).dump());
+  const auto first = test::lines_of(sandbox.text("1.jsonl")),
+             second = test::lines_of(sandbox.text("2.jsonl"));
   REQUIRE(first.size() == second.size());
   CHECK(first.size() > 50);
   std::size_t different = 0;
   for (std::size_t i = 0; i < first.size(); ++i)
-    different +=
-        without_timing(parse_json(first[i], "log")).dump() != without_timing(parse_json(second[i], "log")).dump();
+    different += without_timing(parse_json(first[i], "log")).dump() !=
+                 without_timing(parse_json(second[i], "log")).dump();
   CHECK(different == 0);
   CHECK(parse_json(first.front(), "log")["type"] == "header");
   CHECK(parse_json(first.back(), "log")["type"] == "result");
 }
 
-TEST_CASE("a long run is interrupted by SIGINT and still closes its log and result", "[end_to_end]") {
-  Bench bench;
-  const pid_t child = bench.start({"integrate", "data/robots/planar3.json", "--step", "0.0001", "--duration", "100000",
-                                   "--every", "100", "--log", "run.jsonl", "--result", "run.json"});
-  // Once the log has lines the handler stands.
-  for (int i = 0; i < 2000 && !(bench.has("run.jsonl") && !bench.text("run.jsonl").empty()); ++i)
+TEST_CASE("a long run is interrupted by SIGINT and still closes its log and result",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const pid_t child =
+      sandbox.start({"integrate", "data/robots/planar3.json", "--step", "0.0001", "--duration",
+                     "100000", "--every", "100", "--log", "run.jsonl", "--result", "run.json"});
+  // The signal handler is installed before the log gets its first line.
+  for (int i = 0; i < 2000 && !(sandbox.has("run.jsonl") && !sandbox.text("run.jsonl").empty());
+       ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   ::kill(child, SIGINT);
-  const auto output = bench.finish(child);
+  const auto output = sandbox.finish(child);
   CHECK(output.exit_code == 130);
-  CHECK(bench.json("run.json")["outcome"] == "interrupted");
-  const Json last = parse_json(test::lines_of(bench.text("run.jsonl")).back(), "log");
+  CHECK(sandbox.json("run.json")["outcome"] == "interrupted");
+  const Json last = parse_json(test::lines_of(sandbox.text("run.jsonl")).back(), "log");
   CHECK(last["type"] == "result");
   CHECK(last["outcome"] == "interrupted");
-  CHECK(bench.run({"validate", "run.jsonl", "run.json"}).exit_code == 0);
+  CHECK(sandbox.run({"validate", "run.jsonl", "run.json"}).exit_code == 0);
 }
 
 TEST_CASE("a start in contact is refused, with the result written", "[end_to_end]") {
-  Bench bench;
-  const auto output = bench.run(
-      {"run", "data/scenes/paper_52_hybrid.json", "--set", "/obstacles/0/position_m=[0.5,0,0]", "--result", "r.json"});
+  Sandbox sandbox;
+  const auto output = sandbox.run({"run", "data/scenes/paper_52_hybrid.json", "--set",
+                                   "/obstacles/0/position_m=[0.5,0,0]", "--result", "r.json"});
   CHECK(output.exit_code == 2);
   CHECK(test::lines_of(output.err).size() == 1);
-  CHECK_THAT(output.err, Catch::StartsWith("hamelin: data/scenes/paper_52_hybrid.json: refused: ") &&
-                             Catch::Contains("link1") && Catch::Contains("obstacle"));
-  CHECK(bench.json("r.json")["outcome"] == "refused");
-  CHECK(bench.json("r.json")["steps"] == 0);
-  CHECK(bench.run({"validate", "r.json"}).exit_code == 0);
+  CHECK_THAT(output.err,
+             Catch::StartsWith("hamelin: data/scenes/paper_52_hybrid.json: refused: ") &&
+                 Catch::Contains("link1") && Catch::Contains("obstacle"));
+  CHECK(sandbox.json("r.json")["outcome"] == "refused");
+  CHECK(sandbox.json("r.json")["steps"] == 0);
+  CHECK(sandbox.run({"validate", "r.json"}).exit_code == 0);
 }
 
-TEST_CASE("plugins list names the planners beside the program, and refusals do not change its exit code",
-          "[end_to_end]") {
-  Bench bench;
-  bench.put("planners/broken.hamelin.so", "this is no library\n");
-  const auto output = bench.run({"plugins", "list", "--plugin-path", "planners"});
+TEST_CASE(
+    "plugins list names the installed planners, and refused plugins do not change its exit code",
+    "[end_to_end]") {
+  Sandbox sandbox;
+  sandbox.put("planners/broken.hamelin.so", "this is no library\n");
+  const auto output = sandbox.run({"plugins", "list", "--plugin-path", "planners"});
   CHECK(output.exit_code == 0);
   for (const char* name : {"apf", "gyro", "hybrid", "template", "broken.hamelin.so"}) {
     CAPTURE(name);
     CHECK_THAT(output.out + output.err, Catch::Contains(name));
   }
-  CHECK(test::run_json(bench, {"plugins", "list"}).is_structured());
+  CHECK(test::run_json(sandbox, {"plugins", "list"}).is_structured());
 }
 
-TEST_CASE("plugins check passes every planner of ours", "[end_to_end]") {
-  Bench bench;
+TEST_CASE("plugins check passes for every planner of the project", "[end_to_end]") {
+  Sandbox sandbox;
   for (const char* name : {"apf", "gyro", "hybrid", "template"}) {
-    const auto output = bench.run({"plugins", "check", name});
+    const auto output = sandbox.run({"plugins", "check", name});
     CAPTURE(name, output.out, output.err);
     CHECK(output.exit_code == 0);
     CHECK_THAT(output.out, Catch::StartsWith("ok"));
@@ -141,18 +151,19 @@ TEST_CASE("plugins check passes every planner of ours", "[end_to_end]") {
 }
 
 TEST_CASE("the scene that --print-config prints runs to the same result", "[end_to_end]") {
-  Bench bench;
+  Sandbox sandbox;
   for (const char* command : {"run", "integrate"}) {
     CAPTURE(command);
-    const auto printed =
-        bench.run({command, "data/scenes/paper_52_gyro.json", "--step", "0.002", "--duration", "3", "--print-config"});
+    const auto printed = sandbox.run({command, "data/scenes/paper_52_gyro.json", "--step", "0.002",
+                                      "--duration", "3", "--print-config"});
     REQUIRE(printed.exit_code == 0);
     CHECK(parse_json(printed.out, "standard output")["integrator"]["params"]["tolerance"] == 1e-12);
-    bench.put("printed.json", printed.out);
-    Json given =
-        test::run_json(bench, {command, "data/scenes/paper_52_gyro.json", "--step", "0.002", "--duration", "3"},
-                       command == std::string("run") ? 1 : 0);
-    Json again = test::run_json(bench, {command, "printed.json"}, command == std::string("run") ? 1 : 0);
+    sandbox.put("printed.json", printed.out);
+    Json given = test::run_json(
+        sandbox, {command, "data/scenes/paper_52_gyro.json", "--step", "0.002", "--duration", "3"},
+        command == std::string("run") ? 1 : 0);
+    Json again =
+        test::run_json(sandbox, {command, "printed.json"}, command == std::string("run") ? 1 : 0);
     for (Json* result : {&given, &again})
       for (const char* key : {"scene", "timing", "provenance"}) result->erase(key);
     CHECK(given == again);

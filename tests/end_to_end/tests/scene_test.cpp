@@ -4,18 +4,19 @@
 #include "hamelin/test/scene_data.hpp"
 
 using namespace hamelin;
-using test::Bench;
+using test::Sandbox;
 namespace fs = std::filesystem;
 
 namespace {
 
-// A ball of voxels where planar4, stretched along x at its start, has its third joint.
-Json scene_in_a_ball(Bench& bench) {
-  bench.put("ball.primitives.json", R"({"schema": "hamelin.primitives/1", "resolution_m": 0.02,
+// A ball of voxels at the third joint of planar4, which is stretched along x at the start.
+Json scene_in_a_ball(Sandbox& sandbox) {
+  sandbox.put("ball.primitives.json", R"({"schema": "hamelin.primitives/1", "resolution_m": 0.02,
     "free_bounds_m": {"min_m": [-4.6, -4.6, -0.5], "max_m": [4.6, 4.6, 0.5]},
     "obstacles": [{"type": "sphere", "radius_m": 0.1, "position_m": [2, 0, 0]}]})");
-  REQUIRE(bench.run({"scene", "make", "--primitives", "ball.primitives.json", "-o", "ball.bt"}).exit_code == 0);
-  Json scene = bench.json("data/scenes/paper_52_apf.json");
+  REQUIRE(sandbox.run({"scene", "make", "--primitives", "ball.primitives.json", "-o", "ball.bt"})
+              .exit_code == 0);
+  Json scene = sandbox.json("data/scenes/paper_52_apf.json");
   scene["robot"]["file"] = "data/robots/planar4.json";
   scene["obstacles"] = Json::array();
   scene["map"] = {{"file", "ball.bt"}};
@@ -25,22 +26,24 @@ Json scene_in_a_ball(Bench& bench) {
 }
 
 bool some(const Json& lines, const std::string& text) {
-  return std::any_of(lines.begin(), lines.end(),
-                     [&](const Json& line) { return line.get<std::string>().find(text) != std::string::npos; });
+  return std::any_of(lines.begin(), lines.end(), [&](const Json& line) {
+    return line.get<std::string>().find(text) != std::string::npos;
+  });
 }
 
 }  // namespace
 
-TEST_CASE("scene info of a map tells what is within reach of a base", "[end_to_end]") {
-  Bench bench;
+TEST_CASE("scene info of a map reports the occupancy within reach of a base", "[end_to_end]") {
+  Sandbox sandbox;
   const std::string map = "data/maps/clutter.bt";
-  const Json all = test::run_json(bench, {"scene", "info", map});
+  const Json all = test::run_json(sandbox, {"scene", "info", map});
   CHECK(all["kind"] == "map");
-  CHECK(all["bytes"] == fs::file_size(bench.path(map)));
-  CHECK(all["sha256"] == sha256_hex(bench.text(map)));
+  CHECK(all["bytes"] == fs::file_size(sandbox.path(map)));
+  CHECK(all["sha256"] == sha256_hex(sandbox.text(map)));
   CHECK(all["resolution_m"] == 0.02);
   CHECK(all["within_reach"]["occupied_leaves"] == all["occupied_leaves"]);
-  const Json near = test::run_json(bench, {"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
+  const Json near =
+      test::run_json(sandbox, {"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
   const Json& within = near["within_reach"];
   CHECK(within["base_m"] == Json{0.0, 0.0, 0.3});
   CHECK(within["reach_m"] == 0.6);
@@ -52,15 +55,16 @@ TEST_CASE("scene info of a map tells what is within reach of a base", "[end_to_e
             within["unknown_share"].get<double>() ==
         Approx(1.0));
   CHECK(within["occupied_share"] > 0.0);
-  // what depends on the clock stands under "timing" alone
-  Json again = test::run_json(bench, {"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
+  // Only "timing" depends on the clock.
+  Json again =
+      test::run_json(sandbox, {"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
   Json once = near;
   CHECK(once["timing"]["build_ms"] > 0.0);
   again.erase("timing");
   once.erase("timing");
   CHECK(again == once);
 
-  const auto text = bench.run({"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
+  const auto text = sandbox.run({"scene", "info", map, "--base", "0,0,0.3", "--reach", "0.6"});
   CHECK(text.exit_code == 0);
   CHECK_THAT(text.out, Catch::StartsWith("data/maps/clutter.bt: OctoMap with voxels of 0.02 m"));
   CHECK_THAT(text.out, Catch::Contains("within reach  0.6 m of 0 0 0.3: "));
@@ -73,159 +77,176 @@ TEST_CASE("scene info of a map tells what is within reach of a base", "[end_to_e
     std::vector<std::string> command{"scene", "info", map};
     command.insert(command.end(), wrong.begin(), wrong.end());
     CAPTURE(command);
-    const auto output = bench.run(command);
+    const auto output = sandbox.run(command);
     CHECK(output.exit_code == 2);
     CHECK(output.out.empty());
     CHECK(test::lines_of(output.err).size() == 1);
   }
-  const auto scene = bench.run({"scene", "info", "data/scenes/shelf.json", "--reach", "1"});
+  const auto scene = sandbox.run({"scene", "info", "data/scenes/shelf.json", "--reach", "1"});
   CHECK(scene.exit_code == 2);
   CHECK_THAT(scene.err, Catch::Contains("a scene has its own"));
 }
 
-TEST_CASE("scene info of a scene is for a reader, or complete as JSON", "[end_to_end]") {
-  Bench bench;
-  const Json info = test::run_json(bench, {"scene", "info", "data/scenes/shelf.json"});
+TEST_CASE("scene info of a scene prints readable text, or all data as JSON", "[end_to_end]") {
+  Sandbox sandbox;
+  const Json info = test::run_json(sandbox, {"scene", "info", "data/scenes/shelf.json"});
   const Json& within = info["map"]["within_reach"];
   CHECK(within["reach_m"] == info["reach_m"]);
   CHECK(within["boxes"] > 0);
   CHECK(within["structure_bytes"] > 0);
   CHECK(info["map"]["self_filter"].is_null());
-  CHECK(info["map"]["sha256"] == sha256_hex(bench.text("data/maps/shelf.bt")));
-  const auto text = bench.run({"scene", "info", "data/scenes/shelf.json"});
+  CHECK(info["map"]["sha256"] == sha256_hex(sandbox.text("data/maps/shelf.bt")));
+  const auto text = sandbox.run({"scene", "info", "data/scenes/shelf.json"});
   CHECK_THAT(text.out, Catch::StartsWith("data/scenes/shelf.json: scene of "));
-  for (const char* line :
-       {"\n  goals ", "\n  planner ", "\n  map ", "\n  within reach ", "\n  structure ", "\n  clearance "})
+  for (const char* line : {"\n  goals ", "\n  planner ", "\n  map ", "\n  within reach ",
+                           "\n  structure ", "\n  clearance "})
     CHECK_THAT(text.out, Catch::Contains(line));
 }
 
-TEST_CASE("a cropped map is the map to the scene it was cropped for", "[end_to_end]") {
-  Bench bench;
-  const auto output =
-      bench.run({"scene", "crop", "--scene", "data/scenes/clutter.json", "--influence", "0.2", "-o", "near.bt"});
+TEST_CASE("for its scene a cropped map is equivalent to the full map", "[end_to_end]") {
+  Sandbox sandbox;
+  const auto output = sandbox.run({"scene", "crop", "--scene", "data/scenes/clutter.json",
+                                   "--influence", "0.2", "-o", "near.bt"});
   CAPTURE(output.err);
   REQUIRE(output.exit_code == 0);
   CHECK_THAT(output.out, Catch::StartsWith("near.bt: "));
-  Json scene = bench.json("data/scenes/clutter.json");
+  Json scene = sandbox.json("data/scenes/clutter.json");
   for (const char* key : {"file", "spheres"})
-    if (scene["robot"].contains(key)) scene["robot"][key] = "data/scenes/" + scene["robot"][key].get<std::string>();
+    if (scene["robot"].contains(key))
+      scene["robot"][key] = "data/scenes/" + scene["robot"][key].get<std::string>();
   scene["map"]["file"] = "near.bt";
-  bench.put("near.json", scene.dump());
-  const Json whole = test::run_json(bench, {"scene", "info", "data/scenes/clutter.json"}),
-             cropped = test::run_json(bench, {"scene", "info", "near.json"});
-  CHECK(cropped["map"]["within_reach"]["occupied_leaves"] == whole["map"]["within_reach"]["occupied_leaves"]);
+  sandbox.put("near.json", scene.dump());
+  const Json whole = test::run_json(sandbox, {"scene", "info", "data/scenes/clutter.json"}),
+             cropped = test::run_json(sandbox, {"scene", "info", "near.json"});
+  CHECK(cropped["map"]["within_reach"]["occupied_leaves"] ==
+        whole["map"]["within_reach"]["occupied_leaves"]);
   CHECK(cropped["map"]["within_reach"]["boxes"] == whole["map"]["within_reach"]["boxes"]);
-  CHECK(cropped["map"]["within_reach"]["occupied_share"] == whole["map"]["within_reach"]["occupied_share"]);
-  CHECK(cropped["map"]["within_reach"]["unknown_share"] == whole["map"]["within_reach"]["unknown_share"]);
+  CHECK(cropped["map"]["within_reach"]["occupied_share"] ==
+        whole["map"]["within_reach"]["occupied_share"]);
+  CHECK(cropped["map"]["within_reach"]["unknown_share"] ==
+        whole["map"]["within_reach"]["unknown_share"]);
   CHECK(cropped["clearance_at_start_m"] == whole["clearance_at_start_m"]);
 
-  const Json made = test::run_json(
-      bench, {"scene", "crop", "data/maps/clutter.bt", "--center", "0,0,0.3", "--radius", "0.4", "-o", "ball.bt"});
-  CHECK(made["bytes"] == fs::file_size(bench.path("ball.bt")));
+  const Json made = test::run_json(sandbox, {"scene", "crop", "data/maps/clutter.bt", "--center",
+                                             "0,0,0.3", "--radius", "0.4", "-o", "ball.bt"});
+  CHECK(made["bytes"] == fs::file_size(sandbox.path("ball.bt")));
   CHECK(made["bytes"] < made["bytes_before"]);
-  CHECK(made["sha256"] == sha256_hex(bench.text("ball.bt")));
-  CHECK(bench.run({"scene", "crop", "data/maps/clutter.bt", "--box", "0,-0.5,0,0.5,0.5,1", "-o", "box.bt"}).exit_code ==
-        0);
-  CHECK(bench.run({"validate", "ball.bt", "box.bt", "near.bt"}).exit_code == 0);
+  CHECK(made["sha256"] == sha256_hex(sandbox.text("ball.bt")));
+  CHECK(sandbox
+            .run({"scene", "crop", "data/maps/clutter.bt", "--box", "0,-0.5,0,0.5,0.5,1", "-o",
+                  "box.bt"})
+            .exit_code == 0);
+  CHECK(sandbox.run({"validate", "ball.bt", "box.bt", "near.bt"}).exit_code == 0);
 }
 
-TEST_CASE("scene crop refuses in one line what it cannot do, and writes nothing", "[end_to_end]") {
-  Bench bench;
-  bench.put("own.bt", bench.text("data/maps/clutter.bt"));
+TEST_CASE("scene crop refuses bad options with one line, and writes no file", "[end_to_end]") {
+  Sandbox sandbox;
+  sandbox.put("own.bt", sandbox.text("data/maps/clutter.bt"));
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
       {{"own.bt", "--center", "0,0,0", "--radius", "1", "-o", "own.bt"}, "is the map itself"},
       {{"own.bt", "--center", "0,0,0", "--radius", "1", "-o", "made.ot"}, "ends in .bt"},
       {{"own.bt", "--center", "90,0,0", "--radius", "1", "-o", "made.bt"}, "nothing of the map"},
       {{"own.bt", "--center", "0,0,0", "-o", "made.bt"}, "belong together"},
-      {{"own.bt", "-o", "made.bt"}, "give one of"},
-      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--box", "0,0,0,1,1,1", "-o", "made.bt"}, "give one of"},
+      {{"own.bt", "-o", "made.bt"}, "expected one of"},
+      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--box", "0,0,0,1,1,1", "-o", "made.bt"},
+       "expected one of"},
       {{"own.bt", "--box", "0,0,0,1,1", "-o", "made.bt"}, "--box"},
-      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--threshold", "2", "-o", "made.bt"}, "threshold"},
-      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--unknown", "block", "-o", "made.bt"}, "keep, free"},
+      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--threshold", "2", "-o", "made.bt"},
+       "threshold"},
+      {{"own.bt", "--center", "0,0,0", "--radius", "1", "--unknown", "block", "-o", "made.bt"},
+       "keep, free"},
       {{"--center", "0,0,0", "--radius", "1", "-o", "made.bt"}, "no map"},
       {{"absent.bt", "--center", "0,0,0", "--radius", "1", "-o", "made.bt"}, "absent.bt"},
       {{"--scene", "data/scenes/paper_52_apf.json", "-o", "made.bt"}, "/map: is missing"}};
-  for (const auto& [arguments, wanted] : cases) {
+  for (const auto& [arguments, expected] : cases) {
     std::vector<std::string> command{"scene", "crop"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     CAPTURE(command);
-    const auto output = bench.run(command);
+    const auto output = sandbox.run(command);
     CAPTURE(output.err);
     CHECK(output.exit_code == 2);
     CHECK(output.out.empty());
     CHECK(test::lines_of(output.err).size() == 1);
-    CHECK(output.err.find(wanted) != std::string::npos);
-    CHECK_FALSE(fs::exists(bench.path("made.bt")));
+    CHECK(output.err.find(expected) != std::string::npos);
+    CHECK_FALSE(fs::exists(sandbox.path("made.bt")));
   }
-  CHECK((bench.text("own.bt") == bench.text("data/maps/clutter.bt")));
+  CHECK((sandbox.text("own.bt") == sandbox.text("data/maps/clutter.bt")));
 }
 
-TEST_CASE("a map that holds the robot is noticed, and a self-filter takes the robot out of it", "[end_to_end]") {
-  Bench bench;
-  Json scene = scene_in_a_ball(bench);
-  bench.put("scene.json", scene.dump());
-  const Json plain = test::run_json(bench, {"scene", "info", "scene.json"});
+TEST_CASE("a map that contains the robot gives a warning, and a self-filter removes the robot",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  Json scene = scene_in_a_ball(sandbox);
+  sandbox.put("scene.json", scene.dump());
+  const Json plain = test::run_json(sandbox, {"scene", "info", "scene.json"});
   CHECK(some(plain["warnings"], "the map may contain the robot itself"));
   CHECK(plain["clearance_at_start_m"] < 0.0);
-  const auto refused = bench.run({"run", "scene.json", "--planner", "apf", "--result", "refused.json"});
+  const auto refused =
+      sandbox.run({"run", "scene.json", "--planner", "apf", "--result", "refused.json"});
   CHECK(refused.exit_code == 2);
-  CHECK(bench.json("refused.json")["outcome"] == "refused");
-  CHECK(some(bench.json("refused.json")["warnings"], "map.self_filter"));
+  CHECK(sandbox.json("refused.json")["outcome"] == "refused");
+  CHECK(some(sandbox.json("refused.json")["warnings"], "map.self_filter"));
 
   scene["map"]["self_filter"] = {{"padding_m", 0.03}};
-  bench.put("scene.json", scene.dump());
-  const Json filtered = test::run_json(bench, {"scene", "info", "scene.json"});
+  sandbox.put("scene.json", scene.dump());
+  const Json filtered = test::run_json(sandbox, {"scene", "info", "scene.json"});
   const Json& filter = filtered["map"]["self_filter"];
   CHECK(filter["padding_m"] == 0.03);
   CHECK(filter["occupied_voxels"] > 50);
   CHECK(filter["occupied_leaves"] > 0);
   CHECK(filtered["clearance_at_start_m"] >= 0.03);
   CHECK_FALSE(some(filtered["warnings"], "may contain the robot"));
-  CHECK_THAT(bench.run({"scene", "info", "scene.json"}).out, Catch::Contains("\n  self-filter "));
-  const auto run = bench.run({"run", "scene.json", "--planner", "apf", "--result", "run.json"});
+  CHECK_THAT(sandbox.run({"scene", "info", "scene.json"}).out, Catch::Contains("\n  self-filter "));
+  const auto run = sandbox.run({"run", "scene.json", "--planner", "apf", "--result", "run.json"});
   CAPTURE(run.err);
   CHECK(run.exit_code < 2);
-  CHECK(some(bench.json("run.json")["warnings"], "the self-filter took " + filter["occupied_voxels"].dump()));
+  CHECK(some(sandbox.json("run.json")["warnings"],
+             "the self-filter removed " + filter["occupied_voxels"].dump()));
 }
 
-TEST_CASE("unknown space that blocks is refused in a map that knows no free space", "[end_to_end]") {
-  Bench bench;
-  Json scene = scene_in_a_ball(bench);
-  bench.put("bare.primitives.json", R"({"schema": "hamelin.primitives/1", "resolution_m": 0.02,
+TEST_CASE("a map without free space is refused if unknown space is an obstacle", "[end_to_end]") {
+  Sandbox sandbox;
+  Json scene = scene_in_a_ball(sandbox);
+  sandbox.put("bare.primitives.json", R"({"schema": "hamelin.primitives/1", "resolution_m": 0.02,
     "obstacles": [{"type": "sphere", "radius_m": 0.1, "position_m": [2, 2, 0]}]})");
-  REQUIRE(bench.run({"scene", "make", "--primitives", "bare.primitives.json", "-o", "bare.bt"}).exit_code == 0);
+  REQUIRE(sandbox.run({"scene", "make", "--primitives", "bare.primitives.json", "-o", "bare.bt"})
+              .exit_code == 0);
   scene["map"] = {{"file", "bare.bt"}, {"unknown", "block"}};
-  bench.put("scene.json", scene.dump());
-  const auto refused = bench.run({"run", "scene.json", "--planner", "apf", "--result", "r.json"});
+  sandbox.put("scene.json", scene.dump());
+  const auto refused = sandbox.run({"run", "scene.json", "--planner", "apf", "--result", "r.json"});
   CHECK(refused.exit_code == 2);
   CHECK_THAT(refused.err, Catch::Contains("bare.bt: the map has no free leaf"));
   scene["map"]["unknown"] = "slow";
-  bench.put("scene.json", scene.dump());
-  CHECK(some(test::run_json(bench, {"scene", "info", "scene.json"})["warnings"], "slows all motion down"));
+  sandbox.put("scene.json", scene.dump());
+  CHECK(some(test::run_json(sandbox, {"scene", "info", "scene.json"})["warnings"],
+             "slows all motion down"));
 }
 
-TEST_CASE("a problem becomes a scene whose arm knows free space all around", "[end_to_end]") {
-  const fs::path problem_file = fs::path(HAMELIN_SOURCE_DIR) / "libs/scene/tests/data/cabinet.problem.json";
+TEST_CASE("a scene made from a problem has known space all around its arm", "[end_to_end]") {
+  const fs::path problem_file =
+      fs::path(HAMELIN_SOURCE_DIR) / "libs/scene/tests/data/cabinet.problem.json";
   const fs::path& robots = test::third_party_robots;
-  Bench bench;
+  Sandbox sandbox;
   for (const char* mark : {"touch", "centre"}) {
-    const auto output = bench.run({"scene", "make", problem_file.string(), "--robot", (robots / "panda.urdf").string(),
-                                   "--spheres", (robots / "panda_spheres.json").string(), "--tip", "panda_grasptarget",
-                                   "--resolution", "0.01", "--mark", mark, "-o", "scene.json"});
+    const auto output = sandbox.run(
+        {"scene", "make", problem_file.string(), "--robot", (robots / "panda.urdf").string(),
+         "--spheres", (robots / "panda_spheres.json").string(), "--tip", "panda_grasptarget",
+         "--resolution", "0.01", "--mark", mark, "-o", "scene.json"});
     CAPTURE(output.err);
     REQUIRE(output.exit_code == 0);
-    const Json info = test::run_json(bench, {"scene", "info", "scene.json"});
+    const Json info = test::run_json(sandbox, {"scene", "info", "scene.json"});
     CHECK(info["map"]["within_reach"]["unknown_share"] == 0.0);
     CHECK(info["map"]["within_reach"]["occupied_share"] > 0.0);
     CHECK_FALSE(some(info["warnings"], "free leaf"));
-    CHECK(info["obstacles"] == bench.json("scene.json")["obstacles"].size());
+    CHECK(info["obstacles"] == sandbox.json("scene.json")["obstacles"].size());
   }
   Json problem = read_json(problem_file);
   problem["obstacles"][2]["type"] = "mesh";
-  bench.put("problem.json", problem.dump());
-  const auto refused = bench.run({"scene", "make", "problem.json", "--robot", (robots / "panda.urdf").string(), "--tip",
-                                  "panda_grasptarget", "-o", "none.json"});
+  sandbox.put("problem.json", problem.dump());
+  const auto refused =
+      sandbox.run({"scene", "make", "problem.json", "--robot", (robots / "panda.urdf").string(),
+                   "--tip", "panda_grasptarget", "-o", "none.json"});
   CHECK(refused.exit_code == 2);
   CHECK_THAT(refused.err, Catch::Contains("problem.json: /obstacles/2/type: is \"mesh\""));
-  CHECK_FALSE(fs::exists(bench.path("none.bt")));
+  CHECK_FALSE(fs::exists(sandbox.path("none.bt")));
 }

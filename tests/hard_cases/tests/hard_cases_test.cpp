@@ -5,12 +5,13 @@
 using namespace hamelin;
 using namespace hamelin::hard_cases;
 
-// Bounds are the figures of docs/hard_cases.md with some room for another machine's rounding, and the motion itself, by
-// another scheme. What other libraries test of the hard cases is named there too.
+// Bounds are the figures of docs/hard_cases.md, with some room for another machine's rounding, and
+// the motion itself by another scheme. docs/hard_cases.md also names the tests of other libraries.
 namespace {
 
-/// Complete, or ended at a step without a root; never with a state that is no number.
-Outcome sound(const Motion& motion, const std::string& scheme) {
+/// Runs a motion, which may end at a step without a root, but never with a state that is not
+/// finite.
+Outcome run_checked(const Motion& motion, const std::string& scheme) {
   const Outcome outcome = run(motion, scheme);
   CAPTURE(scheme, outcome.steps, outcome.completed);
   CHECK(outcome.q.allFinite());
@@ -18,10 +19,10 @@ Outcome sound(const Motion& motion, const std::string& scheme) {
   return outcome;
 }
 
-/// By the motion of `duration` that make(step, steps) sets up: the error against the reference is at most `bound` and
-/// falls as the square of the step.
+/// Checks, for the motion of `duration_s` that make(step, steps) sets up, that the error against
+/// the reference is at most `bound` and falls as the square of the step.
 template <class F>
-void follows(F&& make, double step_s, double duration_s, double bound) {
+void check_second_order(F&& make, double step_s, double duration_s, double bound) {
   const long steps = std::lround(duration_s / step_s);
   const Motion coarse = make(step_s, steps), fine = make(0.5 * step_s, 2 * steps);
   const VectorXd truth = reference_end(coarse);
@@ -39,91 +40,108 @@ void follows(F&& make, double step_s, double duration_s, double bound) {
 }  // namespace
 
 TEST_CASE("a stretched arm falls out of its singular pose with its energy", "[hard]") {
-  const Outcome ours = sound(stretched(7, 1e-3, 1000), "hamel-variational");
-  REQUIRE(ours.completed);
-  CHECK(ours.q.norm() > 0.5);  // it did fall
-  CHECK(ours.energy_error_J < 1e-3);
-  CHECK(sound(stretched(7, 1e-3, 1000), "hamel").energy_error_J > 100.0 * ours.energy_error_J);
-  follows([](double h, long steps) { return stretched(7, h, steps); }, 1e-3, 0.3, 2e-5);
+  const Outcome variational = run_checked(stretched(7, 1e-3, 1000), "hamel-variational");
+  REQUIRE(variational.completed);
+  CHECK(variational.q.norm() > 0.5);  // it fell
+  CHECK(variational.energy_error_J < 1e-3);
+  CHECK(run_checked(stretched(7, 1e-3, 1000), "hamel").energy_error_J >
+        100.0 * variational.energy_error_J);
+  check_second_order([](double h, long steps) { return stretched(7, h, steps); }, 1e-3, 0.3, 2e-5);
 }
 
-TEST_CASE("joints that turn past pi again and again are nothing special", "[hard]") {
-  const Outcome ours = sound(turning(1e-3, 10000), "hamel-variational");
-  REQUIRE(ours.completed);
-  CHECK(ours.q.cwiseAbs().maxCoeff() > 10.0 * M_PI);
-  CHECK(ours.energy_error_J < 2e-3);
-  CHECK(ours.late_over_early < 1.5);
-  // the same motion with each joint a full turn on: only sine and cosine of an angle may count
+TEST_CASE("joints that turn past pi again and again keep their energy", "[hard]") {
+  const Outcome variational = run_checked(turning(1e-3, 10000), "hamel-variational");
+  REQUIRE(variational.completed);
+  CHECK(variational.q.cwiseAbs().maxCoeff() > 10.0 * M_PI);
+  CHECK(variational.energy_error_J < 2e-3);
+  CHECK(variational.late_over_early < 1.5);
+  // The same motion with each joint a full turn further: only sine and cosine of an angle may
+  // matter.
   Motion again = turning(1e-3, 500);
   const VectorXd here = run(again, "hamel-variational").q;
   again.q0.array() -= 2.0 * M_PI;
-  CHECK((run(again, "hamel-variational").q.array() + 2.0 * M_PI - here.array()).abs().maxCoeff() < 1e-9);
-  follows(turning, 2.5e-4, 1.0, 1e-4);
+  CHECK((run(again, "hamel-variational").q.array() + 2.0 * M_PI - here.array()).abs().maxCoeff() <
+        1e-9);
+  check_second_order(turning, 2.5e-4, 1.0, 1e-4);
 }
 
-TEST_CASE("chains of 100 and 200 links take three corrections a step at most, and one factorisation", "[hard]") {
+TEST_CASE(
+    "chains of 100 and 200 links take at most three corrections per step, and one factorisation",
+    "[hard]") {
   for (const int links : {100, 200}) {
     CAPTURE(links);
-    const Outcome ours = sound(stretched(links, 1e-3, 200), "hamel-variational");
-    REQUIRE(ours.completed);
-    CHECK(ours.halvings == 0);
-    CHECK(ours.updates_max <= 3);
-    CHECK(ours.factorizations_mean < 1.2);
-    CHECK(ours.energy_error_J < 1e-6 * ours.energy_scale_J);
-    follows([&](double h, long steps) { return stretched(links, h, steps); }, 2.5e-4, 0.2, 5e-6);
+    const Outcome variational = run_checked(stretched(links, 1e-3, 200), "hamel-variational");
+    REQUIRE(variational.completed);
+    CHECK(variational.halvings == 0);
+    CHECK(variational.updates_max <= 3);
+    CHECK(variational.factorizations_mean < 1.2);
+    CHECK(variational.energy_error_J < 1e-6 * variational.energy_scale_J);
+    check_second_order([&](double h, long steps) { return stretched(links, h, steps); }, 2.5e-4,
+                       0.2, 5e-6);
   }
-  CHECK(sound(stretched(200, 1e-3, 200), "hamel").updates_max > 10);
+  CHECK(run_checked(stretched(200, 1e-3, 200), "hamel").updates_max > 10);
 }
 
-TEST_CASE("a link that weighs a million times the others is followed, or the motion ends at a named step", "[hard]") {
-  const Outcome first = sound(mass_ratio(0, 1e-3, 1000), "hamel-variational");
+TEST_CASE(
+    "a link a million times as heavy as the others is integrated, or the motion ends at a step "
+    "without a root",
+    "[hard]") {
+  const Outcome first = run_checked(mass_ratio(0, 1e-3, 1000), "hamel-variational");
   REQUIRE(first.completed);
   CHECK(first.energy_error_J < 1e-4 * first.energy_scale_J);
-  follows([](double h, long steps) { return mass_ratio(0, h, steps); }, 1e-3, 0.1, 1e-5);
-  // with the tip so heavy the light links whip faster than 1 ms shows; a tenth of it does
-  const Outcome tip = sound(mass_ratio(6, 1e-3, 1000), "hamel-variational");
+  check_second_order([](double h, long steps) { return mass_ratio(0, h, steps); }, 1e-3, 0.1, 1e-5);
+  // With such a heavy tip the light links move too fast for steps of 1 ms; 0.1 ms resolves the
+  // motion.
+  const Outcome tip = run_checked(mass_ratio(6, 1e-3, 1000), "hamel-variational");
   CHECK(tip.halvings > 0);
-  CHECK(tip.energy_error_J < 0.1 * tip.energy_scale_J);  // also where it ended
-  follows([](double h, long steps) { return mass_ratio(6, h, steps); }, 2.5e-5, 0.1, 2e-5);
-  const Outcome fine = sound(mass_ratio(6, 1e-4, 3000), "hamel-variational");
+  CHECK(tip.energy_error_J < 0.1 * tip.energy_scale_J);  // up to where it ended
+  check_second_order([](double h, long steps) { return mass_ratio(6, h, steps); }, 2.5e-5, 0.1,
+                     2e-5);
+  const Outcome fine = run_checked(mass_ratio(6, 1e-4, 3000), "hamel-variational");
   REQUIRE(fine.completed);
   CHECK(fine.energy_error_J < 1e-3 * fine.energy_scale_J);
 }
 
-TEST_CASE("the grid of steps from 1e-6 to 0.1 s: the error falls as the square of the step where motion is resolved",
-          "[hard]") {
+TEST_CASE(
+    "the grid of steps from 1e-6 to 0.1 s: the error falls as the square of the step while motion "
+    "is resolved",
+    "[hard]") {
   double last = 0.0;
   for (const double h : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
     CAPTURE(h);
-    const Outcome ours = sound(stretched(7, h, std::min(2000L, std::lround(1.0 / h))), "hamel-variational");
-    REQUIRE(ours.completed);
-    CHECK(ours.halvings == 0);
-    if (last > 0.0) CHECK(ours.energy_error_J < 0.02 * last);
-    last = ours.energy_error_J;
+    const Outcome variational =
+        run_checked(stretched(7, h, std::min(2000L, std::lround(1.0 / h))), "hamel-variational");
+    REQUIRE(variational.completed);
+    CHECK(variational.halvings == 0);
+    if (last > 0.0) CHECK(variational.energy_error_J < 0.02 * last);
+    last = variational.energy_error_J;
   }
-  const Outcome coarse = sound(stretched(7, 0.1, 10), "hamel-variational");  // not resolved: halved
+  // 0.1 s does not resolve the motion: steps are halved.
+  const Outcome coarse = run_checked(stretched(7, 0.1, 10), "hamel-variational");
   REQUIRE(coarse.completed);
   CHECK(coarse.halvings > 0);
   CHECK(coarse.energy_error_J < 2.0);
 }
 
-TEST_CASE("a stiff barrier is not tunnelled through where the step resolves it, and keeps the energy", "[hard]") {
-  // hits at up to 2.8 J: no deeper than √(2 · 2.8 / stiffness), h ω = 0.06, 0.6
+TEST_CASE("a stiff barrier that the step resolves is not passed through and keeps the energy",
+          "[hard]") {
+  // Impacts have up to 2.8 J, so the depth is at most √(2 · 2.8 / stiffness). h ω = 0.06 and 0.6.
   for (const double stiffness : {1e4, 1e6}) {
     CAPTURE(stiffness);
-    const Outcome ours = sound(falling_on_barrier(stiffness, 1e-3, 10000), "hamel-variational");
-    REQUIRE(ours.completed);
-    CHECK(ours.deepest > 0.0);
-    CHECK(ours.deepest < 1.1 * std::sqrt(2.0 * 2.8 / stiffness));
-    CHECK(ours.late_over_early < 1.1);  // bounded
-    CHECK(ours.energy_error_J < 0.1 * 2.8);
+    const Outcome variational =
+        run_checked(falling_on_barrier(stiffness, 1e-3, 10000), "hamel-variational");
+    REQUIRE(variational.completed);
+    CHECK(variational.deepest > 0.0);
+    CHECK(variational.deepest < 1.1 * std::sqrt(2.0 * 2.8 / stiffness));
+    CHECK(variational.late_over_early < 1.1);  // bounded
+    CHECK(variational.energy_error_J < 0.1 * 2.8);
   }
 }
 
-TEST_CASE("10^6 steps of example 5.1 keep the energy of the first", "[hard]") {
-  const Outcome ours = sound(million_steps(), "hamel-variational");
-  REQUIRE(ours.completed);
-  CHECK(ours.energy_error_J < 1.8e-4);
-  CHECK(ours.late_over_early < 1.01);
-  CHECK(ours.halvings == 0);
+TEST_CASE("10^6 steps of example 5.1 keep the initial energy", "[hard]") {
+  const Outcome variational = run_checked(million_steps(), "hamel-variational");
+  REQUIRE(variational.completed);
+  CHECK(variational.energy_error_J < 1.8e-4);
+  CHECK(variational.late_over_early < 1.01);
+  CHECK(variational.halvings == 0);
 }

@@ -21,8 +21,8 @@
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/simulation/run.hpp"
 
-// What judges here shares no code with hamelin: urdfdom reads the arm, Eigen places it, OctoMap reads the map, FCL
-// answers. hamelin runs the scene and reads its own log's JSON.
+// The checks share no code with hamelin: urdfdom reads the arm, Eigen places it, OctoMap reads the
+// map, and FCL decides about contact. hamelin runs the scene and reads the JSON of its log.
 using namespace hamelin;
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
@@ -36,7 +36,7 @@ struct Ball {
   double radius;
 };
 
-/// A link of the URDF that carries balls, with a ball around them all.
+/// A link of the URDF with balls, and a ball around all of them.
 struct Part {
   std::string link;
   std::vector<Ball> balls;
@@ -47,30 +47,35 @@ Isometry3d isometry(const urdf::Pose& pose) {
   Isometry3d g = Isometry3d::Identity();
   g.translation() = Vector3d(pose.position.x, pose.position.y, pose.position.z);
   g.linear() =
-      Eigen::Quaterniond(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z).toRotationMatrix();
+      Eigen::Quaterniond(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z)
+          .toRotationMatrix();
   return g;
 }
 
 Ball hull_of(const std::vector<Ball>& balls) {
   Ball hull{Vector3d::Zero(), 0.0};
   for (const auto& ball : balls) hull.center += ball.center / static_cast<double>(balls.size());
-  for (const auto& ball : balls) hull.radius = std::max(hull.radius, (ball.center - hull.center).norm() + ball.radius);
+  for (const auto& ball : balls)
+    hull.radius = std::max(hull.radius, (ball.center - hull.center).norm() + ball.radius);
   return hull;
 }
 
-/// The scene's arm, in the world.
+/// The arm of a scene.
 class Arm {
  public:
   Arm(const Json& scene, const fs::path& directory)
-      : urdf_(urdf::parseURDFFile((directory / scene["robot"]["file"].get<std::string>()).string())) {
+      : urdf_(
+            urdf::parseURDFFile((directory / scene["robot"]["file"].get<std::string>()).string())) {
     for (auto link = urdf_->getLink(scene["robot"]["tip"].get<std::string>()); link->parent_joint;
          link = urdf_->getLink(link->parent_joint->parent_link_name))
-      if (link->parent_joint->type != urdf::Joint::FIXED) moving_.insert(moving_.begin(), link->parent_joint->name);
+      if (link->parent_joint->type != urdf::Joint::FIXED)
+        moving_.insert(moving_.begin(), link->parent_joint->name);
     const Json sidecar = read_json(directory / scene["robot"]["spheres"].get<std::string>());
     for (const auto& [name, list] : sidecar["links"].items()) {
       Part part{name, {}, {}};
       for (const auto& ball : list)
-        part.balls.push_back({Vector3d(ball["center"][0], ball["center"][1], ball["center"][2]), ball["radius"]});
+        part.balls.push_back(
+            {Vector3d(ball["center"][0], ball["center"][1], ball["center"][2]), ball["radius"]});
       part.hull = hull_of(part.balls);
       if (!part.balls.empty() && moves(name)) parts_.push_back(part);
     }
@@ -79,7 +84,8 @@ class Arm {
   [[nodiscard]] std::size_t dof() const { return moving_.size(); }
   [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
 
-  /// Poses of the parts' links, by the product of the joints' transforms from the root down.
+  /// Poses of the parts' links in the world, as products of the joint transforms from the root to
+  /// the link.
   [[nodiscard]] std::vector<Isometry3d> poses(const std::vector<double>& q) const {
     std::map<std::string, double> angles;
     for (std::size_t i = 0; i < moving_.size(); ++i) angles[moving_[i]] = q[i];
@@ -91,8 +97,8 @@ class Arm {
         const auto& joint = *link->parent_joint;
         Isometry3d step = isometry(joint.parent_to_joint_origin_transform);
         if (const auto angle = angles.find(joint.name); angle != angles.end())
-          step.rotate(
-              Eigen::AngleAxisd(angle->second, Vector3d(joint.axis.x, joint.axis.y, joint.axis.z).normalized()));
+          step.rotate(Eigen::AngleAxisd(
+              angle->second, Vector3d(joint.axis.x, joint.axis.y, joint.axis.z).normalized()));
         g = step * g;
       }
       poses.push_back(g);
@@ -104,19 +110,21 @@ class Arm {
   [[nodiscard]] bool moves(const std::string& name) const {
     for (auto link = urdf_->getLink(name); link->parent_joint;
          link = urdf_->getLink(link->parent_joint->parent_link_name))
-      if (std::find(moving_.begin(), moving_.end(), link->parent_joint->name) != moving_.end()) return true;
+      if (std::find(moving_.begin(), moving_.end(), link->parent_joint->name) != moving_.end())
+        return true;
     return false;
   }
 
   urdf::ModelInterfaceSharedPtr urdf_;
-  std::vector<std::string> moving_;  ///< the joints that q is of, from the root
+  std::vector<std::string> moving_;  ///< joints with a position in q, from the root
   std::vector<Part> parts_;
 };
 
-/// A map, as FCL sees it.
+/// A map in FCL.
 class Judge {
  public:
-  explicit Judge(const fs::path& file) : octree_(std::make_shared<octomap::OcTree>(file.string())) {}
+  explicit Judge(const fs::path& file)
+      : octree_(std::make_shared<octomap::OcTree>(file.string())) {}
 
   [[nodiscard]] bool touches(const Vector3d& center, double radius) const {
     const fcl::Sphered sphere(radius);
@@ -126,7 +134,8 @@ class Judge {
     return result.isCollision();
   }
 
-  /// Whether any ball, its radius grown by `margin`, touches; links whose hull is clear are not looked into.
+  /// Whether any ball touches the map if its radius is enlarged by `margin`. The balls of a link
+  /// are checked only if its hull touches the map.
   [[nodiscard]] bool touches(const Arm& arm, const std::vector<double>& q, double margin) const {
     const auto poses = arm.poses(q);
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -138,7 +147,8 @@ class Judge {
     return false;
   }
 
-  /// FCL's distance of the ball nearest to the map; balls farther than `limit` are left out. Infinite if all are.
+  /// FCL's distance between the map and the nearest ball, without balls farther than `limit`.
+  /// Infinite if all are farther.
   [[nodiscard]] double distance(const Arm& arm, const std::vector<double>& q, double limit) const {
     double nearest = std::numeric_limits<double>::infinity();
     const auto poses = arm.poses(q);
@@ -176,9 +186,10 @@ struct Run {
   std::vector<Tick> ticks;
 };
 
-/// The scene as it stands, with the hybrid planner, every tick logged.
+/// Runs the unmodified scene and logs every tick.
 Run run_logged(const fs::path& file) {
-  const fs::path directory = fs::temp_directory_path() / ("hamelin_judge_" + std::to_string(::getpid()));
+  const fs::path directory =
+      fs::temp_directory_path() / ("hamelin_judge_" + std::to_string(::getpid()));
   fs::create_directories(directory);
   Run run;
   {
@@ -189,12 +200,14 @@ Run run_logged(const fs::path& file) {
   }
   for (const Json& line : log::read_log(directory / "run.jsonl").lines)
     if (line["type"] == "tick")
-      run.ticks.push_back({line["q"].get<std::vector<double>>(), line["clearance_m"].get<double>()});
+      run.ticks.push_back(
+          {line["q"].get<std::vector<double>>(), line["clearance_m"].get<double>()});
   fs::remove_all(directory);
   return run;
 }
 
-std::vector<double> between(const std::vector<double>& a, const std::vector<double>& b, double share) {
+std::vector<double> between(const std::vector<double>& a, const std::vector<double>& b,
+                            double share) {
   std::vector<double> q(a.size());
   for (std::size_t i = 0; i < q.size(); ++i) q[i] = (1.0 - share) * a[i] + share * b[i];
   return q;
@@ -208,16 +221,18 @@ TEST_CASE("the judge sees a contact where there is one", "[judge][unit]") {
   const Arm arm(scene, directory);
   const Judge judge(directory / scene["map"]["file"].get<std::string>());
   REQUIRE(arm.dof() == 7);
-  // The shelf's boards stand before the arm: stretched out towards them it must hit one, folded back not.
+  // The boards of the shelf are in front of the arm. Stretched out towards them it must hit one,
+  // folded back it must not.
   const std::vector<double> into{0.0, 1.2, 0.0, -0.4, 0.0, 1.6, 0.0},
       folded{3.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785};
   CHECK(judge.touches(arm, into, 0.0));
   CHECK_FALSE(judge.touches(arm, folded, 0.0));
 }
 
-TEST_CASE("by FCL's account hybrid reaches the goals of the shelf and the clutter without touching", "[judge][long]") {
-  constexpr int parts_between = 5;     // so four points between two nodes
-  constexpr std::size_t sampled = 50;  // ticks whose distance is compared; FCL takes milliseconds for one
+TEST_CASE("hybrid reaches the goals of the shelf and the clutter without contact according to FCL",
+          "[judge][long]") {
+  constexpr int parts_between = 5;     // four points between two nodes
+  constexpr std::size_t sampled = 50;  // ticks whose distance is compared; each takes milliseconds
   constexpr double agreement_m = 1e-4;
   const fs::path directory = fs::path(HAMELIN_SOURCE_DIR) / "data" / "scenes";
   for (const std::string name : {"shelf.json", "clutter.json"}) {
@@ -234,11 +249,12 @@ TEST_CASE("by FCL's account hybrid reaches the goals of the shelf and the clutte
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
       touching += judge.touches(arm, run.ticks[k].q, 0.0);
       for (int i = 1; k > 0 && i < parts_between; ++i)
-        touching += judge.touches(arm, between(run.ticks[k - 1].q, run.ticks[k].q, double(i) / parts_between), 0.0);
+        touching += judge.touches(
+            arm, between(run.ticks[k - 1].q, run.ticks[k].q, double(i) / parts_between), 0.0);
     }
     CHECK(touching == 0);
 
-    // the planner's influence distance caps what is logged
+    // the logged clearance is limited to the influence distance of the planner
     double cap = 0.0;
     std::size_t tightest = 0;
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
@@ -248,7 +264,8 @@ TEST_CASE("by FCL's account hybrid reaches the goals of the shelf and the clutte
     REQUIRE(run.result.min_clearance_m.has_value());
     CHECK(*run.result.min_clearance_m == run.ticks[tightest].clearance_m);
     std::vector<std::size_t> sample{tightest};
-    for (std::size_t i = 0; i < sampled; ++i) sample.push_back(i * (run.ticks.size() - 1) / (sampled - 1));
+    for (std::size_t i = 0; i < sampled; ++i)
+      sample.push_back(i * (run.ticks.size() - 1) / (sampled - 1));
     for (const std::size_t k : sample) {
       CAPTURE(k);
       const double distance = judge.distance(arm, run.ticks[k].q, cap + agreement_m);

@@ -25,6 +25,7 @@ int main() {
   hamelin::dynamics::forward_dynamics(model, ws, rest, rest, rest, a);
   const double expected = -2.0 * 9.81 * 0.5 / (1.0 + 2.0 * 0.5 * 0.5);
   const auto plugin = hamelin::planning::find_plugin("template", {PLUGIN_DIR});
-  std::cout << "hamelin " << hamelin::version() << ": a = " << a[0] << ", planner " << plugin.name() << '\n';
+  std::cout << "hamelin " << hamelin::version() << ": a = " << a[0] << ", planner " << plugin.name()
+            << '\n';
   return std::abs(a[0] - expected) < 1e-12 ? 0 : 1;
 }

@@ -7,9 +7,11 @@
 int main(int, char** argv) {  // first PREFIX/share/hamelin PREFIX/lib/hamelin/plugins
   using namespace hamelin;
   const std::filesystem::path data = argv[1], robots = data / "robots";
-  const model::Model arm(description::read_robot(robots / "arm7.urdf", {"flange", robots / "arm7.spheres.json"}));
+  const model::Model arm(
+      description::read_robot(robots / "arm7.urdf", {"flange", robots / "arm7.spheres.json"}));
   const auto integrator = integration::make_integrator("gauss:8", arm);
-  integration::State state = integrator->start(Eigen::VectorXd::Constant(7, 0.3), Eigen::VectorXd::Zero(7));
+  integration::State state =
+      integrator->start(Eigen::VectorXd::Constant(7, 0.3), Eigen::VectorXd::Zero(7));
   for (int k = 0; k < 1000; ++k)
     if (!integrator->step(state, {}, 1e-3).converged) return 1;
   std::cout << "energy after 1 s of free fall: " << integrator->energy(state).total() << " J\n";

@@ -10,7 +10,8 @@ using namespace hamelin::integration;
 
 namespace {
 
-// odeint's rosenbrock4 (the same method) on y = (q, v, work of the held torque), with the Jacobian by differences.
+// odeint's rosenbrock4 (the same method) for y = (q, v, work of the held torque), with the Jacobian
+// by finite differences.
 class Peer {
  public:
   Peer(const Model& model, const Channels& channels)
@@ -21,7 +22,8 @@ class Peer {
         size_(2 * n_ + 1),
         a_(n_),
         method_(
-            static_cast<std::size_t>(size_), [this](const double* y, double* dy) { derivative(y, dy); },
+            static_cast<std::size_t>(size_),
+            [this](const double* y, double* dy) { derivative(y, dy); },
             [this](const double* y, double* rows) { jacobian(y, rows); }) {}
 
   void step(const VectorXd& y, double h, VectorXd& next, VectorXd& error) {
@@ -30,7 +32,8 @@ class Peer {
 
  private:
   void derivative(const double* y, double* dy) {
-    const VectorXd q = Eigen::Map<const VectorXd>(y, n_), v = Eigen::Map<const VectorXd>(y + n_, n_);
+    const VectorXd q = Eigen::Map<const VectorXd>(y, n_),
+                   v = Eigen::Map<const VectorXd>(y + n_, n_);
     const VectorXd force = channels_.held_torque - channels_.damping.cwiseProduct(v);
     dynamics::forward_dynamics(model_, ws_, q, v, force, a_);
     Eigen::Map<VectorXd> out(dy, size_);
@@ -38,7 +41,8 @@ class Peer {
   }
   void jacobian(const double* y, double* rows) {
     const double e = 1e-5;
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(rows, size_, size_);
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(
+        rows, size_, size_);
     VectorXd at = Eigen::Map<const VectorXd>(y, size_), up(size_), down(size_);
     J.setZero();
     for (Eigen::Index j = 0; j < 2 * n_; ++j) {
@@ -61,7 +65,8 @@ class Peer {
 
 }  // namespace
 
-TEST_CASE("a step of rosenbrock is that of Boost.odeint's rosenbrock4, and so is its error estimate", "[reference]") {
+TEST_CASE("a step of rosenbrock and its error estimate equal those of Boost.odeint's rosenbrock4",
+          "[reference]") {
   const int n = 5;
   const double damping = GENERATE(0.1, 1e3, 1e6), h = GENERATE(1e-3, 0.05);
   const bool prismatic = GENERATE(false, true);
@@ -73,7 +78,7 @@ TEST_CASE("a step of rosenbrock is that of Boost.odeint's rosenbrock4, and so is
   channels.held_torque = test::random_joints(rng, n, 2.0);
   const VectorXd q0 = test::random_joints(rng, n), v0 = test::random_joints(rng, n);
 
-  const double tolerance = 1e9;  // any step is accepted
+  const double tolerance = 1e9;  // every step is accepted
   const auto ours = make_integrator("rosenbrock", model, test::tolerances(0.0, tolerance));
   State state = ours->start(q0, v0);
   const auto report = ours->advance(state, channels, h);
@@ -83,10 +88,11 @@ TEST_CASE("a step of rosenbrock is that of Boost.odeint's rosenbrock4, and so is
   VectorXd y(2 * n + 1), next(2 * n + 1), error(2 * n + 1);
   y << q0, v0, 0.0;
   Peer(model, channels).step(y, h, next, error);
-  const double rounding = 1e-13;  // of q, where strong damping leaves it nearly still
+  const double rounding = 1e-13;  // of q, if strong damping leaves it nearly constant
   CHECK((state.q - next.head(n)).norm() < 1e-9 * (next.head(n) - q0).norm() + rounding);
   CHECK((state.v - next.segment(n, n)).norm() < 1e-9 * (next.segment(n, n) - v0).norm() + rounding);
   CHECK(report.held_work_J == Approx(next[2 * n]).epsilon(1e-9).margin(rounding));
-  CHECK(report.residual * tolerance ==
-        Approx(std::sqrt(error.head(2 * n).squaredNorm() / (2 * n))).epsilon(1e-6).margin(rounding));
+  CHECK(
+      report.residual * tolerance ==
+      Approx(std::sqrt(error.head(2 * n).squaredNorm() / (2 * n))).epsilon(1e-6).margin(rounding));
 }

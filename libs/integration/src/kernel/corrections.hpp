@@ -4,49 +4,54 @@
 namespace hamelin::integration::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
 
-/// What an iteration for the displacement of a step asks of its corrections [rad or m].
+/// Bounds on the corrections of an iteration for the displacement of a step [rad or m],
+/// docs/theory.md (4.27). A correction beyond them leads to another root or to none, and the step
+/// is halved instead.
 struct CorrectionRule {
-  double largest;      ///< one beyond this is on its way to some other root of the step: better to halve the step
-  double contraction;  ///< each is at most this share of the one before it,
-  double floor;        ///< or at most this: rounding of long chains ends the contraction, not the iteration
-  int free;            ///< how many come before any contraction is asked
+  double largest;      ///< bound on every correction
+  double contraction;  ///< a correction is at most this share of the one before it,
+  double floor;        ///< or at most this: rounding on long chains ends the contraction earlier
+  int unchecked;       ///< how many corrections come before contraction is required
 };
 
-/// Near a root Newton contracts quadratically, and the guess is near.
+/// Newton's method contracts quadratically near a root.
 HAMELIN_INLINE CorrectionRule newton_rule(double largest, double tolerance) noexcept {
   return {largest, 0.5, 1e3 * tolerance, 0};
 }
-/// Factors made anew, at the worst contraction from the largest correction to 1e-9.
+/// Enough for the slowest contraction that is accepted, from the largest correction to 1e-9.
 inline constexpr int max_newton_updates = 30;
 
-/// Follows the sizes of an iteration's corrections: the one rule for whether it goes on. NaN never passes.
+/// Follows the sizes of the corrections of an iteration and decides whether it may continue. NaN is
+/// never accepted.
 class Corrections {
  public:
-  HAMELIN_INLINE explicit Corrections(const CorrectionRule& rule) noexcept : rule_(rule), allowed_(rule.largest) {}
+  HAMELIN_INLINE explicit Corrections(const CorrectionRule& rule) noexcept
+      : rule_(rule), allowed_(rule.largest) {}
 
-  /// How the size compares with that of the correction before; 1 for the first.
-  HAMELIN_INLINE double pace(double size) const noexcept { return taken_ > 0 ? size / last_ : 1.0; }
-  /// Notes a correction that was made. False where the iteration does not head for the root.
-  HAMELIN_INLINE bool take(double size) noexcept {
-    const bool on_course = size <= allowed_;
+  /// The ratio of a size to that of the correction before; 1 for the first correction.
+  HAMELIN_INLINE double ratio(double size) const noexcept {
+    return count_ > 0 ? size / last_ : 1.0;
+  }
+  /// Records a correction. False if it breaks the rule.
+  HAMELIN_INLINE bool record(double size) noexcept {
+    const bool within_bounds = size <= allowed_;
     last_ = size;
-    if (++taken_ > rule_.free) {
+    if (++count_ > rule_.unchecked) {
       allowed_ = rule_.contraction * size;
       if (allowed_ < rule_.floor) allowed_ = rule_.floor;
       if (!(allowed_ <= rule_.largest)) allowed_ = rule_.largest;
     }
-    return on_course;
+    return within_bounds;
   }
-  /// Whether a correction only stirs what rounding leaves (`rounding`: the least that it can change), so that no more
-  /// is to be gained.
+  /// Whether only rounding errors are left, where `rounding` is their size.
   HAMELIN_INLINE bool at_rounding_floor(double size, double rounding) const noexcept {
-    return taken_ > 1 && (size <= rounding || (size > 0.3 * last_ && size <= 1e4 * rounding));
+    return count_ > 1 && (size <= rounding || (size > 0.3 * last_ && size <= 1e4 * rounding));
   }
 
  private:
   CorrectionRule rule_;
   double allowed_, last_ = 0.0;
-  int taken_ = 0;
+  int count_ = 0;
 };
 
 }  // namespace HAMELIN_ISA_NAMESPACE

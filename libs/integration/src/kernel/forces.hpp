@@ -6,7 +6,8 @@
 
 namespace hamelin::integration::kernel {
 
-/// The forces of a step's channels as the kernels take them; null or none: not computed.
+/// The forces of a step's channels, docs/theory.md (8.2), in the form of the kernels. Null pointers
+/// and a count of zero mean that there are none.
 struct Forces {
   const double *damping, *coulomb, *held;
   double coulomb_speed;
@@ -14,7 +15,7 @@ struct Forces {
   std::size_t spin_count;
 };
 
-/// What they did in a step [J].
+/// The work of these forces in a step [J].
 struct Work {
   double held, dissipated, gyroscopic;
 };
@@ -39,7 +40,7 @@ HAMELIN_INLINE Real joint_force(const Forces& f, std::size_t i, Real rate) noexc
   return force;
 }
 
-/// −∂(joint force)/∂rate: what damping and dry friction add to the stiffness of a step.
+/// −∂(joint force)/∂rate, the D of docs/theory.md (4.15).
 HAMELIN_INLINE double joint_force_slope(const Forces& f, std::size_t i, double rate) noexcept {
   double slope = f.damping != nullptr ? f.damping[i] : 0.0;
   if (f.coulomb != nullptr) {
@@ -51,7 +52,8 @@ HAMELIN_INLINE double joint_force_slope(const Forces& f, std::size_t i, double r
 
 /// Adds the work of these forces over a time dt at the rates rate(i).
 template <class Rate>
-HAMELIN_INLINE void add_joint_work(const Forces& f, std::size_t n, double dt, Work& work, Rate&& rate) noexcept {
+HAMELIN_INLINE void add_joint_work(const Forces& f, std::size_t n, double dt, Work& work,
+                                   Rate&& rate) noexcept {
   if (f.held != nullptr)
     for (std::size_t i = 0; i < n; ++i) work.held += f.held[i] * rate(i) * dt;
   if (f.damping != nullptr)

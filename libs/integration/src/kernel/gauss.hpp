@@ -8,40 +8,42 @@
 
 namespace hamelin::integration::kernel {
 
-inline constexpr std::size_t most_stages = 8;
+inline constexpr std::size_t max_stages = 8;
 
-/// Gauss–Legendre collocation with s stages on [0, 1]: nodes c, weights b, a_ij by columns, and the barycentric weights
-/// 1/Π_{m≠j}(c_j − c_m). Rows beyond s repeat the first, for lanes without a stage.
+/// Gauss–Legendre collocation with s stages on [0, 1], docs/theory.md (5.2): nodes c, weights b,
+/// a_ij by columns, and the barycentric weights 1/Π_{m≠j}(c_j − c_m). Rows beyond s repeat the
+/// first, for lanes without a stage.
 struct GaussTableau {
   std::size_t stages;
-  double c[most_stages], b[most_stages], a_column[most_stages][most_stages], barycentric[most_stages];
+  double c[max_stages], b[max_stages], a_column[max_stages][max_stages], barycentric[max_stages];
 };
 
-/// One step y = (q, p) → y + h Σ b_j K_j with K_i = f(y + h Σ a_ij K_j), by fixed-point sweeps over all stages.
+/// One step y = (q, p) → y + h Σ b_j K_j with K_i = f(y + h Σ a_ij K_j), docs/theory.md (5.1), by
+/// fixed-point sweeps over all stages.
 template <class Chain>
 struct GaussCall {
   const Chain& chain;
   const GaussTableau& tableau;
   double h;
   const double *q, *p;
-  double *q_next, *p_next;  ///< written where it converges
-  /// Slopes K, 2n × stages (all of q̇, then all of ṗ; the stages of one number side by side). In: those of the step
-  /// before, of length `h_before` (0: none), from which the guess is extrapolated. Out, where it converges: this
+  double *q_next, *p_next;  ///< written if the step converges
+  /// Slopes K, 2n × stages: all of q̇, then all of ṗ, with the stages of one component adjacent.
+  /// In: those of the step before, of length `h_before` (0: none). Out, if it converges: this
   /// step's.
   double* slopes;
   double h_before;
   bool jumped;       ///< whether p was changed after that step
-  Forces forces;     ///< at the stages, with their own velocities
-  double tolerance;  ///< on the displacement's error that is left [rad or m]
+  Forces forces;     ///< evaluated at the stages and their velocities
+  double tolerance;  ///< on the remaining error of the displacement [rad or m]
   int max_sweeps;
 };
 
 struct GaussOutcome {
   bool converged;
-  int sweeps;            ///< each as many stage evaluations as there are stages
-  double residual;       ///< what the last sweep still changed, times its contraction [rad or m]
-  double starter_error;  ///< what the first sweep changed [rad or m]; 0 without a guess
-  Work work;             ///< h Σ b_i F_i·v_i
+  int sweeps;            ///< each evaluates all stages once
+  double residual;       ///< docs/theory.md (5.8), of the last sweep [rad or m]
+  double starter_error;  ///< the change in the first sweep [rad or m]; 0 without a guess
+  Work work;             ///< docs/theory.md (5.4)
 };
 
 /// The entry points for one instruction set.
@@ -54,8 +56,9 @@ using GaussSet = dynamics::kernel::Groups<GaussEntry>;
 
 inline namespace HAMELIN_ISA_NAMESPACE {
 
-/// The stages of a step are independent within a sweep, so they go into the lanes of a register: `W` at a time, in as
-/// many groups as it takes, each group using what those before it have found. Lanes without a stage repeat the first.
+/// The stages of a step are independent within a sweep, so they go into the lanes of a register:
+/// `W` at a time. Each group of lanes uses the results of the groups before it. Lanes without a
+/// stage repeat the first.
 template <template <class> class Group, int W>
 class Gauss {
   using Pack = dynamics::kernel::Lanes<W>;
@@ -63,14 +66,16 @@ class Gauss {
   using Chain = typename Space::Chain;
   using Scratch = dynamics::kernel::Scratch<Space>;
   static constexpr auto lanes = static_cast<std::size_t>(W);
-  static constexpr std::size_t most_groups = (most_stages + lanes - 1) / lanes;
+  static constexpr std::size_t max_groups = (max_stages + lanes - 1) / lanes;
 
  public:
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
     return (2 * n * groups(stages) + 5 * n) * sizeof(Pack) + Scratch::alignment + Scratch::bytes(n);
   }
 
-  static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept { return Gauss(call, memory).solve(); }
+  static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
+    return Gauss(call, memory).solve();
+  }
 
  private:
   Gauss(const GaussCall<Chain>& call, void* memory) noexcept
@@ -90,7 +95,7 @@ class Gauss {
     address = (address + Scratch::alignment - 1) / Scratch::alignment * Scratch::alignment;
     return reinterpret_cast<void*>(address);
   }
-  /// Slope of number r at stage j.
+  /// Slope of component r at stage j.
   HAMELIN_INLINE double slope(std::size_t r, std::size_t j) const noexcept {
     return slopes_[r * groups_ + j / lanes].v[j % lanes];
   }
@@ -98,16 +103,17 @@ class Gauss {
   GaussOutcome solve() noexcept {
     GaussOutcome out{};
     const double h = call_.h;
-    Pack weights[most_groups][most_stages];
+    Pack weights[max_groups][max_stages];
     for (std::size_t g = 0; g < groups_; ++g)
-      for (std::size_t j = 0; j < s_; ++j) weights[g][j] = Pack::load(call_.tableau.a_column[j] + g * lanes) * h;
+      for (std::size_t j = 0; j < s_; ++j)
+        weights[g][j] = Pack::load(call_.tableau.a_column[j] + g * lanes) * h;
     const bool guessed = call_.h_before > 0.0;
-    if (call_.jumped || !guessed) start();
+    if (call_.jumped || !guessed) evaluate_start();
     if (guessed)
       extrapolate();
     else
       repeat_start();
-    // A sweep may do anything at first, then each changes less than the one before.
+    // the first sweeps may change much, later ones less and less
     Corrections corrections({1e3, 1.0, 0.0, 2});
     for (int sweep = 0;; ++sweep) {
       Pack change(0.0);
@@ -122,7 +128,7 @@ class Gauss {
           Pack& v = slopes_[r * groups_ + g];
           Pack& p_rate = slopes_[(n_ + r) * groups_ + g];
           change = max(change, abs(rate_[r] - v));
-          // a change of momentum as the displacement it makes
+          // docs/theory.md (5.7): the change of momentum as a displacement
           change = max(change, abs(rate_[n_ + r] - p_rate) * scratch_[r].inv_d * h);
           v = rate_[r];
           p_rate = rate_[n_ + r];
@@ -131,19 +137,22 @@ class Gauss {
       const double now = h * largest(change);
       ++out.sweeps;
       if (sweep == 0 && guessed) out.starter_error = now;
-      // An extrapolated guess is trusted to contract by a tenth at first. After a repeated first slope each sweep mends
-      // one more order in h, at a pace that says nothing of the next.
-      const double pace = !guessed ? 1.0 : sweep == 0 && !call_.jumped ? 0.1 : corrections.pace(now);
-      out.residual = now * (pace < 1.0 ? pace : 1.0);
+      // docs/theory.md (5.8). An extrapolated guess is assumed to contract by 1/10 at first. After
+      // a constant guess each sweep gains one order in h, at a pace that says nothing about the
+      // next.
+      const double ratio = !guessed                      ? 1.0
+                           : sweep == 0 && !call_.jumped ? 0.1
+                                                         : corrections.ratio(now);
+      out.residual = now * (ratio < 1.0 ? ratio : 1.0);
       if (out.residual <= call_.tolerance || corrections.at_rounding_floor(now, rounding())) break;
-      if (!corrections.take(now) || sweep + 1 == call_.max_sweeps) return out;
+      if (!corrections.record(now) || sweep + 1 == call_.max_sweeps) return out;
     }
     out.converged = true;
     finish(out);
     return out;
   }
 
-  /// What rounding alone may change in a sweep.
+  /// The change in a sweep that rounding alone can cause.
   double rounding() const noexcept {
     double most = 1.0;
     for (std::size_t r = 0; r < n_; ++r) {
@@ -153,20 +162,21 @@ class Gauss {
     return 4e-16 * most;
   }
 
-  /// The polynomial through the slopes of the step before, read at this step's stages. After an impulse it is raised to
-  /// the slopes at the start: the motion goes on from there much as it did. That saves more than one sweep a step where
-  /// every tick sets a velocity; forgetting the polynomial would cost one more.
+  /// Evaluates the polynomial through the slopes of the step before at this step's stages:
+  /// docs/theory.md (5.5) and (5.6). The latter, after an impulse, saves more than one sweep per
+  /// step where every tick sets a velocity.
   void extrapolate() noexcept {
     const Pack ratio(call_.h / call_.h_before);
     const auto& t = call_.tableau;
-    Pack weights[most_groups][most_stages];
+    Pack weights[max_groups][max_stages];
     for (std::size_t g = 0; g < groups_; ++g) {
       const Pack at = Pack(1.0) + ratio * Pack::load(t.c + g * lanes);  // beyond all nodes
       Pack product(1.0);
       for (std::size_t j = 0; j < s_; ++j) product *= at - t.c[j];
-      for (std::size_t j = 0; j < s_; ++j) weights[g][j] = product * t.barycentric[j] / (at - t.c[j]);
+      for (std::size_t j = 0; j < s_; ++j)
+        weights[g][j] = product * t.barycentric[j] / (at - t.c[j]);
     }
-    double end[most_stages];  // reads it at the end of the step before
+    double end[max_stages];  // ℓ_j(1), the end of the step before
     for (std::size_t j = 0; j < s_; ++j) {
       end[j] = t.barycentric[j];
       for (std::size_t m = 0; m < s_; ++m)
@@ -187,8 +197,8 @@ class Gauss {
     }
   }
 
-  /// rate_ = f(y) at the step's start, in all lanes.
-  void start() noexcept {
+  /// rate_ = f(y) at the start of the step, in all lanes.
+  void evaluate_start() noexcept {
     for (std::size_t r = 0; r < n_; ++r) {
       y_[r] = Pack(call_.q[r]);
       y_[n_ + r] = Pack(call_.p[r]);
@@ -201,14 +211,16 @@ class Gauss {
       for (std::size_t g = 0; g < groups_; ++g) slopes_[r * groups_ + g] = rate_[r];
   }
 
-  /// rate_ = f(y_): Hamilton's equations and the forces at the stages' own velocities.
+  /// rate_ = f(y_), docs/theory.md (5.3): Hamilton's equations, and the forces at the velocities of
+  /// the stages.
   HAMELIN_INLINE void rates() noexcept {
     dynamics::kernel::hamilton<Space>(call_.chain, scratch_, y_, y_ + n_, rate_, rate_ + n_);
     const Forces& f = call_.forces;
     if (f.held != nullptr || f.damping != nullptr || f.coulomb != nullptr)
       for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += joint_force(f, r, rate_[r]);
     if (f.spin_count > 0) {
-      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, f.spins, f.spin_count, force_);
+      dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, f.spins, f.spin_count,
+                                                 force_);
       for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += force_[r];
     }
   }
@@ -229,10 +241,11 @@ class Gauss {
       call_.p_next[r] = call_.p[r] + dp;
     }
     for (std::size_t j = 0; j < s_; ++j)
-      add_joint_work(call_.forces, n_, h * b[j], out.work, [&](std::size_t r) { return slope(r, j); });
+      add_joint_work(call_.forces, n_, h * b[j], out.work,
+                     [&](std::size_t r) { return slope(r, j); });
     if (call_.forces.spin_count == 0) return;
     for (std::size_t g = 0; g < groups_; ++g) {
-      // the terms' own power, at the stages as they came out
+      // the power of the gyroscopic terms at the converged stages
       for (std::size_t r = 0; r < 2 * n_; ++r) {
         Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
         for (std::size_t j = 0; j < s_; ++j)

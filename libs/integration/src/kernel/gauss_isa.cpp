@@ -1,4 +1,4 @@
-// Compiled once for each instruction set; see dynamics/kernel/lanes.hpp on what may be used here.
+// Compiled once per instruction set; dynamics/kernel/lanes.hpp says what may be used here.
 #include "gauss.hpp"
 #include "hamelin/dynamics/kernel/planar.hpp"
 #include "hamelin/dynamics/kernel/spatial.hpp"
@@ -8,18 +8,22 @@ inline namespace HAMELIN_ISA_NAMESPACE {
 
 namespace {
 
-// As narrow as the stages allow: half-empty wide registers cost more than full narrow ones.
+// Up to four stages use registers of four lanes: half-empty wide registers cost more than full
+// narrow ones.
 template <template <class> class Group>
 struct Entry {
   using Chain = typename Group<double>::Chain;
-  static constexpr int narrow = dynamics::kernel::native_lanes < 4 ? dynamics::kernel::native_lanes : 4;
+  static constexpr int narrow =
+      dynamics::kernel::native_lanes < 4 ? dynamics::kernel::native_lanes : 4;
   static constexpr int wide = dynamics::kernel::native_lanes;
 
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
-    return stages <= 4 ? Gauss<Group, narrow>::bytes(n, stages) : Gauss<Group, wide>::bytes(n, stages);
+    return stages <= 4 ? Gauss<Group, narrow>::bytes(n, stages)
+                       : Gauss<Group, wide>::bytes(n, stages);
   }
   static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
-    return call.tableau.stages <= 4 ? Gauss<Group, narrow>::step(call, memory) : Gauss<Group, wide>::step(call, memory);
+    return call.tableau.stages <= 4 ? Gauss<Group, narrow>::step(call, memory)
+                                    : Gauss<Group, wide>::step(call, memory);
   }
   static constexpr GaussEntry<Chain> entry{bytes, step};
 };
@@ -27,8 +31,9 @@ struct Entry {
 }  // namespace
 
 extern const GaussSet gauss_set;
-constexpr GaussSet gauss_set{Entry<dynamics::kernel::SpatialPlain>::entry, Entry<dynamics::kernel::SpatialMixed>::entry,
-                             Entry<dynamics::kernel::PlanarPlain>::entry, Entry<dynamics::kernel::PlanarMixed>::entry};
+constexpr GaussSet gauss_set{
+    Entry<dynamics::kernel::SpatialPlain>::entry, Entry<dynamics::kernel::SpatialMixed>::entry,
+    Entry<dynamics::kernel::PlanarPlain>::entry, Entry<dynamics::kernel::PlanarMixed>::entry};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::integration::kernel

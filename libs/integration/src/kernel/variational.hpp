@@ -8,50 +8,52 @@
 
 namespace hamelin::integration::kernel {
 
-/// One step of hamel-variational: Δ from p_k⁻(Δ) + (h/2)(∂V − F) = p_k, and p_{k+1}⁺ (SPEC §3).
+/// One step of hamel-variational: Δ from docs/theory.md (4.7), and p⁺ of (4.6).
 template <class Chain>
 struct VariationalCall {
   const Chain& chain;
-  double h;          ///< may be negative (compositions)
-  const double* q;   ///< θ^k
-  const double* p;   ///< p_k − (h/2) ∂V(θ^k)
-  double* delta;     ///< in: the guess; out: Δ
-  double* p_next;    ///< out: p_{k+1}⁺ + (h/2) F
-  Forces forces;     ///< at θ_mid with velocity Δ/h
-  double tolerance;  ///< ‖error of Δ‖∞ [rad or m]
-  /// Whether a first correction whose square promises the tolerance needs no confirming (tolerances from 1e-10 up).
-  bool trust_quadratic;
+  double h;                 ///< may be negative (compositions)
+  const double* q;          ///< θ^k
+  const double* p;          ///< p_k − (h/2) ∂U(θ^k)
+  double* delta;            ///< in: the guess; out: Δ
+  double* p_next;           ///< out: p_{k+1} + (h/2) ∂U(θ^{k+1})
+  Forces forces;            ///< evaluated at θ_mid and the velocity Δ/h
+  double tolerance;         ///< on ‖error of Δ‖∞ [rad or m]
+  bool accept_unconfirmed;  ///< whether docs/theory.md (4.28) may accept a step
 };
 
 struct VariationalOutcome {
   bool converged;
   int updates, factorizations, evaluations;
-  double residual;  ///< the last correction, or what its square promises [rad or m]
+  double residual;  ///< the last correction, or the estimate made from its square [rad or m]
   Work work;        ///< F·Δ
 };
 
 template <class Chain>
 struct VariationalEntry {
   std::size_t (*bytes)(std::size_t links) noexcept;
-  /// Newton, as Variational::solve().
+  /// Newton's method, see Variational::solve().
   VariationalOutcome (*step)(const VariationalCall<Chain>& call, void* memory) noexcept;
-  /// What a step of just this Δ would be, and the residual R of its equation.
-  VariationalOutcome (*evaluate)(const VariationalCall<Chain>& call, void* memory, double* residual) noexcept;
+  /// The step with the given Δ, and the residual R of its equation.
+  VariationalOutcome (*evaluate)(const VariationalCall<Chain>& call, void* memory,
+                                 double* residual) noexcept;
 };
 using VariationalSet = dynamics::kernel::Groups<VariationalEntry>;
 
 inline constexpr double largest_correction = 0.3;
-// A correction of size e leaves an error of about 0.3 e² (measured on falling chains); this is on the safe side.
+// A correction of size e leaves an error of about 0.3 e² (measured on falling chains); 10 is a safe
+// bound.
 inline constexpr double quadratic_constant = 10.0;
 
 inline namespace HAMELIN_ISA_NAMESPACE {
 
-/// The sweeps and their exact linearisation, written once over the group. All that the linearisation needs is scaled so
-/// that h drops out: with σ = δΔ/h, b = (h/2) ad(X)A and z = (h/2) adᵀ(A)λ,
-///   a = A − b,  B = A + b,  u = P B − z,  w = Pᵀa + z,  d = a·P B + z·b + armature + (h/2) D,
+/// The sweeps, docs/theory.md (4.3)–(4.8), and their exact linearisation, docs/theory.md
+/// (4.9)–(4.22), written once over the group and scaled so that h drops out of the linearisation:
+///   σ = δΔ/h,  b = (h/2) ad(X)A,  z = (h/2) adᵀ(A)λ,  a = A − b,  B = A + b,
+///   u = P B − z,  w = Pᵀa + z,  d = a·P B + z·b + armature + (h/2) D,
 ///   P_{i−1} = I_{i−1} + Adᵀ(P − u wᵀ/d)Ad,  ρ = (−R − a·s)/d,  s_{i−1} = Adᵀ(s + u ρ),
 ///   σ = ρ − w·y/d,  y_i = Ad δξ_{i−1},  δξ = y + B σ.
-/// Gyroscopic terms hang their wrenches on A, not on a: a second pair δμ = Q δξ + t runs along with them.
+/// Gyroscopic terms have a second pair, δμ = Q δξ + t.
 template <class Space>
 class Variational {
   using Chain = typename Space::Chain;
@@ -63,7 +65,7 @@ class Variational {
   struct Factors {
     Motion b;  ///< (h/2) ad(X) A
     Force z, w, u;
-    Force spin_u;  ///< Q B − (h/2) adᵀ(A) μ
+    Force spin_u;  ///< e = Q B − (h/2) adᵀ(A) μ, docs/theory.md (4.21)
     double inv_d, rho;
   };
 
@@ -77,7 +79,8 @@ class Variational {
     return v.out_;
   }
 
-  static VariationalOutcome evaluate(const VariationalCall<Chain>& call, void* memory, double* residual) noexcept {
+  static VariationalOutcome evaluate(const VariationalCall<Chain>& call, void* memory,
+                                     double* residual) noexcept {
     Variational v(call, memory);
     v.evaluate();
     for (std::size_t i = 0; i < v.n_; ++i) {
@@ -102,17 +105,19 @@ class Variational {
         force_(residual_ + n_),
         sigma_(force_ + n_) {}
 
-  /// R and p⁺ at the present Δ.
+  /// R and p⁺ at the current Δ.
   void evaluate() noexcept { sweep<false>(); }
 
-  /// The same, and the factors of the linearisation there. False where a pivot vanishes.
-  bool evaluate_and_factor() noexcept { return call_.forces.spin_count > 0 ? eliminate<true>() : eliminate<false>(); }
+  /// The same, and the factors of the linearisation there. False if a pivot is lost.
+  bool evaluate_and_factor() noexcept {
+    return call_.forces.spin_count > 0 ? eliminate<true>() : eliminate<false>();
+  }
 
-  /// δΔ for the residual that the factors were made with, added to Δ; returns its largest size.
+  /// Solves for the residual of evaluate_and_factor() and adds δΔ to Δ; returns ‖δΔ‖∞.
   double correct() noexcept { return substitute(); }
 
-  /// R and p⁺ at the present Δ, and δΔ for this R by the factors there are, added to Δ; returns its largest size. The
-  /// frames are those of now: another change of the order of δΔ to an approximate Jacobian.
+  /// R and p⁺ at the current Δ; solves for this R with the kept factors and adds δΔ to Δ; returns
+  /// ‖δΔ‖∞. Frames are those of the current Δ, which changes the kept Jacobian by the order of δΔ.
   double evaluate_and_correct() noexcept {
     sweep<true>();
     return substitute();
@@ -121,8 +126,9 @@ class Variational {
   const double* residual() const noexcept { return residual_; }
 
  private:
-  /// Places the chain at θ_mid, moves it at Δ/h: motion[i] = ξ_i, b_i, and the forces there.
-  HAMELIN_INLINE void move() noexcept {
+  /// Places the chain at θ_mid and computes the twists ξ_i, b_i and the forces at the velocity Δ/h:
+  /// docs/theory.md (4.3), (4.9).
+  HAMELIN_INLINE void update_kinematics() noexcept {
     const double inv_h = 1.0 / call_.h;
     for (std::size_t i = 0; i < n_; ++i) {
       mid_[i] = call_.q[i] + 0.5 * call_.delta[i];
@@ -145,16 +151,17 @@ class Variational {
     }
   }
 
+  /// λ, R and p⁺ inwards; with Correct also ρ for this R by the kept factors.
   template <bool Correct>
   HAMELIN_INLINE void sweep() noexcept {
     ++out_.evaluations;
-    move();
+    update_kinematics();
     auto lambda = Space::zero_force(), s = Space::zero_force(), t = Space::zero_force();
     for (std::size_t i = n_; i-- > 0;) {
       const Link& l = links_[i];
       const auto& x = k_[i].x;
-      lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));
-      read(i, lambda);
+      lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));  // docs/theory.md (4.4)
+      store_momenta(i, lambda);
       if (i > 0) lambda = Space::to_parent(l, x, lambda);
       if constexpr (Correct) {
         auto& f = f_[i];
@@ -163,58 +170,63 @@ class Variational {
         f.rho = right * f.inv_d;
         if (i == 0) break;
         s = Space::to_parent(l, x, Space::sum(s, Space::scaled(f.u, f.rho)));
-        if (call_.forces.spin_count > 0) t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
+        if (call_.forces.spin_count > 0)
+          t = Space::to_parent(l, x, Space::sum(t, Space::scaled(f.spin_u, f.rho)));
       }
     }
   }
 
-  /// p⁻, p⁺ and R of a joint from its λ.
-  HAMELIN_INLINE void read(std::size_t i, const Force& lambda) noexcept {
+  /// p⁺ and R of a joint from its λ: docs/theory.md (4.5)–(4.7).
+  HAMELIN_INLINE void store_momenta(std::size_t i, const Force& lambda) noexcept {
     double along = Space::along_axis(links_[i], lambda);
-    if constexpr (Space::mixed) along += links_[i].armature * rate_[i];
+    if constexpr (Space::has_prismatic_or_rotor) along += links_[i].armature * rate_[i];
     const double turned = Space::pair(f_[i].b, lambda);
     residual_[i] = along - turned - half_ * force_[i] - call_.p[i];
     plus_[i] = along + turned;
   }
 
+  /// a·s of a joint.
   HAMELIN_INLINE double along_a(std::size_t i, const Force& s) const noexcept {
     return Space::along_axis(links_[i], s) - Space::pair(f_[i].b, s);
   }
 
+  /// One pass inwards: λ, R, p⁺, the factors and ρ. False if a pivot is lost.
   template <bool Spins>
   bool eliminate() noexcept {
     ++out_.evaluations;
     ++out_.factorizations;
-    move();
+    update_kinematics();
     auto P = Space::no_operator(), Q = Space::no_operator();
-    auto lambda = Space::zero_force(), mu = Space::zero_force(), s = Space::zero_force(), t = Space::zero_force();
+    auto lambda = Space::zero_force(), mu = Space::zero_force(), s = Space::zero_force(),
+         t = Space::zero_force();
     for (std::size_t i = n_; i-- > 0;) {
       const Link& l = links_[i];
       auto& f = f_[i];
       const auto& x = k_[i].x;
       lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));
-      read(i, lambda);
-      Space::add_rigid(l, x, P);
-      const Force z = f.z = Space::scaled(Space::turned_axis(l, lambda), half_);
-      const Force PB = Space::times_axis_and(l, P, f.b);
+      store_momenta(i, lambda);
+      Space::add_rigid(l, x, P);  // from here docs/theory.md (4.14)–(4.18)
+      const Force z = f.z = Space::scaled(Space::ad_T_axis(l, lambda), half_);
+      const Force PB = Space::times_axis_plus(l, P, f.b);
       f.u = Space::sum(PB, Space::scaled(z, -1.0));
-      f.w = Space::sum(Space::transposed_times_axis_less(l, P, f.b), z);
+      f.w = Space::sum(Space::transposed_times_axis_minus(l, P, f.b), z);
       const double along = Space::along_axis(l, PB);
       double d = along - Space::pair(f.b, PB) + Space::pair(f.b, z);
-      if constexpr (Space::mixed) d += l.armature;
+      if constexpr (Space::has_prismatic_or_rotor) d += l.armature;
       if (call_.forces.damping != nullptr || call_.forces.coulomb != nullptr)
         d += half_ * joint_force_slope(call_.forces, i, rate_[i]);
       double right = -residual_[i] - along_a(i, s);
       if constexpr (Spins) {
         for (std::size_t j = 0; j < call_.forces.spin_count; ++j)
           if (call_.forces.spins[j].link == i) add_gyroscopic(call_.forces.spins[j], Q, mu);
-        const Force QB = Space::times_axis_and(l, Q, f.b);
-        f.spin_u = Space::sum(QB, Space::scaled(Space::turned_axis(l, mu), -half_));
+        // docs/theory.md (4.20)–(4.22)
+        const Force QB = Space::times_axis_plus(l, Q, f.b);
+        f.spin_u = Space::sum(QB, Space::scaled(Space::ad_T_axis(l, mu), -half_));
         f.w = Space::sum(f.w, Space::scaled(Space::row(l, Q), -half_));
         d -= half_ * Space::along_axis(l, QB);
         right += half_ * Space::along_axis(l, t);
       }
-      // A pivot is an inertia; one that is lost in the rounding of its terms has no meaning.
+      // docs/theory.md (4.23): a pivot that is lost in the rounding of its terms has no meaning
       if (!(__builtin_fabs(d) > 1e-14 * __builtin_fabs(along))) return false;
       f.inv_d = 1.0 / d;
       f.rho = right * f.inv_d;
@@ -234,15 +246,17 @@ class Variational {
     return true;
   }
 
-  /// A term's wrench and its dependence on the link's twist. That its w stays put while the link turns is left out: it
-  /// is of higher order in h.
-  void add_gyroscopic(const dynamics::kernel::Spin& spin, typename Space::Operator& Q, Force& mu) const noexcept {
+  /// Adds the wrench of a term and its derivative by the link's twist, docs/theory.md (4.19). The
+  /// turning of the link relative to w is left out of the derivative: it is of higher order in h.
+  void add_gyroscopic(const dynamics::kernel::Spin& spin, typename Space::Operator& Q,
+                      Force& mu) const noexcept {
     auto w = Space::spin_axis(spin.w);
     for (std::size_t j = 0; j <= spin.link; ++j) w = Space::to_child_axis(links_[j], k_[j].x, w);
     Space::add(Q, Space::spin_operator(w, k_[spin.link].x, spin.point));
     mu = Space::sum(mu, Space::spin_force(w, k_[spin.link].x, spin.point, k_[spin.link].motion));
   }
 
+  /// One pass outwards, docs/theory.md (4.10), (4.16): σ, and Δ ← Δ + h σ. Returns ‖δΔ‖∞.
   HAMELIN_INLINE double substitute() noexcept {
     auto step = Space::zero_motion();
     double most = 0.0;
@@ -254,7 +268,7 @@ class Variational {
       const double correction = sigma_[i] * call_.h;
       call_.delta[i] += correction;
       const double size = __builtin_fabs(correction);
-      most = most >= size ? most : size;  // a NaN passes down the chain, so the last joint has it
+      most = most >= size ? most : size;  // a NaN spreads outwards, so the last joint has it
       step = Space::sum(y, Space::scaled(f.b, sigma_[i]));
       Space::add_along_axis(l, step, sigma_[i]);
     }
@@ -262,9 +276,10 @@ class Variational {
     return most;
   }
 
-  /// p_{k+1} after a correction that no sweep confirms: p⁻ is then p + (h/2) F, and what b·λ gains is taken to first
-  /// order, δ(b·λ) = b·δλ − z·δX with δX = y + b σ, δλ handed on less z σ. Gyroscopic terms are not followed.
-  HAMELIN_INLINE void follow() noexcept {
+  /// p⁺ after a correction that no sweep confirms, docs/theory.md (4.28): p⁻ is p + (h/2) F, and
+  /// b·λ changes to first order by b·δλ − z·δX with (4.10) and (4.11). Gyroscopic terms are not
+  /// included.
+  HAMELIN_INLINE void update_momentum() noexcept {
     const double inv_h = 1.0 / call_.h;
     auto step = Space::zero_motion();
     for (std::size_t i = 0; i < n_; ++i) {
@@ -283,7 +298,9 @@ class Variational {
       lambda = Space::sum(lambda, k_[i].force);
       plus_[i] = call_.p[i] + 2.0 * (plus_[i] + Space::pair(f_[i].b, lambda)) + half_ * force_[i];
       residual_[i] = 0.0;
-      if (i > 0) lambda = Space::to_parent(links_[i], k_[i].x, Space::sum(lambda, Space::scaled(f_[i].z, -sigma_[i])));
+      if (i > 0)
+        lambda = Space::to_parent(links_[i], k_[i].x,
+                                  Space::sum(lambda, Space::scaled(f_[i].z, -sigma_[i])));
     }
   }
 
@@ -293,15 +310,15 @@ class Variational {
       if (!evaluate_and_factor()) return;
       const double first = correct();
       out_.residual = first;
-      if (!corrections.take(first)) return;
-      if (call_.trust_quadratic && call_.forces.spin_count == 0 &&
+      if (!corrections.record(first)) return;
+      if (call_.accept_unconfirmed && call_.forces.spin_count == 0 &&
           quadratic_constant * first * first <= call_.tolerance) {
         out_.residual = quadratic_constant * first * first;
-        follow();
+        update_momentum();
         finish();
         return;
       }
-      // confirmed by the sweep that p⁺ needs anyway: the kept factors turn its residual into the error of Δ
+      // docs/theory.md (4.25): confirm with the sweep that p⁺ needs in any case
       for (bool again = true; again;) {
         const double error = evaluate_and_correct();
         out_.residual = error;
@@ -309,20 +326,20 @@ class Variational {
           finish();
           return;
         }
-        const double pace = corrections.pace(error);
-        // on by the same factors where two sweeps will do, for they cost no more than new ones
-        again = pace < 0.1 && error * pace * pace <= 0.1 * call_.tolerance;
-        if (!corrections.take(error)) return;
+        const double ratio = corrections.ratio(error);
+        // keep the factors if two sweeps suffice, because new factors cost as much as two sweeps
+        again = ratio < 0.1 && error * ratio * ratio <= 0.1 * call_.tolerance;
+        if (!corrections.record(error)) return;
       }
       if (out_.updates >= max_newton_updates) return;
     }
   }
 
-  /// Δ has taken the last correction, since it was at hand; taking R out of p⁺ = p⁻ + 2 b·λ moves p⁺ along but for its
-  /// slow part.
+  /// Δ includes the last correction; p⁺ − R applies it to p⁺ to first order: docs/theory.md (4.26).
   HAMELIN_INLINE void finish() noexcept {
     out_.converged = true;
-    for (std::size_t i = 0; i < n_; ++i) call_.p_next[i] = plus_[i] - residual_[i] + half_ * force_[i];
+    for (std::size_t i = 0; i < n_; ++i)
+      call_.p_next[i] = plus_[i] - residual_[i] + half_ * force_[i];
     const Forces& f = call_.forces;
     add_joint_work(f, n_, call_.h, out_.work, [&](std::size_t i) { return rate_[i]; });
     if (f.spin_count > 0) {

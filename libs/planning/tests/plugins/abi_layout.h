@@ -5,13 +5,13 @@
 extern "C" {
 #endif
 
-/* A struct of plugin_abi.h (offset 0) or a field of one. */
+/* A struct of plugin_abi.h (with offset 0) or one of its fields. */
 typedef struct layout_row {
   const char* name;
   size_t offset, size;
 } layout_row;
 
-/* The rows of abi_layout.inc in its order, as the C compiler lays them out. */
+/* The rows of abi_layout.inc in its order, with the layout of the C compiler. */
 extern const layout_row layout_in_c[];
 extern const size_t layout_in_c_count;
 

@@ -1,4 +1,4 @@
-// A planner that does on request what planners must not do, and one of each channel.
+// A test planner that uses every channel and breaks one rule of the interface on request.
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -22,7 +22,9 @@ constexpr const char* schema = R"({
 
 class Awkward : public Planner {
  public:
-  static double influence_m(const hamelin::Json& params) { return 0.25 * params.at("gain").get<double>(); }
+  static double influence_m(const hamelin::Json& params) {
+    return 0.25 * params.at("gain").get<double>();
+  }
 
   Awkward(const Host& host, const Setup& setup, const hamelin::Json& params)
       : host_(host),
@@ -35,7 +37,8 @@ class Awkward : public Planner {
     if (fault_ == "throw an int") throw 42;
     if (params.at("nested").at("depth") != 3) throw std::runtime_error("nested default missing");
     host_.warning("awkward is here");
-    if (fault_ == "instruction set") host_.warning(std::string(hamelin::name_of(hamelin::default_isa())));
+    if (fault_ == "instruction set")
+      host_.warning(std::string(hamelin::name_of(hamelin::default_isa())));
   }
 
   void tick(const Tick& tick, Command& command) override {
@@ -49,15 +52,17 @@ class Awkward : public Planner {
     command.set_accounts(-0.5, 0.25);
     if (fault_ == "nan") command.held_torque()[0] = std::numeric_limits<double>::quiet_NaN();
     if (fault_ == "negative damping") command.damping()[0] = -1.0;
-    if (fault_ == "wrong link") command.add_gyroscopic(setup_.dof(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    if (fault_ == "wrong link")
+      command.add_gyroscopic(setup_.dof(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     if (fault_ == "many terms")
-      for (int i = 0; i < 100; ++i) command.add_gyroscopic(0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+      for (int i = 0; i < 100; ++i)
+        command.add_gyroscopic(0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     if (fault_ == "state") command.raw().state = 17;
     if (fault_ == "node velocity") command.node_velocity() = 0.5 * tick.v();
     if (fault_ == "closest points") {
       const auto q = tick.q();
-      const auto count =
-          host_.closest_points({q.data(), static_cast<std::size_t>(q.size())}, setup_.influence_m(), contacts_);
+      const auto count = host_.closest_points({q.data(), static_cast<std::size_t>(q.size())},
+                                              setup_.influence_m(), contacts_);
       command.held_torque()[0] = static_cast<double>(count) + contacts_[0].distance_m;
     }
   }
@@ -72,4 +77,5 @@ class Awkward : public Planner {
 
 }  // namespace
 
-HAMELIN_PLANNER_PLUGIN(Awkward, "awkward", "0.0.1", "what planners must not do", schema);
+HAMELIN_PLANNER_PLUGIN(Awkward, "awkward", "0.0.1",
+                       "breaks a rule of the plugin interface on request", schema);

@@ -1,4 +1,5 @@
-/* A planner in plain C: damping only. A fault named on the compiler's command line is built in. */
+/* A planner in plain C that answers with damping only. A macro on the compiler's command line
+ * selects a fault. */
 #include "hamelin/planning/plugin_abi.h"
 
 #include <stdlib.h>

@@ -1,9 +1,12 @@
-// The arm as a solid body: tapered limbs along the skeleton, a drum on each joint's axis.
+// The arm as a solid body: tapered limbs along the skeleton, a cylinder on the axis of each joint.
 import { CylinderGeometry, Group, Mesh, MeshPhongMaterial } from 'three';
 import { poseOf, rotate } from './kinematics.js';
-import { about, BALL, between, CUBE, DRUM, still, veil } from './shapes.js';
+import { BALL, CUBE, DRUM, fixMatrix, matrixAt, matrixBetween, translucent } from './shapes.js';
 
-/** Radius of each limb [m]: within the collision spheres if there are any, thinner towards the tip. */
+/**
+ * Radius of each limb [m]: inside the collision spheres if there are any, decreasing towards the
+ * tip.
+ */
 function limbRadii(robot, reach) {
   const n = robot.joints.length;
   const radii = [];
@@ -21,16 +24,16 @@ export class Arm {
   /**
    * @param {object} robot of the report's world
    * @param {number} reach [m]
-   * @param {{ghost?: boolean}} options a ghost is one translucent colour and has no pedestal
+   * @param {{ghost?: boolean}} options a ghost has one translucent colour and no pedestal
    */
   constructor(robot, reach, { ghost = false } = {}) {
     this.robot = robot;
     this.group = new Group();
     const n = robot.joints.length;
     this.radii = limbRadii(robot, reach);
-    /** On a thin arm the joints are drawn larger, to be seen. */
+    /** Scale of the joints: on a thin arm they are drawn larger to be visible. */
     this.joint = Math.max(1, (0.019 * reach) / Math.min(...this.radii));
-    const material = (specular) => new MeshPhongMaterial(ghost ? { ...veil(2, 0.28), specular: 0 } : { specular, shininess: 24 });
+    const material = (specular) => new MeshPhongMaterial(ghost ? { ...translucent(2, 0.28), specular: 0 } : { specular, shininess: 24 });
     this.limbMaterial = material(0x383838);
     this.jointMaterial = ghost ? this.limbMaterial : material(0x505050);
     this.baseMaterial = ghost ? this.limbMaterial : material(0x202020);
@@ -38,11 +41,12 @@ export class Arm {
     this.points = Array.from({ length: n + 2 }, () => [0, 0, 0]);
     this.axis = [0, 0, 0];
     const add = (geometry, part) => {
-      const mesh = still(new Mesh(geometry, part));
+      const mesh = fixMatrix(new Mesh(geometry, part));
       this.group.add(mesh);
       return mesh;
     };
-    // Limb i joins points i and i + 1, the base being point 0. Coinciding points have none.
+    // Limb i connects points i and i + 1, where point 0 is the base. Coinciding points have no
+    // limb.
     this.limbs = [];
     this.drums = [];
     this.balls = [];
@@ -51,7 +55,7 @@ export class Arm {
       const length = Math.hypot(...rest[i].map((c, k) => c - rest[i + 1][k]));
       const below = this.radii[Math.max(0, i - 1)];
       const taper = i === n ? 0.62 : this.radii[i] / below;
-      if (ghost && i === 0) continue; // it would coincide with the arm's own
+      if (ghost && i === 0) continue; // it would coincide with that of the arm
       if (length > 1e-4 * reach || (i > 0 && robot.joints[i - 1].type === 'prismatic')) {
         const shape = new CylinderGeometry(Math.min(taper, 1), 1, 1, 28, 1);
         this.limbs.push({ i, radius: below * (i === 0 ? 1.25 : 1), mesh: add(shape, i === 0 ? this.baseMaterial : this.limbMaterial) });
@@ -69,7 +73,7 @@ export class Arm {
       const radius = this.radii[0] * (pedestal ? 2 : 1.8);
       const up = robot.planar_normal ?? rotate(poseOf([0, 0, 0], robot.base.quaternion_wxyz), [0, 0, 1]);
       const half = 0.12 * radius;
-      about(robot.base.position_m.map((c, k) => c + half * up[k]), up, radius, 2 * half, this.plate.matrix);
+      matrixAt(robot.base.position_m.map((c, k) => c + half * up[k]), up, radius, 2 * half, this.plate.matrix);
     }
   }
 
@@ -80,18 +84,18 @@ export class Arm {
     this.baseMaterial.color.set(colors.base);
   }
 
-  /** Follows a chain that was moved to its joint values. */
-  follow(chain) {
+  /** Moves the arm to the poses of a chain. */
+  update(chain) {
     const { joints, base } = this.robot;
     const n = joints.length;
     this.points[0] = base.position_m;
     for (let i = 0; i <= n; ++i) chain.skeleton(i, this.points[i + 1]);
-    for (const { i, radius, mesh } of this.limbs) between(this.points[i], this.points[i + 1], radius, mesh.matrix);
+    for (const { i, radius, mesh } of this.limbs) matrixBetween(this.points[i], this.points[i + 1], radius, mesh.matrix);
     for (const { i, slide, mesh } of this.drums) {
       const screw = joints[i].screw;
       rotate(chain.link(i), slide ? screw.slice(3) : screw.slice(0, 3), this.axis);
       const radius = this.radii[i] * this.joint;
-      about(this.points[i + 1], this.axis, radius * (slide ? 1.7 : 1.1), radius * (slide ? 1.7 : 2.24), mesh.matrix);
+      matrixAt(this.points[i + 1], this.axis, radius * (slide ? 1.7 : 1.1), radius * (slide ? 1.7 : 2.24), mesh.matrix);
     }
     for (const { i, mesh } of this.balls) mesh.matrix.makeScale(...Array(3).fill(this.radii[i])).setPosition(...this.points[i + 1]);
     const end = this.radii[n] * 0.72;

@@ -20,7 +20,7 @@ const DARK = {
   axis: '#a9b4c0', grid: '#29323b', mark: '#ff8b80',
 };
 
-/** 'light' or 'dark', whichever is shown now. */
+/** The theme that is shown now: 'light' or 'dark'. */
 export function themeName() {
   const set = document.documentElement.dataset.theme;
   if (set) return set;
@@ -31,10 +31,11 @@ export const theme = () => (themeName() === 'dark' ? DARK : LIGHT);
 export const runColor = (i) => theme().runs[i % 4];
 export const seriesColor = (i) => theme().series[i % 8];
 
-// From touching (dark red) to the edge of influence (pale yellow): lightness rises all the way, so it also reads without hue.
+// From contact (dark red) to the influence distance (pale yellow). Lightness increases
+// monotonically, so the scale is also readable without hue.
 const STOPS = [[103, 0, 31], [178, 24, 43], [226, 74, 51], [252, 141, 89], [253, 204, 138], [254, 240, 190]];
 
-/** Colour of a clearance as sRGB numbers 0…1; x = clearance / influence, 0…1. */
+/** Colour of a clearance as sRGB components 0…1; x = clearance / influence distance, 0…1. */
 export function clearanceColor(x, out = [0, 0, 0]) {
   const s = Math.min(0.99999, Math.max(0, x)) * (STOPS.length - 1);
   const i = Math.floor(s);
@@ -42,5 +43,5 @@ export function clearanceColor(x, out = [0, 0, 0]) {
   return out;
 }
 
-/** The scale as a CSS gradient, from touching on the left. */
+/** The scale as a CSS gradient, with contact on the left. */
 export const clearanceGradient = () => `linear-gradient(to right, ${STOPS.map((s) => `rgb(${s.join(' ')})`).join(', ')})`;

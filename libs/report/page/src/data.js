@@ -1,8 +1,10 @@
-// Reads the container that hamelin puts into a page.
+// Reads the container that hamelin inserts into a page.
 
 /**
- * @typedef {{at: number, n: number, type: string, scale?: number, offset?: number, none?: number}} Packed
- * @typedef {{t: Float64Array, q: Float64Array, goalIndex: Float64Array, clearance: Float64Array | null, influence: number,
+ * @typedef {{at: number, n: number, type: string,
+ *   scale?: number, offset?: number, none?: number}} Packed
+ * @typedef {{t: Float64Array, q: Float64Array, goalIndex: Float64Array,
+ *   clearance: Float64Array | null, influence: number,
  *   contacts: {count: Float64Array, first: Uint32Array, points: Float64Array} | null,
  *   forces: {channel: string, f: Float64Array}[]}} Frames
  */
@@ -32,7 +34,8 @@ async function gunzip(bytes) {
 }
 
 /**
- * The JSON of a container, with every packed array unpacked to doubles (value = offset + scale·raw, "none" becomes NaN).
+ * The JSON of a container, with every packed array unpacked to doubles. A value is
+ * offset + scale · raw, and the raw value "none" becomes NaN.
  * @param {Uint8Array} bytes
  */
 export function unpack(bytes) {
@@ -58,7 +61,7 @@ export function unpack(bytes) {
   );
 }
 
-/** Names and shapes that the rest of the page relies on. */
+/** Converts the data to the names and forms that the rest of the page uses. */
 function prepare(report) {
   report.worlds ??= [];
   report.runs ??= [];
@@ -88,10 +91,10 @@ function prepare(report) {
   return report;
 }
 
-/** Reads the page's data; throws with one line when there is none, or none of this format. */
+/** Reads the page's data; throws an error if it is missing or has another format. */
 export async function readData(format) {
   const text = document.getElementById('hamelin-data').textContent.trim();
-  if (text.startsWith('_')) throw new Error('This is an empty template: hamelin puts the data into it.');
+  if (text.startsWith('_')) throw new Error('This is an empty template: hamelin inserts the data into it.');
   const data = unpack(await gunzip(bytesOf(text)));
   if (data.format !== format) throw new Error(`format "${data.format}" found, ${format} expected`);
   return data;
@@ -100,7 +103,7 @@ export async function readData(format) {
 /** Reads the runs of a report. */
 export const readReport = async () => prepare(await readData('hamelin.report/1'));
 
-/** Index k of the last t[k] ≤ x (0 if there is none). */
+/** Index k of the last t[k] ≤ x; 0 if there is none. */
 export function indexAt(t, x) {
   let lo = 0;
   let hi = t.length - 1;
@@ -112,7 +115,9 @@ export function indexAt(t, x) {
   return lo;
 }
 
-/** Value of a sampled line at x, straight between samples; NaN outside or beside a gap. */
+/**
+ * Value of a sampled line at x, interpolated linearly; NaN outside of the samples or next to a gap.
+ */
 export function valueAt(t, y, x) {
   const last = t.length - 1;
   if (last < 0 || x < t[0] || x > t[last]) return NaN;

@@ -1,22 +1,22 @@
-// What the pages of tables and plots have in common: their data, their head, the theme.
+// Common parts of the pages with tables and plots: data, header, theme.
 import { seriesColor, themeName } from './colors.js';
 import { readData } from './data.js';
 import { h, themeSwitch } from './dom.js';
 
-/** Drawings name the series' colours as --series-0 to --series-7. */
+/** Sets the colours of the series, which the drawings use as --series-0 to --series-7. */
 function paint() {
   const root = document.documentElement;
   for (let i = 0; i < 8; ++i) root.style.setProperty(`--series-${i}`, seriesColor(i));
   root.dataset.shown = themeName();
 }
 
-/** What a reader should know. */
+/** A list of remarks. */
 export const notes = (lines) => lines.length > 0 && h('ul', { class: 'notes' }, lines.map((line) => h('li', {}, line)));
 
-/** A part of the page under a heading of its own; nothing where all its content is. */
+/** A section of the page with a heading; nothing if it has no content. */
 export function section(title, ...content) {
-  const there = content.flat().filter(Boolean);
-  return there.length > 0 && h('section', { 'aria-label': title }, h('h2', {}, title), there);
+  const children = content.flat().filter(Boolean);
+  return children.length > 0 && h('section', { 'aria-label': title }, h('h2', {}, title), children);
 }
 
 /**

@@ -1,7 +1,8 @@
-// A few helpers to make elements.
+// Functions that create elements.
 
 /**
- * An element with properties and children. `class`, `style` and names with a dash are set as attributes, `on…` are listeners.
+ * Creates an element with properties and children. `class`, `style` and names with a dash are set
+ * as attributes; `on…` are listeners.
  * @returns {HTMLElement}
  */
 export function h(tag, props = {}, ...children) {
@@ -16,7 +17,7 @@ export function h(tag, props = {}, ...children) {
   return element;
 }
 
-/** An element of a drawing with attributes and children. */
+/** Creates an SVG element with attributes and children. */
 export function svg(tag, attributes = {}, ...children) {
   const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
   for (const [key, value] of Object.entries(attributes)) {
@@ -34,18 +35,18 @@ const ICONS = {
   start: 'M15 3.4v11.2L9 9.2v5.4L1.8 9 9 3.4v5.4z',
 };
 
-/** A drawn icon, hidden from readers: the button around it carries the name. */
+/** An icon, hidden from screen readers, which read the name of its button. */
 export function icon(name) {
   return svg('svg', { viewBox: '0 0 18 18', 'aria-hidden': 'true' }, svg('path', { d: ICONS[name] }));
 }
 
 /** A labelled check box; `changed` is called with the new state. */
-export function check(label, checked, changed, swatch = null) {
+export function checkbox(label, checked, changed, swatch = null) {
   const input = h('input', { type: 'checkbox', checked, onchange: () => changed(input.checked) });
   return h('label', { class: 'check' }, input, swatch && h('span', { class: 'swatch', style: `background:${swatch}` }), label);
 }
 
-/** A labelled slider with its value in words. */
+/** A labelled slider that shows its value as text. */
 export function slider(label, { min, max, step, value, text }, changed) {
   const output = h('output', {}, text(value));
   const input = h('input', {
@@ -65,7 +66,7 @@ export function slider(label, { min, max, step, value, text }, changed) {
   return element;
 }
 
-/** Buttons of which one is pressed. `pick` is called with the key of the new one. */
+/** A group of buttons, one of which is pressed. `pick` is called with the key of the new one. */
 export function choice(label, options, value, pick) {
   const buttons = new Map();
   const element = h('div', { class: 'choice', role: 'group', 'aria-label': label });
@@ -79,9 +80,9 @@ export function choice(label, options, value, pick) {
   return element;
 }
 
-/** Light, dark or as the system has it; `changed` is called after the switch. */
+/** Light, dark or the theme of the system; `changed` is called after the switch. */
 export function themeSwitch(changed) {
-  return choice('Colours', [['auto', 'Auto', 'As the system has it'], ['light', 'Light', 'Light'], ['dark', 'Dark', 'Dark']], 'auto', (key) => {
+  return choice('Colours', [['auto', 'Auto', 'Follow the system setting'], ['light', 'Light', 'Light'], ['dark', 'Dark', 'Dark']], 'auto', (key) => {
     if (key === 'auto') delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = key;
     changed();

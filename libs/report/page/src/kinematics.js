@@ -1,9 +1,10 @@
-// Product of exponentials: T_i(q) = base · exp(S_1 q_1) … exp(S_i q_i), screws S = [ω; v] in the base frame at q = 0.
-// A pose is 12 numbers: rotation row by row, then the position.
+// Product of exponentials: T_i(q) = base · exp(S_1 q_1) … exp(S_i q_i), with the screws
+// S_i = [ω; v] of the joints in the base frame at q = 0. A pose has 12 numbers: the rotation row by
+// row, then the position.
 
 /** @typedef {Float64Array} Pose */
 
-/** Rotation of a quaternion [w, x, y, z] and a position. @returns {Pose} */
+/** The pose with a position and a quaternion [w, x, y, z]. @returns {Pose} */
 export function poseOf(position = [0, 0, 0], quaternion = [1, 0, 0, 0]) {
   const norm = Math.hypot(...quaternion) || 1;
   const [w, x, y, z] = quaternion.map((c) => c / norm);
@@ -25,7 +26,7 @@ export function compose(a, b, out) {
   return out;
 }
 
-/** Point p, given in the pose's frame, in the frame the pose is given in. */
+/** Transforms point p from the pose's frame to the frame in which the pose is given. */
 export function transform(pose, p, out = [0, 0, 0]) {
   const [x, y, z] = p;
   out[0] = pose[0] * x + pose[1] * y + pose[2] * z + pose[9];
@@ -34,7 +35,7 @@ export function transform(pose, p, out = [0, 0, 0]) {
   return out;
 }
 
-/** Direction d, turned by the pose. */
+/** Rotates direction d by the pose. */
 export function rotate(pose, d, out = [0, 0, 0]) {
   const [x, y, z] = d;
   out[0] = pose[0] * x + pose[1] * y + pose[2] * z;
@@ -43,7 +44,7 @@ export function rotate(pose, d, out = [0, 0, 0]) {
   return out;
 }
 
-/** out = exp(S q), Rodrigues' formula; a screw without rotation is a slide. */
+/** out = exp(S q), by Rodrigues' formula; a screw without rotation is a translation. */
 export function exponential(S, q, out) {
   const rate = Math.hypot(S[0], S[1], S[2]);
   if (rate < 1e-12) {
@@ -59,7 +60,8 @@ export function exponential(S, q, out) {
     1 - c1 * (y * y + z * z), c1 * x * y - s * z, c1 * x * z + s * y,
     c1 * x * y + s * z, 1 - c1 * (x * x + z * z), c1 * y * z - s * x,
     c1 * x * z - s * y, c1 * y * z + s * x, 1 - c1 * (x * x + y * y)]);
-  // position = (θ I + (1 − cos θ) [ω] + (θ − sin θ) [ω]²) v / |ω|
+  // With S = [s; v], the unit axis ω = s / |s| and the angle θ = |s| q:
+  // position = (θ I + (1 − cos θ) [ω] + (θ − sin θ) [ω]²) v / |s|
   const [a, b, d] = [S[3] / rate, S[4] / rate, S[5] / rate];
   const dot = x * a + y * b + z * d;
   out[9] = s * a + c1 * (y * d - z * b) + (angle - s) * dot * x;
@@ -79,8 +81,8 @@ export class Chain {
     this.step = new Float64Array(12);
   }
 
-  /** Sets the links for joint values q. */
-  move(q) {
+  /** Computes the poses of the links for joint values q. */
+  setJoints(q) {
     let before = this.base;
     for (let i = 0; i < this.n; ++i) {
       exponential(this.robot.joints[i].screw, q[i], this.step);
@@ -89,7 +91,7 @@ export class Chain {
     return this;
   }
 
-  /** Displacement of a link; links below 0 stand with the base. */
+  /** Displacement of a link; that of the base for a negative index. */
   link(i) {
     return i < 0 ? this.base : this.links[i];
   }
@@ -109,7 +111,10 @@ export class Chain {
   }
 }
 
-/** Joint values at time t, straight between frames and held outside. Returns the frame before t and how far to the next. */
+/**
+ * Joint values at time t, interpolated linearly between frames and constant outside. Returns the
+ * index k of the frame before t and the fraction a of the way to the next frame.
+ */
 export function jointsAt(frames, n, t, q, indexAt) {
   const k = indexAt(frames.t, t);
   const last = frames.t.length - 1;

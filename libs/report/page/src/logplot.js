@@ -1,13 +1,16 @@
-// Plots with two logarithmic axes: marks, lines between them, and a shape for each kind of mark.
+// Plots with two logarithmic axes: marks of several shapes, and lines between them.
 import { h, svg } from './dom.js';
 import { number } from './format.js';
 
 const MARGIN = { left: 72, right: 14, top: 12, bottom: 42 };
 const PADDING = 10;
 
-/** A logarithmic axis over whole decades and halves of them. */
+/** A logarithmic axis that begins and ends at multiples of half a decade. */
 class LogAxis {
-  /** @param {number[]} values positive, at least one  @param from, to pixels of the ends */
+  /**
+   * @param {number[]} values positive, at least one
+   * @param {number} from, to pixel coordinates of the ends
+   */
   constructor(values, from, to) {
     this.low = Math.floor(2 * Math.log10(Math.min(...values))) / 2;
     this.high = Math.max(this.low + 0.5, Math.ceil(2 * Math.log10(Math.max(...values))) / 2);
@@ -18,7 +21,9 @@ class LogAxis {
     return this.from + ((Math.log10(value) - this.low) / (this.high - this.low)) * (this.to - this.from);
   }
 
-  /** At most `most` of them or few more: 1, 2 and 5 of each decade, or 1, or 1 of every so many decades. */
+  /**
+   * About `most` ticks: 1, 2 and 5 of each decade, or 1 of each decade, or 1 of every n-th decade.
+   */
   ticks(most) {
     const decades = this.high - this.low;
     const digits = 3 * decades <= most ? [1, 2, 5] : [1];
@@ -35,22 +40,22 @@ class LogAxis {
   }
 }
 
-/** 1e−4 rather than 0.0001, which would reach into the words beside the axis. */
+/** 1e−4 rather than 0.0001, which would overlap the label of the axis. */
 const tickText = (value) => (value < 0.0099 || value > 99999 ? number(value, 1) : String(value));
 
-const around = (x, y, points) => `M${points.map(([dx, dy]) => `${(x + dx).toFixed(1)} ${(y + dy).toFixed(1)}`).join('L')}Z`;
+const polygon = (x, y, points) => `M${points.map(([dx, dy]) => `${(x + dx).toFixed(1)} ${(y + dy).toFixed(1)}`).join('L')}Z`;
 
-/** Marks by name, drawn about a point; `filled` shapes take the fill of their class, the others its stroke. */
+/** Shapes of marks by name, centred at a point. */
 const SHAPES = {
   circle: (x, y) => svg('circle', { cx: x.toFixed(1), cy: y.toFixed(1), r: 4 }),
-  square: (x, y) => svg('path', { d: around(x, y, [[-3.5, -3.5], [3.5, -3.5], [3.5, 3.5], [-3.5, 3.5]]) }),
-  triangle: (x, y) => svg('path', { d: around(x, y, [[0, -5], [4.5, 3], [-4.5, 3]]) }),
-  diamond: (x, y) => svg('path', { d: around(x, y, [[0, -5], [5, 0], [0, 5], [-5, 0]]) }),
-  wedge: (x, y) => svg('path', { d: around(x, y, [[0, 5], [4.5, -3], [-4.5, -3]]) }),
+  square: (x, y) => svg('path', { d: polygon(x, y, [[-3.5, -3.5], [3.5, -3.5], [3.5, 3.5], [-3.5, 3.5]]) }),
+  triangle: (x, y) => svg('path', { d: polygon(x, y, [[0, -5], [4.5, 3], [-4.5, 3]]) }),
+  diamond: (x, y) => svg('path', { d: polygon(x, y, [[0, -5], [5, 0], [0, 5], [-5, 0]]) }),
+  wedge: (x, y) => svg('path', { d: polygon(x, y, [[0, 5], [4.5, -3], [-4.5, -3]]) }),
   cross: (x, y) => svg('path', { d: `M${(x - 3.5).toFixed(1)} ${(y - 3.5).toFixed(1)}l7 7m0 -7l-7 7` }),
 };
 
-/** A mark as the plots draw it. @param {{shape: string, class?: string, style?: string}} kind */
+/** The SVG element of a mark. @param {{shape: string, class?: string, style?: string}} kind */
 export function mark(kind, x, y) {
   const shape = SHAPES[kind.shape](x, y);
   shape.setAttribute('class', `mark ${kind.class ?? ''}`.trim());
@@ -58,7 +63,7 @@ export function mark(kind, x, y) {
   return shape;
 }
 
-/** A mark for a legend, on a line if it has one. */
+/** A mark for a legend, on a piece of its line if it has one. */
 export function legendMark(kind, line = null) {
   return svg('svg', { width: line ? 34 : 16, height: 14, 'aria-hidden': 'true' },
     line && svg('path', { class: line, d: 'M1 7H33', style: kind.style }), mark(kind, line ? 17 : 8, 7));
@@ -83,11 +88,13 @@ function axes(x, y, { width, height, xLabel, yLabel }) {
 
 /**
  * A figure of points on two logarithmic axes.
- * @param {{title: string, detail?: string, label: string, xLabel: string, yLabel: string, width?: number, height?: number,
- *   floor?: {y: number, hint: string},
- *   series: {name: string, line?: string, style?: string, lines: {x: number, y: number, hint: string, kind: object}[][]}[]}} plot
- *   `line` is the class of the lines that join the points of each list; without it there are only marks
- * @returns {HTMLElement | null} null where there is no point
+ * @typedef {{x: number, y: number, hint: string, kind: object}} Point
+ * @typedef {{name: string, line?: string, style?: string, lines: Point[][]}} Series
+ * @param {{title: string, detail?: string, label: string, xLabel: string, yLabel: string,
+ *   width?: number, height?: number, floor?: {y: number, hint: string}, series: Series[]}} plot
+ *   `line` is the class of the lines that connect the points of each list; without it there are
+ *   only marks
+ * @returns {HTMLElement | null} null if there are no points
  */
 export function logPlot(plot) {
   const { width = 448, height = 372, floor } = plot;

@@ -1,4 +1,4 @@
-// Puts the page together and keeps its parts on one time.
+// Builds the report's page and keeps all parts at the same time.
 import { clearanceGradient, runColor, theme, themeName } from './colors.js';
 import { readReport, valueAt } from './data.js';
 import { h, themeSwitch } from './dom.js';
@@ -6,11 +6,11 @@ import { number, unitText } from './format.js';
 import { Board } from './plots.js';
 import { Replay } from './replay.js';
 import { Settings } from './settings.js';
-import { badge, comparison, named, notes, sections } from './summary.js';
+import { badge, comparison, notes, runLabel, sections } from './summary.js';
 import { Timeline } from './timeline.js';
 import { View } from './view.js';
 
-/** What stands over a panel: the run, and its figures at the time shown. */
+/** The text over a panel: the run, and its values at the current time. */
 class Panel {
   constructor(run, i, alone, goals) {
     this.goals = goals;
@@ -19,10 +19,10 @@ class Panel {
       .map(([label, ids]) => [label, ids.map(plot).filter(Boolean)]).filter(([, found]) => found.length);
     this.values = this.figures.map(() => h('output', {}));
     this.goal = h('output', {});
-    this.over = h('span', { class: 'over', hidden: true }, 'run has ended');
+    this.ended = h('span', { class: 'over', hidden: true }, 'run has ended');
     this.element = h('div', { class: 'panel' },
       h('div', { class: 'hud' },
-        h('div', { class: 'hud-name' }, !alone && named(run, i), !alone && badge(run.outcome), this.over),
+        h('div', { class: 'hud-name' }, !alone && runLabel(run, i), !alone && badge(run.outcome), this.ended),
         h('dl', {}, this.figures.map(([label], j) => [h('dt', {}, label), h('dd', {}, this.values[j])]), goals > 0 && [h('dt', {}, 'goal'), h('dd', {}, this.goal)])));
     this.element.firstChild.hidden = alone && goals === 0 && this.figures.length === 0;
   }
@@ -30,7 +30,7 @@ class Panel {
   showTime(t, replay) {
     this.figures.forEach(([, plots], j) => {
       const parts = plots.flatMap((plot) => {
-        // A plot of metres and radians has one unit a line.
+        // A plot with several units has one unit per line.
         const units = plot.unit.split(/, */).map(unitText);
         const last = plot.t[plot.t.length - 1];
         return plot.series.map(({ y }, s) => [valueAt(plot.t, y, Math.min(t, last)), units[Math.min(s, units.length - 1)]]);
@@ -39,11 +39,11 @@ class Panel {
     });
     const index = replay.goalIndex;
     this.goal.textContent = index >= this.goals ? `all ${this.goals} reached` : `${index + 1} of ${this.goals}`;
-    this.over.hidden = t <= replay.end + 1e-9;
+    this.ended.hidden = t <= replay.end + 1e-9;
   }
 }
 
-/** Colour scale of the spheres, in metres. */
+/** Colour scale of the collision spheres, in metres. */
 function clearanceLegend(influence) {
   const bar = h('span', { class: 'gradient' });
   bar.style.background = clearanceGradient();
@@ -52,8 +52,8 @@ function clearanceLegend(influence) {
     h('div', { class: 'scale-row' }, h('div', { class: 'scale-bar' }, bar, h('div', { class: 'scale-ticks' }, [0, 0.5, 1].map((s) => h('span', {}, number(s * influence, 2))))), h('div', { class: 'scale-beyond' }, beyond, h('span', {}, 'beyond'))));
 }
 
-/** The 3D part; without WebGL it says so. */
-function threeD(report, replays, panels, row, failed) {
+/** The 3D view, or null without WebGL, after `failed` has been called. */
+function createView(report, replays, panels, row, failed) {
   try {
     return new View(row, panels.map((panel) => panel.element), replays);
   } catch (error) {
@@ -65,7 +65,7 @@ function threeD(report, replays, panels, row, failed) {
 async function start() {
   const report = await readReport();
   const { runs, worlds, title } = report;
-  if (!runs.length) throw new Error('There is no run in this report.');
+  if (!runs.length) throw new Error('This report contains no runs.');
   document.title = `${title} · hamelin`;
   const alone = runs.length === 1;
   const replays = runs.map((run, i) => new Replay(run, worlds[run.world], i));
@@ -80,7 +80,7 @@ async function start() {
       replay.setTime(now);
       panels[i].showTime(now, replay);
     });
-    view?.follow(now);
+    view?.update(now);
     board.showTime(now);
     timeline.showTime(now);
   };
@@ -100,9 +100,9 @@ async function start() {
   const row = h('div', { class: 'panels' }, panels.map((panel) => panel.element));
   const viewSection = h('section', { class: 'view', 'aria-label': 'Replay' }, row);
   const plots = h('section', { class: 'plots', 'aria-label': 'Plots' },
-    h('div', { class: 'plots-head' }, h('h2', {}, 'Plots'), h('p', { class: 'quiet' }, 'Click: set the time · Drag: zoom · Shift-drag: move the time'), board.sharing, board.resetButton),
+    h('div', { class: 'plots-head' }, h('h2', {}, 'Plots'), h('p', { class: 'quiet' }, 'Click: set the time · Drag: zoom · Shift-drag: move the time'), board.sharedScale, board.resetButton),
     board.overlays.length > 0 && h('div', { class: 'overlays' }, board.overlays.map((group) => group.element)),
-    !alone && h('div', { class: 'plot-cells column-heads', 'aria-hidden': 'true' }, runs.map((run, i) => h('div', {}, named(run, i)))),
+    !alone && h('div', { class: 'plot-cells column-heads', 'aria-hidden': 'true' }, runs.map((run, i) => h('div', {}, runLabel(run, i)))),
     board.groups.map((group) => group.element));
   document.documentElement.style.setProperty('--columns', runs.length);
   document.getElementById('app').replaceChildren(
@@ -115,9 +115,9 @@ async function start() {
     timeline.element);
   board.build();
 
-  view = threeD(report, replays, panels, row, (error) => {
+  view = createView(report, replays, panels, row, (error) => {
     row.classList.add('no-webgl');
-    row.prepend(h('p', { class: 'no-webgl-note', role: 'status' }, 'The 3D picture needs WebGL, and this browser has none to offer. The plots and figures are complete without it.', h('br'), h('small', {}, String(error.message ?? error))));
+    row.prepend(h('p', { class: 'no-webgl-note', role: 'status' }, 'The 3D view needs WebGL, which this browser does not provide. Plots and tables are complete without it.', h('br'), h('small', {}, String(error.message ?? error))));
   });
   if (view) {
     const changed = () => {
@@ -150,7 +150,7 @@ async function start() {
   Object.assign(window.hamelin, {
     setTime,
     time: () => now,
-    /** Tip of a run's arm in the world [m]. */
+    /** Position of the tip of a run's arm in the world [m]. */
     pose: (i) => [...replays[i].tip],
     counts: () => ({
       runs: runs.length,

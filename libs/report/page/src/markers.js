@@ -1,4 +1,5 @@
-// What is drawn around the arm: collision spheres, closest-point lines, force arrows, trail, goals, obstacles, floor.
+// Objects drawn around the arm: collision spheres, lines between closest points, force arrows,
+// trail, goals, obstacles, floor.
 import {
   BufferAttribute, BufferGeometry, Color, GridHelper, Group, InstancedMesh, Line, LineBasicMaterial, Matrix4, Mesh,
   MeshBasicMaterial, MeshLambertMaterial, Quaternion, TorusGeometry, Vector3,
@@ -6,22 +7,22 @@ import {
 import { Arm } from './arm.js';
 import { clearanceColor } from './colors.js';
 import { Chain } from './kinematics.js';
-import { BALL, between, CONE, CUBE, DRUM, ROD, still, veil } from './shapes.js';
+import { BALL, CONE, CUBE, DRUM, fixMatrix, matrixBetween, ROD, translucent } from './shapes.js';
 
 const matrix = new Matrix4();
 const color = new Color();
 const rgb = [0, 0, 0];
 
-/** Balls in one draw, put one after the other. */
+/** Balls that are drawn by one call. */
 class Balls {
   constructor(count, material, order) {
     this.material = material;
-    this.mesh = still(new InstancedMesh(BALL, material, count));
+    this.mesh = fixMatrix(new InstancedMesh(BALL, material, count));
     this.mesh.renderOrder = order;
     this.count = 0;
   }
 
-  put(p, radius) {
+  add(p, radius) {
     this.mesh.setMatrixAt(this.count, matrix.makeScale(radius, radius, radius).setPosition(p[0], p[1], p[2]));
     return this.count++;
   }
@@ -33,18 +34,21 @@ class Balls {
   }
 }
 
-/** Collision spheres, and rows of balls for capsules, coloured by their shape's clearance; those beyond the influence distance are faint and grey. */
+/**
+ * Collision spheres, and rows of balls for capsules, coloured by the clearance of their shape.
+ * Those beyond the influence distance are faint and grey.
+ */
 export class Spheres {
   constructor(robot, frames, thin) {
     this.robot = robot;
     this.frames = frames;
     const count = Math.max(1, robot.spheres.length);
     this.group = new Group();
-    // Spheres within the limbs of a thin arm would not be seen: they are drawn over it.
+    // Spheres inside the limbs of the arm would be invisible, so they are drawn over it.
     this.near = new Balls(count, new MeshLambertMaterial({ transparent: true, opacity: 0.88, depthTest: !thin }), 2);
-    this.far = new Balls(count, new MeshLambertMaterial(veil(1, 0.16)), 3);
+    this.far = new Balls(count, new MeshLambertMaterial(translucent(1, 0.16)), 3);
     this.group.add(this.near.mesh, this.far.mesh);
-    /** x, y, z, radius of each sphere, world; the map uses them too. */
+    /** x, y, z, radius of each sphere in the world [m]; the map uses them as well. */
     this.balls = new Float32Array(4 * robot.spheres.length);
     this.p = [0, 0, 0];
   }
@@ -54,7 +58,7 @@ export class Spheres {
     this.contact = colors.contact;
   }
 
-  follow(chain, k) {
+  update(chain, k) {
     const { spheres, shapes } = this.robot;
     const { clearance, influence } = this.frames;
     this.near.count = this.far.count = 0;
@@ -64,10 +68,10 @@ export class Spheres {
       this.balls[4 * i + 3] = sphere.radius_m;
       const d = clearance ? clearance[k * shapes + sphere.shape] : NaN;
       if (!(d < influence)) {
-        this.far.put(this.p, sphere.radius_m);
+        this.far.add(this.p, sphere.radius_m);
         return;
       }
-      const slot = this.near.put(this.p, sphere.radius_m * 1.004);
+      const slot = this.near.add(this.p, sphere.radius_m * 1.004);
       if (d <= 0) color.set(this.contact);
       else color.setRGB(...clearanceColor(d / influence, rgb), 'srgb');
       this.near.mesh.setColorAt(slot, color);
@@ -77,15 +81,15 @@ export class Spheres {
   }
 }
 
-/** Thin rods with a dot at the obstacle's end. */
+/** Thin rods between closest points, with a larger dot at the obstacle. */
 export class Contacts {
   constructor(frames, reach) {
     this.contacts = frames.contacts;
     this.reach = reach;
     this.material = new MeshBasicMaterial();
     const most = this.contacts ? Math.max(1, ...this.contacts.count) : 1;
-    this.rods = still(new InstancedMesh(ROD, this.material, most));
-    this.dots = still(new InstancedMesh(BALL, this.material, 2 * most));
+    this.rods = fixMatrix(new InstancedMesh(ROD, this.material, most));
+    this.dots = fixMatrix(new InstancedMesh(BALL, this.material, 2 * most));
     this.group = new Group();
     this.group.add(this.rods, this.dots);
     this.shown = 0;
@@ -95,14 +99,14 @@ export class Contacts {
     this.material.color.set(colors.line);
   }
 
-  follow(k) {
+  update(k) {
     this.shown = this.contacts?.count[k] ?? 0;
     const r = 0.0022 * this.reach;
     for (let i = 0; i < this.shown; ++i) {
       const at = 6 * (this.contacts.first[k] + i);
       const a = this.contacts.points.subarray(at, at + 3);
       const b = this.contacts.points.subarray(at + 3, at + 6);
-      this.rods.setMatrixAt(i, between(a, b, r, matrix));
+      this.rods.setMatrixAt(i, matrixBetween(a, b, r, matrix));
       this.dots.setMatrixAt(2 * i, matrix.makeScale(2.2 * r, 2.2 * r, 2.2 * r).setPosition(...a));
       this.dots.setMatrixAt(2 * i + 1, matrix.makeScale(3.4 * r, 3.4 * r, 3.4 * r).setPosition(...b));
     }
@@ -112,15 +116,15 @@ export class Contacts {
   }
 }
 
-/** One arrow a channel, from the tip. */
+/** One arrow per channel, starting at the tip. */
 export class Forces {
   constructor(frames, reach) {
     this.group = new Group();
     this.reach = reach;
     this.arrows = frames.forces.map(({ channel, f }) => {
       const material = new MeshLambertMaterial();
-      const shaft = still(new Mesh(ROD, material));
-      const head = still(new Mesh(CONE, material));
+      const shaft = fixMatrix(new Mesh(ROD, material));
+      const head = fixMatrix(new Mesh(CONE, material));
       const group = new Group();
       group.add(shaft, head);
       this.group.add(group);
@@ -136,8 +140,8 @@ export class Forces {
     }
   }
 
-  /** @param {number} metres length of 1 N */
-  follow(tip, k, a, metres) {
+  /** @param {number} metres length of an arrow of 1 N */
+  update(tip, k, a, metres) {
     for (const arrow of this.arrows) {
       const { f } = arrow;
       for (let c = 0; c < 3; ++c) {
@@ -152,13 +156,13 @@ export class Forces {
       const headLength = Math.min(0.45 * length, 0.05 * this.reach);
       const end = tip.map((c, i) => c + this.f[i] * metres);
       const neck = tip.map((c, i) => c + this.f[i] * metres * (1 - headLength / length));
-      between(tip, neck, r, arrow.shaft.matrix);
-      between(neck, end, Math.min(2.6 * r, 0.6 * headLength), arrow.head.matrix);
+      matrixBetween(tip, neck, r, arrow.shaft.matrix);
+      matrixBetween(neck, end, Math.min(2.6 * r, 0.6 * headLength), arrow.head.matrix);
     }
   }
 }
 
-/** Path of the tip: travelled as a rod, ahead as a thin line. */
+/** Path of the tip: the past part as rods, the rest as a thin line. */
 export class Trail {
   /** @param {Float32Array} tips x, y, z of each frame */
   constructor(tips, reach) {
@@ -166,8 +170,8 @@ export class Trail {
     this.tips = tips;
     this.radius = 0.0028 * reach;
     this.material = new MeshBasicMaterial();
-    this.past = still(new InstancedMesh(ROD, this.material, Math.max(1, count)));
-    for (let k = 0; k + 1 < count; ++k) this.lay(k, tips.subarray(3 * k + 3, 3 * k + 6));
+    this.past = fixMatrix(new InstancedMesh(ROD, this.material, Math.max(1, count)));
+    for (let k = 0; k + 1 < count; ++k) this.setRod(k, tips.subarray(3 * k + 3, 3 * k + 6));
     this.lineMaterial = new LineBasicMaterial();
     this.line = new Line(new BufferGeometry().setAttribute('position', new BufferAttribute(tips, 3)), this.lineMaterial);
     this.group = new Group();
@@ -179,36 +183,39 @@ export class Trail {
     this.lineMaterial.color.set(colors.trailRest);
   }
 
-  /** Rods up to frame k, and one from there to the tip, which stands between two frames. */
-  follow(tip, k) {
+  /** Shows the rods up to frame k, and one from there to the tip, which is between two frames. */
+  update(tip, k) {
     this.past.count = 0;
     if (!this.tips.length) return;
-    if (this.cut !== undefined && this.cut !== k) this.lay(this.cut, this.tips.subarray(3 * this.cut + 3, 3 * this.cut + 6));
-    this.cut = k;
-    this.lay(k, tip);
+    if (this.partial !== undefined && this.partial !== k) this.setRod(this.partial, this.tips.subarray(3 * this.partial + 3, 3 * this.partial + 6));
+    this.partial = k;
+    this.setRod(k, tip);
     this.past.count = k + 1;
     this.past.instanceMatrix.needsUpdate = true;
   }
 
-  lay(k, end) {
-    if (end.length === 3) this.past.setMatrixAt(k, between(this.tips.subarray(3 * k, 3 * k + 3), end, this.radius, matrix));
+  setRod(k, end) {
+    if (end.length === 3) this.past.setMatrixAt(k, matrixBetween(this.tips.subarray(3 * k, 3 * k + 3), end, this.radius, matrix));
   }
 }
 
 const AXES = [[1, 0, 0, '#d43d3d'], [0, 1, 0, '#2f9e44'], [0, 0, 1, '#2b6fd6']];
 
-/** Three rods in red, green and blue: a frame. */
-export function frame(size) {
+/** A coordinate frame: three rods in red (x), green (y) and blue (z). */
+export function coordinateAxes(size) {
   const group = new Group();
   for (const [x, y, z, paint] of AXES) {
-    const rod = still(new Mesh(ROD, new MeshBasicMaterial({ color: paint })));
-    between([0, 0, 0], [x * size, y * size, z * size], 0.055 * size, rod.matrix);
+    const rod = fixMatrix(new Mesh(ROD, new MeshBasicMaterial({ color: paint })));
+    matrixBetween([0, 0, 0], [x * size, y * size, z * size], 0.055 * size, rod.matrix);
     group.add(rod);
   }
   return group;
 }
 
-/** Targets: a ring and a dot, a frame for poses, a ghost of the arm for joint goals. The one aimed at stands out. */
+/**
+ * Goals: a ring and a dot, a coordinate frame for poses, a translucent arm for joint goals. The
+ * current one is highlighted.
+ */
 export class Goals {
   constructor(world) {
     const { robot, reach_m: reach } = world;
@@ -221,10 +228,10 @@ export class Goals {
       let at = goal.position_m;
       let ghost = null;
       if (goal.type === 'joint') {
-        const chain = new Chain(robot).move(goal.q);
+        const chain = new Chain(robot).setJoints(goal.q);
         at = chain.tip([0, 0, 0]);
         ghost = new Arm(robot, reach, { ghost: true });
-        ghost.follow(chain);
+        ghost.update(chain);
         this.group.add(ghost.group);
         ++this.ghosts;
       }
@@ -236,7 +243,7 @@ export class Goals {
       group.add(ball, ring, cross);
       if (goal.type === 'pose') {
         const [w, x, y, z] = goal.quaternion_wxyz;
-        const axes = frame(0.09 * reach);
+        const axes = coordinateAxes(0.09 * reach);
         axes.quaternion.copy(new Quaternion(x, y, z, w));
         group.add(axes);
       }
@@ -251,11 +258,11 @@ export class Goals {
     for (const { ghost } of this.items) ghost?.paint(colors, colors.goal);
     const current = this.current;
     this.current = -1;
-    this.aim(Math.max(0, current));
+    this.setCurrent(Math.max(0, current));
   }
 
-  /** @param {number} index goal aimed at; past the last: all are reached */
-  aim(index) {
+  /** @param {number} index current goal; beyond the last one if all are reached */
+  setCurrent(index) {
     if (index === this.current || !this.colors) return;
     this.current = index;
     this.items.forEach(({ group, material, ghost }, i) => {
@@ -269,7 +276,7 @@ export class Goals {
   }
 }
 
-/** Primitive obstacles; some move, some appear late. */
+/** Primitive obstacles; some of them move or appear later. */
 export class Obstacles {
   constructor(obstacles, planarNormal) {
     this.group = new Group();
@@ -284,7 +291,7 @@ export class Obstacles {
       else if (o.shape === 'box') mesh.scale.fromArray(o.size_m);
       else {
         mesh.scale.set(o.radius_m, o.length_m, o.radius_m);
-        // The unit drum stands along y, the obstacle along its own z.
+        // The axis of the unit cylinder is y, that of the obstacle is its own z.
         mesh.quaternion.multiply(new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2));
       }
       if (o.motion) ++this.moving;
@@ -297,7 +304,7 @@ export class Obstacles {
     for (const { o, material } of this.items) material.color.set(o.judge_only ? colors.judge : colors.obstacle);
   }
 
-  follow(t) {
+  update(t) {
     for (const { o, mesh } of this.items) {
       mesh.visible = t >= (o.appears_s ?? 0);
       const moved = displacement(o.motion, t);
@@ -306,7 +313,7 @@ export class Obstacles {
   }
 }
 
-/** How far a motion of the scene file has led by time t [m]. */
+/** Displacement of an obstacle's motion at time t [m]. */
 function displacement(motion, t) {
   if (!motion) return [0, 0, 0];
   if (motion.type === 'linear') {

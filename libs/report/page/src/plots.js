@@ -1,8 +1,8 @@
-// Plots: one row for each quantity, one column for each run, all on one time axis.
+// Plots: one row per quantity, one column per run, with a common time axis.
 import uPlot from 'uplot';
 import { runColor, seriesColor, theme } from './colors.js';
 import { indexAt, valueAt } from './data.js';
-import { check, h } from './dom.js';
+import { checkbox, h } from './dom.js';
 import { number, ticks, unitText } from './format.js';
 
 const HEIGHT = 168;
@@ -10,16 +10,16 @@ const AXIS = 68;
 const FONT = '11px system-ui, sans-serif';
 const LOGARITHMIC = new Set(['energy_error', 'solver', 'residual', 'tick_us']);
 
-// Steps between labels; on a log scale whole decades are preferred by leaving out thirds of them.
+// Steps between labels. On a log scale there are no steps of thirds, which prefers whole decades.
 const STEPS = Array.from({ length: 60 }, (_, i) => i - 30).flatMap((power) => [1, 2, 5].map((m) => Number(`${m}e${power}`)));
 const DECADES = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20];
 
-/** Values for uPlot: gaps are null; on a log scale, exponents of sizes. */
+/** Values for uPlot: null for a gap; on a log scale the logarithm of the magnitude. */
 function column(y, log) {
   return Array.from(y, (v) => (Number.isFinite(v) ? (log ? (v === 0 ? null : Math.log10(Math.abs(v))) : v) : null));
 }
 
-/** Smallest and largest of the columns within [from, to]. */
+/** Smallest and largest value of the columns within [from, to]. */
 function extent(t, columns, from, to) {
   let lo = Infinity;
   let hi = -Infinity;
@@ -36,20 +36,23 @@ function extent(t, columns, from, to) {
   return [lo, hi];
 }
 
-/** All runs' plots of one quantity. They share the y scale, hidden series and the log switch. */
+/**
+ * The plots of one quantity for all runs. They share the y scale, the hidden series and the log
+ * switch.
+ */
 class Group {
   constructor(board, { id, title, unit, cells, overlay = false }) {
     Object.assign(this, { board, id, title, unit: unitText(unit), overlay });
     this.log = false;
     this.hidden = new Set();
     this.cells = cells.filter(Boolean);
-    /** Names of all lines of the row: a name has the same colour in every run. */
+    /** Names of all lines in the row; a name has the same colour in every run. */
     this.labels = [...new Set(this.cells.flatMap((cell) => cell.series.map((s) => s.label)))];
     this.plots = [];
-    const swatches = LOGARITHMIC.has(id) && check('log scale', false, (on) => this.setLog(on));
+    const logBox = LOGARITHMIC.has(id) && checkbox('log scale', false, (on) => this.setLog(on));
     this.element = h('details', { class: 'plot-row', open: true },
       h('summary', {}, h('span', { class: 'plot-title' }, title), ' ', h('span', { class: 'unit' }, this.unit && `[${this.unit}]`)),
-      swatches && h('div', { class: 'plot-tools' }, swatches),
+      logBox && h('div', { class: 'plot-tools' }, logBox),
       h('div', { class: 'plot-cells' }, cells.map((cell) => {
         if (!cell) return h('div', { class: 'plot-cell' }, h('p', { class: 'quiet' }, 'not in this log'));
         cell.host = h('div', { class: 'plot-host' });
@@ -64,7 +67,7 @@ class Group {
     const box = h('div', { class: 'legend', role: 'group', 'aria-label': `${this.title}: lines` });
     cell.items = cell.series.map((s) => {
       const value = h('span', { class: 'value' }, '–');
-      const button = h('button', { type: 'button', 'aria-pressed': 'true', title: `show or hide ${s.label}`, onclick: () => this.toggle(s.label) },
+      const button = h('button', { type: 'button', 'aria-pressed': 'true', title: `Show or hide ${s.label}`, onclick: () => this.toggle(s.label) },
         h('span', { class: 'key' }), h('span', { class: 'label' }, s.label), value);
       box.append(button);
       return { button, value };
@@ -96,13 +99,13 @@ class Group {
     return [Array.from(cell.t), ...cell.columns];
   }
 
-  /** The y range of each plot, over what is shown now: one for the whole row, unless each run is to have its own. */
-  measure() {
-    if (this.board.shared) this.measureTogether(this.cells);
-    else for (const cell of this.cells) this.measureTogether([cell]);
+  /** Computes the y range of each plot over what is shown now: one for the row, or one per run. */
+  computeRanges() {
+    if (this.board.shared) this.computeSharedRange(this.cells);
+    else for (const cell of this.cells) this.computeSharedRange([cell]);
   }
 
-  measureTogether(cells) {
+  computeSharedRange(cells) {
     const [from, to] = this.board.zoom;
     let lo = Infinity;
     let hi = -Infinity;
@@ -113,11 +116,11 @@ class Group {
       hi = Math.max(hi, b);
     }
     if (!(lo <= hi)) [lo, hi] = [0, 1];
-    // A mark is taken in when it is no farther away than the lines are tall.
-    const tall = hi - lo;
+    // The range includes a mark if its distance from the lines is at most their height.
+    const height = hi - lo;
     for (const mark of cells.flatMap((cell) => cell.marks)) {
       const y = this.log ? Math.log10(Math.abs(mark.y)) : mark.y;
-      if (Number.isFinite(y) && y > lo - tall && y < hi + tall) {
+      if (Number.isFinite(y) && y > lo - height && y < hi + height) {
         lo = Math.min(lo, y);
         hi = Math.max(hi, y);
       }
@@ -131,7 +134,7 @@ class Group {
   }
 
   rescale() {
-    this.measure();
+    this.computeRanges();
     for (const { plot, range } of this.cells) {
       plot.batch(() => {
         plot.setScale('x', { min: this.board.zoom[0], max: this.board.zoom[1] });
@@ -142,9 +145,9 @@ class Group {
 
   build() {
     for (const cell of this.cells) cell.data = this.data(cell);
-    this.measure();
+    this.computeRanges();
     for (const cell of this.cells) {
-      cell.plot = this.make(cell);
+      cell.plot = this.createPlot(cell);
       cell.now = h('div', { class: 'now' });
       cell.plot.over.append(cell.now);
     }
@@ -163,7 +166,7 @@ class Group {
     return this.labels.length === 1 ? runColor(cell.run) : seriesColor(this.labels.indexOf(cell.series[i].label));
   }
 
-  make(cell) {
+  createPlot(cell) {
     const { board } = this;
     const axis = { stroke: () => theme().axis, font: FONT, grid: { stroke: () => theme().grid, width: 1 }, ticks: { stroke: () => theme().grid, width: 1, size: 4 }, gap: 4 };
     const options = {
@@ -178,7 +181,7 @@ class Group {
         drag: { x: true, y: false, setScale: false, dist: 4 },
         sync: { key: 'hamelin', scales: ['x', null], setSeries: false, filters: { pub: (type) => type === 'mousemove' || type === 'mouseleave' } },
         bind: {
-          mousedown: (u, target, handler) => (event) => (board.scrubs(u, event) ? null : handler(event)),
+          mousedown: (u, target, handler) => (event) => (board.startsScrub(u, event) ? null : handler(event)),
           dblclick: () => () => board.resetZoom(),
         },
       },
@@ -196,7 +199,7 @@ class Group {
       ],
       series: [{}, ...cell.series.map((_, i) => ({ stroke: () => this.color(cell, i), width: 1.4, points: { show: false }, dash: this.labels.indexOf(cell.series[i].label) > 7 && !this.overlay ? [5, 3] : undefined }))],
       hooks: {
-        draw: [(u) => this.marks(u, cell)],
+        draw: [(u) => this.drawMarks(u, cell)],
         setSelect: [(u) => {
           if (u.select.width < 4) return;
           board.setZoom(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'));
@@ -206,12 +209,14 @@ class Group {
       },
     };
     const plot = new uPlot(options, cell.data, cell.host);
-    board.listen(plot);
+    board.addPointerHandlers(plot);
     return plot;
   }
 
-  /** Dashed level lines with their name; names that would cover each other stand side by side. */
-  marks(u, cell) {
+  /**
+   * Draws dashed level lines with their labels; labels that would overlap are placed side by side.
+   */
+  drawMarks(u, cell) {
     const { ctx } = u;
     const px = devicePixelRatio;
     const { left, width, top } = u.bbox;
@@ -235,7 +240,7 @@ class Group {
       let right = left + width - 4 * px;
       for (const other of taken) if (Math.abs(other.baseline - baseline) < 13 * px) right = Math.min(right, other.left - 12 * px);
       const start = right - ctx.measureText(text).width;
-      // Where many marks lie together, the first names stand for them.
+      // If many marks are close together, only the first ones have labels.
       if (start < left + 0.5 * width) continue;
       taken.push({ baseline, left: start });
       ctx.fillText(text, right, baseline);
@@ -243,7 +248,7 @@ class Group {
     ctx.restore();
   }
 
-  /** Puts the line of the current time, and the values there or under the cursor. */
+  /** Shows the line of the current time, and the values at time `at`. */
   showTime(now, at) {
     for (const cell of this.cells) {
       const x = cell.plot.valToPos(now, 'x');
@@ -287,14 +292,14 @@ export class Board {
     });
     this.overlays = runs.length < 2 ? [] : ['clearance', 'goal'].flatMap((id) => this.overlay(runs, id));
     this.resetButton = h('button', { type: 'button', class: 'reset-zoom', disabled: true, onclick: () => this.resetZoom() }, 'Reset zoom');
-    this.sharing = runs.length > 1 && check('same scale for all runs', true, (on) => {
+    this.sharedScale = runs.length > 1 && checkbox('same scale for all runs', true, (on) => {
       this.shared = on;
       for (const group of this.all) group.rescale();
     });
     this.all = [...this.overlays, ...this.groups];
   }
 
-  /** All runs' first line of one quantity in one plot, on the union of their times. */
+  /** One plot with the first line of a quantity for all runs, on the union of their times. */
   overlay(runs, id) {
     const plots = runs.map((run, i) => ({ i, name: run.name, plot: run.plots.find((plot) => plot.id === id) })).filter(({ plot }) => plot?.series.length);
     if (plots.length < 2) return [];
@@ -305,7 +310,7 @@ export class Board {
     return [new Group(this, { id, title: `${first.title}, all runs`, unit: first.unit, overlay: true, cells: [{ run: 0, t, series, marks: [...marks.values()] }] })];
   }
 
-  /** Draws the plots; their elements must be in the page. */
+  /** Draws the plots, whose elements must be in the page. */
   build() {
     for (const group of this.all) group.build();
     const sizes = new ResizeObserver((entries) => {
@@ -320,19 +325,19 @@ export class Board {
     for (const host of this.cellOf.keys()) sizes.observe(host);
   }
 
-  /** Clicks set the time; dragging the time line, or with Shift, moves it. */
-  listen(plot) {
+  /** Clicks set the time; dragging the time line, or dragging with Shift, moves the time. */
+  addPointerHandlers(plot) {
     const over = plot.over;
     let start = null;
     const timeAt = (event) => plot.posToVal(event.clientX - over.getBoundingClientRect().left, 'x');
     over.addEventListener('pointerdown', (event) => {
       if (event.button !== 0) return;
-      start = { x: event.clientX, scrub: this.scrubs(plot, event) };
+      start = { x: event.clientX, scrub: this.startsScrub(plot, event) };
       if (start.scrub) over.setPointerCapture(event.pointerId);
     });
     over.addEventListener('pointermove', (event) => {
       if (start?.scrub) this.setTime(timeAt(event));
-      else if (!start) over.style.cursor = this.scrubs(plot, event) ? 'ew-resize' : 'crosshair';
+      else if (!start) over.style.cursor = this.startsScrub(plot, event) ? 'ew-resize' : 'crosshair';
     });
     over.addEventListener('pointerup', (event) => {
       if (start && (start.scrub || Math.abs(event.clientX - start.x) < 4)) this.setTime(timeAt(event));
@@ -341,7 +346,7 @@ export class Board {
     over.addEventListener('pointercancel', () => { start = null; });
   }
 
-  scrubs(plot, event) {
+  startsScrub(plot, event) {
     return event.shiftKey || Math.abs(event.clientX - plot.over.getBoundingClientRect().left - plot.valToPos(this.now, 'x')) < 5;
   }
 
@@ -366,7 +371,8 @@ export class Board {
   hover(at) {
     if (at === this.hovered) return;
     this.hovered = at;
-    // One plot under the pointer moves the cursors of all; their values follow once a frame.
+    // The plot under the pointer moves the cursors of all plots; their values are updated once per
+    // frame.
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {

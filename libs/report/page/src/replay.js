@@ -1,4 +1,4 @@
-// One run as it is replayed: where the arm is at a time, with or without a picture of it.
+// The replay of one run: the configuration of the arm at a time, independent of the 3D view.
 import { indexAt } from './data.js';
 import { Chain, jointsAt } from './kinematics.js';
 
@@ -15,18 +15,18 @@ export class Replay {
     this.end = this.frames.t.length ? this.frames.t[this.frames.t.length - 1] : 0;
     this.k = 0;
     this.a = 0;
-    /** Tip in each frame: x, y, z [m], world. */
+    /** Position of the tip in each frame: x, y, z in the world [m]. */
     this.tips = new Float32Array(3 * this.frames.t.length);
     for (let k = 0; k < this.frames.t.length; ++k) {
-      this.tips.set(this.chain.move(this.frames.q.subarray(k * this.n, (k + 1) * this.n)).tip(this.tip), 3 * k);
+      this.tips.set(this.chain.setJoints(this.frames.q.subarray(k * this.n, (k + 1) * this.n)).tip(this.tip), 3 * k);
     }
     this.setTime(0);
   }
 
   setTime(t) {
     if (this.frames.t.length) Object.assign(this, jointsAt(this.frames, this.n, t, this.q, indexAt));
-    this.chain.move(this.q).tip(this.tip);
-    /** The frame whose sampled figures (clearance, closest points) are shown. */
+    this.chain.setJoints(this.q).tip(this.tip);
+    /** The frame whose sampled values (clearance, closest points) are shown. */
     this.nearest = this.a > 0.5 ? this.k + 1 : this.k;
   }
 

@@ -1,8 +1,8 @@
-// The picture of one run: map, arm and markers, following its replay.
+// The 3D scene of one run: map, arm and markers, updated from its replay.
 import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
 import { Arm } from './arm.js';
 import { runColor, theme } from './colors.js';
-import { Contacts, Floor, Forces, frame, Goals, Obstacles, Spheres, Trail } from './markers.js';
+import { Contacts, coordinateAxes, Floor, Forces, Goals, Obstacles, Spheres, Trail } from './markers.js';
 import { Voxels } from './voxels.js';
 
 export class RunScene {
@@ -26,17 +26,21 @@ export class RunScene {
     this.goals = new Goals(world);
     this.obstacles = new Obstacles(world.obstacles ?? [], world.robot.planar_normal);
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
-    this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? frame(0.07 * reach) : new Group();
+    this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? coordinateAxes(0.07 * reach) : new Group();
     this.tipFrame.matrixAutoUpdate = false;
     this.parts = [this.floor, this.voxels, this.obstacles, this.goals, this.arm, this.spheres, this.contacts, this.forces, this.trail].filter(Boolean);
     for (const part of this.parts) this.scene.add(part.group);
     this.scene.add(this.tipFrame);
-    this.balls = this.ballsOf(world.robot);
+    this.probes = this.probesOf(world.robot);
     this.paint();
   }
 
-  /** Who is asked how near a cell is: the spheres, else points along segments, else along the skeleton. */
-  ballsOf(robot) {
+  /**
+   * Balls whose distance decides whether a cell is near the arm. Null if the robot has collision
+   * spheres, which are used then; otherwise points along the segments or, without segments, along
+   * the skeleton.
+   */
+  probesOf(robot) {
     if (robot.spheres.length) return null;
     const bars = robot.segments.length
       ? robot.segments
@@ -49,14 +53,14 @@ export class RunScene {
     return { list, out: new Float32Array(4 * list.length) };
   }
 
-  nearBalls() {
-    if (!this.balls) return this.spheres.balls;
+  probeBalls() {
+    if (!this.probes) return this.spheres.balls;
     const p = [0, 0, 0];
-    this.balls.list.forEach(({ link, p: at, radius }, i) => {
-      this.balls.out.set(this.replay.chain.point(link, at, p), 4 * i);
-      this.balls.out[4 * i + 3] = radius;
+    this.probes.list.forEach(({ link, p: at, radius }, i) => {
+      this.probes.out.set(this.replay.chain.point(link, at, p), 4 * i);
+      this.probes.out[4 * i + 3] = radius;
     });
-    return this.balls.out;
+    return this.probes.out;
   }
 
   paint() {
@@ -69,7 +73,7 @@ export class RunScene {
     for (const part of this.parts) part.paint(colors, accent);
   }
 
-  /** Takes over the view's settings. */
+  /** Applies the settings of the view. */
   apply(settings) {
     const { show } = settings;
     this.settings = settings;
@@ -90,16 +94,16 @@ export class RunScene {
     this.floor.group.visible = show.floor;
   }
 
-  follow(t) {
+  update(t) {
     const { replay, settings } = this;
     const { chain, k, a, tip } = replay;
-    this.arm.follow(chain);
-    this.spheres.follow(chain, replay.nearest);
-    this.contacts.follow(replay.nearest);
-    this.forces.follow(tip, k, a, settings.metresPerNewton);
-    this.trail.follow(tip, k);
-    this.goals.aim(replay.goalIndex);
-    this.obstacles.follow(t);
+    this.arm.update(chain);
+    this.spheres.update(chain, replay.nearest);
+    this.contacts.update(replay.nearest);
+    this.forces.update(tip, k, a, settings.metresPerNewton);
+    this.trail.update(tip, k);
+    this.goals.setCurrent(replay.goalIndex);
+    this.obstacles.update(t);
     const pose = chain.link(replay.world.robot.tip_link);
     // prettier-ignore
     this.tipFrame.matrix.set(
@@ -108,6 +112,6 @@ export class RunScene {
       pose[6], pose[7], pose[8], tip[2], 0, 0, 0, 1);
     if (!this.voxels) return;
     if (settings.near === null) this.voxels.showAll();
-    else this.voxels.showNear(this.nearBalls(), settings.near);
+    else this.voxels.showNear(this.probeBalls(), settings.near);
   }
 }

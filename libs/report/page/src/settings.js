@@ -1,9 +1,12 @@
-// What the 3D view shows, and the controls for it.
+// Settings of the 3D view and their controls.
 import { theme } from './colors.js';
-import { check, choice, h, slider } from './dom.js';
+import { checkbox, choice, h, slider } from './dom.js';
 import { number } from './format.js';
 
-/** Largest force [N] that the arrows must fit, over all runs: 98 % of the samples are below. */
+/**
+ * The force [N] that determines the scale of the arrows: 98 % of the nonzero samples of all runs
+ * are at most this.
+ */
 function typicalForce(runs) {
   const sizes = [];
   for (const { frames } of runs) {
@@ -19,10 +22,13 @@ function typicalForce(runs) {
 }
 
 /** 1, 2 or 5 times a power of ten, at most x. */
-function round(x) {
+function roundDown(x) {
   const power = 10 ** Math.floor(Math.log10(x));
   return power * [5, 2, 1].find((m) => m * power <= x * 1.0001);
 }
+
+/** Labels of channels whose name in the data is abbreviated. */
+const CHANNEL_LABELS = { held: 'held torque', node: 'node velocity' };
 
 export class Settings {
   /**
@@ -55,10 +61,10 @@ export class Settings {
 
     const planar = Boolean(view.planar);
     this.views = choice('View', [
-      ...(planar ? [['plane', 'Plane', 'Along the normal of the plane']] : []),
-      ['3d', '3D', 'In perspective'], ...(planar ? [] : [['top', 'Top', 'From above']]), ['front', 'Front', 'Along y'], ['side', 'Side', 'Along x'],
-    ], view.name, (name) => view.look(name));
-    const toggle = (key, label) => has[key] !== false && check(label, true, (on) => { this.show[key] = on; changed(); });
+      ...(planar ? [['plane', 'Plane', 'View along the normal of the plane']] : []),
+      ['3d', '3D', 'Perspective view'], ...(planar ? [] : [['top', 'Top', 'View from above']]), ['front', 'Front', 'View along y'], ['side', 'Side', 'View along x'],
+    ], view.name, (name) => view.setView(name));
+    const toggle = (key, label) => has[key] !== false && checkbox(label, true, (on) => { this.show[key] = on; changed(); });
     this.element = h('div', { class: 'settings' },
       h('fieldset', {}, h('legend', {}, 'View'), this.views),
       h('fieldset', { class: 'shows' }, h('legend', {}, 'Show'),
@@ -76,7 +82,7 @@ export class Settings {
       this.near = d;
       changed();
     });
-    const nearBox = check('only near the arm', false, (on) => {
+    const nearBox = checkbox('only near the arm', false, (on) => {
       this.near = on ? Number(distance.input.value) : null;
       changed();
     });
@@ -84,7 +90,7 @@ export class Settings {
     const lo = [0, 1, 2].map((a) => Math.min(...scenes.map((scene) => scene.voxels.lo[a])));
     const hi = [0, 1, 2].map((a) => Math.max(...scenes.map((scene) => scene.voxels.hi[a])));
     const at = slider('cut at', { min: 0, max: 1, step: 'any', value: 0.5, text: (s) => (this.axis === undefined ? '–' : `${number(lo[this.axis] + s * (hi[this.axis] - lo[this.axis]), 3)} m`) }, () => cut());
-    const flip = check('other half', false, () => cut());
+    const flip = checkbox('other half', false, () => cut());
     const cut = () => {
       const a = this.axis;
       this.clip = a === undefined ? null : { axis: a, at: lo[a] + Number(at.input.value) * (hi[a] - lo[a]), flip: flip.querySelector('input').checked };
@@ -92,7 +98,7 @@ export class Settings {
       at.set(Number(at.input.value));
       changed();
     };
-    const axes = choice('Cut the map across', [['off', 'off', 'The whole map'], ['0', 'x', 'Across the x axis'], ['1', 'y', 'Across the y axis'], ['2', 'z', 'Across the z axis']], 'off', (key) => {
+    const axes = choice('Cut the map across', [['off', 'off', 'Show the whole map'], ['0', 'x', 'Cut across the x axis'], ['1', 'y', 'Cut across the y axis'], ['2', 'z', 'Cut across the z axis']], 'off', (key) => {
       this.axis = key === 'off' ? undefined : Number(key);
       cut();
     });
@@ -110,12 +116,12 @@ export class Settings {
     this.bar = h('span', { class: 'bar' });
     this.barText = h('span', {});
     this.channelBoxes = channels.map((channel) => {
-      const box = check(channel, true, (on) => { this.channels[channel] = on; this.changed(); }, 'currentColor');
+      const box = checkbox(CHANNEL_LABELS[channel] ?? channel, true, (on) => { this.channels[channel] = on; this.changed(); }, 'currentColor');
       box.dataset.channel = channel;
       return box;
     });
-    const all = check('arrows', true, (on) => { this.show.forces = on; this.changed(); });
-    const element = h('fieldset', { class: 'forces' }, h('legend', { title: 'Force at the tip that equals the joint torques of each channel of the planner [N]' }, 'Forces'),
+    const all = checkbox('arrows', true, (on) => { this.show.forces = on; this.changed(); });
+    const element = h('fieldset', { class: 'forces' }, h('legend', { title: 'Forces that accelerate the tip as the joint torques of each channel of the planner do [N]' }, 'Forces'),
       all, h('div', { class: 'channels' }, this.channelBoxes),
       slider('length', { min: -1, max: 1, step: 0.05, value: 0, text: (s) => `${number(10 ** s, 2)}×` }, (s) => { this.forceScale = 10 ** s; this.changed(); }),
       h('div', { class: 'force-scale' }, this.bar, this.barText));
@@ -127,16 +133,16 @@ export class Settings {
     for (const box of this.channelBoxes ?? []) box.querySelector('.swatch').style.background = theme().channels[box.dataset.channel] ?? theme().axis;
   }
 
-  /** Length of 1 N in the picture [m]. */
+  /** Length of an arrow of 1 N [m]. */
   get metresPerNewton() {
     return this.typical > 0 ? (0.3 * this.reach * this.forceScale) / this.typical : 0;
   }
 
-  /** Sets the bar that says how long a force is drawn, for the scale of the picture at the centre of the view. */
+  /** Updates the scale bar of the forces, for the scale of the view at its centre. */
   showScale(pixelsPerMetre) {
     if (!this.bar || !(this.typical > 0)) return;
     const perNewton = this.metresPerNewton * pixelsPerMetre;
-    const force = round(90 / perNewton);
+    const force = roundDown(90 / perNewton);
     this.bar.style.width = `${force * perNewton}px`;
     const text = `${number(force, 2)} N`;
     if (this.barText.textContent !== text) this.barText.textContent = text;

@@ -1,4 +1,4 @@
-// Geometry that several parts share: unit shapes, and matrices that lay a unit rod between two points.
+// Shared geometry: unit shapes, and matrices that place unit shapes.
 import {
   BoxGeometry, ConeGeometry, CylinderGeometry, IcosahedronGeometry, Matrix4, NotEqualStencilFunc, Quaternion, ReplaceStencilOp, Vector3,
 } from 'three';
@@ -16,8 +16,11 @@ const middle = new Vector3();
 const size = new Vector3();
 const turn = new Quaternion();
 
-/** Matrix that puts a unit shape along y (height 1, radius 1, centred) from a to b with a radius. */
-export function between(a, b, radius, out = new Matrix4()) {
+/**
+ * Matrix that places a unit shape along y (height 1, radius 1, centred) between a and b with a
+ * radius.
+ */
+export function matrixBetween(a, b, radius, out = new Matrix4()) {
   from.fromArray(a);
   along.fromArray(b).sub(from);
   const length = Math.max(along.length(), 1e-9);
@@ -26,22 +29,23 @@ export function between(a, b, radius, out = new Matrix4()) {
   return out.compose(middle, turn, size.set(radius, length, radius));
 }
 
-/** Matrix that centres a unit shape along y at a point with an axis. */
-export function about(point, axis, radius, length, out = new Matrix4()) {
+/** Matrix that centres a unit shape along y at a point and aligns it with an axis. */
+export function matrixAt(point, axis, radius, length, out = new Matrix4()) {
   turn.setFromUnitVectors(UP, along.fromArray(axis).normalize());
   return out.compose(middle.fromArray(point), turn, size.set(radius, length, radius));
 }
 
 /**
- * Material settings for a translucent body of many overlapping parts: each pixel is blended once (the stencil remembers), and
- * nothing is written to the depth, so that what lies behind shows through.
+ * Material settings for a translucent body of many overlapping parts. The stencil buffer ensures
+ * that each pixel is blended only once. The depth buffer is not written, which keeps objects behind
+ * the body visible.
  */
-export const veil = (mark, opacity) => ({
+export const translucent = (mark, opacity) => ({
   transparent: true, opacity, depthWrite: false, stencilWrite: true, stencilRef: mark, stencilFunc: NotEqualStencilFunc, stencilZPass: ReplaceStencilOp,
 });
 
-/** Lets a mesh take its matrix as it is. */
-export function still(mesh) {
+/** Makes a mesh use the matrix that is set, without updating it from position and rotation. */
+export function fixMatrix(mesh) {
   mesh.matrixAutoUpdate = false;
   mesh.frustumCulled = false;
   return mesh;

@@ -1,4 +1,5 @@
-// The page of `hamelin sweep merge`: success, the map of gain sets, and why runs did not reach.
+// The page of `hamelin sweep merge`: success, the map of gain sets, and why runs did not reach
+// their goal.
 import { notes, section, showDocument } from './document.js';
 import { h, svg } from './dom.js';
 import { fixed } from './format.js';
@@ -8,7 +9,7 @@ import { table } from './tables.js';
 
 const SHARE_HEAD = { content: '0 % … 100 %', class: 'text' };
 
-/** A share as a bar with its interval as a whisker. */
+/** A share as a bar, with its confidence interval as a whisker. */
 function bar(share, [low, high]) {
   const width = 130;
   const percent = (part) => fixed(100 * part, 1);
@@ -22,7 +23,7 @@ function bar(share, [low, high]) {
 
 const scaled = (value, scale, decimals) => fixed(value === null ? null : scale * value, decimals);
 const pair = (a, b) => `${a} / ${b}`;
-/** Percent and bar of a share of `all`; dashes for none of none. */
+/** Percentage and bar of a share of `all`; a dash if `all` is 0. */
 const shareCells = (part, all, interval) => (all > 0 ? [fixed((100 * part) / all, 1), { content: bar(part / all, interval), class: 'text' }] : ['–', '']);
 
 function groupCells(group, by) {
@@ -42,16 +43,16 @@ function groupCells(group, by) {
 
 function success({ by, groups }) {
   return section('Success',
-    h('p', {}, 'Reached: share of the feasible runs that arrived without contact, with Wilson’s 95 % interval. Feasible: start and goal are free of the map, by a checker of its own. Contacts and clearance: by the judge, on the exact primitives where the scene has them. Times are medians; tick: median over the runs of each run’s p50 and p99.'),
+    h('p', {}, '“Reached” is the share of the feasible runs that arrived without contact, with Wilson’s 95 % interval. A run is feasible if start and goal are free of the map, obstacles and self-contact. Contacts and clearances are measured by the judge, which uses the exact primitives if the scene has them. Arrival times are medians. The tick times are medians over the p50 and p99 of the runs.'),
     table({
       caption: 'Success by group', words: by.length,
-      head: [...by, 'runs', 'feasible', 'reached', '%', SHARE_HEAD, 'stalled', 'timeout', 'collision', 'other', ['contacts', 'judged'], ['least clearance', '[mm]'], ['of itself', '[mm]'],
-        ['certified [%]', 'mean / least'], ['arrival', '[s]'], ['tick [µs]', 'p50 / p99'], ['recovery', 'work [J]']],
+      head: [...by, 'runs', 'feasible', 'reached', '%', SHARE_HEAD, 'stalled', 'timeout', 'collision', 'other', ['contacts', 'judged'], ['smallest clearance', '[mm]'], ['self-clearance', '[mm]'],
+        ['certified [%]', 'mean / smallest'], ['arrival', '[s]'], ['tick [µs]', 'p50 / p99'], ['recovery', 'work [J]']],
       rows: groups.map((group) => ({ cells: groupCells(group, by) })),
     }));
 }
 
-// How the runs of gain sets are drawn: shapes differ as well as colours.
+// Marks for the runs of gain sets, with different shapes and colours.
 const SPOTS = {
   reached: { shape: 'circle', style: '--color: var(--good)' },
   contact: { shape: 'cross', class: 'stroke', style: '--color: var(--bad)' },
@@ -78,7 +79,7 @@ function gainPanel(planner, sets) {
 function gainTable(gains) {
   return table({
     caption: 'Gain sets by planner',
-    head: ['planner', 'sets', 'reached', 'contacts', ['reach without', 'the obstacle'], ['reached', 'of these'], '%', SHARE_HEAD, 'apf stalls', ['reached', 'of these']],
+    head: ['planner', 'sets', 'reached', 'contacts', ['reached without', 'the obstacle'], ['reached', 'of these'], '%', SHARE_HEAD, 'apf stalls', ['reached', 'of these']],
     rows: gains.map((group) => ({
       cells: [group.planner, String(group.sets), String(group.reached), { content: String(group.contacts), class: group.contacts > 0 ? 'contacts' : null }, String(group.reference), String(group.reached_of_reference),
         ...shareCells(group.reached_of_reference, group.reference, group.reached_share_interval), String(group.apf_stalled), String(group.reached_of_apf_stalled)],
@@ -90,27 +91,27 @@ function gainMap(sets, gains) {
   if (!sets.length) return false;
   const planners = [...new Set(sets.map((set) => set.planner))].sort();
   return section('Gain map of example 5.2',
-    h('p', {}, 'Each mark is a random gain set: k_p against η (apf) or k_obs (gyro, hybrid), both axes logarithmic. Links as segments, semi-implicit Euler at 4 ms, 40 s, no gravity. A point under the pointer names its run.'),
+    h('p', {}, 'Each mark is a random gain set: k_p against η (apf) or k_obs (gyro, hybrid), on logarithmic axes. Links are segments, and the runs use semi-implicit Euler with a step of 4 ms for 40 s, without gravity. Point at a mark to see its run.'),
     h('div', { class: 'legend' }, Object.entries(SPOTS).map(([spot, kind]) => h('span', {}, legendMark(kind), ` ${spot}`))),
     h('div', { class: 'figure-row' }, planners.map((planner) => gainPanel(planner, sets.filter((set) => set.planner === planner)))),
-    h('p', {}, 'Against the sets that reach without the obstacle in the same time, and those with which apf stalls:'),
+    h('p', {}, 'Results among the sets that reach the goal without the obstacle in the same time, and among those with which apf stalls:'),
     gainTable(gains));
 }
 
 function causes({ by, groups }) {
   const rows = groups.flatMap((group) => Object.entries(group.causes).sort(([, a], [, b]) => b - a)
     .map(([cause, count]) => ({ cells: [by.map((label) => group.labels[label]).join(', '), String(count), { content: cause, class: 'cause' }] })));
-  return rows.length > 0 && section('Why runs did not reach',
+  return rows.length > 0 && section('Why runs did not reach their goal',
     table({ caption: 'Causes by group', head: [by.join(', '), 'runs', { content: 'outcome: cause', class: 'text' }], rows }));
 }
 
 function failed(failures) {
   if (!failures.length) return false;
-  return section('Runs that did not reach',
+  return section('Runs that did not reach their goal',
     h('details', { open: failures.length <= 100 },
       h('summary', {}, `${failures.length} runs, each with the command that repeats it`),
       table({
-        caption: 'Commands that repeat them', words: 4, head: ['run', 'outcome', 'cause', 'command'],
+        caption: 'Commands that repeat the runs', words: 4, head: ['run', 'outcome', 'cause', 'command'],
         rows: failures.map(({ run, outcome, cause, command }) => ({
           cells: [run, { content: badge(outcome), class: 'text' }, { content: cause, class: 'cause' }, { content: h('code', {}, command), class: 'text' }],
         })),

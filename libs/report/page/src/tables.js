@@ -1,14 +1,15 @@
-// Tables of words and figures.
+// Tables of text and numbers.
 import { h } from './dom.js';
 
-/** A cell that is more than its content: {content, class}. */
+/** A cell as {content, class}. */
 const parts = (cell) => (cell !== null && typeof cell === 'object' && !Array.isArray(cell) && !(cell instanceof Node) ? cell : { content: cell });
 
 /**
- * @param {{caption: string, shown?: boolean, head: Cell[], words?: number, rows: {cells: Cell[], class?: string}[]}} table
- *   a Cell is a string, a node, a list of lines, or {content, class} with one of these;
- *   the first `words` columns are words, the others figures unless a cell's class says otherwise; the first cell of a row
- *   is its head; `shown`: the caption is shown, not only told
+ * @param {{caption: string, shown?: boolean, head: Cell[], words?: number,
+ *   rows: {cells: Cell[], class?: string}[]}} table
+ *   A Cell is a string, a node, a list of lines, or {content, class} with one of these. The first
+ *   `words` columns contain text and the others numbers, unless a cell has its own class. The first
+ *   cell of a row is its header. `shown`: the caption is visible and not only for screen readers.
  */
 export function table({ caption, shown = false, head, words = 1, rows }) {
   const lines = (content) => (Array.isArray(content) ? content.flatMap((line, i) => (i ? [h('br'), line] : [line])) : content);

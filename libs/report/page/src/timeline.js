@@ -1,4 +1,4 @@
-// The bar at the foot of the page: play, step, time, speed, and the events as ticks.
+// The bar at the bottom of the page: play, step, time, speed, and the events as ticks.
 import { runColor } from './colors.js';
 import { h, icon } from './dom.js';
 import { seconds } from './format.js';
@@ -28,13 +28,13 @@ export class Timeline {
     this.tip = h('div', { class: 'event-tip', hidden: true });
     this.ticks = h('div', { class: 'event-ticks', style: `--rows:${runs.length}` });
     this.element = h('section', { class: 'timeline', 'aria-label': 'Time' },
-      h('div', { class: 'buttons' }, button('start', 'To the start (Home)', () => this.jump(0)), button('back', 'One frame back (left arrow)', () => this.step(-1)), this.play, button('forward', 'One frame on (right arrow)', () => this.step(1))),
+      h('div', { class: 'buttons' }, button('start', 'Go to the start (Home)', () => this.jump(0)), button('back', 'Previous frame (left arrow)', () => this.step(-1)), this.play, button('forward', 'Next frame (right arrow)', () => this.step(1))),
       this.readout,
       h('div', { class: 'track' }, this.ticks, this.range, this.tip),
       h('label', { class: 'speed' }, h('span', {}, 'Speed'), this.rate),
     );
     this.addTicks();
-    addEventListener('keydown', (event) => this.key(event));
+    addEventListener('keydown', (event) => this.handleKey(event));
   }
 
   addTicks() {
@@ -63,12 +63,12 @@ export class Timeline {
     for (const tick of this.ticks.children) tick.style.background = runColor(Number(tick.dataset.run));
   }
 
-  /** Time by hand: playing goes on from there. */
+  /** Sets the time; playing continues from there. */
   jump(t) {
     this.setTime(t);
   }
 
-  /** To the next frame of any run, or the one before. */
+  /** Goes to the next or the previous frame of any run. */
   step(direction) {
     this.pause();
     let next = direction > 0 ? this.duration : 0;
@@ -89,11 +89,12 @@ export class Timeline {
   start() {
     if (this.now >= this.duration) this.setTime(0);
     this.playing = true;
-    this.face('pause', 'Pause (space)');
+    this.setPlayButton('pause', 'Pause (space)');
     let before = performance.now();
     const tick = (clock) => {
       if (!this.playing) return;
-      // After a pause of the page itself (a hidden tab) the replay goes on where it stood.
+      // The limit makes the replay continue where it stopped while the page was suspended, for
+      // example in a hidden tab.
       const passed = Math.min(Math.max(0, clock - before), 250) / 1000;
       before = clock;
       const t = Math.min(this.duration, this.now + passed * this.speed);
@@ -106,16 +107,16 @@ export class Timeline {
 
   pause() {
     this.playing = false;
-    this.face('play', 'Play (space)');
+    this.setPlayButton('play', 'Play (space)');
   }
 
-  face(name, title) {
+  setPlayButton(name, title) {
     this.play.replaceChildren(icon(name));
     this.play.title = title;
     this.play.setAttribute('aria-label', title);
   }
 
-  key(event) {
+  handleKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const { target } = event;
     const own = target === this.range;

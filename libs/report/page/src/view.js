@@ -6,7 +6,7 @@ import { Chain } from './kinematics.js';
 
 const FOV = 32;
 
-/** Whether WebGL is computed without a graphics card; throws without WebGL. */
+/** Whether WebGL is rendered in software; throws an error without WebGL. */
 function inSoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   if (!gl) throw new Error('WebGL 2 is not available.');
@@ -16,8 +16,11 @@ function inSoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
-/** Box of what the arms sweep, with the goals; centre and radius. */
-function sweep(replays) {
+/**
+ * Centre and radius of the space that the arms sweep, with the goals, and sampled points of the
+ * arms.
+ */
+function sweptBounds(replays) {
   const lo = [Infinity, Infinity, Infinity];
   const hi = [-Infinity, -Infinity, -Infinity];
   const samples = [];
@@ -28,11 +31,11 @@ function sweep(replays) {
   for (const { world, frames, n } of replays) {
     const chain = new Chain(world.robot);
     grow(world.robot.base.position_m);
-    chain.move(new Float64Array(n));
+    chain.setJoints(new Float64Array(n));
     if (!frames.t.length) world.robot.skeleton.forEach((_, i) => grow(chain.skeleton(i, [0, 0, 0])));
     const stride = Math.max(1, Math.floor(frames.t.length / 40));
     for (let k = 0; k < frames.t.length; k += stride) {
-      chain.move(frames.q.subarray(k * n, k * n + n));
+      chain.setJoints(frames.q.subarray(k * n, k * n + n));
       world.robot.skeleton.forEach((_, i) => {
         const p = chain.skeleton(i, [0, 0, 0]);
         grow(p);
@@ -46,14 +49,14 @@ function sweep(replays) {
   return { center, samples, radius: Math.hypot(...lo.map((c, i) => (hi[i] - c) / 2)) + margin };
 }
 
-/** Direction [1, 2, 5]·10^k next above x. */
-function nice(x) {
+/** The smallest 1, 2 or 5 times a power of ten that is at least x. */
+function roundUp(x) {
   const power = 10 ** Math.floor(Math.log10(x));
   return power * ([1, 2, 5, 10].find((m) => m * power >= x * 0.999) ?? 10);
 }
 
-/** The viewing direction, of some around, from which the map hides the arm least. */
-function clearDirection(scene, samples) {
+/** The candidate direction from which the map hides the arm least. */
+function leastHiddenDirection(scene, samples) {
   const candidates = [];
   for (const azimuth of [-55, -30, -80, -115, -145, 150, 180, 125, 95, 60, 30, 0]) {
     for (const elevation of [22, 38]) {
@@ -93,7 +96,7 @@ function clearDirection(scene, samples) {
 export class View {
   /**
    * @param {HTMLElement} row holds the panels
-   * @param {HTMLElement[]} panels one a replay, in the same order
+   * @param {HTMLElement[]} panels one per replay, in the same order
    */
   constructor(row, panels, replays) {
     this.row = row;
@@ -103,22 +106,22 @@ export class View {
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setScissorTest(true);
     this.canvas = this.renderer.domElement;
-    this.canvas.setAttribute('aria-label', 'The arm and its surroundings. Drag turns, the wheel zooms, the right button shifts.');
+    this.canvas.setAttribute('aria-label', 'The arm and its surroundings. Drag to rotate, scroll to zoom, drag with the right button to pan.');
     this.canvas.setAttribute('role', 'img');
     row.prepend(this.canvas);
 
-    const swept = sweep(replays);
+    const swept = sweptBounds(replays);
     this.center = new Vector3(...swept.center);
     this.radius = swept.radius;
     const reach = Math.max(...replays.map((r) => r.world.reach_m));
-    this.gridStep = nice(reach / 8);
+    this.gridStep = roundUp(reach / 8);
     this.planar = replays[0].world.robot.planar_normal;
     const half = this.gridStep * Math.ceil(((this.planar ? 2.4 : 1.45) * reach) / this.gridStep);
     this.scenes = replays.map((replay) => {
       const robot = replay.world.robot;
       return new RunScene(replay, { step: this.gridStep, half, center: robot.base.position_m, normal: robot.planar_normal ?? [0, 0, 1] });
     });
-    this.homeDirection = this.planar ? [0.3, -0.55, 0.78] : clearDirection(this.scenes[0], swept.samples);
+    this.homeDirection = this.planar ? [0.3, -0.55, 0.78] : leastHiddenDirection(this.scenes[0], swept.samples);
 
     this.perspective = new PerspectiveCamera(FOV, 1, 0.01 * reach, 40 * reach);
     this.orthographic = new OrthographicCamera(-1, 1, 1, -1, -40 * reach, 40 * reach);
@@ -126,21 +129,24 @@ export class View {
     this.controls = new OrbitControls(this.perspective, this.canvas);
     this.controls.addEventListener('change', () => this.request());
     this.controls.enableDamping = false;
-    this.wanted = false;
+    this.drawRequested = false;
     this.aspect = 1;
     new ResizeObserver(() => this.request()).observe(row);
     this.canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
     this.canvas.addEventListener('webglcontextrestored', () => this.request());
     this.layout();
-    this.look(this.planar ? 'plane' : '3d');
+    this.setView(this.planar ? 'plane' : '3d');
   }
 
-  /** Turns the camera to a named view: '3d', 'top', 'front', 'side' or 'plane' (along a planar scene's normal). */
-  look(name) {
+  /**
+   * Sets the camera to a view: '3d', 'top', 'front', 'side' or 'plane' (along the normal of a
+   * planar scene).
+   */
+  setView(name) {
     this.name = name;
     const directions = { '3d': this.homeDirection, top: [0, 0, 1], front: [0, -1, 0], side: [1, 0, 0], plane: this.planar ?? [0, 0, 1] };
     const direction = new Vector3(...directions[name]).normalize();
-    // Straight down, "up" is undefined: a hair's breadth decides that x points right and y up.
+    // Looking straight down, "up" is undefined. A small tilt makes x point right and y up.
     if (Math.abs(direction.z) > 0.999) direction.y -= 1e-4;
     const flat = name !== '3d';
     this.camera = flat ? this.orthographic : this.perspective;
@@ -149,12 +155,12 @@ export class View {
     this.camera.zoom = 1;
     this.controls.object = this.camera;
     this.controls.target.copy(this.center);
-    this.lens();
+    this.updateProjection();
     this.controls.update();
     this.request();
   }
 
-  lens() {
+  updateProjection() {
     if (this.camera.isPerspectiveCamera) this.camera.aspect = this.aspect;
     else {
       const height = (this.radius * 1.02) / Math.min(1, this.aspect);
@@ -163,7 +169,7 @@ export class View {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Measures the panels; true if the canvas changed. */
+  /** Adapts the canvas to the panels; returns whether its size changed. */
   layout() {
     const width = this.row.clientWidth;
     const height = this.row.clientHeight;
@@ -173,7 +179,7 @@ export class View {
     this.renderer.setSize(width, height, false);
     const panel = this.panels[0];
     this.aspect = Math.max(0.1, panel.clientWidth / Math.max(1, panel.clientHeight));
-    if (this.camera) this.lens();
+    if (this.camera) this.updateProjection();
     return true;
   }
 
@@ -187,15 +193,15 @@ export class View {
     this.request();
   }
 
-  /** Asks for a picture at the next chance. */
+  /** Requests a drawing in the next animation frame. */
   request() {
-    if (this.wanted) return;
-    this.wanted = true;
+    if (this.drawRequested) return;
+    this.drawRequested = true;
     requestAnimationFrame(() => this.draw());
   }
 
   draw() {
-    this.wanted = false;
+    this.drawRequested = false;
     this.layout();
     const top = this.row.getBoundingClientRect();
     this.scenes.forEach((scene, i) => {
@@ -209,8 +215,8 @@ export class View {
     this.drawn = (this.drawn ?? 0) + 1;
   }
 
-  follow(t) {
-    for (const scene of this.scenes) scene.follow(t);
+  update(t) {
+    for (const scene of this.scenes) scene.update(t);
     this.request();
   }
 

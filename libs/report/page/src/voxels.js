@@ -1,6 +1,6 @@
-// The map: the faces of its cells lie in a texture, and each instance draws a block of them. Faces between two cells are left out
-// while the whole map is shown. (One instanced cube a cell looks simpler, but where WebGL is done in software, 20,000 of them take
-// half a second a picture.)
+// The map: the faces of its cells are stored in a texture, and each instance draws a block of them.
+// Faces between two cells are omitted while the whole map is shown. One instanced cube per cell
+// would be simpler, but with WebGL in software 20,000 of them take half a second per picture.
 import {
   Color, DataTexture, DoubleSide, FloatType, FrontSide, Group, InstancedBufferGeometry, Matrix4, Mesh, RGBAFormat, ShaderMaterial, Uint16BufferAttribute, Vector4,
 } from 'three';
@@ -9,14 +9,15 @@ import { poseOf, transform } from './kinematics.js';
 const BLOCK = 1024;
 const WIDTH = 1024;
 
-/** Indices of BLOCK squares of 4 corners. */
+/** A geometry with the indices of BLOCK squares of 4 corners each. */
 function blockOfFaces() {
   const geometry = new InstancedBufferGeometry();
   geometry.setIndex(new Uint16BufferAttribute(Array.from({ length: BLOCK }, (_, i) => [0, 1, 3, 0, 3, 2].map((corner) => 4 * i + corner)).flat(), 1));
   return geometry;
 }
 
-// A texel is a face: centre of its cell [m] and 8·level + face; face 0, 1 = −x, +x, then y and z.
+// A texel describes a face: the centre of its cell [m] and 8 · level + face. The faces 0 to 5 are
+// −x, +x, −y, +y, −z, +z.
 const VERTEX = `
 uniform highp sampler2D uFaces;
 uniform mat4 uPose;
@@ -42,8 +43,9 @@ void main() {
   gl_Position = i < uCount ? projectionMatrix * viewMatrix * world : vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 
-// Light comes from above and a little from -y; edges of a cell are darker while they are wide enough to be seen apart.
-// Where the clip plane cuts a cell open, its far walls are seen from within: painted flat, they look like the cut itself.
+// Light comes from above and slightly from −y. The edges of a cell are darker if the cell is large
+// enough on the screen. Where the clip plane cuts a cell, the inner sides of its far faces are
+// visible; with a uniform colour they look like the cut surface.
 const FRAGMENT = `
 varying vec3 vLocal;
 varying vec3 vWorld;
@@ -73,10 +75,11 @@ void main() {
   gl_FragColor = vec4(1.0);
 }`;
 
-/** Per cell, a bit for each face that no cell of the same or a larger size covers. */
-function exposed(lo, level) {
+/** For each cell, one bit for each face that no cell of the same or a larger size covers. */
+function exposedFaces(lo, level) {
   const levels = [...new Set(level)].sort((a, b) => a - b);
-  const key = (x, y, z) => ((x + 65536) * 131072 + (y + 65536)) * 131072 + (z + 65536); // below 2^51, so exact
+  // keys are below 2^51 and therefore exact
+  const key = (x, y, z) => ((x + 65536) * 131072 + (y + 65536)) * 131072 + (z + 65536);
   const tables = new Map(levels.map((l) => [l, new Set()]));
   for (let i = 0; i < level.length; ++i) tables.get(level[i]).add(key(lo[3 * i], lo[3 * i + 1], lo[3 * i + 2]));
   const bits = new Uint8Array(level.length);
@@ -118,7 +121,7 @@ export class Voxels {
       }
     }
     this.level = map.level;
-    this.outside = exposed(map.lo, map.level);
+    this.exposed = exposedFaces(map.lo, map.level);
     this.texture = this.textureFor(1);
     const p = this.pose;
     this.uniforms = {
@@ -128,7 +131,8 @@ export class Voxels {
     };
     const pass = (fragmentShader, more) => new ShaderMaterial({ vertexShader: VERTEX, fragmentShader, uniforms: this.uniforms, transparent: true, ...more });
     this.paintPass = pass(FRAGMENT, {});
-    // A translucent map is laid down in depth first, so that one layer of it is blended, whatever the order of the cells.
+    // A translucent map is first drawn to the depth buffer: then only its nearest layer is blended,
+    // in any order of the cells.
     this.depthPass = pass(MASK, { colorWrite: false });
     this.geometry = blockOfFaces();
     this.mesh = new Mesh(this.geometry, this.paintPass);
@@ -140,8 +144,8 @@ export class Voxels {
       mesh.frustumCulled = false;
       this.group.add(mesh);
     }
-    this.list = new Float32Array(0);
-    this.all = false;
+    this.mapBalls = new Float32Array(0);
+    this.showsAll = false;
     this.showAll();
   }
 
@@ -150,7 +154,7 @@ export class Voxels {
     return transform(this.pose, this.cells.subarray(4 * i, 4 * i + 3), out);
   }
 
-  /** Cells are tinted by height. */
+  /** Sets the colours; cells are coloured by height. */
   paint(colors) {
     this.uniforms.uBottom.value.set(colors.voxel);
     this.uniforms.uTop.value.set(colors.voxelTop);
@@ -163,37 +167,37 @@ export class Voxels {
     this.mask.visible = opacity > 0 && opacity < 1;
   }
 
-  /** Keeps what lies on one side of a plane across a world axis; null keeps all. */
+  /** Shows only the part on one side of a plane across a world axis; null shows all. */
   setClip(clip) {
     const sign = clip?.flip ? 1 : -1;
     if (clip) this.uniforms.uClip.value.set(0, 0, 0, -sign * clip.at).setComponent(clip.axis, sign);
     const side = clip ? DoubleSide : FrontSide;
     if (this.paintPass.side === side) return;
     this.cut = Boolean(clip);
-    this.all = false;
+    this.showsAll = false;
     for (const material of [this.paintPass, this.depthPass]) {
       material.side = side;
-      // A program of its own: one that may discard cannot skip hidden fragments early.
+      // A separate program, because a program with `discard` prevents the early depth test.
       material.defines = clip ? { CLIP: 1 } : {};
       material.needsUpdate = true;
     }
   }
 
   showAll() {
-    if (this.all) return;
-    this.all = true;
+    if (this.showsAll) return;
+    this.showsAll = true;
     this.begin();
-    // A cut opens the map: then the faces between cells are its inside.
-    for (let i = 0; i < this.total; ++i) this.put(i, this.cut ? 63 : this.outside[i]);
+    // In a cut map the faces between cells are visible.
+    for (let i = 0; i < this.total; ++i) this.addCell(i, this.cut ? 63 : this.exposed[i]);
     this.publish();
   }
 
   /**
-   * Keeps the cells whose box is within `distance` of a ball.
+   * Shows only the cells whose box is within `distance` of a ball.
    * @param {Float32Array} balls x, y, z, radius of each [m], world
    */
   showNear(balls, distance) {
-    this.all = false;
+    this.showsAll = false;
     const count = balls.length / 4;
     const near = this.toMap(balls);
     const lo = [Infinity, Infinity, Infinity];
@@ -207,7 +211,9 @@ export class Voxels {
     }
     const { cells } = this;
     this.begin();
-    let last = 0; // neighbours in the list are neighbours in space: the ball that kept one cell is asked first for the next
+    // Neighbours in the list are neighbours in space: the ball that is near to one cell is tried
+    // first for the next cell.
+    let last = 0;
     for (let i = 0; i < 4 * this.total; i += 4) {
       const x = cells[i];
       const y = cells[i + 1];
@@ -222,7 +228,7 @@ export class Voxels {
         const r = near[4 * j + 3];
         if (dx * dx + dy * dy + dz * dz <= r * r) {
           last = j;
-          this.put(i / 4, 63);
+          this.addCell(i / 4, 63);
           break;
         }
       }
@@ -232,16 +238,16 @@ export class Voxels {
 
   /** Balls in the map frame: Rᵀ (p − t). */
   toMap(balls) {
-    if (this.list.length !== balls.length) this.list = new Float32Array(balls.length);
+    if (this.mapBalls.length !== balls.length) this.mapBalls = new Float32Array(balls.length);
     const p = this.pose;
     for (let j = 0; j < balls.length; j += 4) {
       const x = balls[j] - p[9];
       const y = balls[j + 1] - p[10];
       const z = balls[j + 2] - p[11];
-      for (let a = 0; a < 3; ++a) this.list[j + a] = p[a] * x + p[3 + a] * y + p[6 + a] * z;
-      this.list[j + 3] = balls[j + 3];
+      for (let a = 0; a < 3; ++a) this.mapBalls[j + a] = p[a] * x + p[3 + a] * y + p[6 + a] * z;
+      this.mapBalls[j + 3] = balls[j + 3];
     }
-    return this.list;
+    return this.mapBalls;
   }
 
   begin() {
@@ -249,8 +255,8 @@ export class Voxels {
     this.faces = 0;
   }
 
-  /** Takes in the faces of a cell whose bits are set. */
-  put(i, bits) {
+  /** Adds the faces of a cell whose bits are set. */
+  addCell(i, bits) {
     if (4 * (this.faces + 6) > this.texture.image.data.length) this.grow();
     const { data } = this.texture.image;
     for (let face = 0; face < 6; ++face) {

@@ -1,5 +1,6 @@
-// Compiled once for each instruction set; see dynamics/kernel/lanes.hpp on what may be used here. Unlike other kernels
-// this one is compiled without fused products.
+// Compiled once for each instruction set; see dynamics/kernel/lanes.hpp on what may be used here.
+// Unlike other kernels, this one is compiled without fused multiply-add: all instruction sets give
+// the same bits.
 #include "hamelin/scene/kernel/box_tree.hpp"
 #include "segment_box.hpp"
 
@@ -37,7 +38,7 @@ HAMELIN_INLINE float magnitude(float x) {
   return x < 0.0F ? -x : x;
 }
 
-// Which of a node's numbers are not above the bound, a bit each.
+// A bit mask of those of a node's eight numbers that are not above the bound.
 HAMELIN_INLINE unsigned not_above(const float* x, float bound) {
   unsigned bits = 0;
 #if defined(__AVX2__)
@@ -53,48 +54,48 @@ HAMELIN_INLINE unsigned not_above(const float* x, float bound) {
 
 constexpr float float_max = 3.4e38F;
 
-// The largest float not above: what a bound is compared with. Three subtractions, squares and sums in single precision
-// are off by less than 8 units in the last place.
+// The value with which lower bounds in single precision are compared: a squared distance widened
+// for their rounding, docs/theory.md (11.17).
 HAMELIN_INLINE float bound_of(double squared) {
   const double wide = (squared > 0.0 ? squared : 0.0) * (1.0 + 2e-6);
   return wide < 3.3e38 ? static_cast<float>(wide) + 1e-37F : float_max;
 }
 
-// The way from a box's nearest point, its direction, and the key.
-struct Away {
+// A point's offset from a box and its key, docs/theory.md (11.1)–(11.3).
+struct Offset {
   double x[3];
-  double key;
-  int face;  ///< inside: the nearest one, lo's before hi's; else −1
+  double key;  ///< squared distance (11.2); inside the box: minus the squared depth (11.3)
+  int face;    ///< inside: the nearest face, lower ones before upper ones; else −1
 };
 
-HAMELIN_INLINE Away away_from(const double* p, const double* box) {
-  Away away{};
-  away.face = -1;
+HAMELIN_INLINE Offset offset_from(const double* p, const double* box) {
+  Offset offset{};
+  offset.face = -1;
   for (int i = 0; i < 3; ++i) {
-    away.x[i] = outside(p[i], box[i], box[3 + i]);
-    away.key += away.x[i] * away.x[i];
+    offset.x[i] = outside(p[i], box[i], box[3 + i]);
+    offset.key += offset.x[i] * offset.x[i];
   }
-  if (away.key > 0.0) return away;
+  if (offset.key > 0.0) return offset;
   double depth = p[0] - box[0];
-  away.face = 0;
+  offset.face = 0;
   for (int i = 1; i < 6; ++i) {
     const double d = i < 3 ? p[i] - box[i] : box[i] - p[i - 3];
     if (d < depth) {
       depth = d;
-      away.face = i;
+      offset.face = i;
     }
   }
-  away.key = -depth * depth;
-  return away;
+  offset.key = -depth * depth;
+  return offset;
 }
 
-// A point, as nodes and leaves ask it.
+// A query point: bounds for nodes, keys and directions for boxes.
 class Point {
  public:
   HAMELIN_INLINE Point(const Tree& tree, const double* p) noexcept : p_(p) {
     for (int i = 0; i < 3; ++i) {
       const float at = static_cast<float>(p[i] - tree.origin[i]);
-      const float slack = magnitude(at) * 1.2e-7F + 1e-37F;
+      const float slack = magnitude(at) * 1.2e-7F + 1e-37F;  // docs/theory.md (11.15)
       low_[i] = at - slack;
       high_[i] = at + slack;
       at_[i] = at;
@@ -102,7 +103,7 @@ class Point {
     }
   }
 
-  // Lower bounds of the squared distances of a node's slots.
+  // Lower bounds of the squared distances of a node's children, docs/theory.md (11.16).
   HAMELIN_INLINE void bounds(const TreeNode& node, float* out) const {
     for (int half = 0; half < width; half += lanes) {
       Lanes sum{};
@@ -116,86 +117,97 @@ class Point {
     }
   }
 
-  HAMELIN_INLINE double key(const double* box) const { return away_from(p_, box).key; }
+  HAMELIN_INLINE double key(const double* box) const { return offset_from(p_, box).key; }
 
-  struct Taken {
+  // What decides whether another box is a duplicate of this one.
+  struct Accepted {
     double direction[3];
     float direction_f[3];
   };
-  HAMELIN_INLINE Taken take(const double* box) const {
-    const Away away = away_from(p_, box);
-    Taken taken{};
-    const double length = __builtin_sqrt(away.key > 0.0 ? away.key : 1.0);
-    for (int i = 0; i < 3; ++i) taken.direction[i] = away.face < 0 ? away.x[i] / length : 0.0;
-    if (away.face >= 0) taken.direction[away.face % 3] = away.face < 3 ? -1.0 : 1.0;
-    for (int i = 0; i < 3; ++i) taken.direction_f[i] = static_cast<float>(taken.direction[i]);
-    return taken;
+  HAMELIN_INLINE Accepted accept(const double* box) const {
+    const Offset offset = offset_from(p_, box);
+    Accepted accepted{};
+    const double length = __builtin_sqrt(offset.key > 0.0 ? offset.key : 1.0);
+    for (int i = 0; i < 3; ++i)
+      accepted.direction[i] = offset.face < 0 ? offset.x[i] / length : 0.0;
+    if (offset.face >= 0) accepted.direction[offset.face % 3] = offset.face < 3 ? -1.0 : 1.0;
+    for (int i = 0; i < 3; ++i) accepted.direction_f[i] = static_cast<float>(accepted.direction[i]);
+    return accepted;
   }
-  HAMELIN_INLINE bool same(const Taken& taken, const Taken& other, double cone_cosine) const {
+  // docs/theory.md (11.22)
+  HAMELIN_INLINE bool is_duplicate(const Accepted& accepted, const Accepted& other,
+                                   double cone_cosine) const {
     double dot = 0.0;
-    for (int i = 0; i < 3; ++i) dot += taken.direction[i] * other.direction[i];
+    for (int i = 0; i < 3; ++i) dot += accepted.direction[i] * other.direction[i];
     return dot > cone_cosine;
   }
 
-  // Whether all that a slot holds is seen within the cone of what was taken: its ball (radius R, at distance d) is,
-  // where the angle to its centre plus asin(R/d) is no more than the cone's, by some hair.
-  HAMELIN_INLINE bool hidden(const TreeNode& node, int slot, const Taken& taken, float cosine, float sine) const {
+  // Whether everything in a child lies in the cone of an accepted box, docs/theory.md (11.23), with
+  // a margin for rounding.
+  HAMELIN_INLINE bool hidden(const TreeNode& node, int slot, const Accepted& accepted, float cosine,
+                             float sine) const {
     float along = 0.0F, square = 0.0F, radius2 = 0.0F;
     for (int i = 0; i < 3; ++i) {
       const float half = 0.5F * (node.hi[i][slot] - node.lo[i][slot]);
-      const float away = at_[i] - (node.lo[i][slot] + half);
-      along += away * taken.direction_f[i];
-      square += away * away;
+      const float offset = at_[i] - (node.lo[i][slot] + half);
+      along += offset * accepted.direction_f[i];
+      square += offset * offset;
       radius2 += half * half;
     }
     if (!(radius2 < 0.999F * sine * sine * square) || !(along > slack_)) return false;
-    return along - slack_ > (cosine * __builtin_sqrtf(square - radius2) + sine * __builtin_sqrtf(radius2)) * 1.00001F;
+    return along - slack_ >
+           (cosine * __builtin_sqrtf(square - radius2) + sine * __builtin_sqrtf(radius2)) *
+               1.00001F;
   }
 
  private:
   const double* p_;
   float low_[3], high_[3], at_[3];
-  float slack_ = 0.0F;  // for rounding in single precision, far more than that takes
+  float slack_ = 0.0F;  // margin for rounding in single precision, far above the largest error
 };
 
-// A capsule's axis, likewise.
+// A capsule's axis as a query.
 class Segment {
  public:
-  HAMELIN_INLINE Segment(const Tree& tree, const double* p, const double* q) noexcept : axis_(axis_of(p, q)) {
+  HAMELIN_INLINE Segment(const Tree& tree, const double* p, const double* q) noexcept
+      : axis_(axis_of(p, q)) {
     float length2 = 0.0F;
     for (int i = 0; i < 3; ++i) {
-      from_[i] = static_cast<float>(p[i] - tree.origin[i]);
-      way_[i] = static_cast<float>(axis_.way[i]);
-      slack_[i] = (magnitude(from_[i]) + magnitude(way_[i])) * 4e-7F + 1e-37F;
-      length2 += way_[i] * way_[i];
-      reach_ += slack_[i];
+      a_[i] = static_cast<float>(p[i] - tree.origin[i]);
+      w_[i] = static_cast<float>(axis_.w[i]);
+      slack_[i] = (magnitude(a_[i]) + magnitude(w_[i])) * 4e-7F + 1e-37F;  // docs/theory.md (11.18)
+      length2 += w_[i] * w_[i];
+      slack_sum_ += slack_[i];
     }
-    loss_ = 4.0F * reach_ * __builtin_sqrtf(length2) + 2e-6F * length2;
+    // docs/theory.md (11.21)
+    loss_ = 4.0F * slack_sum_ * __builtin_sqrtf(length2) + 2e-6F * length2;
   }
 
-  // f(t) = the squared distance of the axis' point at t is convex: f(s) ≥ f(t) + f'(t)(s − t), whatever t is. Three of
-  // Newton's steps bring it near the least f. `loss_` is what rounding can do to f' within [0, 1].
+  // The squared distance f(t) of the point at t is convex, so f(s) ≥ f(t) + f'(t)(s − t) for every
+  // t: docs/theory.md (11.20). Three Newton steps, docs/theory.md (11.19), bring t near the
+  // minimum. `loss_` bounds the rounding errors.
   HAMELIN_INLINE void bounds(const TreeNode& node, float* out) const {
     for (int half = 0; half < width; half += lanes) {
       Lanes t = splat(0.5F), f{}, g{};
       for (int step = 0;; ++step) {
-        Lanes w = splat(1e-30F);
+        Lanes curvature = splat(1e-30F);
         f = Lanes{};
         g = Lanes{};
         for (int i = 0; i < 3; ++i) {
-          const Lanes at = splat(from_[i]) + t * splat(way_[i]);
+          const Lanes at = splat(a_[i]) + t * splat(w_[i]);
           const Lanes above = max(at - (load(node.hi[i] + half) + splat(slack_[i])), Lanes{});
           const Lanes below = max((load(node.lo[i] + half) - splat(slack_[i])) - at, Lanes{});
           const Lanes e = above - below;
           f += e * e;
-          g += splat(way_[i]) * e;
-          w += e != Lanes{} ? splat(way_[i] * way_[i]) : Lanes{};
+          g += splat(w_[i]) * e;
+          curvature += e != Lanes{} ? splat(w_[i] * w_[i]) : Lanes{};
         }
         if (step == 3) break;
-        t = min(max(t - g / w, Lanes{}), splat(1.0F));
+        t = min(max(t - g / curvature, Lanes{}), splat(1.0F));
       }
-      const Lanes falls = min(min(-(g * t), g * (splat(1.0F) - t)), Lanes{});
-      store(max(f * splat(1.0F - 4e-6F) + splat(2.0F) * falls - splat(loss_), Lanes{}), out + half);
+      const Lanes decrease = min(min(-(g * t), g * (splat(1.0F) - t)), Lanes{});
+      store(max(f * splat(1.0F - 4e-6F) + splat(2.0F) * decrease - splat(loss_), Lanes{}),
+            out + half);
     }
   }
 
@@ -203,35 +215,39 @@ class Segment {
     return squared_distance(axis_, box, box + 3, nearest_along(axis_, box, box + 3));
   }
 
-  struct Taken {
+  struct Accepted {
     double direction[3];
     double along;
   };
-  HAMELIN_INLINE Taken take(const double* box) const {
-    Taken taken{};
-    taken.along = nearest_along(axis_, box, box + 3);
+  HAMELIN_INLINE Accepted accept(const double* box) const {
+    Accepted accepted{};
+    accepted.along = nearest_along(axis_, box, box + 3);
     double square = 0.0;
     for (int i = 0; i < 3; ++i) {
-      taken.direction[i] = outside(axis_.from[i] + taken.along * axis_.way[i], box[i], box[3 + i]);
-      square += taken.direction[i] * taken.direction[i];
+      accepted.direction[i] = outside(axis_.a[i] + accepted.along * axis_.w[i], box[i], box[3 + i]);
+      square += accepted.direction[i] * accepted.direction[i];
     }
     const double length = __builtin_sqrt(square);
-    for (double& x : taken.direction) x = length > 0.0 ? x / length : 0.0;
-    return taken;
+    for (double& x : accepted.direction) x = length > 0.0 ? x / length : 0.0;
+    return accepted;
   }
-  // Far apart on the axis they are two, whatever their directions.
-  HAMELIN_INLINE bool same(const Taken& taken, const Taken& other, double cone_cosine) const {
-    const double apart = taken.along - other.along;
+  // Boxes that are near distant points of the axis are distinct for all directions:
+  // docs/theory.md (11.22).
+  HAMELIN_INLINE bool is_duplicate(const Accepted& accepted, const Accepted& other,
+                                   double cone_cosine) const {
+    const double apart = accepted.along - other.along;
     double dot = 0.0;
-    for (int i = 0; i < 3; ++i) dot += taken.direction[i] * other.direction[i];
+    for (int i = 0; i < 3; ++i) dot += accepted.direction[i] * other.direction[i];
     return dot > cone_cosine && apart < 1.0 / 3.0 && apart > -1.0 / 3.0;
   }
-  HAMELIN_INLINE bool hidden(const TreeNode&, int, const Taken&, float, float) const { return false; }
+  HAMELIN_INLINE bool hidden(const TreeNode&, int, const Accepted&, float, float) const {
+    return false;
+  }
 
  private:
   Axis axis_;
-  float from_[3], way_[3], slack_[3];
-  float reach_ = 0.0F, loss_ = 0.0F;
+  float a_[3], w_[3], slack_[3];
+  float slack_sum_ = 0.0F, loss_ = 0.0F;
 };
 
 template <class Query>
@@ -254,7 +270,8 @@ HAMELIN_INLINE bool nearest_of(const Tree& tree, const Query& query, double limi
     float bound;
     std::int32_t node;
   };
-  // At most 10 levels of free cuts and 31 of halving, each leaving at most 7 siblings behind.
+  // At most 10 levels of heuristic cuts and 31 of halving, each of which leaves at most 7 siblings
+  // on the stack.
   Entry stack[512];
   int waiting = 0;
   stack[waiting++] = {0.0F, 0};
@@ -266,12 +283,13 @@ HAMELIN_INLINE bool nearest_of(const Tree& tree, const Query& query, double limi
     query.bounds(node, squares);
     unsigned near = not_above(squares, bound) & ((1U << static_cast<unsigned>(node.count)) - 1U);
     const int first = waiting;
-    // Nearest box first: its bound all but settles the others.
+    // Nearest box first: its distance usually excludes the others.
     for (;;) {
       int box_slot = -1;
       for (unsigned rest = near; rest != 0; rest &= rest - 1U) {
         const int slot = __builtin_ctz(rest);
-        if (node.child[slot] < 0 && (box_slot < 0 || squares[slot] < squares[box_slot])) box_slot = slot;
+        if (node.child[slot] < 0 && (box_slot < 0 || squares[slot] < squares[box_slot]))
+          box_slot = slot;
       }
       if (box_slot < 0) break;
       near &= ~(1U << static_cast<unsigned>(box_slot));
@@ -282,7 +300,7 @@ HAMELIN_INLINE bool nearest_of(const Tree& tree, const Query& query, double limi
     }
     for (; near != 0; near &= near - 1U) {
       const int slot = __builtin_ctz(near);
-      // nearest on top of the stack
+      // the nearest child on top of the stack
       int at = waiting++;
       for (; at > first && stack[at - 1].bound < squares[slot]; --at) stack[at] = stack[at - 1];
       stack[at] = {squares[slot], node.child[slot]};
@@ -294,11 +312,11 @@ HAMELIN_INLINE bool nearest_of(const Tree& tree, const Query& query, double limi
 }
 
 // Nodes before boxes, then boxes by index.
-HAMELIN_INLINE bool before(const Waiting& a, const Waiting& b) {
+HAMELIN_INLINE bool before(const QueueEntry& a, const QueueEntry& b) {
   return a.key < b.key || (a.key == b.key && a.id > b.id);
 }
 
-HAMELIN_INLINE void push(Waiting* heap, int& size, const Waiting& entry) {
+HAMELIN_INLINE void push(QueueEntry* heap, int& size, const QueueEntry& entry) {
   int at = size++;
   while (at > 0) {
     const int parent = (at - 1) / 2;
@@ -309,9 +327,9 @@ HAMELIN_INLINE void push(Waiting* heap, int& size, const Waiting& entry) {
   heap[at] = entry;
 }
 
-HAMELIN_INLINE Waiting pop(Waiting* heap, int& size) {
-  const Waiting top = heap[0];
-  const Waiting last = heap[--size];
+HAMELIN_INLINE QueueEntry pop(QueueEntry* heap, int& size) {
+  const QueueEntry top = heap[0];
+  const QueueEntry last = heap[--size];
   int at = 0;
   for (int child = 1; child < size; child = 2 * at + 1) {
     if (child + 1 < size && before(heap[child + 1], heap[child])) ++child;
@@ -324,19 +342,20 @@ HAMELIN_INLINE Waiting pop(Waiting* heap, int& size) {
 }
 
 template <class Query>
-HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit, double cone_cosine, Waiting* heap,
-                              Found* out, int count) {
+HAMELIN_INLINE int nearest_distinct_of(const Tree& tree, const Query& query, double limit,
+                                       double cone_cosine, QueueEntry* heap, Found* out,
+                                       int count) {
   constexpr int most = 8;
-  typename Query::Taken taken[most];
+  typename Query::Accepted accepted[most];
   const double limit2 = limit * limit;
   const float bound = bound_of(limit2);
   const float cosine = static_cast<float>(cone_cosine);
-  // cones of a right angle and more hide nothing early
+  // (11.23) holds for cones of less than a right angle only; for others no child is skipped early
   const float sine = cone_cosine > 0.0 ? __builtin_sqrtf(1.0F - cosine * cosine) : 0.0F;
   int found = 0, size = 0;
   const auto hidden = [&](const TreeNode& node, int slot) __attribute__((always_inline)) {
     for (int i = 0; i < found; ++i)
-      if (query.hidden(node, slot, taken[i], cosine, sine)) return true;
+      if (query.hidden(node, slot, accepted[i], cosine, sine)) return true;
     return false;
   };
   alignas(32) float squares[width];
@@ -352,7 +371,7 @@ HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit
   };
   open(0);
   while (size > 0 && found < count && found < most) {
-    Waiting next = pop(heap, size);
+    QueueEntry next = pop(heap, size);
     if (next.id >= 0) {
       const TreeNode& parent = tree.nodes[next.id / width];
       const int slot = next.id % width;
@@ -361,7 +380,7 @@ HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit
         if (!hidden(parent, slot)) open(child);
         continue;
       }
-      // a box whose turn it is by its bound: now by its distance
+      // a box with a lower bound of its key: continue with the exact key
       next = {query.key(tree.boxes + 6 * static_cast<std::int64_t>(-1 - child)), child};
       if (!(next.key <= limit2)) continue;
       if (size > 0 && before(heap[0], next)) {
@@ -370,31 +389,36 @@ HAMELIN_INLINE int several_of(const Tree& tree, const Query& query, double limit
       }
     }
     const std::int32_t index = -1 - next.id;
-    const typename Query::Taken hit = query.take(tree.boxes + 6 * static_cast<std::int64_t>(index));
-    bool seen = false;
-    for (int i = 0; i < found; ++i) seen = seen || query.same(taken[i], hit, cone_cosine);
-    if (seen) continue;
-    taken[found] = hit;
+    const typename Query::Accepted hit =
+        query.accept(tree.boxes + 6 * static_cast<std::int64_t>(index));
+    bool duplicate = false;
+    for (int i = 0; i < found; ++i)
+      duplicate = duplicate || query.is_duplicate(accepted[i], hit, cone_cosine);
+    if (duplicate) continue;
+    accepted[found] = hit;
     out[found++] = {next.key, index};
   }
   return found;
 }
 
-bool nearest(const Tree& tree, const double* p, const double* q, double limit, Found& found) noexcept {
+bool nearest(const Tree& tree, const double* p, const double* q, double limit,
+             Found& found) noexcept {
   return q == nullptr ? nearest_of(tree, Point(tree, p), limit, found)
                       : nearest_of(tree, Segment(tree, p, q), limit, found);
 }
 
-int several(const Tree& tree, const double* p, const double* q, double limit, double cone_cosine, Waiting* room,
-            Found* out, int count) noexcept {
-  return q == nullptr ? several_of(tree, Point(tree, p), limit, cone_cosine, room, out, count)
-                      : several_of(tree, Segment(tree, p, q), limit, cone_cosine, room, out, count);
+int nearest_distinct(const Tree& tree, const double* p, const double* q, double limit,
+                     double cone_cosine, QueueEntry* queue, Found* out, int count) noexcept {
+  return q == nullptr
+             ? nearest_distinct_of(tree, Point(tree, p), limit, cone_cosine, queue, out, count)
+             : nearest_distinct_of(tree, Segment(tree, p, q), limit, cone_cosine, queue, out,
+                                   count);
 }
 
 }  // namespace
 
 extern const TreeKernels tree_kernels;
-constexpr TreeKernels tree_kernels{nearest, several};
+constexpr TreeKernels tree_kernels{nearest, nearest_distinct};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::scene::kernel

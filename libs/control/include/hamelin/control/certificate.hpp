@@ -11,71 +11,75 @@
 
 namespace hamelin::control {
 
-/// Proves that the motion between two nodes stays clear. Between nodes the motion is the joint-space line q + s Δq, off
-/// which a trajectory strays by at most σ_j = h |v⁺_j − v_j| / 4 a joint. A shape whose axis moves by the chord Δc
-/// between the nodes, with clearances d and d' there, comes no nearer to what moves no faster than u than
+/// Proves that the motion between two nodes stays clear: chapter 12 of docs/theory.md. The motion
+/// is assumed to follow the joint-space line q + s Δq, from which joint j deviates by at most σ_j,
+/// docs/theory.md (12.1), (12.2). Let the axis of a shape move by the chord Δc during the step h,
+/// with clearances d and d⁺ at the nodes, and let u be the largest speed of an obstacle. Then, by
+/// docs/theory.md (12.7), every clearance on the step is at least
 ///
-///     (d + d' − |Δc| − u h)/2 − κ/8 − Σ_j l_j σ_j,
+///     (d + d⁺ − |Δc| − u h)/2 − κ/8 − Σ_j l_j σ_j.
 ///
-/// where l_j bounds over all q how far joint j moves the shape, and κ = Σ_j l_j |Δq_j| ([j turns] |Δq_j| + 2 Σ_{i<j, i
-/// turns} |Δq_i|) its second derivative along the line. Where that is not positive the line is halved, with the speed
-/// of the shape at each piece's middle in place of the chord, until a piece is no longer than `resolution_m`. Two parts
-/// of the arm are treated the same way, in the frame of the one nearer to the base: only the joints between them move
-/// the other.
+/// l_j bounds how far joint j moves the shape, docs/theory.md (12.3), and κ its second derivative
+/// along the line, docs/theory.md (12.5). If the bound is not positive, the line is bisected, and
+/// each piece is bounded by the speed at its middle, docs/theory.md (12.10), until it is proved or
+/// no longer than `resolution_m`. Pairs of parts of the arm are treated in the frame of the part
+/// nearer to the base: only the joints between the two move the other part.
 class Certificate {
  public:
-  /// A piece of a step's path this short is not halved again [m].
+  /// A piece of a step's path this short is not bisected again [m].
   static constexpr double resolution_m = 1e-4;
-  /// So many configurations between two nodes are looked at, at most; what is open then is not certified.
-  static constexpr int looks_max = 4096;
+  /// The largest number of pieces examined in a step; what is open then is not certified.
+  static constexpr int pieces_max = 4096;
 
-  /// @param limit distances are known up to here; what is farther counts as this far [m]
-  /// @param self null where self-collision is not modelled
-  /// @param self_limit as limit, for distances between parts of the arm [m]
+  /// @param limit distances are known up to here; larger ones count as this [m]
+  /// @param self null if self-collision is not modelled
+  /// @param self_limit the same for distances between parts of the arm [m]
   Certificate(const model::Model& model, const scene::Environment& environment, double limit,
               const scene::SelfField* self, double self_limit);
 
   struct Verdict {
     bool certified = true;
-    double margin_m = 0.0;  ///< no distance is smaller; zero or below: not proved, or the clearance of the contact
-    bool contact = false;   ///< a sub-check met a clearance of zero or below
-    int self_pair = -1;     ///< the pair of parts that touched, if that was it
+    double margin_m = 0.0;  ///< lower bound of all distances; zero or below: not proved, or contact
+    bool contact = false;   ///< a clearance of zero or below was found between the nodes
+    int self_pair = -1;     ///< the pair of parts that touched, or −1
   };
 
-  /// One end of a step. Clearances are capped at the limits.
+  /// One end of a step. Clearances are at most the limits.
   struct Node {
     const Eigen::VectorXd& q;
-    const Eigen::VectorXd& v;  ///< of the motion that leaves or reaches the node
+    const Eigen::VectorXd& v;  ///< velocity with which the motion leaves or reaches the node
     double time_s;
     scene::Shapes arm;                  ///< all shapes at q
-    std::span<const double> clearance;  ///< of all shapes to obstacles; empty where there is nothing to hit
-    std::span<const double> pairs;      ///< of all pairs of SelfField::pairs(); empty where not modelled
+    std::span<const double> clearance;  ///< of all shapes to obstacles; empty if there are none
+    std::span<const double> pairs;      ///< of all SelfField::pairs(); empty if not modelled
   };
   /// @param ws scratch of the same model; its poses change
   [[nodiscard]] Verdict check(dynamics::Workspace& ws, const Node& from, const Node& to);
 
  private:
-  /// What is looked at between the nodes: a shape against the obstacles, or a pair of parts.
+  /// What a bound is for: a shape against the obstacles, or a pair of parts.
   struct Subject {
     std::size_t index;
     bool is_pair;
   };
   struct Piece {
-    double at, width;  ///< of the line, 0 to 1
+    double at, width;  ///< start and width in s, 0 to 1
     double from, to;   ///< clearances at its ends
   };
 
   void set_levers();
-  /// Counts more travel of prismatic joints than their limits say, if that is what they do.
-  void follow_travel(const Eigen::VectorXd& q);
-  /// Lower bound of the subject's clearance over the piece.
+  /// Extends the travel of prismatic joints if q exceeds it.
+  void extend_travel(const Eigen::VectorXd& q);
+  /// Lower bound of the subject's clearance on the piece.
   double prove(dynamics::Workspace& ws, Subject subject, const Piece& piece);
-  /// How fast any point of the subject's axes moves along the line at the posture of ws [m per unit of the line].
+  /// Largest |dc/ds| of any point of the subject's axes at the posture of ws [m].
   [[nodiscard]] double speed(const dynamics::Workspace& ws, Subject subject) const;
-  /// At the posture that arm_ was placed in, the line's at `at`; notes contact.
-  [[nodiscard]] double clearance_at(Subject subject, double at);
-  /// The given clearance, or less if an obstacle that appears in this step is nearer, as if it were there all the time.
-  [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape, double time_s, double clearance) const;
+  /// Clearance at the posture of arm_, which is that of s; records contact.
+  [[nodiscard]] double clearance_at(Subject subject, double s);
+  /// The given clearance, or less if an obstacle that appears in this step is nearer, as if it
+  /// existed all the time.
+  [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape, double time_s,
+                                              double clearance) const;
   [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const {
     return (subject.is_pair ? pair_lever_ : lever_).row(static_cast<Eigen::Index>(subject.index));
   }
@@ -85,19 +89,21 @@ class Certificate {
   double limit_;
   const scene::SelfField* self_;
   double self_limit_;
-  Eigen::VectorXd hop_, travel_;  ///< between successive joint frames at q = 0; of prismatic joints at most
-  Eigen::MatrixXd lever_;         ///< shapes × dof: how far joint j moves any point of shape s's axis [m/rad or 1]
-  Eigen::MatrixXd pair_lever_;    ///< pairs × dof: likewise one part against the other
+  Eigen::VectorXd frame_distance_;  ///< of successive joint frames at q = 0 [m]
+  Eigen::VectorXd travel_;          ///< largest |q| of prismatic joints [m]
+  Eigen::MatrixXd lever_;           ///< shapes × dof, docs/theory.md (12.3) [m/rad or 1]
+  Eigen::MatrixXd pair_lever_;      ///< pairs × dof, docs/theory.md (12.11) [m/rad or 1]
 
   // of the step that is checked
-  Eigen::VectorXd q_, dq_, stray_, bend_;  ///< stray: σ; bend: what levers are multiplied with for κ
-  Eigen::VectorXd rest_;                   ///< bend / 8 + stray
+  Eigen::VectorXd q_, dq_, stray_;  ///< stray: σ
+  Eigen::VectorXd curvature_;       ///< κ is the scalar product of this and the levers
+  Eigen::VectorXd rest_;            ///< curvature / 8 + stray
   double time_s_ = 0.0, h_ = 0.0;
-  double obstacle_way_ = 0.0;           ///< no obstacle moves farther [m]
-  std::vector<std::size_t> appearing_;  ///< obstacles that are there at the end and were not at the start
-  bool contact_ = false;                ///< whether a sub-check met contact
-  int looks_ = 0;
-  Eigen::VectorXd between_, turning_;
+  double obstacle_travel_ = 0.0;        ///< u h: no obstacle moves farther [m]
+  std::vector<std::size_t> appearing_;  ///< obstacles that exist at the end but not at the start
+  bool contact_ = false;                ///< whether contact was found between the nodes
+  int pieces_ = 0;
+  Eigen::VectorXd q_middle_, rate_;
   scene::PlacedShapes arm_;
 };
 

@@ -8,34 +8,41 @@
 
 namespace hamelin::control {
 
-/// How far the arm is from a goal.
+/// The distance of the arm from a goal.
 struct GoalError {
-  std::optional<double> metres;   ///< of the tip, for position and pose goals
-  std::optional<double> radians;  ///< of the tip's rotation for pose goals; the largest of all joints for joint goals
-  bool reached = false;           ///< within the goal's tolerances, speeds included
+  std::optional<double> metres;  ///< of the tip, for position and pose goals
+  std::optional<double>
+      radians;  ///< of the tip's rotation for pose goals; the largest of all joints for joint goals
+  bool reached = false;  ///< within the goal's tolerances, speeds included
 };
 
-/// Which goal is next, and whether the arm rests away from it.
+/// Keeps track of the current goal, and detects stalls: an arm at rest away from the goal.
 class GoalTracker {
  public:
-  /// @param goals at least one; both must outlive this @param rule none: rest is never a stall
+  /// @param goals at least one @param rule none: stalls are not detected; `goals` and `rule` must
+  ///        outlive this
   GoalTracker(const std::vector<scene::Goal>& goals, const std::optional<scene::StallRule>& rule,
               const model::Model& model);
 
-  /// Error of the current goal, or of the last one after all are reached. `ws` holds the poses of q.
+  /// Error of the current goal, or of the last one if all are reached. `ws` must have the poses of
+  /// q.
   [[nodiscard]] GoalError error(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                                 const Eigen::VectorXd& v) const;
-  /// Goes on to the next goal if the current one is reached. @return whether it was
-  [[nodiscard]] bool advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// Selects the next goal if the current one is reached. @return whether it was
+  [[nodiscard]] bool advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                             const Eigen::VectorXd& v);
   [[nodiscard]] bool all_reached() const noexcept { return index_ == goals_.size(); }
   /// Index of the current goal; size() after the last.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }
   [[nodiscard]] std::size_t size() const noexcept { return goals_.size(); }
   /// The current goal, or the last one.
-  [[nodiscard]] const scene::Goal& goal() const { return goals_[std::min(index_, goals_.size() - 1)]; }
+  [[nodiscard]] const scene::Goal& goal() const {
+    return goals_[std::min(index_, goals_.size() - 1)];
+  }
 
-  /// The scene's stall rule, to be asked once a step of dt_s: the tip at rest, away from a goal that has a place for
-  /// it, or joints at rest away from theirs, for as long as the rule says.
+  /// Evaluates the scene's stall rule; to be called once per step of dt_s. A stall is a tip whose
+  /// speed stayed below that of the rule for its hold time, and for position and pose goals also
+  /// farther from the goal than its distance.
   [[nodiscard]] bool stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s);
 
  private:

@@ -9,15 +9,17 @@
 
 namespace hamelin::control {
 
-/// A limit of each joint; `unlimited` where the robot gives none.
-[[nodiscard]] Eigen::VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit,
+/// A limit of each joint; `unlimited` for joints without one.
+[[nodiscard]] Eigen::VectorXd joint_limits(const model::Robot& robot,
+                                           std::optional<double> model::Joint::*limit,
                                            double unlimited);
 
-/// What a planner is told before its first tick: goals, limits and timing of a scene, the shapes of the arm and how far
-/// it is shown obstacles.
-/// @param nominal the arm that the planner believes in
+/// The data that a planner is given before its first tick: goals, limits and timing of a scene, the
+/// shapes of the arm and the distance up to which it is shown obstacles.
+/// @param nominal the planner's model of the arm
 /// @param control_period_s time between two ticks [s]
-[[nodiscard]] planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
-                                                const WorldView& world, double control_period_s);
+[[nodiscard]] planning::SetupData planner_setup(const scene::Scene& scene,
+                                                const model::Model& nominal, const WorldView& world,
+                                                double control_period_s);
 
 }  // namespace hamelin::control

@@ -14,61 +14,74 @@
 
 namespace hamelin::control {
 
-/// What the arm meets where it stands: near points of obstacles and of its own parts, the smallest clearances, and the
-/// proof that the motion between two configurations stayed clear of both. One object a thread; nothing here allocates
-/// once it is made, but for the change of a map.
+/// The surroundings of the arm at a configuration: near points of obstacles and of its own parts,
+/// the smallest clearances, and the proof that the motion between two configurations was clear of
+/// both. One object per thread. After construction, only changes of the map allocate.
 class WorldView {
  public:
-  /// @param influence_m obstacles are looked for up to this distance; what is farther counts as this far
-  /// @throws Error io, parse or invalid for a map, an obstacle, or a robot without shapes where some are needed
+  /// @param influence_m largest distance at which obstacles are found; larger distances count as
+  ///        this
+  /// @throws Error io, parse or invalid for a map, an obstacle, or a robot without shapes if some
+  ///        are needed
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m);
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
-  /// Looks at q: contacts(), self_contacts(), clearances and poses() follow.
+  /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q.
   void look(const Eigen::VectorXd& q, double time_s);
-  /// Makes the configuration last looked at the one from which certify() starts.
+  /// Makes the configuration of the last look() the start of the motion for certify().
   void depart(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
-  /// Whether the motion from depart()'s configuration to the one last looked at stayed clear.
-  /// @param q the configuration last looked at @param v velocity with which it was reached
+  /// Whether the motion from the configuration of depart() to that of the last look() was clear,
+  /// see Certificate.
+  /// @param q the configuration of the last look() @param v velocity with which it was reached
   [[nodiscard]] Certificate::Verdict certify(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
-  /// Makes the changes of the map that are due. What was looked at before shows the map as it was.
-  /// @return a line about them; empty if none was due
+  /// Applies the changes of the map that are due. Results of the last look() still belong to the
+  /// old map.
+  /// @return one line that describes them; empty if none was due
   [[nodiscard]] std::string advance_map() { return environment_.advance(time_s_); }
 
   /// The near points that a planner is shown: shapes in order, nearest first within a shape.
-  [[nodiscard]] std::span<const scene::Contact> contacts() const noexcept { return {contacts_.data(), contact_count_}; }
+  [[nodiscard]] std::span<const scene::Contact> contacts() const noexcept {
+    return {contacts_.data(), contact_count_};
+  }
   [[nodiscard]] std::span<const scene::SelfContact> self_contacts() const noexcept {
     return {self_contacts_.data(), self_contact_count_};
   }
-  /// Contacts at another configuration, obstacles standing where they were at the last look.
+  /// Contacts at another configuration, with the obstacles at their positions of the last look().
   /// @return how many there are; the nearest out.size() of them are written
   std::size_t closest(const Eigen::VectorXd& q, double influence_m, std::span<scene::Contact> out);
-  std::size_t closest_self(const Eigen::VectorXd& q, double influence_m, std::span<scene::SelfContact> out);
-  /// All that `shapes` touch, seen or not, at time 0: the deepest contact with what does not move.
-  /// @return false where there is none
+  std::size_t closest_self(const Eigen::VectorXd& q, double influence_m,
+                           std::span<scene::SelfContact> out);
+  /// The deepest contact of `shapes` at time 0 with obstacles that never move, seen or not.
+  /// @return false if there is none
   [[nodiscard]] bool deepest_at_start(const scene::Shapes& shapes, scene::Contact& deepest);
-  /// The deepest contact of two parts at the configuration of `shapes`. @return false where there is none
+  /// The deepest contact of two parts at the configuration of `shapes`. @return false if there is
+  /// none
   [[nodiscard]] bool deepest_self(const scene::Shapes& shapes, scene::SelfContact& deepest);
-  /// The arm's shapes at a configuration, good until the next call of this or of closest().
+  /// The arm's shapes at a configuration, valid until the next call of this, closest() or
+  /// closest_self().
   [[nodiscard]] scene::Shapes place(const Eigen::VectorXd& q);
 
-  /// Poses of the links at the configuration last looked at.
+  /// Poses of the links at the configuration of the last look().
   [[nodiscard]] const dynamics::Workspace& poses() const noexcept { return poses_; }
 
-  /// To obstacles that the planner is not shown as well; the influence where all is farther [m].
+  /// Clearance to all obstacles, also those that the planner is not shown; at most the influence
+  /// [m].
   [[nodiscard]] double clearance_m() const noexcept { return clearance_now_; }
   [[nodiscard]] double self_clearance_m() const noexcept { return self_clearance_now_; }
   [[nodiscard]] bool touching() const noexcept {
     return (has_obstacles() && clearance_now_ <= 0.0) || (has_self() && self_clearance_now_ <= 0.0);
   }
-  /// The nearest of all obstacle points; null where all is farther than the influence.
-  [[nodiscard]] const scene::Contact* nearest() const noexcept { return nearest_.sphere >= 0 ? &nearest_ : nullptr; }
-  /// What is touched at the configuration last looked at, how deep, when and which way is out.
+  /// The nearest of all obstacle points; null if all are farther than the influence.
+  [[nodiscard]] const scene::Contact* nearest() const noexcept {
+    return nearest_.sphere >= 0 ? &nearest_ : nullptr;
+  }
+  /// Describes the contact at the last look(): what touches what, how deep, when, and the exit
+  /// direction.
   [[nodiscard]] std::string describe_contact() const;
-  /// Obstacles that came into sight at the last look, as indices into environment().obstacles().
+  /// Obstacles that became visible at the last look(), as indices into environment().obstacles().
   [[nodiscard]] std::span<const int> revealed() const noexcept { return revealed_; }
-  /// 1, or less where the arm is in unknown space that is to be crossed slowly.
+  /// 1, or less if the arm is in unknown space that is to be crossed slowly.
   [[nodiscard]] double speed_scale() const noexcept { return speed_scale_; }
 
   [[nodiscard]] bool has_obstacles() const noexcept { return environment_.has_obstacles(); }
@@ -78,29 +91,29 @@ class WorldView {
   [[nodiscard]] const scene::SelfField* self_field() const noexcept { return self_.get(); }
   [[nodiscard]] double influence_m() const noexcept { return influence_; }
   [[nodiscard]] double self_influence_m() const noexcept { return self_influence_; }
-  /// How many contacts look() finds at most.
+  /// The largest number of contacts that look() can find.
   [[nodiscard]] std::size_t contacts_max() const noexcept { return contacts_.size(); }
   [[nodiscard]] std::size_t self_contacts_max() const noexcept { return self_contacts_.size(); }
 
  private:
-  void look_at_obstacles();
-  void look_at_itself();
+  void update_obstacle_contacts();
+  void update_self_contacts();
   void reveal_visible();
   std::size_t find(scene::View view, std::span<scene::Contact> out);
-  void count_clearances(std::span<const scene::Contact> contacts);
+  void update_clearances(std::span<const scene::Contact> contacts);
 
   const model::Model& model_;
   scene::Environment environment_;
   scene::Environment::Scratch scratch_;
-  std::unique_ptr<scene::SelfField> self_;  ///< null where self-collision is not modelled
+  std::unique_ptr<scene::SelfField> self_;  ///< null if self-collision is not modelled
   double influence_, self_influence_ = 0.0;
   std::unique_ptr<Certificate> certificate_;
   bool slow_in_unknown_ = false;
-  bool hidden_obstacles_ = false;   ///< the judge sees what the planner does not
-  std::vector<std::uint8_t> seen_;  ///< obstacles that came into sight, see Environment::see
+  bool hidden_obstacles_ = false;   ///< whether some obstacles may be hidden from the planner
+  std::vector<std::uint8_t> seen_;  ///< see Environment::reveal_visible
   std::vector<int> revealed_;
 
-  // at the configuration last looked at
+  // at the configuration of the last look()
   dynamics::Workspace poses_;
   double time_s_ = 0.0;
   std::vector<scene::Contact> contacts_, other_contacts_;
@@ -118,9 +131,9 @@ class WorldView {
   scene::PlacedShapes arm_before_;
   std::vector<double> clearance_before_, self_clearance_before_;
 
-  // where somebody asks about another configuration
-  dynamics::Workspace asked_poses_;
-  scene::PlacedShapes asked_;
+  // for queries at other configurations
+  dynamics::Workspace query_poses_;
+  scene::PlacedShapes query_arm_;
 };
 
 }  // namespace hamelin::control

@@ -4,20 +4,21 @@
 
 namespace hamelin {
 
-/// The instruction sets that the numerical kernels are compiled for. `baseline` is what the whole program needs;
-/// v3 adds AVX2 and FMA, v4 AVX-512 (F, VL, DQ): names after the levels of the x86-64 psABI. The same results to the
-/// bit are promised on one set only.
+/// The instruction sets that the numerical kernels are compiled for. The whole program needs
+/// `baseline`; v3 adds AVX2 and FMA, v4 adds AVX-512 (F, VL, DQ). The names are those of the levels
+/// in the x86-64 psABI. Results are bit-identical on one set, not between sets.
 enum class Isa : std::int32_t { baseline, v3, v4 };
 
-/// Whether this machine and this build have it.
+/// Whether this machine and this build have the instruction set.
 [[nodiscard]] bool is_available(Isa isa) noexcept;
 
-/// The set of kernels that are made without naming one: the best there is, until set_default_isa names another. A
-/// library that is linked into a plugin has a default of its own, which the plugin interface hands over.
+/// The set that kernels use unless their caller names one: the best available set, until
+/// set_default_isa chooses another. A library that is linked into a plugin has a default of its
+/// own, which the plugin interface sets.
 [[nodiscard]] Isa default_isa() noexcept;
 
-/// A program calls it once, before it makes anything that computes.
-/// @throws Error usage if the set is not available; the default is then as before
+/// Sets the default. A program calls this once, before it makes anything that computes.
+/// @throws Error usage if the set is not available; the default is then unchanged
 void set_default_isa(Isa isa);
 /// Whether set_default_isa was called.
 [[nodiscard]] bool default_isa_is_set() noexcept;
@@ -25,7 +26,7 @@ void set_default_isa(Isa isa);
 /// "x86-64" (elsewhere "generic"), "v3" or "v4".
 [[nodiscard]] std::string_view name_of(Isa isa) noexcept;
 /// The set of that name.
-/// @param where what names it, with which an error message begins
+/// @param where the source of the name, for example an environment variable; prefix of the message
 /// @throws Error usage if the name is unknown or the set is not available
 [[nodiscard]] Isa isa_from_name(std::string_view name, std::string_view where);
 

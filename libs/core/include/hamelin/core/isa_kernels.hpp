@@ -1,9 +1,10 @@
 #pragma once
 #include "hamelin/core/isa.hpp"
 
-/// `const Set& select_NAME(Isa)`: the object NAME of that instruction set, of those that a source under
-/// hamelin_isa_sources defines. To be written in the namespace around theirs. A set that this machine does not have is
-/// an Error.
+/// Defines `const Set& select_NAME(Isa)`, which returns the object NAME compiled for that
+/// instruction set. A source under hamelin_isa_sources defines one such object per set. Use the
+/// macro in the namespace that encloses theirs. The function throws an Error for a set that this
+/// machine does not have.
 #if defined(__x86_64__)
 #define HAMELIN_SELECT_KERNELS(Set, name)                                                      \
   inline namespace isa_baseline {                                                              \

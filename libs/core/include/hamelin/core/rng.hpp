@@ -7,8 +7,8 @@
 
 namespace hamelin {
 
-/// xoshiro256++ (Blackman and Vigna 2019), seeded by splitmix64. Its mappings to doubles are its own, so that a seed
-/// means the same numbers with every standard library. A copyable value.
+/// xoshiro256++ (Blackman and Vigna 2019), seeded by splitmix64. It maps draws to doubles itself,
+/// so that a seed gives the same numbers with every standard library. A copyable value.
 class Rng {
  public:
   static constexpr const char* name = "xoshiro256++";
@@ -38,10 +38,12 @@ class Rng {
   /// Uniform in [0, 1).
   [[nodiscard]] double uniform() noexcept { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
   /// Uniform in [low, high).
-  [[nodiscard]] double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
+  [[nodiscard]] double uniform(double low, double high) noexcept {
+    return low + (high - low) * uniform();
+  }
   /// Uniform in 0 .. count − 1, count > 0.
   [[nodiscard]] std::uint64_t below(std::uint64_t count) noexcept { return next() % count; }
-  /// Standard normal, Box and Muller; two uniforms a call.
+  /// Standard normal (Box and Muller); takes two uniform numbers per call.
   [[nodiscard]] double normal() noexcept {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
     return radius * std::cos(2.0 * std::numbers::pi * uniform());

@@ -12,14 +12,15 @@ struct DisabledPair {
   int line = 0;
 };
 
-/// The pairs that an SRDF (the semantic file beside a URDF, as MoveIt's setup assistant writes it) switches off, in its
-/// order. Groups, states and all else in it are passed over.
+/// The pairs that an SRDF disables, in the file's order. An SRDF is the semantic description that
+/// accompanies a URDF, as written by MoveIt's setup assistant. Its groups, states and other
+/// elements are skipped.
 /// @throws Error io, parse or invalid: "file: line N: what is wrong, what was expected"; also for
-/// <disable_default_collisions>, which means another list than the pairs in the file
+/// <disable_default_collisions>, which disables pairs that the file does not list
 [[nodiscard]] std::vector<DisabledPair> read_srdf(const std::filesystem::path& file);
 
-/// The same for links of a known robot.
-/// @param links all names it has
+/// As above, and checks that the links exist.
+/// @param links names of all links of the robot
 /// @throws Error invalid, with the nearest name, for a link that is not among them
 [[nodiscard]] std::vector<DisabledPair> read_srdf(const std::filesystem::path& file,
                                                   const std::vector<std::string>& links);

@@ -8,7 +8,7 @@
 
 namespace hamelin::description {
 
-/// One <collision> or <visual> of a URDF link: a shape and where it stands in the link's frame.
+/// One <collision> or <visual> of a URDF link: a shape and its pose in the link's frame.
 struct LinkShape {
   enum class Kind { sphere, box, cylinder, mesh };
   Kind kind = Kind::sphere;
@@ -16,16 +16,16 @@ struct LinkShape {
   double radius_m = 0.0;                             ///< sphere, cylinder
   double length_m = 0.0;                             ///< cylinder: along its z, centred
   Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  ///< box: full extents, centred
-  std::string mesh;                                  ///< the file as the URDF names it: package://, file:// or a path
+  std::string mesh;                                  ///< package://, file:// or a path
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();   ///< mesh: factors of its coordinates
-  int line = 0;                                      ///< of the URDF where the shape stands
+  int line = 0;                                      ///< of the shape in the URDF
 };
 
-/// A link with the shapes the file gives it.
+/// A link and its shapes in the file.
 struct LinkGeometry {
   std::string name;
   int line = 0;
-  std::string parent;  ///< the link whose joint carries this one; empty: none, this is the root
+  std::string parent;  ///< parent link, to which a joint connects this link; empty for the root
   std::vector<LinkShape> collision, visual;
 };
 

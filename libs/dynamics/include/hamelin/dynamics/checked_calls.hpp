@@ -1,24 +1,30 @@
 #pragma once
-// Included by dynamics.hpp: the definitions of its functions of joint vectors. Sizes and the workspace are compared
-// here, inline, so that a call costs a few integer comparisons more than the sweep; the sweeps take plain pointers.
+// Included by dynamics.hpp: the inline definitions of its functions of joint vectors. They check
+// sizes and the workspace with a few integer comparisons per call; the sweeps behind them take
+// plain pointers.
 #include "hamelin/dynamics/dynamics.hpp"
 
 namespace hamelin::dynamics {
 
 namespace detail {
 
-[[noreturn]] void refuse_workspace(const char* function, const Model& model, const WorkspaceOwner& owner);
-[[noreturn]] void refuse_size(const char* function, const char* argument, Eigen::Index given, Eigen::Index expected);
-[[noreturn]] void refuse_states(const char* function, const char* argument, Eigen::Index rows, Eigen::Index cols,
-                                Eigen::Index stride, Eigen::Index dof, Eigen::Index states, Eigen::Index expected);
+[[noreturn]] void refuse_workspace(const char* function, const Model& model,
+                                   const WorkspaceOwner& owner);
+[[noreturn]] void refuse_size(const char* function, const char* argument, Eigen::Index given,
+                              Eigen::Index expected);
+[[noreturn]] void refuse_states(const char* function, const char* argument, Eigen::Index rows,
+                                Eigen::Index cols, Eigen::Index stride, Eigen::Index dof,
+                                Eigen::Index states, Eigen::Index expected);
 
 [[noreturn]] void refuse_link(const char* function, int link, Eigen::Index dof);
-[[noreturn]] void refuse_count(const char* function, const char* argument, std::size_t given, std::size_t expected);
+[[noreturn]] void refuse_count(const char* function, const char* argument, std::size_t given,
+                               std::size_t expected);
 
-/// Checks what a call is given; the functions named are those that a user calls.
+/// Checks the arguments of a call. `function` is the name of the public function, for messages.
 class Call {
  public:
-  Call(const char* function, const Model& model, const WorkspaceOwner& owner) : function_(function), dof_(owner.dof) {
+  Call(const char* function, const Model& model, const WorkspaceOwner& owner)
+      : function_(function), dof_(owner.dof) {
     if (model.id() != owner.id) [[unlikely]]
       refuse_workspace(function, model, owner);
   }
@@ -32,11 +38,13 @@ class Call {
       refuse_size(function_, argument, given, expected);
     return *this;
   }
-  /// Columns of joint vectors, laid out as those of `first`.
+  /// Columns of joint vectors with the same size and stride as `first`.
   template <class States, class First>
   const Call& states(const char* argument, const States& x, const First& first) const {
-    if (x.rows() != dof_ || x.cols() != first.cols() || x.outerStride() != first.outerStride()) [[unlikely]]
-      refuse_states(function_, argument, x.rows(), x.cols(), x.outerStride(), dof_, first.cols(), first.outerStride());
+    if (x.rows() != dof_ || x.cols() != first.cols() || x.outerStride() != first.outerStride())
+        [[unlikely]]
+      refuse_states(function_, argument, x.rows(), x.cols(), x.outerStride(), dof_, first.cols(),
+                    first.outerStride());
     return *this;
   }
 
@@ -45,63 +53,76 @@ class Call {
   Eigen::Index dof_;
 };
 
-void inverse_dynamics(const Model&, Workspace&, const double* q, const double* v, const double* a, double* tau);
-void forward_dynamics(const Model&, Workspace&, const double* q, const double* v, const double* tau, double* a);
+void inverse_dynamics(const Model&, Workspace&, const double* q, const double* v, const double* a,
+                      double* tau);
+void forward_dynamics(const Model&, Workspace&, const double* q, const double* v, const double* tau,
+                      double* a);
 void gravity_torque(const Model&, Workspace&, const double* q, double* tau);
 void solve_mass(const Model&, Workspace&, const double* q, const double* y, double* x);
 void momentum(const Model&, Workspace&, const double* q, const double* v, double* p);
 void mass_matrix(const Model&, Workspace&, const double* q, double* M, Eigen::Index stride);
 double kinetic_energy(const Model&, Workspace&, const double* q, const double* v);
 double potential_energy(const Model&, Workspace&, const double* q);
-void inverse_dynamics(const Model&, BatchWorkspace&, Eigen::Index states, Eigen::Index stride, const double* q,
-                      const double* v, const double* a, double* tau);
-void forward_dynamics(const Model&, BatchWorkspace&, Eigen::Index states, Eigen::Index stride, const double* q,
-                      const double* v, const double* tau, double* a);
+void inverse_dynamics(const Model&, BatchWorkspace&, Eigen::Index states, Eigen::Index stride,
+                      const double* q, const double* v, const double* a, double* tau);
+void forward_dynamics(const Model&, BatchWorkspace&, Eigen::Index states, Eigen::Index stride,
+                      const double* q, const double* v, const double* tau, double* a);
 void forward_kinematics(const Model&, Workspace&, const double* q);
-Eigen::Vector3d point_velocity(const Model&, const Workspace&, int link, const Eigen::Vector3d& point_world,
-                               const double* v);
-void gyroscopic_torque(const Model&, Workspace&, const double* q, const double* v, std::span<const GyroscopicTerm>,
-                       double* tau);
-Eigen::Matrix3d operational_inertia(const Model&, Workspace&, const double* q, const double* J, Eigen::Index stride,
-                                    double damping);
+Eigen::Vector3d point_velocity(const Model&, const Workspace&, int link,
+                               const Eigen::Vector3d& point_world, const double* v);
+void gyroscopic_torque(const Model&, Workspace&, const double* q, const double* v,
+                       std::span<const GyroscopicTerm>, double* tau);
+Eigen::Matrix3d operational_inertia(const Model&, Workspace&, const double* q, const double* J,
+                                    Eigen::Index stride, double damping);
 
 }  // namespace detail
 
-inline void inverse_dynamics(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v,
-                             const ConstVectorRef& a, VectorRef tau) {
-  detail::Call("inverse_dynamics", model, ws.owner).joints("q", q).joints("v", v).joints("a", a).joints("tau", tau);
+inline void inverse_dynamics(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                             const ConstVectorRef& v, const ConstVectorRef& a, VectorRef tau) {
+  detail::Call("inverse_dynamics", model, ws.owner)
+      .joints("q", q)
+      .joints("v", v)
+      .joints("a", a)
+      .joints("tau", tau);
   detail::inverse_dynamics(model, ws, q.data(), v.data(), a.data(), tau.data());
 }
 
-inline void forward_dynamics(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v,
-                             const ConstVectorRef& tau, VectorRef a) {
-  detail::Call("forward_dynamics", model, ws.owner).joints("q", q).joints("v", v).joints("tau", tau).joints("a", a);
+inline void forward_dynamics(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                             const ConstVectorRef& v, const ConstVectorRef& tau, VectorRef a) {
+  detail::Call("forward_dynamics", model, ws.owner)
+      .joints("q", q)
+      .joints("v", v)
+      .joints("tau", tau)
+      .joints("a", a);
   detail::forward_dynamics(model, ws, q.data(), v.data(), tau.data(), a.data());
 }
 
-inline void bias_torque(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v,
-                        VectorRef tau) {
+inline void bias_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                        const ConstVectorRef& v, VectorRef tau) {
   detail::Call("bias_torque", model, ws.owner).joints("q", q).joints("v", v).joints("tau", tau);
   detail::inverse_dynamics(model, ws, q.data(), v.data(), nullptr, tau.data());
 }
 
-inline void gravity_torque(const Model& model, Workspace& ws, const ConstVectorRef& q, VectorRef tau) {
+inline void gravity_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                           VectorRef tau) {
   detail::Call("gravity_torque", model, ws.owner).joints("q", q).joints("tau", tau);
   detail::gravity_torque(model, ws, q.data(), tau.data());
 }
 
-inline void solve_mass(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& y,
-                       VectorRef x) {
+inline void solve_mass(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                       const ConstVectorRef& y, VectorRef x) {
   detail::Call("solve_mass", model, ws.owner).joints("q", q).joints("y", y).joints("x", x);
   detail::solve_mass(model, ws, q.data(), y.data(), x.data());
 }
 
-inline void momentum(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v, VectorRef p) {
+inline void momentum(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                     const ConstVectorRef& v, VectorRef p) {
   detail::Call("momentum", model, ws.owner).joints("q", q).joints("v", v).joints("p", p);
   detail::momentum(model, ws, q.data(), v.data(), p.data());
 }
 
-inline void mass_matrix(const Model& model, Workspace& ws, const ConstVectorRef& q, Eigen::Ref<Eigen::MatrixXd> M) {
+inline void mass_matrix(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                        Eigen::Ref<Eigen::MatrixXd> M) {
   detail::Call("mass_matrix", model, ws.owner)
       .joints("q", q)
       .size("M (rows)", M.rows(), ws.owner.dof)
@@ -109,7 +130,8 @@ inline void mass_matrix(const Model& model, Workspace& ws, const ConstVectorRef&
   detail::mass_matrix(model, ws, q.data(), M.data(), M.outerStride());
 }
 
-inline double kinetic_energy(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v) {
+inline double kinetic_energy(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                             const ConstVectorRef& v) {
   detail::Call("kinetic_energy", model, ws.owner).joints("q", q).joints("v", v);
   return detail::kinetic_energy(model, ws, q.data(), v.data());
 }
@@ -119,24 +141,26 @@ inline double potential_energy(const Model& model, Workspace& ws, const ConstVec
   return detail::potential_energy(model, ws, q.data());
 }
 
-inline void inverse_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q, const ConstStatesRef& v,
-                             const ConstStatesRef& a, StatesRef tau) {
+inline void inverse_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q,
+                             const ConstStatesRef& v, const ConstStatesRef& a, StatesRef tau) {
   detail::Call("inverse_dynamics", model, ws.owner)
       .states("q", q, q)
       .states("v", v, q)
       .states("a", a, q)
       .states("tau", tau, q);
-  detail::inverse_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), a.data(), tau.data());
+  detail::inverse_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), a.data(),
+                           tau.data());
 }
 
-inline void forward_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q, const ConstStatesRef& v,
-                             const ConstStatesRef& tau, StatesRef a) {
+inline void forward_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q,
+                             const ConstStatesRef& v, const ConstStatesRef& tau, StatesRef a) {
   detail::Call("forward_dynamics", model, ws.owner)
       .states("q", q, q)
       .states("v", v, q)
       .states("tau", tau, q)
       .states("a", a, q);
-  detail::forward_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), tau.data(), a.data());
+  detail::forward_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), tau.data(),
+                           a.data());
 }
 
 inline void forward_kinematics(const Model& model, Workspace& ws, const ConstVectorRef& q) {
@@ -150,15 +174,22 @@ inline Eigen::Vector3d point_velocity(const Model& model, const Workspace& ws, i
   return detail::point_velocity(model, ws, link, point_world, v.data());
 }
 
-inline void gyroscopic_torque(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& v,
-                              std::span<const GyroscopicTerm> terms, VectorRef tau) {
-  detail::Call("gyroscopic_torque", model, ws.owner).joints("q", q).joints("v", v).joints("tau", tau);
+inline void gyroscopic_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
+                              const ConstVectorRef& v, std::span<const GyroscopicTerm> terms,
+                              VectorRef tau) {
+  detail::Call("gyroscopic_torque", model, ws.owner)
+      .joints("q", q)
+      .joints("v", v)
+      .joints("tau", tau);
   detail::gyroscopic_torque(model, ws, q.data(), v.data(), terms, tau.data());
 }
 
-inline Eigen::Matrix3d operational_inertia(const Model& model, Workspace& ws, const ConstVectorRef& q,
-                                           const ConstRef<Matrix3Xd>& J, double damping) {
-  detail::Call("operational_inertia", model, ws.owner).joints("q", q).size("J (columns)", J.cols(), ws.owner.dof);
+inline Eigen::Matrix3d operational_inertia(const Model& model, Workspace& ws,
+                                           const ConstVectorRef& q, const ConstRef<Matrix3Xd>& J,
+                                           double damping) {
+  detail::Call("operational_inertia", model, ws.owner)
+      .joints("q", q)
+      .size("J (columns)", J.cols(), ws.owner.dof);
   return detail::operational_inertia(model, ws, q.data(), J.data(), J.outerStride(), damping);
 }
 

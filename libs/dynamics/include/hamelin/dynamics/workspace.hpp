@@ -13,12 +13,13 @@ namespace hamelin::dynamics {
 
 struct KernelSet;
 
-/// Memory for the kernels' scratch, aligned for any SIMD register.
+/// Scratch memory for the kernels, aligned for any SIMD register.
 class AlignedBuffer {
  public:
   static constexpr std::align_val_t alignment{64};
 
-  explicit AlignedBuffer(std::size_t bytes) : bytes_(static_cast<std::byte*>(::operator new(bytes, alignment))) {}
+  explicit AlignedBuffer(std::size_t bytes)
+      : bytes_(static_cast<std::byte*>(::operator new(bytes, alignment))) {}
   [[nodiscard]] void* get() noexcept { return bytes_.get(); }
 
  private:
@@ -28,23 +29,25 @@ class AlignedBuffer {
   std::unique_ptr<std::byte, Free> bytes_;
 };
 
-/// What a workspace was made for: calls compare it with the model they are given.
+/// Identifies the model that a workspace was made for. Calls compare it with the model in their
+/// arguments.
 struct WorkspaceOwner {
   explicit WorkspaceOwner(const model::Model& model) noexcept : id(model.id()), dof(model.dof()) {}
   std::uint64_t id;  ///< Model::id
   Eigen::Index dof;
 };
 
-/// All scratch of the algorithms for one model (or its copies) and one thread, and the instruction set they run on.
-/// Made once; nothing allocates afterwards. It does not keep the model: calls are given both and refuse a pair that
-/// does not belong together.
+/// Scratch memory of the algorithms for one model (or its copies) and one thread, and the
+/// instruction set that they use. After its construction no call allocates. It does not keep the
+/// model; calls take both and refuse a workspace that was made for another model.
 class Workspace {
  public:
   /// @throws Error usage if this machine does not have the instruction set
   explicit Workspace(const model::Model& model, Isa isa = default_isa());
-  explicit Workspace(const model::Model&& model, Isa isa = default_isa()) = delete;  ///< nothing could use it
+  /// Deleted: a temporary model is gone before any call could use the workspace.
+  explicit Workspace(const model::Model&& model, Isa isa = default_isa()) = delete;
 
-  /// A link's joint-aligned frame in the world, as the last forward_kinematics left it.
+  /// A link's joint-aligned frame in the world, written by forward_kinematics.
   struct Frame {
     Eigen::Matrix3d R;
     Eigen::Vector3d p;
@@ -55,7 +58,8 @@ class Workspace {
   const KernelSet* kernels;
   AlignedBuffer sweep;  ///< scratch of the kernels
   std::vector<Frame> frames;
-  /// Angular velocity and velocity of a frame's origin, or moment about it and force; world axes.
+  /// Angular velocity and the velocity of a frame's origin, or a moment about the origin and a
+  /// force; world axes.
   struct Pair {
     Eigen::Vector3d angular, linear;
   };
@@ -63,12 +67,14 @@ class Workspace {
   Eigen::VectorXd column_in, column_out;  ///< joint vectors of operational_inertia
 };
 
-/// Scratch for many states at once (inverse_dynamics and forward_dynamics of matrices); of one thread.
+/// Scratch memory of one thread for many states at once (inverse_dynamics and forward_dynamics of
+/// matrices).
 class BatchWorkspace {
  public:
   /// @throws Error usage if this machine does not have the instruction set
   explicit BatchWorkspace(const model::Model& model, Isa isa = default_isa());
-  explicit BatchWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;  ///< nothing could use it
+  /// Deleted: a temporary model is gone before any call could use the workspace.
+  explicit BatchWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;
 
   WorkspaceOwner owner;
   const KernelSet* kernels;

@@ -10,7 +10,7 @@
 
 namespace hamelin::fit {
 
-/// Triangles of a surface [m]; they need not be closed, oriented or free of overlaps.
+/// Triangles of a surface [m]. It need not be closed, oriented or free of overlaps.
 struct Mesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::array<std::int32_t, 3>> triangles;
@@ -20,15 +20,16 @@ struct Mesh {
   }
 };
 
-/// The most triangles that a file may hold.
+/// Most triangles that a file may hold.
 inline constexpr std::size_t triangles_max = 5'000'000;
 
-/// How far a mesh of a curved surface may stand off it [m]. It never lies inside: what covers the mesh covers the
-/// solid.
+/// How far the mesh of a cylinder may lie outside the cylinder [m], docs/theory.md (13.40); twice
+/// that for a ball, (13.41). It never lies inside, so shapes that cover the mesh cover the solid.
 inline constexpr double facet_error_m = 5e-5;
 
-/// Reads STL, OBJ, COLLADA and what else assimp takes. Of a COLLADA file the unit counts and the up-axis does not.
-/// @param scale factors of the file's coordinates
+/// Reads STL, OBJ, COLLADA and other formats that assimp reads. The unit of a COLLADA file is
+/// applied, its up-axis is ignored.
+/// @param scale factors applied to the coordinates in the file
 /// @throws Error io, parse or invalid: "file: what is wrong"
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file, const Eigen::Vector3d& scale);
 
@@ -41,7 +42,7 @@ inline constexpr double facet_error_m = 5e-5;
 /// A polyhedron around a ball [m].
 [[nodiscard]] Mesh ball_mesh(const Eigen::Vector3d& center, double radius);
 
-/// Adds `other`, moved by `pose`.
+/// Adds the triangles of `other`, moved by `pose`.
 void append(Mesh& mesh, const Mesh& other, const geometry::SE3& pose = {});
 
 }  // namespace hamelin::fit

@@ -13,36 +13,39 @@
 
 namespace hamelin::fit {
 
-/// Where meshes are looked for.
+/// Where mesh files are searched for.
 struct MeshPlaces {
-  std::vector<std::pair<std::string, std::filesystem::path>> packages;  ///< NAME of package://NAME/…, its folder
-  std::vector<std::filesystem::path> folders;  ///< tried with the mesh's path and ever shorter ends of it
+  /// NAME of package://NAME/…, and the folder of that package.
+  std::vector<std::pair<std::string, std::filesystem::path>> packages;
+  /// Searched for the mesh's path, and for the ends of that path.
+  std::vector<std::filesystem::path> folders;
 };
 
-/// The file that a URDF means: package://NAME/PATH in NAME's folder, file://PATH, or a path from the URDF's own folder;
-/// where that is absent, the path and its ever shorter ends below each of `folders` and below the URDF's folder and the
-/// folders above it.
-/// @param urdf the file that names it
-/// @param tried receives what was looked at
+/// Finds the mesh file that a URDF names: package://NAME/PATH or model://NAME/PATH in NAME's
+/// folder, file://PATH, or a path relative to the URDF's folder. If that file does not exist, the
+/// path and its ends (without the first folder, the first two, …) are searched below each of
+/// `folders`, below the URDF's folder and below the folders above it.
+/// @param urdf the file that names the mesh
+/// @param tried receives the paths that were tried
 /// @return none if there is no such file
-[[nodiscard]] std::optional<std::filesystem::path> find_mesh(const std::string& name, const std::filesystem::path& urdf,
-                                                             const MeshPlaces& places,
-                                                             std::vector<std::filesystem::path>* tried = nullptr);
+[[nodiscard]] std::optional<std::filesystem::path> find_mesh(
+    const std::string& name, const std::filesystem::path& urdf, const MeshPlaces& places,
+    std::vector<std::filesystem::path>* tried = nullptr);
 
 struct FitOptions {
   CoverOptions cover;
-  std::optional<int> total;  ///< as many shapes in all, at most: the excess is then the least that does
-  double padding_m = 0.0;    ///< added to all radii at last
-  bool visual = false;       ///< take <visual> where a link has no <collision>
+  std::optional<int> total;  ///< most shapes of all links together; the excess is then minimized
+  double padding_m = 0.0;    ///< added to all radii after fitting
+  bool visual = false;       ///< use <visual> where a link has no <collision>
   MeshPlaces meshes;
-  double tolerance_m = 1e-4;  ///< to which the coverage gap is bounded
+  double tolerance_m = 1e-4;  ///< of the bound of the coverage gap
 };
 
-/// One link's shapes beside its geometry; link frame.
+/// One link's shapes and how they fit its geometry; link frame.
 struct LinkFit {
   std::string name;
   std::size_t triangles = 0;
-  bool closed = true;  ///< whether its meshes are
+  bool closed = true;  ///< whether its meshes are closed
   std::vector<Shape> shapes;
   Gap gap;
   Excess excess;
@@ -50,29 +53,32 @@ struct LinkFit {
 };
 
 struct RobotFit {
-  std::vector<LinkFit> links;  ///< those with geometry, in the file's order
+  std::vector<LinkFit> links;  ///< links with geometry, in the file's order
   std::vector<std::string> notes;
   [[nodiscard]] std::size_t shapes() const;
-  [[nodiscard]] double gap_bound_m() const;    ///< the largest
-  [[nodiscard]] double excess_max_m() const;   ///< the largest
+  [[nodiscard]] double gap_bound_m() const;    ///< largest of all links
+  [[nodiscard]] double excess_max_m() const;   ///< largest of all links
   [[nodiscard]] double excess_mean_m() const;  ///< over the surfaces of all links' shapes
-  [[nodiscard]] double volume_ratio() const;   ///< of all shapes to all geometry
+  [[nodiscard]] double volume_ratio() const;   ///< volume of all shapes over that of all geometry
 };
 
-/// Fits shapes to all links of a .urdf that have geometry.
+/// Fits shapes to all links with geometry of a URDF.
 /// @throws Error io, parse, invalid or usage: "file: line N: link 'x': what is wrong"
 [[nodiscard]] RobotFit fit_robot(const std::filesystem::path& urdf, const FitOptions& options);
 
-/// Measures the shapes of a sidecar against the geometry of the same .urdf. Links without shapes have an infinite gap.
+/// Measures the shapes of a sidecar file against the geometry of its URDF. Links without shapes
+/// have an infinite gap.
 /// @throws Error as fit_robot
-[[nodiscard]] RobotFit measure_sidecar(const std::filesystem::path& urdf, const std::filesystem::path& sidecar,
+[[nodiscard]] RobotFit measure_sidecar(const std::filesystem::path& urdf,
+                                       const std::filesystem::path& sidecar,
                                        const FitOptions& options);
 
-/// The sidecar that read_robot takes as RobotOptions::spheres.
-[[nodiscard]] Json sidecar_json(const RobotFit& fit, const std::string& note,
-                                const std::vector<std::pair<std::string, std::string>>& self_collision_disabled);
+/// The sidecar document that read_robot reads as RobotOptions::spheres.
+[[nodiscard]] Json sidecar_json(
+    const RobotFit& fit, const std::string& note,
+    const std::vector<std::pair<std::string, std::string>>& self_collision_disabled);
 
-/// Figures by link and in all, for --json.
+/// Figures per link and in total, for --json.
 [[nodiscard]] Json figures_json(const RobotFit& fit);
 
 }  // namespace hamelin::fit

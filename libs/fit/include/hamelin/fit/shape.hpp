@@ -4,7 +4,8 @@
 
 namespace hamelin::fit {
 
-/// All points within a radius of a segment: a capsule, or a ball where both ends are the same. Some link's frame [m].
+/// All points within a radius of a segment: a capsule, or a ball if both ends are the same. In the
+/// frame of a link [m].
 struct Shape {
   Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;

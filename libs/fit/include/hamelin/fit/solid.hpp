@@ -10,52 +10,58 @@
 
 namespace hamelin::fit {
 
-/// What a surface bounds: distances, inside and outside. Inside is what the outside cannot reach by a way that stays
-/// clear of all triangles on a grid, so cavities count as inside and neither orientation nor overlaps matter; of a
-/// surface that is not closed also what its winding number (Jacobson, Kavan, Sorkine 2013) puts inside. A point
-/// between walls so close that no grid point fits is inside unless it sees the outside. Distances are to the surface
-/// that the outside sees: walls of cavities and what overlapping parts hide do not count.
+/// The solid that a surface bounds: distances, inside and outside, docs/theory.md (13.27)–(13.30).
+/// Inside are the points that the outside cannot reach on a grid without crossing a triangle, so
+/// cavities count as inside and neither orientation nor overlaps matter. If the surface is not
+/// closed, points with a winding number above ½ are inside, too. A point between walls so close
+/// that no grid point fits between them is inside unless the outside is visible from it. Distances
+/// are to the part of the surface that is visible from outside: walls of cavities and parts hidden
+/// by overlapping bodies do not count.
 class Solid {
  public:
   /// @param mesh at least one triangle with an area
-  /// @param nodes about how many points the grid may have
+  /// @param nodes approximate number of grid points
   explicit Solid(Mesh mesh, std::size_t nodes = 120'000);
 
-  /// The surface as given.
+  /// The surface as given to the constructor.
   [[nodiscard]] const Mesh& mesh() const noexcept { return mesh_; }
   /// Distance from the surface [m].
   [[nodiscard]] double distance(const Eigen::Vector3d& p) const;
-  /// The same, negative inside [m].
+  /// Distance from the surface, negative inside [m].
   [[nodiscard]] double signed_distance(const Eigen::Vector3d& p) const;
-  /// How deep p lies inside [m], negative outside; from the grid, fast and as good as that is.
+  /// Depth of p below the surface [m], negative outside: fast, interpolated on the grid.
   [[nodiscard]] double depth(const Eigen::Vector3d& p) const;
-  /// The least depth along a segment, likewise.
+  /// The least depth along a segment, interpolated likewise.
   [[nodiscard]] double depth(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
-  /// The same by exact distances of points a grid step apart.
+  /// The least depth along a segment, by exact distances of points one grid step apart.
   [[nodiscard]] double exact_depth(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
   [[nodiscard]] double spacing() const noexcept { return spacing_; }  ///< of the grid [m]
-  [[nodiscard]] bool closed() const noexcept { return closed_; }      ///< each edge has as many triangles to each side
-  [[nodiscard]] double volume() const;                                ///< [m³], from the grid
-  [[nodiscard]] double area() const noexcept { return area_; }        ///< [m²]
-  /// The grid's points that lie inside, or so near the surface that it matters for thin things.
+  /// Whether each edge is passed equally often in both directions by the triangles around it.
+  [[nodiscard]] bool closed() const noexcept { return closed_; }
+  [[nodiscard]] double volume() const;                          ///< [m³], docs/theory.md (13.39)
+  [[nodiscard]] double area() const noexcept { return area_; }  ///< [m²]
+  /// The grid points inside, or within one grid step of the surface, as thin bodies need.
   [[nodiscard]] std::vector<Eigen::Vector3d> inner_points() const;
 
  private:
   struct Node {
     Eigen::Vector3d low, high;
-    Eigen::Vector3d center, normal;                ///< centroid by area; sum of area times normal
-    double radius = 0.0;                           ///< of a ball about `center` that holds the triangles
-    std::int32_t first = 0, count = 0, right = 0;  ///< a leaf has a count; else the left child is the next node
+    Eigen::Vector3d center, normal;  ///< centroid by area; sum of area times normal
+    double radius = 0.0;             ///< of a ball about `center` that holds the triangles
+    /// A leaf has a count > 0. The left child of any other node is the next node.
+    std::int32_t first = 0, count = 0, right = 0;
   };
   enum class Side : std::uint8_t { near, outside, inside };
 
   void build_tree();
   std::int32_t build(std::size_t first, std::size_t last);
   void find_closed();
-  [[nodiscard]] bool drop_hidden();
-  /// The side of the nearest point of the grid that is clear of the surface and in sight; `near` if there is none.
-  [[nodiscard]] Side seen_from(const Eigen::Vector3d& p, bool outside_only) const;
+  /// Removes from outer_ what is not visible from outside. @return whether anything was removed
+  [[nodiscard]] bool remove_hidden_triangles();
+  /// The side of the nearest grid point that is clear of the surface and visible from p; `near` if
+  /// there is none.
+  [[nodiscard]] Side visible_side(const Eigen::Vector3d& p, bool outside_only) const;
   [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
   void fill_grid(std::size_t nodes);
   [[nodiscard]] Eigen::Vector3d closest(const Eigen::Vector3d& p, double within) const;
@@ -65,17 +71,17 @@ class Solid {
   [[nodiscard]] std::size_t index(int i, int j, int k) const;
 
   Mesh mesh_;
-  Mesh outer_;                       ///< what of it the outside sees, perhaps in smaller triangles
-  std::vector<std::int32_t> order_;  ///< triangles as the tree's leaves hold them
+  Mesh outer_;                       ///< the part visible from outside, perhaps cut smaller
+  std::vector<std::int32_t> order_;  ///< triangles in the order of the tree's leaves
   std::vector<Node> tree_;
   double area_ = 0.0;
   bool closed_ = false;
   double spacing_ = 0.0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::Vector3i size_ = Eigen::Vector3i::Zero();
-  std::vector<float> field_;  ///< signed distance at the grid's points
+  std::vector<float> field_;  ///< signed distance at the grid points [m]
   std::vector<Side> side_;
-  std::vector<Eigen::Vector3i> around_;  ///< steps on the grid, nearest first
+  std::vector<Eigen::Vector3i> offsets_;  ///< to grid points around one, nearest first
 };
 
 }  // namespace hamelin::fit

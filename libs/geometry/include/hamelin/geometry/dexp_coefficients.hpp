@@ -3,7 +3,8 @@
 #include <cmath>
 #include <cstddef>
 
-/// The scalar functions in exp, dexp and dexp⁻¹ of all four groups, to full precision at every angle.
+/// The scalar functions of the angle θ in exp, dexp and dexp⁻¹ of all four groups, to full
+/// precision at every angle: docs/theory.md (1.3), (1.7)–(1.11).
 namespace hamelin::geometry {
 
 /// Σ c_k xᵏ by Horner's rule.
@@ -14,7 +15,8 @@ template <std::size_t n>
   return sum;
 }
 
-/// exp(ω̂) = 1 + sinc ω̂ + a ω̂² and dexp = 1 + a ad + b ad² where ad³ = −θ² ad (all groups but SE(3)).
+/// exp(ω̂) = 1 + sinc ω̂ + a ω̂², and dexp = 1 + a ad + b ad² where ad³ = −θ² ad. The latter holds
+/// for all groups except SE(3).
 struct ExpCoefficients {
   double sinc;  ///< sin θ / θ
   double a;     ///< (1 − cos θ)/θ²
@@ -23,8 +25,8 @@ struct ExpCoefficients {
   double db;    ///< b'(θ)/θ = (a − 3b)/θ²
 };
 
-/// Below this angle [rad] the closed forms in exp_coefficients cancel and the series is used: ten terms, up to θ¹⁸, the
-/// first one left out below 2e-18 of the sum.
+/// Below this angle [rad] the closed forms in exp_coefficients suffer from cancellation, and a
+/// series is used: ten terms, up to θ¹⁸. The first omitted term is below 2e-18 of the sum.
 inline constexpr double exp_series_threshold = 1.0;
 
 /// @param theta_squared θ² ≥ 0 [rad²]
@@ -52,7 +54,8 @@ inline constexpr double exp_series_threshold = 1.0;
     };
     constexpr auto sinc = series(1), a = series(2), b = series(3);
     constexpr auto da = derivative(a), db = derivative(b);
-    return {polynomial(sinc, x), polynomial(a, x), polynomial(b, x), polynomial(da, x), polynomial(db, x)};
+    return {polynomial(sinc, x), polynomial(a, x), polynomial(b, x), polynomial(da, x),
+            polynomial(db, x)};
   }
   const double theta = std::sqrt(x);
   const double half_sine = std::sin(0.5 * theta);
@@ -69,12 +72,13 @@ struct InverseExpCoefficients {
   double de;     ///< e'(θ)/θ = (1/4 − (γ + 2) e)/θ²
 };
 
-/// Below this angle [rad] inverse_exp_coefficients uses the series Σ |B₂ₖ|/(2k)! θ^(2k−2), up to B₂₄ (θ²²); the first
-/// term left out is below 1e-19 of the sum.
+/// Below this angle [rad] inverse_exp_coefficients uses the series Σ |B₂ₖ|/(2k)! θ^(2k−2) with the
+/// Bernoulli numbers B₂ to B₂₄ (θ²²). The first omitted term is below 1e-19 of the sum.
 inline constexpr double inverse_exp_series_threshold = 1.0;
 
 /// @param theta_squared θ² ≥ 0 [rad²]; singular at θ = 2π, 4π, …
-[[nodiscard]] inline InverseExpCoefficients inverse_exp_coefficients(double theta_squared) noexcept {
+[[nodiscard]] inline InverseExpCoefficients inverse_exp_coefficients(
+    double theta_squared) noexcept {
   const double x = theta_squared;
   if (x < inverse_exp_series_threshold * inverse_exp_series_threshold) {
     constexpr std::array<double, 12> e{1.0 / 12.0,

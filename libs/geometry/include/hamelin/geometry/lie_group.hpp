@@ -3,14 +3,17 @@
 
 namespace hamelin::geometry {
 
-/// What SO(2), SO(3), SE(2) and SE(3) share, so that an algorithm is written once over the group G.
+/// The common interface of SO(2), SO(3), SE(2) and SE(3), for algorithms written once over the
+/// group G.
 ///
-/// A value of G is a displacement; `Tangent` is a twist, `Dual` a wrench or momentum (both plain Eigen vectors of size
-/// `dof`, angular part first), `Adjoint` a dof × dof matrix, `Point` a point of the space moved, `Matrix` the group's
-/// own matrices. `dexp` is right-trivialised: d/dt exp(x) = hat(dexp(x) ẋ) exp(x).
+/// A value of G is a displacement. `Tangent` is a twist, and also the type of wrenches and momenta:
+/// a plain Eigen vector of size `dof`, angular part first. `Adjoint` is a dof × dof matrix, `Point`
+/// a point of the space that is moved, `Matrix` the group's own matrices. `dexp` is
+/// right-trivialised: d/dt exp(x) = hat(dexp(x) ẋ) exp(x), docs/theory.md (1.5).
 template <class G>
 concept LieGroup = std::regular<G> &&
-    requires(const G g, const typename G::Tangent x, const typename G::Point point, const typename G::Matrix m) {
+    requires(const G g, const typename G::Tangent x, const typename G::Point point,
+             const typename G::Matrix m) {
   { G::dof } -> std::convertible_to<int>;
   { g* g } -> std::same_as<G>;
   { g* point } -> std::same_as<typename G::Point>;

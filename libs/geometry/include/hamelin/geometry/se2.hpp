@@ -30,29 +30,34 @@ class SE2 {
     return (Matrix() << c, -s, p_.x(), s, c, p_.y(), 0.0, 0.0, 1.0).finished();
   }
 
-  [[nodiscard]] SE2 operator*(const SE2& other) const { return {rotation_ * other.rotation_, act(other.p_)}; }
+  [[nodiscard]] SE2 operator*(const SE2& other) const {
+    return {rotation_ * other.rotation_, act(other.p_)};
+  }
   [[nodiscard]] Point operator*(const Point& point) const { return act(point); }
   [[nodiscard]] Point act(const Point& point) const { return rotation_.act(point) + p_; }
   [[nodiscard]] SE2 inverse() const {
     const SO2 back = rotation_.inverse();
     return {back, -back.act(p_)};
   }
-  [[nodiscard]] bool operator==(const SE2& other) const { return rotation_ == other.rotation_ && p_ == other.p_; }
+  [[nodiscard]] bool operator==(const SE2& other) const {
+    return rotation_ == other.rotation_ && p_ == other.p_;
+  }
 
-  /// Rotation by ω and p = V v with V = (sin ω/ω) 1 + ω a J, J the quarter turn.
+  /// Rotation by ω and p = V v with V = (sin ω/ω) 1 + ω a J, where J is the rotation by a quarter
+  /// turn. docs/theory.md (1.13).
   [[nodiscard]] static SE2 exp(const Tangent& x) {
     const ExpCoefficients c = exp_coefficients(x[0] * x[0]);
     const double off = x[0] * c.a;
     return {SO2(x[0]), Point(c.sinc * x[1] - off * x[2], off * x[1] + c.sinc * x[2])};
   }
-  /// |ω| ≤ π; v = V⁻¹ p with V⁻¹ = γ 1 − (ω/2) J.
+  /// |ω| ≤ π; v = V⁻¹ p with V⁻¹ = γ 1 − (ω/2) J. docs/theory.md (1.13).
   [[nodiscard]] Tangent log() const {
     const double omega = rotation_.angle();
     const double gamma = inverse_exp_coefficients(omega * omega).gamma, half = 0.5 * omega;
     return {omega, gamma * p_.x() + half * p_.y(), gamma * p_.y() - half * p_.x()};
   }
 
-  /// [1 0; −J p  R].
+  /// [1 0; −J p  R], docs/theory.md (1.14).
   [[nodiscard]] Adjoint Ad() const {
     const double c = rotation_.cos(), s = rotation_.sin();
     return (Adjoint() << 1.0, 0.0, 0.0, p_.y(), c, -s, -p_.x(), s, c).finished();
@@ -65,7 +70,7 @@ class SE2 {
     const Point f = rotation_.inverse().act(y.tail<2>());
     return {y[0] + p_.y() * y[1] - p_.x() * y[2], f.x(), f.y()};
   }
-  /// [0 0; −J v  ω J].
+  /// [0 0; −J v  ω J], docs/theory.md (1.14).
   [[nodiscard]] static Adjoint ad(const Tangent& x) {
     return (Adjoint() << 0.0, 0.0, 0.0, x[2], 0.0, -x[0], -x[1], x[0], 0.0).finished();
   }
@@ -91,7 +96,9 @@ class SE2 {
   [[nodiscard]] static Matrix hat(const Tangent& x) {
     return (Matrix() << 0.0, -x[0], x[1], x[0], 0.0, x[2], 0.0, 0.0, 0.0).finished();
   }
-  [[nodiscard]] static Tangent vee(const Matrix& m) { return {0.5 * (m(1, 0) - m(0, 1)), m(0, 2), m(1, 2)}; }
+  [[nodiscard]] static Tangent vee(const Matrix& m) {
+    return {0.5 * (m(1, 0) - m(0, 1)), m(0, 2), m(1, 2)};
+  }
 
  private:
   SO2 rotation_;

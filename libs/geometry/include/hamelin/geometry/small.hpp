@@ -1,12 +1,13 @@
 #pragma once
 #include <type_traits>
 
-/// For functions that are compiled for several instruction sets in one program: a copy kept out of line for one of
-/// them could be linked into the others.
+/// For functions that are compiled for several instruction sets in one program. Without forced
+/// inlining, the linker could use the copy for one set in the code for another.
 #define HAMELIN_INLINE inline __attribute__((always_inline))
 
-/// Small value types of the recursive kernels: a scalar S (a double, or as many as a SIMD register has lanes) and
-/// nothing else, so that they stay in registers. Eigen is the language of the public interfaces.
+/// Small value types for the recursive kernels. They hold scalars S only (a double, or one double
+/// per lane of a SIMD register), so they stay in registers. Public interfaces use Eigen types
+/// instead.
 namespace hamelin::geometry {
 
 template <class S>
@@ -23,7 +24,8 @@ constexpr HAMELIN_INLINE Vec3<S> operator-(const Vec3<S>& a, const Vec3<S>& b) n
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class S>
-constexpr HAMELIN_INLINE Vec3<S> operator*(const Vec3<S>& a, const std::type_identity_t<S>& k) noexcept {
+constexpr HAMELIN_INLINE Vec3<S> operator*(const Vec3<S>& a,
+                                           const std::type_identity_t<S>& k) noexcept {
   return {a.x * k, a.y * k, a.z * k};
 }
 template <class S>
@@ -88,7 +90,8 @@ constexpr HAMELIN_INLINE Vec3<S> transposed_times(const Mat3<S>& a, const Vec3<S
 }
 /// a − u wᵀ.
 template <class S>
-constexpr HAMELIN_INLINE Mat3<S> minus_outer(const Mat3<S>& a, const Vec3<S>& u, const Vec3<S>& w) noexcept {
+constexpr HAMELIN_INLINE Mat3<S> minus_outer(const Mat3<S>& a, const Vec3<S>& u,
+                                             const Vec3<S>& w) noexcept {
   return {a.x - w * u.x, a.y - w * u.y, a.z - w * u.z};
 }
 template <class S>

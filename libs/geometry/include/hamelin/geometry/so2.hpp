@@ -51,7 +51,9 @@ class SO2 {
   [[nodiscard]] static Adjoint dexp(const Tangent&) { return Adjoint::Identity(); }
   [[nodiscard]] static Adjoint dexp_inv(const Tangent&) { return Adjoint::Identity(); }
 
-  [[nodiscard]] static Matrix hat(const Tangent& x) { return (Matrix() << 0.0, -x[0], x[0], 0.0).finished(); }
+  [[nodiscard]] static Matrix hat(const Tangent& x) {
+    return (Matrix() << 0.0, -x[0], x[0], 0.0).finished();
+  }
   [[nodiscard]] static Tangent vee(const Matrix& m) { return Tangent(0.5 * (m(1, 0) - m(0, 1))); }
 
  private:

@@ -9,14 +9,15 @@ namespace hamelin::geometry {
 /// x̂ with x̂ y = x × y.
 [[nodiscard]] Eigen::Matrix3d hat(const Eigen::Vector3d& x);
 
-/// The inverse of hat; of a matrix that is not skew, its skew part.
+/// The inverse of hat. A matrix that is not skew-symmetric is replaced by its skew part first.
 [[nodiscard]] Eigen::Vector3d vee(const Eigen::Matrix3d& m);
 
-/// Unit quaternion (w, x, y, z) of a rotation matrix, w ≥ 0; accurate at every angle (Shepperd 1978).
+/// Unit quaternion (w, x, y, z) of a rotation matrix, w ≥ 0; accurate at every angle (Shepperd
+/// 1978).
 [[nodiscard]] Eigen::Vector4d quaternion_wxyz(const Eigen::Matrix3d& R);
 
-/// Rotation matrix of a quaternion (w, x, y, z), normalised first.
-/// @throws Error invalid unless the norm is 1 to 1e-6
+/// Rotation matrix of a quaternion (w, x, y, z), which is normalised first.
+/// @throws Error invalid unless its norm is 1 to within 1e-6
 [[nodiscard]] Eigen::Matrix3d rotation_from_wxyz(const Eigen::Vector4d& wxyz);
 
 /// Rotation of space, kept as a matrix. A value; the default is the identity.
@@ -41,13 +42,14 @@ class SO3 {
   [[nodiscard]] SO3 inverse() const;
   [[nodiscard]] bool operator==(const SO3& other) const;
 
-  /// 1 + (sin θ/θ) ω̂ + ((1 − cos θ)/θ²) ω̂², (2) of the paper with its coefficient corrected.
+  /// 1 + (sin θ/θ) ω̂ + ((1 − cos θ)/θ²) ω̂², docs/theory.md (1.3).
   [[nodiscard]] static SO3 exp(const Tangent& omega);
 
-  /// Below this sine of the half angle asin(n)/n is 1 to rounding (order 0, error n²/6 < 2e-17).
+  /// Below this value n of the half angle's sine, asin(n)/n is 1 to rounding (error n²/6 < 2e-17).
   static constexpr double log_threshold = 1e-8;
 
-  /// The shortest rotation vector, |ω| ≤ π; at π exactly, of the two the one whose largest component is positive.
+  /// The shortest rotation vector, |ω| ≤ π. At exactly π there are two; the one whose largest
+  /// component is positive is returned. docs/theory.md (1.12).
   [[nodiscard]] Tangent log() const;
 
   [[nodiscard]] const Adjoint& Ad() const noexcept { return R_; }
@@ -57,9 +59,9 @@ class SO3 {
   [[nodiscard]] static Tangent ad(const Tangent& x, const Tangent& y);
   [[nodiscard]] static Tangent ad_T(const Tangent& x, const Tangent& y);
 
-  /// 1 + a ω̂ + b ω̂².
+  /// 1 + a ω̂ + b ω̂², docs/theory.md (1.7).
   [[nodiscard]] static Adjoint dexp(const Tangent& omega);
-  /// 1 − ω̂/2 + e ω̂²; singular at |ω| = 2π.
+  /// 1 − ω̂/2 + e ω̂², docs/theory.md (1.8); singular at |ω| = 2π.
   [[nodiscard]] static Adjoint dexp_inv(const Tangent& omega);
 
   [[nodiscard]] static Matrix hat(const Tangent& x);

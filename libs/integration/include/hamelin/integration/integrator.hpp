@@ -17,65 +17,71 @@ using dynamics::VectorRef;
 using Eigen::VectorXd;
 using model::Model;
 
-/// What acts on the arm during one step besides gravity. Coefficients are kept over the step and evaluated at
-/// the scheme's own velocity: midpoint, stage or sub-step. Empty vectors mean none and cost nothing. The nodal
-/// potential (a) and the node impulse (e) act between steps: Integrator::kick and Integrator::set_velocity.
+/// The forces on the arm during one step besides gravity, docs/theory.md (8.2). Coefficients are
+/// constant over the step; forces are evaluated at the scheme's own velocity: midpoint, stage or
+/// sub-step. Channels that are empty have no effect and no cost. The channels potential and node
+/// velocity act between steps: Integrator::kick and Integrator::set_velocity.
 struct Channels {
-  VectorXd damping;                        ///< (b) torque −damping_i v_i; empty or dof [Nm s/rad]
-  VectorXd coulomb;                        ///< dry friction −coulomb_i tanh(v_i / coulomb_speed); empty or dof [Nm]
-  double coulomb_speed = 0.01;             ///< below it dry friction turns viscous [rad/s or m/s]
-  std::vector<GyroscopicTerm> gyroscopic;  ///< (c)
-  VectorXd held_torque;                    ///< (d) empty or dof [Nm]
+  VectorXd damping;  ///< torque −damping_i v_i; empty or dof [Nm s/rad]
+  /// Dry friction −coulomb_i tanh(v_i/coulomb_speed); empty or dof [Nm].
+  VectorXd coulomb;
+  double coulomb_speed = 0.01;  ///< dry friction is viscous below this speed [rad/s or m/s]
+  std::vector<GyroscopicTerm> gyroscopic;
+  VectorXd held_torque;  ///< empty or dof [Nm]
 
   [[nodiscard]] bool none() const noexcept {
-    return damping.size() == 0 && coulomb.size() == 0 && gyroscopic.empty() && held_torque.size() == 0;
+    return damping.size() == 0 && coulomb.size() == 0 && gyroscopic.empty() &&
+           held_torque.size() == 0;
   }
 };
 
-/// What an integrator remembers between steps: a plain value, to be copied, kept and restored. Of v and p a state has
-/// the one that its scheme steps, and the other is empty: Integrator::velocity() answers for all schemes.
+/// The memory of an integrator between steps: a plain value to copy, keep and restore. Of v and p a
+/// state has the one that its scheme steps, and the other is empty; Integrator::velocity() works
+/// for all schemes.
 struct State {
   double time_s = 0.0;
   long k = 0;
   VectorXd q;
-  VectorXd v;                        ///< velocity at the node: explicit schemes, newmark, feedback
-  VectorXd p;                        ///< momentum at the node [Nm s]; hamel: impulses that no step has taken up yet
-  bool jumped = true;                ///< whether the velocity was set or kicked since the last step
-  VectorXd memory;                   ///< the scheme's own; hamel: body twists of the last step, dof × (6 or 3)
-  VectorXd force_previous;           ///< hamel, newmark: generalised force of the last step
-  double step_previous = 0.0;        ///< gauss, hamel, newmark: length of the last step; 0 where there is none
-  std::vector<StepHistory> history;  ///< composition: one for each sub-step
-  double step_next = 0.0;  ///< what step control takes next [s]: set it for a first step; 0 goes as far as asked
+  VectorXd v;                  ///< velocity at the node: explicit schemes, newmark, feedback
+  VectorXd p;                  ///< momentum at the node [Nm s]; hamel: impulses since the last step
+  bool jumped = true;          ///< whether the velocity was set or kicked since the last step
+  VectorXd memory;             ///< the scheme's own data, e.g. hamel: body twists of the last step
+  VectorXd force_previous;     ///< hamel, newmark: generalised force of the last step
+  double step_previous = 0.0;  ///< gauss, hamel, newmark: length of the last step, or 0
+  std::vector<StepHistory> history;  ///< composition: one per sub-step
+  double step_next = 0.0;  ///< next step under step control [s]; 0 tries the whole limit first
 };
 
-/// What one step did.
+/// The outcome and the cost of one step.
 struct StepReport {
   bool converged = true;
-  int updates = 0;         ///< corrections of Δ
-  int factorizations = 0;  ///< linear solves that made new factors
-  int evaluations = 0;     ///< sweeps over the chain: residuals, or forward dynamics for explicit schemes
-  int halvings = 0;        ///< how often the step was halved to find a root
-  int rejected = 0;        ///< steps that step control took back
-  double step_s = 0.0;     ///< how far the state went
-  double residual = 0.0;   ///< the figure the criterion looks at, of the accepted step
-  double gyroscopic_work_J = 0.0;
-  double dissipated_J = 0.0;  ///< by channel (b) and dry friction, positive
-  double held_work_J = 0.0;   ///< by channel (d)
+  int updates = 0;                 ///< corrections of Δ
+  int factorizations = 0;          ///< factorisations, or multiplications by M⁻¹
+  int evaluations = 0;             ///< residuals, stages, or forward dynamics of explicit schemes
+  int halvings = 0;                ///< how often the step was halved to find a root
+  int rejected = 0;                ///< tries that step control rejected
+  double step_s = 0.0;             ///< the time by which the state advanced
+  double residual = 0.0;           ///< the value that criterion() bounds, of the accepted step
+  double gyroscopic_work_J = 0.0;  ///< this and the works below: docs/theory.md (8.5)
+  double dissipated_J = 0.0;       ///< by damping and dry friction, positive
+  double held_work_J = 0.0;        ///< by the held torque
 };
 
-/// What two parts of a step did, the second after the first.
-[[nodiscard]] StepReport together(const StepReport& a, const StepReport& b);
+/// The report of two parts of a step, the second after the first.
+[[nodiscard]] StepReport merge(const StepReport& a, const StepReport& b);
 
 struct Energy {
   double kinetic_J = 0.0, potential_J = 0.0;
   [[nodiscard]] double total() const noexcept { return kinetic_J + potential_J; }
 };
 
-/// A one-step scheme for a chain: θ^k → θ^{k+1}. One object a thread; State is the memory. No allocation in a step. The
-/// model is kept by reference and must outlive the integrator.
+/// A one-step scheme for a chain: θ^k → θ^{k+1}. An object belongs to one thread; State is the
+/// memory. A step allocates nothing. The model is kept by reference and must outlive the
+/// integrator.
 ///
-/// Calls check sizes, and that a state is one that this scheme makes for this model, and throw an Error (usage).
-/// start() also checks that its numbers are finite; later ones that are not come out as a step that has not converged.
+/// Calls check sizes, and that a state is one of this scheme for this model; they throw an Error
+/// (usage). start() also checks that its numbers are finite. If numbers are not finite later, the
+/// step reports converged = false.
 class Integrator {
  public:
   virtual ~Integrator() = default;
@@ -84,62 +90,68 @@ class Integrator {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const Model& model() const noexcept { return model_; }
-  /// What "converged" means, for the result: e.g. "|delta|_inf <= 1e-12".
+  /// The condition for converged = true, as text for results: e.g. "|delta|_inf <= 1e-12".
   [[nodiscard]] virtual std::string criterion() const = 0;
-  /// The number in the criterion, the larger of rtol and atol under step control; 1e-12 where nothing is iterated.
+  /// The number in the criterion, or the larger of rtol and atol under step control; 1e-12 for
+  /// schemes without iteration.
   [[nodiscard]] double tolerance() const noexcept;
   [[nodiscard]] virtual int order() const = 0;
-  /// A step is cut into at most 2^max_halvings pieces.
+  /// A step is divided into at most 2^max_halvings parts.
   [[nodiscard]] int max_halvings() const noexcept { return settings_.max_halvings; }
 
   /// A state at rest or in motion. q0, v0: dof numbers.
   [[nodiscard]] State start(const ConstVectorRef& q0, const ConstVectorRef& v0);
-  /// Velocity at the node.
+  /// Writes the velocity at the node to v.
   void velocity(const State& state, VectorRef v) const;
   /// Energy at the node, as the scheme defines it.
   [[nodiscard]] Energy energy(const State& state) const;
-  /// Node impulse: p += dp [Nm s].
+  /// Adds an impulse at the node: p += dp [Nm s], e.g. docs/theory.md (8.1).
   void kick(State& state, const ConstVectorRef& dp);
-  /// Node velocity: p = M(θ^k) v.
+  /// Sets the velocity at the node: p = M(θ^k) v, docs/theory.md (8.3).
   void set_velocity(State& state, const ConstVectorRef& v);
-  /// Exactly h > 0 ahead: one step, or under step control as many as it takes. If it reports converged = false no root
-  /// was found, and the state is as it was.
+  /// Advances by exactly h > 0: one step, or under step control as many as needed. If the report
+  /// has converged = false, the state is unchanged.
   [[nodiscard]] StepReport step(State& state, const Channels& channels, double h);
-  /// One step of at most `limit`: all of it for fixed steps, what step control chooses else (StepReport::step_s).
+  /// Takes one step of at most `limit`: of exactly `limit` for fixed steps, of the length that step
+  /// control chooses otherwise (StepReport::step_s).
   [[nodiscard]] StepReport advance(State& state, const Channels& channels, double limit);
-  /// Whether the scheme chooses its steps itself (rtol, atol).
-  [[nodiscard]] bool adaptive() const noexcept { return settings_.rtol > 0.0 || settings_.atol > 0.0; }
-  /// "structure": fixed steps of a structure-preserving scheme, iterated to rounding; else "accurate".
+  /// Whether the scheme is under step control (rtol, atol).
+  [[nodiscard]] bool adaptive() const noexcept {
+    return settings_.rtol > 0.0 || settings_.atol > 0.0;
+  }
+  /// "structure" for fixed steps of a structure-preserving scheme that are iterated to rounding,
+  /// otherwise "accurate".
   [[nodiscard]] virtual std::string mode() const { return "accurate"; }
 
  protected:
-  /// What the schemes' options have in common.
+  /// The options that all schemes share.
   struct Settings {
     Isa isa = default_isa();
-    int max_halvings = 0;      ///< 0 for explicit schemes: a shorter step finds no other root
+    int max_halvings = 0;      ///< 0 for explicit schemes: they have no root to find
     double tolerance = 1e-12;  ///< the number in the criterion, for fixed steps
     double rtol = 0.0, atol = 0.0;
   };
   Integrator(std::string name, const Model& model, const Settings& settings);
 
-  /// Sets whatever the scheme keeps besides q, which is there.
+  /// Sets the scheme's part of a state whose q is set.
   virtual void begin(State& state, const ConstVectorRef& v0) = 0;
   virtual void node_velocity(const State& state, VectorRef v) const = 0;
   [[nodiscard]] virtual Energy node_energy(const State& state) const;
   virtual void add_momentum(State& state, const ConstVectorRef& dp) = 0;
   virtual void replace_velocity(State& state, const ConstVectorRef& v) = 0;
-  /// One undivided step. Where it does not converge the state is left as it was.
+  /// One undivided step. If it does not converge, the state is unchanged.
   virtual StepReport attempt(State& state, const Channels& channels, double h) = 0;
-  /// One step under step control, of at most `limit`, chosen by State::step_next; rejected ones are counted. Where it
-  /// fails the state is left as it was. Schemes without step control never get here: make_options refuses.
-  virtual StepReport controlled(State& state, const Channels& channels, double limit);
+  /// One step under step control of at most `limit`, starting from State::step_next; rejected tries
+  /// are counted. If it fails, the state is unchanged. Never called for schemes without step
+  /// control, since make_options refuses rtol and atol for them.
+  virtual StepReport controlled_step(State& state, const Channels& channels, double limit);
 
   const Model& model_;
   const Settings settings_;
   mutable dynamics::Workspace ws_;
 
  private:
-  /// Sizes of what a scheme keeps in a state.
+  /// The sizes of a scheme's states.
   struct Shape {
     Eigen::Index q = 0, v = 0, p = 0, memory = 0, force_previous = 0;
     std::size_t history = 0;
@@ -151,27 +163,29 @@ class Integrator {
   void check_channels(const char* function, const Channels& channels) const;
   void refuse_shape(const char* function, const State& state) const;
   void check_size(const char* function, const char* argument, Eigen::Index given) const;
-  /// Makes the room that steps need; at the latest before the first.
+  /// Allocates the memory that steps need, at the latest before the first step.
   void prepare();
-  StepReport go(State& state, const Channels& channels, double limit);
-  StepReport parts(State& state, const Channels& channels, double h);
-  /// One step, in halves where no root is found.
-  StepReport divide(State& state, const Channels& channels, double h, int depth);
+  StepReport take_step(State& state, const Channels& channels, double limit);
+  /// Exactly h under step control.
+  StepReport take_controlled_steps(State& state, const Channels& channels, double h);
+  /// One step; if no root is found, its halves: docs/theory.md (4.30).
+  StepReport attempt_or_halve(State& state, const Channels& channels, double h, int depth);
   void halve(State& state, const Channels& channels, double h, int depth, StepReport& report);
 
   std::string name_;
   Shape shape_;                ///< of this scheme's states, once prepared
-  std::vector<State> saved_;   ///< one a halving level
+  std::vector<State> saved_;   ///< one per level of halving
   mutable VectorXd velocity_;  ///< scratch of node_energy()
 };
 
-/// @throws Error usage for numbers out of range, e.g. an order that the scheme does not have
-[[nodiscard]] std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& options);
+/// @throws Error usage for options out of range, e.g. an order that the scheme does not have
+[[nodiscard]] std::unique_ptr<Integrator> make_integrator(const Model& model,
+                                                          const Options& options);
 /// The integrator keeps a reference to the model, so a temporary would not outlive this call.
 std::unique_ptr<Integrator> make_integrator(const Model&& model, const Options& options) = delete;
 
-/// The same by name: make_integrator("gauss:8", model).
-/// @throws Error usage as make_options
+/// Makes an integrator by name: make_integrator("gauss:8", model).
+/// @throws Error usage like make_options
 [[nodiscard]] std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model& model,
                                                           const Parameters& parameters = {});
 std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model&& model,

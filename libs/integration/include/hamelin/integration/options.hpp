@@ -8,21 +8,22 @@
 
 #include "hamelin/core/isa.hpp"
 
-/// What each scheme can be told; docs/integrators has a page for each.
+/// Options of the schemes; docs/theory.md, chapters 3 to 7, has their equations.
 namespace hamelin::integration {
 
-/// What hamel and hamel-midpoint count of the potential at the first node: half of it, or as published the whole.
+/// First step of hamel and hamel-midpoint, docs/theory.md (3.14): half of the potential at the
+/// first node, or the whole potential.
 enum class Start : std::int32_t { consistent, published };
-/// Root-finding, of all schemes.
+/// Root-finding methods of all schemes.
 enum class Solver : std::int32_t { newton, feedback, riqn };
 
-// In all of them: a step that finds no root is cut into at most 2^max_halvings pieces, and `isa` is the instruction set
-// to compute with.
+// In all structs below: a step that finds no root is divided into at most 2^max_halvings parts,
+// docs/theory.md (4.30), and `isa` is the instruction set to compute with.
 
 struct HamelOptions {
   double alpha = 0.5;  ///< where in the step velocities are taken, 0 to 1
   Start start = Start::consistent;
-  double feedback_tolerance = 1e-8;  ///< ‖τ_e‖ [Nm], the paper's ε
+  double feedback_tolerance = 1e-8;  ///< on ‖τ_e‖ [Nm], docs/theory.md (3.9)
   int max_updates = 100;
   int max_halvings = 8;
   Isa isa = default_isa();
@@ -30,28 +31,28 @@ struct HamelOptions {
 
 struct HamelMidpointOptions {
   Start start = Start::consistent;
-  double feedback_tolerance = 1e-8;  ///< ‖τ_e‖ [Nm], the paper's ε
+  double feedback_tolerance = 1e-8;  ///< on ‖τ_e‖ [Nm], docs/theory.md (3.9)
   int max_updates = 100;
   int max_halvings = 8;
   Isa isa = default_isa();
 };
 
-/// hamel-variational.
+/// Options of hamel-variational.
 struct VariationalOptions {
   enum class Solver : std::int32_t { newton, feedback };
   Solver solver = Solver::newton;
-  double tolerance = 1e-12;          ///< newton: ‖δΔ‖∞ [rad or m]
-  double feedback_tolerance = 1e-8;  ///< feedback: ‖τ_e‖ [Nm], the paper's ε
-  int max_updates = 100;             ///< feedback; newton gives up where it does not contract
+  double tolerance = 1e-12;          ///< newton: on ‖δΔ‖∞ [rad or m], docs/theory.md (4.25)
+  double feedback_tolerance = 1e-8;  ///< feedback: on ‖τ_e‖ [Nm], docs/theory.md (4.29)
+  int max_updates = 100;             ///< of feedback; newton stops if it does not contract
   int max_halvings = 8;
   Isa isa = default_isa();
 };
 
 struct GaussOptions {
   int order = 8;             ///< even, 4 to 16
-  double tolerance = 1e-12;  ///< of the iteration, for fixed steps: ‖δΔ‖∞ [rad or m]
-  /// Either above 0 switches step control on; the first step is the one asked for. rtol alone sets atol to the same
-  /// number [rad or m, and per second]; atol alone stays absolute.
+  double tolerance = 1e-12;  ///< of the iteration at fixed steps, on ‖δΔ‖∞ [rad or m]
+  /// A value above 0 switches step control on; State::step_next is then the first step. rtol alone
+  /// sets atol to the same number [rad or m, and per second]; atol alone stays absolute.
   double rtol = 0.0, atol = 0.0;
   int max_halvings = 8;
   Isa isa = default_isa();
@@ -60,15 +61,15 @@ struct GaussOptions {
 struct LieExactOptions {
   enum class Solver : std::int32_t { newton, riqn };
   Solver solver = Solver::newton;
-  double tolerance = 1e-12;  ///< ‖δΔ‖∞ [rad or m]
-  int max_updates = 100;     ///< riqn; newton gives up where it does not contract
+  double tolerance = 1e-12;  ///< on ‖δΔ‖∞ [rad or m]
+  int max_updates = 100;     ///< of riqn; newton stops if it does not contract
   int max_halvings = 8;
   Isa isa = default_isa();
 };
 
 struct CompositionOptions {
   int order = 4;             ///< 4, 6 or 8
-  double tolerance = 1e-12;  ///< ‖δΔ‖∞ of a sub-step [rad or m]
+  double tolerance = 1e-12;  ///< on ‖δΔ‖∞ of a sub-step [rad or m]
   int max_halvings = 8;
   Isa isa = default_isa();
 };
@@ -79,13 +80,13 @@ struct SemiImplicitEulerOptions {
 
 struct NewmarkOptions {
   double newmark_beta = 0.25, newmark_gamma = 0.5;
-  double tolerance = 1e-12;  ///< of the iteration: h² times the change of the acceleration [rad or m]
+  double tolerance = 1e-12;  ///< on h² times the change of the acceleration [rad or m]
   int max_updates = 100;
   int max_halvings = 8;
   Isa isa = default_isa();
 };
 
-/// The feedback integrator after Chang and others.
+/// Options of the feedback integrator after Chang, Jiménez, Perlmutter (2016).
 struct FeedbackOptions {
   Isa isa = default_isa();
 };
@@ -95,24 +96,26 @@ struct Rk4Options {
 };
 
 struct Dop853Options {
-  double rtol = 0.0, atol = 0.0;  ///< as GaussOptions
+  double rtol = 0.0, atol = 0.0;  ///< as in GaussOptions
   Isa isa = default_isa();
 };
 
-/// Always under step control: rtol = atol = 1e-10 where neither is given.
+/// Always under step control: rtol = atol = 1e-10 if neither is given.
 struct RosenbrockOptions {
-  double rtol = 0.0, atol = 0.0;  ///< as GaussOptions
+  double rtol = 0.0, atol = 0.0;  ///< as in GaussOptions
   Isa isa = default_isa();
 };
 
 /// A scheme and its options, in the order of integrator_names().
-using Options = std::variant<HamelOptions, HamelMidpointOptions, VariationalOptions, GaussOptions, LieExactOptions,
-                             CompositionOptions, SemiImplicitEulerOptions, NewmarkOptions, FeedbackOptions, Rk4Options,
-                             Dop853Options, RosenbrockOptions>;
+using Options =
+    std::variant<HamelOptions, HamelMidpointOptions, VariationalOptions, GaussOptions,
+                 LieExactOptions, CompositionOptions, SemiImplicitEulerOptions, NewmarkOptions,
+                 FeedbackOptions, Rk4Options, Dop853Options, RosenbrockOptions>;
 
-/// Options of a scheme that is chosen by name, as scene files and command lines give them; what is not set is the
-/// scheme's default. Solver, order and step control are refused by schemes that have none. The others mean nothing to
-/// some schemes, which ignore them, so that schemes can be compared by changing the name alone.
+/// Options of a scheme that is chosen by name, as in scene files and on command lines; what is not
+/// set keeps the scheme's default. Solver, order and step control are refused by schemes that have
+/// none. Schemes ignore the other options that they do not have, so that schemes can be compared by
+/// changing only the name.
 struct Parameters {
   std::optional<int> order;
   std::optional<Solver> solver;
@@ -122,14 +125,16 @@ struct Parameters {
   std::optional<int> max_updates, max_halvings;
   std::optional<Isa> isa;
 
-  [[nodiscard]] bool step_control() const noexcept { return rtol.value_or(0.0) > 0.0 || atol.value_or(0.0) > 0.0; }
+  [[nodiscard]] bool step_control() const noexcept {
+    return rtol.value_or(0.0) > 0.0 || atol.value_or(0.0) > 0.0;
+  }
 };
 
-/// What a scheme takes of Parameters.
+/// The Parameters that a scheme takes.
 struct Scheme {
   std::string name;
-  std::vector<Solver> solvers;  ///< root-finding, the default first; none where nothing is to be solved
-  std::vector<int> orders;      ///< to choose from; none where there is but one
+  std::vector<Solver> solvers;  ///< methods of root-finding, the default first; empty for others
+  std::vector<int> orders;      ///< orders to choose from; empty if there is only one
   bool step_control = false;    ///< whether it takes rtol and atol
   bool iterates = false;        ///< whether it takes a tolerance of its iterations
 };
@@ -137,21 +142,22 @@ struct Scheme {
 /// Names of all schemes.
 [[nodiscard]] const std::vector<std::string>& integrator_names();
 
-/// By its name, or a name with an order ("gauss:8"); null for an unknown one.
+/// The scheme of a name, with or without an order ("gauss:8"); null if the name is unknown.
 [[nodiscard]] const Scheme* find_scheme(std::string_view name);
 
-/// The parts of "gauss:8", the name of a scheme with an order, or of "rk4" without.
+/// The parts of a name with an order ("gauss:8") or without ("rk4").
 struct SchemeName {
   std::string name;
   std::optional<int> order;
 };
 
-/// @throws Error usage if what follows the colon is not a positive whole number; the name is not looked up
+/// Does not check that the name exists.
+/// @throws Error usage if the text after the colon is not a positive integer
 [[nodiscard]] SchemeName parse_scheme_name(std::string_view text);
 
-/// @param name as integrator_names() lists it, or with an order: "gauss:8"
-/// @throws Error usage for an unknown name (with the nearest), a solver, order or step control that the scheme does not
-/// have, two orders, or numbers out of range
+/// @param name one of integrator_names(), possibly with an order: "gauss:8"
+/// @throws Error usage for an unknown name (with the most similar one), a solver, an order or step
+/// control that the scheme does not have, two orders, or values out of range
 [[nodiscard]] Options make_options(std::string_view name, const Parameters& parameters = {});
 
 }  // namespace hamelin::integration

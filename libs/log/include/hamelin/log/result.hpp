@@ -16,16 +16,17 @@ enum class Outcome : std::int32_t {
   stalled,
   collision,
   timeout,
-  diverged,  ///< a step found no root, or numbers left the finite range
-  defect,    ///< an internal check failed: an energy account, or what a plugin may answer
+  diverged,  ///< a step found no root, or numbers became infinite or NaN
+  defect,    ///< an internal check failed: of an energy account or of a plugin's answer
   refused,   ///< the start is in contact
   interrupted,
 };
 [[nodiscard]] std::string_view to_string(Outcome outcome) noexcept;
-/// SPEC §6: 0 done, 1 goal not reached, 2 refused, 3 diverged or defect, 130 interrupted.
+/// Exit code of the program: 0 completed or reached, 1 goal not reached, 2 refused, 3 diverged or
+/// defect, 130 interrupted.
 [[nodiscard]] int exit_code(Outcome outcome) noexcept;
 
-/// Statistics over all steps, filled by StepReports.
+/// Statistics of the integrator over all steps, from its StepReports.
 struct SolverSummary {
   long steps = 0;
   long updates = 0, factorizations = 0, evaluations = 0, halvings = 0, rejected = 0;
@@ -35,36 +36,39 @@ struct SolverSummary {
   double tolerance = 0.0;
 };
 
-/// One run's outcome: the object of --result (SPEC §6). What does not apply stays empty and is written as null.
+/// The outcome of one run, as `--result` writes it (docs/logs.md). Fields that do not apply stay
+/// empty and are written as null.
 struct Result {
   std::string scene, integrator;
   std::optional<std::string> planner;
   Outcome outcome = Outcome::completed;
-  std::string cause;  ///< empty for plain success
+  std::string cause;  ///< empty if the run succeeded
   double time_s = 0.0;
   long steps = 0;
   Eigen::VectorXd q, v;
-  Eigen::VectorXd v_abs_max;     ///< largest speed of each joint at any node [rad/s or m/s]; empty in free motion
-  Eigen::VectorXd a_abs_max;     ///< largest |Δv/h| of each joint between two nodes; empty in free motion
-  Eigen::VectorXd jerk_abs_max;  ///< largest |Δ(Δv/h)/h|; empty in free motion
+  // Largest values of each joint, empty in free motion; h is the step.
+  Eigen::VectorXd v_abs_max;     ///< speed at any node [rad/s or m/s]
+  Eigen::VectorXd a_abs_max;     ///< |Δv/h| between two nodes
+  Eigen::VectorXd jerk_abs_max;  ///< |Δ(Δv/h)/h|
   double energy_initial_J = 0.0, energy_final_J = 0.0;
-  double energy_error_max_J = 0.0;  ///< largest |E_k − E_0 − work booked|
+  double energy_error_max_J = 0.0;  ///< largest |E_k − E_0 − booked work| over all nodes k
   std::optional<double> min_clearance_m, min_self_clearance_m;
   struct Goal {
     std::string type;
-    std::size_t index = 0, count = 0;  ///< how many goals are reached, of how many
+    std::size_t index = 0, count = 0;  ///< number of goals reached, and of all goals
     std::optional<double> error_m, error_rad;
   };
   std::optional<Goal> goal;
   SolverSummary solver;
-  double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0, held_work_J = 0.0;
-  double node_work_J = 0.0;               ///< by node velocities: the law, the filter and recovery together
-  std::optional<double> saturated_share;  ///< of all steps; null where torque limits are not modelled
-  std::optional<double> certified_share;  ///< of all steps; null where nothing can be hit
+  double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0,
+         held_work_J = 0.0;
+  double node_work_J = 0.0;               ///< of node velocities: law, filter and recovery together
+  std::optional<double> saturated_share;  ///< of all steps; null if torque limits are not modelled
+  std::optional<double> certified_share;  ///< of all steps; null if nothing can be hit
   std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified
   std::uint64_t seed = 0;
   std::vector<std::string> warnings;
-  // timing: what depends on clock and machine
+  // The rest depends on clock and machine.
   double cpu_s = 0.0;
   struct TickTime {
     double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [µs], thread CPU time
@@ -73,7 +77,7 @@ struct Result {
   Json provenance = Json::object();
 };
 
-/// The result as the JSON object of SPEC §6, schema "hamelin.result/1". Non-finite numbers become null, named in
+/// The result as JSON, schema "hamelin.result/1". Non-finite numbers become null and are named in
 /// "warnings".
 [[nodiscard]] Json to_json(const Result& result);
 

@@ -11,9 +11,9 @@
 
 namespace hamelin::model {
 
-/// A robot placed in a world, ready for the algorithms: joint-aligned frames with their constants absorbed, in SE(2)
-/// where the chain is planar, else in SE(3). Immutable and shared between threads; scratch lives in
-/// dynamics::Workspace.
+/// A robot placed in a world and prepared for the algorithms: joint-aligned frames with precomputed
+/// constants, in SE(2) if the chain is planar, otherwise in SE(3). Immutable; threads may share it.
+/// Scratch memory is in dynamics::Workspace.
 class Model {
  public:
   /// @param base pose of the robot's base frame in the world
@@ -23,19 +23,22 @@ class Model {
                  const Eigen::Vector3d& gravity = Eigen::Vector3d{0.0, 0.0, -9.81});
 
   [[nodiscard]] int dof() const noexcept { return robot_.dof(); }
-  /// A number that this model shares with its copies only (they are equal), by which scratch knows what it was made
-  /// for. An address would not do: the next model may get the same one. Zero once the model was moved from.
+  /// A number that only this model and its copies have; a workspace uses it to recognise the model
+  /// that it was made for. An address cannot serve, since a later model may get the same one. Zero
+  /// after the model was moved from.
   [[nodiscard]] std::uint64_t id() const noexcept { return identity_.value; }
   [[nodiscard]] const Robot& robot() const noexcept { return robot_; }
   [[nodiscard]] const geometry::SE3& base() const noexcept { return base_; }
   [[nodiscard]] const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
-  /// Whether all joints keep one plane, so that the SE(2) path is taken.
+  /// Whether all joints move in one plane; the algorithms then use SE(2).
   [[nodiscard]] bool planar() const noexcept { return std::holds_alternative<PlanarChain>(chain_); }
-  /// Whether any joint slides or turns a rotor: then the sweeps ask each joint, else none.
-  [[nodiscard]] bool mixed() const noexcept { return mixed_; }
-  [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept { return chain_; }
+  /// Whether any joint is prismatic or has rotor inertia. If none is, faster sweeps are used.
+  [[nodiscard]] bool has_prismatic_or_rotor() const noexcept { return has_prismatic_or_rotor_; }
+  [[nodiscard]] const std::variant<SpatialChain, PlanarChain>& chain() const noexcept {
+    return chain_;
+  }
 
-  /// World pose of the chain's root frame; of a planar chain its z is the plane's normal.
+  /// World pose of the chain's root frame. For a planar chain its z is the plane's normal.
   [[nodiscard]] const geometry::SE3& root() const noexcept { return root_; }
 
   /// Pose of link i's COM frame in its joint-aligned frame (constant).
@@ -45,24 +48,26 @@ class Model {
   /// Pose of the tip in its link's joint-aligned frame (constant).
   [[nodiscard]] const geometry::SE3& tip_in_frame() const noexcept { return tip_in_frame_; }
 
-  /// A collision shape of a link: all points within `radius` of the axis from centre − half_axis to centre + half_axis.
+  /// A collision shape of a link: all points within `radius` of the segment from center − half_axis
+  /// to center + half_axis.
   struct Shape {
     int link;
     int index_in_link;          ///< into Link::spheres, or Link::segments if it is a capsule
-    bool is_capsule;            ///< a sphere's axis is a point
+    bool is_capsule;            ///< otherwise a sphere
     Eigen::Vector3d center;     ///< in the link's joint-aligned frame [m]
-    Eigen::Vector3d half_axis;  ///< likewise; zero for a sphere
+    Eigen::Vector3d half_axis;  ///< in the same frame [m]; zero for a sphere
     double radius;              ///< [m]
   };
   /// The collision shapes of all links, link by link: its spheres, then its capsules.
   [[nodiscard]] const std::vector<Shape>& shapes() const noexcept { return shapes_; }
   /// Whether any shape is a capsule.
   [[nodiscard]] bool has_capsules() const noexcept { return has_capsules_; }
-  /// A shape in words: "sphere 2 of link 'forearm'".
-  [[nodiscard]] std::string words(const Shape& shape) const;
+  /// A shape's description for messages, for example "sphere 2 of link 'forearm'".
+  [[nodiscard]] std::string describe(const Shape& shape) const;
 
-  /// An upper bound of the distance from the base to any point of any shape or the tip, over all q; infinite never:
-  /// prismatic joints count their limits, unlimited ones 1 m. [m]
+  /// An upper bound over all q of the distance from the base to any point of a shape or to the tip
+  /// [m]. Prismatic joints contribute their limits, or 1 m without limits, so the bound is always
+  /// finite. docs/theory.md (1.22).
   [[nodiscard]] double reach() const noexcept { return reach_; }
 
  private:
@@ -83,7 +88,7 @@ class Model {
   Robot robot_;
   geometry::SE3 base_;
   Eigen::Vector3d gravity_;
-  bool mixed_ = false;
+  bool has_prismatic_or_rotor_ = false;
   geometry::SE3 root_;
   std::variant<SpatialChain, PlanarChain> chain_;
   std::vector<geometry::SE3> com_in_frame_;

@@ -18,89 +18,97 @@ enum class JointType : std::int32_t { revolute, prismatic };
 struct Joint {
   std::string name;
   JointType type = JointType::revolute;
-  Vector6d screw = Vector6d::Zero();   ///< S = [ω; v], spatial, base frame, at q = 0; |ω| = 1, or ω = 0 and |v| = 1
+  /// S = [ω; v], spatial, in the base frame at q = 0; |ω| = 1, or ω = 0 and |v| = 1.
+  Vector6d screw = Vector6d::Zero();
   std::optional<double> lower, upper;  ///< position limits [rad or m]; none = unlimited
   std::optional<double> velocity_max;  ///< [rad/s or m/s]
   std::optional<double> effort_max;    ///< [Nm or N]
-  double damping = 0.0;                ///< viscous, as the robot file gives it; used only where a scene says so
-  double friction = 0.0;               ///< dry friction [Nm or N], likewise
-  double armature = 0.0;               ///< rotor inertia seen at the joint [kg m² or kg]; part of the dynamics
+  double damping = 0.0;                ///< viscous; used only if a scene enables it
+  double friction = 0.0;               ///< dry friction [Nm or N]; used only if a scene enables it
+  double armature = 0.0;               ///< rotor inertia at the joint [kg m² or kg]
 };
 
 /// Collision sphere. Coordinates in the link's COM frame.
 struct Sphere {
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  std::string part{};  ///< what was lumped into the link and bears the sphere; empty: the link itself
+  std::string part{};  ///< the link lumped into this one that has the sphere; empty: this link
 };
 
-/// Collision capsule: a sphere swept along a segment. With a radius of zero a line, for drawings and gain sets, that
-/// collides with nothing. Coordinates in the link's COM frame.
+/// Collision capsule: a sphere swept along a segment. A radius of zero makes it a line for drawings
+/// and gain sets, which is not checked for collisions. Coordinates in the link's COM frame.
 struct Segment {
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  std::string part{};  ///< as a sphere's
+  std::string part{};  ///< as in Sphere
 
   [[nodiscard]] bool is_capsule() const noexcept { return radius_m > 0.0; }
 };
 
-/// One moving body with the joint that carries it.
+/// One moving body and the joint that moves it.
 struct Link {
   std::string name;
-  int parent = -1;  ///< index of the parent link, −1 for the base; always less than the link's own index
+  int parent = -1;  ///< index of the parent link, less than the link's own; −1: the base
   Joint joint;
   geometry::SE3 com;  ///< pose of the COM frame in the base frame at q = 0
   double mass_kg = 0.0;
-  /// About the COM, in the COM frame. What differs across the diagonal by no more than 1e-12 of the largest entry, as
-  /// products R I Rᵀ do, counts as symmetric; its symmetric part is used.
+  /// About the COM, in the COM frame. A matrix counts as symmetric if entries across the diagonal
+  /// differ by at most 1e-12 of the largest entry, as in products R I Rᵀ; the symmetric part is
+  /// used.
   Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
   std::vector<Sphere> spheres;
   std::vector<Segment> segments;
 };
 
-/// The last link's point that goals speak of.
+/// The frame on a link that goals refer to.
 struct Tip {
   std::string name;
   int link = 0;        ///< index of the link it moves with
   geometry::SE3 pose;  ///< in the base frame at q = 0
 };
 
-/// An open chain as a file describes it, brought to one form: screws and poses in the base frame at q = 0, everything
-/// about a link in its COM frame (SPEC §1, data/robots). `notes` says what the reader lumped, locked or skipped.
+/// An open chain as a file describes it, in one form for all file formats: screws and poses in the
+/// base frame at q = 0, the other quantities of a link in its COM frame (examples: data/robots).
+/// `notes` lists what the reader lumped, locked or skipped.
 struct Robot {
   std::string name;
   std::vector<Link> links;
   Tip tip;
-  std::vector<Sphere> base_spheres;  ///< of what does not move: base frame, each with its part; for self-collision only
-  std::vector<Segment> base_segments;  ///< likewise, capsules only
-  /// Pairs of parts that never count as colliding: links, or what was lumped into one or into the base.
+  /// Spheres of fixed links, in the base frame, each with its part; for self-collision only.
+  std::vector<Sphere> base_spheres;
+  std::vector<Segment> base_segments;  ///< as base_spheres; capsules only
+  /// Pairs of parts that never count as colliding. A part is a link, or a link of the file that was
+  /// lumped into another link or into the base.
   std::vector<std::pair<std::string, std::string>> self_collision_disabled;
   std::vector<std::string> notes;
 
   [[nodiscard]] int dof() const noexcept { return static_cast<int>(links.size()); }
 };
 
-/// Checks what every robot must satisfy: at least one link, parents before children and no branches, unit screws,
-/// inertia about its joint in whatever a joint moves, symmetric inertias with positive principal moments wherever there
-/// is mass, finite numbers, lower < upper, each part on one body only, disabled pairs of parts that are there. Moments
-/// against the triangle inequality, which no body has, make a positive definite mass matrix and pass: readers warn.
+/// Checks what every robot must satisfy: at least one link; parents before children and no
+/// branches; unit screws; for each joint, inertia about the joint in the links that it moves;
+/// symmetric inertias, with positive principal moments for every link with mass; finite numbers;
+/// lower < upper; each part on one body only; disabled pairs that name existing parts. Principal
+/// moments that break the triangle inequality pass, since the mass matrix is positive definite with
+/// them; readers warn about them.
 /// @throws Error invalid: "where: link 'x': what is wrong, what was expected"
 void check(const Robot& robot, const std::string& where);
 
-/// Why no mass matrix can be made of an inertia: empty if one can. `definite`: its moments must be positive, else
-/// they may be zero.
+/// The reason why an inertia cannot be part of a mass matrix; empty if it can.
+/// @param definite whether its principal moments must be positive; otherwise they may be zero
 [[nodiscard]] std::string inertia_fault(const Eigen::Matrix3d& inertia, bool definite);
 
-/// How principal moments tell that no body has them: empty if one may.
+/// The violation of the triangle inequality by an inertia's principal moments; empty if there is
+/// none. No rigid body violates it.
 [[nodiscard]] std::string triangle_fault(const Eigen::Matrix3d& inertia);
 
-/// Begins the notes that warn.
+/// The prefix of notes that are warnings.
 inline constexpr std::string_view warning_prefix = "warning: ";
 
-/// The notes that warn, without that beginning: what a reader takes though it is doubtful.
+/// The notes that are warnings, without the prefix: doubtful input that the reader accepted.
 [[nodiscard]] std::vector<std::string> warnings(const Robot& robot);
 
-/// (I + Iᵀ)/2; I itself, to the bit, if it is symmetric.
+/// (I + Iᵀ)/2 for an inertia I. A symmetric I is returned bit for bit.
 [[nodiscard]] Eigen::Matrix3d symmetric_part(const Eigen::Matrix3d& inertia);
 
 }  // namespace hamelin::model

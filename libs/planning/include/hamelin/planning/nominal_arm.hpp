@@ -7,13 +7,13 @@
 
 namespace hamelin::planning {
 
-/// The arm as the planner believes it to be, at one tick: what planners that work with forces at points share. Made
-/// once; nothing allocates afterwards. Points, forces and velocities in world axes.
+/// The nominal arm at one tick, for planners that work with forces at points. All memory is
+/// allocated by the constructor. Points, forces and velocities are in world axes.
 class NominalArm {
  public:
   explicit NominalArm(const Setup& setup);
 
-  /// Takes q and v of a tick; all below speaks of them.
+  /// Takes q and v of a tick. All functions below refer to them.
   void update(const Tick& tick);
 
   [[nodiscard]] const model::Model& model() const noexcept { return model_; }
@@ -25,20 +25,25 @@ class NominalArm {
   [[nodiscard]] Eigen::Vector3d tip_position() const;
   /// Velocity of a world point that moves with the link [m/s].
   [[nodiscard]] Eigen::Vector3d point_velocity(int link, const Eigen::Vector3d& point) const;
-  /// A world point in the link's COM frame.
+  /// The coordinates of a world point in the link's COM frame [m].
   [[nodiscard]] Eigen::Vector3d in_link(int link, const Eigen::Vector3d& point) const;
-  /// Damped operational-space inertia M_x at a world point of the link (21) [kg].
+  /// Damped operational-space inertia M_x [kg] at a world point of the link, docs/theory.md (2.21).
   [[nodiscard]] Eigen::Matrix3d operational_inertia(int link, const Eigen::Vector3d& point);
 
-  /// tau += Jᵀ f for a force at a world point of the link.
-  void add_force(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& force, Eigen::VectorXd& tau);
-  /// tau += Jᵀ M_x f (21): f is then an acceleration of the point [m/s²].
-  void add_mapped(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& f, Eigen::VectorXd& tau);
-  /// The attraction (17), mapped by (21): f = −k_p (x_e − x_d) − k_v ẋ_e at the tip; for a joint goal its likeness in
-  /// joint space, tau += M(q)(−k_p (q − q_d) − k_v v). A pose goal pulls by its position only.
-  /// @param k_p [1/s²]  @param k_v [1/s]
-  void add_mapped_attraction(const hamelin_goal& goal, double k_p, double k_v, Eigen::VectorXd& tau);
-  /// tau += ∂U(q): holds the nominal arm against gravity.
+  /// tau += Jᵀ f for a force f [N] at a world point of the link.
+  void add_force(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& force,
+                 Eigen::VectorXd& tau);
+  /// tau += Jᵀ M_x f, docs/theory.md (9.4). Here f is an acceleration of the point [m/s²].
+  void add_mapped(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& f,
+                  Eigen::VectorXd& tau);
+  /// Adds the attraction f = −k_p (x_e − x_d) − k_v ẋ_e of the tip x_e to the goal x_d, mapped to
+  /// joints, docs/theory.md (9.1), (9.4). For a joint goal q_d it adds the corresponding law in
+  /// joint space, tau += M(q) (−k_p (q − q_d) − k_v v), docs/theory.md (9.6). A pose goal attracts
+  /// by its position only.
+  /// @param k_p [1/s²] @param k_v [1/s]
+  void add_mapped_attraction(const hamelin_goal& goal, double k_p, double k_v,
+                             Eigen::VectorXd& tau);
+  /// tau += ∂U(q): compensates the gravity of the nominal arm.
   void add_gravity(Eigen::VectorXd& tau);
 
  private:
@@ -48,12 +53,16 @@ class NominalArm {
   dynamics::Matrix3Xd J_;
 };
 
-/// Calls f(contact, link) for the nearest contact of each link with each obstacle (the map counts as one, unknown space
-/// that blocks as another) within `range`: the x_i of (18). Equal distances: the first. Contacts as a tick lists them.
+/// Calls f(contact, link) for the nearest contact of each link with each obstacle within `range`
+/// [m]: the points x_i of docs/theory.md (9.2). The map counts as one obstacle, unknown space that
+/// blocks as another. Of equal distances the first counts.
+/// @param contacts in the order in which a tick lists them
 template <class F>
-void for_each_nearest(std::span<const hamelin_contact> contacts, std::span<const hamelin_sphere> spheres, double range,
-                      F&& f) {
-  const auto link_of = [&](std::size_t i) { return spheres[static_cast<std::size_t>(contacts[i].sphere)].link; };
+void for_each_nearest(std::span<const hamelin_contact> contacts,
+                      std::span<const hamelin_sphere> spheres, double range, F&& f) {
+  const auto link_of = [&](std::size_t i) {
+    return spheres[static_cast<std::size_t>(contacts[i].sphere)].link;
+  };
   for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
     const auto link = link_of(begin);
     while (end < contacts.size() && link_of(end) == link) ++end;
@@ -61,7 +70,8 @@ void for_each_nearest(std::span<const hamelin_contact> contacts, std::span<const
       if (contacts[i].distance_m > range) continue;
       bool nearest = true;
       for (std::size_t j = begin; j < end && nearest; ++j) {
-        nearest = contacts[j].obstacle != contacts[i].obstacle || contacts[j].distance_m > contacts[i].distance_m ||
+        nearest = contacts[j].obstacle != contacts[i].obstacle ||
+                  contacts[j].distance_m > contacts[i].distance_m ||
                   (contacts[j].distance_m == contacts[i].distance_m && j >= i);
       }
       if (nearest) f(contacts[i], link);

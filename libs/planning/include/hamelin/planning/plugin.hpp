@@ -15,16 +15,16 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_abi.h"
 
-/// What the author of a planner includes: thin C++ views over the C structs of plugin_abi.h, a base class, and the
-/// macro that makes a plugin of it. The views own nothing, are cheap to copy, and are good as long as what they show: a
-/// Tick and a Command for one call, a Setup and a Host as long as the planner (keep a copy of the view, not a
-/// reference).
+/// The header for authors of planners: thin C++ views of the C structs of plugin_abi.h, a base
+/// class, and the macro that makes a plugin of it. Views own nothing and are cheap to copy. A view
+/// is valid as long as the struct behind it: a Tick and a Command during one call, a Setup and a
+/// Host as long as the planner. Keep a copy of the view, not a reference to it.
 namespace hamelin::planning {
 
 using ConstVectorMap = Eigen::Map<const Eigen::VectorXd>;
 using VectorMap = Eigen::Map<Eigen::VectorXd>;
 
-/// Three numbers of a C struct as a vector.
+/// Converts three numbers of a C struct to a vector.
 [[nodiscard]] inline Eigen::Vector3d vec3(const double (&x)[3]) {
   return {x[0], x[1], x[2]};
 }
@@ -32,58 +32,73 @@ using VectorMap = Eigen::Map<Eigen::VectorXd>;
 /// Where a contact's obstacle point lies.
 enum class ContactKind : std::int32_t {
   map,      ///< occupied space of the map
-  unknown,  ///< space that the map does not know, where the scene says that it blocks
-  obstacle  ///< of the scene: hamelin_contact::obstacle is its index
+  unknown,  ///< space that the map does not know, in scenes where it blocks
+  obstacle  ///< an obstacle of the scene; hamelin_contact::obstacle is its index
 };
 
 [[nodiscard]] inline ContactKind kind_of(const hamelin_contact& contact) noexcept {
   if (contact.obstacle == HAMELIN_OBSTACLE_MAP) return ContactKind::map;
-  return contact.obstacle == HAMELIN_OBSTACLE_UNKNOWN ? ContactKind::unknown : ContactKind::obstacle;
+  return contact.obstacle == HAMELIN_OBSTACLE_UNKNOWN ? ContactKind::unknown
+                                                      : ContactKind::obstacle;
 }
 
-/// What holds for a whole run.
+/// The data that are fixed for a whole run.
 class Setup {
  public:
   explicit Setup(const hamelin_setup& raw) : raw_(&raw) {}
 
   [[nodiscard]] int dof() const { return static_cast<int>(raw_->dof); }
   /// The nominal robot as resolved JSON (hamelin.robot/1).
-  [[nodiscard]] std::string_view robot_json() const { return {raw_->robot_json, raw_->robot_json_size}; }
-  /// The nominal robot where it stands, with the scene's gravity. Builds it anew at each call.
-  /// @throws Error invalid if the robot's JSON is not what the border promises
+  [[nodiscard]] std::string_view robot_json() const {
+    return {raw_->robot_json, raw_->robot_json_size};
+  }
+  /// The nominal robot at its base pose, with the scene's gravity. Each call builds a new model.
+  /// @throws Error invalid if the robot's JSON violates the plugin interface
   [[nodiscard]] model::Model model() const;
   /// Control shapes, spheres and capsules, in their link's COM frame [m].
-  [[nodiscard]] std::span<const hamelin_sphere> spheres() const { return {raw_->spheres, raw_->sphere_count}; }
-  /// Goals, to be reached in this order.
-  [[nodiscard]] std::span<const hamelin_goal> goals() const { return {raw_->goals, raw_->goal_count}; }
-  /// A tick's goal. @throws Error plugin if there is none of that index
+  [[nodiscard]] std::span<const hamelin_sphere> spheres() const {
+    return {raw_->spheres, raw_->sphere_count};
+  }
+  /// The goals, in the order in which they must be reached.
+  [[nodiscard]] std::span<const hamelin_goal> goals() const {
+    return {raw_->goals, raw_->goal_count};
+  }
+  /// The goal of that index. @throws Error plugin if there is none
   [[nodiscard]] const hamelin_goal& goal(std::size_t index) const {
-    if (index >= raw_->goal_count) throw Error(ErrorCode::plugin, "there is no goal " + std::to_string(index));
+    if (index >= raw_->goal_count)
+      throw Error(ErrorCode::plugin, "no goal of index " + std::to_string(index));
     return raw_->goals[index];
   }
-  /// Position limits [rad or m]; none where the scene models none.
+  /// Position limits [rad or m]. This and the other limits are absent if the scene does not model
+  /// them.
   [[nodiscard]] std::optional<ConstVectorMap> q_lower() const { return limit(raw_->q_lower); }
   [[nodiscard]] std::optional<ConstVectorMap> q_upper() const { return limit(raw_->q_upper); }
   /// Speed limits [rad/s or m/s].
-  [[nodiscard]] std::optional<ConstVectorMap> velocity_max() const { return limit(raw_->velocity_max); }
+  [[nodiscard]] std::optional<ConstVectorMap> velocity_max() const {
+    return limit(raw_->velocity_max);
+  }
   /// Torque limits [Nm or N].
   [[nodiscard]] std::optional<ConstVectorMap> effort_max() const { return limit(raw_->effort_max); }
-  /// How fast a held torque may change [Nm/s or N/s].
-  [[nodiscard]] std::optional<ConstVectorMap> effort_rate_max() const { return limit(raw_->effort_rate_max); }
-  /// Whether all channels become one torque held over the control period, and how late it acts [s].
+  /// Limits of the rate of change of the held torque [Nm/s or N/s].
+  [[nodiscard]] std::optional<ConstVectorMap> effort_rate_max() const {
+    return limit(raw_->effort_rate_max);
+  }
+  /// Whether all channels are summed into one torque, held over the control period, and its delay
+  /// [s].
   [[nodiscard]] bool sampled() const { return raw_->sampled != 0; }
   [[nodiscard]] double delay_s() const { return raw_->delay_s; }
-  /// Whether self contacts are listed.
+  /// Whether ticks list self contacts.
   [[nodiscard]] bool self_collision() const { return raw_->self_collision != 0; }
-  /// A joint goal's path, one column a way-point, the goal itself the last; no columns without a path.
+  /// A joint goal's path: one column per way-point, the goal itself last; no columns without a
+  /// path.
   [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> path(const hamelin_goal& goal) const {
     return {goal.path, dof(), static_cast<Eigen::Index>(goal.path_points)};
   }
   /// Time between two ticks [s].
   [[nodiscard]] double control_period_s() const { return raw_->control_period_s; }
-  /// Contacts are listed up to this distance [m].
+  /// Ticks list contacts up to this distance [m].
   [[nodiscard]] double influence_m() const { return raw_->influence_m; }
-  /// Edge of the map's smallest box [m]; zero without a map.
+  /// The edge of the map's smallest box [m]; zero without a map.
   [[nodiscard]] double map_resolution_m() const { return raw_->map_resolution_m; }
   [[nodiscard]] std::uint64_t seed() const { return raw_->seed; }
   [[nodiscard]] const hamelin_setup& raw() const { return *raw_; }
@@ -96,25 +111,28 @@ class Setup {
   const hamelin_setup* raw_;
 };
 
-/// One tick's input.
+/// The input of one tick.
 class Tick {
  public:
-  Tick(const hamelin_tick& raw, std::size_t dof) : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
+  Tick(const hamelin_tick& raw, std::size_t dof)
+      : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
 
   [[nodiscard]] std::uint64_t k() const { return raw_->k; }
   [[nodiscard]] double time_s() const { return raw_->time_s; }
-  /// Joint positions [rad or m] and velocities.
+  /// Joint positions [rad or m] and velocities [rad/s or m/s].
   [[nodiscard]] ConstVectorMap q() const { return {raw_->q, dof_}; }
   [[nodiscard]] ConstVectorMap v() const { return {raw_->v, dof_}; }
-  /// Near obstacle points: shapes in order, nearest first within a shape.
-  [[nodiscard]] std::span<const hamelin_contact> contacts() const { return {raw_->contacts, raw_->contact_count}; }
+  /// Near obstacle points, shape by shape, nearest first within a shape.
+  [[nodiscard]] std::span<const hamelin_contact> contacts() const {
+    return {raw_->contacts, raw_->contact_count};
+  }
   /// Near pairs of parts of the arm itself; empty unless the scene models self-collision.
   [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
     return {raw_->self_contacts, raw_->self_contact_count};
   }
-  /// Index into Setup::goals().
+  /// The current goal, an index into Setup::goals().
   [[nodiscard]] std::size_t goal_index() const { return raw_->goal_index; }
-  /// 1, or less where the scene asks for slow motion.
+  /// 1, or less where the scene requires slow motion.
   [[nodiscard]] double speed_scale() const { return raw_->speed_scale; }
   [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
 
@@ -123,43 +141,51 @@ class Tick {
   Eigen::Index dof_;
 };
 
-/// One tick's answer, in channels (SPEC §4; plugin_abi.h). All zero at first; what is left alone acts not.
+/// The answer of one tick, in the channels that plugin_abi.h describes. All of them are zero at
+/// first; channels that are not set have no effect.
 class Command {
  public:
-  Command(hamelin_command& raw, std::size_t dof) : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
+  Command(hamelin_command& raw, std::size_t dof)
+      : raw_(&raw), dof_(static_cast<Eigen::Index>(dof)) {}
 
-  /// (a) Value [J] and gradient [Nm or N] of a control potential at q.
+  /// Channel `potential`: value [J] and gradient [Nm or N] of a control potential at q.
   void set_potential(double value_J) { raw_->potential_J = value_J; }
   [[nodiscard]] VectorMap potential_gradient() { return {raw_->potential_gradient, dof_}; }
-  /// (b) Non-negative coefficients [Nm s/rad or N s/m].
+  /// Channel `damping`: non-negative coefficients [Nm s/rad or N s/m].
   [[nodiscard]] VectorMap damping() { return {raw_->damping, dof_}; }
-  /// (c) Adds the force w × (velocity of the point), w in world axes [N s/m], the point in the link's COM frame [m].
-  /// @throws Error plugin if the host left no room, which it does for one term a contact
+  /// Channel `gyroscopic`: adds the force w × (velocity of the point), docs/theory.md (2.22).
+  /// @param point_link in the link's COM frame [m] @param w_world in world axes [N s/m]
+  /// @throws Error plugin if the capacity is used up; the host provides at least one term per
+  ///   contact
   void add_gyroscopic(int link, const Eigen::Vector3d& point_link, const Eigen::Vector3d& w_world) {
     if (raw_->gyroscopic_count == raw_->gyroscopic_capacity)
-      throw Error(ErrorCode::plugin, "more gyroscopic terms than the host has room for");
+      throw Error(ErrorCode::plugin, "more gyroscopic terms than the host's capacity");
     auto& term = raw_->gyroscopic[raw_->gyroscopic_count++];
     term.link = link;
     VectorMap(term.point_link_m, 3) = point_link;
     VectorMap(term.w_world, 3) = w_world;
   }
-  /// The terms added so far.
-  [[nodiscard]] std::span<hamelin_gyroscopic_term> gyroscopic() { return {raw_->gyroscopic, raw_->gyroscopic_count}; }
-  /// (d) Torque held over the step [Nm or N].
+  /// The gyroscopic terms added so far.
+  [[nodiscard]] std::span<hamelin_gyroscopic_term> gyroscopic() {
+    return {raw_->gyroscopic, raw_->gyroscopic_count};
+  }
+  /// Channel `held torque`: constant over the step [Nm or N].
   [[nodiscard]] VectorMap held_torque() { return {raw_->held_torque, dof_}; }
-  /// (e) The velocity right after this node; asking for it switches the channel on.
+  /// Channel `node velocity`: the velocity right after this node. A call switches the channel on.
   [[nodiscard]] VectorMap node_velocity() {
     raw_->has_node_velocity = 1;
     return {raw_->node_velocity, dof_};
   }
-  /// Energy that the planner's own filter took out and put in at this node [J], for the log.
+  /// Sets the work of the planner's own safety filter at this node [J], for the log:
+  /// docs/theory.md (10.16), (10.17).
   void set_accounts(double filter_work_J, double recovery_work_J) {
     raw_->filter_work_J = filter_work_J;
     raw_->recovery_work_J = recovery_work_J;
   }
-  /// Says that the planner notices by itself when it stalls: the scene's rule does not apply.
-  void mind_own_stalls() { raw_->state = HAMELIN_PLANNER_OWN_STALL_RULE; }
-  /// Ends the run: the planner knows no way on. The cause is one line; what does not fit is cut off.
+  /// Disables the scene's stall rule, for planners that detect their stalls themselves.
+  void disable_stall_rule() { raw_->state = HAMELIN_PLANNER_OWN_STALL_RULE; }
+  /// Ends the run because the planner cannot continue. The cause is one line, truncated if too
+  /// long.
   void give_up(std::string_view cause) {
     raw_->state = HAMELIN_PLANNER_GAVE_UP;
     const std::size_t size = std::min(cause.size(), sizeof raw_->cause - 1);
@@ -173,21 +199,22 @@ class Command {
   Eigen::Index dof_;
 };
 
-/// Services of the host. May be called in the constructor and in tick.
+/// Services of the host. They may be called in the planner's constructor and in tick.
 class Host {
  public:
   explicit Host(const hamelin_host& raw) : raw_(&raw) {}
 
   void info(std::string_view line) const { log(HAMELIN_LOG_INFO, line); }
   void warning(std::string_view line) const { log(HAMELIN_LOG_WARNING, line); }
-  /// Contacts of the control shapes at any q, obstacles standing where they are now.
+  /// Finds the contacts of the control shapes at any q, with the obstacles at their present
+  /// positions.
   /// @param q dof numbers
-  /// @return how many there are; more than out.size() means that the farthest are left out
+  /// @return the number of contacts; if it exceeds out.size(), the farthest are left out
   [[nodiscard]] std::size_t closest_points(std::span<const double> q, double influence_m,
                                            std::span<hamelin_contact> out) const {
     return raw_->closest_points(raw_->context, q.data(), influence_m, out.data(), out.size());
   }
-  /// Self contacts at any q, in the same way.
+  /// Finds the self contacts at any q, in the same way.
   [[nodiscard]] std::size_t closest_self(std::span<const double> q, double influence_m,
                                          std::span<hamelin_self_contact> out) const {
     return raw_->closest_self(raw_->context, q.data(), influence_m, out.data(), out.size());
@@ -200,25 +227,27 @@ class Host {
   const hamelin_host* raw_;
 };
 
-/// A planner. Besides tick it has a constructor (const Host&, const Setup&, const Json& params), where params are
-/// checked against the plugin's schema and complete, and, if it wants, `static double influence_m(const Json& params)`:
-/// how far obstacles matter to it [m]. Constructors report bad input by throwing Error.
+/// Base class of planners. A planner has a constructor (const Host&, const Setup&, const Json&
+/// params), which reports bad input by throwing Error; params are complete and checked against the
+/// plugin's schema. It may have a function `static double influence_m(const Json& params)`: the
+/// distance up to which it needs contacts [m].
 class Planner {
  public:
   Planner() = default;
   Planner(const Planner&) = delete;
   Planner& operator=(const Planner&) = delete;
   virtual ~Planner() = default;
-  /// Answers a tick. Must not allocate. An exception ends the run as a defect.
+  /// Answers a tick. It must not allocate. An exception ends the run as a defect.
   virtual void tick(const Tick& tick, Command& command) = 0;
 };
 
 namespace detail {
 
-/// Makes the host's instruction set the default of this plugin's copy of the library.
+/// Makes the host's instruction set the default of this plugin's copy of the libraries.
 void take_instruction_set(const hamelin_setup& setup) noexcept;
 
-/// The line behind an exception that must not cross the border, cut to size and nul-terminated.
+/// Writes the message of the current exception, which must not cross the plugin interface, as one
+/// line: truncated to error_size and nul-terminated.
 void write_current_exception(char* error, std::size_t error_size) noexcept;
 
 template <class Type>
@@ -230,8 +259,9 @@ struct Glue {
     Type planner;
   };
 
-  static std::int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json,
-                             std::size_t params_size, void** out, char* error, std::size_t error_size) noexcept {
+  static std::int32_t create(const hamelin_host* host, const hamelin_setup* setup,
+                             const char* params_json, std::size_t params_size, void** out,
+                             char* error, std::size_t error_size) noexcept {
     try {
       take_instruction_set(*setup);
       const Json params = parse_json({params_json, params_size}, "params");
@@ -242,8 +272,8 @@ struct Glue {
       return 1;
     }
   }
-  static std::int32_t tick(void* instance, const hamelin_tick* tick, hamelin_command* command, char* error,
-                           std::size_t error_size) noexcept {
+  static std::int32_t tick(void* instance, const hamelin_tick* tick, hamelin_command* command,
+                           char* error, std::size_t error_size) noexcept {
     try {
       auto& self = *static_cast<Instance*>(instance);
       Command view(*command, self.dof);
@@ -260,7 +290,7 @@ struct Glue {
       if constexpr (requires(const Json& params) { Type::influence_m(params); })
         return Type::influence_m(parse_json({params_json, params_size}, "params"));
     } catch (...) {
-      // The same parameters reach create next, which has a way to say what is wrong.
+      // create gets the same parameters next and can report the error.
     }
     return -1.0;
   }
@@ -269,16 +299,19 @@ struct Glue {
 }  // namespace detail
 }  // namespace hamelin::planning
 
-/// Makes a plugin of a Planner: once in one file of the plugin, outside any namespace. The only place that catches
-/// exceptions; none crosses the border. The texts must be string literals or otherwise live for ever.
-#define HAMELIN_PLANNER_PLUGIN(Type, plugin_name, plugin_version, plugin_description, schema_text)                     \
-  extern "C" __attribute__((visibility("default"))) const hamelin_plugin* hamelin_plugin_entry(void);                  \
-  extern "C" const hamelin_plugin* hamelin_plugin_entry(void) {                                                        \
-    using HamelinGlue = ::hamelin::planning::detail::Glue<Type>;                                                       \
-    static const hamelin_plugin plugin = {sizeof(hamelin_plugin),   HAMELIN_PLUGIN_ABI_VERSION, plugin_name,           \
-                                          plugin_version,           plugin_description,         schema_text,           \
-                                          &HamelinGlue::create,     &HamelinGlue::tick,         &HamelinGlue::destroy, \
-                                          &HamelinGlue::influence_m};                                                  \
-    return &plugin;                                                                                                    \
-  }                                                                                                                    \
+/// Defines the entry point of a plugin. Use it once, in one file of the plugin, outside any
+/// namespace. The entry point catches all exceptions, so that none crosses the plugin interface.
+/// The texts must have static storage duration, as string literals do.
+#define HAMELIN_PLANNER_PLUGIN(Type, plugin_name, plugin_version, plugin_description, schema_text) \
+  extern "C" __attribute__((visibility("default"))) const hamelin_plugin* hamelin_plugin_entry(    \
+      void);                                                                                       \
+  extern "C" const hamelin_plugin* hamelin_plugin_entry(void) {                                    \
+    using HamelinGlue = ::hamelin::planning::detail::Glue<Type>;                                   \
+    static const hamelin_plugin plugin = {                                                         \
+        sizeof(hamelin_plugin),   HAMELIN_PLUGIN_ABI_VERSION, plugin_name,                         \
+        plugin_version,           plugin_description,         schema_text,                         \
+        &HamelinGlue::create,     &HamelinGlue::tick,         &HamelinGlue::destroy,               \
+        &HamelinGlue::influence_m};                                                                \
+    return &plugin;                                                                                \
+  }                                                                                                \
   static_assert(true, "")

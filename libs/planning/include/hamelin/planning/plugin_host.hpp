@@ -13,11 +13,12 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_abi.h"
 
-/// The host's side of the border of plugin_abi.h: finding, loading and checking plugins, and calling their planners.
-/// Loading runs code, so no directory is searched that the caller did not name.
+/// The host's side of the plugin interface (plugin_abi.h): finding, loading and checking plugins,
+/// and calling their planners. Loading a plugin runs its code, so only directories that the caller
+/// named are searched.
 namespace hamelin::planning {
 
-/// What a host offers its planners.
+/// The services that a host provides to its planners.
 class HostServices {
  public:
   HostServices() = default;
@@ -26,20 +27,23 @@ class HostServices {
   virtual ~HostServices() = default;
   /// @param level HAMELIN_LOG_INFO or HAMELIN_LOG_WARNING
   virtual void log(std::int32_t level, std::string_view line) = 0;
-  /// Contacts of the control shapes at q; returns how many there are, writes the nearest out.size() of them.
-  virtual std::size_t closest_points(std::span<const double> q, double influence_m, std::span<hamelin_contact> out) = 0;
-  /// The same for pairs of parts of the arm itself. None unless overridden.
+  /// Finds the contacts of the control shapes at q up to influence_m [m]. Writes the nearest
+  /// out.size() of them and returns their number.
+  virtual std::size_t closest_points(std::span<const double> q, double influence_m,
+                                     std::span<hamelin_contact> out) = 0;
+  /// The same for pairs of parts of the arm itself. The default finds none.
   virtual std::size_t closest_self(std::span<const double> /*q*/, double /*influence_m*/,
                                    std::span<hamelin_self_contact> /*out*/) {
     return 0;
   }
 };
 
-/// Owns what a hamelin_setup points at. Fill the fields; a planner made from it keeps its own copy.
+/// Owns the data that a hamelin_setup points at. Fill the fields; a planner that is made from it
+/// keeps its own copy.
 struct SetupData {
   SetupData() = default;
-  /// Everything the model knows: robot, base, gravity, control shapes.
-  /// @param nominal the robot the planner shall believe in
+  /// Fills in robot, base, gravity and control shapes.
+  /// @param nominal the model that the planner works with
   explicit SetupData(const model::Model& nominal);
 
   std::size_t dof = 0;
@@ -48,10 +52,10 @@ struct SetupData {
   Eigen::Vector3d base_position_world_m = Eigen::Vector3d::Zero();
   Eigen::Vector4d base_quaternion_wxyz{1.0, 0.0, 0.0, 0.0};
   std::vector<hamelin_sphere> spheres;
-  std::vector<hamelin_goal> goals;       ///< their `q` is filled in from goals_q
-  std::vector<Eigen::VectorXd> goals_q;  ///< one a goal; of size zero unless it is a joint goal
-  std::vector<Eigen::MatrixXd> paths;    ///< one a goal: way-points as columns, or empty
-  /// Limits the scene models: dof numbers, or of size zero where it models none.
+  std::vector<hamelin_goal> goals;       ///< view() sets their `q` from goals_q
+  std::vector<Eigen::VectorXd> goals_q;  ///< one per goal; of size zero unless it is a joint goal
+  std::vector<Eigen::MatrixXd> paths;    ///< one per goal: way-points as columns, or empty
+  /// Limits: dof numbers, or of size zero where the scene does not model them.
   Eigen::VectorXd q_lower, q_upper, velocity_max, effort_max, effort_rate_max;
   double control_period_s = 0.0;
   bool sampled = false, self_collision = false;
@@ -60,14 +64,16 @@ struct SetupData {
   double map_resolution_m = 0.0;
   std::uint64_t seed = 0;
 
-  /// Adds a goal. @param q dof numbers for a joint goal, else of size zero
-  /// @param path of a joint goal: way-points as columns, q the last; or empty
-  void add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q = {}, const Eigen::MatrixXd& path = {});
-  /// The C view; good until the next change. Sets the goals' q.
+  /// Adds a goal.
+  /// @param q dof numbers for a joint goal, else of size zero
+  /// @param path of a joint goal: way-points as columns, the last of them q; or empty
+  void add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q = {},
+                const Eigen::MatrixXd& path = {});
+  /// The C view, valid until the next change. Sets the goals' q.
   [[nodiscard]] hamelin_setup view();
 };
 
-/// The memory behind a hamelin_command: sized once, cleared before each tick.
+/// The memory behind a hamelin_command. It is allocated once and cleared before each tick.
 class CommandBuffers {
  public:
   /// @param gyroscopic_capacity at least the number of contacts of any tick
@@ -78,8 +84,10 @@ class CommandBuffers {
   void clear() noexcept;
   [[nodiscard]] hamelin_command& raw() noexcept { return raw_; }
   [[nodiscard]] const hamelin_command& raw() const noexcept { return raw_; }
-  /// The channels, as plugin_abi.h describes them.
-  [[nodiscard]] const Eigen::VectorXd& potential_gradient() const noexcept { return potential_gradient_; }
+  /// The channels, as described in plugin_abi.h.
+  [[nodiscard]] const Eigen::VectorXd& potential_gradient() const noexcept {
+    return potential_gradient_;
+  }
   [[nodiscard]] const Eigen::VectorXd& damping() const noexcept { return damping_; }
   [[nodiscard]] std::span<const hamelin_gyroscopic_term> gyroscopic() const noexcept {
     return {gyroscopic_.data(), raw_.gyroscopic_count};
@@ -95,30 +103,35 @@ class CommandBuffers {
 
 class LoadedPlanner;
 
-/// A loaded plugin. A copyable handle; the shared object stays loaded as long as a handle or a planner of it lives.
+/// A copyable handle of a loaded plugin. The shared object stays loaded as long as any handle or
+/// planner of it exists.
 class Plugin {
  public:
-  /// @throws Error plugin, one line that names the file: absent or no shared object (with the system's reason), no
-  ///   entry symbol, an entry that returns null, another ABI number, a short struct, a null function, no name, or a
-  ///   parameter schema that is not a JSON object
+  /// @throws Error plugin, one line that names the file, if the file does not exist or is not a
+  ///   shared object (with the system's reason), has no entry symbol, or its entry point returns
+  ///   null, another ABI number, a short struct, a null function, no name, or a parameter schema
+  ///   that is not a JSON object
   [[nodiscard]] static Plugin load(const std::filesystem::path& file);
 
   [[nodiscard]] const std::filesystem::path& file() const noexcept;
   [[nodiscard]] const std::string& name() const noexcept;
   [[nodiscard]] const std::string& version() const noexcept;
   [[nodiscard]] const std::string& description() const noexcept;
-  /// The JSON Schema of its parameters; unknown keys are errors even where the plugin's text forgot to say so.
+  /// The JSON Schema of its parameters. Unknown keys are errors even if the plugin's text does not
+  /// forbid them.
   [[nodiscard]] const Json& params_schema() const noexcept;
 
-  /// How far obstacles matter with these (checked) parameters [m]; none if the plugin does not say.
+  /// The distance up to which a planner with these (checked) parameters needs contacts [m]; none if
+  /// the plugin does not specify it.
   [[nodiscard]] std::optional<double> influence_m(const Json& checked_params) const;
 
   /// Makes a planner.
   /// @param setup moved into the planner
   /// @param services must outlive the planner
-  /// @param checked_params as check_params returned them
+  /// @param checked_params the result of check_params
   /// @throws Error plugin with the text of the planner's own error
-  [[nodiscard]] LoadedPlanner create(SetupData setup, HostServices& services, const Json& checked_params) const;
+  [[nodiscard]] LoadedPlanner create(SetupData setup, HostServices& services,
+                                     const Json& checked_params) const;
 
  private:
   friend class LoadedPlanner;
@@ -132,7 +145,7 @@ class Plugin {
 /// @throws Error invalid naming the planner, the key and what was expected
 [[nodiscard]] Json check_params(const Plugin& plugin, const Json& params);
 
-/// A planner and all that it needs to live.
+/// A planner together with its plugin, its setup and its link to the host's services.
 class LoadedPlanner {
  public:
   ~LoadedPlanner();
@@ -142,10 +155,11 @@ class LoadedPlanner {
   [[nodiscard]] const Plugin& plugin() const noexcept;
 
   /// Clears `out` and lets the planner fill it. Does not allocate.
-  /// @return false for a defect, with a line in error(): the planner's own text, or an answer that no planner may
-  ///   give (not finite, negative damping, a gyroscopic term on no link, an unknown state)
+  /// @return false for a defect, with a line in error(): the planner's own text, or the reason why
+  ///   its answer is invalid (not finite, negative damping, a gyroscopic term on a link that does
+  ///   not exist, an unknown state)
   [[nodiscard]] bool tick(const hamelin_tick& tick, CommandBuffers& out) noexcept;
-  /// Why the last tick returned false.
+  /// The reason why the last tick returned false.
   [[nodiscard]] std::string_view error() const noexcept;
 
  private:
@@ -155,30 +169,33 @@ class LoadedPlanner {
   std::unique_ptr<Instance> instance_;
 };
 
-/// File names end so: NAME.hamelin.so is searched for planner NAME.
+/// The suffix of plugin files: planner NAME is loaded from NAME.hamelin.so.
 inline constexpr std::string_view plugin_suffix = ".hamelin.so";
 
-/// The directories to search, in order and without repetition: those given, those of HAMELIN_PLUGIN_PATH (parted by
-/// colons), and the program's own.
-[[nodiscard]] std::vector<std::filesystem::path> plugin_directories(const std::vector<std::filesystem::path>& given,
-                                                                    const std::vector<std::filesystem::path>& own);
+/// The directories to search, in order and without repetition: those given, those in the
+/// environment variable HAMELIN_PLUGIN_PATH (separated by colons), and the program's own.
+[[nodiscard]] std::vector<std::filesystem::path> plugin_directories(
+    const std::vector<std::filesystem::path>& given, const std::vector<std::filesystem::path>& own);
 
-/// Loads the planner of that name from the first directory that has it, or, if the text has a slash or ends in
-/// plugin_suffix, the file of that path.
-/// @throws Error plugin; if none is found, with every directory searched, what is in it, and the nearest name
+/// Loads the planner of that name from the first directory that contains it. If the text contains a
+/// slash or ends in plugin_suffix, it is the path of the file to load.
+/// @throws Error plugin; if no planner is found, with every directory searched, the planners in it,
+///   and the most similar name
 [[nodiscard]] Plugin find_plugin(const std::string& name_or_path,
                                  const std::vector<std::filesystem::path>& directories);
-/// The file that find_plugin() would load, without running its code. @throws Error plugin if none is found
-[[nodiscard]] std::filesystem::path find_plugin_file(const std::string& name_or_path,
-                                                     const std::vector<std::filesystem::path>& directories);
+/// The file that find_plugin() would load, without running its code.
+/// @throws Error plugin if none is found
+[[nodiscard]] std::filesystem::path find_plugin_file(
+    const std::string& name_or_path, const std::vector<std::filesystem::path>& directories);
 
-/// One *.hamelin.so of a directory, loaded or refused.
+/// One plugin file of a directory, loaded or refused.
 struct ListedPlugin {
   std::filesystem::path file;
   std::optional<Plugin> plugin;
   std::string refusal;  ///< one line; empty if loaded
 };
-/// All plugins of the directories, in their order, by file name within each.
-[[nodiscard]] std::vector<ListedPlugin> list_plugins(const std::vector<std::filesystem::path>& directories);
+/// All plugins of the directories, in the order of the directories, by file name within each.
+[[nodiscard]] std::vector<ListedPlugin> list_plugins(
+    const std::vector<std::filesystem::path>& directories);
 
 }  // namespace hamelin::planning

@@ -14,41 +14,46 @@ struct Options {
   std::size_t plot_points_max = 1500;  ///< points per plotted line, at least 4
 };
 
-/// What went into the page of one run.
+/// Summary of a run in the page.
 struct RunSummary {
-  std::string name;  ///< the planner's, or the integrator's in free motion; with the log's if several share it
+  /// Name of the planner, or of the integrator in free motion; with the name of the log if several
+  /// runs share it.
+  std::string name;
   std::filesystem::path log;
-  std::string outcome;  ///< as in the log's result; "unfinished" without one
+  std::string outcome;  ///< as in the log's result; "unfinished" if there is no result
   double time_s = 0.0;  ///< of the last tick
   std::size_t ticks = 0, frames = 0;
-  std::vector<std::string> notes;  ///< what a reader should know: inputs that changed, a log that was cut
+  std::vector<std::string> notes;  ///< remarks: inputs that have changed, a truncated log
 };
 
-/// What a page shows, as it is handed to the page's script (format hamelin.report/1; this library's README says how the
-/// bytes are laid out).
+/// Data of a page in the format hamelin.report/1. The README of this library describes the layout
+/// of the bytes.
 struct Data {
   std::string bytes;
   std::vector<RunSummary> runs;
 };
 
-/// Reads logs, plain or zstd, and makes a page's data of them. Runs of one robot, map, obstacles and goals share a
-/// world. Clearances, closest points and forces at the tip are recomputed from the robot and the map, which are looked
-/// for as simulation::read_header does; without the very map that a run had, its page goes without map and clearances,
-/// and says so. A log is read line by line: memory grows with the options, not with the log. Equal inputs give equal
-/// bytes.
-/// @throws Error usage for no logs or options out of range; io, parse or invalid for a file that is no log, a damaged
-/// line, or a robot that is missing or no longer fits
-[[nodiscard]] Data make_data(const std::vector<std::filesystem::path>& logs, const Options& options = {});
+/// Reads logs, plain or zstd, and makes the data of a page. Runs with the same robot, map,
+/// obstacles and goals share a world. Clearances, closest points and forces at the tip are
+/// recomputed from the robot and the map, which are searched as in simulation::read_header. If the
+/// map has changed or is missing, the run has no map and no clearances, and a note says so. A log
+/// is read line by line, and memory is bounded by the options. Equal inputs give equal bytes.
+/// @throws Error usage for no logs or options out of range; io, parse or invalid for a file that is
+///         not a log, a damaged line, or a robot that is missing or does not match the log
+[[nodiscard]] Data make_data(const std::vector<std::filesystem::path>& logs,
+                             const Options& options = {});
 
-/// A page's data that is JSON alone, as the pages of sweeps and of accuracy have it, in the same form as Data::bytes.
+/// Packs JSON without arrays of numbers, as in the pages of sweeps and of accuracy, in the same
+/// form as Data::bytes.
 [[nodiscard]] std::string pack(const Json& data);
 
-/// The text in a page's template that the data takes the place of.
+/// The text in a page's template that is replaced by the data.
 inline constexpr std::string_view token = "__HAMELIN_REPORT_DATA__";
 
-/// The template with base64(gzip(data)) in place of its token. Equal inputs give equal bytes.
-/// @param where the template's file, opens the message
+/// Replaces the token of the template by base64(gzip(data)). Equal inputs give equal bytes.
+/// @param where file name of the template, for messages
 /// @throws Error invalid unless the token occurs exactly once
-[[nodiscard]] std::string make_page(std::string_view page_template, std::string_view data, const std::string& where);
+[[nodiscard]] std::string make_page(std::string_view page_template, std::string_view data,
+                                    const std::string& where);
 
 }  // namespace hamelin::report

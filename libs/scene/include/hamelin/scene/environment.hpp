@@ -17,26 +17,30 @@
 
 namespace hamelin::scene {
 
-/// A near obstacle point of one shape of the arm; world frame. The fields are those of hamelin_contact. A capsule is
-/// nearest at one point of its axis, which stands for a sphere's centre.
+/// A near obstacle point of one shape of the arm, in the world frame; docs/theory.md (11.7),
+/// (11.8). The fields are those of hamelin_contact. For a capsule, its nearest axis point takes the
+/// place of a sphere's centre.
 struct Contact {
-  static constexpr int map = -1;                        ///< `obstacle`: the map
-  static constexpr int unknown = -2;                    ///< `obstacle`: unknown space that blocks
-  int sphere = 0;                                       ///< index of the shape, in the order of Model::shapes()
-  int obstacle = map;                                   ///< map, unknown, or the obstacle's index
-  double distance = 0.0;                                ///< from the shape's surface [m]; zero or below is contact
+  static constexpr int map = -1;      ///< `obstacle`: the map
+  static constexpr int unknown = -2;  ///< `obstacle`: unknown space that blocks
+  int sphere = 0;                     ///< index of the shape in Model::shapes()
+  int obstacle = map;                 ///< map, unknown, or the obstacle's index
+  double distance = 0.0;              ///< from the shape's surface [m]; zero or below is contact
   Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();  ///< on the shape's surface
   Eigen::Vector3d obstacle_point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();          ///< unit, from the obstacle towards the shape
+  Eigen::Vector3d direction =
+      Eigen::Vector3d::Zero();  ///< unit, from the obstacle towards the shape
   Eigen::Vector3d obstacle_velocity = Eigen::Vector3d::Zero();  ///< [m/s]
 };
 
-/// Who looks. A planner: the map, and obstacles that are known or were seen (Environment::see), never judge_only ones.
-/// Hidden: only what a planner is not shown. The judge: all that is there.
+/// Which obstacles a query includes. planner: the map, and obstacles that are known or were seen,
+/// see Environment::reveal_visible, but never those that are judge_only. hidden: only the obstacles
+/// that a planner is not shown. judge: everything that exists.
 enum class View : std::int32_t { planner, hidden, judge };
 
-/// All that the arm can hit, cropped to where it can be. Queries are const and may run on several threads at once, each
-/// with a Scratch of its own. advance() changes the map: no query may run meanwhile.
+/// Everything that the arm can hit, cropped to the space that it can reach. Queries are const and
+/// may run on several threads at once, each with a Scratch of its own. advance() changes the map:
+/// no query may run at the same time.
 class Environment {
  public:
   /// Nearest points of the map (and of blocking unknown space) per shape.
@@ -48,19 +52,20 @@ class Environment {
     std::size_t obstacles = 0;
   };
 
-  /// Nothing to hit.
+  /// An environment without obstacles.
   Environment() = default;
   /// @param base pose of the robot's base frame in the world
-  /// @param reach distance from the base that no point of the arm exceeds [m]
-  /// @param influence the largest distance that will be asked for [m]
+  /// @param reach upper bound of the distance of any point of the arm from the base [m]
+  /// @param influence the largest distance that queries will use [m]
   /// @param robot see read_region()
   /// @throws Error io, parse or invalid for the map or an obstacle
-  Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles, const geometry::SE3& base,
-              double reach, double influence, const RobotAtStart& robot = {});
+  Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles,
+              const geometry::SE3& base, double reach, double influence,
+              const RobotAtStart& robot = {});
 
   class Scratch {
    public:
-    /// @param shapes how many will be asked for at once; more allocate at the first such call
+    /// @param shapes the largest number per query; the first query with more of them allocates
     Scratch(const Environment& environment, std::size_t shapes);
 
    private:
@@ -70,61 +75,70 @@ class Environment {
     std::vector<std::size_t> order_;
   };
 
-  /// How many contacts so many shapes can have at most.
+  /// The largest number of contacts that so many shapes can have.
   [[nodiscard]] std::size_t contacts_max(std::size_t shapes) const noexcept;
 
-  /// All near obstacle points of all shapes: shapes in order, within a shape nearest first.
+  /// All near obstacle points of all shapes: shapes in order, nearest first within a shape.
   /// @param influence largest distance from a shape's surface [m]
   /// @param out receives them; if it is too small, the nearest of all
-  /// @param seen see(): one flag an obstacle; empty: none was seen
-  /// @return how many there are, also if out is smaller. No allocation.
-  std::size_t closest(const Shapes& arm, double influence, double time_s, Scratch& scratch, std::span<Contact> out,
-                      View view = View::planner, std::span<const std::uint8_t> seen = {}) const;
+  /// @param seen one flag per obstacle, see reveal_visible(); empty: none was seen
+  /// @return how many there are, even if out is smaller. No allocation.
+  std::size_t closest(const Shapes& arm, double influence, double time_s, Scratch& scratch,
+                      std::span<Contact> out, View view = View::planner,
+                      std::span<const std::uint8_t> seen = {}) const;
 
-  /// Marks the obstacles that are not known but come into sight of the arm as it stands: they are there, and its
-  /// clearance to them is at most their visible_within_m. Marks stay: what was seen is remembered.
-  /// @param seen one flag an obstacle, zero at first
-  /// @return the index of one that was newly seen, or −1 if there is none (any more). No allocation.
-  int see(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const;
+  /// Marks an obstacle that is not known but visible from the arm's configuration: it exists, and
+  /// the clearance to it is at most its visible_within_m. Marks are permanent: an obstacle that was
+  /// seen is remembered.
+  /// @param seen one flag per obstacle, zero at first
+  /// @return the index of the obstacle that was marked, or −1 if no other is visible. No
+  ///        allocation.
+  int reveal_visible(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const;
 
-  /// Smallest distance between any shape's surface and any obstacle [m], or `limit` if all is farther. Zero or below
-  /// is contact. No allocation.
-  [[nodiscard]] double clearance(const Shapes& arm, double time_s, double limit, View view = View::judge,
+  /// Smallest distance between the surface of any shape and any obstacle [m], or `limit` if all
+  /// obstacles are farther. Zero or below is contact. No allocation.
+  [[nodiscard]] double clearance(const Shapes& arm, double time_s, double limit,
+                                 View view = View::judge,
                                  std::span<const std::uint8_t> seen = {}) const;
 
   /// Whether a shape touches unknown space where the policy is `slow`.
   [[nodiscard]] bool in_slow_space(const Shapes& arm) const;
 
-  /// Distance of the arm from one obstacle [m], whether it is there or not, or `limit` if that is less. No allocation.
-  [[nodiscard]] double clearance_to(std::size_t obstacle, const Shapes& arm, double time_s, double limit) const {
+  /// Distance of the arm from one obstacle [m], whether it exists at that time or not, or `limit`
+  /// if that is less. No allocation.
+  [[nodiscard]] double clearance_to(std::size_t obstacle, const Shapes& arm, double time_s,
+                                    double limit) const {
     return clearance_to(obstacles_[obstacle], arm, time_s, limit);
   }
 
-  /// A contact of the arm in words: "sphere 2 of link 'hand' is 4.2 mm inside the map".
-  [[nodiscard]] std::string words(const Contact& contact, const model::Model& model) const;
-  /// A Contact's obstacle in words: "the map", "unknown space" or "obstacle 'NAME'".
-  [[nodiscard]] std::string words(int obstacle) const;
+  /// Describes a contact of the arm: "sphere 2 of link 'hand' is 4.2 mm inside the map".
+  [[nodiscard]] std::string describe(const Contact& contact, const model::Model& model) const;
+  /// Describes a Contact's obstacle: "the map", "unknown space" or "obstacle 'NAME'".
+  [[nodiscard]] std::string describe(int obstacle) const;
 
-  /// Makes the map's changes that are due, see MapSpec::changes; what was unknown there is known from then on. To be
-  /// called with times that do not fall, between ticks: nobody else may look meanwhile.
-  /// @return a line about them; empty if none was due
+  /// Applies the map's changes that are due, see MapSpec::changes; changed voxels are known from
+  /// then on. To be called between ticks with times that do not decrease, while no query runs.
+  /// @return one line that describes them; empty if none was due
   std::string advance(double time_s);
 
-  /// Whether there is anything at all to hit, now or later.
+  /// Whether there is any obstacle, now or later.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
   [[nodiscard]] const MapField& map_field() const noexcept { return map_; }
-  /// Pose of the map's frame, in which map_field() is, in the world.
+  /// Pose of the map's frame in the world; map_field() is in that frame.
   [[nodiscard]] const geometry::SE3& map_pose() const noexcept { return map_pose_; }
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
 
  private:
-  [[nodiscard]] bool shown(std::size_t obstacle, double time_s, View view, std::span<const std::uint8_t> seen) const;
+  [[nodiscard]] bool in_view(std::size_t obstacle, double time_s, View view,
+                             std::span<const std::uint8_t> seen) const;
   /// Adds the points of a field, or of obstacle k, that are within `influence` of the arm.
-  void find_in(const MapField& field, int id, const Shapes& arm, double influence, MapField::Scratch& room,
-               std::vector<Contact>& found) const;
-  void find_on(std::size_t k, const Shapes& arm, double influence, double time_s, std::vector<Contact>& found) const;
-  [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s, double limit);
+  void add_map_contacts(const MapField& field, int id, const Shapes& arm, double influence,
+                        MapField::Scratch& scratch, std::vector<Contact>& found) const;
+  void add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence, double time_s,
+                             std::vector<Contact>& found) const;
+  [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,
+                                           double time_s, double limit);
 
   geometry::SE3 map_pose_, map_pose_inverse_;
   MapField map_, unknown_;  ///< in the map's frame [m]
@@ -134,7 +148,7 @@ class Environment {
   Summary summary_;
 };
 
-/// A contact's way out in words: "(0, 0, 1)", to two digits.
-[[nodiscard]] std::string way_out(const Contact& contact);
+/// The exit direction of a contact as text, to two digits: "(0, 0, 1)".
+[[nodiscard]] std::string describe_exit_direction(const Contact& contact);
 
 }  // namespace hamelin::scene

@@ -14,19 +14,19 @@
 
 namespace hamelin::scene {
 
-/// Which voxels a primitive marks: those it touches, or those whose centre it holds.
+/// Which voxels a primitive marks: those that it touches, or those whose centre it contains.
 enum class Mark : std::int32_t { touch, centre };
 
 [[nodiscard]] std::string_view to_string(Mark mark) noexcept;
 /// @throws Error usage for anything but "touch" and "centre"
 [[nodiscard]] Mark mark_from(std::string_view name);
 
-/// Random primitives: shape, size, place and turn uniform.
+/// Random primitives, uniform in shape, size, position and rotation.
 struct Clutter {
   std::size_t count = 0;
   double size_min_m = 0.0, size_max_m = 0.0;  ///< full edges and diameters
   Box bounds;                                 ///< of the centres
-  std::vector<Ball> keep_out;                 ///< no primitive reaches into these
+  std::vector<Ball> keep_out;                 ///< no primitive overlaps these
   std::uint64_t seed = 1;
 };
 
@@ -35,7 +35,7 @@ struct MakeMapOptions {
   Mark mark = Mark::touch;
   std::vector<Obstacle> primitives;  ///< in the map's frame, at rest
   std::optional<Clutter> clutter;
-  std::optional<Box> free_bounds;  ///< voxels with their centre in here are free unless marked; all else is unknown
+  std::optional<Box> free_bounds;  ///< unmarked voxels with their centre inside are free
   std::filesystem::path output;    ///< a .bt file
 };
 
@@ -47,15 +47,18 @@ struct MakeReport {
   std::size_t occupied_voxels = 0, free_voxels = 0;
 };
 
-/// The clutter's primitives, the same for the same seed.
-/// @throws Error invalid if the keep-outs leave no room
+/// The primitives of the clutter; the same seed gives the same primitives.
+/// @throws Error invalid if the keep-out balls leave no room
 [[nodiscard]] std::vector<Obstacle> make_clutter(const Clutter& clutter);
 
-/// Whether a solid primitive and a cube touch. Exact to 1e-9 m; when in doubt they do.
+/// Whether a solid primitive and a cube touch, docs/theory.md (11.33). Exact to 1e-9 m; true in
+/// undecided cases.
 [[nodiscard]] bool touches(const Obstacle& primitive, const Box& cube);
 
-/// Marks the primitives in an OctoMap and writes it beside, then renames. Same options, same bytes.
-/// @throws Error invalid (sizes; more than 2²⁵ cells to look at, which grow with surfaces, not volumes) or io
+/// Marks the primitives in an OctoMap and writes it atomically. The same options give the same
+/// bytes.
+/// @throws Error io, or invalid for sizes, or if more than 2²⁵ cells have to be examined, whose
+///        number grows with surfaces, not with volumes
 MakeReport make_map(const MakeMapOptions& options);
 
 /// Options from a document of the form hamelin.primitives/1 (docs/schema); `output` is left empty.
@@ -67,14 +70,17 @@ struct ProblemOptions {
   std::string tip;                       ///< may be empty
   double resolution_m = 0.02;
   Mark mark = Mark::touch;
-  std::filesystem::path output;     ///< the scene; the map stands beside it, with ending .bt
-  GoalType goal = GoalType::joint;  ///< the problem's goal itself, or where the tip is then
+  std::filesystem::path output;     ///< the scene; its map gets the extension .bt
+  GoalType goal = GoalType::joint;  ///< the goal itself, or the tip's position or pose
 };
 
-/// Turns a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a map and a scene: the
-/// planner sees the map, the primitives themselves are there for the judge. Joints go by order. The map is free up to
-/// 0.5 m beyond the arm's reach. Joint, velocity and torque limits and self-collision are modelled, and gravity.
-/// @throws Error io, parse or invalid, naming the key in the problem that is not understood; then nothing is written
-MakeReport make_scene_from_problem(const std::filesystem::path& problem, const ProblemOptions& options);
+/// Converts a MotionBenchMaker problem (start, goal, primitives in the robot's base frame) into a
+/// map and a scene. The planner sees the map; the primitives are for the judge only. Joint values
+/// are matched by order. The map is free up to 0.5 m beyond the arm's reach. Joint, velocity and
+/// torque limits, self-collision and gravity are modelled.
+/// @throws Error io, parse or invalid, naming the key of the problem that is not understood; then
+///        nothing is written
+MakeReport make_scene_from_problem(const std::filesystem::path& problem,
+                                   const ProblemOptions& options);
 
 }  // namespace hamelin::scene

@@ -8,26 +8,27 @@
 
 namespace hamelin::scene {
 
-/// How a map is to change during a run, as a scene names it.
+/// A change of the map during a run, as given in a scene.
 struct MapChangeSpec {
   double time_s = 0.0;
-  /// An OctoMap of the map's own resolution and frame: what is occupied or free there is so from then on, what it does
-  /// not know stays as it is.
+  /// An OctoMap with the resolution and frame of the map. Its occupied and free voxels replace
+  /// those of the map; voxels that are unknown in it stay unchanged.
   std::optional<std::filesystem::path> file;
-  std::vector<Box> free_m, occupied_m;  ///< voxels that these boxes touch, map's frame [m]; free ones first
+  std::vector<Box> free_m, occupied_m;  ///< boxes in the map's frame [m]; voxels are freed first
 };
 
 struct MapSpec;
 struct MapRegion;
 
-/// A change, ready to be made: voxels freed first, then occupied ones.
+/// A change in voxels, ready to be applied: first `free`, then `occupied`.
 struct MapChange {
   double time_s = 0.0;
-  std::vector<VoxelBox> free, occupied;  ///< each of them disjoint
+  std::vector<VoxelBox> free, occupied;  ///< disjoint boxes each
 };
 
-/// Reads what a change needs and crops it to the region.
+/// Reads a change and crops it to the region.
 /// @throws Error io, parse or invalid, one line
-[[nodiscard]] MapChange read_change(const MapChangeSpec& change, const MapSpec& map, const MapRegion& region);
+[[nodiscard]] MapChange read_change(const MapChangeSpec& change, const MapSpec& map,
+                                    const MapRegion& region);
 
 }  // namespace hamelin::scene

@@ -14,8 +14,8 @@ struct CropOptions {
   std::filesystem::path map;
   ReadMapOptions read;             ///< keep_free is set anyway
   std::variant<Ball, Box> region;  ///< in the map's frame, in metres after scaling
-  bool unknown_is_free = false;    ///< whether unknown space that touches the region is written as free
-  std::filesystem::path output;    ///< a .bt file, not the map itself
+  bool unknown_is_free = false;    ///< write unknown space that touches the region as free
+  std::filesystem::path output;    ///< a .bt file other than the map
 };
 
 struct CropReport {
@@ -28,10 +28,12 @@ struct CropReport {
   std::vector<std::string> warnings;  ///< of the map that was read
 };
 
-/// Writes the part of a map that touches a region as a `.bt` of its own, beside, then renamed. Leaves that touch the
-/// region are kept whole, so inside it occupied, free and unknown space are the map's, voxel by voxel; beyond them all
-/// is unknown. Its unit is the metre: no scale is needed to read it.
-/// @throws Error io, parse or invalid: also if the output is the map, or nothing of the map is in the region
+/// Writes the part of a map that touches a region as a `.bt`, atomically. Leaves that touch the
+/// region are kept whole. So inside the region occupied, free and unknown space are those of the
+/// map, voxel by voxel; beyond these leaves everything is unknown. The unit of the file is the
+/// metre, so it is read without a scale.
+/// @throws Error io, parse or invalid, also if the output is the map itself, or no part of the map
+///        is in the region
 CropReport crop_map(const CropOptions& options);
 
 }  // namespace hamelin::scene

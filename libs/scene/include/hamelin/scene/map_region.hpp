@@ -16,12 +16,12 @@
 
 namespace hamelin::scene {
 
-/// What unknown space means: as if free; free, but to be crossed slowly; an obstacle.
+/// The meaning of unknown space: free; free, but to be crossed slowly; an obstacle.
 enum class UnknownPolicy : std::int32_t { free, slow, block };
 
 [[nodiscard]] std::string_view to_string(UnknownPolicy policy) noexcept;
 
-/// A map as a scene names it.
+/// A map as given in a scene.
 struct MapSpec {
   std::filesystem::path file;
   geometry::SE3 pose;                              ///< of the map's frame in the world
@@ -29,18 +29,18 @@ struct MapSpec {
   std::optional<double> scale;                     ///< metres per unit of the file
   double occupancy_threshold = 0.5;
   UnknownPolicy unknown = UnknownPolicy::free;
-  double keep_out_radius_m = 0.0;  ///< unknown voxels touched by this ball around the base count as free
-  /// If given: the map holds the robot itself, so voxels are taken out that its shapes, this much thicker, touch at the
-  /// start [m].
+  double keep_out_radius_m = 0.0;  ///< unknown voxels that touch this ball at the base are free
+  /// If given, the map contains the robot itself: voxels are removed that touch its shapes at the
+  /// start, with radii increased by this [m].
   std::optional<double> self_filter_padding_m;
-  std::vector<MapChangeSpec> changes;  ///< by time
+  std::vector<MapChangeSpec> changes;  ///< in the order of their times
 };
 
-/// The padding of a self-filter that a scene does not give [m].
+/// The padding of a self-filter if the scene gives none [m].
 inline constexpr double default_self_filter_padding_m = 0.02;
 
-/// What a ball holds of each kind of space, as shares of its volume that add up to one. Beyond the octree all is
-/// unknown. See volume_inside() for how exact they are.
+/// Shares of a ball's volume by kind of space, docs/theory.md (11.38); they add up to one.
+/// Everything beyond the octree is unknown. See volume_inside() for their accuracy.
 struct Shares {
   double occupied = 0.0, free = 0.0, unknown = 0.0;
 };
@@ -48,13 +48,13 @@ struct Shares {
 /// @param ball in the map's frame [m]; zero shares if its radius is zero
 [[nodiscard]] Shares shares_within(const MapData& map, const Ball& ball);
 
-/// The robot where it stands when a run begins, in the world.
+/// The robot's shapes at the start of a run, in the world.
 struct RobotAtStart {
-  Shapes arm;   ///< what moves
-  Shapes base;  ///< what does not
+  Shapes arm;   ///< of the links
+  Shapes base;  ///< of the fixed base
 };
 
-/// What was read and what is left of it where the arm can be.
+/// What was read, and what remains of it within the arm's reach.
 struct MapSummary {
   bool has_map = false;
   std::string map_file, map_sha256;
@@ -63,34 +63,34 @@ struct MapSummary {
   std::size_t leaves = 0;          ///< occupied leaves in the file
   std::size_t leaves_cropped = 0;  ///< of these within reach + influence
   std::size_t free_leaves = 0;     ///< in the file
-  Shares within_reach;             ///< of the file's map, before anything is taken out of it
+  Shares within_reach;             ///< of the file's map, before any removal
   UnknownPolicy unknown = UnknownPolicy::free;
   std::optional<double> self_filter_padding_m;
-  std::size_t self_filter_voxels = 0;          ///< occupied ones that the self-filter took out
-  std::size_t self_filter_leaves = 0;          ///< occupied leaves that lost any
-  std::size_t self_filter_unknown_voxels = 0;  ///< unknown ones, unless unknown space is free
-  std::size_t leaves_in_arm = 0;               ///< without a self-filter: occupied ones that touch the arm at its start
+  std::size_t self_filter_voxels = 0;          ///< occupied voxels that the self-filter removed
+  std::size_t self_filter_leaves = 0;          ///< occupied leaves that lost any voxel
+  std::size_t self_filter_unknown_voxels = 0;  ///< unknown voxels, unless unknown space is free
+  std::size_t leaves_in_arm = 0;  ///< without a self-filter: that touch the arm at its start
   std::vector<std::string> warnings;
 };
 
-/// A map cut down to what an arm can come near, in the map's frame.
+/// The part of a map that an arm can come near, in the map's frame.
 struct MapRegion {
   double resolution_m = 0.0;
   Ball ball;                   ///< what was kept: reach + influence around the base
-  Ball reachable;              ///< where the arm can be: reach around the base
+  Ball reachable;              ///< reach around the base
   std::vector<Cell> occupied;  ///< whole cells that touch the ball
   std::vector<Cell> unknown;   ///< likewise; empty where unknown space is free
   MapSummary summary;
 };
 
-/// Reads a map and cuts it down: shares within reach, crop, self-filter, unknown space by its policy, keep-out around
-/// the base.
+/// Reads a map and reduces it to what an arm can come near: shares within reach, crop, self-filter,
+/// unknown space by its policy, keep-out around the base.
 /// @param base pose of the robot's base frame in the world
 /// @param reach, influence see Environment [m]
-/// @param robot for the self-filter, and to notice a map that holds the robot itself
-/// @throws Error io, parse or invalid for the map, also where unknown space blocks and there is no free space within
-///         reach though most of it is unknown; usage for reach and influence
-[[nodiscard]] MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence,
-                                    const RobotAtStart& robot = {});
+/// @param robot for the self-filter, or to detect a map that contains the robot itself
+/// @throws Error io, parse or invalid for the map, also if unknown space blocks although nothing
+///        within reach is free and most of it is unknown; usage for reach and influence
+[[nodiscard]] MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach,
+                                    double influence, const RobotAtStart& robot = {});
 
 }  // namespace hamelin::scene

@@ -20,7 +20,7 @@ struct RobotRef {
   std::filesystem::path file;
   std::optional<std::string> tip;                ///< none: the only leaf
   std::optional<std::filesystem::path> spheres;  ///< sidecar file
-  std::optional<std::filesystem::path> srdf;     ///< its pairs never count as colliding
+  std::optional<std::filesystem::path> srdf;  ///< its disabled pairs are not checked for collision
 };
 
 enum class GoalType : std::int32_t { joint, position, pose };
@@ -29,42 +29,45 @@ enum class GoalType : std::int32_t { joint, position, pose };
 
 struct Goal {
   GoalType type = GoalType::joint;
-  Eigen::VectorXd q;     ///< joint [rad or m]
-  Eigen::MatrixXd path;  ///< joint, if given as a path: way-points as columns, q the last; else empty
-  geometry::SE3 pose;    ///< position, pose: of the tip in the world; a position's rotation means nothing
-  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};              ///< see Quaternion
-  double tolerance_m = 0.0;                                    ///< position 0.02, pose 0.01
-  double tolerance_rad = 0.0;                                  ///< joint 0.05, pose 0.26
-  double speed_max = std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
-  std::optional<double> tip_speed_max_m_s;                     ///< position, pose: of the tip at arrival
+  Eigen::VectorXd q;  ///< joint [rad or m]
+  Eigen::MatrixXd
+      path;            ///< joint, if given as a path: way-points as columns, q the last; else empty
+  geometry::SE3 pose;  ///< position, pose: of the tip in the world; rotation unused for position
+  Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
+  double tolerance_m = 0.0;                        ///< position 0.02, pose 0.01
+  double tolerance_rad = 0.0;                      ///< joint 0.05, pose 0.26
+  double speed_max =
+      std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
+  std::optional<double> tip_speed_max_m_s;      ///< position, pose: of the tip at arrival
 };
 
 /// The goal's "type" in a scene file: "path" is a joint goal with way-points.
 [[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
-/// A number for each joint.
+/// One value per joint.
 struct JointNumbers {
-  bool from_robot = false;     ///< what the robot file gives
-  std::vector<double> values;  ///< else one number for all joints, one per joint, or none: zero
+  bool from_robot = false;     ///< the values of the robot file
+  std::vector<double> values;  ///< else one value for all joints, one per joint, or none: zero
 };
 
 /// A body fixed to the tip.
 struct Payload {
   double mass_kg = 0.0;
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();     ///< centre of mass, tip frame
-  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();  ///< about the centre of mass, tip frame's axes
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< centre of mass, tip frame
+  Eigen::Matrix3d inertia_kg_m2 =
+      Eigen::Matrix3d::Zero();  ///< about the centre of mass, tip frame's axes
 };
 
-/// Below this speed dry friction turns viscous, if a scene says nothing else [rad/s or m/s].
+/// Default speed below which dry friction becomes viscous [rad/s or m/s].
 inline constexpr double default_friction_speed = 0.01;
 
-/// What of the robot is modelled; by default nothing that could be left out.
+/// Which properties of the robot are modelled. By default all optional ones are off.
 struct ModelFlags {
-  JointNumbers joint_damping;                      ///< viscous [Nms/rad or Ns/m]
-  JointNumbers friction;                           ///< dry: torque −c tanh(v / friction_speed) [Nm or N]
+  JointNumbers joint_damping;  ///< viscous [Nms/rad or Ns/m]
+  JointNumbers friction;       ///< dry: torque −c tanh(v / friction_speed) [Nm or N]
   double friction_speed = default_friction_speed;  ///< [rad/s or m/s]
-  /// Rotor inertia seen at the joint [kg m² or kg]. The robot's own by default, as masses are: no part of its motion
-  /// would be right without.
+  /// Rotor inertia seen at the joint [kg m² or kg]. By default that of the robot file, as for
+  /// masses: the motion would be wrong without it.
   JointNumbers armature{true, {}};
   bool joint_limits = false, velocity_limits = false, torque_limits = false, self_collision = false;
   std::optional<Payload> payload;
@@ -76,15 +79,16 @@ enum class ActuationType : std::int32_t { ideal, sampled };
 
 struct Actuation {
   ActuationType type = ActuationType::ideal;
-  double control_period_s = 0.001;  ///< a whole number of steps; one step under ideal
+  double control_period_s = 0.001;  ///< an integer multiple of the step; one step under ideal
   double delay_s = 0.0;
   double joint_noise_rad = 0.0;
   double planner_mass_scale = 1.0;
-  std::optional<double> torque_rate_max_Nm_s;  ///< sampled: of each joint's held torque [Nm/s or N/s]
-  double coulomb_friction_share = 0.0;         ///< of the effort limits; the planner knows nothing of it
+  std::optional<double>
+      torque_rate_max_Nm_s;             ///< sampled: of each joint's held torque [Nm/s or N/s]
+  double coulomb_friction_share = 0.0;  ///< of the effort limits; unknown to the planner
 };
 
-/// A planner or integrator by name, with parameters that only it understands.
+/// A planner or integrator by name, with its own parameters.
 struct Choice {
   std::string name;
   Json params = Json::object();
@@ -94,8 +98,8 @@ struct StallRule {
   double speed_m_s = 0.002, distance_m = 0.2, hold_s = 1.0;
 };
 
-/// A scene file, read and checked (hamelin.scene/1; docs/schema/scene.schema.json says what each field means). What is
-/// empty is not modelled.
+/// A scene file, read and checked (hamelin.scene/1). docs/schema/scene.schema.json defines each
+/// field. What is empty is not modelled.
 struct Scene {
   std::string name;  ///< the file it came from
   RobotRef robot;
@@ -115,37 +119,42 @@ struct Scene {
   std::uint64_t seed = 1;
 };
 
-/// The files that a run of the scene reads, the scene's own left out: robot, spheres, SRDF, map and its changes.
+/// The files that a run of the scene reads, without the scene file itself: robot, spheres, SRDF,
+/// map and its changes.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const Scene& scene);
 
-/// Reads a scene file; paths inside are taken relative to it, see resolve_path().
+/// Reads a scene file; paths in it are relative to its folder, see resolve_path().
 /// @throws Error io, parse or invalid: "file: /json/pointer: what is wrong, what was expected"
 [[nodiscard]] Scene read_scene(const std::filesystem::path& file);
 
-/// @param where opens each message and becomes the scene's name
+/// @param where prefix of each message, and the name of the scene
 /// @throws Error invalid
 [[nodiscard]] Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
                                     const std::string& where);
 
-/// The scene with every default written out; what is not modelled is null. scene_from_json() reads it back as the same.
+/// The scene with all defaults written out; what is not modelled is null. scene_from_json() of it
+/// gives the same scene.
 [[nodiscard]] Json resolved_json(const Scene& scene);
 
-/// Sets one value by "/json/pointer=VALUE"; VALUE is JSON, else a string. Keys that the file leaves out are made if
-/// the schema knows them.
+/// Sets one value by "/json/pointer=VALUE". VALUE is JSON, or else a string. Keys that the file
+/// leaves out are added if the schema defines them.
 /// @throws Error usage, one line that begins with the assignment
 void set_pointer(Json& document, std::string_view assignment);
 
-/// One obstacle in a scene's form. @throws Error invalid, "where: …"
+/// One obstacle in the format of a scene. @throws Error invalid, "where: …"
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
 [[nodiscard]] Json motion_json(const std::variant<SineMotion, LinearMotion>& motion);
 
-/// A scene's map cut down to its robot, which stands in it as the scene starts. See read_region().
-/// @throws Error io, parse or invalid, also if start/q does not fit the model; usage if there is no map
-[[nodiscard]] MapRegion make_region(const Scene& scene, const model::Model& model, double influence);
+/// The region of a scene's map around its robot in its start configuration, see read_region().
+/// @throws Error io, parse or invalid, also if start/q does not fit the model; usage if there is no
+///        map
+[[nodiscard]] MapRegion make_region(const Scene& scene, const model::Model& model,
+                                    double influence);
 
-/// The surroundings of a scene's robot, which stands in them as the scene starts. See Environment.
+/// The environment of a scene's robot in its start configuration, see Environment.
 /// @throws Error io, parse or invalid, also if start/q does not fit the model
-[[nodiscard]] Environment make_environment(const Scene& scene, const model::Model& model, double influence);
+[[nodiscard]] Environment make_environment(const Scene& scene, const model::Model& model,
+                                           double influence);
 
 }  // namespace hamelin::scene

@@ -6,9 +6,11 @@
 
 namespace hamelin::simulation {
 
-/// The parameters of an integrator from a scene's `/integrator/params`, docs/schema/integrator.schema.json.
-/// @param where file and place, with which an error message begins
+/// The parameters of an integrator from a scene's `/integrator/params`,
+/// docs/schema/integrator.schema.json.
+/// @param where file and place, the prefix of error messages
 /// @throws Error invalid, naming `where` and the key
-[[nodiscard]] integration::Parameters integrator_options(const Json& params, const std::string& where);
+[[nodiscard]] integration::Parameters integrator_options(const Json& params,
+                                                         const std::string& where);
 
 }  // namespace hamelin::simulation

@@ -19,20 +19,23 @@ class logger;
 
 namespace hamelin::simulation {
 
-/// What a caller may watch and steer while a run goes on.
+/// How a caller observes and controls a run.
 struct Watch {
-  log::LineSink* log = nullptr;             ///< null: nothing is recorded, and nothing is paid for it
-  long every = 1;                           ///< a tick line every so many steps; step 0 and the last always
-  std::vector<std::string> argv;            ///< the command line, for the provenance
-  const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: the record ends properly
-  std::optional<long> stop_at;              ///< as if stopped at this step: repeats a run that was interrupted
-  /// Called at every node of a run in closed loop, the first and the last included.
+  log::LineSink* log = nullptr;   ///< null: no log, at no cost
+  long every = 1;                 ///< steps between tick lines; first and last always written
+  std::vector<std::string> argv;  ///< the command line, for the provenance
+  /// Set by a signal handler: the run stops, and its log ends properly.
+  const std::atomic<bool>* stop = nullptr;
+  std::optional<long> stop_at;  ///< stops at this step, to repeat a run that was interrupted
+  /// Called at every node of a run in closed loop, including the first and the last.
   std::function<void(double time_s, const Eigen::VectorXd& q)> at_node;
-  std::function<void(double time_s, double duration_s)> progress;  ///< called about every 1000 steps
-  /// Receives diagnostics: what a planner says and what comes into sight (debug), goals in contact (info), what the
-  /// planner warns of (warn). Null: none. Nothing is formatted for a level that is switched off.
+  std::function<void(double time_s, double duration_s)> progress;  ///< called every 1000 steps
+  /// Receives diagnostics: messages of the planner and obstacles that become visible (debug), goals
+  /// in contact (info), warnings of the planner (warn). Null: none. Levels that are off cost
+  /// nothing.
   std::shared_ptr<spdlog::logger> diagnostics;
-  /// Called once before a run that is logged: tick lines to come at most, and joints.
+  /// Called once before a run with a log: the largest number of tick lines, and the number of
+  /// joints.
   std::function<void(double ticks, int dof)> announce;
 };
 
@@ -46,32 +49,36 @@ struct FreeMotion {
   Eigen::VectorXd damping;  ///< empty: none
   Eigen::VectorXd coulomb;  ///< dry friction, see integration::Channels; empty: none
   double coulomb_speed = scene::default_friction_speed;
-  Json config = Json::object();    ///< for the log's header: a scene's form, see free_motion()
-  std::vector<log::Input> inputs;  ///< files it was read from
+  Json config = Json::object();    ///< a scene for the log's header, see free_motion()
+  std::vector<log::Input> inputs;  ///< the files it was read from
 };
 
-/// What a scene says of free motion: start, damping, step, duration, integrator. Planner, goals and obstacles are left
-/// out, of its config too.
+/// The free motion of a scene: start, damping, step, duration, integrator. Planner, goals and
+/// obstacles are left out, also from its config.
 /// @throws Error invalid for integrator parameters or numbers that do not fit the robot
 [[nodiscard]] FreeMotion free_motion(const scene::Scene& scene, const model::Model& model);
 
-/// Integrates free motion. The result's outcome is completed, diverged or interrupted.
-/// Under step control (options.rtol, atol) step_s is the first step, the last one ends at the duration, and the result
-/// counts the accepted steps.
-/// @throws Error usage if the duration is no whole number of fixed steps (to 1e-9 steps), or sizes do not match
-[[nodiscard]] log::Result integrate(const model::Model& model, const FreeMotion& motion, const Watch& watch);
+/// Integrates free motion. The result's outcome is completed, diverged or interrupted. Under step
+/// control (options.rtol, atol) step_s is the first step, the last step ends at the duration, and
+/// the result counts the accepted steps.
+/// @throws Error usage if the duration is not an integer multiple of a fixed step (to 1e-9 steps),
+/// or sizes do not match
+[[nodiscard]] log::Result integrate(const model::Model& model, const FreeMotion& motion,
+                                    const Watch& watch);
 
-/// Runs a scene in closed loop with its planner: every tick kinematics, closest points, planner, one integrator step,
-/// and a check that the motion between the ticks stayed clear.
-/// @param plugin_directories where planners are looked for, in order
+/// Runs a scene in closed loop with its planner. Each tick consists of kinematics, closest points,
+/// the planner, one integrator step, and a check that the motion between the ticks stayed clear.
+/// @param plugin_directories where planners are searched for, in order
 /// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
-[[nodiscard]] log::Result run(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories,
+[[nodiscard]] log::Result run(const scene::Scene& scene,
+                              const std::vector<std::filesystem::path>& plugin_directories,
                               const Watch& watch);
 
-/// The scene as a document with every default written out, the planner's and the integrator's too: a log's `config`.
-/// Paths are as seen from here.
-/// @throws Error for parameters that are wrong, or a planner that is not found
-[[nodiscard]] Json full_config(const scene::Scene& scene, const std::vector<std::filesystem::path>& plugin_directories);
+/// The scene as a document with all defaults, including the planner's and the integrator's: the
+/// `config` of a log. Paths are relative to the working directory.
+/// @throws Error for wrong parameters, or a planner that is not found
+[[nodiscard]] Json full_config(const scene::Scene& scene,
+                               const std::vector<std::filesystem::path>& plugin_directories);
 
 /// The robot of a scene as a model: file, tip, spheres, payload, base, gravity.
 [[nodiscard]] model::Model load_model(const scene::Scene& scene);

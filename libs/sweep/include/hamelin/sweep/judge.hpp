@@ -10,36 +10,40 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
 
-/// A second opinion on contact. It shares with what planners and runs use only the files and how they are read: the arm
-/// is placed, and distances are taken, by code of its own.
+/// Independent contact checker. It shares with planners and runs only the files and their readers.
+/// It places the arm and computes distances with code of its own.
 namespace hamelin::sweep {
 
-/// A collision sphere of the arm, or one of those that stand for a capsule.
+/// A collision sphere of the arm, or one of the row of balls that models a capsule.
 struct JudgedBall {
   std::string name;        ///< "part/3": the fourth ball of that part of the arm
-  int link = -1;           ///< it moves with; −1: the base
+  int link = -1;           ///< index of the link that carries the ball; −1: the base
   Eigen::Vector3d center;  ///< in the base frame at q = 0 [m]
   double radius = 0.0;     ///< [m]
 };
 
-/// The arm of a scene, its capsules as rows of balls, placed by the product of exponentials (SPEC §2): exp(S_1 q_1) …
-/// exp(S_i q_i) moves a point of link i from where it is at q = 0.
+/// The arm of a scene, its capsules modelled as rows of balls. The arm is placed by the product of
+/// exponentials: a point of link i at q = 0 is moved by exp(S_1 q_1) … exp(S_i q_i), where S_i is
+/// the screw of joint i in the base frame.
 class JudgedArm {
  public:
-  /// Rows of balls lie within their capsules and reach to within this of their surfaces [m].
+  /// Rows of balls lie within their capsules; no point of a capsule's surface is farther from them
+  /// than this [m].
   static constexpr double capsule_gap_m = 1e-4;
 
   /// @throws Error as description::read_robot does
   explicit JudgedArm(const scene::Scene& scene);
 
   [[nodiscard]] std::size_t dof() const noexcept { return joints_.size(); }
-  /// Those that move, then those of the base if the scene models self-collision.
+  /// The balls that move, then those of the base if the scene models self-collision.
   [[nodiscard]] const std::vector<JudgedBall>& balls() const noexcept { return balls_; }
-  /// Those of the base, whatever the scene models.
+  /// The balls of the base, also where the scene does not model self-collision.
   [[nodiscard]] const std::vector<JudgedBall>& base_balls() const noexcept { return base_balls_; }
-  /// Pairs of balls that must not touch each other: of two parts that move against each other and are not listed as
-  /// disabled; where a robot lists no pair at all, not of neighbouring links. None unless the scene models it.
-  [[nodiscard]] const std::vector<std::pair<std::size_t, std::size_t>>& self_pairs() const noexcept {
+  /// Pairs of balls that must not touch each other. They belong to two parts that move relative to
+  /// each other and are not listed as disabled. If a robot lists no disabled pair at all,
+  /// neighbouring links are left out. Empty unless the scene models self-collision.
+  [[nodiscard]] const std::vector<std::pair<std::size_t, std::size_t>>& self_pairs()
+      const noexcept {
     return self_pairs_;
   }
   /// World centres of all balls at q [m].
@@ -56,33 +60,41 @@ class JudgedArm {
   std::vector<std::pair<std::size_t, std::size_t>> self_pairs_;
 };
 
-/// Signed distance of a point from an obstacle where it is at a time [m]; inside it is minus the depth.
-[[nodiscard]] double distance_from(const scene::Obstacle& obstacle, double time_s, const Eigen::Vector3d& p);
+/// Signed distance of a point from an obstacle at a time [m]; minus the depth if the point is
+/// inside.
+[[nodiscard]] double distance_from(const scene::Obstacle& obstacle, double time_s,
+                                   const Eigen::Vector3d& p);
 
-/// The occupied leaves of a map, as OctoMap itself lists them, at a time: changes of the scene's map are made as that
-/// time passes theirs. Unknown space is free.
+/// The occupied leaves of a map at a time, as OctoMap itself lists them. Changes of the scene's map
+/// are applied once that time has passed theirs. Unknown space is free.
 class JudgedMap {
  public:
   JudgedMap() = default;
   /// The map and its changes. @throws Error io, parse or invalid
   explicit JudgedMap(const scene::MapSpec& spec);
-  /// The same without the voxels that a self-filter takes out: those that the robot touches, padded, at its start.
+  /// The same without the voxels that the scene's self-filter removes: those that the padded robot
+  /// touches at its start.
   JudgedMap(const scene::Scene& scene, const JudgedArm& arm);
 
-  /// Makes the changes that are due, in the order listed: each frees voxels first, then occupies some.
-  /// @param time_s not less than at the call before
-  /// @return whether any was made
+  /// Applies the changes that are due, in the order listed: each first frees voxels, then occupies
+  /// some.
+  /// @param time_s not less than in the previous call
+  /// @return whether a change was applied
   bool advance(double time_s);
-  /// Takes all leaves away; what changes occupy later is kept.
+  /// Removes all leaves; voxels that later changes occupy are still added.
   void clear() { leaves_.clear(); }
 
   [[nodiscard]] const std::vector<scene::Box>& leaves() const noexcept { return leaves_; }
-  /// Distance of a world point from the nearest leaf [m]; 0 inside, infinite without leaves. O(leaves).
+  /// Distance of a world point from the nearest leaf [m]; 0 inside, infinite without leaves.
+  /// O(leaves).
   [[nodiscard]] double distance(const Eigen::Vector3d& p) const;
-  /// The leaves at most that far from a world point [m].
-  [[nodiscard]] std::vector<scene::Box> near(const Eigen::Vector3d& p, double distance) const;
+  /// The leaves within a distance of a world point [m].
+  [[nodiscard]] std::vector<scene::Box> leaves_within(const Eigen::Vector3d& p,
+                                                      double distance) const;
   /// A world point in the map's frame [m].
-  [[nodiscard]] Eigen::Vector3d local(const Eigen::Vector3d& p) const { return from_world_ * p; }
+  [[nodiscard]] Eigen::Vector3d to_map_frame(const Eigen::Vector3d& p) const {
+    return from_world_ * p;
+  }
 
  private:
   /// Voxels from lo up to but not including hi.
@@ -94,7 +106,8 @@ class JudgedMap {
     std::vector<Voxels> free, occupied;
   };
 
-  [[nodiscard]] Change read_change(const scene::MapChangeSpec& spec, const scene::MapSpec& map) const;
+  [[nodiscard]] Change read_change(const scene::MapChangeSpec& spec,
+                                   const scene::MapSpec& map) const;
   [[nodiscard]] Voxels voxels_of(const scene::Box& leaf) const;
   [[nodiscard]] scene::Box box_of(const Voxels& voxels) const;
   void free(const std::vector<Voxels>& freed);
@@ -102,33 +115,36 @@ class JudgedMap {
   std::vector<scene::Box> leaves_;  ///< in the map's frame [m]
   double voxel_m_ = 0.0;            ///< edge of the smallest leaf
   std::vector<Change> changes_;     ///< by time
-  std::size_t made_ = 0;            ///< of the changes
+  std::size_t applied_ = 0;         ///< number of changes that have been applied
   Eigen::Isometry3d from_world_ = Eigen::Isometry3d::Identity();
 };
 
-/// The smallest distance seen [m], when, and between which ball and what: an obstacle's name, "map", or another ball.
+/// The smallest distance found, its time, the ball, and what the ball was nearest to: an obstacle's
+/// name, "map", or another ball.
 struct Closest {
   double clearance_m = 0.0, time_s = 0.0;
   std::string ball, other;
 };
 
-/// What a judge saw of a run.
+/// The judge's result for a run.
 struct Verdict {
-  std::optional<Closest> obstacles;  ///< none where there is nothing to hit
-  std::optional<Closest> self;       ///< of the arm from itself; none where the scene does not model that
-  std::size_t configurations = 0;    ///< looked at
+  std::optional<Closest> obstacles;  ///< none if there is nothing to hit
+  std::optional<Closest> self;       ///< of the arm from itself; none if not modelled
+  std::size_t configurations = 0;    ///< number of configurations checked
 
   [[nodiscard]] bool contact() const noexcept {
     return (obstacles && obstacles->clearance_m <= 0.0) || (self && self->clearance_m <= 0.0);
   }
 };
-/// {contact, obstacles, self, configurations}, each of the two {clearance_m, time_s, sphere, other} or null.
+/// {contact, obstacles, self, configurations}; `obstacles` and `self` are {clearance_m, time_s,
+/// sphere, other} or null.
 [[nodiscard]] Json to_json(const Verdict& verdict);
 
-/// Follows a run node by node and looks at every configuration, and between two nodes at as many more as keep joints
-/// within `step_rad` from one to the next. Obstacles are where they are at that time, and the map is as it is then. The
-/// map's leaves count only where the scene has no obstacle that is judge_only: such obstacles are what the map was made
-/// of, and the map is wider. What changes of the map occupy counts in any case.
+/// Follows a run node by node and checks every node. Between two nodes it checks as many
+/// intermediate configurations as are needed to keep the step of every joint within `step_rad`.
+/// Obstacles and map are taken as they are at the time of the configuration. The map's leaves count
+/// only if the scene has no obstacle that is judge_only: the map was made from such obstacles and
+/// is wider than they are. Voxels that changes of the map occupy always count.
 class Judge {
  public:
   static constexpr double step_rad = 0.01;
@@ -136,46 +152,49 @@ class Judge {
   /// @throws Error as JudgedArm and JudgedMap do
   explicit Judge(const scene::Scene& scene);
 
-  /// The next node: time [s] and joint vector [rad or m].
-  void node(double time_s, const Eigen::VectorXd& q);
+  /// Checks the motion from the previous node to this one: time [s] and joint vector [rad or m].
+  void add_node(double time_s, const Eigen::VectorXd& q);
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
 
  private:
-  /// A ball's distance from the map where it last was, and all leaves that can be the nearest around there.
-  struct Nearby {
-    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  /// A ball's distance from the map at an earlier position, and all leaves that can be the nearest
+  /// one close to it.
+  struct NearbyLeaves {
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
     double distance = 0.0;
     std::vector<scene::Box> leaves;
-    bool known = false;
+    bool valid = false;
   };
 
-  void look(double time_s, const Eigen::VectorXd& q);
+  void check(double time_s, const Eigen::VectorXd& q);
   [[nodiscard]] double map_distance(std::size_t ball, double enough);
 
   JudgedArm arm_;
   std::vector<scene::Obstacle> obstacles_;
-  std::vector<double> bounds_;  ///< of each obstacle: radius of the ball around it
+  std::vector<double> bounding_radii_;  ///< of each obstacle: radius of a ball around it
   JudgedMap map_;
-  std::vector<Nearby> nearby_;
+  std::vector<NearbyLeaves> nearby_;  ///< of each ball
   std::vector<Eigen::Vector3d> centers_;
-  double best_, best_self_;  ///< smallest distances so far; infinite at first
+  double min_clearance_, min_self_clearance_;  ///< so far; infinite at first
   double last_time_s_ = 0.0;
   Eigen::VectorXd last_q_;
   Verdict verdict_;
 };
 
-/// Whether an arm can be at these configurations at all.
+/// Whether the arm fits into the scene at its start and its goals.
 struct Feasibility {
   bool feasible = true;
-  std::string reason;  ///< empty if it can
+  std::string reason;  ///< empty if feasible
 };
 
-/// Start and goals against every occupied leaf of the map, every obstacle that is not judge_only at time 0, and the
-/// arm itself where the scene models that; free means a distance above 0. The start is looked at in the map at time 0.
-/// When the arm will be at a goal is not known: a goal is infeasible only if none of the maps from time 0 to the
-/// scene's duration leaves room for it.
-/// @param goals_q joint vectors to look at beside the scene's own joint goals
+/// Checks start and goals against every occupied leaf of the map, every obstacle that is present at
+/// time 0 and not judge_only, and the arm itself if the scene models self-collision; free means a
+/// distance above 0. The start is checked in the map at time 0. It is not known when the arm will
+/// be at a goal, so a goal is infeasible only if none of the maps from time 0 to the scene's
+/// duration leaves room for it.
+/// @param goals_q joint vectors to check in addition to the scene's own joint goals
 /// @throws Error as Judge
-[[nodiscard]] Feasibility feasibility(const scene::Scene& scene, const std::vector<Eigen::VectorXd>& goals_q);
+[[nodiscard]] Feasibility feasibility(const scene::Scene& scene,
+                                      const std::vector<Eigen::VectorXd>& goals_q);
 
 }  // namespace hamelin::sweep

@@ -1,13 +1,16 @@
 #pragma once
-#include <Eigen/Core>  // first: its includes declare posix_memalign once more, which clang refuses after a definition
+// Eigen comes first: its includes declare posix_memalign again, which clang refuses after the
+// definition below.
+#include <Eigen/Core>
 #include <catch2/catch.hpp>
 #include <cerrno>
 #include <cstdlib>
 
-/// Counts what a test program takes from the heap: malloc and its kin, which operator new and Eigen come down to. They
-/// are replaced in the whole program, so include this in exactly one source file of it.
+/// Counts the heap allocations of a test program: calls of malloc and related functions, which
+/// operator new and Eigen use. This header replaces them in the whole program, so include it in
+/// exactly one source file.
 
-#if defined(__GLIBC__) && !defined(HAMELIN_SANITIZED)  // sanitizers bring a heap of their own
+#if defined(__GLIBC__) && !defined(HAMELIN_SANITIZED)  // sanitizers replace the heap
 #define HAMELIN_COUNTS_ALLOCATIONS 1
 #else
 #define HAMELIN_COUNTS_ALLOCATIONS 0
@@ -25,7 +28,7 @@ long allocations_in(F&& f) {
   return allocation_count - before;
 }
 
-/// Whether allocations are counted in this build; where they are not, the test at hand says that it was skipped.
+/// Whether allocations are counted in this build; if not, it warns that the test is skipped.
 inline bool counts_allocations() {
   if (HAMELIN_COUNTS_ALLOCATIONS == 0) WARN("skipped: this build does not count allocations");
   return HAMELIN_COUNTS_ALLOCATIONS != 0;
@@ -35,8 +38,8 @@ inline bool counts_allocations() {
 
 #if HAMELIN_COUNTS_ALLOCATIONS
 
-// The C library's own heap under its second names. Visible, so that shared libraries and plugins are counted as well;
-// memory goes back by the library's free(), which is the same for all of them.
+// The replacements call the C library's heap by its internal names. They are visible, so that
+// allocations of shared libraries and plugins are counted too. free() stays that of the C library.
 #define HAMELIN_COUNTED extern "C" [[gnu::visibility("default")]]
 extern "C" {
 void* __libc_malloc(std::size_t);
@@ -67,9 +70,9 @@ HAMELIN_COUNTED void* aligned_alloc(std::size_t alignment, std::size_t size) noe
 }
 HAMELIN_COUNTED int posix_memalign(void** p, std::size_t alignment, std::size_t size) noexcept {
   ++hamelin::test::allocation_count;
-  void* const made = __libc_memalign(alignment, size);
-  if (made == nullptr) return ENOMEM;
-  *p = made;
+  void* const memory = __libc_memalign(alignment, size);
+  if (memory == nullptr) return ENOMEM;
+  *p = memory;
   return 0;
 }
 #undef HAMELIN_COUNTED

@@ -15,12 +15,13 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 
-/// A small closed loop for the tests of planners, independent of hamelin's simulation: semi-implicit Euler, balls as
-/// obstacles, one goal.
+/// A small closed loop for the tests of planners, independent of hamelin's simulation:
+/// semi-implicit Euler, balls as obstacles, one goal.
 namespace hamelin::test {
 
-/// The arm of example 5.2 (Table 1): unit links along x, COM at their far ends, unit masses and inertias, turning about
-/// z; control spheres side by side along the links.
+/// The arm of example 5.2 of Shen, Wang, Shi (2021), Table 1: unit links along x with joints about
+/// z, centres of mass at their far ends, unit masses and inertias. Control spheres are placed side
+/// by side along the links.
 inline model::Robot planar4(int spheres = 25, double radius = 0.02) {
   model::Robot robot;
   robot.name = "planar4";
@@ -37,7 +38,8 @@ inline model::Robot planar4(int spheres = 25, double radius = 0.02) {
       link.spheres.push_back({Eigen::Vector3d{(k + 0.5) / spheres - 1.0, 0.0, 0.0}, radius});
     robot.links.push_back(link);
   }
-  robot.tip = {"tip", 3, geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{4.0, 0.0, 0.0}}};
+  robot.tip = {"tip", 3,
+               geometry::SE3{Eigen::Matrix3d::Identity(), Eigen::Vector3d{4.0, 0.0, 0.0}}};
   return robot;
 }
 
@@ -46,21 +48,22 @@ struct Ball {
   double radius;
 };
 
-/// What a planner did and what became of it.
+/// The outcome of a closed loop.
 struct LoopResult {
   bool reached = false;  ///< tip within 0.02 m and 0.05 m/s
-  double time_s = 0.0;   ///< of arrival, else of the end
+  double time_s = 0.0;   ///< of arrival, or else of the end
   double clearance_m = std::numeric_limits<double>::infinity();
   double distance_m = 0.0;         ///< of the tip from the goal at the end
   double speed_m_s = 0.0;          ///< of the tip at the end
-  double gyroscopic_work_J = 0.0;  ///< Σ h |power| of channel c
+  double gyroscopic_work_J = 0.0;  ///< Σ h |power| of the gyroscopic channel
 };
 
 class ArmLoop : public planning::HostServices {
  public:
-  /// @param q_goal a joint goal, which then takes the place of the tip's goal
-  ArmLoop(const std::string& plugin_file, Json params, const model::Robot& robot, const Eigen::Vector3d& goal,
-          std::vector<Ball> balls, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero(),
+  /// @param q_goal a joint goal, which replaces the tip's goal if it is not empty
+  ArmLoop(const std::string& plugin_file, Json params, const model::Robot& robot,
+          const Eigen::Vector3d& goal, std::vector<Ball> balls,
+          const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero(),
           const Eigen::VectorXd& q_goal = {})
       : model_(robot, geometry::SE3{}, gravity),
         ws_(model_),
@@ -85,17 +88,19 @@ class ArmLoop : public planning::HostServices {
   }
 
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+    return 0;
+  }
 
-  /// Contacts at q, as a host lists them.
+  /// Contacts at q, listed as a host lists them.
   const std::vector<hamelin_contact>& contacts() {
     dynamics::forward_kinematics(model_, ws_, q);
     contacts_.clear();
     clearance = std::numeric_limits<double>::infinity();
     for (std::size_t s = 0; s < spheres_.size(); ++s) {
       const auto& sphere = spheres_[s];
-      const Eigen::Vector3d center =
-          dynamics::point_position(model_, ws_, sphere.link, Eigen::Map<const Eigen::Vector3d>(sphere.center_link_m));
+      const Eigen::Vector3d center = dynamics::point_position(
+          model_, ws_, sphere.link, Eigen::Map<const Eigen::Vector3d>(sphere.center_link_m));
       const std::size_t first = contacts_.size();
       for (std::size_t b = 0; b < balls_.size(); ++b) {
         const Eigen::Vector3d away = center - balls_[b].center, direction = away.normalized();
@@ -106,7 +111,8 @@ class ArmLoop : public planning::HostServices {
         clearance = std::min(clearance, c.distance_m);
         if (c.distance_m > influence_) continue;
         Eigen::Map<Eigen::Vector3d>(c.arm_point_world_m) = center - sphere.radius_m * direction;
-        Eigen::Map<Eigen::Vector3d>(c.obstacle_point_world_m) = balls_[b].center + balls_[b].radius * direction;
+        Eigen::Map<Eigen::Vector3d>(c.obstacle_point_world_m) =
+            balls_[b].center + balls_[b].radius * direction;
         Eigen::Map<Eigen::Vector3d>(c.direction_world) = direction;
         contacts_.push_back(c);
       }
@@ -132,13 +138,13 @@ class ArmLoop : public planning::HostServices {
   }
   [[nodiscard]] std::string_view error() const { return planner_.front().error(); }
 
-  /// Torque of channel c at velocity v.
+  /// Torque of the gyroscopic channel at velocity v.
   Eigen::VectorXd gyroscopic_torque() {
     Eigen::VectorXd tau = Eigen::VectorXd::Zero(model_.dof()), row = tau;
     dynamics::forward_kinematics(model_, ws_, q);
     for (const auto& term : buffers.gyroscopic()) {
-      const Eigen::Vector3d at =
-          dynamics::point_position(model_, ws_, term.link, Eigen::Map<const Eigen::Vector3d>(term.point_link_m));
+      const Eigen::Vector3d at = dynamics::point_position(
+          model_, ws_, term.link, Eigen::Map<const Eigen::Vector3d>(term.point_link_m));
       const Eigen::Vector3d velocity = dynamics::point_velocity(model_, ws_, term.link, at, v);
       const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(term.w_world).cross(velocity);
       dynamics::point_jacobian_transpose(model_, ws_, term.link, at, force, row);
@@ -147,7 +153,7 @@ class ArmLoop : public planning::HostServices {
     return tau;
   }
 
-  /// Semi-implicit Euler at 4 ms until arrival or the time is over.
+  /// Semi-implicit Euler with steps of 4 ms until arrival or until the time is over.
   LoopResult run(double duration_s) {
     const double h = 0.004;
     LoopResult result;
@@ -157,15 +163,17 @@ class ArmLoop : public planning::HostServices {
       result.clearance_m = std::min(result.clearance_m, clearance);
       const Eigen::Vector3d tip = dynamics::tip_pose(model_, ws_).p();
       result.distance_m = (tip - goal_).norm();
-      result.speed_m_s = dynamics::point_velocity(model_, ws_, model_.robot().tip.link, tip, v).norm();
+      result.speed_m_s =
+          dynamics::point_velocity(model_, ws_, model_.robot().tip.link, tip, v).norm();
       result.time_s = h * static_cast<double>(k_);
       if (result.distance_m < 0.02 && result.speed_m_s < 0.05) {
         result.reached = true;
         return result;
       }
-      const Eigen::VectorXd turn = gyroscopic_torque();
-      result.gyroscopic_work_J += h * std::abs(turn.dot(v));
-      tau = buffers.held_torque() - buffers.potential_gradient() - buffers.damping().cwiseProduct(v) + turn;
+      const Eigen::VectorXd gyroscopic = gyroscopic_torque();
+      result.gyroscopic_work_J += h * std::abs(gyroscopic.dot(v));
+      tau = buffers.held_torque() - buffers.potential_gradient() -
+            buffers.damping().cwiseProduct(v) + gyroscopic;
       dynamics::forward_dynamics(model_, ws_, q, v, tau, a);
       v += h * a;
       q += h * v;
@@ -190,11 +198,12 @@ class ArmLoop : public planning::HostServices {
   double clearance = 0.0;
 };
 
-/// Example 5.2: ball and goal.
+/// The ball and the goal of example 5.2.
 inline const std::vector<Ball> ball_52{{{2.4, 2.2, 0.0}, 0.25}};
 inline const Eigen::Vector3d goal_52{2.0, 3.0, 0.0};
 
-/// For a spatial arm of about a metre: two of these are near it.
-inline const std::vector<Ball> three_balls{{{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
+/// Obstacles for a spatial arm with a reach of about 1 m; two of them are near it.
+inline const std::vector<Ball> three_balls{
+    {{1.2, 0.4, 0.3}, 0.1}, {{-0.8, 0.9, 0.1}, 0.2}, {{0.1, -1.4, 0.8}, 0.15}};
 
 }  // namespace hamelin::test

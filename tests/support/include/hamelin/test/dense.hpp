@@ -5,15 +5,16 @@
 
 namespace hamelin::test {
 
-/// An independent reference for dynamics: product of exponentials and dense Lagrangian mechanics, no recursion, no
-/// joint frames.
+/// An independent reference for dynamics: product of exponentials and dense Lagrangian mechanics,
+/// without recursion and joint frames.
 struct Dense {
   const model::Model& model;
 
   [[nodiscard]] geometry::SE3 com_pose(int link, const Eigen::VectorXd& q) const {
     geometry::SE3 g = model.base();
     for (int j = 0; j <= link; ++j)
-      g = g * geometry::SE3::exp(model.robot().links[static_cast<std::size_t>(j)].joint.screw * q[j]);
+      g = g *
+          geometry::SE3::exp(model.robot().links[static_cast<std::size_t>(j)].joint.screw * q[j]);
     return g * model.robot().links[static_cast<std::size_t>(link)].com;
   }
   [[nodiscard]] Eigen::MatrixXd mass(const Eigen::VectorXd& q) const {
@@ -40,10 +41,12 @@ struct Dense {
   [[nodiscard]] double potential(const Eigen::VectorXd& q) const {
     double U = 0.0;
     for (int i = 0; i < model.dof(); ++i)
-      U -= model.robot().links[static_cast<std::size_t>(i)].mass_kg * model.gravity().dot(com_pose(i, q).p());
+      U -= model.robot().links[static_cast<std::size_t>(i)].mass_kg *
+           model.gravity().dot(com_pose(i, q).p());
     return U;
   }
-  /// C(q, v) v + ∂U(q) by central differences of both.
+  /// C(q, v) v + ∂U(q)/∂q with the Coriolis matrix C and the potential energy U, by central
+  /// differences of the mass matrix and of U.
   [[nodiscard]] Eigen::VectorXd bias(const Eigen::VectorXd& q, const Eigen::VectorXd& v) const {
     const int n = model.dof();
     const double e = 1e-5;

@@ -1,17 +1,17 @@
 #pragma once
 #include "hamelin/integration/integrator.hpp"
 
-/// What tests of integrators share.
+/// Helpers for the tests of integrators.
 namespace hamelin::test {
 
-/// Parameters with a scheme's order (composition, gauss); 0 leaves it to the scheme.
+/// Parameters with the order of a scheme (composition, gauss); 0 selects the scheme's default.
 inline integration::Parameters of_order(int order) {
   integration::Parameters parameters;
   if (order > 0) parameters.order = order;
   return parameters;
 }
 
-/// Parameters that switch step control on.
+/// Parameters that enable step control.
 inline integration::Parameters tolerances(double rtol, double atol) {
   integration::Parameters parameters;
   parameters.rtol = rtol;
@@ -19,7 +19,7 @@ inline integration::Parameters tolerances(double rtol, double atol) {
   return parameters;
 }
 
-/// Names of the schemes that take rtol and atol.
+/// The names of the schemes with step control.
 inline std::vector<std::string> controlled_names() {
   std::vector<std::string> names;
   for (const auto& name : integration::integrator_names())
@@ -27,7 +27,8 @@ inline std::vector<std::string> controlled_names() {
   return names;
 }
 
-inline Eigen::VectorXd velocity(const integration::Integrator& integrator, const integration::State& state) {
+inline Eigen::VectorXd velocity(const integration::Integrator& integrator,
+                                const integration::State& state) {
   Eigen::VectorXd v(state.q.size());
   integrator.velocity(state, v);
   return v;
@@ -35,10 +36,13 @@ inline Eigen::VectorXd velocity(const integration::Integrator& integrator, const
 
 /// Whether all fields of two states are the same numbers.
 inline bool same_state(const integration::State& a, const integration::State& b) {
-  const auto same = [](const Eigen::VectorXd& x, const Eigen::VectorXd& y) { return x.size() == y.size() && x == y; };
+  const auto same = [](const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
+    return x.size() == y.size() && x == y;
+  };
   return a.time_s == b.time_s && a.k == b.k && same(a.q, b.q) && same(a.v, b.v) && same(a.p, b.p) &&
-         a.jumped == b.jumped && same(a.memory, b.memory) && same(a.force_previous, b.force_previous) &&
-         a.step_previous == b.step_previous && a.history == b.history && a.step_next == b.step_next;
+         a.jumped == b.jumped && same(a.memory, b.memory) &&
+         same(a.force_previous, b.force_previous) && a.step_previous == b.step_previous &&
+         a.history == b.history && a.step_next == b.step_next;
 }
 
 }  // namespace hamelin::test

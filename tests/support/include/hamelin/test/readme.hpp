@@ -7,12 +7,13 @@
 
 namespace hamelin::test {
 
-/// Checks that the first example of folder/README.md stands verbatim in folder/tests/readme_test.cpp, between two lines
-/// "  // [example]" and with clang-format off.
-/// @param folder from the checkout's root, e.g. "libs/scene"
+/// Checks that folder/tests/readme_test.cpp contains the first C++ example of folder/README.md
+/// verbatim, between two lines "  // [example]" and with clang-format off.
+/// @param folder relative to the root of the checkout, e.g. "libs/scene"
 inline void check_readme_example(const std::string& folder) {
   const auto root = std::filesystem::path(HAMELIN_SOURCE_DIR) / folder;
-  const auto between = [](const std::string& text, const std::string& open, const std::string& close) {
+  const auto between = [](const std::string& text, const std::string& open,
+                          const std::string& close) {
     const auto found = text.find(open);
     REQUIRE(found != std::string::npos);
     const auto begin = found + open.size(), end = text.find(close, begin);

@@ -4,7 +4,7 @@
 #include "hamelin/core/rng.hpp"
 #include "hamelin/model/robot.hpp"
 
-/// Random chains and joint vectors for tests, by seed.
+/// Random chains and joint vectors for tests, determined by a seed.
 namespace hamelin::test {
 
 inline Eigen::Vector3d random_vector(Rng& rng, double size = 1.0) {
@@ -19,18 +19,20 @@ inline Eigen::VectorXd random_joints(Rng& rng, int n, double size = 1.0) {
 }
 
 inline Eigen::Matrix3d random_inertia(Rng& rng) {
-  // second moments of a random box, turned: positive and within the triangle inequality
+  // A rotated random box, whose inertia is positive and satisfies the triangle inequality.
   const Eigen::Vector3d d = (random_vector(rng).cwiseAbs().array() + 0.1).square();
   const Eigen::Matrix3d R =
       Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized()).toRotationMatrix();
-  const Eigen::Matrix3d inertia = (d.sum() * Eigen::Matrix3d::Identity() - Eigen::Matrix3d(d.asDiagonal())) * 0.1;
+  const Eigen::Matrix3d inertia =
+      (d.sum() * Eigen::Matrix3d::Identity() - Eigen::Matrix3d(d.asDiagonal())) * 0.1;
   const Eigen::Matrix3d turned = R * inertia * R.transpose();
   return 0.5 * (turned + turned.transpose());
 }
 
-/// n links with random screws, poses and inertias; every `prismatic_every`-th joint slides (0: none).
-/// Planar chains keep one random plane, with joints along and against its normal.
-inline model::Robot random_robot(std::uint64_t seed, int n, int prismatic_every = 0, bool planar = false) {
+/// n links with random screws, poses and inertias. Every `prismatic_every`-th joint is prismatic
+/// (0: none). Planar chains lie in a random plane, with joint axes along and against its normal.
+inline model::Robot random_robot(std::uint64_t seed, int n, int prismatic_every = 0,
+                                 bool planar = false) {
   Rng rng(seed);
   model::Robot robot;
   robot.name = "random";
@@ -53,7 +55,8 @@ inline model::Robot random_robot(std::uint64_t seed, int n, int prismatic_every 
     }
     const Eigen::Vector3d com = at + random_vector(rng, 0.3);
     const Eigen::Matrix3d R =
-        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized()).toRotationMatrix();
+        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized())
+            .toRotationMatrix();
     link.com = geometry::SE3{R, com};
     link.mass_kg = rng.uniform(0.2, 3.0);
     link.inertia_kg_m2 = random_inertia(rng);

@@ -10,7 +10,7 @@
 
 namespace hamelin::test {
 
-/// A unit vector, uniform on the sphere.
+/// A random unit vector, uniform on the sphere.
 inline Eigen::Vector3d random_direction(Rng& rng) {
   for (;;) {
     const Eigen::Vector3d v{rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)};
@@ -19,7 +19,7 @@ inline Eigen::Vector3d random_direction(Rng& rng) {
   }
 }
 
-/// Distance from a point to a union of cells by looking at all of them; zero inside.
+/// The distance from a point to a union of boxes, by visiting all of them; zero inside.
 inline double brute_force_distance(const std::vector<scene::Box>& boxes, const Eigen::Vector3d& p) {
   double best = std::numeric_limits<double>::infinity();
   for (const scene::Box& box : boxes) {
@@ -33,8 +33,10 @@ inline double brute_force_distance(const std::vector<scene::Box>& boxes, const E
   return std::sqrt(best);
 }
 
-/// Points within `reach` of the boxes: a random point of a random box, moved a random way; some lie inside.
-inline std::vector<Eigen::Vector3d> points_near(const std::vector<scene::Box>& boxes, std::size_t count, double reach,
+/// Random points within `reach` of the boxes: points of random boxes, displaced in random
+/// directions. Some of them lie inside a box.
+inline std::vector<Eigen::Vector3d> points_near(const std::vector<scene::Box>& boxes,
+                                                std::size_t count, double reach,
                                                 std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Eigen::Vector3d> points;

@@ -9,7 +9,7 @@
 
 namespace hamelin::test {
 
-/// A directory of one's own that goes with the value: tests run side by side.
+/// A unique temporary directory, which the destructor removes. Tests run in parallel.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -26,7 +26,7 @@ class TemporaryFolder {
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Writes a file in it, with the directories above.
+  /// Writes a file in the directory, and creates its parent directories.
   std::filesystem::path put(const std::filesystem::path& name, const std::string& bytes) const {
     std::filesystem::create_directories((path_ / name).parent_path());
     std::ofstream(path_ / name, std::ios::binary) << bytes;
@@ -37,7 +37,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// A path in a directory that goes with the process.
+/// A path in a temporary directory that is removed when the process ends.
 inline std::filesystem::path temporary(const std::string& name) {
   static const TemporaryFolder folder;
   return folder.path() / name;

@@ -7,12 +7,14 @@
 
 namespace hamelin::dynamics::kernel {
 
-/// f(entry, chain) for this model's kind: two branches a call, none inside.
+/// Calls f(entry, chain) with the entry for this model's kind of chain. This takes two branches per
+/// call.
 template <template <class> class Entry, class F>
 decltype(auto) with_group(const model::Model& model, const Groups<Entry>& groups, F&& f) {
   if (const auto* planar = std::get_if<model::PlanarChain>(&model.chain()))
-    return f(model.mixed() ? groups.planar_mixed : groups.planar_plain, *planar);
-  return f(model.mixed() ? groups.spatial_mixed : groups.spatial_plain, std::get<model::SpatialChain>(model.chain()));
+    return f(model.has_prismatic_or_rotor() ? groups.planar_mixed : groups.planar_plain, *planar);
+  return f(model.has_prismatic_or_rotor() ? groups.spatial_mixed : groups.spatial_plain,
+           std::get<model::SpatialChain>(model.chain()));
 }
 
 }  // namespace hamelin::dynamics::kernel

@@ -3,8 +3,9 @@
 
 namespace hamelin::dynamics::kernel {
 
-/// Entry points for the four kinds of chains, each compiled for what it needs only: `Entry<Chain>` is a table of
-/// functions over a chain. Plain chains have revolute joints and no rotor inertias. dispatch.hpp chooses.
+/// Entry points for the four kinds of chains; `Entry<Chain>` is a table of functions of a chain.
+/// Plain chains have revolute joints and no rotor inertias; mixed chains may have prismatic joints
+/// and rotor inertias. dispatch.hpp chooses between them.
 template <template <class> class Entry>
 struct Groups {
   Entry<model::SpatialChain> spatial_plain, spatial_mixed;

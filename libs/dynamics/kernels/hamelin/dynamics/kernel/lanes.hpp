@@ -5,9 +5,10 @@
 
 #include "hamelin/geometry/small.hpp"
 
-/// Everything in kernel/ is compiled once for each instruction set (core/isa.hpp) and linked into one program. So that
-/// no copy meant for one of them serves another, it lives in an inline namespace named after the set, and what is used
-/// from outside (std, geometry) must be inlined. Sources that are compiled more than once get the name from CMake.
+/// Everything in kernel/ is compiled once per instruction set (core/isa.hpp) and linked into one
+/// program. The linker must not use a copy for one set in the code for another. Therefore
+/// everything is in an inline namespace named after the set, and functions from outside (std,
+/// geometry) must be inlined. CMake defines the name for sources that are compiled more than once.
 #ifndef HAMELIN_ISA_NAMESPACE
 #define HAMELIN_ISA_NAMESPACE isa_baseline
 #endif
@@ -15,7 +16,7 @@
 namespace hamelin::dynamics::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
 
-/// How many doubles a register holds.
+/// The number of doubles in a register.
 #if defined(__AVX512F__)
 inline constexpr int native_lanes = 8;
 #elif defined(__AVX2__)
@@ -42,8 +43,9 @@ struct NativeVector<8> {
   using Bits [[gnu::vector_size(64)]] = std::int64_t;
 };
 
-/// W independent numbers in one register: a scalar to the sweeps, which then treat W states at once. W must not exceed
-/// native_lanes: a wider vector is lowered through memory.
+/// W independent numbers in one register. As the scalar of the sweeps it makes them compute W
+/// states at once. W must not exceed native_lanes, since the compiler keeps wider vectors in
+/// memory.
 template <int W>
 struct Lanes {
   using Real = typename NativeVector<W>::Real;
@@ -100,19 +102,19 @@ HAMELIN_INLINE double largest(Lanes<W> a) noexcept {
   return most;
 }
 
-/// Beyond this [rad] the reduction below loses digits, and the C library takes over.
+/// Beyond this [rad] the range reduction below loses digits, and the C library is used.
 inline constexpr double largest_reduced_angle = 1e6;
 
-/// Sine and cosine of all lanes, right to 1.5 units in the last place up to 100 rad and to 2.5 beyond, without a branch
-/// for |x| ≤ 1e6: reduction to [−π/4, π/4] with π/2 in three parts (Cody and Waite), then the minimax polynomials of
-/// fdlibm's kernels.
+/// Sine and cosine of all lanes, accurate to 1.5 units in the last place up to 100 rad and to 2.5
+/// beyond. For |x| ≤ 1e6 there is no branch: range reduction to [−π/4, π/4] with π/2 in three parts
+/// (Cody and Waite), then the minimax polynomials of fdlibm.
 template <int W>
 HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noexcept {
   using Real = typename Lanes<W>::Real;
   using Bits = typename Lanes<W>::Bits;
   const Real x = angle.v;
   const Lanes<W> size = abs(angle);
-  double most = size[0];  // without a care for NaN, which stays NaN either way
+  double most = size[0];  // ignores NaN; both paths below keep it
   for (int i = 1; i < W; ++i) most = most <= size[i] ? size[i] : most;
   if (__builtin_expect(!(most <= largest_reduced_angle), 0)) {
     for (int i = 0; i < W; ++i) {
@@ -121,7 +123,7 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
     }
     return;
   }
-  // adding 1.5·2^52 rounds to an integer and leaves it in the low bits
+  // Adding 1.5·2^52 rounds to an integer, which is then in the low bits.
   constexpr double to_integer = 6755399441055744.0;
   const Real shifted = x * 0.63661977236758134308 + to_integer;
   const Bits quadrant = reinterpret_cast<Bits>(shifted);
@@ -130,29 +132,33 @@ HAMELIN_INLINE void sincos(Lanes<W> angle, Lanes<W>& sine, Lanes<W>& cosine) noe
   y = y - turns * 6.07710050630396597660e-11;
   y = y - turns * 2.02226624879595063154e-21;
   const Real z = y * y;
-  const Real s = y + y * z *
-                         (-1.66666666666666324348e-01 +
-                          z * (8.33333333332248946124e-03 +
-                               z * (-1.98412698298579493134e-04 +
-                                    z * (2.75573137070700676789e-06 +
-                                         z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+  const Real s =
+      y + y * z *
+              (-1.66666666666666324348e-01 +
+               z * (8.33333333332248946124e-03 +
+                    z * (-1.98412698298579493134e-04 +
+                         z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 +
+                                                                z * 1.58969099521155010221e-10)))));
   const Real c =
-      1.0 - (0.5 * z - z * z *
-                           (4.16666666666666019037e-02 +
-                            z * (-1.38888888888741095749e-03 +
-                                 z * (2.48015872894767294178e-05 +
-                                      z * (-2.75573143513906633035e-07 +
-                                           z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
-  // odd quadrants exchange the two, and their signs turn with the quadrant
+      1.0 -
+      (0.5 * z -
+       z * z *
+           (4.16666666666666019037e-02 +
+            z * (-1.38888888888741095749e-03 +
+                 z * (2.48015872894767294178e-05 +
+                      z * (-2.75573143513906633035e-07 +
+                           z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+  // Odd quadrants exchange sine and cosine; the signs depend on the quadrant.
   const Bits odd = (quadrant & 1) != 0;
   const Real a = odd ? c : s, b = odd ? s : c;
   sine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(a) ^ ((quadrant & 2) << 62));
   cosine.v = reinterpret_cast<Real>(reinterpret_cast<Bits>(b) ^ (((quadrant + 1) & 2) << 62));
 }
 
-/// The same for arrays whose room is a multiple of 8. Not wider than 4: one wide load of numbers just stored one by one
-/// waits for all of them.
-HAMELIN_INLINE void sincos(std::size_t n, const double* angle, double* sine, double* cosine) noexcept {
+/// As above for arrays, whose allocated size must be a multiple of 8. The width is at most 4,
+/// because a wide load of numbers that were just stored one by one must wait for all these stores.
+HAMELIN_INLINE void sincos(std::size_t n, const double* angle, double* sine,
+                           double* cosine) noexcept {
   constexpr int width = native_lanes < 4 ? native_lanes : 4;
   using Pack = Lanes<width>;
   for (std::size_t i = 0; i < n; i += static_cast<std::size_t>(width)) {
@@ -163,7 +169,8 @@ HAMELIN_INLINE void sincos(std::size_t n, const double* angle, double* sine, dou
   }
 }
 template <int W>
-HAMELIN_INLINE void sincos(std::size_t n, const Lanes<W>* angle, Lanes<W>* sine, Lanes<W>* cosine) noexcept {
+HAMELIN_INLINE void sincos(std::size_t n, const Lanes<W>* angle, Lanes<W>* sine,
+                           Lanes<W>* cosine) noexcept {
   for (std::size_t i = 0; i < n; ++i) sincos(angle[i], sine[i], cosine[i]);
 }
 

@@ -3,12 +3,14 @@
 
 #include "hamelin/dynamics/kernel/lanes.hpp"
 
-/// The recursive algorithms, written once over the group (kernel/spatial.hpp, kernel/planar.hpp) and the scalar. Links
-/// come root first and each is the parent of the next, so what a sweep hands on stays in registers.
+/// The recursive algorithms as templates over the group (kernel/spatial.hpp, kernel/planar.hpp) and
+/// the scalar. Links are stored from the root on, and each is the parent of the next, so what a
+/// sweep passes from link to link stays in registers. Outwards means from the root to the tip,
+/// inwards the reverse.
 namespace hamelin::dynamics::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
 
-/// Scratch of one link. Which members hold what is said at each sweep.
+/// Scratch memory of one link. The comment of each sweep says which members it uses.
 template <class Space>
 struct LinkScratch {
   typename Space::Placement x;
@@ -18,29 +20,31 @@ struct LinkScratch {
   typename Space::Scalar inv_d, u;
 };
 
-/// Room for a chain, laid out in memory that the caller owns: nothing here allocates.
+/// Scratch memory of a chain, laid out in memory that the caller owns. Nothing here allocates.
 template <class Space>
 struct Scratch {
   using S = typename Space::Scalar;
 
   LinkScratch<Space>* links;
-  S *angle, *sine, *cosine;  ///< room for a multiple of native_lanes
+  S *angle, *sine, *cosine;  ///< their sizes are multiples of native_lanes
 
   static constexpr std::size_t alignment = 64;
-  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept { return (n + 7) & ~std::size_t{7}; }
+  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
+    return (n + 7) & ~std::size_t{7};
+  }
   HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
     return 3 * padded(n) * sizeof(S) + n * sizeof(LinkScratch<Space>);
   }
   HAMELIN_INLINE static Scratch at(void* memory, std::size_t n) noexcept {
     S* const numbers = static_cast<S*>(memory);
     for (std::size_t i = n; i < padded(n); ++i) numbers[i] = S(0.0);
-    return {reinterpret_cast<LinkScratch<Space>*>(numbers + 3 * padded(n)), numbers, numbers + padded(n),
-            numbers + 2 * padded(n)};
+    return {reinterpret_cast<LinkScratch<Space>*>(numbers + 3 * padded(n)), numbers,
+            numbers + padded(n), numbers + 2 * padded(n)};
   }
   HAMELIN_INLINE LinkScratch<Space>& operator[](std::size_t i) const noexcept { return links[i]; }
 };
 
-/// A chain's links as the sweeps read them.
+/// The links of a chain, and their number.
 template <class Space>
 HAMELIN_INLINE const typename Space::Link* links_of(const typename Space::Chain& chain) noexcept {
   return chain.links.data();
@@ -50,7 +54,7 @@ HAMELIN_INLINE std::size_t count(const typename Space::Chain& chain) noexcept {
   return chain.links.size();
 }
 
-/// Places all frames at q.
+/// Computes the placements of all frames at q: the factors of docs/theory.md (1.16).
 template <class Space>
 HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Space>& k,
                           const typename Space::Scalar* q) noexcept {
@@ -63,61 +67,68 @@ HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Spac
   sincos(n, k.angle, k.sine, k.cosine);
   for (std::size_t i = 0; i < n; ++i) {
     if constexpr (Space::root_axes)
-      Space::place(links[i], i > 0 ? k.sine[i - 1] : S(0.0), i > 0 ? k.cosine[i - 1] : S(1.0), k.sine[i], k.cosine[i],
-                   k[i].x);
+      Space::place(links[i], i > 0 ? k.sine[i - 1] : S(0.0), i > 0 ? k.cosine[i - 1] : S(1.0),
+                   k.sine[i], k.cosine[i], k[i].x);
     else
       Space::place(links[i], q[i], k.sine[i], k.cosine[i], k[i].x);
   }
 }
 
-/// Newton–Euler outwards (5): force[i] = the wrench link i needs for itself. v, a may be null (zero).
+/// Newton–Euler outwards, docs/theory.md (2.10), (2.11): force[i] is the wrench that moves link i
+/// alone. v and a may be null, which means zero.
 template <class Space>
 HAMELIN_INLINE void inertial_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
-                                    const typename Space::Scalar* v, const typename Space::Scalar* a) noexcept {
+                                    const typename Space::Scalar* v,
+                                    const typename Space::Scalar* a) noexcept {
   using S = typename Space::Scalar;
   const auto* const links = links_of<Space>(chain);
   auto flow = Space::root_flow(chain);
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
-    flow = Space::advance(links[i], k[i].x, flow, v == nullptr ? S(0.0) : v[i], a == nullptr ? S(0.0) : a[i]);
+    flow = Space::advance(links[i], k[i].x, flow, v == nullptr ? S(0.0) : v[i],
+                          a == nullptr ? S(0.0) : a[i]);
     k[i].force = Space::inertial_force(links[i], k[i].x, flow);
   }
 }
 
-/// (8) inwards: sums force[] from the tip, reads tau[i] = A_i · f_i (6), and adds what rotors take, armature · a.
+/// Sums force[] from the tip inwards, sets tau[i] = A_i · f_i and adds the rotors' part,
+/// armature · a: docs/theory.md (2.9).
 template <class Space>
 HAMELIN_INLINE void gather_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
-                                  const typename Space::Scalar* a, typename Space::Scalar* tau) noexcept {
+                                  const typename Space::Scalar* a,
+                                  typename Space::Scalar* tau) noexcept {
   const auto* const links = links_of<Space>(chain);
   auto carried = Space::zero_force();
   for (std::size_t i = count<Space>(chain); i-- > 0;) {
     const auto& l = links[i];
     const auto f = Space::sum(k[i].force, carried);
     tau[i] = Space::along_axis(l, f);
-    if constexpr (Space::mixed)
+    if constexpr (Space::has_prismatic_or_rotor)
       if (a != nullptr) tau[i] += a[i] * l.armature;
     if (i > 0) carried = Space::to_parent(l, k[i].x, f);
   }
 }
 
 template <class Space>
-void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-                      const typename Space::Scalar* v, const typename Space::Scalar* a,
-                      typename Space::Scalar* tau) noexcept {
+void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k,
+                      const typename Space::Scalar* q, const typename Space::Scalar* v,
+                      const typename Space::Scalar* a, typename Space::Scalar* tau) noexcept {
   place(chain, k, q);
   inertial_forces(chain, k, v, a);
   gather_forces(chain, k, a, tau);
 }
 
-/// One link of the articulated-body recursion: P comes in as what the links outboard hand over and leaves as what this
-/// one hands to its parent. inv_d[i] = 1/d with d = A·P A + armature, column[i] = P A/d: in the link's frame, or in
-/// parallel frames about the parent's origin, where it is needed without waiting for anything to be shifted.
+/// One link of the articulated-body recursion, docs/theory.md (2.12), (2.13). On entry P is the
+/// articulated inertia of the links outboard, on return that of this link and the links outboard,
+/// in the parent's frame. inv_d[i] is 1/d with d = A·P A + armature; column[i] is P A/d in the
+/// link's frame, or, for parallel frames, about the parent's origin, which shortens the chain of
+/// dependent operations.
 template <class Space>
 HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                                typename Space::Inertia& P) noexcept {
   using S = typename Space::Scalar;
   Space::add_rigid(l, link.x, P);
   S d = Space::pivot(l, P);
-  if constexpr (Space::mixed) d += l.armature;
+  if constexpr (Space::has_prismatic_or_rotor) d += l.armature;
   link.inv_d = S(1.0) / d;
   link.column = Space::scaled(Space::column(l, P), link.inv_d);
   if (root) return;
@@ -125,7 +136,9 @@ HAMELIN_INLINE void articulate(const typename Space::Link& l, LinkScratch<Space>
   if constexpr (Space::root_axes) link.column = Space::to_parent(l, link.x, link.column);
 }
 
-/// One link of the solve: bias comes in as what outboard links hand over. u[i] = (y − A·bias)/d.
+/// One link of the solve, docs/theory.md (2.14). On entry bias is the wrench of the links outboard,
+/// on return that of this link and the links outboard, in the parent's frame. u[i] = (y −
+/// A·bias)/d.
 template <class Space>
 HAMELIN_INLINE void eliminate(const typename Space::Link& l, LinkScratch<Space>& link, bool root,
                               typename Space::Scalar y, typename Space::Force& bias) noexcept {
@@ -138,11 +151,12 @@ HAMELIN_INLINE void eliminate(const typename Space::Link& l, LinkScratch<Space>&
     bias = Space::to_parent(l, link.x, Space::sum(bias, Space::scaled(link.column, left)));
 }
 
-/// Outwards after the elimination: x[i], and the twists that the x are rates of, on their way: visit(i, X_i) sees
-/// X_i = Ad(g⁻¹) ξ_{i−1} before the joint's own rate is added.
+/// The outward sweep after the elimination, docs/theory.md (2.15). Computes x[i] and the twists ξ_i
+/// whose joint rates are x, and calls visit(i, X_i) with X_i = Ad(g⁻¹) ξ_{i−1}, the twist before
+/// the joint's own rate is added.
 template <class Space, class Visit>
-HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch<Space>& k, typename Space::Scalar* x,
-                               Visit&& visit) noexcept {
+HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch<Space>& k,
+                               typename Space::Scalar* x, Visit&& visit) noexcept {
   const auto* const links = links_of<Space>(chain);
   auto twist = Space::zero_motion();
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
@@ -150,7 +164,7 @@ HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch
     const auto& link = k[i];
     auto m = i == 0 ? twist : Space::to_child(l, link.x, twist);
     if constexpr (Space::root_axes)
-      x[i] = Space::less_pair(link.u, twist, link.column);
+      x[i] = Space::minus_pair(link.u, twist, link.column);
     else
       x[i] = link.u - Space::pair(m, link.column);
     visit(i, m);
@@ -159,28 +173,31 @@ HAMELIN_INLINE void substitute(const typename Space::Chain& chain, const Scratch
   }
 }
 
-/// Articulated inertias inwards, kept for solve_factored. Placements must stand.
+/// Articulated inertias inwards, stored for solve_factored. Requires the placements of place().
 template <class Space>
 HAMELIN_INLINE void factor(const typename Space::Chain& chain, const Scratch<Space>& k) noexcept {
   auto P = Space::no_inertia();
-  for (std::size_t i = count<Space>(chain); i-- > 0;) articulate<Space>(links_of<Space>(chain)[i], k[i], i == 0, P);
+  for (std::size_t i = count<Space>(chain); i-- > 0;)
+    articulate<Space>(links_of<Space>(chain)[i], k[i], i == 0, P);
 }
 
-/// x = M⁻¹ y after factor. x may be y.
+/// x = M⁻¹ y, after factor(). x and y may be the same.
 template <class Space>
 HAMELIN_INLINE void solve_factored(const typename Space::Chain& chain, const Scratch<Space>& k,
-                                   const typename Space::Scalar* y, typename Space::Scalar* x) noexcept {
+                                   const typename Space::Scalar* y,
+                                   typename Space::Scalar* x) noexcept {
   auto bias = Space::zero_force();
   for (std::size_t i = count<Space>(chain); i-- > 0;)
     eliminate<Space>(links_of<Space>(chain)[i], k[i], i == 0, y[i], bias);
   substitute<Space>(chain, k, x, [](std::size_t, const auto&) {});
 }
 
-/// a = M⁻¹(τ − C v − ∂U): Newton–Euler bias outwards, articulated bodies inwards, accelerations outwards.
+/// a = M⁻¹(τ − C v − ∂U): Newton–Euler bias outwards, articulated bodies inwards, accelerations
+/// outwards.
 template <class Space>
-void forward_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-                      const typename Space::Scalar* v, const typename Space::Scalar* tau,
-                      typename Space::Scalar* a) noexcept {
+void forward_dynamics(const typename Space::Chain& chain, const Scratch<Space>& k,
+                      const typename Space::Scalar* q, const typename Space::Scalar* v,
+                      const typename Space::Scalar* tau, typename Space::Scalar* a) noexcept {
   place(chain, k, q);
   inertial_forces(chain, k, v, static_cast<const typename Space::Scalar*>(nullptr));
   auto P = Space::no_inertia();
@@ -195,8 +212,9 @@ void forward_dynamics(const typename Space::Chain& chain, const Scratch<Space>& 
 }
 
 template <class Space>
-void solve_mass(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-                const typename Space::Scalar* y, typename Space::Scalar* x) noexcept {
+void solve_mass(const typename Space::Chain& chain, const Scratch<Space>& k,
+                const typename Space::Scalar* q, const typename Space::Scalar* y,
+                typename Space::Scalar* x) noexcept {
   place(chain, k, q);
   auto P = Space::no_inertia();
   auto bias = Space::zero_force();
@@ -208,9 +226,11 @@ void solve_mass(const typename Space::Chain& chain, const Scratch<Space>& k, con
   substitute<Space>(chain, k, x, [](std::size_t, const auto&) {});
 }
 
-/// Hamilton's equations for the momenta p = M v: v = M⁻¹ p by articulated bodies, then
-///   ṗ_i = λ_i · ad(X_i) A_i − ∂U_i  with  λ_i = I_i ξ_i + Adᵀ λ_{i+1}  (SPEC §3; the kinetic part is −∂(½ pᵀM⁻¹p)).
-/// No Newton–Euler bias is needed, so it costs less than forward dynamics. Leaves the twists ξ_i in motion[].
+/// Hamilton's equations for the momenta p = M v, docs/theory.md (2.16), (2.17): v = M⁻¹ p by
+/// articulated bodies, then
+///   ṗ_i = λ_i · ad(X_i) A_i − ∂U_i  with  λ_i = I_i ξ_i + Adᵀ λ_{i+1}.
+/// The first term is −∂(½ pᵀM⁻¹p)/∂q_i. No Newton–Euler bias is needed, so this costs less than
+/// forward dynamics. Stores the twists ξ_i in motion[].
 template <class Space>
 HAMELIN_INLINE void hamilton(const typename Space::Chain& chain, const Scratch<Space>& k,
                              const typename Space::Scalar* q, const typename Space::Scalar* p,
@@ -238,23 +258,26 @@ HAMELIN_INLINE void hamilton(const typename Space::Chain& chain, const Scratch<S
     Space::add_along_axis(l, k[i].motion, v[i]);
     lambda = Space::sum(lambda, Space::momentum(l, k[i].x, k[i].motion));
     Space::add(moment, Space::moment(l, k[i].x));
-    p_rate[i] = Space::turning(l, X, lambda) + Space::falling(l, k[i].down, moment);
+    p_rate[i] = Space::coriolis_torque(l, X, lambda) + Space::gravity_torque(l, k[i].down, moment);
     if (i == 0) break;
     lambda = Space::to_parent(l, k[i].x, lambda);
     moment = Space::to_parent(l, k[i].x, moment);
   }
 }
 
-/// A gyroscopic term as the sweeps read it: the point in the link's joint-aligned frame, w in the root's axes.
+/// A gyroscopic term for the sweeps: the point in the link's joint-aligned frame, w in the root's
+/// axes.
 struct Spin {
   std::size_t link;
   geometry::Vec3<double> point, w;
 };
 
-/// Joint torques Σ J_pᵀ (w × J_p v) of gyroscopic terms, at placements and twists (motion[]) that stand.
+/// Joint torques Σ J_pᵀ (w × J_p v) of gyroscopic terms, where J_p is the Jacobian of a term's
+/// point, docs/theory.md (2.22). Requires the placements of place() and the twists in motion[].
 template <class Space>
-HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const Scratch<Space>& k, const Spin* spins,
-                                      std::size_t count_spins, typename Space::Scalar* tau) noexcept {
+HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const Scratch<Space>& k,
+                                      const Spin* spins, std::size_t count_spins,
+                                      typename Space::Scalar* tau) noexcept {
   const auto* const links = links_of<Space>(chain);
   const std::size_t n = count<Space>(chain);
   for (std::size_t i = 0; i < n; ++i) k[i].force = Space::zero_force();
@@ -263,15 +286,16 @@ HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const 
     auto w = Space::spin_axis(spin.w);
     for (std::size_t i = 0; i <= spin.link; ++i) w = Space::to_child_axis(links[i], k[i].x, w);
     auto& total = k[spin.link].force;
-    total = Space::sum(total, Space::spin_force(w, k[spin.link].x, spin.point, k[spin.link].motion));
+    total =
+        Space::sum(total, Space::spin_force(w, k[spin.link].x, spin.point, k[spin.link].motion));
   }
   gather_forces(chain, k, static_cast<const typename Space::Scalar*>(nullptr), tau);
 }
 
-/// ∂U(q).
+/// ∂U(q), docs/theory.md (2.7).
 template <class Space>
-void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-                    typename Space::Scalar* tau) noexcept {
+void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k,
+                    const typename Space::Scalar* q, typename Space::Scalar* tau) noexcept {
   place(chain, k, q);
   const auto* const links = links_of<Space>(chain);
   const std::size_t n = count<Space>(chain);
@@ -280,12 +304,12 @@ void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k,
   auto moment = Space::no_moment();
   for (std::size_t i = n; i-- > 0;) {
     Space::add(moment, Space::moment(links[i], k[i].x));
-    tau[i] = -Space::falling(links[i], k[i].down, moment);
+    tau[i] = -Space::gravity_torque(links[i], k[i].down, moment);
     if (i > 0) moment = Space::to_parent(links[i], k[i].x, moment);
   }
 }
 
-/// Body twists (5) at placements that stand: motion[i].
+/// Body twists into motion[i], docs/theory.md (2.1). Requires the placements of place().
 template <class Space>
 HAMELIN_INLINE void twists(const typename Space::Chain& chain, const Scratch<Space>& k,
                            const typename Space::Scalar* v) noexcept {
@@ -298,10 +322,11 @@ HAMELIN_INLINE void twists(const typename Space::Chain& chain, const Scratch<Spa
   }
 }
 
-/// p = M v.
+/// p = M v, docs/theory.md (2.5).
 template <class Space>
-void momentum(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-              const typename Space::Scalar* v, typename Space::Scalar* p) noexcept {
+void momentum(const typename Space::Chain& chain, const Scratch<Space>& k,
+              const typename Space::Scalar* q, const typename Space::Scalar* v,
+              typename Space::Scalar* p) noexcept {
   place(chain, k, q);
   twists(chain, k, v);
   for (std::size_t i = 0; i < count<Space>(chain); ++i)
@@ -311,7 +336,8 @@ void momentum(const typename Space::Chain& chain, const Scratch<Space>& k, const
 
 template <class Space>
 typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, const Scratch<Space>& k,
-                                      const typename Space::Scalar* q, const typename Space::Scalar* v) noexcept {
+                                      const typename Space::Scalar* q,
+                                      const typename Space::Scalar* v) noexcept {
   using S = typename Space::Scalar;
   place(chain, k, q);
   twists(chain, k, v);
@@ -319,12 +345,12 @@ typename Space::Scalar kinetic_energy(const typename Space::Chain& chain, const 
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
     const auto& l = links_of<Space>(chain)[i];
     twice += Space::pair(k[i].motion, Space::momentum(l, k[i].x, k[i].motion));
-    if constexpr (Space::mixed) twice += v[i] * v[i] * l.armature;
+    if constexpr (Space::has_prismatic_or_rotor) twice += v[i] * v[i] * l.armature;
   }
   return S(0.5) * twice;
 }
 
-/// −Σ m g·(position − root): mass moments gathered inwards.
+/// −Σ m g·(position − root), from masses and first moments summed inwards: docs/theory.md (2.6).
 template <class Space>
 typename Space::Scalar potential_energy(const typename Space::Chain& chain, const Scratch<Space>& k,
                                         const typename Space::Scalar* q) noexcept {
@@ -338,10 +364,12 @@ typename Space::Scalar potential_energy(const typename Space::Chain& chain, cons
   return Space::potential(chain, moment);
 }
 
-/// Composite inertias inwards, then one column of M a link; `M` is column-major with leading dimension `ld`.
+/// Composite inertias inwards, and one column of M per link: docs/theory.md (2.18), (2.19). `M` is
+/// column-major with leading dimension `ld`.
 template <class Space>
-void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k, const typename Space::Scalar* q,
-                 typename Space::Scalar* M, std::size_t ld) noexcept {
+void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k,
+                 const typename Space::Scalar* q, typename Space::Scalar* M,
+                 std::size_t ld) noexcept {
   place(chain, k, q);
   const auto* const links = links_of<Space>(chain);
   const std::size_t n = count<Space>(chain);
@@ -354,7 +382,7 @@ void mass_matrix(const typename Space::Chain& chain, const Scratch<Space>& k, co
       if (j == 0) break;
       f = Space::to_parent(links[j], k[j].x, f);
     }
-    if constexpr (Space::mixed) M[i * ld + i] += links[i].armature;
+    if constexpr (Space::has_prismatic_or_rotor) M[i * ld + i] += links[i].armature;
     if (i > 0) composite = Space::to_parent(links[i], k[i].x, composite);
   }
 }

@@ -3,7 +3,7 @@
 
 namespace hamelin::scene::kernel {
 
-/// Eight boxes in single precision, rounded outwards, about the tree's origin.
+/// Bounds of eight children in single precision, rounded outwards, relative to the tree's origin.
 struct alignas(32) TreeNode {
   static constexpr int width = 8;
   float lo[3][width], hi[3][width];
@@ -11,10 +11,10 @@ struct alignas(32) TreeNode {
   std::int32_t count;         ///< slots in use, from the front
 };
 
-/// A tree as its kernels see it.
+/// A view of a tree, the argument of its kernels.
 struct Tree {
-  const TreeNode* nodes;  ///< the root first
-  const double* boxes;    ///< six numbers a box: lo, hi
+  const TreeNode* nodes;  ///< the root is the first
+  const double* boxes;    ///< six numbers per box: lo, hi
   double origin[3];
 };
 
@@ -23,21 +23,26 @@ struct Found {
   std::int32_t box = -1;
 };
 
-/// What waits to be looked at, with a lower bound of its key.
-struct Waiting {
+/// An entry of the best-first search: a child of a node with a lower bound of its key, or a box
+/// with its exact key.
+struct QueueEntry {
   double key;
-  std::int32_t id;  ///< 8 node + slot that it is in; or −1 − box, if its key is exact
+  std::int32_t id;  ///< 8 · node + slot of a child; −1 − box for a box
 };
 
-/// The traversals, compiled for each instruction set. Products are never fused and lanes do what single numbers would:
-/// all sets give the same bits.
+/// The traversals, compiled for each instruction set. They never use fused multiply-add and perform
+/// the same operations in every lane, so all instruction sets give the same bits.
 struct TreeKernels {
-  /// The box with the least (key, index) of all with a key up to `limit`²; the axis goes from p to q, or is the point p
-  /// if q is null. `found` is the first candidate, or has box −1.
-  bool (*nearest)(const Tree& tree, const double* p, const double* q, double limit, Found& found) noexcept;
-  /// Nearest boxes, see BoxField::several. @param room for all nodes and boxes @return how many
-  int (*several)(const Tree& tree, const double* p, const double* q, double limit, double cone_cosine, Waiting* room,
-                 Found* out, int count) noexcept;
+  /// Finds the box with the least (key, index) among those with a key up to `limit`². The query is
+  /// the segment from p to q, or the point p if q is null. On entry `found` holds the first
+  /// candidate, or box −1.
+  bool (*nearest)(const Tree& tree, const double* p, const double* q, double limit,
+                  Found& found) noexcept;
+  /// Nearest boxes in distinct directions, see BoxField::nearest_distinct.
+  /// @param queue memory for as many entries as there are nodes and boxes @return how many were
+  ///        found
+  int (*nearest_distinct)(const Tree& tree, const double* p, const double* q, double limit,
+                          double cone_cosine, QueueEntry* queue, Found* out, int count) noexcept;
 };
 
 }  // namespace hamelin::scene::kernel

@@ -8,17 +8,20 @@
 
 namespace hamelin::test {
 
-/// What ArmLoop does not make: any goal, with a path or without, and self contacts. One tick of a planner that has a
-/// parameter rho0_m, for a moving spatial arm of four joints among three balls.
-class BareTick : public planning::HostServices {
+/// A single tick of a planner with any goal, with or without a path, and with self contacts, which
+/// ArmLoop does not offer. A spatial arm of four joints moves among three balls. The planner must
+/// have a parameter rho0_m.
+class SingleTick : public planning::HostServices {
  public:
-  explicit BareTick(std::string plugin_file) : plugin_file_(std::move(plugin_file)) {}
+  explicit SingleTick(std::string plugin_file) : plugin_file_(std::move(plugin_file)) {}
 
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override { return 0; }
+  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+    return 0;
+  }
 
-  /// @param self whether the tick lists two parts that nearly touch
-  /// @return held torque, then the potential's gradient
+  /// @param self whether the tick lists a self contact of two parts that nearly touch
+  /// @return the held torque, followed by the gradient of the control potential
   Eigen::VectorXd answer(Json params, const hamelin_goal& goal, const Eigen::VectorXd& q_goal = {},
                          const Eigen::MatrixXd& path = {}, bool self = false) {
     const double influence = 5.0;
@@ -60,24 +63,28 @@ class BareTick : public planning::HostServices {
   std::string plugin_file_;
 };
 
-/// A planner that goes to the end of a path, to a pose by its position, and past self contacts.
-inline void check_goes_by_goals_alone(const std::string& plugin_file, const Json& params) {
-  BareTick bare(plugin_file);
+/// Checks that a planner aims at the end of a path and at the position of a pose, and ignores
+/// way-points and self contacts.
+inline void check_ignores_path_and_self_contacts(const std::string& plugin_file,
+                                                 const Json& params) {
+  SingleTick tick(plugin_file);
   hamelin_goal joint{}, position{}, pose{};
   joint.type = HAMELIN_GOAL_JOINT;
   position.type = HAMELIN_GOAL_POSITION;
   pose.type = HAMELIN_GOAL_POSE;
-  for (auto* goal : {&position, &pose}) Eigen::Map<Eigen::Vector3d>(goal->position_world_m) << 0.3, 0.4, -0.2;
+  for (auto* goal : {&position, &pose})
+    Eigen::Map<Eigen::Vector3d>(goal->position_world_m) << 0.3, 0.4, -0.2;
   pose.quaternion_wxyz[1] = 1.0;
   const Eigen::Vector4d end(0.5, -0.2, 0.1, 1.0);
   Eigen::MatrixXd path(4, 3);
   path << Eigen::Vector4d::Constant(2.0), Eigen::Vector4d::Constant(-1.0), end;
-  const Eigen::VectorXd to_end = bare.answer(params, joint, end), there = bare.answer(params, position);
+  const Eigen::VectorXd to_end = tick.answer(params, joint, end),
+                        to_position = tick.answer(params, position);
   CHECK(to_end.norm() > 1.0);
-  CHECK((to_end - there).norm() > 1.0);
-  CHECK(bare.answer(params, joint, end, path) == to_end);
-  CHECK(bare.answer(params, pose) == there);
-  CHECK(bare.answer(params, position, {}, {}, true) == there);
+  CHECK((to_end - to_position).norm() > 1.0);
+  CHECK(tick.answer(params, joint, end, path) == to_end);
+  CHECK(tick.answer(params, pose) == to_position);
+  CHECK(tick.answer(params, position, {}, {}, true) == to_position);
 }
 
 }  // namespace hamelin::test
