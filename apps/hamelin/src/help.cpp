@@ -98,24 +98,6 @@ HelpSection options_of(const CLI::App& command, const std::string& title, const 
   return section;
 }
 
-// Wraps text into lines indented by `left` columns; the caller has written the first indentation.
-std::string wrapped(const std::string& text, std::size_t left) {
-  std::string out;
-  std::size_t column = left;
-  for (const auto& word : split(text, ' ')) {
-    if (column > left && column + 1 + word.size() > width) {
-      out += "\n" + std::string(left, ' ');
-      column = left;
-    } else if (column > left) {
-      out += ' ';
-      ++column;
-    }
-    out += word;
-    column += word.size();
-  }
-  return out;
-}
-
 std::string section_text(const HelpSection& section) {
   std::string out = fmt::format("\n{}:\n", section.title);
   for (const auto& entry : section.entries) {
@@ -133,9 +115,28 @@ const CLI::App& root_of(const CLI::App& command) {
 
 }  // namespace
 
+std::string wrapped(const std::string& text, std::size_t left) {
+  std::string out;
+  std::size_t column = left;
+  for (const auto& word : split(text, ' ')) {
+    if (column > left && column + 1 + word.size() > width) {
+      out += "\n" + std::string(left, ' ');
+      column = left;
+    } else if (column > left) {
+      out += ' ';
+      ++column;
+    }
+    out += word;
+    column += word.size();
+  }
+  return out;
+}
+
 std::string placeholder(const CLI::Option& option) {
   const std::string type = option.get_type_name();
-  return type.substr(0, type.find(':'));
+  const auto bracket = type.find('[');
+  const auto from = bracket < type.find(':') ? type.find(']', bracket) : 0;  // as in NAME[:ORDER]
+  return type.substr(0, type.find(':', from));
 }
 
 std::vector<std::string> names_of(const CLI::Option& option) {

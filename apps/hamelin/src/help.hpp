@@ -27,6 +27,9 @@ struct HelpPage {
 
 [[nodiscard]] HelpPage help_page(const CLI::App& command);
 
+/// Text in lines of at most 100 columns that are indented by `left`, the first line excepted.
+[[nodiscard]] std::string wrapped(const std::string& text, std::size_t left);
+
 /// The first sentence of a description, without its full stop.
 [[nodiscard]] std::string first_sentence(const std::string& description);
 

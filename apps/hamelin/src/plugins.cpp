@@ -5,6 +5,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "hamelin/core/error.hpp"
+#include "help.hpp"
 #include "plugin_check.hpp"
 
 namespace hamelin::app {
@@ -50,10 +51,11 @@ void list(const ListOptions& options) {
                entry["version"].get<std::string>(), entry["description"].get<std::string>(),
                entry["file"].get<std::string>());
     const Json properties = entry["params_schema"].value("properties", Json::object());
-    for (const auto& [key, rule] : properties.items())
-      fmt::print("    {:<22} {:<14} {}\n", key,
-                 rule.contains("default") ? rule["default"].dump() : "",
-                 rule.value("description", ""));
+    for (const auto& [key, rule] : properties.items()) {
+      const std::string name = fmt::format("    {:<22} {:<16} ", key,
+                                           rule.contains("default") ? rule["default"].dump() : "");
+      fmt::print("{}{}\n", name, wrapped(rule.value("description", ""), name.size()));
+    }
   }
   if (all.empty()) {
     fmt::print("no plugins found; searched:\n");

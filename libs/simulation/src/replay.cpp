@@ -141,9 +141,16 @@ class Comparison final : public log::LineSink {
     verdict_.finished = logged["type"] == "result";
   }
 
+  // Texts for people: another build may word them differently.
+  static bool is_wording(const std::string& at) {
+    return at == "/robot_notes" || at == "/warnings" || at == "/cause" || at == "/text";
+  }
+
   void compare(const std::string& at, const Json& a, const Json& b, const Json& line) {
     if (enough_) return;
-    if (a.is_object() && b.is_object()) {
+    if (is_wording(at)) {
+      if (a != b) record_difference(at, a, b, line, tolerance_ > 0.0);
+    } else if (a.is_object() && b.is_object()) {
       for (const auto& [key, value] : a.items())
         if (b.contains(key))
           compare(fmt::format("{}/{}", at, key), value, b[key], line);

@@ -221,6 +221,30 @@ TEST_CASE("a log of another build is compared within a tolerance, with a note",
   CHECK(verdict["beyond_tolerance"]["field"] == "/q/1");
 }
 
+TEST_CASE("texts of another build may be worded differently, those of the same build may not",
+          "[end_to_end][replay]") {
+  Sandbox sandbox;
+  auto lines = short_log(sandbox);
+  Json header = parse_json(lines[0], "header");
+  header["robot_notes"] = {"a note in other words"};
+  lines[0] = header.dump();
+  sandbox.put("same_build.jsonl", joined(lines));
+  const Json same =
+      test::run_json(sandbox, {"replay", "same_build.jsonl", "--verify"}, 1)["beyond_tolerance"];
+  CHECK(same["field"] == "/robot_notes");
+
+  header["provenance"]["build"]["id"] = "0123456789012345678901234567890123456789";
+  lines[0] = header.dump();
+  Json result = parse_json(lines.back(), "result");
+  result["cause"] = "a cause in other words";
+  lines.back() = result.dump();
+  sandbox.put("other_build.jsonl", joined(lines));
+  const Json other = test::run_json(sandbox, {"replay", "other_build.jsonl", "--verify"});
+  CHECK(other["equal"] == true);
+  CHECK(other["to_the_bit"] == false);
+  CHECK(other["first_difference"]["field"] == "/robot_notes");
+}
+
 TEST_CASE("replay without --verify writes the same log again", "[end_to_end][replay]") {
   Sandbox sandbox;
   const auto lines = short_log(sandbox);

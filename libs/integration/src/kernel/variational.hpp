@@ -206,7 +206,7 @@ class Variational {
       lambda = Space::sum(lambda, Space::momentum(l, x, k_[i].motion));
       store_momenta(i, lambda);
       Space::add_rigid(l, x, P);  // from here docs/theory.md (4.14)–(4.18)
-      const Force z = f.z = Space::scaled(Space::ad_T_axis(l, lambda), half_);
+      const Force z = f.z = Space::scaled(Space::ad_transposed_axis(l, lambda), half_);
       const Force PB = Space::times_axis_plus(l, P, f.b);
       f.u = Space::sum(PB, Space::scaled(z, -1.0));
       f.w = Space::sum(Space::transposed_times_axis_minus(l, P, f.b), z);
@@ -221,7 +221,7 @@ class Variational {
           if (call_.forces.spins[j].link == i) add_gyroscopic(call_.forces.spins[j], Q, mu);
         // docs/theory.md (4.20)–(4.22)
         const Force QB = Space::times_axis_plus(l, Q, f.b);
-        f.spin_u = Space::sum(QB, Space::scaled(Space::ad_T_axis(l, mu), -half_));
+        f.spin_u = Space::sum(QB, Space::scaled(Space::ad_transposed_axis(l, mu), -half_));
         f.w = Space::sum(f.w, Space::scaled(Space::row(l, Q), -half_));
         d -= half_ * Space::along_axis(l, QB);
         right += half_ * Space::along_axis(l, t);

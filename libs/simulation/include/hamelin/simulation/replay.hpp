@@ -66,7 +66,8 @@ struct Verdict {
 /// first difference beyond the tolerance. An interrupted run is stopped at the same step. Of an
 /// unfinished log the complete lines are compared.
 /// @param recorded the log's header
-/// @param tolerance for numbers: |a − b| ≤ tolerance · max(1, |a|); zero: equal bits
+/// @param tolerance for numbers: |a − b| ≤ tolerance · max(1, |a|); zero: equal bits. With a
+///        tolerance, notes, warnings, causes and the text of events may be worded differently.
 /// @param watch its log, every and stop_at are not used
 /// @throws Error for a log that cannot be read, changed inputs, or a planner that is not found
 [[nodiscard]] Verdict verify(const Recorded& recorded, const std::filesystem::path& log,

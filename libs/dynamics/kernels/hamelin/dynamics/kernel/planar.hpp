@@ -193,7 +193,7 @@ struct Planar {
     if (is_prismatic(l)) return {S(0.0), S(0.0), X.w};
     return {S(0.0), X.y * l.direction, -X.x * l.direction};
   }
-  HAMELIN_INLINE static Force ad_T_axis(const Link& l, const Force& f) noexcept {
+  HAMELIN_INLINE static Force ad_transposed_axis(const Link& l, const Force& f) noexcept {
     if (is_prismatic(l)) return {-f.y, S(0.0), S(0.0)};
     return {S(0.0), f.y * l.direction, -f.x * l.direction};
   }

@@ -348,7 +348,7 @@ struct Spatial {
     return {{X.w.y, -X.w.x, o}, {X.v.y, -X.v.x, o}};
   }
   /// adᵀ(A) f.
-  HAMELIN_INLINE static Force ad_T_axis(const Link& l, const Force& f) noexcept {
+  HAMELIN_INLINE static Force ad_transposed_axis(const Link& l, const Force& f) noexcept {
     const S o = S(0.0);
     if (is_prismatic(l)) return {{f.f.y, -f.f.x, o}, {o, o, o}};
     return {{f.t.y, -f.t.x, o}, {f.f.y, -f.f.x, o}};
