@@ -11,8 +11,8 @@ namespace hamelin::control {
 /// The distance of the arm from a goal.
 struct GoalError {
   std::optional<double> metres;  ///< of the tip, for position and pose goals
-  std::optional<double>
-      radians;  ///< of the tip's rotation for pose goals; the largest of all joints for joint goals
+  /// Of the tip's rotation for pose goals; the largest of all joints for joint goals.
+  std::optional<double> radians;
   bool reached = false;  ///< within the goal's tolerances, speeds included
 };
 

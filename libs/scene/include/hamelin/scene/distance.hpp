@@ -17,15 +17,15 @@ struct BoxHit {
   double distance = 0.0;  ///< [m]; inside: minus the depth below the nearest face
   std::int32_t box = -1;  ///< index into BoxField::boxes()
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the box's surface
-  Eigen::Vector3d direction =
-      Eigen::Vector3d::Zero();  ///< unit, from `point` to the query; inside: exit direction
+  /// Unit, from `point` to the query; inside: exit direction.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
 };
 
 /// The pair of nearest points of a box and the axis of a capsule, the segment from a to b.
 struct SegmentHit : BoxHit {
   double along = 0.0;  ///< position on the axis: 0 at a, 1 at b
-  Eigen::Vector3d axis_point =
-      Eigen::Vector3d::Zero();  ///< a + along (b − a); `distance` is measured from here
+  /// The point a + along (b − a); `distance` is measured from here.
+  Eigen::Vector3d axis_point = Eigen::Vector3d::Zero();
 };
 
 /// Distance, closest point and direction from a point to one box, docs/theory.md (11.1)–(11.3). On

@@ -28,8 +28,8 @@ struct Contact {
   double distance = 0.0;              ///< from the shape's surface [m]; zero or below is contact
   Eigen::Vector3d arm_point = Eigen::Vector3d::Zero();  ///< on the shape's surface
   Eigen::Vector3d obstacle_point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction =
-      Eigen::Vector3d::Zero();  ///< unit, from the obstacle towards the shape
+  /// Unit, from the obstacle towards the shape.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   Eigen::Vector3d obstacle_velocity = Eigen::Vector3d::Zero();  ///< [m/s]
 };
 

@@ -55,8 +55,8 @@ struct Obstacle {
 struct SurfacePoint {
   double distance = 0.0;                            ///< [m]; inside: minus the depth
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the surface, world
-  Eigen::Vector3d direction =
-      Eigen::Vector3d::Zero();  ///< unit outward, the gradient of the distance, world
+  /// Unit outward, the gradient of the distance, world.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
 };
 
 /// Position of its centre [m, world] and its velocity [m/s, world] at a time.
@@ -76,8 +76,8 @@ struct SurfacePoint {
 
 /// The nearest pair of an obstacle's surface and the axis of a capsule.
 struct AxisPoint : SurfacePoint {
-  Eigen::Vector3d axis_point =
-      Eigen::Vector3d::Zero();  ///< on the axis; `distance` is measured from here, world
+  /// On the axis; `distance` is measured from here, world.
+  Eigen::Vector3d axis_point = Eigen::Vector3d::Zero();
 };
 
 /// The same for the axis from a to b. If it enters the obstacle, the result is its deepest point.

@@ -30,15 +30,15 @@ enum class GoalType : std::int32_t { joint, position, pose };
 struct Goal {
   GoalType type = GoalType::joint;
   Eigen::VectorXd q;  ///< joint [rad or m]
-  Eigen::MatrixXd
-      path;            ///< joint, if given as a path: way-points as columns, q the last; else empty
+  /// Joint, if given as a path: way-points as columns, q the last; else empty.
+  Eigen::MatrixXd path;
   geometry::SE3 pose;  ///< position, pose: of the tip in the world; rotation unused for position
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
   double tolerance_m = 0.0;                        ///< position 0.02, pose 0.01
   double tolerance_rad = 0.0;                      ///< joint 0.05, pose 0.26
-  double speed_max =
-      std::numeric_limits<double>::infinity();  ///< largest |v_i| at arrival; joint 0.05, else none
-  std::optional<double> tip_speed_max_m_s;      ///< position, pose: of the tip at arrival
+  /// Largest |v_i| at arrival; joint 0.05, else none.
+  double speed_max = std::numeric_limits<double>::infinity();
+  std::optional<double> tip_speed_max_m_s;  ///< position, pose: of the tip at arrival
 };
 
 /// The goal's "type" in a scene file: "path" is a joint goal with way-points.
@@ -54,8 +54,8 @@ struct JointNumbers {
 struct Payload {
   double mass_kg = 0.0;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< centre of mass, tip frame
-  Eigen::Matrix3d inertia_kg_m2 =
-      Eigen::Matrix3d::Zero();  ///< about the centre of mass, tip frame's axes
+  /// About the centre of mass, tip frame's axes.
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
 };
 
 /// Default speed below which dry friction becomes viscous [rad/s or m/s].
@@ -83,8 +83,8 @@ struct Actuation {
   double delay_s = 0.0;
   double joint_noise_rad = 0.0;
   double planner_mass_scale = 1.0;
-  std::optional<double>
-      torque_rate_max_Nm_s;             ///< sampled: of each joint's held torque [Nm/s or N/s]
+  /// Sampled: of each joint's held torque [Nm/s or N/s].
+  std::optional<double> torque_rate_max_Nm_s;
   double coulomb_friction_share = 0.0;  ///< of the effort limits; unknown to the planner
 };
 
