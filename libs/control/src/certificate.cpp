@@ -26,10 +26,9 @@ double chord(const scene::Shapes& before, const scene::Shapes& after, std::size_
 
 }  // namespace
 
-Certificate::Certificate(const model::Model& model, const scene::Environment& environment,
-                         double limit, const scene::SelfField* self, double self_limit)
+Certificate::Certificate(const model::Model& model, double limit, const scene::SelfField* self,
+                         double self_limit, std::size_t obstacles_max)
     : model_(model),
-      environment_(environment),
       limit_(limit),
       self_(self),
       self_limit_(self_limit),
@@ -39,9 +38,9 @@ Certificate::Certificate(const model::Model& model, const scene::Environment& en
       pair_lever_(Eigen::MatrixXd::Zero(
           self != nullptr ? static_cast<Index>(self->pairs().size()) : 0, model.dof())),
       arm_(model) {
+  appearing_.reserve(obstacles_max);
   const Index n = model.dof();
   for (auto* x : {&q_, &dq_, &stray_, &curvature_, &rest_, &q_middle_, &rate_}) x->setZero(n);
-  appearing_.reserve(environment.obstacles().size());
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, q_);
   for (Index j = 0; j < n; ++j) {
@@ -87,7 +86,10 @@ void Certificate::extend_travel(const VectorXd& q) {
   if (extended) set_levers();
 }
 
-Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& from, const Node& to) {
+Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
+                                        const scene::Environment& environment, const Node& from,
+                                        const Node& to) {
+  environment_ = &environment;
   q_ = from.q;
   dq_ = to.q - from.q;
   time_s_ = from.time_s;
@@ -104,8 +106,8 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& fro
   rest_ = 0.125 * curvature_ + stray_;
   obstacle_travel_ = 0.0;
   appearing_.clear();
-  for (std::size_t k = 0; k < environment_.obstacles().size(); ++k) {
-    const auto& obstacle = environment_.obstacles()[k];
+  for (std::size_t k = 0; k < environment_->obstacles().size(); ++k) {
+    const auto& obstacle = environment_->obstacles()[k];
     if (!scene::exists(obstacle, to.time_s)) continue;
     obstacle_travel_ = std::max(obstacle_travel_, h_ * scene::max_speed(obstacle));
     if (!scene::exists(obstacle, from.time_s)) appearing_.push_back(k);
@@ -146,7 +148,7 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws, const Node& fro
 double Certificate::clearance_of_appearing(const scene::Shapes& shape, double time_s,
                                            double clearance) const {
   for (const std::size_t k : appearing_)
-    clearance = std::min(clearance, environment_.clearance_to(k, shape, time_s, clearance));
+    clearance = std::min(clearance, environment_->clearance_to(k, shape, time_s, clearance));
   return clearance;
 }
 
@@ -180,7 +182,7 @@ double Certificate::clearance_at(Subject subject, double s) {
   const scene::Shapes shape = subject.is_pair ? arm_.view() : arm_.view().single(subject.index);
   const double time_s = time_s_ + s * h_;
   const double clearance = subject.is_pair ? self_->distance(subject.index, shape, self_limit_)
-                                           : environment_.clearance(shape, time_s, limit_);
+                                           : environment_->clearance(shape, time_s, limit_);
   contact_ = contact_ || clearance <= 0.0;
   return subject.is_pair ? clearance : clearance_of_appearing(shape, time_s, clearance);
 }

@@ -28,9 +28,18 @@ void require_shapes(const scene::Scene& scene, const model::Model& model, const 
 }  // namespace
 
 WorldView::WorldView(const scene::Scene& scene, const model::Model& model, double influence_m)
+    : WorldView(scene, model, influence_m,
+                Own(scene::make_environment(scene, model, influence_m), model.shapes().size()),
+                nullptr, 0) {}
+
+WorldView::WorldView(const scene::Scene& scene, const model::Model& model, World& world)
+    : WorldView(scene, model, world.influence_m(), std::nullopt, &world, world.contacts_max()) {}
+
+WorldView::WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
+                     std::optional<Own> own, World* world, std::size_t contacts_max)
     : model_(model),
-      environment_(scene::make_environment(scene, model, influence_m)),
-      scratch_(environment_, model.shapes().size()),
+      own_(std::move(own)),
+      world_(world),
       influence_(influence_m),
       slow_in_unknown_(scene.map && scene.map->unknown == scene::UnknownPolicy::slow),
       poses_(model),
@@ -38,8 +47,14 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
       arm_before_(model),
       query_poses_(model),
       query_arm_(model) {
-  if (environment_.has_obstacles())
-    require_shapes(scene, model, "/robot", "some because there are obstacles");
+  if (world_ != nullptr) {
+    (void)take_newest();
+  } else {
+    environment_ = &own_->environment;
+    scratch_ = &own_->scratch;
+    contacts_max = environment_->contacts_max(model.shapes().size());
+  }
+  if (has_obstacles()) require_shapes(scene, model, "/robot", "some because there are obstacles");
   if (scene.model.self_collision) {
     require_shapes(scene, model, "/model/self_collision", "some or false");
     self_ = std::make_unique<scene::SelfField>(model);
@@ -48,17 +63,31 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
     self_clearance_.assign(self_->pairs().size(), self_influence_);
     self_clearance_before_ = self_clearance_;
   }
-  certificate_ =
-      std::make_unique<Certificate>(model, environment_, influence_, self_.get(), self_influence_);
-  seen_.assign(environment_.obstacles().size(), 0);
-  revealed_.reserve(environment_.obstacles().size());
-  for (const auto& obstacle : environment_.obstacles())
-    hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
-  contacts_.resize(environment_.contacts_max(model.shapes().size()) + 1);
+  certificate_ = std::make_unique<Certificate>(
+      model, influence_, self_.get(), self_influence_,
+      world_ != nullptr ? world_->obstacles_max() : environment_->obstacles().size());
+  if (own_) {
+    seen_.assign(environment_->obstacles().size(), 0);
+    revealed_.reserve(environment_->obstacles().size());
+    for (const auto& obstacle : environment_->obstacles())
+      hidden_obstacles_ = hidden_obstacles_ || obstacle.judge_only || !obstacle.known;
+  }
+  contacts_.resize(contacts_max + 1);
   other_contacts_.resize(contacts_.size());
   clearance_.assign(model.shapes().size(), influence_);
   clearance_before_ = clearance_;
   q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
+}
+
+bool WorldView::take_newest() {
+  if (world_ == nullptr) return false;
+  World::View& newest = world_->take();
+  if (environment_ == &newest.snapshot->environment) return false;
+  environment_ = &newest.snapshot->environment;
+  scratch_ = &newest.scratch;
+  ids_ = newest.snapshot->obstacle_ids;
+  snapshot_ = newest.snapshot->number;
+  return true;
 }
 
 void WorldView::look(const Eigen::VectorXd& q, double time_s) {
@@ -84,18 +113,18 @@ void WorldView::update_obstacle_contacts() {
     const std::size_t hidden = find(scene::View::hidden, other_contacts_);
     update_clearances(std::span(other_contacts_).first(hidden));
   }
-  if (slow_in_unknown_ && environment_.in_slow_space(arm_.view())) speed_scale_ = slow_speed_scale;
+  if (slow_in_unknown_ && environment_->in_slow_space(arm_.view())) speed_scale_ = slow_speed_scale;
 }
 
 void WorldView::reveal_visible() {
-  for (int found = environment_.reveal_visible(arm_.view(), time_s_, seen_); found >= 0;
-       found = environment_.reveal_visible(arm_.view(), time_s_, seen_))
+  for (int found = environment_->reveal_visible(arm_.view(), time_s_, seen_); found >= 0;
+       found = environment_->reveal_visible(arm_.view(), time_s_, seen_))
     revealed_.push_back(found);
 }
 
 std::size_t WorldView::find(scene::View view, std::span<scene::Contact> out) {
-  return std::min(out.size(), environment_.closest(arm_.view(), influence_, time_s_, scratch_, out,
-                                                   view, seen_));
+  return std::min(out.size(), environment_->closest(arm_.view(), influence_, time_s_, *scratch_,
+                                                    out, view, seen_));
 }
 
 void WorldView::update_clearances(std::span<const scene::Contact> contacts) {
@@ -135,7 +164,7 @@ Certificate::Verdict WorldView::certify(const Eigen::VectorXd& q, const Eigen::V
     return has_obstacles() ? std::span<const double>(all) : std::span<const double>();
   };
   return certificate_->check(
-      query_poses_,
+      query_poses_, *environment_,
       {q_before_, v_before_, time_before_s_, arm_before_.view(), to_obstacles(clearance_before_),
        self_clearance_before_},
       {q, v, time_s_, arm_.view(), to_obstacles(clearance_), self_clearance_});
@@ -150,8 +179,8 @@ scene::Shapes WorldView::place(const Eigen::VectorXd& q) {
 std::size_t WorldView::closest(const Eigen::VectorXd& q, double influence_m,
                                std::span<scene::Contact> out) {
   if (!has_obstacles()) return 0;
-  return environment_.closest(place(q), std::min(influence_m, influence_), time_s_, scratch_, out,
-                              scene::View::planner, seen_);
+  return environment_->closest(place(q), std::min(influence_m, influence_), time_s_, *scratch_, out,
+                               scene::View::planner, seen_);
 }
 
 std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m,
@@ -163,12 +192,12 @@ std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m
 bool WorldView::deepest_at_start(const scene::Shapes& shapes, scene::Contact& deepest) {
   const std::size_t count = std::min(
       other_contacts_.size(),
-      environment_.closest(shapes, 0.0, 0.0, scratch_, other_contacts_, scene::View::judge));
+      environment_->closest(shapes, 0.0, 0.0, *scratch_, other_contacts_, scene::View::judge));
   bool found = false;
   for (const auto& contact : std::span(other_contacts_).first(count)) {
     // a moving obstacle may be elsewhere when the arm arrives
     if (contact.obstacle >= 0 &&
-        scene::max_speed(environment_.obstacles()[static_cast<std::size_t>(contact.obstacle)]) >
+        scene::max_speed(environment_->obstacles()[static_cast<std::size_t>(contact.obstacle)]) >
             0.0)
       continue;
     if (!found || contact.distance < deepest.distance) deepest = contact;
@@ -191,7 +220,7 @@ bool WorldView::deepest_self(const scene::Shapes& shapes, scene::SelfContact& de
 std::string WorldView::describe_contact() const {
   if (nearest() != nullptr && clearance_now_ <= 0.0)
     return fmt::format("{} at {} s; the exit direction is {}",
-                       environment_.describe(nearest_, model_), time_s_,
+                       environment_->describe(nearest_, model_), time_s_,
                        scene::describe_exit_direction(nearest_));
   return fmt::format("the arm touches itself: {} are {:.2g} mm inside each other at {} s",
                      self_->describe(nearest_pair_), -1e3 * self_clearance_now_, time_s_);

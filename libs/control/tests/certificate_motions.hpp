@@ -98,7 +98,8 @@ class MotionJudge {
       }
       const scene::Environment environment(setup_.map, obstacles, setup_.model.base(),
                                            setup_.model.reach(), limit_m);
-      control::Certificate certificate(setup_.model, environment, limit_m, &self_, self_limit_m);
+      control::Certificate certificate(setup_.model, limit_m, &self_, self_limit_m,
+                                       obstacles.size());
       for (int i = 0; i < motions_per_set_up && counts.motions < motions; ++i)
         if (!motion(environment, certificate, counts)) break;
     }
@@ -168,7 +169,7 @@ class MotionJudge {
     place(q_next, next_);
     measure(environment, next_, start_s_ + step_s, clearance_next, pairs_next);
     const auto verdict = certificate.check(
-        ws_, {q, v, start_s_, arm_.view(), clearance, pairs},
+        ws_, environment, {q, v, start_s_, arm_.view(), clearance, pairs},
         {q_next, v_next, start_s_ + step_s, next_.view(), clearance_next, pairs_next});
 
     const bool contact = sampled_contact(environment.obstacles(), q, dq, dv);

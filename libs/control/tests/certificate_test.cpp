@@ -22,7 +22,7 @@ struct Rig {
   explicit Rig(scene::Obstacle obstacle)
       : model(model::make_chain({1, "z", 1.0, 1.0, 0.05})),
         environment(std::nullopt, {std::move(obstacle)}, geometry::SE3{}, model.reach(), limit),
-        certificate(model, environment, limit, nullptr, 0.0),
+        certificate(model, limit, nullptr, 0.0, 1),
         ws(model),
         arm(model),
         next(model) {}
@@ -39,7 +39,7 @@ struct Rig {
     next.place(model, ws);
     before = {environment.clearance(arm.view(), t0, limit)};
     after = {environment.clearance(next.view(), t1, limit)};
-    return certificate.check(ws, {q, v, t0, arm.view(), before, {}},
+    return certificate.check(ws, environment, {q, v, t0, arm.view(), before, {}},
                              {p, w, t1, next.view(), after, {}});
   }
 
@@ -150,7 +150,7 @@ TEST_CASE("the travel of a prismatic joint without limits is bounded by its moti
   // axis
   scene::Obstacle post = ball({-4.4 * std::sin(0.05), 4.4 * std::cos(0.05), 0.0}, 0.04);
   const scene::Environment environment(std::nullopt, {post}, geometry::SE3{}, 10.0, 0.5);
-  Certificate certificate(model, environment, 0.5, nullptr, 0.0);
+  Certificate certificate(model, 0.5, nullptr, 0.0, 1);
   dynamics::Workspace ws(model);
   scene::PlacedShapes arm(model), next(model);
   const Eigen::Vector2d q(0.0, 4.0), p(0.1, 4.0);
@@ -166,7 +166,7 @@ TEST_CASE("the travel of a prismatic joint without limits is bounded by its moti
   REQUIRE(before[1] > 0.1);
   REQUIRE(after[1] > 0.1);
   const VectorXd v = (p - q) / 0.01;
-  const auto verdict = certificate.check(ws, {q, v, 0.0, arm.view(), before, {}},
+  const auto verdict = certificate.check(ws, environment, {q, v, 0.0, arm.view(), before, {}},
                                          {p, v, 0.01, next.view(), after, {}});
   CHECK_FALSE(verdict.certified);
   CHECK(verdict.contact);

@@ -64,24 +64,57 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   static_cast<MapSummary&>(summary_) = region.summary;
   map_pose_ = map->pose;
   map_pose_inverse_ = map->pose.inverse();
-  map_ = MapField(region.occupied, region.resolution_m, region.reachable);
-  unknown_ = MapField(region.unknown, region.resolution_m, region.reachable);
-  summary_.boxes = map_.boxes().boxes().size();
-  summary_.unknown_boxes = unknown_.boxes().boxes().size();
+  map_ = std::make_shared<MapField>(region.occupied, region.resolution_m, region.reachable);
+  unknown_ = std::make_shared<MapField>(region.unknown, region.resolution_m, region.reachable);
+  summary_.boxes = map_->boxes().boxes().size();
+  summary_.unknown_boxes = unknown_->boxes().boxes().size();
+  map_spec_ = map;
+  map_spec_->changes.clear();
+  map_ball_ = region.ball;
   for (const MapChangeSpec& change : map->changes)
-    changes_.push_back(read_change(change, *map, region));
+    changes_.push_back(read_change(change, *map, region.resolution_m, region.ball));
+}
+
+Environment Environment::with_obstacles(std::vector<Obstacle> obstacles) const {
+  for (const Obstacle& obstacle : obstacles)
+    check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
+  Environment copy = *this;
+  copy.obstacles_ = std::move(obstacles);
+  copy.summary_.obstacles = copy.obstacles_.size();
+  return copy;
+}
+
+Environment Environment::with_change(const MapChangeSpec& change) const {
+  if (!map_spec_) throw Error(ErrorCode::invalid, "map: there is none, expected a map to change");
+  const MapChange read = read_change(change, *map_spec_, summary_.resolution_m, map_ball_);
+  Environment copy = *this;
+  (void)copy.apply(read);
+  return copy;
+}
+
+void Environment::prepare() const {
+  map_->prepare();
+  if (summary_.unknown == UnknownPolicy::block) unknown_->prepare();
+}
+
+MapField::Changed Environment::apply(const MapChange& change) {
+  const auto own = [](std::shared_ptr<MapField>& field) -> MapField& {
+    if (field.use_count() > 1) field = std::make_shared<MapField>(*field);
+    return *field;
+  };
+  const MapField::Changed changed = own(map_).change(change.occupied, change.free);
+  if (summary_.unknown != UnknownPolicy::free) {
+    own(unknown_).change({}, change.free);
+    own(unknown_).change({}, change.occupied);
+  }
+  return changed;
 }
 
 std::string Environment::advance(double time_s) {
   std::string message;
   for (; next_change_ < changes_.size() && changes_[next_change_].time_s <= time_s + 1e-9;
        ++next_change_) {
-    const MapChange& change = changes_[next_change_];
-    const MapField::Changed changed = map_.change(change.occupied, change.free);
-    if (summary_.unknown != UnknownPolicy::free) {
-      unknown_.change({}, change.free);
-      unknown_.change({}, change.occupied);
-    }
+    const MapField::Changed changed = apply(changes_[next_change_]);
     message += fmt::format("{}the map changes: {} voxels are occupied now, {} free",
                            message.empty() ? "" : "; ", changed.added, changed.removed);
   }
@@ -89,13 +122,9 @@ std::string Environment::advance(double time_s) {
 }
 
 Environment::Scratch::Scratch(const Environment& environment, std::size_t shapes)
-    : map_(environment.map_), unknown_(environment.unknown_) {
+    : map_(*environment.map_), unknown_(*environment.unknown_) {
   found_.reserve(environment.contacts_max(shapes));
   order_.reserve(environment.contacts_max(shapes));
-}
-
-std::size_t Environment::contacts_max(std::size_t shapes) const noexcept {
-  return shapes * (2 * points_per_sphere + 3 * obstacles_.size());
 }
 
 std::string Environment::describe(int obstacle) const {
@@ -118,8 +147,8 @@ std::string describe_exit_direction(const Contact& contact) {
 }
 
 bool Environment::has_obstacles() const noexcept {
-  return !map_.empty() || !changes_.empty() || !obstacles_.empty() ||
-         (!unknown_.empty() && summary_.unknown == UnknownPolicy::block);
+  return !map_->empty() || !changes_.empty() || !obstacles_.empty() ||
+         (!unknown_->empty() && summary_.unknown == UnknownPolicy::block);
 }
 
 double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s,
@@ -166,9 +195,9 @@ std::size_t Environment::closest(const Shapes& arm, double influence, double tim
                                  std::span<const std::uint8_t> seen) const {
   scratch.found_.clear();
   if (view != View::hidden) {
-    add_map_contacts(map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
+    add_map_contacts(*map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
     if (summary_.unknown == UnknownPolicy::block)
-      add_map_contacts(unknown_, Contact::unknown, arm, influence, scratch.unknown_,
+      add_map_contacts(*unknown_, Contact::unknown, arm, influence, scratch.unknown_,
                        scratch.found_);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
@@ -256,8 +285,8 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
       smallest = std::min(smallest, hit.distance - arm.radii[i]);
     }
   };
-  consider(map_);
-  if (summary_.unknown == UnknownPolicy::block) consider(unknown_);
+  consider(*map_);
+  if (summary_.unknown == UnknownPolicy::block) consider(*unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
     if (in_view(k, time_s, view, seen))
       smallest = clearance_to(obstacles_[k], arm, time_s, smallest);
@@ -265,14 +294,15 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
 }
 
 bool Environment::in_slow_space(const Shapes& arm) const {
-  if (summary_.unknown != UnknownPolicy::slow || unknown_.empty()) return false;
+  if (summary_.unknown != UnknownPolicy::slow || unknown_->empty()) return false;
   BoxHit hit;
   SegmentHit axis_hit;
   for (std::size_t i = 0; i < arm.size(); ++i) {
     const bool touches =
-        arm.is_capsule(i) ? unknown_.nearest(map_pose_inverse_ * arm.from(i),
-                                             map_pose_inverse_ * arm.to(i), arm.radii[i], axis_hit)
-                          : unknown_.nearest(map_pose_inverse_ * arm.centers[i], arm.radii[i], hit);
+        arm.is_capsule(i)
+            ? unknown_->nearest(map_pose_inverse_ * arm.from(i), map_pose_inverse_ * arm.to(i),
+                                arm.radii[i], axis_hit)
+            : unknown_->nearest(map_pose_inverse_ * arm.centers[i], arm.radii[i], hit);
     if (touches) return true;
   }
   return false;

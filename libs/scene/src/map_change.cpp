@@ -37,22 +37,23 @@ std::vector<VoxelBox> touched(const std::vector<Box>& boxes, double resolution, 
 
 }  // namespace
 
-MapChange read_change(const MapChangeSpec& change, const MapSpec& map, const MapRegion& region) {
+MapChange read_change(const MapChangeSpec& change, const MapSpec& map, double resolution_m,
+                      const Ball& ball) {
   MapChange out;
   out.time_s = change.time_s;
   if (change.file) {
     ReadMapOptions options{map.scale, map.occupancy_threshold};
     options.keep_free = true;
     const MapData data = read_map(*change.file, options);
-    if (std::abs(data.resolution - region.resolution_m) > 1e-9 * region.resolution_m)
+    if (std::abs(data.resolution - resolution_m) > 1e-9 * resolution_m)
       throw Error(ErrorCode::invalid,
                   fmt::format("{}: resolution {} m, expected {} m as in the map that it changes",
-                              change.file->string(), data.resolution, region.resolution_m));
-    out.free = merge(crop(data.free, data.resolution, region.ball));
-    out.occupied = merge(crop(data.occupied, data.resolution, region.ball));
+                              change.file->string(), data.resolution, resolution_m));
+    out.free = merge(crop(data.free, data.resolution, ball));
+    out.occupied = merge(crop(data.occupied, data.resolution, ball));
   }
   const auto append = [&](const std::vector<Box>& boxes, std::vector<VoxelBox>& to) {
-    for (const VoxelBox& box : touched(boxes, region.resolution_m, region.ball)) {
+    for (const VoxelBox& box : touched(boxes, resolution_m, ball)) {
       std::vector<VoxelBox> pieces{box};
       for (const VoxelBox& present : to) subtract(pieces, present);
       to.insert(to.end(), pieces.begin(), pieces.end());

@@ -41,6 +41,14 @@ MapField::MapField(const std::vector<Cell>& cells, double resolution, const Ball
   if (!boxes_.empty()) near_ = NearTable(reachable, table_edge_m);
 }
 
+MapField::MapField(const MapField& other)
+    : resolution_(other.resolution_),
+      reachable_(other.reachable_),
+      boxes_(other.boxes_),
+      surface_(std::make_unique<Surface>()) {
+  if (!boxes_.empty()) near_ = NearTable(reachable_, table_edge_m);
+}
+
 std::vector<VoxelBox> MapField::voxel_boxes(std::size_t from) const {
   std::vector<VoxelBox> voxels;
   for (std::size_t i = from; i < boxes_.boxes().size(); ++i)

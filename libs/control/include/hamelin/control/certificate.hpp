@@ -34,8 +34,9 @@ class Certificate {
   /// @param limit distances are known up to here; larger ones count as this [m]
   /// @param self null if self-collision is not modelled
   /// @param self_limit the same for distances between parts of the arm [m]
-  Certificate(const model::Model& model, const scene::Environment& environment, double limit,
-              const scene::SelfField* self, double self_limit);
+  /// @param obstacles_max the largest number of obstacles in any environment to be checked
+  Certificate(const model::Model& model, double limit, const scene::SelfField* self,
+              double self_limit, std::size_t obstacles_max);
 
   struct Verdict {
     bool certified = true;
@@ -54,7 +55,9 @@ class Certificate {
     std::span<const double> pairs;      ///< of all SelfField::pairs(); empty if not modelled
   };
   /// @param ws scratch of the same model; its poses change
-  [[nodiscard]] Verdict check(dynamics::Workspace& ws, const Node& from, const Node& to);
+  /// @param environment the obstacles during the step
+  [[nodiscard]] Verdict check(dynamics::Workspace& ws, const scene::Environment& environment,
+                              const Node& from, const Node& to);
 
  private:
   /// What a bound is for: a shape against the obstacles, or a pair of parts.
@@ -85,7 +88,7 @@ class Certificate {
   }
 
   const model::Model& model_;
-  const scene::Environment& environment_;
+  const scene::Environment* environment_ = nullptr;  ///< of the step that is checked
   double limit_;
   const scene::SelfField* self_;
   double self_limit_;

@@ -2,11 +2,14 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hamelin/control/certificate.hpp"
+#include "hamelin/control/world.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/scene/self_collision.hpp"
@@ -16,17 +19,25 @@ namespace hamelin::control {
 
 /// The surroundings of the arm at a configuration: near points of obstacles and of its own parts,
 /// the smallest clearances, and the proof that the motion between two configurations was clear of
-/// both. One object per thread. After construction, only changes of the map allocate.
+/// both. One object per thread. After construction, only advance_map() allocates.
 class WorldView {
  public:
+  /// All obstacles of a scene, those that a planner is not shown included.
   /// @param influence_m largest distance at which obstacles are found; larger distances count as
   ///        this
   /// @throws Error io, parse or invalid for a map, an obstacle, or a robot without shapes if some
   ///        are needed
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m);
+  /// The obstacles of a world that other threads may update, as take_newest() finds them.
+  /// @param scene says whether self-collision is modelled and unknown space is crossed slowly
+  /// @param world must outlive this
+  WorldView(const scene::Scene& scene, const model::Model& model, World& world);
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
+  /// Takes the newest snapshot of the World; results of the last look() still belong to the one
+  /// before. @return whether it is another one
+  bool take_newest();
   /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q.
   void look(const Eigen::VectorXd& q, double time_s);
   /// Makes the configuration of the last look() the start of the motion for certify().
@@ -38,7 +49,7 @@ class WorldView {
   /// Applies the changes of the map that are due. Results of the last look() still belong to the
   /// old map.
   /// @return one line that describes them; empty if none was due
-  [[nodiscard]] std::string advance_map() { return environment_.advance(time_s_); }
+  [[nodiscard]] std::string advance_map() { return own_->environment.advance(time_s_); }
 
   /// The near points that a planner is shown: shapes in order, nearest first within a shape.
   [[nodiscard]] std::span<const scene::Contact> contacts() const noexcept {
@@ -84,10 +95,18 @@ class WorldView {
   /// 1, or less if the arm is in unknown space that is to be crossed slowly.
   [[nodiscard]] double speed_scale() const noexcept { return speed_scale_; }
 
-  [[nodiscard]] bool has_obstacles() const noexcept { return environment_.has_obstacles(); }
+  [[nodiscard]] bool has_obstacles() const noexcept { return environment_->has_obstacles(); }
   /// Whether self-collision is modelled.
   [[nodiscard]] bool has_self() const noexcept { return self_ != nullptr; }
-  [[nodiscard]] const scene::Environment& environment() const noexcept { return environment_; }
+  /// That of the last look().
+  [[nodiscard]] const scene::Environment& environment() const noexcept { return *environment_; }
+  /// The number of the snapshot that the last look() saw; zero without a World.
+  [[nodiscard]] std::uint64_t snapshot() const noexcept { return snapshot_; }
+  /// The id of an obstacle of environment(), which is its index without a World. `obstacle` may be
+  /// that of a contact, also the map or unknown space.
+  [[nodiscard]] std::int32_t obstacle_id(int obstacle) const noexcept {
+    return obstacle < 0 || ids_.empty() ? obstacle : ids_[static_cast<std::size_t>(obstacle)];
+  }
   [[nodiscard]] const scene::SelfField* self_field() const noexcept { return self_.get(); }
   [[nodiscard]] double influence_m() const noexcept { return influence_; }
   [[nodiscard]] double self_influence_m() const noexcept { return self_influence_; }
@@ -96,6 +115,14 @@ class WorldView {
   [[nodiscard]] std::size_t self_contacts_max() const noexcept { return self_contacts_.size(); }
 
  private:
+  struct Own {
+    Own(scene::Environment&& of, std::size_t shapes)
+        : environment(std::move(of)), scratch(environment, shapes) {}
+    scene::Environment environment;
+    scene::Environment::Scratch scratch;
+  };
+  WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
+            std::optional<Own> own, World* world, std::size_t contacts_max);
   void update_obstacle_contacts();
   void update_self_contacts();
   void reveal_visible();
@@ -103,8 +130,12 @@ class WorldView {
   void update_clearances(std::span<const scene::Contact> contacts);
 
   const model::Model& model_;
-  scene::Environment environment_;
-  scene::Environment::Scratch scratch_;
+  std::optional<Own> own_;  ///< without a World
+  World* world_;            ///< null without one
+  const scene::Environment* environment_ = nullptr;
+  scene::Environment::Scratch* scratch_ = nullptr;
+  std::span<const std::int32_t> ids_;
+  std::uint64_t snapshot_ = 0;
   std::unique_ptr<scene::SelfField> self_;  ///< null if self-collision is not modelled
   double influence_, self_influence_ = 0.0;
   std::unique_ptr<Certificate> certificate_;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -75,8 +76,15 @@ class Environment {
     std::vector<std::size_t> order_;
   };
 
-  /// The largest number of contacts that so many shapes can have.
-  [[nodiscard]] std::size_t contacts_max(std::size_t shapes) const noexcept;
+  /// The largest number of contacts that so many shapes can have, with this environment's obstacles
+  /// or with another number of them.
+  [[nodiscard]] std::size_t contacts_max(std::size_t shapes) const noexcept {
+    return contacts_max(shapes, obstacles_.size());
+  }
+  [[nodiscard]] static std::size_t contacts_max(std::size_t shapes,
+                                                std::size_t obstacles) noexcept {
+    return shapes * (2 * points_per_sphere + 3 * obstacles);
+  }
 
   /// All near obstacle points of all shapes: shapes in order, nearest first within a shape.
   /// @param influence largest distance from a shape's surface [m]
@@ -121,10 +129,20 @@ class Environment {
   /// @return one line that describes them; empty if none was due
   std::string advance(double time_s);
 
+  /// A copy with other obstacles, which shares the map. @throws Error invalid for an obstacle
+  [[nodiscard]] Environment with_obstacles(std::vector<Obstacle> obstacles) const;
+  /// A copy in which voxels of the map are freed and occupied now; time_s of the change is not
+  /// used. Queries may run on this environment at the same time.
+  /// @throws Error io, parse or invalid, also if there is no map to change
+  [[nodiscard]] Environment with_change(const MapChangeSpec& change) const;
+  /// Computes now what the first query inside the map would compute, so that queries neither
+  /// allocate nor wait.
+  void prepare() const;
+
   /// Whether there is any obstacle, now or later.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
-  [[nodiscard]] const MapField& map_field() const noexcept { return map_; }
+  [[nodiscard]] const MapField& map_field() const noexcept { return *map_; }
   /// Pose of the map's frame in the world; map_field() is in that frame.
   [[nodiscard]] const geometry::SE3& map_pose() const noexcept { return map_pose_; }
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }
@@ -140,8 +158,14 @@ class Environment {
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,
                                            double time_s, double limit);
 
+  /// Applies one change to fields that no other environment shares.
+  MapField::Changed apply(const MapChange& change);
+
   geometry::SE3 map_pose_, map_pose_inverse_;
-  MapField map_, unknown_;  ///< in the map's frame [m]
+  /// In the map's frame [m]. Copies of an environment share them until one of them is changed.
+  std::shared_ptr<MapField> map_ = std::make_shared<MapField>(), unknown_ = map_;
+  std::optional<MapSpec> map_spec_;  ///< without its changes
+  Ball map_ball_;                    ///< what was kept of the map, in its frame
   std::vector<MapChange> changes_;
   std::size_t next_change_ = 0;
   std::vector<Obstacle> obstacles_;

@@ -18,7 +18,6 @@ struct MapChangeSpec {
 };
 
 struct MapSpec;
-struct MapRegion;
 
 /// A change in voxels, ready to be applied: first `free`, then `occupied`.
 struct MapChange {
@@ -26,9 +25,10 @@ struct MapChange {
   std::vector<VoxelBox> free, occupied;  ///< disjoint boxes each
 };
 
-/// Reads a change and crops it to the region.
+/// Reads a change and crops it to a ball in the map's frame.
+/// @param resolution_m of the map
 /// @throws Error io, parse or invalid, one line
 [[nodiscard]] MapChange read_change(const MapChangeSpec& change, const MapSpec& map,
-                                    const MapRegion& region);
+                                    double resolution_m, const Ball& ball);
 
 }  // namespace hamelin::scene

@@ -28,6 +28,13 @@ class MapField {
   /// @param resolution edge of a voxel [m]
   /// @param reachable where most queries will be
   MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable);
+  /// A copy can be changed while queries run on the original. It computes table and surface anew
+  /// when they are needed.
+  MapField(const MapField& other);
+  MapField(MapField&&) noexcept = default;
+  MapField& operator=(const MapField&) = delete;
+  MapField& operator=(MapField&&) noexcept = default;
+  ~MapField() = default;
 
   [[nodiscard]] bool empty() const noexcept { return boxes_.empty(); }
   /// The merged boxes, disjoint, with the union of the cells. Some may have been removed, see
@@ -73,6 +80,11 @@ class MapField {
   /// too.
   std::size_t nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
                                Scratch& scratch, std::span<SegmentHit, points_max> out) const;
+
+  /// Computes now what the first query inside would compute, so that no query allocates or waits.
+  void prepare() const {
+    if (!empty()) (void)faces();
+  }
 
   /// Memory in use.
   [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.bytes() + near_.bytes(); }

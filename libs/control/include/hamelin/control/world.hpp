@@ -1,0 +1,103 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hamelin/control/newest.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::control {
+
+/// The surroundings of an arm at some moment. Immutable once published; queries may run on any
+/// thread.
+struct WorldSnapshot {
+  std::uint64_t number = 0;  ///< counts the updates since the world was made
+  scene::Environment environment;
+  /// One per obstacle of the environment: a number that the obstacle keeps for its life and that no
+  /// other obstacle of this world gets.
+  std::vector<std::int32_t> obstacle_ids;
+};
+
+/// The surroundings of an arm, which any thread may update while another one uses them. Each update
+/// makes a new snapshot from the last one and publishes it; the control loop picks up the newest at
+/// its next tick, without waiting. An update that is invalid throws and changes nothing. Updates
+/// cost what building the snapshot costs: microseconds for obstacles, milliseconds for a map.
+class World {
+ public:
+  struct Options {
+    double influence_m = 0.2;        ///< the largest distance at which obstacles are found
+    std::size_t obstacles_max = 64;  ///< the largest number of obstacles at a time
+    /// Compute with each update what a query inside the map would compute first, so that no tick
+    /// ever allocates or waits.
+    bool prepare = true;
+  };
+
+  /// The surroundings of a scene: its map with unknown space and self-filter, and its obstacles,
+  /// except those that are judge_only or not known.
+  /// @throws Error io, parse or invalid, also for more obstacles than obstacles_max
+  World(const scene::Scene& scene, const model::Model& model, const Options& options);
+
+  /// Adds an obstacle, or replaces the one of the same name, which keeps its id.
+  /// @return the number of the snapshot from which on it exists, as do all updates
+  /// @throws Error invalid for an obstacle that check() refuses, a pose that is not finite, or more
+  ///         obstacles than obstacles_max
+  std::uint64_t set_obstacle(scene::Obstacle obstacle);
+  /// Moves an obstacle: at time_s it is at the pose, from where it goes on with the velocity
+  /// [m/s].
+  /// @throws Error invalid if there is no such obstacle, or for numbers that are not finite
+  std::uint64_t move_obstacle(std::string_view name, const geometry::SE3& pose,
+                              const Eigen::Vector3d& velocity_m_s, double time_s);
+  /// @throws Error invalid if there is no such obstacle
+  std::uint64_t remove_obstacle(std::string_view name);
+  /// Replaces the map; none: removes it. Obstacles stay. Changes that the map lists with a time are
+  /// not made: change_map() makes them when they are due.
+  /// @param q configuration in which a self-filter finds the arm; of size zero: the scene's start
+  /// @throws Error io, parse or invalid
+  std::uint64_t set_map(const std::optional<scene::MapSpec>& map, const Eigen::VectorXd& q = {});
+  /// Frees and occupies voxels of the map, see scene::MapChangeSpec.
+  /// @throws Error io, parse or invalid, also if there is no map
+  std::uint64_t change_map(const scene::MapChangeSpec& change);
+
+  /// The newest snapshot, for queries on any thread but that of the control loop: this locks.
+  [[nodiscard]] std::shared_ptr<const WorldSnapshot> latest() const;
+
+  /// A snapshot with the working memory of queries on it.
+  struct View {
+    std::shared_ptr<const WorldSnapshot> snapshot;
+    scene::Environment::Scratch scratch;
+  };
+  /// The newest snapshot, valid until the next call. For the thread of the control loop: never
+  /// waits, never allocates.
+  [[nodiscard]] View& take() noexcept { return newest_->take(); }
+
+  [[nodiscard]] double influence_m() const noexcept { return options_.influence_m; }
+  [[nodiscard]] std::size_t obstacles_max() const noexcept { return options_.obstacles_max; }
+  /// The largest number of contacts that a query can find.
+  [[nodiscard]] std::size_t contacts_max() const noexcept { return contacts_max_; }
+
+ private:
+  std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids);
+  /// Index of an obstacle in the latest snapshot; the number of obstacles if there is none.
+  [[nodiscard]] std::size_t find(std::string_view name) const;
+  [[nodiscard]] std::size_t require(std::string_view name) const;
+  [[nodiscard]] scene::Environment make_environment(const std::optional<scene::MapSpec>& map,
+                                                    const Eigen::VectorXd& q) const;
+
+  Options options_;
+  scene::Scene scene_;  ///< name, base and start
+  const model::Model& model_;
+  std::size_t contacts_max_ = 0;
+  mutable std::mutex mutex_;  ///< among writers; the control loop never takes it
+  std::int32_t next_id_ = 0;
+  std::shared_ptr<const WorldSnapshot> latest_;
+  std::optional<Newest<View>> newest_;
+};
+
+}  // namespace hamelin::control
