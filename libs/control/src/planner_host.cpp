@@ -11,10 +11,10 @@ void write(const Eigen::Vector3d& from, double (&to)[3]) {
   for (int i = 0; i < 3; ++i) to[i] = from[i];
 }
 
-hamelin_contact to_c(const scene::Contact& contact) {
+hamelin_contact to_c(const WorldView& world, const scene::Contact& contact) {
   hamelin_contact out{};
   out.sphere = contact.sphere;
-  out.obstacle = contact.obstacle;
+  out.obstacle = world.obstacle_id(contact.obstacle);
   out.distance_m = contact.distance;
   write(contact.arm_point, out.arm_point_world_m);
   write(contact.obstacle_point, out.obstacle_point_world_m);
@@ -52,7 +52,7 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
                        std::size_t goal_index) {
   const auto contacts = world_.contacts();
   const auto self_contacts = world_.self_contacts();
-  for (std::size_t i = 0; i < contacts.size(); ++i) contacts_[i] = to_c(contacts[i]);
+  for (std::size_t i = 0; i < contacts.size(); ++i) contacts_[i] = to_c(world_, contacts[i]);
   for (std::size_t i = 0; i < self_contacts.size(); ++i) self_contacts_[i] = to_c(self_contacts[i]);
   hamelin_tick tick{};
   tick.struct_size = sizeof tick;
@@ -79,7 +79,8 @@ std::size_t PlannerHost::closest_points(std::span<const double> q, double influe
   const auto contacts =
       std::span(query_contacts_).first(std::min(query_contacts_.size(), out.size()));
   const std::size_t found = world_.closest(query_q_, influence_m, contacts);
-  for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i) out[i] = to_c(contacts[i]);
+  for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i)
+    out[i] = to_c(world_, contacts[i]);
   return found;
 }
 

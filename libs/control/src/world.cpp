@@ -32,8 +32,11 @@ World::World(const scene::Scene& scene, const model::Model& model, const Options
   std::vector<scene::Obstacle> obstacles;
   std::vector<std::int32_t> ids;
   for (const auto& obstacle : scene.obstacles) {
-    const std::int32_t id = next_id_++;  // also of those that are not shown: the scene's index
-    if (!obstacle.known || obstacle.judge_only) continue;
+    const std::int32_t id = next_id_++;
+    if (!obstacle.known || obstacle.judge_only) {
+      reserved_.emplace_back(obstacle.name, id);
+      continue;
+    }
     obstacles.push_back(obstacle);
     ids.push_back(id);
   }
@@ -98,8 +101,12 @@ std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
       throw Error(ErrorCode::invalid, fmt::format("obstacle '{}': there are {} already, the most "
                                                   "that this world was made for",
                                                   obstacle.name, obstacles.size()));
+    const auto reserved = std::find_if(reserved_.begin(), reserved_.end(), [&](const auto& entry) {
+      return entry.first == obstacle.name;
+    });
+    ids.push_back(reserved != reserved_.end() ? reserved->second : next_id_++);
+    if (reserved != reserved_.end()) reserved_.erase(reserved);
     obstacles.push_back(std::move(obstacle));
-    ids.push_back(next_id_++);
   }
   return publish(latest_->environment.with_obstacles(std::move(obstacles)), std::move(ids));
 }

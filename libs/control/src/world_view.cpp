@@ -76,7 +76,7 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
   other_contacts_.resize(contacts_.size());
   clearance_.assign(model.shapes().size(), influence_);
   clearance_before_ = clearance_;
-  q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
+  q_ = q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
 }
 
 bool WorldView::take_newest() {
@@ -87,10 +87,14 @@ bool WorldView::take_newest() {
   scratch_ = &newest.scratch;
   ids_ = newest.snapshot->obstacle_ids;
   snapshot_ = newest.snapshot->number;
+  current_ = false;
   return true;
 }
 
 void WorldView::look(const Eigen::VectorXd& q, double time_s) {
+  if (current_ && time_s == time_s_ && q == q_) return;
+  current_ = true;
+  q_ = q;
   time_s_ = time_s;
   dynamics::forward_kinematics(model_, poses_, q);
   clearance_now_ = influence_;
@@ -151,6 +155,7 @@ void WorldView::update_self_contacts() {
 }
 
 void WorldView::depart(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  current_ = false;
   q_before_ = q;
   v_before_ = v;
   time_before_s_ = time_s_;

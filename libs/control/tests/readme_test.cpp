@@ -10,9 +10,8 @@
 using namespace hamelin;
 
 TEST_CASE("the README's example proves a motion beside a ball", "[control][unit]") {
-  const std::filesystem::path folder =
-      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output";
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   const model::Robot robot = test::planar4();
   write_file_atomically(folder / "control_readme_robot.json",
                         description::robot_to_json(robot).dump());

@@ -6,14 +6,12 @@
 #include "hamelin/log/result.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/test/readme.hpp"
+#include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 
 TEST_CASE("the README's example writes a valid log", "[log][unit]") {
-  const auto file =
-      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "log_readme.jsonl";
-  std::filesystem::create_directories(file.parent_path());
-  std::filesystem::remove(file);
+  const auto file = test::temporary("readme.jsonl");
   // clang-format off
   // [example]
 {

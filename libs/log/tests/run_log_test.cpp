@@ -1,4 +1,5 @@
 #include "hamelin/log/run_log.hpp"
+#include "hamelin/test/temporary.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -21,7 +22,7 @@ namespace {
 
 // A directory of its own for each test, empty at first.
 fs::path fresh_directory(const std::string& name) {
-  const fs::path directory = fs::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / ("log_" + name);
+  const fs::path directory = test::temporary("log_" + name);
   fs::remove_all(directory);
   fs::create_directories(directory);
   return directory;

@@ -8,6 +8,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/run_log.hpp"
+#include "hamelin/test/temporary.hpp"
 #include "ticks.hpp"
 
 using namespace hamelin;
@@ -16,10 +17,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 std::filesystem::path file() {
-  const auto directory =
-      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / "trajectory";
-  std::filesystem::create_directories(directory);
-  return directory / "run.jsonl.zst";
+  return test::temporary("run.jsonl.zst");
 }
 
 // Two joints, q = (t³, 1 − t²), so that cubic interpolation is exact.

@@ -13,6 +13,7 @@
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "hamelin/test/temporary.hpp"
 
 /// Reads the bytes of make_data, following the layout in the library's README, and makes logs for
 /// it.
@@ -70,8 +71,7 @@ struct Decoded {
 
 /// An empty folder for one test.
 inline std::filesystem::path scratch(const std::string& name) {
-  const auto folder =
-      std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "test_output" / ("report_" + name);
+  const auto folder = temporary("report_" + name);
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -61,8 +61,8 @@ class IdealActuation final : public Actuation {
     audit.book_node(arm, answer.raw().potential_J);
   }
 
-  void apply(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd&,
-             EnergyAudit& audit) override {
+  void apply(SimulatedArm& arm, const control::Answer& decided, EnergyAudit& audit) override {
+    const planning::CommandBuffers& answer = *decided.channels;
     auto& channels = arm.channels;
     channels.held_torque = answer.held_torque();
     channels.damping = answer.damping();
@@ -143,21 +143,17 @@ class IdealActuation final : public Actuation {
   bool saturated_ = false;
 };
 
-/// A sampled controller: one torque, made of all channels at the tick, held over the control period
-/// and delayed: docs/theory.md (8.7).
+/// A sampled controller: the torque of a tick acts `delay` periods later and is held for a period,
+/// docs/theory.md (8.7).
 class SampledActuation final : public Actuation {
  public:
   SampledActuation(const scene::Scene& scene, SimulatedArm& arm, long period_steps,
-                   long delay_periods, std::size_t gyroscopic_terms)
+                   long delay_periods)
       : period_steps_(period_steps),
-        period_s_(static_cast<double>(period_steps) * scene.step_s),
-        mass_scale_(scene.actuation.planner_mass_scale),
-        limits_(torque_limits(scene, arm.model)),
-        channels_(arm.model, gyroscopic_terms) {
+        limited_(scene.model.torque_limits || scene.actuation.torque_rate_max_Nm_s) {
     // Until the first torque arrives the arm is held against gravity.
     VectorXd torque = VectorXd::Zero(arm.model.dof());
     dynamics::gravity_torque(arm.model, arm.ws, arm.state.q, torque);
-    limits_.start_from(torque);
     delayed_.assign(static_cast<std::size_t>(delay_periods) + 1, torque);
   }
 
@@ -168,14 +164,12 @@ class SampledActuation final : public Actuation {
     audit.book_node(arm, 0.0);
   }
 
-  void apply(SimulatedArm& arm, const planning::CommandBuffers& answer, const VectorXd& q_measured,
-             EnergyAudit& audit) override {
+  void apply(SimulatedArm& arm, const control::Answer& decided, EnergyAudit& audit) override {
     if (!asks_planner(arm.state.k)) return;
     const long tick = arm.state.k / period_steps_;
-    VectorXd& torque = slot(tick);
-    channels_.sum(arm.ws, answer, arm.state.q, arm.v, q_measured, period_s_, mass_scale_, torque);
-    if (answer.raw().has_node_velocity != 0) audit.book_filter(answer.raw());
-    saturated_ = limits_.limit(torque, period_s_);
+    slot(tick) = decided.torque;
+    if (decided.channels->raw().has_node_velocity != 0) audit.book_filter(decided.channels->raw());
+    saturated_ = decided.saturated;
     // The next slot of the ring was written `delay` ticks ago.
     arm.channels.held_torque = slot(tick + 1);
   }
@@ -190,15 +184,13 @@ class SampledActuation final : public Actuation {
   }
 
   bool saturated() const override { return saturated_; }
-  bool limited() const override { return limits_.any(); }
+  bool limited() const override { return limited_; }
 
  private:
   VectorXd& slot(long tick) { return delayed_[static_cast<std::size_t>(tick) % delayed_.size()]; }
 
   long period_steps_;
-  double period_s_, mass_scale_;
-  control::TorqueLimits limits_;
-  control::ChannelSum channels_;
+  bool limited_;
   std::vector<VectorXd> delayed_;
   bool saturated_ = false;
 };
@@ -220,14 +212,13 @@ long steps_per_tick(const scene::Scene& scene) {
                                        "control_period_s"));
 }
 
-std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm,
-                                          std::size_t gyroscopic_terms) {
+std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm) {
   if (scene.actuation.type == scene::ActuationType::ideal)
     return std::make_unique<IdealActuation>(scene, arm.model);
   const long period_steps = steps_per_tick(scene);
   const long delay = integer_multiple(scene.actuation.delay_s, scene.actuation.control_period_s,
                                       scene.name, "delay_s");
-  return std::make_unique<SampledActuation>(scene, arm, period_steps, delay, gyroscopic_terms);
+  return std::make_unique<SampledActuation>(scene, arm, period_steps, delay);
 }
 
 }  // namespace hamelin::simulation

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "energy_audit.hpp"
-#include "hamelin/control/torque_limits.hpp"
+#include "hamelin/control/controller.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "simulated_arm.hpp"
 
@@ -27,9 +27,7 @@ class Actuation {
   virtual void book(SimulatedArm& arm, const planning::CommandBuffers& answer,
                     EnergyAudit& audit) = 0;
   /// Puts the answer into the channels and the state. It acts until the next node.
-  /// @param q_measured joint positions that the planner was given
-  virtual void apply(SimulatedArm& arm, const planning::CommandBuffers& answer,
-                     const Eigen::VectorXd& q_measured, EnergyAudit& audit) = 0;
+  virtual void apply(SimulatedArm& arm, const control::Answer& answer, EnergyAudit& audit) = 0;
   /// Whether the account of the last node needs one more answer of the planner.
   [[nodiscard]] virtual bool needs_answer_at_end() const = 0;
   /// Velocity with which the motion leaves the node.
@@ -44,11 +42,9 @@ class Actuation {
 };
 
 /// The actuation of a scene.
-/// @param gyroscopic_terms the most that a planner may return
 /// @throws Error invalid for periods and delays that are not integer multiples of the step
 [[nodiscard]] std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene,
-                                                        SimulatedArm& arm,
-                                                        std::size_t gyroscopic_terms);
+                                                        SimulatedArm& arm);
 
 /// Steps between two ticks of the planner. @throws Error invalid
 [[nodiscard]] long steps_per_tick(const scene::Scene& scene);

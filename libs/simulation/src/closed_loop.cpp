@@ -22,9 +22,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-// Obstacles are searched within this distance if the planner gives no other.
-constexpr double default_influence_m = 0.2;
-
 // Prefixes errors of another library with the scene's name.
 template <class F>
 auto in_scene(const scene::Scene& scene, const char* place, F&& f) {
@@ -45,6 +42,16 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
   }
   inputs.push_back({"plugin", plugin.file()});
   return inputs;
+}
+
+// Whether nothing is hidden from the controller, nothing changes, and it measures exactly: then one
+// view of the world serves controller and judge.
+bool controller_sees_all(const scene::Scene& scene) {
+  const bool exact =
+      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0;
+  return exact && !(scene.map && !scene.map->changes.empty()) &&
+         std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
+                     [](const auto& o) { return o.known && !o.judge_only; });
 }
 
 model::Model load_checked(const scene::Scene& scene) {
@@ -72,7 +79,6 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       model_(load_checked(scene)),
       options_(integrator_options(scene.integrator.params, scene.name + ": /integrator/params")),
       arm_(scene, model_, options_),
-      goals_(scene.goals, scene.stall, model_),
       noise_(scene.seed),
       q_measured_(VectorXd::Zero(model_.dof())) {
   result_.warnings = model::warnings(model_.robot());
@@ -81,30 +87,26 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
                              [&] { return planning::check_params(plugin, scene.planner->params); });
   steps_ =
       in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
-  const double influence = plugin.influence_m(planner_params_).value_or(default_influence_m);
-  world_ = std::make_unique<control::WorldView>(scene, model_, influence);
-  if (world_->has_self() && !world_->self_field()->note().empty())
-    result_.warnings.push_back(world_->self_field()->note());
-  arm_.channels.gyroscopic.reserve(world_->contacts_max());
-  actuation_ = make_actuation(scene, arm_, world_->contacts_max());
-  make_planner(plugin);
-  inputs_ = all_inputs(scene, plugin);
-}
-
-void ClosedLoop::make_planner(const planning::Plugin& plugin) {
-  const auto create = [&](const model::Model& nominal) {
-    planner_ = std::make_unique<control::PlannerHost>(
-        plugin,
-        control::planner_setup(scene_, nominal, *world_,
-                               static_cast<double>(steps_per_tick(scene_)) * scene_.step_s),
-        planner_params_, *world_,
-        [this](std::int32_t level, std::string_view line) { log_planner_message(level, line); });
+  actuation_ = make_actuation(scene, arm_);
+  control::Controller::Options options;
+  options.obstacles_max = 0;  // no more than the scene's
+  options.prepare_maps = false;
+  options.certify = false;  // the judge does, for every step and with all obstacles
+  options.torque = scene.actuation.type == scene::ActuationType::sampled;
+  options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
+  options.log = [this](std::int32_t level, std::string_view line) {
+    log_planner_message(level, line);
   };
-  const double mass_scale = scene_.actuation.planner_mass_scale;
-  if (mass_scale == 1.0)
-    create(model_);
-  else
-    create(scaled_masses(model_, mass_scale));
+  controller_ = std::make_unique<control::Controller>(scene, model_, plugin, planner_params_,
+                                                      std::move(options));
+  if (!controller_sees_all(scene))
+    own_judge_ =
+        std::make_unique<control::WorldView>(scene, model_, controller_->view().influence_m());
+  judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
+  if (judge_->has_self() && !judge_->self_field()->note().empty())
+    result_.warnings.push_back(judge_->self_field()->note());
+  arm_.channels.gyroscopic.reserve(controller_->view().contacts_max());
+  inputs_ = all_inputs(scene, plugin);
 }
 
 void ClosedLoop::log_planner_message(std::int32_t level, std::string_view line) {
@@ -135,13 +137,13 @@ void ClosedLoop::start(const Watch& watch) {
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
   audit_ = std::make_unique<EnergyAudit>(*recorder_,
                                          ideal && arm_.integrator->name() == "hamel-variational");
-  log_ = std::make_unique<TickLog>(*recorder_, arm_, *world_, goals_, *actuation_);
+  log_ = std::make_unique<TickLog>(*recorder_, arm_, *judge_, controller_->goals(), *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging())
-    log_->header(scene_, planner_->plugin(), planner_params_, result_.provenance, steps_);
+    log_->header(scene_, controller_->plugin(), planner_params_, result_.provenance, steps_);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
-  min_clearance_ = world_->influence_m();
-  min_self_clearance_ = world_->self_influence_m();
+  min_clearance_ = judge_->influence_m();
+  min_self_clearance_ = judge_->self_influence_m();
   warn_of_goals_in_contact(watch);
 }
 
@@ -149,7 +151,9 @@ log::Result ClosedLoop::run(const Watch& watch) {
   start(watch);
   while (!done_) {
     TickTimer timer;
+    if (own_judge_) timer.pause();  // what only the judge does is no part of a tick
     observe_node();
+    if (own_judge_) timer.resume();
     check_outcome();
     if (done_)
       book_last_node();
@@ -170,23 +174,19 @@ log::Result ClosedLoop::run(const Watch& watch) {
 
 void ClosedLoop::observe_node() {
   actuation_->reach_node(arm_);
-  world_->look(arm_.state.q, arm_.state.time_s);
-  for (const int found : world_->revealed())
-    recorder_->event(
-        arm_.state.time_s,
-        fmt::format("obstacle '{}' becomes visible",
-                    world_->environment().obstacles()[static_cast<std::size_t>(found)].name));
-  min_clearance_ = std::min(min_clearance_, world_->clearance_m());
-  min_self_clearance_ = std::min(min_self_clearance_, world_->self_clearance_m());
-  touching_ = world_->touching();
-  if (arm_.state.k > 0 && (world_->has_obstacles() || world_->has_self())) certify();
+  judge_->look(arm_.state.q, arm_.state.time_s);
+  reveal_obstacles();
+  min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
+  min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
+  touching_ = judge_->touching();
+  if (arm_.state.k > 0 && (judge_->has_obstacles() || judge_->has_self())) certify();
   change_map();
-  recorder_->observe(world_->clearance_m(), certified_, arm_.v, scene_.step_s);
+  recorder_->observe(judge_->clearance_m(), certified_, arm_.v, scene_.step_s);
   if (watch_->at_node) watch_->at_node(arm_.state.time_s, arm_.state.q);
 }
 
 void ClosedLoop::certify() {
-  const auto verdict = world_->certify(arm_.state.q, arm_.v);
+  const auto verdict = judge_->certify(arm_.state.q, arm_.v);
   certified_ = verdict.certified;
   ++checked_steps_;
   if (certified_) ++certified_steps_;
@@ -196,20 +196,35 @@ void ClosedLoop::certify() {
   const std::string parts =
       verdict.self_pair < 0
           ? ""
-          : fmt::format("of {} ", world_->self_field()->describe(verdict.self_pair));
+          : fmt::format("of {} ", judge_->self_field()->describe(verdict.self_pair));
   finish(log::Outcome::collision, fmt::format("contact {}between the nodes {} and {}", parts,
                                               arm_.state.k - 1, arm_.state.k));
+}
+
+void ClosedLoop::reveal_obstacles() {
+  for (const int found : judge_->revealed()) {
+    scene::Obstacle obstacle = judge_->environment().obstacles()[static_cast<std::size_t>(found)];
+    recorder_->event(arm_.state.time_s,
+                     fmt::format("obstacle '{}' becomes visible", obstacle.name));
+    obstacle.known = true;
+    controller_->world().set_obstacle(std::move(obstacle));
+  }
 }
 
 // The step that led here was checked against the old map; what follows is checked against the new
 // one.
 void ClosedLoop::change_map() {
-  const std::string change = world_->advance_map();
+  const std::string change = own_judge_ ? own_judge_->advance_map() : "";
   if (change.empty()) return;
   report_event(false, change);
-  world_->look(arm_.state.q, arm_.state.time_s);
-  min_clearance_ = std::min(min_clearance_, world_->clearance_m());
-  touching_ = touching_ || world_->clearance_m() <= 0.0;
+  for (const auto& changes = scene_.map->changes;
+       next_map_change_ < changes.size() &&
+       changes[next_map_change_].time_s <= arm_.state.time_s + 1e-9;
+       ++next_map_change_)
+    controller_->world().change_map(changes[next_map_change_]);
+  judge_->look(arm_.state.q, arm_.state.time_s);
+  min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
+  touching_ = touching_ || judge_->clearance_m() <= 0.0;
 }
 
 void ClosedLoop::check_outcome() {
@@ -217,16 +232,15 @@ void ClosedLoop::check_outcome() {
   if (!arm_.v.allFinite() || !state.q.allFinite())
     return finish(log::Outcome::diverged,
                   fmt::format("step {}: the state is no longer finite", state.k));
-  if (touching_ && state.k > 0) return finish(log::Outcome::collision, world_->describe_contact());
+  if (touching_ && state.k > 0) return finish(log::Outcome::collision, judge_->describe_contact());
   if (touching_) return refuse();
   if (done_) return;
-  while (goals_.advance(world_->poses(), state.q, arm_.v))
-    recorder_->event(state.time_s,
-                     fmt::format("goal {} of {} reached", goals_.index(), goals_.size()));
-  if (goals_.all_reached())
+  const bool tick = actuation_->asks_planner(state.k);
+  if (tick) let_controller_observe();
+  const control::ControlState now = controller_->answer().state;
+  if (now == control::ControlState::reached)
     finish(log::Outcome::reached, "");
-  else if (!planner_->has_own_stall_rule() &&
-           goals_.stalled(world_->poses(), arm_.v, scene_.step_s))
+  else if (tick && now == control::ControlState::stalled)
     finish(log::Outcome::stalled,
            fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
   else if (state.k == steps_)
@@ -236,58 +250,72 @@ void ClosedLoop::check_outcome() {
 }
 
 void ClosedLoop::refuse() {
-  std::string cause = world_->describe_contact();
-  if (world_->clearance_m() > 0.0)
+  std::string cause = judge_->describe_contact();
+  if (judge_->clearance_m() > 0.0)
     cause += fmt::format("; {}", scene::self_contact_remedy(scene_.robot));
   finish(log::Outcome::refused, std::move(cause));
 }
 
-bool ClosedLoop::call_planner() {
+void ClosedLoop::let_controller_observe() {
+  observed_k_ = arm_.state.k;
   q_measured_ = arm_.state.q;
   if (scene_.actuation.joint_noise_rad > 0.0 &&
       scene_.actuation.type == scene::ActuationType::sampled)
     for (auto& angle : q_measured_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  return planner_->tick(arm_.state.k, arm_.state.time_s, q_measured_, arm_.v, goals_.index());
+  controller_->observe(arm_.state.time_s, q_measured_, arm_.v);
+  const control::GoalTracker& goals = controller_->goals();
+  while (goals_reached_ < goals.index())
+    recorder_->event(arm_.state.time_s,
+                     fmt::format("goal {} of {} reached", ++goals_reached_, goals.size()));
 }
 
 void ClosedLoop::ask_planner() {
-  if (!call_planner())
-    finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
-                                             arm_.state.k, planner_->error()));
-  else if (planner_->gave_up())
-    finish(log::Outcome::stalled, planner_->command().raw().cause);
+  controller_->decide();
+  if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
+    finish(log::Outcome::stalled, std::string(controller_->answer().cause));
   if (done_ && !actuation_->needs_answer_at_end()) book_last_node();
 }
 
+bool ClosedLoop::planner_answered() {
+  const control::Answer& answer = controller_->answer();
+  if (answer.channels != nullptr) return true;
+  finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
+                                           arm_.state.k, answer.cause));
+  return false;
+}
+
 void ClosedLoop::apply_answer() {
-  actuation_->book(arm_, planner_->command(), *audit_);
+  const planning::CommandBuffers& channels = *controller_->answer().channels;
+  actuation_->book(arm_, channels, *audit_);
   finish_if(audit_->fault(arm_));
-  const std::string fault = audit_->fault_of_planner(planner_->command().raw());
+  const std::string fault = audit_->fault_of_planner(channels.raw());
   if (!fault.empty())
     finish_if(
         fmt::format("planner '{}' at step {}: {}", scene_.planner->name, arm_.state.k, fault));
-  if (!done_) actuation_->apply(arm_, planner_->command(), q_measured_, *audit_);
+  if (!done_) actuation_->apply(arm_, controller_->answer(), *audit_);
 }
 
 // Only the planner knows a control potential's value and its gradient for the closing half-kick.
 void ClosedLoop::book_last_node() {
   if (arm_.state.k == 0 || result_.outcome == log::Outcome::diverged) return;
-  if (!actuation_->needs_answer_at_end())
+  if (!actuation_->needs_answer_at_end()) {
     audit_->book_node(arm_);
-  else if (call_planner())
-    actuation_->book(arm_, planner_->command(), *audit_);
-  else
-    return;
+  } else {
+    if (observed_k_ != arm_.state.k) let_controller_observe();
+    controller_->decide();
+    if (controller_->answer().channels == nullptr) return;
+    actuation_->book(arm_, *controller_->answer().channels, *audit_);
+  }
   if (result_.outcome != log::Outcome::collision) finish_if(audit_->fault(arm_));
 }
 
 void ClosedLoop::write_tick() {
   if (recorder_->wants_tick(arm_.state.k) || (done_ && recorder_->logging()))
-    log_->tick(certified_, done_ ? nullptr : &planner_->command());
+    log_->tick(certified_, done_ ? nullptr : controller_->answer().channels);
 }
 
 void ClosedLoop::step() {
-  world_->depart(arm_.state.q, actuation_->departure_velocity(arm_));
+  judge_->depart(arm_.state.q, actuation_->departure_velocity(arm_));
   if (actuation_->saturated()) ++saturated_steps_;
   const bool converged = arm_.step(scene_.step_s);
   recorder_->step(arm_.report);
@@ -313,7 +341,7 @@ void ClosedLoop::finish_if(std::string defect) {
 
 void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
   const std::array<double, 1> point{0.0};
-  const auto& environment = world_->environment();
+  const auto& environment = judge_->environment();
   for (std::size_t i = 0; i < scene_.goals.size(); ++i) {
     const auto& goal = scene_.goals[i];
     const bool of_joints = goal.type == scene::GoalType::joint;
@@ -321,11 +349,11 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
       result_.warnings.push_back(fmt::format("goal {}: {}", i + 1, what));
       if (watch.diagnostics) watch.diagnostics->info(result_.warnings.back());
     };
-    if (!world_->has_obstacles() && !world_->has_self()) return;
+    if (!judge_->has_obstacles() && !judge_->has_self()) return;
     const scene::Shapes placed =
-        of_joints ? world_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
+        of_joints ? judge_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
     scene::Contact deepest;
-    if (world_->deepest_at_start(placed, deepest))
+    if (judge_->deepest_at_start(placed, deepest))
       warn(fmt::format("{}; the exit direction is {}",
                        of_joints
                            ? environment.describe(deepest, model_)
@@ -333,35 +361,36 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
                                          environment.describe(deepest.obstacle)),
                        scene::describe_exit_direction(deepest)));
     scene::SelfContact worst;
-    if (of_joints && world_->deepest_self(placed, worst))
+    if (of_joints && judge_->deepest_self(placed, worst))
       warn(fmt::format("the arm touches itself: {} are {:.2g} mm inside each other",
-                       world_->self_field()->describe(worst.pair), -1e3 * worst.distance));
+                       judge_->self_field()->describe(worst.pair), -1e3 * worst.distance));
   }
 }
 
 void ClosedLoop::fill_result() {
-  if (world_->has_obstacles()) result_.min_clearance_m = min_clearance_;
-  if (world_->has_self()) result_.min_self_clearance_m = min_self_clearance_;
+  if (judge_->has_obstacles()) result_.min_clearance_m = min_clearance_;
+  if (judge_->has_self()) result_.min_self_clearance_m = min_self_clearance_;
   result_.scene = scene_.name;
-  result_.planner = planner_->plugin().name();
+  result_.planner = controller_->plugin().name();
   result_.time_s = arm_.state.time_s;
   result_.steps = arm_.state.k;
   result_.q = arm_.state.q;
   result_.v = arm_.v;
   result_.seed = scene_.seed;
   dynamics::forward_kinematics(model_, arm_.ws, arm_.state.q);
-  const control::GoalError error = goals_.error(arm_.ws, arm_.state.q, arm_.v);
+  const control::GoalTracker& goals = controller_->goals();
+  const control::GoalError error = goals.error(arm_.ws, arm_.state.q, arm_.v);
   log::Result::Goal out;
-  out.type = scene::type_name(goals_.goal());
-  out.index = goals_.index();
-  out.count = goals_.size();
+  out.type = scene::type_name(goals.goal());
+  out.index = goals.index();
+  out.count = goals.size();
   out.error_m = error.metres;
   out.error_rad = error.radians;
   result_.goal = out;
   if (checked_steps_ > 0)
     result_.certified_share =
         static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
-  for (const auto& warning : world_->environment().summary().warnings)
+  for (const auto& warning : judge_->environment().summary().warnings)
     result_.warnings.push_back(warning);
   if (actuation_->limited() && arm_.state.k > 0) {
     result_.saturated_share =

@@ -5,8 +5,7 @@
 
 #include "actuation.hpp"
 #include "energy_audit.hpp"
-#include "hamelin/control/goal_tracker.hpp"
-#include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/controller.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/simulation/run.hpp"
@@ -16,8 +15,9 @@
 
 namespace hamelin::simulation {
 
-/// A scene that is ready to run: the control part (world, planner, goals), the simulated arm, and
-/// the actuation that carries out the planner's answers. One object per run.
+/// A scene that is ready to run: the controller, the simulated arm, the actuation that carries out
+/// the controller's answers, and a judge who sees all obstacles and watches every step. It also
+/// plays the sensor that shows the controller obstacles and changes of the map. One object per run.
 class ClosedLoop {
  public:
   /// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
@@ -26,7 +26,6 @@ class ClosedLoop {
   [[nodiscard]] log::Result run(const Watch& watch);
 
  private:
-  void make_planner(const planning::Plugin& plugin);
   /// Logs a message of the planner.
   void log_planner_message(std::int32_t level, std::string_view line);
   /// Reports an event to the log and to diagnostics.
@@ -39,14 +38,18 @@ class ClosedLoop {
   /// stayed clear, and changes of the map that are due.
   void observe_node();
   void certify();
+  /// Shows the controller obstacles that come into sight.
+  void reveal_obstacles();
   void change_map();
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
   /// Ends a run whose start is in contact.
   void refuse();
-  /// Calls the planner at this node. @return false if it failed
-  bool call_planner();
+  /// Lets the controller look at the arm, as it measures it, and at its goals.
+  void let_controller_observe();
   void ask_planner();
+  /// Ends the run if the controller's planner failed. @return whether it did not
+  bool planner_answered();
   /// Books the node and applies the answer.
   void apply_answer();
   /// Books the last node: nothing acts any more, but its energies belong to the account.
@@ -66,9 +69,11 @@ class ClosedLoop {
   Json planner_params_;
   std::vector<log::Input> inputs_;
   log::Result result_;
-  std::unique_ptr<control::WorldView> world_;
-  std::unique_ptr<control::PlannerHost> planner_;
-  control::GoalTracker goals_;
+  std::unique_ptr<control::Controller> controller_;
+  /// The judge's own view; null if the controller sees all that exists, and where the arm really
+  /// is.
+  std::unique_ptr<control::WorldView> own_judge_;
+  control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
   Rng noise_;
   Eigen::VectorXd q_measured_;
@@ -88,6 +93,8 @@ class ClosedLoop {
   bool done_ = false;
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;
+  std::size_t next_map_change_ = 0, goals_reached_ = 0;
+  long observed_k_ = -1;  ///< the step at which the controller last looked
 };
 
 }  // namespace hamelin::simulation

@@ -45,14 +45,4 @@ planning::Plugin find_planner(const scene::Scene& scene,
   return planning::find_plugin(scene.planner->name, directories);
 }
 
-model::Model scaled_masses(const model::Model& arm, double scale) {
-  model::Robot robot = arm.robot();
-  for (auto& link : robot.links) {
-    link.mass_kg *= scale;
-    link.inertia_kg_m2 *= scale;
-    link.joint.armature *= scale;
-  }
-  return model::Model(std::move(robot), arm.base(), arm.gravity());
-}
-
 }  // namespace hamelin::simulation

@@ -16,7 +16,4 @@ void check_numbers(const scene::Scene& scene, const model::Model& model);
 [[nodiscard]] planning::Plugin find_planner(const scene::Scene& scene,
                                             const std::vector<std::filesystem::path>& directories);
 
-/// The same arm with all masses and inertias scaled by one factor.
-[[nodiscard]] model::Model scaled_masses(const model::Model& arm, double scale);
-
 }  // namespace hamelin::simulation

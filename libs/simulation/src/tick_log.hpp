@@ -12,6 +12,7 @@ namespace hamelin::simulation {
 /// Writes the header and ticks of a run in closed loop.
 class TickLog {
  public:
+  /// @param world all obstacles, those that the planner does not know included
   TickLog(Recorder& recorder, SimulatedArm& arm, const control::WorldView& world,
           const control::GoalTracker& goals, Actuation& actuation)
       : recorder_(recorder), arm_(arm), world_(world), goals_(goals), actuation_(actuation) {

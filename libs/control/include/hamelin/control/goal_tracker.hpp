@@ -31,6 +31,11 @@ class GoalTracker {
   /// Selects the next goal if the current one is reached. @return whether it was
   [[nodiscard]] bool advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                              const Eigen::VectorXd& v);
+  /// Starts again with the first goal.
+  void restart() noexcept {
+    index_ = 0;
+    rest_s_ = 0.0;
+  }
   [[nodiscard]] bool all_reached() const noexcept { return index_ == goals_.size(); }
   /// Index of the current goal; size() after the last.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "hamelin/control/newest.hpp"
@@ -40,7 +41,8 @@ class World {
   };
 
   /// The surroundings of a scene: its map with unknown space and self-filter, and its obstacles,
-  /// except those that are judge_only or not known.
+  /// except those that are judge_only or not known. The id of an obstacle of the scene is its index
+  /// there, also if it is added later.
   /// @throws Error io, parse or invalid, also for more obstacles than obstacles_max
   World(const scene::Scene& scene, const model::Model& model, const Options& options);
 
@@ -96,6 +98,8 @@ class World {
   std::size_t contacts_max_ = 0;
   mutable std::mutex mutex_;  ///< among writers; the control loop never takes it
   std::int32_t next_id_ = 0;
+  /// Obstacles of the scene that are not known at first, with their indices in the scene.
+  std::vector<std::pair<std::string, std::int32_t>> reserved_;
   std::shared_ptr<const WorldSnapshot> latest_;
   std::optional<Newest<View>> newest_;
 };

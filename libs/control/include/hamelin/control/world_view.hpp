@@ -38,7 +38,8 @@ class WorldView {
   /// Takes the newest snapshot of the World; results of the last look() still belong to the one
   /// before. @return whether it is another one
   bool take_newest();
-  /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q.
+  /// Updates contacts(), self_contacts(), clearances and poses() to the configuration q. Costs
+  /// nothing if the last look was at the same configuration, time and snapshot.
   void look(const Eigen::VectorXd& q, double time_s);
   /// Makes the configuration of the last look() the start of the motion for certify().
   void depart(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
@@ -49,7 +50,10 @@ class WorldView {
   /// Applies the changes of the map that are due. Results of the last look() still belong to the
   /// old map.
   /// @return one line that describes them; empty if none was due
-  [[nodiscard]] std::string advance_map() { return own_->environment.advance(time_s_); }
+  [[nodiscard]] std::string advance_map() {
+    current_ = false;
+    return own_->environment.advance(time_s_);
+  }
 
   /// The near points that a planner is shown: shapes in order, nearest first within a shape.
   [[nodiscard]] std::span<const scene::Contact> contacts() const noexcept {
@@ -145,6 +149,8 @@ class WorldView {
   std::vector<int> revealed_;
 
   // at the configuration of the last look()
+  bool current_ = false;  ///< whether the following belongs to q_, time_s_ and environment_
+  Eigen::VectorXd q_;
   dynamics::Workspace poses_;
   double time_s_ = 0.0;
   std::vector<scene::Contact> contacts_, other_contacts_;

@@ -28,8 +28,8 @@ class MapField {
   /// @param resolution edge of a voxel [m]
   /// @param reachable where most queries will be
   MapField(const std::vector<Cell>& cells, double resolution, const Ball& reachable);
-  /// A copy can be changed while queries run on the original. It computes table and surface anew
-  /// when they are needed.
+  /// A copy can be changed while queries run on the original. It computes table and surface
+  /// when they are first needed.
   MapField(const MapField& other);
   MapField(MapField&&) noexcept = default;
   MapField& operator=(const MapField&) = delete;

@@ -1,0 +1,198 @@
+#include "hamelin/control/controller.hpp"
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <random>
+#include <thread>
+
+#include "hamelin/integration/integrator.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/test/allocations.hpp"
+
+using namespace hamelin;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+const std::filesystem::path data_folder = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
+
+// A scene of data/, controlled by one torque per millisecond as a robot is.
+scene::Scene sampled(const std::string& name) {
+  scene::Scene scene = scene::read_scene(data_folder / "scenes" / name);
+  scene.actuation.type = scene::ActuationType::sampled;
+  scene.actuation.control_period_s = scene.step_s = 0.001;
+  return scene;
+}
+
+// An arm that is simulated by an integrator alone, and a controller that moves it.
+struct Loop {
+  explicit Loop(const scene::Scene& scene, control::Controller::Options options = {},
+                const Json& params = Json::object())
+      : arm(simulation::load_model(scene)),
+        plugin(planning::find_plugin(scene.planner->name,
+                                     {HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR})),
+        controller(scene, arm, plugin, planning::check_params(plugin, params), std::move(options)),
+        integrator(integration::make_integrator("hamel-variational", arm)),
+        state(integrator->start(scene.start_q, VectorXd::Zero(arm.dof()))),
+        v(VectorXd::Zero(arm.dof())) {}
+
+  const control::Answer& tick() { return controller.tick(state.time_s, state.q, v); }
+
+  void step(const VectorXd& torque) {
+    channels.held_torque = torque;
+    REQUIRE(integrator->step(state, channels, 0.001).converged);
+    state.time_s = 0.001 * static_cast<double>(state.k);
+    integrator->velocity(state, v);
+  }
+
+  model::Model arm;
+  planning::Plugin plugin;
+  control::Controller controller;
+  std::unique_ptr<integration::Integrator> integrator;
+  integration::State state;
+  integration::Channels channels;
+  VectorXd v;
+};
+
+}  // namespace
+
+TEST_CASE("a controller without a simulation takes an arm to its goals, each step proved clear",
+          "[control][controller]") {
+  const scene::Scene scene = sampled("clutter.json");
+  Loop loop(scene);
+  control::ControlState state = control::ControlState::running;
+  int uncertified = 0;
+  double clearance = 1.0;
+  for (int k = 0; k < 20000 && state == control::ControlState::running; ++k) {
+    const control::Answer& answer = loop.tick();
+    state = answer.state;
+    clearance = std::min(clearance, loop.controller.view().clearance_m());
+    if (loop.controller.verdict() && !loop.controller.verdict()->certified) ++uncertified;
+    loop.step(answer.torque);
+  }
+  CHECK(state == control::ControlState::reached);
+  CHECK(loop.controller.answer().goal_index == scene.goals.size());
+  CHECK(clearance > 0.0);
+  CHECK(uncertified == 0);
+}
+
+TEST_CASE("an obstacle that is added while the arm moves is avoided", "[control][controller]") {
+  const scene::Scene scene = sampled("clutter.json");
+  const auto clearance_of_crate = [&](bool tell) {
+    Loop loop(scene);
+    scene::Obstacle crate;
+    crate.name = "crate";
+    crate.radius_m = 0.08;
+    double least = 1.0;
+    for (int k = 0; k < 6000; ++k) {
+      const control::Answer& answer = loop.tick();
+      if (k == 300) {  // in the way of the arm without it
+        const geometry::SE3 tip = dynamics::tip_pose(loop.arm, loop.controller.view().poses());
+        crate.pose = {Eigen::Matrix3d::Identity(), tip.p() + Vector3d(0.12, 0.12, 0.16)};
+        if (tell) loop.controller.world().set_obstacle(crate);
+      }
+      if (k > 300) {
+        scene::PlacedShapes shapes(loop.arm);
+        shapes.place(loop.arm, loop.controller.view().poses());
+        const scene::Environment alone(std::nullopt, {crate}, scene.base, 2.0, 0.5);
+        least = std::min(least, alone.clearance(shapes.view(), 0.0, 1.0));
+      }
+      loop.step(answer.torque);
+    }
+    return least;
+  };
+  CHECK(clearance_of_crate(false) < 0.0);
+  CHECK(clearance_of_crate(true) > 0.0);
+}
+
+TEST_CASE("a planner that fails is replaced by a brake that brings the arm to rest",
+          "[control][controller]") {
+  for (const std::string how : {"throw", "nan"}) {
+    scene::Scene scene = sampled("clutter.json");
+    scene.planner->name = "breaking";
+    Loop loop(scene, {}, {{"at_tick", 100}, {"how", how}});
+    loop.state = loop.integrator->start(scene.start_q, VectorXd::Constant(loop.arm.dof(), 0.2));
+    loop.v.setConstant(0.2);
+    for (int k = 0; k < 1000; ++k) {
+      const control::Answer& answer = loop.tick();
+      CHECK(answer.torque.allFinite());
+      CHECK((answer.state == control::ControlState::stopping) == (k >= 100));
+      CHECK(answer.cause.empty() == (k < 100));
+      loop.step(answer.torque);
+    }
+    CHECK(loop.v.lpNorm<Eigen::Infinity>() < 1e-3);
+  }
+}
+
+TEST_CASE("positions for the next period follow with bounded acceleration and jerk",
+          "[control][controller]") {
+  const scene::Scene scene = sampled("clutter.json");
+  control::Controller::Options options;
+  options.position = true;
+  options.acceleration_max = 10.0;
+  options.jerk_max = 2000.0;
+  Loop loop(scene, options);
+  VectorXd q = scene.start_q, v = VectorXd::Zero(loop.arm.dof()), a = v;
+  double acceleration = 0.0, jerk = 0.0;
+  control::ControlState state = control::ControlState::running;
+  for (int k = 0; k < 20000 && state == control::ControlState::running; ++k) {
+    const control::Answer& answer = loop.controller.tick(0.001 * k, q, v);  // perfect servos
+    const VectorXd next = (answer.v_next - v) / 0.001;
+    acceleration = std::max(acceleration, next.lpNorm<Eigen::Infinity>());
+    if (k > 0) jerk = std::max(jerk, (next - a).lpNorm<Eigen::Infinity>() / 0.001);
+    CHECK(answer.q_next.isApprox(q + 0.001 * answer.v_next, 1e-12));
+    a = next;
+    q = answer.q_next;
+    v = answer.v_next;
+    state = answer.state;
+  }
+  CHECK(state == control::ControlState::reached);
+  CHECK(acceleration <= 10.0 * (1.0 + 1e-9));
+  CHECK(jerk <= 2000.0 * (1.0 + 1e-6));
+}
+
+TEST_CASE("ticks neither allocate nor tear while two threads change the world",
+          "[control][controller]") {
+  scene::Scene scene = sampled("clutter.json");
+  control::Controller::Options options;
+  options.obstacles_max = 8;
+  Loop loop(scene, options);
+  std::atomic<bool> stop{false};
+  std::thread obstacles([&] {
+    std::mt19937 random(1);
+    while (!stop) {
+      scene::Obstacle ball;
+      ball.name = "ball " + std::to_string(random() % 4);
+      ball.radius_m = 0.05;
+      ball.pose = {Eigen::Matrix3d::Identity(),
+                   {2.0 + 0.1 * static_cast<double>(random() % 10), 0.0, 0.5}};
+      loop.controller.world().set_obstacle(ball);
+    }
+  });
+  std::thread map([&] {
+    for (int i = 0; !stop; ++i) {
+      scene::MapChangeSpec change;
+      (i % 2 == 0 ? change.occupied_m : change.free_m) = {{{0.7, 0.7, 0.0}, {0.8, 0.8, 0.1}}};
+      loop.controller.world().change_map(change);
+    }
+  });
+  long allocations = 0, snapshots = 0;
+  std::uint64_t last = 0;
+  constexpr long ticks_max = 100'000;
+  for (long k = 0; snapshots < 200 && k < ticks_max; ++k) {
+    const control::Answer* answer = nullptr;
+    const long made = test::allocations_in([&] { answer = &loop.tick(); });
+    if (k > 0) allocations += made;  // the first tick of a planner may prepare
+    if (answer->snapshot != last) ++snapshots;
+    CHECK(answer->snapshot >= last);
+    last = answer->snapshot;
+    CHECK(loop.controller.view().environment().obstacles().size() <= 8);
+    loop.step(answer->torque);
+  }
+  stop = true;
+  obstacles.join();
+  map.join();
+  CHECK(snapshots == 200);
+  if (test::counts_allocations()) CHECK(allocations == 0);
+}
