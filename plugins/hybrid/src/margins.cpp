@@ -12,7 +12,7 @@ constexpr double smallest_margin_m = 0.001;
 
 Margins::Margins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),
-      dof_(setup.dof()),
+      goal_q_(Eigen::VectorXd::Zero(setup.dof())),
       self_at_goal_(params.self_m),
       clearance_at_goal_(setup.spheres().size()) {}
 
@@ -21,8 +21,8 @@ void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, dou
   std::fill(clearance_at_goal_.begin(), clearance_at_goal_.end(), radius);
   self_at_goal_ = params_.self_m;
   if (!joint_goal_) return;
-  surroundings.query(planning::ConstVectorMap(goal.q, dof_), radius,
-                     2.0 * params_.self_m + params_.slack_m);
+  goal_q_ = planning::ConstVectorMap(goal.q, goal_q_.size());
+  surroundings.query(goal_q_, radius, 2.0 * params_.self_m + params_.slack_m);
   for (const auto& contact : surroundings.contacts()) {
     auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contact.sphere)];
     clearance = std::min(clearance, contact.distance_m);

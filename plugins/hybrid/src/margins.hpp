@@ -32,7 +32,7 @@ class Margins {
   [[nodiscard]] double at_goal(const NearPoint& point) const;
 
   MarginParams params_;
-  int dof_;
+  Eigen::VectorXd goal_q_;  ///< of a joint goal; sized once, since a tick does not allocate
   bool joint_goal_ = false;
   double self_at_goal_ = 0.0;
   std::vector<double> clearance_at_goal_;
