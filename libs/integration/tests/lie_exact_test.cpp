@@ -148,7 +148,8 @@ TEST_CASE("the logarithm of a dual quaternion is the geometry library's at every
 }
 
 TEST_CASE(
-    "RIQN and Newton find the same lie-exact motion, Newton in at most three factorisations per step",
+    "RIQN and Newton find the same lie-exact motion, Newton in at most three factorisations per "
+    "step",
     "[integration][lie-exact]") {
   const int n = GENERATE(3, 7, 20);
   CAPTURE(n);
