@@ -117,7 +117,7 @@ inline Motion stretched(int links, double step_s, long steps) {
 }
 
 /// No gravity: every joint turns past π again and again.
-inline Motion turning(double step_s, long steps) {
+inline Motion turn_through_half_turns(double step_s, long steps) {
   return {"turning",
           model::Model(chain(3, "x,y,z"), geometry::SE3{}, Eigen::Vector3d::Zero()),
           VectorXd::Constant(3, 3.0),  // near π

@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
   fmt::print("{:<42} {:<20} {:>9} {:>9} {:>7} {:>8} {:>8} {:>8} {:>9}\n", "case", "scheme",
              "|dE| J", "max K J", "late/e.", "updates", "at most", "factors", "halvings");
   print("stretched, 7 links, 1 ms, 1 s", stretched(7, 1e-3, 1000), schemes);
-  print("turning through pi, 1 ms, 10 s", turning(1e-3, 10000), schemes);
+  print("turning through pi, 1 ms, 10 s", turn_through_half_turns(1e-3, 10000), schemes);
   print("100 links, 1 ms, 0.2 s", stretched(100, 1e-3, 200), schemes);
   print("200 links, 1 ms, 0.2 s", stretched(200, 1e-3, 200), schemes);
   print("tip 10^6 times as heavy, 1 ms, 1 s", mass_ratio(6, 1e-3, 1000), schemes);

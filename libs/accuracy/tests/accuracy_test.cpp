@@ -28,7 +28,7 @@ model::Model planar3() {
       std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/robots/planar3.json", {}));
 }
 
-Options falling(const std::string& schemes, const VectorXd& q0, double duration_s) {
+Options free_fall(const std::string& schemes, const VectorXd& q0, double duration_s) {
   Options options;
   options.name = "test";
   options.q0 = q0;
@@ -89,7 +89,7 @@ TEST_CASE("the reference of a pendulum agrees with the closed form, within its o
   for (const double q0 : {-1.2, 0.0, 1.1})
     for (const double duration_s : {0.3, 2.0}) {
       CAPTURE(q0, duration_s);
-      auto options = falling("rk4,hamel-variational", numbers({q0}), duration_s);
+      auto options = free_fall("rk4,hamel-variational", numbers({q0}), duration_s);
       options.steps_s = {0.01, 0.005};
       const Pendulum exact = pendulum(q0 + std::numbers::pi / 2.0, omega, duration_s);
       const Measurement found = measure(model, options);
@@ -122,7 +122,7 @@ TEST_CASE("the reference of spatial chains agrees with an independent program's"
   for (const auto& [q0, q] : cases) {
     CAPTURE(q0.size());
     const auto reference =
-        find_reference(chain(static_cast<int>(q0.size())), falling("rk4", numbers(q0), 0.5));
+        find_reference(chain(static_cast<int>(q0.size())), free_fall("rk4", numbers(q0), 0.5));
     CHECK(reference.error_q < 1e-10);
     CHECK((reference.q - numbers(q)).lpNorm<Eigen::Infinity>() < 1e-10);
   }
@@ -134,13 +134,13 @@ TEST_CASE("the reference of a long chain, whose coarse steps find no root, has a
   for (int i = 0; i < 20; ++i)
     q0[i] = std::vector<double>{
         0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6}[static_cast<std::size_t>(i % 7)];
-  const auto reference = find_reference(chain(20), falling("rk4", q0, 1.0));
+  const auto reference = find_reference(chain(20), free_fall("rk4", q0, 1.0));
   CHECK(reference.error_q < 1e-9);
 }
 
 TEST_CASE("errors of rows fall with the order of their schemes", "[accuracy]") {
-  auto options = falling("semi-implicit-euler,hamel-midpoint,hamel-variational,rk4",
-                         numbers({0.3, -0.25, 0.4}), 0.5);
+  auto options = free_fall("semi-implicit-euler,hamel-midpoint,hamel-variational,rk4",
+                           numbers({0.3, -0.25, 0.4}), 0.5);
   options.steps_s = {0.002, 0.001, 0.0005};
   const Measurement found = measure(chain(3), options);
   REQUIRE(found.rows.size() == 12);
@@ -162,7 +162,7 @@ TEST_CASE("errors of rows fall with the order of their schemes", "[accuracy]") {
 }
 
 TEST_CASE("under step control errors fall with the tolerance", "[accuracy]") {
-  auto options = falling("dop853", numbers({0.3, -0.25, 0.4}), 1.0);
+  auto options = free_fall("dop853", numbers({0.3, -0.25, 0.4}), 1.0);
   options.rtols = {1e-4, 1e-7, 1e-10};
   const Measurement found = measure(chain(3), options);
   REQUIRE(found.rows.size() == 3);
@@ -237,7 +237,7 @@ TEST_CASE("energy: the published scheme drifts by the known rate, the variationa
           "[accuracy]") {
   // Example 5.1 of Shen, Wang, Shi (2021) over 100 s: the energy error of hamel (α = ½) grows
   // linearly to 0.08 J, that of the variational scheme stays below 1.76e-4 J.
-  auto options = falling("hamel,hamel-variational", VectorXd::Zero(3), 100.0);
+  auto options = free_fall("hamel,hamel-variational", VectorXd::Zero(3), 100.0);
   options.steps_s = {0.01};
   options.reference = false;
   const Measurement found = measure(planar3(), options);
@@ -254,7 +254,7 @@ TEST_CASE("energy: the published scheme drifts by the known rate, the variationa
 
 TEST_CASE("energy is sampled at the requested interval, and always at the last node",
           "[accuracy]") {
-  auto options = falling("rk4", VectorXd::Zero(3), 1.0);
+  auto options = free_fall("rk4", VectorXd::Zero(3), 1.0);
   options.steps_s = {0.01};
   options.reference = false;
   options.every = 7;
@@ -262,7 +262,7 @@ TEST_CASE("energy is sampled at the requested interval, and always at the last n
 }
 
 TEST_CASE("energy dissipated by damping is booked and is not an error", "[accuracy]") {
-  auto options = falling("rk4", numbers({0.3, -0.25, 0.4}), 2.0);
+  auto options = free_fall("rk4", numbers({0.3, -0.25, 0.4}), 2.0);
   options.channels.damping = VectorXd::Constant(3, 0.05);
   options.steps_s = {0.002};
   const auto row = measure(chain(3), options).rows[0];
@@ -272,8 +272,8 @@ TEST_CASE("energy dissipated by damping is booked and is not an error", "[accura
 
 TEST_CASE("a run that diverges gives a row that says so, and other runs are not affected",
           "[accuracy]") {
-  auto options = falling("rk4,hamel-variational,dop853",
-                         numbers({0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6}), 20.0);
+  auto options = free_fall("rk4,hamel-variational,dop853",
+                           numbers({0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6}), 20.0);
   options.steps_s = {5.0, 20.0};
   options.rtols = {1e-3};
   options.reference = false;
@@ -291,7 +291,7 @@ TEST_CASE("a run that diverges gives a row that says so, and other runs are not 
 
 TEST_CASE("the same inputs give the same bytes except for times, and JSON keeps every field",
           "[accuracy]") {
-  auto options = falling("hamel-variational,rk4,dop853", numbers({0.3, -0.25, 0.4}), 0.5);
+  auto options = free_fall("hamel-variational,rk4,dop853", numbers({0.3, -0.25, 0.4}), 0.5);
   options.steps_s = {0.01, 0.005};
   options.rtols = {1e-6};
   options.tolerances = {1e-8, 1e-12};
@@ -433,7 +433,7 @@ TEST_CASE("lists of integrators are read, or refused with what was expected", "[
 TEST_CASE("options that cannot be measured are refused before any work", "[accuracy]") {
   const auto model = chain(3);
   const auto refused = [&](const auto& change, const char* words) {
-    auto options = falling("rk4", VectorXd::Zero(3), 1.0);
+    auto options = free_fall("rk4", VectorXd::Zero(3), 1.0);
     options.steps_s = {0.1};
     change(options);
     CHECK_THROWS_WITH(measure(model, options), Catch::Contains(words));

@@ -72,8 +72,8 @@ TEST_CASE("a mesh of degenerate triangles only is refused; among others they hav
   flat.vertices = {{0.0, 0.0, 0.0}, {0.1, 0.0, 0.0}, {0.2, 0.0, 0.0}};
   flat.triangles = {{0, 1, 2}, {0, 0, 1}};
   CHECK_THROWS_AS(Solid(flat), Error);
-  Mesh mixed = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
-  mixed.triangles.push_back({0, 0, 1});
-  mixed.triangles.push_back({2, 2, 2});
-  CHECK(Solid(mixed).signed_distance({0.05, 0.05, 0.05}) == Approx(-0.05));
+  Mesh with_degenerate = test::boxes({{Vector3d(0.0, 0.0, 0.0), Vector3d(0.1, 0.1, 0.1)}});
+  with_degenerate.triangles.push_back({0, 0, 1});
+  with_degenerate.triangles.push_back({2, 2, 2});
+  CHECK(Solid(with_degenerate).signed_distance({0.05, 0.05, 0.05}) == Approx(-0.05));
 }

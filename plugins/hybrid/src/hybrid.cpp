@@ -473,7 +473,7 @@ class Hybrid final : public planning::Planner {
   JointBox box_;
   SafetyFilter filter_;
   StallDetector stall_;
-  Memory memory_;
+  EscapeMemory memory_;
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;

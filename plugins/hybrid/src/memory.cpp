@@ -10,7 +10,7 @@ constexpr double memory_global_share = 0.2;  // share of candidates from all of 
 
 }  // namespace
 
-Memory::Memory(const planning::Setup& setup, const JointBox& box, int max_escapes)
+EscapeMemory::EscapeMemory(const planning::Setup& setup, const JointBox& box, int max_escapes)
     : box_(box),
       rng_(setup.seed()),
       via_(Eigen::VectorXd::Zero(setup.dof())),
@@ -19,12 +19,12 @@ Memory::Memory(const planning::Setup& setup, const JointBox& box, int max_escape
       scores_(candidates),
       visited_(setup.dof(), 2 * max_escapes + 2) {}
 
-void Memory::remember(const Eigen::VectorXd& q) {
+void EscapeMemory::remember(const Eigen::VectorXd& q) {
   visited_.col(visited_count_ % visited_.cols()) = q;
   ++visited_count_;
 }
 
-void Memory::draw_all(const Eigen::VectorXd& q) {
+void EscapeMemory::draw_all(const Eigen::VectorXd& q) {
   ++count_;
   remember(q);
   const double radius = std::min(2.5, 0.4 + 0.2 * count_);

@@ -10,9 +10,9 @@ namespace hamelin::hybrid {
 
 /// Escape by memory: random way-points around the arm that are far from its earlier stalls and not
 /// far from the goal.
-class Memory {
+class EscapeMemory {
  public:
-  Memory(const planning::Setup& setup, const JointBox& box, int max_escapes);
+  EscapeMemory(const planning::Setup& setup, const JointBox& box, int max_escapes);
 
   [[nodiscard]] int count() const noexcept { return count_; }
   [[nodiscard]] const Eigen::VectorXd& via() const noexcept { return via_; }

@@ -110,7 +110,7 @@ TEST_CASE("searches do not allocate", "[hybrid][allocation]") {
 TEST_CASE("the memory of stalls does not allocate", "[hybrid][allocation]") {
   if (!test::counts_allocations()) return;
   test::Scene scene(round_ball());
-  hybrid::Memory memory(scene.setup, scene.box, 5);
+  hybrid::EscapeMemory memory(scene.setup, scene.box, 5);
   const VectorXd stall = test::below_ball(), goal = test::above_ball();
   CHECK(allocations_in([&] {
           for (int i = 0; i < 20; ++i)

@@ -8,7 +8,7 @@
 using namespace hamelin;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
-using hybrid::Memory;
+using hybrid::EscapeMemory;
 using hybrid::StallDetector;
 
 namespace {
@@ -28,7 +28,7 @@ test::Task limited(std::uint64_t seed) {
 TEST_CASE("way-points are far from earlier stalls and earlier way-points", "[hybrid][memory]") {
   // The seed fixes the candidates, so only the memory makes a difference.
   test::Scene scene(limited(7));
-  Memory memory(scene.setup, scene.box, 60);
+  EscapeMemory memory(scene.setup, scene.box, 60);
   std::vector<VectorXd> visited;
   double nearest = 1e9;
   for (int i = 0; i < 12; ++i) {
@@ -47,7 +47,7 @@ TEST_CASE("way-points nearer to the goal are preferred", "[hybrid][memory]") {
   double with = 0.0, without = 0.0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     test::Scene scene(limited(seed));
-    Memory drawn(scene.setup, scene.box, 60), blind(scene.setup, scene.box, 60);
+    EscapeMemory drawn(scene.setup, scene.box, 60), blind(scene.setup, scene.box, 60);
     const auto distance = [&](const VectorXd& q) { return (q - goal).norm(); };
     drawn.next(VectorXd::Zero(4), distance, all_clear);
     blind.next(VectorXd::Zero(4), no_distance, all_clear);
@@ -59,14 +59,14 @@ TEST_CASE("way-points nearer to the goal are preferred", "[hybrid][memory]") {
 
 TEST_CASE("a way-point is clear if one of the best is, and within the limits", "[hybrid][memory]") {
   test::Scene scene(limited(3));
-  Memory memory(scene.setup, scene.box, 60);
+  EscapeMemory memory(scene.setup, scene.box, 60);
   int checked = 0;
   memory.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++checked == 3; });
   CHECK(checked == 3);
   CHECK(memory.via().lpNorm<Eigen::Infinity>() <= 2.0);
 
   // If none is clear, only the best few are checked and the best is taken.
-  Memory other(scene.setup, scene.box, 60), reference(scene.setup, scene.box, 60);
+  EscapeMemory other(scene.setup, scene.box, 60), reference(scene.setup, scene.box, 60);
   checked = 0;
   other.next(VectorXd::Zero(4), no_distance, [&](const VectorXd&) { return ++checked < 0; });
   CHECK(checked == 8);
@@ -77,7 +77,7 @@ TEST_CASE("a way-point is clear if one of the best is, and within the limits", "
 TEST_CASE("the seed decides the way-points", "[hybrid][memory]") {
   const auto vias = [](std::uint64_t seed) {
     test::Scene scene(limited(seed));
-    Memory memory(scene.setup, scene.box, 4);
+    EscapeMemory memory(scene.setup, scene.box, 4);
     Eigen::MatrixXd all(4, 20);  // more than it remembers
     for (int i = 0; i < 20; ++i) {
       memory.next(VectorXd::Constant(4, 0.1 * i), no_distance, all_clear);
@@ -91,7 +91,7 @@ TEST_CASE("the seed decides the way-points", "[hybrid][memory]") {
 
 TEST_CASE("a restart forgets all stalls", "[hybrid][memory]") {
   test::Scene scene(limited(3));
-  Memory memory(scene.setup, scene.box, 60);
+  EscapeMemory memory(scene.setup, scene.box, 60);
   memory.next(VectorXd::Zero(4), no_distance, all_clear);
   memory.restart();
   CHECK(memory.count() == 0);

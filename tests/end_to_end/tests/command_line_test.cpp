@@ -228,10 +228,10 @@ TEST_CASE("with --json standard output is one JSON document", "[command_line]") 
     CHECK(!test::run_json(sandbox, concatenated({"-q"}, command)).empty());
   }
 
-  const auto mixed = sandbox.run({"validate", shelf, "absent.json", "--json"});
-  CHECK(mixed.exit_code == 2);
-  CHECK(lines_of(mixed.err).size() == 1);
-  const Json entries = parse_json(mixed.out, "standard output");
+  const auto both = sandbox.run({"validate", shelf, "absent.json", "--json"});
+  CHECK(both.exit_code == 2);
+  CHECK(lines_of(both.err).size() == 1);
+  const Json entries = parse_json(both.out, "standard output");
   CHECK(entries[0]["ok"] == true);
   CHECK(entries[1]["ok"] == false);
   CHECK(entries[1]["error"].get<std::string>().find("absent.json") != std::string::npos);

@@ -50,19 +50,20 @@ TEST_CASE("a stretched arm falls out of its singular pose with its energy", "[ha
 }
 
 TEST_CASE("joints that turn past pi again and again keep their energy", "[hard]") {
-  const Outcome variational = run_checked(turning(1e-3, 10000), "hamel-variational");
+  const Outcome variational =
+      run_checked(turn_through_half_turns(1e-3, 10000), "hamel-variational");
   REQUIRE(variational.completed);
   CHECK(variational.q.cwiseAbs().maxCoeff() > 10.0 * M_PI);
   CHECK(variational.energy_error_J < 2e-3);
   CHECK(variational.late_over_early < 1.5);
   // The same motion with each joint a full turn further: only sine and cosine of an angle may
   // matter.
-  Motion again = turning(1e-3, 500);
+  Motion again = turn_through_half_turns(1e-3, 500);
   const VectorXd here = run(again, "hamel-variational").q;
   again.q0.array() -= 2.0 * M_PI;
   CHECK((run(again, "hamel-variational").q.array() + 2.0 * M_PI - here.array()).abs().maxCoeff() <
         1e-9);
-  check_second_order(turning, 2.5e-4, 1.0, 1e-4);
+  check_second_order(turn_through_half_turns, 2.5e-4, 1.0, 1e-4);
 }
 
 TEST_CASE(

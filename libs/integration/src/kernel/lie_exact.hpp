@@ -133,8 +133,8 @@ struct InverseExp {
   [[nodiscard]] Mat3 off_diagonal_derivative(const Vec3& a) const noexcept {
     using geometry::cross;
     const Vec3 wa = cross(x.w, a), va = cross(x.v, a), wwa = cross(x.w, wa);
-    const Vec3 mixed = cross(x.v, wa) + cross(x.w, va);
-    return scaled(outer(mixed, x.w) + outer(wwa, x.v), de) +
+    const Vec3 cross_terms = cross(x.v, wa) + cross(x.w, va);
+    return scaled(outer(cross_terms, x.w) + outer(wwa, x.v), de) +
            scaled(product(hat(x.v), hat(a)) + hat(va), -e) +
            scaled(outer(wwa, x.w), dde * w_dot_v) +
            scaled(hat(wa) + product(hat(x.w), hat(a)), -de * w_dot_v);
