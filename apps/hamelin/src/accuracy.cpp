@@ -7,6 +7,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "free_motion.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/report/report.hpp"
@@ -33,7 +34,7 @@ struct AccuracyFlags {
 
 int run_accuracy(const AccuracyFlags& flags) {
   scene::Scene scene = read_motion(flags.motion);
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
   set_start(flags.motion, model.dof(), scene);
   scene.integrator = {};  // the integrators of the command line are measured instead

@@ -5,6 +5,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "free_motion.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "integrator_options.hpp"
@@ -27,7 +28,7 @@ struct IntegrateOptions {
 
 int integrate(const IntegrateOptions& options) {
   scene::Scene scene = read_motion(options.motion);
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
   set_start(options.motion, model.dof(), scene);
   scene.step_s = options.step_s.value_or(scene.step_s);

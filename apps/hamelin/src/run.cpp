@@ -4,6 +4,7 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "record.hpp"
@@ -58,7 +59,7 @@ int run(const RunOptions& options) {
     print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
     return 0;
   }
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
   note_unmodelled(scene, model.robot());
   return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {

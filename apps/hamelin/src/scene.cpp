@@ -10,6 +10,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "document.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/self_collision.hpp"
@@ -136,7 +137,7 @@ Json map_json(const scene::Environment& environment, double reach_m) {
 
 Json scene_info(const std::filesystem::path& file) {
   const scene::Scene scene = scene::read_scene(file);
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const auto begin = std::chrono::steady_clock::now();
   const auto environment = scene::make_environment(scene, model, shown_influence_m);
   const double build_ms =

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "command_line.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/map_crop.hpp"
@@ -63,7 +64,7 @@ scene::Box extent(const scene::MapData& map) {
 // The region of the map to keep for a scene: the reach of its arm plus the influence distance of
 // its planner, in the map's frame.
 scene::Ball region_of_arm(const scene::Scene& scene, const CropFlags& flags) {
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   double influence = default_influence_m;
   if (flags.influence) {
     influence = *flags.influence;

@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/accuracy/accuracy.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
@@ -44,7 +45,7 @@ std::string describe_map(const scene::MapData& map) {
 // A scene is valid only if the files that it names are.
 std::string check_scene(const std::filesystem::path& file, bool strict) {
   const scene::Scene scene = scene::read_scene(file);
-  (void)simulation::load_model(scene);
+  (void)control::load_model(scene);
   std::string description = fmt::format(
       "scene, {}", check_robot(scene.robot.file,
                                {scene.robot.tip, scene.robot.spheres, scene.robot.srdf, strict}));

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/numbers.hpp"
 
 namespace hamelin::control {
@@ -30,33 +31,42 @@ TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
           scene.actuation.torque_rate_max_Nm_s};
 }
 
-}  // namespace
-
-model::Model scaled_masses(const model::Model& arm, double scale) {
-  if (scale == 1.0) return arm;
-  model::Robot robot = arm.robot();
-  for (auto& link : robot.links) {
-    link.mass_kg *= scale;
-    link.inertia_kg_m2 *= scale;
-    link.joint.armature *= scale;
-  }
-  return model::Model(std::move(robot), arm.base(), arm.gravity());
+model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
+  check_numbers(scene, arm);
+  return scaled_masses(arm, scene.actuation.planner_mass_scale);
 }
 
+}  // namespace
+
+Controller::Controller(const std::filesystem::path& scene_file,
+                       const std::vector<std::filesystem::path>& plugin_directories,
+                       Options options)
+    : Controller(scene::read_scene(scene_file), plugin_directories, std::move(options)) {}
+
+Controller::Controller(const scene::Scene& scene,
+                       const std::vector<std::filesystem::path>& plugin_directories,
+                       Options options)
+    : Controller(scene, load_model(scene), find_planner(scene, plugin_directories),
+                 std::move(options)) {}
+
 Controller::Controller(const scene::Scene& scene, const model::Model& arm,
+                       const planning::Plugin& plugin, Options options)
+    : Controller(scene, arm, plugin, planner_params(scene, plugin), std::move(options)) {}
+
+Controller::Controller(const scene::Scene& given, const model::Model& arm,
                        const planning::Plugin& plugin, const Json& params, Options options)
-    : scene_(scene),
+    : scene_(given),
       options_(std::move(options)),
-      period_s_(options_.period_s.value_or(period_of(scene))),
-      nominal_(scaled_masses(arm, scene.actuation.planner_mass_scale)),
-      world_(scene, nominal_,
+      period_s_(options_.period_s.value_or(period_of(scene_))),
+      nominal_(nominal_of(scene_, arm)),
+      world_(scene_, nominal_,
              {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
               options_.prepare_maps}),
-      view_(scene, nominal_, world_),
-      planner_(plugin, planner_setup(scene, nominal_, view_, period_s_), params, view_,
+      view_(scene_, nominal_, world_),
+      planner_(plugin, planner_setup(scene_, nominal_, view_, period_s_), params, view_,
                options_.log),
-      goals_(scene.goals, scene.stall, nominal_),
-      limits_(limits_of(scene, nominal_)),
+      goals_(scene_.goals, scene_.stall, nominal_),
+      limits_(limits_of(scene_, nominal_)),
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
   const VectorXd zero = VectorXd::Zero(nominal_.dof());

@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
 
@@ -289,7 +290,7 @@ std::string world_key(const simulation::Recorded& recorded) {
 std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::string key,
                                   bool has_map, Container& container) {
   const scene::Scene& scene = recorded.scene;
-  model::Model model = simulation::load_model(scene);
+  model::Model model = control::load_model(scene);
   const double influence =
       std::clamp(influence_share * model.reach(), influence_min, influence_max);
   auto world = std::make_unique<World>(

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "decode.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/file.hpp"
@@ -87,7 +88,7 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
   REQUIRE(page.head["worlds"].size() == 2);
   for (std::size_t i = 0; i < 2; ++i) {
     const Json& robot = page.head["worlds"][i]["robot"];
-    const model::Model model = simulation::load_model(i == 0 ? scene : planar);
+    const model::Model model = control::load_model(i == 0 ? scene : planar);
     const geometry::SE3 base = pose_of(robot["base"]);
     dynamics::Workspace ws(model);
     const Eigen::VectorXd q = Eigen::VectorXd::LinSpaced(model.dof(), -1.2, 1.7);
@@ -212,7 +213,7 @@ TEST_CASE(
   const auto ticks = test::ticks_of(log);
   const auto t = page(frames["t"]);
   REQUIRE(t.size() == ticks.size());
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   dynamics::Workspace ws(model);
   REQUIRE(frames["forces"].size() >= 2);
   for (const Json& channel : frames["forces"]) {

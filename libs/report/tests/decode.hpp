@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/log/run_log.hpp"
@@ -89,7 +90,7 @@ inline log::Result log_run(const scene::Scene& scene, const std::filesystem::pat
   watch.log = &log;
   watch.every = every;
   if (scene.planner) return simulation::run(scene, {HAMELIN_TEST_PLUGIN_DIR}, watch);
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   return simulation::integrate(model, simulation::free_motion(scene, model), watch);
 }
 

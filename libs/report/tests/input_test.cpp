@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "decode.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/make.hpp"
@@ -149,7 +150,7 @@ TEST_CASE("no visible cell of a map that is too large to draw is lost", "[report
         for (int x = 0; x < size; ++x) grid[index(from[0] + x, from[1] + y, from[2] + z)] = true;
   };
   // The cells near the arm are drawn; the far side of the ball is cropped by whole cells.
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const auto data = scene::read_map(options.output);
   const double radius = model.reach() + page.head["runs"][0]["frames"]["influence_m"].get<double>();
   std::vector<bool> occupied(n * n * n), drawn(n * n * n);

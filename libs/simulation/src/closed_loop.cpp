@@ -8,13 +8,12 @@
 #include <array>
 #include <utility>
 
-#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
 #include "plant.hpp"
-#include "preparation.hpp"
 
 namespace hamelin::simulation {
 
@@ -55,8 +54,8 @@ bool controller_sees_all(const scene::Scene& scene) {
 }
 
 model::Model load_checked(const scene::Scene& scene) {
-  model::Model model = load_model(scene);
-  check_numbers(scene, model);
+  model::Model model = control::load_model(scene);
+  control::check_numbers(scene, model);
   return model;
 }
 
@@ -82,9 +81,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       noise_(scene.seed),
       q_measured_(VectorXd::Zero(model_.dof())) {
   result_.warnings = model::warnings(model_.robot());
-  const planning::Plugin plugin = find_planner(scene, plugin_directories);
-  planner_params_ = in_scene(scene, "/planner/params",
-                             [&] { return planning::check_params(plugin, scene.planner->params); });
+  const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
+  planner_params_ = control::planner_params(scene, plugin);
   steps_ =
       in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
   actuation_ = make_actuation(scene, arm_);

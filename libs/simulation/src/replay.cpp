@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
 #include "hamelin/io/file.hpp"
@@ -289,7 +290,7 @@ log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin
   if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front().text);
   if (recorded.program == Recorded::Program::run)
     return run(recorded.scene, plugin_directories, watch);
-  const model::Model model = load_model(recorded.scene);
+  const model::Model model = control::load_model(recorded.scene);
   return integrate(model, free_motion(recorded.scene, model), watch);
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
@@ -135,19 +136,18 @@ TEST_CASE(
     return x;
   };
   const auto motion = [&](const scene::Scene& scene) {
-    return simulation::free_motion(scene, simulation::load_model(scene));
+    return simulation::free_motion(scene, control::load_model(scene));
   };
   CHECK(motion(scratch.with(nullptr)).coulomb.size() == 0);
-  CHECK(armature(simulation::load_model(scratch.with(nullptr))) ==
-        Eigen::Vector3d(0.01, 0.02, 0.03));
+  CHECK(armature(control::load_model(scratch.with(nullptr))) == Eigen::Vector3d(0.01, 0.02, 0.03));
   const auto robots =
       scratch.with({{"friction", "robot"}, {"friction_speed", 0.1}, {"armature", 0}});
   CHECK(motion(robots).coulomb == Eigen::Vector3d(0.1, 0.2, 3 * 0.1));
   CHECK(motion(robots).coulomb_speed == 0.1);
-  CHECK(armature(simulation::load_model(robots)) == Eigen::Vector3d::Zero());
+  CHECK(armature(control::load_model(robots)) == Eigen::Vector3d::Zero());
   const auto own = scratch.with({{"friction", {0.0, 0.5, 0.0}}, {"armature", 0.2}});
   CHECK(motion(own).coulomb == Eigen::Vector3d(0.0, 0.5, 0.0));
-  CHECK(armature(simulation::load_model(own)) == Eigen::Vector3d::Constant(0.2));
+  CHECK(armature(control::load_model(own)) == Eigen::Vector3d::Constant(0.2));
   CHECK_THROWS_WITH(motion(scratch.with({{"friction", {1.0, 2.0}}})),
                     Catch::Contains("scene: /model/friction: 2 values given, expected 1 or 3"));
   CHECK_THROWS_WITH(motion(scratch.with({{"armature", {1.0, 2.0}}})),
@@ -157,7 +157,7 @@ TEST_CASE(
   auto scene = own;
   scene.gravity_m_s2 = Eigen::Vector3d(0.0, 0.0, -9.81);
   scene.duration_s = 1.0;
-  const auto result = simulation::integrate(simulation::load_model(scene), motion(scene), {});
+  const auto result = simulation::integrate(control::load_model(scene), motion(scene), {});
   CHECK(result.dissipated_J > 1e-3);
   CHECK(result.energy_error_max_J < 1e-4);
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
@@ -20,7 +21,7 @@ using Eigen::VectorXd;
 class Sampler {
  public:
   Sampler(const scene::Scene& scene, const PairOptions& options)
-      : model_(simulation::load_model(scene)),
+      : model_(control::load_model(scene)),
         ws_(model_),
         environment_(scene::make_environment(scene, model_, options.min_clearance_m)),
         min_clearance_(options.min_clearance_m),

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
@@ -68,7 +69,7 @@ TEST_CASE("the judge places spheres where the dynamics place them, also on a rot
           "[sweep][unit]") {
   const auto scene = scene_of(
       {{"base", {{"position_m", {0.3, -0.2, 0.5}}, {"quaternion_wxyz", {0.8, 0.0, 0.6, 0.0}}}}});
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const JudgedArm arm(scene);
   REQUIRE(arm.balls().size() == model.shapes().size());
   Rng rng(3);
@@ -154,7 +155,7 @@ TEST_CASE(
   int contacts = 0, clear = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto scene = scene_of({{"obstacles", random_obstacles(8, seed)}});
-    const model::Model model = simulation::load_model(scene);
+    const model::Model model = control::load_model(scene);
     for (int i = 0; i < 12; ++i) {
       const VectorXd q = random_q(model, rng);
       const double time_s = rng.uniform(0.0, 3.0);
@@ -185,7 +186,7 @@ TEST_CASE(
 
 TEST_CASE("the judge agrees with FCL on contact with and distance from a map", "[sweep][unit]") {
   const auto scene = scene_of({{"map", {{"file", "data/maps/clutter.bt"}}}});
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const auto tree =
       std::make_shared<octomap::OcTree>((source_dir / "data/maps/clutter.bt").string());
   const fcl::OcTreed octree(tree);
@@ -209,7 +210,7 @@ TEST_CASE("the judge agrees with FCL on contact with and distance from a map", "
 
 TEST_CASE("the judge's stored leaves do not change its distances along a motion", "[sweep][unit]") {
   const auto scene = scene_of({{"map", {{"file", "data/maps/clutter.bt"}}}});
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const JudgedMap map(*scene.map);
   Rng rng(11);
   for (int motion = 0; motion < 3; ++motion) {
@@ -285,7 +286,7 @@ TEST_CASE("the judge's self-collision pairs and their distances equal those of l
       source_dir, "panda"));
   for (const auto& scene : scenes) {
     CAPTURE(scene.name);
-    const model::Model model = simulation::load_model(scene);
+    const model::Model model = control::load_model(scene);
     const scene::SelfField field(model);
     Rng rng(23);
     int contacts = 0;
@@ -425,7 +426,7 @@ TEST_CASE("the judge's own code changes maps as runs do", "[sweep][unit]") {
                                         {{"time_s", 1.0}, {"free_boxes_m", free_boxes}},
                                         {{"time_s", 1.5}, {"file", "data/maps/clutter.bt"}},
                                         {{"time_s", 2.0}, {"file", other.output.string()}}}));
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   const JudgedArm judged_arm(scene);
   JudgedMap map(scene, judged_arm);
   auto environment = scene::make_environment(scene, model, 0.5);

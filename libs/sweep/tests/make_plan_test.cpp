@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "../src/sphere_on_path.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/file.hpp"
@@ -233,7 +234,7 @@ TEST_CASE(
   const scene::Scene pose = scene_at(0), joint = scene_at(1);
   CHECK(pose.map->file == joint.map->file);
   CHECK(pose.obstacles.at(0).judge_only);
-  const model::Model model = simulation::load_model(joint);
+  const model::Model model = control::load_model(joint);
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, joint.goals.at(0).q);
   CHECK((dynamics::tip_pose(model, ws).matrix() - pose.goals.at(0).pose.matrix()).norm() < 1e-12);
@@ -346,7 +347,7 @@ TEST_CASE(
   CHECK(scene::read_scene(bench.dir("a") / plan.scenes[1].file).obstacles.empty());
   // no point of a segment is farther than 1 cm from a sphere's centre, and the spheres are hardly
   // wider than the segment
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   for (const auto& link : model.robot().links)
     for (int i = 0; i <= 1000; ++i) {
       const double share = 0.001 * i;
@@ -404,7 +405,7 @@ TEST_CASE("a sphere on a path touches the arm on its path, and is clear of start
   const scene::Goal& goal = scene.goals.at(0);
   REQUIRE(goal.path.cols() > 2);
   // with the kinematics that runs use
-  const model::Model model = simulation::load_model(scene);
+  const model::Model model = control::load_model(scene);
   dynamics::Workspace ws(model);
   std::vector<Eigen::Vector3d> centers(model.shapes().size());
   const auto clearance = [&](const Eigen::VectorXd& q) {

@@ -5,6 +5,7 @@
 #include <random>
 #include <thread>
 
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/allocations.hpp"
@@ -29,7 +30,7 @@ scene::Scene sampled(const std::string& name) {
 struct Loop {
   explicit Loop(const scene::Scene& scene, control::Controller::Options options = {},
                 const Json& params = Json::object())
-      : arm(simulation::load_model(scene)),
+      : arm(control::load_model(scene)),
         plugin(planning::find_plugin(scene.planner->name,
                                      {HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR})),
         controller(scene, arm, plugin, planning::check_params(plugin, params), std::move(options)),

@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/planner_host.hpp"
@@ -34,28 +36,41 @@ struct Answer {
   std::uint64_t snapshot = 0;
 };
 
+/// What a Controller is made with.
+struct ControllerOptions {
+  std::size_t obstacles_max = 64;  ///< see World::Options
+  bool prepare_maps = true;        ///< see World::Options
+  /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
+  bool certify = true;
+  std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
+  bool torque = true;              ///< fill Answer::torque
+  bool position = false;           ///< fill Answer::q_next and v_next
+  /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
+  double acceleration_max = 15.0, jerk_max = 5000.0;
+  PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
+};
+
 /// The control loop of an arm: the world that it sees, its planner, goals and limits, without a
 /// plant and without a clock. One thread calls tick(); it neither allocates nor locks. Any thread
 /// may update world().
 class Controller {
  public:
-  struct Options {
-    std::size_t obstacles_max = 64;  ///< see World::Options
-    bool prepare_maps = true;        ///< see World::Options
-    /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
-    bool certify = true;
-    std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
-    bool torque = true;              ///< fill Answer::torque
-    bool position = false;           ///< fill Answer::q_next and v_next
-    /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
-    double acceleration_max = 15.0, jerk_max = 5000.0;
-    PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
-  };
+  using Options = ControllerOptions;
 
-  /// @param scene goals, limits, actuation, obstacles; must outlive this, as must `arm`
+  /// A controller for a scene file: robot, map, obstacles, goals, limits, planner, control period.
+  /// @param plugin_directories where the planner is searched for, in order
+  /// @throws Error for bad input: files, goals that do not fit the robot, parameters, a planner
+  /// that
+  ///         is not found or refuses to start
+  Controller(const std::filesystem::path& scene_file,
+             const std::vector<std::filesystem::path>& plugin_directories, Options options = {});
+  /// The same from parts that the caller has already.
+  Controller(const scene::Scene& scene,
+             const std::vector<std::filesystem::path>& plugin_directories, Options options = {});
+  Controller(const scene::Scene& scene, const model::Model& arm, const planning::Plugin& plugin,
+             Options options);
   /// @param arm the model of the scene's robot; the planner gets it with the scene's mass scale
   /// @param params of the planner, checked and with defaults
-  /// @throws Error for bad input: map, obstacles, goals, or a planner that refuses to start
   Controller(const scene::Scene& scene, const model::Model& arm, const planning::Plugin& plugin,
              const Json& params, Options options);
   Controller(const Controller&) = delete;
@@ -96,7 +111,7 @@ class Controller {
   void form_position();
   void brake();
 
-  const scene::Scene& scene_;
+  scene::Scene scene_;
   Options options_;
   double period_s_;
   model::Model nominal_;  ///< the planner's model of the arm
@@ -114,9 +129,5 @@ class Controller {
   double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
 };
-
-/// The model of a scene's robot with all masses and inertias scaled by one factor: what a planner
-/// believes.
-[[nodiscard]] model::Model scaled_masses(const model::Model& arm, double scale);
 
 }  // namespace hamelin::control

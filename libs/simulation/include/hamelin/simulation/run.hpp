@@ -80,7 +80,4 @@ struct FreeMotion {
 [[nodiscard]] Json full_config(const scene::Scene& scene,
                                const std::vector<std::filesystem::path>& plugin_directories);
 
-/// The robot of a scene as a model: file, tip, spheres, payload, base, gravity.
-[[nodiscard]] model::Model load_model(const scene::Scene& scene);
-
 }  // namespace hamelin::simulation

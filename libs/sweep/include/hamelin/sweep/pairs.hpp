@@ -42,7 +42,7 @@ struct DrawnPairs {
 /// pairs do not depend on `count`.
 /// @throws Error invalid if a joint has no limits, or if max_draws do not suffice (the message has
 ///         the number of pairs found and the reasons of the failures); usage for invalid options;
-///         as load_model and Environment
+///         as control::load_model and Environment
 [[nodiscard]] DrawnPairs draw_pairs(const scene::Scene& scene, const PairOptions& options);
 
 /// Options for running pairs.

@@ -1,0 +1,101 @@
+#ifndef HAMELIN_CONTROL_HAMELIN_CONTROL_H
+#define HAMELIN_CONTROL_HAMELIN_CONTROL_H
+/*
+ * The controller of an arm for programs in C and other languages; controller.hpp and world.hpp
+ * describe what it does. Functions that can fail return 0 on success; otherwise they write one
+ * line, nul-terminated, to `error` (error_size bytes) and have no effect. Structs begin with their
+ * size in bytes, and fields are only appended to them. SI units and radians; poses are in the world
+ * frame.
+ *
+ * hamelin_controller_tick is called by one thread. It neither allocates nor locks. All functions
+ * that change the world may be called by any thread at any time.
+ */
+#include <stddef.h>
+#include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct hamelin_controller hamelin_controller;
+
+typedef struct hamelin_controller_options {
+  uint32_t struct_size;
+  const char* scene_file; /* robot, map, obstacles, goals, limits, planner, control period */
+  const char* const* plugin_directories; /* where the planner is searched for, in order */
+  size_t plugin_directory_count;
+  size_t obstacles_max;              /* the largest number of obstacles at a time; 0: 64 */
+  int32_t position;                  /* 1: q_next and v_next are computed */
+  double acceleration_max, jerk_max; /* bounds of that motion; 0: 15 rad/s^2, 5000 rad/s^3 */
+  /* Receives the planner's messages (not nul-terminated), with HAMELIN_LOG_INFO or _WARNING of the
+   * plugin interface as level; may be null. */
+  void (*log)(void* context, int32_t level, const char* text, size_t size);
+  void* log_context;
+} hamelin_controller_options;
+
+enum {
+  HAMELIN_CONTROL_RUNNING = 0,
+  HAMELIN_CONTROL_REACHED = 1, /* all goals were reached; the planner holds the last one */
+  HAMELIN_CONTROL_STALLED = 2, /* by the scene's stall rule */
+  HAMELIN_CONTROL_GAVE_UP = 3, /* by the planner's own judgement */
+  HAMELIN_CONTROL_STOPPING = 4 /* the planner failed; the arm is brought to rest */
+};
+
+/* Arrays have one number per joint and stay valid until the next tick. */
+typedef struct hamelin_answer {
+  uint32_t struct_size;          /* set by the caller */
+  int32_t state;                 /* HAMELIN_CONTROL_... */
+  const char* cause;             /* why it gave up or stops; empty otherwise */
+  const double* torque;          /* sum of all channels within the limits */
+  const double *q_next, *v_next; /* one period ahead, for arms that are controlled by position */
+  size_t goal_index;             /* the number of goals after the last one */
+  uint64_t snapshot;             /* number of the world's snapshot that the answer is for */
+  double clearance_m;            /* to obstacles; at most the planner's influence */
+  int32_t certified;             /* 1: the motion since the last tick was proved clear */
+  double margin_m;               /* by so much at least */
+  int32_t saturated;             /* 1: a limit reduced the torque */
+} hamelin_answer;
+
+enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2 };
+
+typedef struct hamelin_obstacle {
+  uint32_t struct_size;
+  const char* name; /* an obstacle of the same name is replaced */
+  int32_t shape;
+  double radius_m;  /* sphere, cylinder */
+  double length_m;  /* cylinder, along its z axis */
+  double size_m[3]; /* box: full edges */
+  double position_m[3], quaternion_wxyz[4];
+} hamelin_obstacle;
+
+/* Returns null on failure. */
+hamelin_controller* hamelin_controller_create(const hamelin_controller_options* options,
+                                              char* error, size_t error_size);
+void hamelin_controller_destroy(hamelin_controller* controller); /* null is allowed */
+size_t hamelin_controller_dof(const hamelin_controller* controller);
+double hamelin_controller_period_s(const hamelin_controller* controller);
+
+/* q and v: measured joint positions and velocities. */
+void hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
+                             const double* v, hamelin_answer* answer);
+
+/* Changes of the world. *snapshot, unless null, receives the number of the first snapshot that
+ * contains the change. */
+int32_t hamelin_controller_set_obstacle(hamelin_controller* controller,
+                                        const hamelin_obstacle* obstacle, uint64_t* snapshot,
+                                        char* error, size_t error_size);
+/* At time_s the obstacle is at the pose, from where it moves on with the velocity. */
+int32_t hamelin_controller_move_obstacle(hamelin_controller* controller, const char* name,
+                                         const double position_m[3],
+                                         const double quaternion_wxyz[4],
+                                         const double velocity_m_s[3], double time_s,
+                                         uint64_t* snapshot, char* error, size_t error_size);
+int32_t hamelin_controller_remove_obstacle(hamelin_controller* controller, const char* name,
+                                           uint64_t* snapshot, char* error, size_t error_size);
+/* Replaces the map by an OctoMap file (.bt, .ot) whose frame is the world; null removes it. */
+int32_t hamelin_controller_set_map(hamelin_controller* controller, const char* file,
+                                   uint64_t* snapshot, char* error, size_t error_size);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

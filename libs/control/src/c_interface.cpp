@@ -1,0 +1,191 @@
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <exception>
+#include <string>
+
+#include "hamelin/control/controller.hpp"
+#include "hamelin/control/hamelin_control.h"
+#include "hamelin/core/error.hpp"
+
+struct hamelin_controller {
+  explicit hamelin_controller(const std::filesystem::path& scene,
+                              const std::vector<std::filesystem::path>& plugins,
+                              hamelin::control::Controller::Options options)
+      : controller(scene, plugins, std::move(options)),
+        q(Eigen::VectorXd::Zero(controller.answer().torque.size())),
+        v(q) {}
+
+  hamelin::control::Controller controller;
+  Eigen::VectorXd q, v;
+  std::array<char, 256> cause{};  ///< of the last answer, nul-terminated
+};
+
+namespace {
+
+using namespace hamelin;
+
+void write_line(std::string_view line, char* out, std::size_t size) noexcept {
+  if (out == nullptr || size == 0) return;
+  const std::size_t length = std::min(line.size(), size - 1);
+  std::memcpy(out, line.data(), length);
+  out[length] = '\0';
+}
+
+// Runs f; what it throws becomes a line. @return 0, or 1 if it threw
+template <class F>
+std::int32_t guarded(char* error, std::size_t error_size, F&& f) noexcept {
+  try {
+    f();
+    return 0;
+  } catch (const std::exception& e) {
+    write_line(e.what(), error, error_size);
+  } catch (...) {
+    write_line("an exception that is not a std::exception", error, error_size);
+  }
+  return 1;
+}
+
+template <class F>
+std::int32_t update(std::uint64_t* snapshot, char* error, std::size_t error_size, F&& f) noexcept {
+  return guarded(error, error_size, [&] {
+    const std::uint64_t number = f();
+    if (snapshot != nullptr) *snapshot = number;
+  });
+}
+
+geometry::SE3 pose_of(const double* position, const double* wxyz) {
+  return {geometry::rotation_from_wxyz(Eigen::Map<const Eigen::Vector4d>(wxyz)),
+          Eigen::Map<const Eigen::Vector3d>(position)};
+}
+
+const char* required(const char* text, const char* what) {
+  if (text == nullptr) throw Error(ErrorCode::usage, std::string(what) + ": is null");
+  return text;
+}
+
+}  // namespace
+
+extern "C" {
+
+hamelin_controller* hamelin_controller_create(const hamelin_controller_options* options,
+                                              char* error, std::size_t error_size) {
+  hamelin_controller* made = nullptr;
+  (void)guarded(error, error_size, [&] {
+    if (options == nullptr || options->struct_size < sizeof(hamelin_controller_options))
+      throw Error(ErrorCode::usage, "options: is null or its struct_size is too small");
+    control::Controller::Options chosen;
+    if (options->obstacles_max > 0) chosen.obstacles_max = options->obstacles_max;
+    chosen.position = options->position != 0;
+    if (options->acceleration_max > 0.0) chosen.acceleration_max = options->acceleration_max;
+    if (options->jerk_max > 0.0) chosen.jerk_max = options->jerk_max;
+    if (options->log != nullptr)
+      chosen.log = [log = options->log, context = options->log_context](std::int32_t level,
+                                                                        std::string_view line) {
+        log(context, level, line.data(), line.size());
+      };
+    std::vector<std::filesystem::path> plugins;
+    for (std::size_t i = 0; i < options->plugin_directory_count; ++i)
+      plugins.emplace_back(required(options->plugin_directories[i], "plugin_directories"));
+    made = std::make_unique<hamelin_controller>(required(options->scene_file, "scene_file"),
+                                                plugins, std::move(chosen))
+               .release();
+  });
+  return made;
+}
+
+void hamelin_controller_destroy(hamelin_controller* controller) {
+  delete controller;
+}
+
+std::size_t hamelin_controller_dof(const hamelin_controller* controller) {
+  return static_cast<std::size_t>(controller->q.size());
+}
+
+double hamelin_controller_period_s(const hamelin_controller* controller) {
+  return controller->controller.period_s();
+}
+
+void hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
+                             const double* v, hamelin_answer* out) {
+  const Eigen::Index dof = controller->q.size();
+  controller->q = Eigen::Map<const Eigen::VectorXd>(q, dof);
+  controller->v = Eigen::Map<const Eigen::VectorXd>(v, dof);
+  const control::Answer& answer = controller->controller.tick(time_s, controller->q, controller->v);
+  write_line(answer.cause, controller->cause.data(), controller->cause.size());
+  const auto& verdict = controller->controller.verdict();
+  hamelin_answer full{};
+  full.struct_size = out->struct_size;
+  full.state = static_cast<std::int32_t>(answer.state);
+  full.cause = controller->cause.data();
+  full.torque = answer.torque.data();
+  full.q_next = answer.q_next.data();
+  full.v_next = answer.v_next.data();
+  full.goal_index = answer.goal_index;
+  full.snapshot = answer.snapshot;
+  full.clearance_m = controller->controller.view().clearance_m();
+  full.certified = !verdict || verdict->certified ? 1 : 0;
+  full.margin_m = verdict ? verdict->margin_m : full.clearance_m;
+  full.saturated = answer.saturated ? 1 : 0;
+  // A caller that was built against an earlier header has a shorter struct.
+  std::memcpy(out, &full, std::min<std::size_t>(out->struct_size, sizeof full));
+}
+
+std::int32_t hamelin_controller_set_obstacle(hamelin_controller* controller,
+                                             const hamelin_obstacle* given, std::uint64_t* snapshot,
+                                             char* error, std::size_t error_size) {
+  return update(snapshot, error, error_size, [&] {
+    if (given == nullptr || given->struct_size < sizeof(hamelin_obstacle))
+      throw Error(ErrorCode::usage, "obstacle: is null or its struct_size is too small");
+    scene::Obstacle obstacle;
+    obstacle.name = required(given->name, "obstacle: name");
+    if (given->shape < HAMELIN_SPHERE || given->shape > HAMELIN_CYLINDER)
+      throw Error(ErrorCode::invalid, "obstacle '" + obstacle.name +
+                                          "': its shape is unknown, expected a sphere, box or "
+                                          "cylinder");
+    obstacle.shape = given->shape == HAMELIN_SPHERE ? scene::Shape::sphere
+                     : given->shape == HAMELIN_BOX  ? scene::Shape::box
+                                                    : scene::Shape::cylinder;
+    obstacle.radius_m = given->radius_m;
+    obstacle.length_m = given->length_m;
+    obstacle.size_m = Eigen::Map<const Eigen::Vector3d>(given->size_m);
+    obstacle.pose = pose_of(given->position_m, given->quaternion_wxyz);
+    return controller->controller.world().set_obstacle(std::move(obstacle));
+  });
+}
+
+std::int32_t hamelin_controller_move_obstacle(hamelin_controller* controller, const char* name,
+                                              const double position_m[3],
+                                              const double quaternion_wxyz[4],
+                                              const double velocity_m_s[3], double time_s,
+                                              std::uint64_t* snapshot, char* error,
+                                              std::size_t error_size) {
+  return update(snapshot, error, error_size, [&] {
+    return controller->controller.world().move_obstacle(
+        required(name, "obstacle: name"), pose_of(position_m, quaternion_wxyz),
+        Eigen::Map<const Eigen::Vector3d>(velocity_m_s), time_s);
+  });
+}
+
+std::int32_t hamelin_controller_remove_obstacle(hamelin_controller* controller, const char* name,
+                                                std::uint64_t* snapshot, char* error,
+                                                std::size_t error_size) {
+  return update(snapshot, error, error_size, [&] {
+    return controller->controller.world().remove_obstacle(required(name, "obstacle: name"));
+  });
+}
+
+std::int32_t hamelin_controller_set_map(hamelin_controller* controller, const char* file,
+                                        std::uint64_t* snapshot, char* error,
+                                        std::size_t error_size) {
+  return update(snapshot, error, error_size, [&] {
+    std::optional<scene::MapSpec> map;
+    if (file != nullptr) {
+      map.emplace();
+      map->file = file;
+    }
+    return controller->controller.world().set_map(map);
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,125 @@
+#include "hamelin/control/preparation.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+#include "hamelin/description/robot_io.hpp"
+
+namespace hamelin::control {
+
+using Eigen::VectorXd;
+
+namespace {
+
+// A body fixed to the tip becomes part of the link that carries it: masses add, COM and inertia
+// follow by the parallel-axis theorem.
+void add_payload(model::Robot& robot, const scene::Payload& payload) {
+  auto& link = robot.links[static_cast<std::size_t>(robot.tip.link)];
+  const geometry::SE3 tip_in_com = link.com.inverse() * robot.tip.pose;
+  const Eigen::Vector3d at = tip_in_com * payload.position_m;
+  const double mass = link.mass_kg + payload.mass_kg;
+  const Eigen::Vector3d com = payload.mass_kg / mass * at;  // of both, in the old COM frame
+  const auto steiner = [](double m, const Eigen::Vector3d& r) -> Eigen::Matrix3d {
+    return m * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  };
+  link.inertia_kg_m2 += steiner(link.mass_kg, com) + steiner(payload.mass_kg, at - com) +
+                        tip_in_com.R() * payload.inertia_kg_m2 * tip_in_com.R().transpose();
+  link.mass_kg = mass;
+  link.com = link.com * geometry::SE3{Eigen::Matrix3d::Identity(), com};
+  for (auto& sphere : link.spheres) sphere.center_m -= com;
+  for (auto& segment : link.segments) {
+    segment.from_m -= com;
+    segment.to_m -= com;
+  }
+}
+
+}  // namespace
+
+VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& given, const char* key,
+                       const model::Robot& robot, double model::Joint::*member) {
+  const int n = robot.dof();
+  if (given.from_robot) {
+    Eigen::VectorXd values(n);
+    for (int i = 0; i < n; ++i) values[i] = robot.links[static_cast<std::size_t>(i)].joint.*member;
+    return values.isZero(0.0) ? Eigen::VectorXd() : values;
+  }
+  if (given.values.empty()) return {};
+  if (given.values.size() == 1) return Eigen::VectorXd::Constant(n, given.values[0]);
+  if (given.values.size() != static_cast<std::size_t>(n))
+    throw Error(ErrorCode::invalid, fmt::format("{}: /model/{}: {} values given, expected 1 or {}",
+                                                scene.name, key, given.values.size(), n));
+  return Eigen::Map<const Eigen::VectorXd>(given.values.data(), n);
+}
+
+model::Model load_model(const scene::Scene& scene) {
+  model::Robot robot = description::read_robot(
+      scene.robot.file, {scene.robot.tip, scene.robot.spheres, scene.robot.srdf});
+  if (scene.model.payload) add_payload(robot, *scene.model.payload);
+  if (!scene.model.armature.from_robot) {
+    const Eigen::VectorXd armature =
+        joint_numbers(scene, scene.model.armature, "armature", robot, &model::Joint::armature);
+    for (int i = 0; i < robot.dof(); ++i)
+      robot.links[static_cast<std::size_t>(i)].joint.armature =
+          armature.size() > 0 ? armature[i] : 0.0;
+  }
+  return model::Model(std::move(robot), scene.base,
+                      scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
+}
+
+model::Model scaled_masses(const model::Model& arm, double scale) {
+  if (scale == 1.0) return arm;
+  model::Robot robot = arm.robot();
+  for (auto& link : robot.links) {
+    link.mass_kg *= scale;
+    link.inertia_kg_m2 *= scale;
+    link.joint.armature *= scale;
+  }
+  return model::Model(std::move(robot), arm.base(), arm.gravity());
+}
+
+void check_numbers(const scene::Scene& scene, const model::Model& model) {
+  const auto sized = [&](const VectorXd& x, const std::string& place) {
+    if (x.size() != model.dof())
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: {}: {} values given, expected {} (one per joint of '{}')",
+                              scene.name, place, x.size(), model.dof(), model.robot().name));
+  };
+  if (scene.start_q.size() > 0) sized(scene.start_q, "/start/q");
+  if (scene.start_v.size() > 0) sized(scene.start_v, "/start/v");
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    if (scene.goals[i].type == scene::GoalType::joint)
+      sized(scene.goals[i].q,
+            fmt::format("/goals/{}/q{}", i, scene.goals[i].path.size() > 0 ? "/0" : ""));
+  if (scene.actuation.coulomb_friction_share > 0.0)
+    for (const auto& link : model.robot().links)
+      if (!link.joint.effort_max)
+        throw Error(ErrorCode::invalid,
+                    fmt::format("{}: /actuation/coulomb_friction_share: is a share of effort "
+                                "limits, but joint '{}' of "
+                                "'{}' has none",
+                                scene.name, link.joint.name, model.robot().name));
+  if (scene.goals.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /goals: is empty, expected at least one goal", scene.name));
+}
+
+planning::Plugin find_planner(const scene::Scene& scene,
+                              const std::vector<std::filesystem::path>& directories) {
+  if (!scene.planner)
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: /planner: is missing, expected the name of a planner", scene.name));
+  return planning::find_plugin(scene.planner->name, directories);
+}
+
+Json planner_params(const scene::Scene& scene, const planning::Plugin& plugin) {
+  try {
+    return planning::check_params(plugin, scene.planner->params);
+  } catch (const Error& e) {
+    throw Error(e.code(), fmt::format("{}: /planner/params: {}", scene.name, e.what()));
+  }
+}
+
+}  // namespace hamelin::control
