@@ -377,7 +377,8 @@ void ClosedLoop::fill_result() {
   result_.seed = scene_.seed;
   dynamics::forward_kinematics(model_, arm_.ws, arm_.state.q);
   const control::GoalTracker& goals = controller_->goals();
-  const control::GoalError error = goals.error(arm_.ws, arm_.state.q, arm_.v);
+  const control::GoalError error =
+      control::goal_error(goals.goal(), model_, arm_.ws, arm_.state.q, arm_.v);
   log::Result::Goal out;
   out.type = scene::type_name(goals.goal());
   out.index = goals.index();
