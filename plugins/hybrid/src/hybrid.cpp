@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "approach_speed.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
@@ -22,6 +23,7 @@
 #include "safety_filter.hpp"
 #include "stall.hpp"
 #include "surroundings.hpp"
+#include "torque_ramp.hpp"
 #include "tree.hpp"
 #include "vias.hpp"
 
@@ -115,6 +117,7 @@ class Hybrid final : public planning::Planner {
       horizon_s_ = std::max(period, params["horizon_s"].get<double>());
       observer_.emplace(setup.dof(), period,
                         static_cast<int>(std::lround(setup.delay_s() / period)));
+      if (const auto rate = setup.effort_rate_max()) ramp_.emplace(*rate, period, setup.delay_s());
     }
     const std::string escape = params["escape"];
     uses_memory_ = escape == "memory";
@@ -130,8 +133,8 @@ class Hybrid final : public planning::Planner {
         search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
     }
     const int n = setup.dof();
-    for (auto* x :
-         {&q_, &v_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_, &steering_})
+    for (auto* x : {&q_, &v_, &w_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_,
+                    &steering_})
       *x = VectorXd::Zero(n);
     M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
     terms_.reserve(Obstacles::max_points);
@@ -166,8 +169,8 @@ class Hybrid final : public planning::Planner {
 
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     const double gain = target.via != nullptr ? follow_gain_ : velocity_gain_;
-    x_ = v_ + horizon_s_ *
-                  (gain * (u_ - v_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
+    x_ = w_ + horizon_s_ *
+                  (gain * (u_ - w_)).cwiseMin(drive_acceleration_).cwiseMax(-drive_acceleration_);
     project(command);
     if (observer_)
       answer_by_torque(command);
@@ -224,6 +227,13 @@ class Hybrid final : public planning::Planner {
     llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
     if (observer_) observer_->update(v_);
+    w_ = v_;
+    if (ramp_ && observer_->ready()) {
+      scratch_ = bias_;
+      scratch_.noalias() -= M_ * observer_->disturbance();
+      ramp_->update(observer_->last(), scratch_, M_inv_, v_);
+      w_ = ramp_->coasting_velocity();
+    }
     dynamics::forward_kinematics(model_, ws_, q_);
     obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   }
@@ -257,11 +267,12 @@ class Hybrid final : public planning::Planner {
   // The torque that leads to x over the horizon, by the nominal model and its observer:
   // docs/theory.md (10.22).
   void answer_by_torque(planning::Command& command) {
-    scratch_ = (x_ - v_) / horizon_s_ - observer_->disturbance();
+    scratch_ = (x_ - w_) / horizon_s_ - observer_->disturbance();
     torque_.noalias() = M_ * scratch_;
     torque_ += bias_;
     if (const auto effort = setup_.effort_max())
       torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
+    if (ramp_ && observer_->ready()) ramp_->limit(torque_, observer_->last());
     observer_->issue(torque_, v_, M_inv_, bias_);
     command.held_torque() = torque_;
   }
@@ -285,16 +296,23 @@ class Hybrid final : public planning::Planner {
     steering_ *= scale;
   }
 
-  // The approach speed φ that leaves room to brake, docs/theory.md (10.10): γx up to x = b/γ², then
-  // √(2b(x − b/2γ²)).
-  [[nodiscard]] double approach_limit(double x, double brake) const {
-    if (x <= brake / (rate_ * rate_)) return rate_ * x;
-    return std::sqrt(2.0 * brake * (x - 0.5 * brake / (rate_ * rate_)));
+  void project(planning::Command& command) {
+    filter_.begin(M_, M_inv_);
+    set_joint_box();
+    set_momentum_box();
+    add_rows();
+    scratch_ = x_;
+    const auto report = filter_.project(x_, passes_);
+    held_back_ =
+        (x_ - scratch_).norm() > 1e-3 * horizon_s_ || obstacles_.clearance() < contact_radius_;
+    const double share = setup_.control_period_s() / horizon_s_;  // docs/theory.md (10.16), (10.17)
+    command.set_accounts(
+        share * (report.energy_after_J - report.energy_before_J - report.recovery_J),
+        share * report.recovery_J);
   }
 
-  void project(planning::Command& command) {
+  void set_joint_box() {
     const double dt = horizon_s_;
-    filter_.begin(M_, M_inv_);
     const auto velocity_max = setup_.velocity_max();
     if (velocity_max) {
       double excess = 1.0;
@@ -306,69 +324,67 @@ class Hybrid final : public planning::Planner {
     for (int k = 0; k < setup_.dof(); ++k) {
       double low = -std::numeric_limits<double>::infinity(), high = -low;
       if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
-      if (q_lower) low = std::max(low, joint_approach((*q_lower)[k] - q_[k], -1.0));
-      if (q_upper) high = std::min(high, joint_approach((*q_upper)[k] - q_[k], 1.0));
+      if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
+      if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
       // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
       // approached with the hardest braking.
-      const double slowest = v_[k] - dt * acceleration_max_,
-                   fastest = v_[k] + dt * acceleration_max_;
+      const double slowest = w_[k] - dt * acceleration_max_,
+                   fastest = w_[k] + dt * acceleration_max_;
       lower_[k] = std::clamp(low, slowest, fastest);
       upper_[k] = std::clamp(high, slowest, fastest);
       if (lower_[k] > upper_[k])
         lower_[k] = upper_[k] = std::clamp(0.5 * (low + high), slowest, fastest);
     }
     filter_.set_box(lower_, upper_);
-    if (const auto effort = setup_.effort_max()) {
-      // docs/theory.md (10.13). The bias torque is held at x, not at v; torque_share covers the
-      // difference.
-      momentum_.noalias() = M_ * v_;
-      lower_ = -torque_share * *effort;
-      upper_ = torque_share * *effort;
-      const auto rate = setup_.effort_rate_max();
-      if (rate && observer_ && observer_->ready()) {
-        scratch_ = setup_.control_period_s() * *rate;
-        lower_ = lower_.cwiseMax(observer_->last() - scratch_).cwiseMin(upper_);
-        upper_ = upper_.cwiseMin(observer_->last() + scratch_).cwiseMax(lower_);
-      }
-      scratch_ = bias_ + steering_;
-      if (observer_) scratch_.noalias() -= M_ * observer_->disturbance();
-      lower_ = momentum_ + dt * (lower_ - scratch_);
-      upper_ = momentum_ + dt * (upper_ - scratch_);
-      filter_.set_momentum_box(lower_, upper_);
-    }
+  }
+
+  // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at
+  // w; torque_share covers the difference.
+  void set_momentum_box() {
+    const auto effort = setup_.effort_max();
+    if (!effort) return;
+    momentum_.noalias() = M_ * w_;
+    scratch_ = bias_ + steering_;
+    if (observer_) scratch_.noalias() -= M_ * observer_->disturbance();
+    lower_ = momentum_ + horizon_s_ * (-torque_share * *effort - scratch_);
+    upper_ = momentum_ + horizon_s_ * (torque_share * *effort - scratch_);
+    filter_.set_momentum_box(lower_, upper_);
+  }
+
+  void add_rows() {
+    const double dt = horizon_s_;
     for (const auto& point : obstacles_.points()) {
       const double x = point.distance - point.margin;
-      double bound = point.obstacle_speed - approach_limit(x, brake_);  // docs/theory.md (10.11)
-      const double present = point.row.dot(v_);
+      // docs/theory.md (10.11)
+      double bound = point.obstacle_speed - approach_speed(x, brake_, rate_);
+      const double present = point.row.dot(w_);
       // Near its limit a row demands no more braking than the boxes surely allow:
       // docs/theory.md (10.20).
-      if (present - least_brake * dt < point.obstacle_speed - approach_limit(x, least_brake)) {
-        const double room = filter_.braking_room(point.row, v_);
+      if (ramp_ || present - least_brake * dt <
+                       point.obstacle_speed - approach_speed(x, least_brake, rate_)) {
+        const double room = filter_.braking_room(point.row, w_);
         const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
-        bound = std::min(point.obstacle_speed - approach_limit(x, brake), present + room);
+        const double speed =
+            ramp_ ? approach_speed(x, brake, rate_, ramp_->loss(point.row, M_inv_, brake))
+                  : approach_speed(x, brake, rate_);
+        bound = std::min(point.obstacle_speed - speed, present + room);
       }
       const double floor =
           point.obstacle_speed - rate_ * std::max(1e-9, point.distance - 0.5 * point.margin);
       (void)filter_.add_row(point.row, bound, floor);
     }
-    scratch_ = x_;
-    const auto report = filter_.project(x_, passes_);
-    held_back_ = (x_ - scratch_).norm() > 1e-3 * dt || obstacles_.clearance() < contact_radius_;
-    const double share = setup_.control_period_s() / dt;  // docs/theory.md (10.16), (10.17)
-    command.set_accounts(
-        share * (report.energy_after_J - report.energy_before_J - report.recovery_J),
-        share * report.recovery_J);
   }
 
   // The velocity bound at a joint limit at the signed distance `offset` in the direction `side`
   // (±1), from which half of the allowed acceleration can brake: φ of docs/theory.md (10.10).
-  [[nodiscard]] double joint_approach(double offset, double side) const {
+  [[nodiscard]] double joint_approach(int k, double offset, double side) const {
     const double x = side * offset;
     if (!std::isfinite(x)) return side * std::numeric_limits<double>::infinity();
+    const double brake = 0.5 * acceleration_max_;
     if (x <= 0.0) return side * joint_limit_rate * x;
-    const double brake = 0.5 * acceleration_max_,
-                 bend = brake / (joint_limit_rate * joint_limit_rate);
-    return side * (x <= bend ? joint_limit_rate * x : std::sqrt(2.0 * brake * (x - 0.5 * bend)));
+    if (!ramp_) return side * approach_speed(x, brake, joint_limit_rate);
+    return side *
+           approach_speed(x, brake, joint_limit_rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
   }
 
   void check_stall(double now, const Target& target, double closing_speed,
@@ -482,9 +498,10 @@ class Hybrid final : public planning::Planner {
   int passes_, max_escapes_, search_steps_;
   double horizon_s_;                  ///< time after which the velocity is to be x
   std::optional<Observer> observer_;  ///< only under sampled actuation
+  std::optional<TorqueRamp> ramp_;    ///< only where the rate of the torque is limited
   bool uses_memory_ = false;
   JointPath path_;
-  VectorXd q_, v_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
+  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
