@@ -63,6 +63,10 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                          : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
                                        100.0 * r["certified_share"].get<double>(),
                                        number(r["tightest_step_m"]))));
+  if (r.contains("torque_change"))
+    line("torque", fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
+                               number(r["torque_change"]["mean"], 3),
+                               number(r["torque_change"]["max"], 3)));
   line("q", joints(r["q"]));
   line("energy", fmt::format("{} J at the start, {} J at the end, largest error {} J",
                              number(r["energy_initial_J"]), number(r["energy_final_J"]),

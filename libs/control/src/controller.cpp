@@ -1,6 +1,7 @@
 #include "hamelin/control/controller.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "hamelin/control/planner_setup.hpp"
@@ -72,6 +73,10 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = zero;
   q_ = v_ = rate_ = command_rate_ = zero;
+  if (!scene_.actuation.estimates_velocity) return;
+  estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth);
+  const double delay = std::round(scene_.actuation.delay_s / period_s_);
+  issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
 }
 
 void Controller::reset() {
@@ -90,34 +95,56 @@ const Answer& Controller::tick(double time_s, const VectorXd& q, const VectorXd&
 
 void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   const bool first = k_ == 0;
-  q_ = q;
-  v_ = v;
+  measure(q, v);
   time_s_ = time_s;
   verdict_.reset();
   if (options_.certify && !first) {  // against the world in which the arm moved
-    view_.look(q, time_s);
-    verdict_ = view_.certify(q, v);
-    if (view_.take_newest()) view_.look(q, time_s);
+    view_.look(q_, time_s);
+    verdict_ = view_.certify(q_, v_);
+    if (view_.take_newest()) view_.look(q_, time_s);
   } else {
     (void)view_.take_newest();
-    view_.look(q, time_s);
+    view_.look(q_, time_s);
   }
   answer_.snapshot = view_.snapshot();
   if (answer_.state == ControlState::stopping) return;
   answer_.state = ControlState::running;
   answer_.cause = {};
-  while (goals_.advance(view_.poses(), q, v)) continue;
+  while (goals_.advance(view_.poses(), q_, v_)) continue;
   answer_.goal_index = goals_.index();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
-  else if (!planner_.has_own_stall_rule() && goals_.stalled(view_.poses(), v, period_s_))
+  else if (!planner_.has_own_stall_rule() && goals_.stalled(view_.poses(), v_, period_s_))
     answer_.state = ControlState::stalled;
 }
 
+void Controller::measure(const VectorXd& q, const VectorXd& v) {
+  if (!estimator_) {
+    q_ = q;
+    v_ = v;
+    return;
+  }
+  if (k_ == 0) {
+    estimator_->start(q);
+  } else {
+    // Issued `delay` ticks before the last one; it acted since then.
+    const VectorXd& acting = issued_[static_cast<std::size_t>(k_) % issued_.size()];
+    if (options_.position)
+      rate_ = acting;
+    else
+      dynamics::forward_dynamics(nominal_, ws_, q_, v_, acting, rate_);
+    estimator_->update(q, rate_);
+  }
+  q_ = estimator_->q();
+  v_ = estimator_->v();
+}
+
 void Controller::decide() {
-  if (k_ == 0 && options_.torque) {
+  if (k_ == 0 && forms_torque()) {
     dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
     limits_.start_from(answer_.torque);
+    if (!options_.position)
+      for (auto& torque : issued_) torque = answer_.torque;
   }
   if (k_ == 0) {
     answer_.q_next = q_;
@@ -135,8 +162,11 @@ void Controller::decide() {
     }
   }
   answer_.channels = answer_.state == ControlState::stopping ? nullptr : &planner_.command();
-  if (options_.torque) form_torque();
+  if (forms_torque()) form_torque();
   if (options_.position) form_position();
+  if (estimator_)
+    issued_[static_cast<std::size_t>(k_) % issued_.size()] =
+        options_.position ? command_rate_ : answer_.torque;
   if (options_.certify) view_.depart(q_, v_);
   ++k_;
 }

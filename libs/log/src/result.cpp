@@ -130,6 +130,8 @@ Json to_json(const Result& r) {
       {"warnings", r.warnings},
       {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
       {"provenance", r.provenance}};
+  if (r.torque_change)
+    document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
   for (const auto& replaced : null_non_finite(document))
     document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
   return document;

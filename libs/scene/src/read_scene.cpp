@@ -242,6 +242,8 @@ Actuation read_actuation(const Reader& in, double step_s) {
   actuation.control_period_s = in.get("control_period_s", step_s);
   actuation.delay_s = in.get("delay_s", 0.0);
   actuation.joint_noise_rad = in.get("joint_noise_rad", 0.0);
+  actuation.estimates_velocity = in.get<std::string>("joint_velocity", "measured") == "estimated";
+  actuation.estimator_bandwidth = in.get("estimator_bandwidth", actuation.estimator_bandwidth);
   actuation.planner_mass_scale = in.get("planner_mass_scale", 1.0);
   actuation.torque_rate_max_Nm_s = in.maybe<double>("torque_rate_max_Nm_s");
   actuation.coulomb_friction_share = in.get("coulomb_friction_share", 0.0);
@@ -256,6 +258,8 @@ Actuation read_actuation(const Reader& in, double step_s) {
   if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
     in.fail("delay_s",
             fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
+  if (actuation.type == ActuationType::ideal && actuation.estimates_velocity)
+    in.fail("joint_velocity", "'estimated' is not allowed, expected sampled actuation");
   if (actuation.type == ActuationType::ideal && actuation.torque_rate_max_Nm_s)
     in.fail("torque_rate_max_Nm_s",
             "is not allowed, expected sampled actuation, whose torques change from tick to tick");

@@ -111,6 +111,8 @@ Json actuation_json(const Actuation& actuation) {
           {"control_period_s", actuation.control_period_s},
           {"delay_s", actuation.delay_s},
           {"joint_noise_rad", actuation.joint_noise_rad},
+          {"joint_velocity", actuation.estimates_velocity ? "estimated" : "measured"},
+          {"estimator_bandwidth", actuation.estimator_bandwidth},
           {"planner_mass_scale", actuation.planner_mass_scale},
           {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
           {"coulomb_friction_share", actuation.coulomb_friction_share}};

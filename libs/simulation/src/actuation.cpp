@@ -170,11 +170,13 @@ class SampledActuation final : public Actuation {
     slot(tick) = decided.torque;
     if (decided.channels->raw().has_node_velocity != 0) audit.book_filter(decided.channels->raw());
     saturated_ = decided.saturated;
+    if (tick > 0) change_.add((decided.torque - slot(tick - 1)).lpNorm<Eigen::Infinity>());
     // The next slot of the ring was written `delay` ticks ago.
     arm.channels.held_torque = slot(tick + 1);
   }
 
   bool needs_answer_at_end() const override { return false; }
+  const log::TorqueChange* torque_change() const override { return &change_; }
   const VectorXd& departure_velocity(SimulatedArm& arm) override { return arm.v; }
 
   void torques(SimulatedArm& arm, const planning::CommandBuffers&, VectorXd& sum,
@@ -192,6 +194,7 @@ class SampledActuation final : public Actuation {
   long period_steps_;
   bool limited_;
   std::vector<VectorXd> delayed_;
+  log::TorqueChange change_;
   bool saturated_ = false;
 };
 

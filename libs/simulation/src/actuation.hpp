@@ -37,6 +37,8 @@ class Actuation {
                        Eigen::VectorXd& sum, Json& channels) = 0;
   /// Whether a limit cut the current answer.
   [[nodiscard]] virtual bool saturated() const = 0;
+  /// By how much the torque changed from tick to tick; null under ideal actuation.
+  [[nodiscard]] virtual const log::TorqueChange* torque_change() const { return nullptr; }
   /// Whether the scene limits torques.
   [[nodiscard]] virtual bool limited() const = 0;
 };

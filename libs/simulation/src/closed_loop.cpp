@@ -47,7 +47,8 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
 // view of the world serves controller and judge.
 bool controller_sees_all(const scene::Scene& scene) {
   const bool exact =
-      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0;
+      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
+      !scene.actuation.estimates_velocity;
   return exact && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
@@ -368,6 +369,7 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
 void ClosedLoop::fill_result() {
   if (judge_->has_obstacles()) result_.min_clearance_m = min_clearance_;
   if (judge_->has_self()) result_.min_self_clearance_m = min_self_clearance_;
+  if (const auto* change = actuation_->torque_change()) result_.torque_change = *change;
   result_.scene = scene_.name;
   result_.planner = controller_->plugin().name();
   result_.time_s = arm_.state.time_s;

@@ -17,7 +17,7 @@ namespace {
 /// Values that a group collects before they are summarized.
 struct GroupData {
   Group group;
-  std::vector<double> clearances, self_clearances, shares, times, p50, p99, recovery, filter;
+  std::vector<double> torque_changes, clearances, self_clearances, shares, times, p50, p99, recovery, filter;
 };
 
 std::optional<double> number_at(const Json& object, const char* key) {
@@ -78,6 +78,8 @@ void add_run(GroupData& data, const MergedRun& merged) {
     g.judged += judge["obstacles"].is_object() || judge["self"].is_object() ? 1U : 0U;
   }
   append(data.shares, number_at(result, "certified_share"));
+  if (result.is_object())
+    append(data.torque_changes, number_at(result.value("torque_change", Json()), "mean"));
   append(data.recovery, number_at(result, "recovery_work_J"));
   append(data.filter, number_at(result, "filter_work_J"));
   if (reached) append(data.times, number_at(result, "time_s"));
@@ -120,6 +122,7 @@ Group make_group(GroupData&& data) {
   g.certified_share_mean = mean(data.shares);
   g.certified_share_min = smallest(data.shares);
   g.reached_time_s_median = median(data.times);
+  g.torque_change_mean = mean(data.torque_changes);
   g.tick_us_p50_median = median(data.p50);
   g.tick_us_p99_median = median(data.p99);
   g.filter_work_J_max = largest(data.filter).value_or(0.0);
@@ -275,6 +278,7 @@ Json to_json(const Merged& merged) {
                    {"certified_share_mean", or_null(g.certified_share_mean)},
                    {"certified_share_min", or_null(g.certified_share_min)},
                    {"reached_time_s_median", or_null(g.reached_time_s_median)},
+                   {"torque_change_mean", or_null(g.torque_change_mean)},
                    {"filter_work_J_max", g.filter_work_J_max},
                    {"recovery_work_J_median", or_null(g.recovery_work_J_median)},
                    {"escapes", g.escapes.empty() ? Json(nullptr) : std::move(escapes)},
@@ -331,6 +335,7 @@ std::vector<std::string> table_row(const Group& g) {
   row.push_back(shown(g.certified_share_mean, 100.0, 3));
   row.push_back(shown(g.certified_share_min, 100.0, 2));
   row.push_back(shown(g.reached_time_s_median, 1.0, 2));
+  row.push_back(shown(g.torque_change_mean, 1.0, 3));
   row.push_back(shown(g.tick_us_p50_median, 1.0, 1));
   row.push_back(shown(g.tick_us_p99_median, 1.0, 1));
   return row;
@@ -369,7 +374,7 @@ std::string to_table(const Merged& merged) {
   std::vector<std::vector<std::string>> rows(1, merged.by);
   for (const char* head :
        {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
-        "self mm", "cert. % mean", "min", "arrive s", "tick us p50", "p99"})
+        "self mm", "cert. % mean", "min", "arrive s", "dtau", "tick us p50", "p99"})
     rows.front().emplace_back(head);
   for (const auto& g : merged.groups) rows.push_back(table_row(g));
   std::string text = aligned(rows, merged.by.size());

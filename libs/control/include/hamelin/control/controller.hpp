@@ -8,6 +8,7 @@
 
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/state_estimator.hpp"
 #include "hamelin/control/torque_limits.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
@@ -81,7 +82,8 @@ class Controller {
 
   /// observe() and decide().
   /// @param time_s of the measurement; must increase from tick to tick
-  /// @param q, v measured joint positions and velocities; dof numbers each
+  /// @param q, v measured joint positions and velocities; dof numbers each. v is not used if the
+  ///        scene lets the controller estimate velocities.
   const Answer& tick(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
 
   /// The first half of a tick: takes the newest snapshot, finds near obstacles, checks goals and
@@ -101,15 +103,21 @@ class Controller {
 
   /// What it sees. A caller may look() at and certify() the motion between ticks with it.
   [[nodiscard]] WorldView& view() noexcept { return view_; }
+  /// The state that the last tick acted on: as measured, or as estimated.
+  [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
+  [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
   [[nodiscard]] const GoalTracker& goals() const noexcept { return goals_; }
   [[nodiscard]] const planning::Plugin& plugin() const noexcept { return planner_.plugin(); }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
 
  private:
+  void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void form_torque();
   void form_position();
   void brake();
+  /// Positions follow from the torque where the planner sets no velocity.
+  [[nodiscard]] bool forms_torque() const noexcept { return options_.torque || options_.position; }
 
   scene::Scene scene_;
   Options options_;
@@ -119,6 +127,8 @@ class Controller {
   WorldView view_;
   PlannerHost planner_;
   GoalTracker goals_;
+  std::optional<StateEstimator> estimator_;
+  std::vector<Eigen::VectorXd> issued_;  ///< for the estimator: torques, or accelerations
   TorqueLimits limits_;
   ChannelSum sum_;
   dynamics::Workspace ws_;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -36,6 +37,19 @@ struct SolverSummary {
   double tolerance = 0.0;
 };
 
+/// By how much the torque of a joint changes from tick to tick: of each tick the largest change of
+/// all joints [Nm or N].
+struct TorqueChange {
+  long ticks = 0;
+  double sum = 0.0, max = 0.0;
+  void add(double change) {
+    ++ticks;
+    sum += change;
+    max = std::max(max, change);
+  }
+  [[nodiscard]] double mean() const { return ticks > 0 ? sum / static_cast<double>(ticks) : 0.0; }
+};
+
 /// The outcome of one run, as `--result` writes it (docs/logs.md). Fields that do not apply stay
 /// empty and are written as null.
 struct Result {
@@ -63,6 +77,7 @@ struct Result {
   double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0,
          held_work_J = 0.0;
   double node_work_J = 0.0;               ///< of node velocities: law, filter and recovery together
+  std::optional<TorqueChange> torque_change;  ///< under sampled actuation
   std::optional<double> saturated_share;  ///< of all steps; null if torque limits are not modelled
   std::optional<double> certified_share;  ///< of all steps; null if nothing can be hit
   std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified

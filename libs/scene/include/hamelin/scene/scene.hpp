@@ -82,6 +82,9 @@ struct Actuation {
   double control_period_s = 0.001;  ///< an integer multiple of the step; one step under ideal
   double delay_s = 0.0;
   double joint_noise_rad = 0.0;
+  /// Whether the controller estimates joint velocities from the measured positions.
+  bool estimates_velocity = false;
+  double estimator_bandwidth = 60.0;  ///< [1/s]
   double planner_mass_scale = 1.0;
   /// Sampled: of each joint's held torque [Nm/s or N/s].
   std::optional<double> torque_rate_max_Nm_s;

@@ -50,6 +50,9 @@ struct Group {
   std::optional<double> min_self_clearance_m;   ///< the judge's, of the arm from itself
   std::optional<double> certified_share_mean, certified_share_min;
   std::optional<double> reached_time_s_median;
+  /// Mean over runs of the mean change of the torque from tick to tick [Nm or N]; none under ideal
+  /// actuation.
+  std::optional<double> torque_change_mean;
   std::optional<double> tick_us_p50_median, tick_us_p99_median;
   double filter_work_J_max = 0.0;  ///< largest over the runs; positive only by rounding errors
   std::optional<double> recovery_work_J_median;

@@ -1,0 +1,33 @@
+#pragma once
+#include <Eigen/Core>
+
+namespace hamelin::control {
+
+/// Joint velocities from measured joint positions. The estimate follows the motion that the nominal
+/// model predicts and corrects position, velocity and an unexplained acceleration by the error of
+/// the measured position. All errors decay with one rate: docs/theory.md (8.14), (8.15).
+class StateEstimator {
+ public:
+  /// @param period_s time between two measurements @param bandwidth rate at which errors decay
+  ///        [1/s]; a higher one follows disturbances faster and passes on more noise
+  StateEstimator(Eigen::Index dof, double period_s, double bandwidth);
+
+  /// Starts at a measured position, at rest.
+  void start(const Eigen::VectorXd& q);
+  /// Advances the estimate by one period to the measurement at its end.
+  /// @param q measured joint positions
+  /// @param acceleration of the nominal model during the period [rad/s² or m/s²]
+  void update(const Eigen::VectorXd& q, const Eigen::VectorXd& acceleration);
+
+  [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
+  [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
+  /// The acceleration that the model does not explain.
+  [[nodiscard]] const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }
+
+ private:
+  double period_s_;
+  double position_gain_, velocity_gain_, disturbance_gain_;
+  Eigen::VectorXd q_, v_, disturbance_, error_;
+};
+
+}  // namespace hamelin::control
