@@ -48,7 +48,7 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
-  data.sampled = scene.actuation.type == scene::ActuationType::sampled;
+  data.sampled = scene.actuation.type != scene::ActuationType::ideal;
   data.delay_s = scene.actuation.delay_s;
   data.control_period_s = control_period_s;
   data.self_collision = scene.model.self_collision;

@@ -130,6 +130,12 @@ Json to_json(const Result& r) {
       {"warnings", r.warnings},
       {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
       {"provenance", r.provenance}};
+  if (r.plant)
+    document["plant"] = {{"type", r.plant->type},
+                         {"version", r.plant->version},
+                         {"contacts", r.plant->contacts},
+                         {"judge_contacts", r.plant->judge_contacts},
+                         {"deepest_m", optional(r.plant->deepest_m)}};
   for (const auto& replaced : null_non_finite(document))
     document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
   return document;
