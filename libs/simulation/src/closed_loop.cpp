@@ -445,7 +445,8 @@ void ClosedLoop::fill_result() {
   dynamics::Workspace ws(model_);
   dynamics::forward_kinematics(model_, ws, plant_->node().q);
   const control::GoalTracker& goals = controller_->goals();
-  const control::GoalError error = goals.error(ws, plant_->node().q, plant_->node().v);
+  const control::GoalError error =
+      control::goal_error(goals.goal(), model_, ws, plant_->node().q, plant_->node().v);
   log::Result::Goal out;
   out.type = scene::type_name(goals.goal());
   out.index = goals.index();

@@ -162,6 +162,22 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("the error of a goal of the tip is reported also if the planner's masses are wrong",
+          "[simulation][actuation]") {
+  const TemporaryFolder folder;
+  Json scene = scene_of(Json::object(), "sampled");
+  scene["actuation"]["planner_mass_scale"] = 1.1;
+  scene["duration_s"] = 0.001;
+  for (const std::string type : {"position", "pose"}) {
+    scene["goals"] = {{{"type", type}, {"position_m", {9.0, 0.0, 0.0}}}};
+    if (type == "pose") scene["goals"][0]["quaternion_wxyz"] = {1.0, 0.0, 0.0, 0.0};
+    const auto result = run_scene(folder, scene);
+    REQUIRE(result.goal->error_m);
+    CHECK(*result.goal->error_m > 4.0);  // the arm is 4 m long
+    CHECK(result.goal->error_rad.has_value() == (type == "pose"));
+  }
+}
+
 TEST_CASE("torque limits scale a node's change of velocity as a whole, and that is counted",
           "[simulation][actuation]") {
   const TemporaryFolder folder;

@@ -16,6 +16,11 @@ struct GoalError {
   bool reached = false;  ///< within the goal's tolerances, speeds included
 };
 
+/// Error of a goal. `ws` must have the poses of q by this model.
+[[nodiscard]] GoalError goal_error(const scene::Goal& goal, const model::Model& model,
+                                   const dynamics::Workspace& ws, const Eigen::VectorXd& q,
+                                   const Eigen::VectorXd& v);
+
 /// Keeps track of the current goal, and detects stalls: an arm at rest away from the goal.
 class GoalTracker {
  public:
@@ -24,11 +29,8 @@ class GoalTracker {
   GoalTracker(const std::vector<scene::Goal>& goals, const std::optional<scene::StallRule>& rule,
               const model::Model& model);
 
-  /// Error of the current goal, or of the last one if all are reached. `ws` must have the poses of
-  /// q.
-  [[nodiscard]] GoalError error(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
-                                const Eigen::VectorXd& v) const;
-  /// Selects the next goal if the current one is reached. @return whether it was
+  /// Selects the next goal if the current one is reached. `ws` must have the poses of q.
+  /// @return whether it was
   [[nodiscard]] bool advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                              const Eigen::VectorXd& v);
   /// Starts again with the first goal.
@@ -51,8 +53,6 @@ class GoalTracker {
   [[nodiscard]] bool stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s);
 
  private:
-  [[nodiscard]] double tip_speed(const dynamics::Workspace& ws, const Eigen::VectorXd& v) const;
-
   const std::vector<scene::Goal>& goals_;
   const std::optional<scene::StallRule>& rule_;
   const model::Model& model_;
