@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <iterator>
-#include <map>
 #include <string_view>
 
 namespace hamelin::mujoco {
@@ -18,9 +17,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::array<std::string_view, 4> kind_names{"link", "base", "obstacle", "map"};
-// Edge of the cells of space whose boxes form one body. MuJoCo looks for bodies that may touch
-// before it looks at their shapes.
-constexpr double cell_m = 0.25;
 // Half the range of a joint that is limited on one side only [rad or m].
 constexpr double far_away = 1e6;
 
@@ -51,11 +47,12 @@ Vector3d joint_axis(const model::Joint& joint) {
 class Writer {
  public:
   Writer(const simulation::PlantSetup& setup, const scene::Environment& environment,
-         const scene::SelfField* self)
+         const scene::SelfField* self, int map_boxes)
       : setup_(setup),
         robot_(setup.model.robot()),
         environment_(environment),
         self_(self),
+        map_boxes_(map_boxes),
         shapes_of_link_(static_cast<std::size_t>(robot_.dof())) {
     const auto& shapes = setup.model.shapes();
     for (std::size_t i = 0; i < shapes.size(); ++i)
@@ -70,7 +67,7 @@ class Writer {
         contacts_max, contacts_max + 2 * robot_.dof(), text(setup_.model.gravity()));
     const auto& obstacles = environment_.obstacles();
     for (std::size_t i = 0; i < obstacles.size(); ++i) add_obstacle(static_cast<int>(i));
-    add_map();
+    if (map_boxes_ > 0) add_map();
     add_arm();
     add("</worldbody>\n");
     if (self_ != nullptr) add_self_pairs();
@@ -104,25 +101,14 @@ class Writer {
     add("/></body>\n");
   }
 
+  // The plant gives these boxes their places and sizes. Shapes that the compiler sees at the origin of
+  // their body stay there.
   void add_map() {
-    const scene::BoxField& field = environment_.map_field().boxes();
-    std::map<std::array<double, 3>, std::vector<int>> cells;
-    for (std::size_t i = 0; i < field.boxes().size(); ++i) {
-      if (!field.alive(i)) continue;
-      const scene::Box& box = field.boxes()[i];
-      const Vector3d cell = ((box.lo + box.hi) / (2.0 * cell_m)).array().floor();
-      cells[{cell.x(), cell.y(), cell.z()}].push_back(static_cast<int>(i));
-    }
     const geometry::SE3& pose = environment_.map_pose();
-    for (const auto& [cell, boxes] : cells) {
-      add("<body pos='{}' quat='{}'>", text(pose.p()), rotation(pose.R()));
-      for (const int i : boxes) {
-        const scene::Box& box = field.boxes()[static_cast<std::size_t>(i)];
-        add("<geom name='{}' type='box' pos='{}' size='{}'/>\n", name_of(Kind::map, i),
-            text(0.5 * (box.lo + box.hi)), text(0.5 * (box.hi - box.lo)));
-      }
-      add("</body>\n");
-    }
+    add("<body name='{}' pos='{}' quat='{}'>", map_body_name, text(pose.p()), rotation(pose.R()));
+    for (int i = 0; i < map_boxes_; ++i)
+      add("<geom name='{}' type='box' pos='1 1 1' size='1 1 1'/>", name_of(Kind::map, i));
+    add("</body>\n");
   }
 
   // All bodies have the axes of the base at q = 0.
@@ -202,6 +188,7 @@ class Writer {
   const model::Robot& robot_;
   const scene::Environment& environment_;
   const scene::SelfField* self_;
+  int map_boxes_;
   std::vector<std::vector<int>> shapes_of_link_;
   std::string out_;
 };
@@ -239,8 +226,8 @@ PrincipalInertia principal_inertia(const model::Link& link) {
 }
 
 std::string mjcf(const simulation::PlantSetup& setup, const scene::Environment& environment,
-                 const scene::SelfField* self) {
-  return Writer(setup, environment, self).write();
+                 const scene::SelfField* self, int map_boxes) {
+  return Writer(setup, environment, self, map_boxes).write();
 }
 
 }  // namespace hamelin::mujoco

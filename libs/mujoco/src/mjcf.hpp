@@ -17,7 +17,7 @@ enum class Kind : std::int32_t {
   link,      ///< Model::shapes()
   base,      ///< Robot::base_spheres, then base_segments
   obstacle,  ///< Environment::obstacles()
-  map,       ///< BoxField::boxes() of the map
+  map,       ///< any box of the map
 };
 
 [[nodiscard]] std::string name_of(Kind kind, int index);
@@ -29,6 +29,8 @@ struct ShapeId {
 };
 [[nodiscard]] ShapeId id_of(const char* name);
 
+/// Name of the body of the map.
+inline constexpr const char* map_body_name = "map";
 /// Name of the body of a link, and of a moving obstacle.
 [[nodiscard]] std::string link_name(int link);
 [[nodiscard]] std::string obstacle_body_name(int obstacle);
@@ -45,7 +47,9 @@ struct PrincipalInertia {
 /// refuses values that the dynamics allow, such as those of planar arms, so they are set
 /// afterwards.
 /// @param self pairs of parts of the arm that count as contact; null: none
+/// @param map_boxes the largest number of boxes of the map that are shapes at a time
 [[nodiscard]] std::string mjcf(const simulation::PlantSetup& setup,
-                               const scene::Environment& environment, const scene::SelfField* self);
+                               const scene::Environment& environment, const scene::SelfField* self,
+                               int map_boxes);
 
 }  // namespace hamelin::mujoco

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
@@ -12,12 +13,15 @@
 #include "hamelin/scene/obstacles.hpp"
 #include "loading.hpp"
 #include "mjcf.hpp"
+#include "near_boxes.hpp"
 
 namespace hamelin::mujoco {
 
 namespace {
 
 using Eigen::VectorXd;
+
+constexpr int map_boxes_at_first = 64;
 
 class MujocoPlant final : public simulation::Plant {
  public:
@@ -34,7 +38,7 @@ class MujocoPlant final : public simulation::Plant {
         environment_(scene::make_environment(setup.scene, setup.model, 0.0)),
         ws_(setup.model) {
     if (setup.scene.model.self_collision) self_.emplace(setup.model);
-    build();
+    build(environment_.map_field().empty() ? 0 : map_boxes_at_first);
     description_.tolerance = model_->opt.tolerance;
   }
 
@@ -44,7 +48,7 @@ class MujocoPlant final : public simulation::Plant {
     node_ = {0, 0.0, q, v};
     report_ = {};
     put_state();
-    arrive();
+    arrive(true);
   }
 
   [[nodiscard]] bool step(const VectorXd& torque, double step_s) override {
@@ -62,11 +66,7 @@ class MujocoPlant final : public simulation::Plant {
     node_.time_s = static_cast<double>(node_.k) * step_s;
     mju_copy(node_.q.data(), data_->qpos, model_->nq);
     mju_copy(node_.v.data(), data_->qvel, model_->nv);
-    if (!environment_.advance(node_.time_s).empty()) {
-      build();
-      put_state();
-    }
-    arrive();
+    arrive(!environment_.advance(node_.time_s).empty());
     return report_.converged = accepted();
   }
 
@@ -99,10 +99,12 @@ class MujocoPlant final : public simulation::Plant {
   }
 
  private:
-  // Makes MuJoCo's model of what exists, at rest at q = 0.
-  void build() {
+  // Makes MuJoCo's model, at rest at q = 0, with room for so many boxes of the map.
+  void build(int map_boxes) {
     data_.reset();
-    model_ = load_model(mjcf(setup_, environment_, self_ ? &*self_ : nullptr), setup_.scene.name);
+    map_boxes_ = map_boxes;
+    model_ = load_model(mjcf(setup_, environment_, self_ ? &*self_ : nullptr, map_boxes),
+                        setup_.scene.name);
     data_.reset(mj_makeData(model_.get()));
     const auto& links = setup_.model.robot().links;
     for (int i = 0; i < setup_.model.dof(); ++i) {
@@ -112,6 +114,14 @@ class MujocoPlant final : public simulation::Plant {
       mju_copy3(model_->body_inertia + 3 * body, principal_inertia(link).moments.data());
     }
     mj_setConst(model_.get(), data_.get());
+    find_obstacles();
+    std::vector<int> shapes;
+    for (int geom = 0; geom < model_->ngeom; ++geom)
+      if (shape(geom).kind == Kind::link) shapes.push_back(geom);
+    near_.set_arm(std::move(shapes));
+  }
+
+  void find_obstacles() {
     obstacles_.clear();
     const auto& obstacles = environment_.obstacles();
     for (std::size_t k = 0; k < obstacles.size(); ++k) {
@@ -131,7 +141,8 @@ class MujocoPlant final : public simulation::Plant {
   }
 
   // Finds contacts and constraints at the node, with the obstacles where they are now.
-  void arrive() {
+  // @param other_map whether the map is not that of the node before
+  void arrive(bool other_map) {
     for (const ChangingObstacle& o : obstacles_) {
       model_->geom_conaffinity[o.geom] = scene::exists(*o.obstacle, node_.time_s) ? 1 : 0;
       if (o.mocap < 0) continue;
@@ -139,6 +150,25 @@ class MujocoPlant final : public simulation::Plant {
       mju_copy3(data_->mocap_pos + 3 * o.mocap, at.data());
     }
     mj_step1(model_.get(), data_.get());
+    if (environment_.map_field().empty()) return;
+    const double moved = near_.moved_m(*data_);
+    if (!other_map && moved < 0.5 * NearBoxes::slack_m) return;
+    choose_boxes();
+    // The boxes chosen before were not all that the arm may touch here.
+    if (other_map || moved > NearBoxes::slack_m) mj_step1(model_.get(), data_.get());
+  }
+
+  void choose_boxes() {
+    const scene::BoxField& field = environment_.map_field().boxes();
+    const int count = near_.choose(field, environment_.map_pose(), *model_, *data_);
+    if (count > map_boxes_) {
+      const std::vector<double> warm(data_->qacc_warmstart, data_->qacc_warmstart + model_->nv);
+      build(std::max(count, 2 * map_boxes_));
+      put_state();
+      mju_copy(data_->qacc_warmstart, warm.data(), model_->nv);
+      return arrive(true);
+    }
+    near_.place(field, *model_, mj_name2id(model_.get(), mjOBJ_BODY, map_body_name));
   }
 
   // MuJoCo resets a state with numbers that are not finite or too large, and counts a warning.
@@ -192,6 +222,8 @@ class MujocoPlant final : public simulation::Plant {
   dynamics::Workspace ws_;
   ModelPointer model_;
   DataPointer data_;
+  int map_boxes_ = 0;  ///< that the model has room for
+  NearBoxes near_;
   std::vector<ChangingObstacle> obstacles_;
 };
 
