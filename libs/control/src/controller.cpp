@@ -156,13 +156,12 @@ void Controller::brake() {
   dynamics::inverse_dynamics(nominal_, ws_, q_, v_, rate_, answer_.torque);
 }
 
-// The velocity integrates the acceleration that the planner asks for, within bounds of it and of
-// jerk; the position integrates the velocity. The acceleration is that of the measured velocity, so
-// that a lag of the servos does not reduce it.
+// The velocity follows the planner's, or the one that the torque causes, within bounds of
+// acceleration and jerk; the position integrates it.
 void Controller::form_position() {
   const double T = period_s_;
   if (answer_.channels != nullptr && answer_.channels->raw().has_node_velocity != 0) {
-    rate_ = (answer_.channels->node_velocity() - v_) / T;
+    rate_ = (answer_.channels->node_velocity() - answer_.v_next) / T;
   } else {
     dynamics::forward_dynamics(nominal_, ws_, q_, v_, answer_.torque, rate_);
   }

@@ -49,7 +49,8 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
   data.sampled = scene.actuation.type != scene::ActuationType::ideal;
-  data.delay_s = scene.actuation.delay_s;
+  // Under position actuation the planner is shown the set points, which change without delay.
+  if (scene.actuation.type == scene::ActuationType::sampled) data.delay_s = scene.actuation.delay_s;
   data.control_period_s = control_period_s;
   data.self_collision = scene.model.self_collision;
   data.influence_m = world.influence_m();

@@ -12,6 +12,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
+#include "hamelin/core/rng.hpp"
 
 namespace hamelin::simulation {
 
@@ -50,6 +51,10 @@ class IdealActuation final : public Actuation {
 
   void reserve(std::size_t gyroscopic_terms) override {
     arm_.channels.gyroscopic.reserve(gyroscopic_terms);
+  }
+  void observe(VectorXd& q, VectorXd& v) override {
+    q = arm_.node().q;
+    v = arm_.node().v;
   }
   bool asks_planner(long) const override { return true; }
 
@@ -207,6 +212,22 @@ class SampledActuation : public Actuation {
   long period_steps_;
 };
 
+/// Joint positions as they are measured.
+class Encoders {
+ public:
+  explicit Encoders(const scene::Scene& scene)
+      : noise_rad_(scene.actuation.joint_noise_rad), random_(scene.seed) {}
+  void measure(const VectorXd& q, VectorXd& measured) {
+    measured = q;
+    if (noise_rad_ > 0.0)
+      for (auto& angle : measured) angle += noise_rad_ * random_.normal();
+  }
+
+ private:
+  double noise_rad_;
+  Rng random_;
+};
+
 /// The torque of a tick is held for a period, docs/theory.md (8.7).
 class TorqueActuation final : public SampledActuation {
  public:
@@ -215,7 +236,13 @@ class TorqueActuation final : public SampledActuation {
                   const VectorXd& holding)
       : SampledActuation(plant, period_steps),
         limited_(scene.model.torque_limits || scene.actuation.torque_rate_max_Nm_s),
+        encoders_(scene),
         delayed_(delay_ticks, holding) {}
+
+  void observe(VectorXd& q, VectorXd& v) override {
+    encoders_.measure(plant_.node().q, q);
+    v = plant_.node().v;
+  }
 
   bool limited() const override { return limited_; }
 
@@ -226,11 +253,13 @@ class TorqueActuation final : public SampledActuation {
   }
 
   bool limited_;
+  Encoders encoders_;
   DelayLine<VectorXd> delayed_;
 };
 
 /// Position servos: the set point of a tick is held for a period, and each joint follows it by
-/// docs/theory.md (8.14) within its torque limit.
+/// docs/theory.md (8.14) within its torque limit. The controller is shown its own last set point:
+/// shown the arm, it would correct what the servos are about to correct, and oscillate.
 class ServoActuation final : public SampledActuation {
  public:
   ServoActuation(const scene::Scene& scene, const model::Model& model, Plant& plant,
@@ -240,14 +269,20 @@ class ServoActuation final : public SampledActuation {
         kv_(servo_gains(scene, model, scene.actuation.servo.kv, "kv")),
         nominal_(control::scaled_masses(model, scene.actuation.planner_mass_scale)),
         ws_(nominal_),
+        encoders_(scene),
         point_{plant.node().q, plant.node().v},
+        sent_(point_),
         delayed_(delay_ticks, point_) {
-    torque_ = VectorXd::Zero(model.dof());
+    torque_ = measured_ = VectorXd::Zero(model.dof());
     if (scene.model.torque_limits)
       effort_max_ = control::joint_limits(model.robot(), &model::Joint::effort_max, infinity);
     check_stability(scene, model);
   }
 
+  void observe(VectorXd& q, VectorXd& v) override {
+    q = sent_.q;
+    v = sent_.v;
+  }
   bool limited() const override { return effort_max_.size() > 0; }
 
  private:
@@ -296,9 +331,10 @@ class ServoActuation final : public SampledActuation {
   }
 
   void form_torque() override {
-    const Plant::Node& node = plant_.node();
-    dynamics::gravity_torque(nominal_, ws_, node.q, torque_);
-    torque_ += kp_.cwiseProduct(point_.q - node.q) + kv_.cwiseProduct(point_.v - node.v);
+    encoders_.measure(plant_.node().q, measured_);
+    dynamics::gravity_torque(nominal_, ws_, measured_, torque_);
+    torque_ +=
+        kp_.cwiseProduct(point_.q - measured_) + kv_.cwiseProduct(point_.v - plant_.node().v);
     saturated_ = false;
     if (effort_max_.size() == 0) return;
     saturated_ = (torque_.cwiseAbs().array() > effort_max_.array()).any();
@@ -308,7 +344,10 @@ class ServoActuation final : public SampledActuation {
   VectorXd kp_, kv_, effort_max_;
   model::Model nominal_;  ///< the arm as its drives know it
   dynamics::Workspace ws_;
-  SetPoint point_, sent_;
+  Encoders encoders_;
+  VectorXd measured_;
+  SetPoint point_;  ///< that the servos follow now
+  SetPoint sent_;   ///< the controller's last one
   DelayLine<SetPoint> delayed_;
 };
 

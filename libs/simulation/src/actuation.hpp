@@ -22,6 +22,8 @@ class Actuation {
   virtual void reach_node() {}
   /// Reserves memory for answers with so many gyroscopic terms.
   virtual void reserve(std::size_t) {}
+  /// The state that the controller is shown at a tick.
+  virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
   /// Whether the planner is called at node k.
   [[nodiscard]] virtual bool asks_planner(long k) const = 0;
   /// Books the node's energies with the planner's answer at the node.

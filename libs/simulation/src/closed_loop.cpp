@@ -44,11 +44,12 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
   return inputs;
 }
 
-// Whether nothing is hidden from the controller, nothing changes, and it measures exactly: then one
-// view of the world serves controller and judge.
+// Whether nothing is hidden from the controller, nothing changes, and it is shown the arm as it is:
+// then one view of the world serves controller and judge.
 bool controller_sees_all(const scene::Scene& scene) {
-  const bool exact =
-      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0;
+  const bool exact = scene.actuation.joint_noise_rad == 0.0 &&
+                     scene.actuation.planner_mass_scale == 1.0 &&
+                     scene.actuation.type != scene::ActuationType::position;
   return exact && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
@@ -78,8 +79,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
                        const PlantFactory& plant_factory)
     : scene_(scene),
       model_(load_checked(scene)),
-      noise_(scene.seed),
-      q_measured_(VectorXd::Zero(model_.dof())) {
+      q_shown_(VectorXd::Zero(model_.dof())),
+      v_shown_(q_shown_) {
   make_plant(plant_factory);
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
@@ -275,7 +276,7 @@ void ClosedLoop::check_outcome() {
   const bool tick = actuation_->asks_planner(node.k);
   if (tick) let_controller_observe();
   const control::ControlState now = controller_->answer().state;
-  if (now == control::ControlState::reached)
+  if (now == control::ControlState::reached && arrived())
     finish(log::Outcome::reached, "");
   else if (tick && now == control::ControlState::stalled)
     finish(log::Outcome::stalled,
@@ -284,6 +285,15 @@ void ClosedLoop::check_outcome() {
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(node.k))
     finish(log::Outcome::interrupted, "stopped from outside");
+}
+
+bool ClosedLoop::arrived() const {
+  if (scene_.actuation.type != scene::ActuationType::position) return true;
+  dynamics::Workspace ws(model_);
+  dynamics::forward_kinematics(model_, ws, plant_->node().q);
+  return control::goal_error(controller_->goals().goal(), model_, ws, plant_->node().q,
+                             plant_->node().v)
+      .reached;
 }
 
 void ClosedLoop::count_contacts() {
@@ -323,11 +333,8 @@ void ClosedLoop::refuse() {
 
 void ClosedLoop::let_controller_observe() {
   observed_k_ = plant_->node().k;
-  q_measured_ = plant_->node().q;
-  if (scene_.actuation.joint_noise_rad > 0.0 &&
-      scene_.actuation.type != scene::ActuationType::ideal)
-    for (auto& angle : q_measured_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  controller_->observe(plant_->node().time_s, q_measured_, plant_->node().v);
+  actuation_->observe(q_shown_, v_shown_);
+  controller_->observe(plant_->node().time_s, q_shown_, v_shown_);
   const control::GoalTracker& goals = controller_->goals();
   while (goals_reached_ < goals.index())
     recorder_->event(plant_->node().time_s,

@@ -7,7 +7,6 @@
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/world_view.hpp"
-#include "hamelin/core/rng.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "recorder.hpp"
 #include "tick_log.hpp"
@@ -45,6 +44,8 @@ class ClosedLoop {
   void change_map();
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
+  /// Whether the arm itself is at the last goal, when its set point is.
+  [[nodiscard]] bool arrived() const;
   /// Counts the contacts of this node for the result, if the plant counts, too.
   void count_contacts();
   /// Describes the contact at this node, and who counted it if the plant counts, too.
@@ -80,8 +81,7 @@ class ClosedLoop {
   std::unique_ptr<control::WorldView> own_judge_;
   control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
-  Rng noise_;
-  Eigen::VectorXd q_measured_;
+  Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
   // State of the run.
   std::unique_ptr<Recorder> recorder_;
