@@ -233,6 +233,36 @@ TEST_CASE("random configurations touch map and arm where hamelin's distances say
   CHECK(in_arm > 5);
 }
 
+TEST_CASE("a moving arm touches the map at the node at which hamelin's distances say so",
+          "[mujoco]") {
+  const scene::Scene scene = scene::read_scene(test::data / "scenes" / "clutter.json");
+  Rig rig(control::load_model(scene), scene);
+  const auto environment = scene::make_environment(scene, rig.model, 0.01);
+  dynamics::Workspace ws(rig.model);
+  scene::PlacedShapes placed(rig.model);
+  VectorXd torque(7);
+  Rng rng(8);
+  int touched = 0;
+  simulation::Plant& plant = rig.make();
+  for (int trial = 0; trial < 20; ++trial) {
+    // fast enough to pass many boxes
+    plant.start(scene.start_q, test::random_joints(rng, 7, 6.0));
+    for (int k = 0; k < 400; ++k) {
+      dynamics::gravity_torque(rig.model, ws, plant.node().q, torque);
+      REQUIRE(plant.step(torque, h));
+      dynamics::forward_kinematics(rig.model, ws, plant.node().q);
+      placed.place(rig.model, ws);
+      const double exact = environment.clearance(placed.view(), 0.0, 0.01);
+      CAPTURE(trial, k, exact);
+      if (std::abs(exact) > 1e-6) REQUIRE((plant.contacts().count > 0) == (exact < 0.0));
+      if (plant.contacts().count == 0) continue;
+      ++touched;
+      break;
+    }
+  }
+  CHECK(touched > 5);
+}
+
 TEST_CASE("a change of the map changes what is touched, and the motion goes on", "[mujoco]") {
   scene::Scene scene = scene::read_scene(test::data / "scenes" / "clutter.json");
   Rig rig(control::load_model(scene), scene);
