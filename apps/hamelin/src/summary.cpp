@@ -63,6 +63,12 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                          : fmt::format("; {:.2f} % of the steps proved clear, the tightest by {} m",
                                        100.0 * r["certified_share"].get<double>(),
                                        number(r["tightest_step_m"]))));
+  if (r.contains("plant"))
+    line(
+        "plant",
+        fmt::format("{} {}; nodes in contact: {} by its own detection, {} by the judge",
+                    r["plant"]["type"].get<std::string>(), r["plant"]["version"].get<std::string>(),
+                    r["plant"]["contacts"].get<long>(), r["plant"]["judge_contacts"].get<long>()));
   line("q", joints(r["q"]));
   line("energy", fmt::format("{} J at the start, {} J at the end, largest error {} J",
                              number(r["energy_initial_J"]), number(r["energy_final_J"]),
