@@ -92,7 +92,7 @@ class MujocoPlant final : public simulation::Plant {
         deepest = data_->contact + i;
     if (deepest == nullptr) return "counts no contact";
     const bool link_first = shape(deepest->geom1).kind == Kind::link;
-    return fmt::format("counts a contact at {} s: {} is {:.2g} mm inside {}", node_.time_s,
+    return fmt::format("counts a contact at {:.9g} s: {} is {:.2g} mm inside {}", node_.time_s,
                        describe_shape(link_first ? deepest->geom1 : deepest->geom2),
                        -1e3 * deepest->dist,
                        describe_shape(link_first ? deepest->geom2 : deepest->geom1));
