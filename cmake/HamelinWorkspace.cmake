@@ -225,7 +225,8 @@ function(hamelin_install_package)
   write_basic_package_version_file(hamelinConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfig.cmake"
     "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
-    "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" DESTINATION ${dest})
+    "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindMuJoCo.cmake"
+    DESTINATION ${dest})
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/schema" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
 endfunction()

@@ -36,6 +36,13 @@ inline Json scene_52() {
           {"duration_s", 40.0}};
 }
 
+/// planar4 with this torque limit in each joint.
+inline model::Robot strong(double effort) {
+  model::Robot robot = planar4();
+  for (auto& link : robot.links) link.joint.effort_max = effort;
+  return robot;
+}
+
 inline Json ball(const std::string& name, double x, double y, double radius) {
   return {{"name", name}, {"type", "sphere"}, {"radius_m", radius}, {"position_m", {x, y, 0.0}}};
 }

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
+#include "plants.hpp"
 #include "record.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
@@ -68,7 +69,7 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
       progress.show(time_s, duration_s);
     };
     verdict = simulation::verify(recorded, options.file, tolerance,
-                                 plugin_path(options.plugin_path), watch);
+                                 plugin_path(options.plugin_path), watch, plant_factory());
   }
   const bool equal = !verdict.beyond_tolerance && !verdict.stopped;
   if (options.record.json) {
@@ -119,7 +120,7 @@ int replay(const ReplayOptions& options) {
   std::vector<std::filesystem::path> inputs = files_of(recorded.scene);
   inputs.push_back(options.file);
   return record(options.record, inputs, [&](const simulation::Watch& watch) {
-    return simulation::repeat(recorded, plugin_path(options.plugin_path), watch);
+    return simulation::repeat(recorded, plugin_path(options.plugin_path), watch, plant_factory());
   });
 }
 

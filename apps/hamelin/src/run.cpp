@@ -7,6 +7,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "plants.hpp"
 #include "record.hpp"
 #include "robot_notes.hpp"
 #include "scene_flags.hpp"
@@ -63,7 +64,7 @@ int run(const RunOptions& options) {
   note_warnings(model.robot(), scene.robot.file);
   note_unmodelled(scene, model.robot());
   return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
-    return simulation::run(scene, plugin_path(options.plugin_path), watch);
+    return simulation::run(scene, plugin_path(options.plugin_path), watch, plant_factory());
   });
 }
 
@@ -85,6 +86,11 @@ void add_run(CLI::App& app, int& exit_code) {
   restrict_to_integrators(
       command->add_option("--integrator", options->flags.integrator,
                           "time integrator (default the scene's, or hamel-variational)"));
+  restrict_values(
+      command->add_option("--plant", options->flags.plant,
+                          "what simulates the arm: hamelin, or MuJoCo, which also counts contacts "
+                          "itself (default the scene's, or hamelin)"),
+      {"hamelin", "mujoco"});
   command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")
       ->type_name("H");
   command

@@ -20,6 +20,7 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
   };
   if (flags.planner) choose("planner", *flags.planner);
   if (flags.integrator) choose("integrator", *flags.integrator);
+  if (flags.plant) document["plant"] = {{"type", *flags.plant}};
   if (flags.step_s) document["step_s"] = *flags.step_s;
   if (flags.duration_s) document["duration_s"] = *flags.duration_s;
   if (flags.seed) document["seed"] = *flags.seed;

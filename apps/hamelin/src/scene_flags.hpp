@@ -11,7 +11,7 @@ namespace hamelin::app {
 
 /// Values of a scene file that the command line overrides.
 struct SceneFlags {
-  std::optional<std::string> planner, integrator;
+  std::optional<std::string> planner, integrator, plant;
   std::optional<double> step_s, duration_s;
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;  ///< "/json/pointer=VALUE", applied last

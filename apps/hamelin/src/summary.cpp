@@ -67,6 +67,12 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
     line("torque", fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
                                number(r["torque_change"]["mean"], 3),
                                number(r["torque_change"]["max"], 3)));
+  if (r.contains("plant"))
+    line(
+        "plant",
+        fmt::format("{} {}; nodes in contact: {} by its own detection, {} by the judge",
+                    r["plant"]["type"].get<std::string>(), r["plant"]["version"].get<std::string>(),
+                    r["plant"]["contacts"].get<long>(), r["plant"]["judge_contacts"].get<long>()));
   line("q", joints(r["q"]));
   line("energy", fmt::format("{} J at the start, {} J at the end, largest error {} J",
                              number(r["energy_initial_J"]), number(r["energy_final_J"]),

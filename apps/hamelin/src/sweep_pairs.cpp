@@ -8,6 +8,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/sweep/pairs.hpp"
+#include "plants.hpp"
 #include "scene_flags.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
@@ -103,6 +104,7 @@ int sweep_pairs(const PairsOptions& options) {
 
   sweep::PairRuns runs;
   runs.plugin_directories = plugin_path(options.plugin_path);
+  runs.plant_factory = plant_factory();
   runs.jobs = options.jobs;
   runs.stop = &stop_on_signals();
   const auto begin = clock::now();

@@ -10,6 +10,7 @@
 #include "hamelin/sweep/judge.hpp"
 #include "hamelin/sweep/plan.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
+#include "plants.hpp"
 #include "scene_flags.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
@@ -70,7 +71,8 @@ int sweep_one(const OneOptions& options) {
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
   watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.add_node(time_s, q); };
-  const log::Result result = simulation::run(scene, plugin_path(options.plugin_path), watch);
+  const log::Result result =
+      simulation::run(scene, plugin_path(options.plugin_path), watch, plant_factory());
   const Json line{{"result", log::to_json(result)}, {"judge", sweep::to_json(judge.verdict())}};
   fmt::print("{}\n", line.dump(-1, ' ', false, Json::error_handler_t::replace));
   return 0;

@@ -48,8 +48,9 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
-  data.sampled = scene.actuation.type == scene::ActuationType::sampled;
-  data.delay_s = scene.actuation.delay_s;
+  data.sampled = scene.actuation.type != scene::ActuationType::ideal;
+  // Under position actuation the planner is shown the set points, which change without delay.
+  if (scene.actuation.type == scene::ActuationType::sampled) data.delay_s = scene.actuation.delay_s;
   data.control_period_s = control_period_s;
   data.self_collision = scene.model.self_collision;
   data.influence_m = world.influence_m();

@@ -132,6 +132,12 @@ Json to_json(const Result& r) {
       {"provenance", r.provenance}};
   if (r.torque_change)
     document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
+  if (r.plant)
+    document["plant"] = {{"type", r.plant->type},
+                         {"version", r.plant->version},
+                         {"contacts", r.plant->contacts},
+                         {"judge_contacts", r.plant->judge_contacts},
+                         {"deepest_m", optional(r.plant->deepest_m)}};
   for (const auto& replaced : null_non_finite(document))
     document["warnings"].push_back(fmt::format("not finite, written as null: {}", replaced));
   return document;

@@ -236,9 +236,36 @@ ModelFlags read_model(const Reader& in) {
   return model;
 }
 
+// One number, or a list of them.
+std::vector<double> read_numbers(const Reader& in, const char* key) {
+  const Json* given = in.find(key);
+  if (given == nullptr) return {};
+  return given->is_number() ? std::vector{given->get<double>()} : given->get<std::vector<double>>();
+}
+
+void read_servo(const Reader& in, Actuation& actuation) {
+  const bool position = actuation.type == ActuationType::position;
+  if (position != (in.find("servo") != nullptr))
+    in.fail("servo", position ? "is missing, expected the gains kp and kv of the position servos"
+                              : "is not allowed, expected position actuation");
+  if (!position) return;
+  const Reader servo = in.child("servo");
+  actuation.servo = {read_numbers(servo, "kp"), read_numbers(servo, "kv")};
+}
+
+PlantType read_plant(const Reader& in, const Reader& plant, ActuationType actuation) {
+  if (plant.get<std::string>("type", "hamelin") == "hamelin") return PlantType::hamelin;
+  if (actuation == ActuationType::ideal)
+    in.fail("actuation/type",
+            "is ideal, expected sampled or position because the joints of MuJoCo take torques");
+  return PlantType::mujoco;
+}
+
 Actuation read_actuation(const Reader& in, double step_s) {
   Actuation actuation;
-  if (in.get<std::string>("type", "ideal") == "sampled") actuation.type = ActuationType::sampled;
+  const auto type = in.get<std::string>("type", "ideal");
+  if (type == "sampled") actuation.type = ActuationType::sampled;
+  if (type == "position") actuation.type = ActuationType::position;
   actuation.control_period_s = in.get("control_period_s", step_s);
   actuation.delay_s = in.get("delay_s", 0.0);
   actuation.joint_noise_rad = in.get("joint_noise_rad", 0.0);
@@ -258,11 +285,12 @@ Actuation read_actuation(const Reader& in, double step_s) {
   if (actuation.type == ActuationType::ideal && actuation.delay_s > 0.0)
     in.fail("delay_s",
             fmt::format("{} s is not allowed, ideal actuation has no delay", actuation.delay_s));
-  if (actuation.type == ActuationType::ideal && actuation.estimates_velocity)
+  if (actuation.type != ActuationType::sampled && actuation.estimates_velocity)
     in.fail("joint_velocity", "'estimated' is not allowed, expected sampled actuation");
-  if (actuation.type == ActuationType::ideal && actuation.torque_rate_max_Nm_s)
+  if (actuation.type != ActuationType::sampled && actuation.torque_rate_max_Nm_s)
     in.fail("torque_rate_max_Nm_s",
             "is not allowed, expected sampled actuation, whose torques change from tick to tick");
+  read_servo(in, actuation);
   return actuation;
 }
 
@@ -338,6 +366,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.duration_s = in.get("duration_s", 10.0);
   scene.seed = in.get<std::uint64_t>("seed", 1);
   scene.actuation = read_actuation(in.child("actuation"), scene.step_s);
+  scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
   return scene;
 }
 

@@ -82,10 +82,13 @@ Json map_json(const MapSpec& map) {
   return out;
 }
 
+Json one_or_list(const std::vector<double>& values) {
+  return values.size() == 1 ? Json(values.front()) : Json(values);
+}
+
 Json joint_numbers_json(const JointNumbers& numbers) {
   if (numbers.from_robot) return "robot";
-  if (numbers.values.empty()) return 0.0;
-  return numbers.values.size() == 1 ? Json(numbers.values.front()) : Json(numbers.values);
+  return numbers.values.empty() ? Json(0.0) : one_or_list(numbers.values);
 }
 
 Json model_json(const ModelFlags& model) {
@@ -107,15 +110,17 @@ Json model_json(const ModelFlags& model) {
 }
 
 Json actuation_json(const Actuation& actuation) {
-  return {{"type", to_string(actuation.type)},
-          {"control_period_s", actuation.control_period_s},
-          {"delay_s", actuation.delay_s},
-          {"joint_noise_rad", actuation.joint_noise_rad},
-          {"joint_velocity", actuation.estimates_velocity ? "estimated" : "measured"},
-          {"estimator_bandwidth", actuation.estimator_bandwidth},
-          {"planner_mass_scale", actuation.planner_mass_scale},
-          {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
-          {"coulomb_friction_share", actuation.coulomb_friction_share}};
+  Json out{{"type", to_string(actuation.type)},
+           {"control_period_s", actuation.control_period_s},
+           {"delay_s", actuation.delay_s},
+           {"joint_noise_rad", actuation.joint_noise_rad},
+           {"planner_mass_scale", actuation.planner_mass_scale},
+           {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
+           {"coulomb_friction_share", actuation.coulomb_friction_share}};
+  if (actuation.type == ActuationType::position)
+    out["servo"] = {{"kp", one_or_list(actuation.servo.kp)},
+                    {"kv", one_or_list(actuation.servo.kv)}};
+  return out;
 }
 
 Json start_json(const Scene& scene) {
@@ -149,6 +154,18 @@ std::string_view to_string(ActuationType type) noexcept {
       return "ideal";
     case ActuationType::sampled:
       return "sampled";
+    case ActuationType::position:
+      return "position";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(PlantType type) noexcept {
+  switch (type) {
+    case PlantType::hamelin:
+      return "hamelin";
+    case PlantType::mujoco:
+      return "mujoco";
   }
   return "unknown";
 }
@@ -200,6 +217,7 @@ Json resolved_json(const Scene& scene) {
   for (const Obstacle& obstacle : scene.obstacles) out["obstacles"].push_back(to_json(obstacle));
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);
+  if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};
   out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
   out["integrator"] = choice_json(scene.integrator);
   out["stall"] = nullptr;

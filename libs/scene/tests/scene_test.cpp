@@ -183,6 +183,38 @@ TEST_CASE("paths of a scene follow symbolic links as the system does", "[scene][
         root / "project/maps/m.bt");
 }
 
+TEST_CASE("position actuation has servos, and MuJoCo takes torques", "[scene][unit]") {
+  Json document = small_document();
+  const auto read = [&] { return scene_from_json(document, ".", "x.json"); };
+  CHECK_FALSE(resolved_json(read()).contains("plant"));
+  document["plant"] = {{"type", "mujoco"}};
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /actuation/type: is ideal, expected sampled or position because "
+                    "the joints of MuJoCo take torques");
+  document["actuation"] = {{"type", "position"}};
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /actuation/servo: is missing, expected the gains kp and kv of "
+                    "the position servos");
+  document["actuation"]["servo"] = {{"kp", 2000.0}, {"kv", {80.0, 40.0}}};
+  CHECK(read().plant == PlantType::mujoco);
+  CHECK(read().actuation.type == ActuationType::position);
+  CHECK(read().actuation.servo.kp == std::vector{2000.0});
+  CHECK(read().actuation.servo.kv == std::vector{80.0, 40.0});
+  const Json resolved = resolved_json(read());
+  CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
+  CHECK(resolved["plant"]["type"] == "mujoco");
+  CHECK(resolved["actuation"]["servo"] == document["actuation"]["servo"]);
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+  document["actuation"]["torque_rate_max_Nm_s"] = 1000.0;
+  CHECK_THROWS_WITH(read(), Catch::Contains("/actuation/torque_rate_max_Nm_s: is not allowed"));
+  document["actuation"].erase("torque_rate_max_Nm_s");
+  document["actuation"]["type"] = "sampled";
+  CHECK_THROWS_WITH(read(),
+                    "x.json: /actuation/servo: is not allowed, expected position actuation");
+  document["actuation"].erase("servo");
+  CHECK(read().plant == PlantType::mujoco);
+}
+
 TEST_CASE("the resolved scene reads back as itself", "[scene][unit]") {
   for (const Json& document : {full_document(), small_document()}) {
     const Json resolved = resolved_json(scene_from_json(document, "a/b", "x.json"));

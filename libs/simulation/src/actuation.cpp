@@ -2,15 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
-#include "plant.hpp"
+#include "hamelin/core/rng.hpp"
 
 namespace hamelin::simulation {
 
@@ -31,82 +33,89 @@ control::TorqueLimits torque_limits(const scene::Scene& scene, const model::Mode
 /// (8.1)–(8.3).
 class IdealActuation final : public Actuation {
  public:
-  IdealActuation(const scene::Scene& scene, const model::Model& model)
-      : step_s_(scene.step_s), limits_(torque_limits(scene, model)) {
+  IdealActuation(const scene::Scene& scene, SimulatedArm& arm)
+      : arm_(arm), step_s_(scene.step_s), limits_(torque_limits(scene, arm.model)) {
     gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ =
-        VectorXd::Zero(model.dof());
+        VectorXd::Zero(arm.model.dof());
   }
 
   // The closing half-kick of the last step uses the previous gradient; book() corrects it,
   // docs/theory.md (8.4).
-  void reach_node(SimulatedArm& arm) override {
+  void reach_node() override {
     if (kicked_) {
       impulse_ = -0.5 * step_s_ * gradient_before_;
-      arm.integrator->kick(arm.state, impulse_);
+      arm_.integrator->kick(arm_.state, impulse_);
     }
-    arm.integrator->velocity(arm.state, arm.v);
+    arm_.update_velocity();
   }
 
+  void reserve(std::size_t gyroscopic_terms) override {
+    arm_.channels.gyroscopic.reserve(gyroscopic_terms);
+  }
+  void observe(VectorXd& q, VectorXd& v) override {
+    q = arm_.node().q;
+    v = arm_.node().v;
+  }
   bool asks_planner(long) const override { return true; }
 
-  void book(SimulatedArm& arm, const planning::CommandBuffers& answer,
-            EnergyAudit& audit) override {
+  void book(const planning::CommandBuffers& answer, EnergyAudit& audit) override {
     gradient_ = answer.potential_gradient();
     if (kicked_) {
       impulse_ = 0.5 * step_s_ * (gradient_before_ - gradient_);
-      arm.integrator->kick(arm.state, impulse_);
-      arm.integrator->velocity(arm.state, arm.v);
+      arm_.integrator->kick(arm_.state, impulse_);
+      arm_.update_velocity();
     }
     if (has_potential(answer)) audit.note_potential();
-    audit.book_node(arm, answer.raw().potential_J);
+    audit.book_node(arm_, answer.raw().potential_J);
   }
 
-  void apply(SimulatedArm& arm, const control::Answer& decided, EnergyAudit& audit) override {
+  void apply(const control::Answer& decided, EnergyAudit& audit) override {
     const planning::CommandBuffers& answer = *decided.channels;
-    auto& channels = arm.channels;
+    auto& channels = arm_.channels;
     channels.held_torque = answer.held_torque();
     channels.damping = answer.damping();
     control::copy_gyroscopic_terms(answer, channels.gyroscopic);
-    saturated_ = limits_.limit(arm.ws, arm.state.q, arm.v, channels);
-    node_velocity_ = arm.v;
-    if (answer.raw().has_node_velocity != 0) set_node_velocity(arm, answer, audit);
-    if (arm.own_damping.size() > 0) channels.damping += arm.own_damping;
+    saturated_ = limits_.limit(arm_.ws, arm_.state.q, arm_.node().v, channels);
+    node_velocity_ = arm_.node().v;
+    if (answer.raw().has_node_velocity != 0) set_node_velocity(answer, audit);
+    if (arm_.own_damping.size() > 0) channels.damping += arm_.own_damping;
     const bool potential = has_potential(answer);
     if (potential) {
       impulse_ = -0.5 * step_s_ * gradient_;
-      arm.integrator->kick(arm.state, impulse_);
+      arm_.integrator->kick(arm_.state, impulse_);
     }
     gradient_before_ = gradient_;
     kicked_ = kicked_ || potential;
   }
 
+  bool step(double step_s) override { return arm_.step_channels(step_s); }
   bool needs_answer_at_end() const override { return kicked_; }
 
-  const VectorXd& departure_velocity(SimulatedArm& arm) override {
+  const VectorXd& departure_velocity() override {
     if (!kicked_) return node_velocity_;
-    arm.integrator->velocity(arm.state, departure_);
+    arm_.integrator->velocity(arm_.state, departure_);
     return departure_;
   }
 
-  void torques(SimulatedArm& arm, const planning::CommandBuffers& answer, VectorXd& sum,
-               Json& by_channel) override {
-    sum = arm.channels.held_torque;
+  void torques(const planning::CommandBuffers& answer, VectorXd& sum, Json& by_channel) override {
+    sum = arm_.channels.held_torque;
     if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
     const auto add = [&](const char* channel, const VectorXd& torque) {
       sum += torque;
       by_channel[channel] = to_json(torque);
     };
     if (!gradient_.isZero(0.0)) add("potential", -gradient_);
-    if (!answer.damping().isZero(0.0)) add("damping", -answer.damping().cwiseProduct(arm.v));
-    if (!arm.channels.gyroscopic.empty()) {
-      dynamics::gyroscopic_torque(arm.model, arm.ws, arm.state.q, arm.v, arm.channels.gyroscopic,
-                                  impulse_);
+    if (!answer.damping().isZero(0.0))
+      add("damping", -answer.damping().cwiseProduct(arm_.node().v));
+    if (!arm_.channels.gyroscopic.empty()) {
+      dynamics::gyroscopic_torque(arm_.model, arm_.ws, arm_.state.q, arm_.node().v,
+                                  arm_.channels.gyroscopic, impulse_);
       add("gyroscopic", impulse_);
     }
     if (answer.raw().has_node_velocity != 0) {
       // The torque that would make the node's change of velocity within one step: M (x − v) / h.
-      departure_ = (node_velocity_ - arm.v) / step_s_;
-      dynamics::momentum(arm.model, arm.ws, arm.state.q, departure_, impulse_);
+      departure_ = (node_velocity_ - arm_.node().v) / step_s_;
+      dynamics::momentum(arm_.model, arm_.ws, arm_.state.q, departure_, impulse_);
       add("node", impulse_);
     }
   }
@@ -119,22 +128,23 @@ class IdealActuation final : public Actuation {
     return answer.raw().potential_J != 0.0 || !gradient_.isZero(0.0);
   }
 
-  void set_node_velocity(SimulatedArm& arm, const planning::CommandBuffers& answer,
-                         EnergyAudit& audit) {
-    departure_ = answer.node_velocity() - arm.v;
-    const double share = limits_.share_of_velocity_change(arm.ws, arm.state.q, departure_, step_s_,
-                                                          arm.channels.held_torque);
+  void set_node_velocity(const planning::CommandBuffers& answer, EnergyAudit& audit) {
+    departure_ = answer.node_velocity() - arm_.node().v;
+    const double share = limits_.share_of_velocity_change(arm_.ws, arm_.state.q, departure_,
+                                                          step_s_, arm_.channels.held_torque);
     if (share < 1.0) {
       saturated_ = true;
       node_velocity_ += share * departure_;
     } else {
       node_velocity_ = answer.node_velocity();
     }
-    arm.integrator->set_velocity(arm.state, node_velocity_);
-    const double kinetic = dynamics::kinetic_energy(arm.model, arm.ws, arm.state.q, node_velocity_);
+    arm_.integrator->set_velocity(arm_.state, node_velocity_);
+    const double kinetic =
+        dynamics::kinetic_energy(arm_.model, arm_.ws, arm_.state.q, node_velocity_);
     audit.book_node_velocity(kinetic - audit.ledger().kinetic, answer.raw());
   }
 
+  SimulatedArm& arm_;
   double step_s_;
   control::TorqueLimits limits_;
   VectorXd gradient_, gradient_before_, impulse_, departure_;
@@ -143,59 +153,208 @@ class IdealActuation final : public Actuation {
   bool saturated_ = false;
 };
 
-/// A sampled controller: the torque of a tick acts `delay` periods later and is held for a period,
-/// docs/theory.md (8.7).
-class SampledActuation final : public Actuation {
+/// Values that arrive a number of ticks after they were sent.
+template <class T>
+class DelayLine {
  public:
-  SampledActuation(const scene::Scene& scene, SimulatedArm& arm, long period_steps,
-                   long delay_periods)
-      : period_steps_(period_steps),
-        limited_(scene.model.torque_limits || scene.actuation.torque_rate_max_Nm_s) {
-    // Until the first torque arrives the arm is held against gravity.
-    VectorXd torque = VectorXd::Zero(arm.model.dof());
-    dynamics::gravity_torque(arm.model, arm.ws, arm.state.q, torque);
-    delayed_.assign(static_cast<std::size_t>(delay_periods) + 1, torque);
+  /// @param first arrives until the first value that is sent
+  DelayLine(long delay_ticks, const T& first)
+      : slots_(static_cast<std::size_t>(delay_ticks) + 1, first) {}
+  /// Sends a value at a tick. @return the value that arrives at this tick
+  const T& exchange(long tick, const T& value) {
+    slot(tick) = value;
+    return slot(tick + 1);  // written `delay_ticks` ticks ago
   }
-
-  void reach_node(SimulatedArm& arm) override { arm.integrator->velocity(arm.state, arm.v); }
-  bool asks_planner(long k) const override { return k % period_steps_ == 0; }
-
-  void book(SimulatedArm& arm, const planning::CommandBuffers&, EnergyAudit& audit) override {
-    audit.book_node(arm, 0.0);
-  }
-
-  void apply(SimulatedArm& arm, const control::Answer& decided, EnergyAudit& audit) override {
-    if (!asks_planner(arm.state.k)) return;
-    const long tick = arm.state.k / period_steps_;
-    slot(tick) = decided.torque;
-    if (decided.channels->raw().has_node_velocity != 0) audit.book_filter(decided.channels->raw());
-    saturated_ = decided.saturated;
-    if (tick > 0) change_.add((decided.torque - slot(tick - 1)).lpNorm<Eigen::Infinity>());
-    // The next slot of the ring was written `delay` ticks ago.
-    arm.channels.held_torque = slot(tick + 1);
-  }
-
-  bool needs_answer_at_end() const override { return false; }
-  const log::TorqueChange* torque_change() const override { return &change_; }
-  const VectorXd& departure_velocity(SimulatedArm& arm) override { return arm.v; }
-
-  void torques(SimulatedArm& arm, const planning::CommandBuffers&, VectorXd& sum,
-               Json& by_channel) override {
-    sum = arm.channels.held_torque;
-    if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
-  }
-
-  bool saturated() const override { return saturated_; }
-  bool limited() const override { return limited_; }
 
  private:
-  VectorXd& slot(long tick) { return delayed_[static_cast<std::size_t>(tick) % delayed_.size()]; }
+  T& slot(long tick) { return slots_[static_cast<std::size_t>(tick) % slots_.size()]; }
+  std::vector<T> slots_;
+};
 
-  long period_steps_;
-  bool limited_;
-  std::vector<VectorXd> delayed_;
-  log::TorqueChange change_;
+/// A sampled controller: a plant takes one torque, which changes at ticks and arrives late.
+class SampledActuation : public Actuation {
+ public:
+  SampledActuation(Plant& plant, long period_steps) : plant_(plant), period_steps_(period_steps) {}
+
+  bool asks_planner(long k) const override { return k % period_steps_ == 0; }
+  void book(const planning::CommandBuffers&, EnergyAudit& audit) override {
+    audit.book_node(plant_, 0.0);
+  }
+  void apply(const control::Answer& decided, EnergyAudit& audit) override {
+    const long k = plant_.node().k;
+    if (asks_planner(k)) {
+      if (decided.channels->raw().has_node_velocity != 0)
+        audit.book_filter(decided.channels->raw());
+      receive(decided, k / period_steps_);
+    }
+    form_torque();
+  }
+  bool step(double step_s) override { return plant_.step(torque_, step_s); }
+  bool needs_answer_at_end() const override { return false; }
+  const VectorXd& departure_velocity() override { return plant_.node().v; }
+  void torques(const planning::CommandBuffers&, VectorXd& sum, Json& by_channel) override {
+    sum = torque_;
+    if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
+  }
+  bool saturated() const override { return saturated_; }
+
+ protected:
+  /// Takes the answer of a tick.
+  virtual void receive(const control::Answer& decided, long tick) = 0;
+  /// Updates the torque at a node.
+  virtual void form_torque() {}
+
+  Plant& plant_;
+  VectorXd torque_;
   bool saturated_ = false;
+
+ private:
+  long period_steps_;
+};
+
+/// Joint positions as they are measured.
+class Encoders {
+ public:
+  explicit Encoders(const scene::Scene& scene)
+      : noise_rad_(scene.actuation.joint_noise_rad), random_(scene.seed) {}
+  void measure(const VectorXd& q, VectorXd& measured) {
+    measured = q;
+    if (noise_rad_ > 0.0)
+      for (auto& angle : measured) angle += noise_rad_ * random_.normal();
+  }
+
+ private:
+  double noise_rad_;
+  Rng random_;
+};
+
+/// The torque of a tick is held for a period, docs/theory.md (8.7).
+class TorqueActuation final : public SampledActuation {
+ public:
+  /// @param holding the torque that acts until the first one of the controller arrives
+  TorqueActuation(const scene::Scene& scene, Plant& plant, long period_steps, long delay_ticks,
+                  const VectorXd& holding)
+      : SampledActuation(plant, period_steps),
+        limited_(scene.model.torque_limits || scene.actuation.torque_rate_max_Nm_s),
+        decided_(holding),
+        encoders_(scene),
+        delayed_(delay_ticks, holding) {}
+
+  void observe(VectorXd& q, VectorXd& v) override {
+    encoders_.measure(plant_.node().q, q);
+    v = plant_.node().v;
+  }
+
+  bool limited() const override { return limited_; }
+  const log::TorqueChange* torque_change() const override { return &change_; }
+
+ private:
+  void receive(const control::Answer& decided, long tick) override {
+    if (tick > 0) change_.add((decided.torque - decided_).lpNorm<Eigen::Infinity>());
+    decided_ = decided.torque;
+    torque_ = delayed_.exchange(tick, decided_);
+    saturated_ = decided.saturated;
+  }
+
+  bool limited_;
+  VectorXd decided_;  ///< at the last tick
+  log::TorqueChange change_;
+  Encoders encoders_;
+  DelayLine<VectorXd> delayed_;
+};
+
+/// Position servos: the set point of a tick is held for a period, and each joint follows it by
+/// docs/theory.md (8.14) within its torque limit. The controller is shown its own last set point:
+/// shown the arm, it would correct what the servos are about to correct, and oscillate.
+class ServoActuation final : public SampledActuation {
+ public:
+  ServoActuation(const scene::Scene& scene, const model::Model& model, Plant& plant,
+                 long period_steps, long delay_ticks)
+      : SampledActuation(plant, period_steps),
+        kp_(servo_gains(scene, model, scene.actuation.servo.kp, "kp")),
+        kv_(servo_gains(scene, model, scene.actuation.servo.kv, "kv")),
+        nominal_(control::scaled_masses(model, scene.actuation.planner_mass_scale)),
+        ws_(nominal_),
+        encoders_(scene),
+        point_{plant.node().q, plant.node().v},
+        sent_(point_),
+        delayed_(delay_ticks, point_) {
+    torque_ = measured_ = VectorXd::Zero(model.dof());
+    if (scene.model.torque_limits)
+      effort_max_ = control::joint_limits(model.robot(), &model::Joint::effort_max, infinity);
+    check_stability(scene, model);
+  }
+
+  void observe(VectorXd& q, VectorXd& v) override {
+    q = sent_.q;
+    v = sent_.v;
+  }
+  bool limited() const override { return effort_max_.size() > 0; }
+
+ private:
+  struct SetPoint {
+    VectorXd q, v;
+  };
+
+  static VectorXd servo_gains(const scene::Scene& scene, const model::Model& model,
+                              const std::vector<double>& given, const char* key) {
+    const auto n = static_cast<std::size_t>(model.dof());
+    if (given.size() != 1 && given.size() != n)
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /actuation/servo/{}: {} values given, expected 1 or {}",
+                              scene.name, key, given.size(), n));
+    VectorXd gains(model.dof());
+    for (std::size_t i = 0; i < n; ++i)
+      gains[static_cast<Eigen::Index>(i)] = given[given.size() == 1 ? 0 : i];
+    return gains;
+  }
+
+  // docs/theory.md (8.15) at the start. The gains of the joint that contributes most are named.
+  void check_stability(const scene::Scene& scene, const model::Model& model) {
+    const double h = scene.step_s;
+    Eigen::MatrixXd M(model.dof(), model.dof());
+    dynamics::Workspace ws(model);
+    dynamics::mass_matrix(model, ws, plant_.node().q, M);
+    const VectorXd gain = h * kv_ + 0.5 * h * h * kp_;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(gain.asDiagonal(), M);
+    const double largest = modes.eigenvalues().maxCoeff();
+    if (largest < 2.0) return;
+    Eigen::Index joint = 0;
+    (gain.cwiseProduct(modes.eigenvectors().rightCols(1).cwiseAbs2())).maxCoeff(&joint);
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("{}: /actuation/servo: joint '{}' is unstable at the step {} s, "
+                    "expected gains that are smaller by a factor of {:.2g}, a smaller "
+                    "step or more rotor inertia",
+                    scene.name, model.robot().links[static_cast<std::size_t>(joint)].joint.name, h,
+                    largest / 2.0));
+  }
+
+  void receive(const control::Answer& decided, long tick) override {
+    sent_.q = decided.q_next;
+    sent_.v = decided.v_next;
+    point_ = delayed_.exchange(tick, sent_);
+  }
+
+  void form_torque() override {
+    encoders_.measure(plant_.node().q, measured_);
+    dynamics::gravity_torque(nominal_, ws_, measured_, torque_);
+    torque_ +=
+        kp_.cwiseProduct(point_.q - measured_) + kv_.cwiseProduct(point_.v - plant_.node().v);
+    saturated_ = false;
+    if (effort_max_.size() == 0) return;
+    saturated_ = (torque_.cwiseAbs().array() > effort_max_.array()).any();
+    torque_ = torque_.cwiseMin(effort_max_).cwiseMax(-effort_max_);
+  }
+
+  VectorXd kp_, kv_, effort_max_;
+  model::Model nominal_;  ///< the arm as its drives know it
+  dynamics::Workspace ws_;
+  Encoders encoders_;
+  VectorXd measured_;
+  SetPoint point_;  ///< that the servos follow now
+  SetPoint sent_;   ///< the controller's last one
+  DelayLine<SetPoint> delayed_;
 };
 
 long integer_multiple(double value, double unit, const std::string& where, const char* what) {
@@ -215,13 +374,21 @@ long steps_per_tick(const scene::Scene& scene) {
                                        "control_period_s"));
 }
 
-std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene, SimulatedArm& arm) {
-  if (scene.actuation.type == scene::ActuationType::ideal)
-    return std::make_unique<IdealActuation>(scene, arm.model);
+std::unique_ptr<Actuation> make_ideal_actuation(const scene::Scene& scene, SimulatedArm& arm) {
+  return std::make_unique<IdealActuation>(scene, arm);
+}
+
+std::unique_ptr<Actuation> make_sampled_actuation(const scene::Scene& scene,
+                                                  const model::Model& model, Plant& plant) {
   const long period_steps = steps_per_tick(scene);
   const long delay = integer_multiple(scene.actuation.delay_s, scene.actuation.control_period_s,
                                       scene.name, "delay_s");
-  return std::make_unique<SampledActuation>(scene, arm, period_steps, delay);
+  if (scene.actuation.type == scene::ActuationType::position)
+    return std::make_unique<ServoActuation>(scene, model, plant, period_steps, delay);
+  dynamics::Workspace ws(model);
+  VectorXd holding(model.dof());
+  dynamics::gravity_torque(model, ws, plant.node().q, holding);
+  return std::make_unique<TorqueActuation>(scene, plant, period_steps, delay, holding);
 }
 
 }  // namespace hamelin::simulation

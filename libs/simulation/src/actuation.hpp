@@ -1,8 +1,7 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
 #include <memory>
-#include <optional>
-#include <vector>
 
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
@@ -11,7 +10,7 @@
 
 namespace hamelin::simulation {
 
-/// How a planner's commands become motion.
+/// How a planner's commands become motion of a plant.
 class Actuation {
  public:
   Actuation() = default;
@@ -19,22 +18,27 @@ class Actuation {
   Actuation& operator=(const Actuation&) = delete;
   virtual ~Actuation() = default;
 
-  /// Computes the arm's velocity at a node, into arm.v, before the planner is called.
-  virtual void reach_node(SimulatedArm& arm) = 0;
+  /// Completes the plant's velocity at a node, before the planner is called.
+  virtual void reach_node() {}
+  /// Reserves memory for answers with so many gyroscopic terms.
+  virtual void reserve(std::size_t) {}
+  /// The state that the controller is shown at a tick.
+  virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
   /// Whether the planner is called at node k.
   [[nodiscard]] virtual bool asks_planner(long k) const = 0;
   /// Books the node's energies with the planner's answer at the node.
-  virtual void book(SimulatedArm& arm, const planning::CommandBuffers& answer,
-                    EnergyAudit& audit) = 0;
-  /// Puts the answer into the channels and the state. It acts until the next node.
-  virtual void apply(SimulatedArm& arm, const control::Answer& answer, EnergyAudit& audit) = 0;
+  virtual void book(const planning::CommandBuffers& answer, EnergyAudit& audit) = 0;
+  /// Makes the answer act from this node on.
+  virtual void apply(const control::Answer& answer, EnergyAudit& audit) = 0;
+  /// Lets the plant step. @return whether it converged
+  [[nodiscard]] virtual bool step(double step_s) = 0;
   /// Whether the account of the last node needs one more answer of the planner.
   [[nodiscard]] virtual bool needs_answer_at_end() const = 0;
   /// Velocity with which the motion leaves the node.
-  [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity(SimulatedArm& arm) = 0;
+  [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity() = 0;
   /// Torque of each channel that acts from this node on, and their sum, for the log.
-  virtual void torques(SimulatedArm& arm, const planning::CommandBuffers& answer,
-                       Eigen::VectorXd& sum, Json& channels) = 0;
+  virtual void torques(const planning::CommandBuffers& answer, Eigen::VectorXd& sum,
+                       Json& channels) = 0;
   /// Whether a limit cut the current answer.
   [[nodiscard]] virtual bool saturated() const = 0;
   /// By how much the torque changed from tick to tick; null under ideal actuation.
@@ -43,10 +47,17 @@ class Actuation {
   [[nodiscard]] virtual bool limited() const = 0;
 };
 
-/// The actuation of a scene.
-/// @throws Error invalid for periods and delays that are not integer multiples of the step
-[[nodiscard]] std::unique_ptr<Actuation> make_actuation(const scene::Scene& scene,
-                                                        SimulatedArm& arm);
+/// The ideal actuation of a scene, which only hamelin's own plant can carry out.
+[[nodiscard]] std::unique_ptr<Actuation> make_ideal_actuation(const scene::Scene& scene,
+                                                              SimulatedArm& arm);
+
+/// The sampled or position actuation of a scene for a plant that was started.
+/// @param model the arm
+/// @throws Error invalid for periods and delays that are not integer multiples of the step, and for
+///         servo gains that do not fit the robot or are unstable at the step
+[[nodiscard]] std::unique_ptr<Actuation> make_sampled_actuation(const scene::Scene& scene,
+                                                                const model::Model& model,
+                                                                Plant& plant);
 
 /// Steps between two ticks of the planner. @throws Error invalid
 [[nodiscard]] long steps_per_tick(const scene::Scene& scene);

@@ -13,7 +13,8 @@
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
-#include "plant.hpp"
+#include "scene_values.hpp"
+#include "simulated_arm.hpp"
 
 namespace hamelin::simulation {
 
@@ -43,12 +44,13 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
   return inputs;
 }
 
-// Whether nothing is hidden from the controller, nothing changes, and it measures exactly: then one
-// view of the world serves controller and judge.
+// Whether nothing is hidden from the controller, nothing changes, and it is shown the arm as it is:
+// then one view of the world serves controller and judge.
 bool controller_sees_all(const scene::Scene& scene) {
-  const bool exact =
-      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
-      !scene.actuation.estimates_velocity;
+  const bool exact = scene.actuation.joint_noise_rad == 0.0 &&
+                     scene.actuation.planner_mass_scale == 1.0 &&
+                     !scene.actuation.estimates_velocity &&
+                     scene.actuation.type != scene::ActuationType::position;
   return exact && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
@@ -74,24 +76,24 @@ class TickTimer {
 }  // namespace
 
 ClosedLoop::ClosedLoop(const scene::Scene& scene,
-                       const std::vector<std::filesystem::path>& plugin_directories)
+                       const std::vector<std::filesystem::path>& plugin_directories,
+                       const PlantFactory& plant_factory)
     : scene_(scene),
       model_(load_checked(scene)),
-      options_(integrator_options(scene.integrator.params, scene.name + ": /integrator/params")),
-      arm_(scene, model_, options_),
-      noise_(scene.seed),
-      q_measured_(VectorXd::Zero(model_.dof())) {
+      q_shown_(VectorXd::Zero(model_.dof())),
+      v_shown_(q_shown_) {
+  make_plant(plant_factory);
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
   planner_params_ = control::planner_params(scene, plugin);
   steps_ =
       in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
-  actuation_ = make_actuation(scene, arm_);
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
   options.certify = false;  // the judge does, for every step and with all obstacles
-  options.torque = scene.actuation.type == scene::ActuationType::sampled;
+  options.torque = scene.actuation.type != scene::ActuationType::ideal;
+  options.position = scene.actuation.type == scene::ActuationType::position;
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
   options.log = [this](std::int32_t level, std::string_view line) {
     log_planner_message(level, line);
@@ -104,8 +106,37 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
   if (judge_->has_self() && !judge_->self_field()->note().empty())
     result_.warnings.push_back(judge_->self_field()->note());
-  arm_.channels.gyroscopic.reserve(controller_->view().contacts_max());
+  actuation_->reserve(controller_->view().contacts_max());
   inputs_ = all_inputs(scene, plugin);
+}
+
+void ClosedLoop::make_plant(const PlantFactory& factory) {
+  const VectorXd zero = VectorXd::Zero(model_.dof());
+  const VectorXd &q = scene_.start_q.size() > 0 ? scene_.start_q : zero,
+                 &v = scene_.start_v.size() > 0 ? scene_.start_v : zero;
+  if (scene_.plant != scene::PlantType::hamelin) {
+    if (!factory)
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: /plant/type: is {}, which this build of hamelin is without, "
+                              "expected hamelin; to build with MuJoCo, install libmujoco-dev and "
+                              "configure again",
+                              scene_.name, to_string(scene_.plant)));
+    const VectorXd damping = plant_damping(scene_, model_.robot()),
+                   friction = plant_friction(scene_, model_.robot());
+    plant_ = factory({scene_, model_, damping.size() > 0 ? damping : zero,
+                      friction.size() > 0 ? friction : zero});
+    plant_->start(q, v);
+    actuation_ = make_sampled_actuation(scene_, model_, *plant_);
+    return;
+  }
+  auto arm = std::make_unique<SimulatedArm>(
+      scene_, model_,
+      integrator_options(scene_.integrator.params, scene_.name + ": /integrator/params"));
+  arm->start(q, v);
+  actuation_ = scene_.actuation.type == scene::ActuationType::ideal
+                   ? make_ideal_actuation(scene_, *arm)
+                   : make_sampled_actuation(scene_, model_, *arm);
+  plant_ = std::move(arm);
 }
 
 void ClosedLoop::log_planner_message(std::int32_t level, std::string_view line) {
@@ -120,7 +151,7 @@ void ClosedLoop::log_planner_message(std::int32_t level, std::string_view line) 
 }
 
 void ClosedLoop::report_event(bool warning, const std::string& text) {
-  recorder_->event(arm_.state.time_s, text);
+  recorder_->event(plant_->node().time_s, text);
   if (watch_->diagnostics)
     watch_->diagnostics->log(warning ? spdlog::level::warn : spdlog::level::debug, text);
 }
@@ -132,11 +163,14 @@ bool ClosedLoop::has_diagnostics(int level) const {
 
 void ClosedLoop::start(const Watch& watch) {
   watch_ = &watch;
-  recorder_ = std::make_unique<Recorder>(result_, watch, *arm_.integrator);
+  const Plant::Description& plant = plant_->description();
+  recorder_ = std::make_unique<Recorder>(result_, watch, plant.integrator, plant.criterion,
+                                         plant.tolerance);
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
-  audit_ = std::make_unique<EnergyAudit>(*recorder_,
-                                         ideal && arm_.integrator->name() == "hamel-variational");
-  log_ = std::make_unique<TickLog>(*recorder_, arm_, *judge_, controller_->goals(), *actuation_);
+  audit_ =
+      std::make_unique<EnergyAudit>(*recorder_, ideal && plant.integrator == "hamel-variational");
+  log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, controller_->goals(),
+                                   *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging())
     log_->header(scene_, controller_->plugin(), planner_params_, result_.provenance, steps_);
@@ -156,14 +190,17 @@ log::Result ClosedLoop::run(const Watch& watch) {
     check_outcome();
     if (done_)
       book_last_node();
-    else if (actuation_->asks_planner(arm_.state.k))
+    else if (actuation_->asks_planner(plant_->node().k))
       ask_planner();
     if (!done_) apply_answer();
     timer.pause();
     write_tick();
     timer.resume();
     if (done_) break;
+    // The time of a plant that is not hamelin's own is no part of a tick.
+    if (scene_.plant != scene::PlantType::hamelin) timer.pause();
     step();
+    if (scene_.plant != scene::PlantType::hamelin) timer.resume();
     if (!done_) recorder_->tick_time(timer.spent_s());
   }
   fill_result();
@@ -172,20 +209,21 @@ log::Result ClosedLoop::run(const Watch& watch) {
 }
 
 void ClosedLoop::observe_node() {
-  actuation_->reach_node(arm_);
-  judge_->look(arm_.state.q, arm_.state.time_s);
+  actuation_->reach_node();
+  judge_->look(plant_->node().q, plant_->node().time_s);
   reveal_obstacles();
   min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
   min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
   touching_ = judge_->touching();
-  if (arm_.state.k > 0 && (judge_->has_obstacles() || judge_->has_self())) certify();
+  contacts_ = plant_->contacts();
+  if (plant_->node().k > 0 && (judge_->has_obstacles() || judge_->has_self())) certify();
   change_map();
-  recorder_->observe(judge_->clearance_m(), certified_, arm_.v, scene_.step_s);
-  if (watch_->at_node) watch_->at_node(arm_.state.time_s, arm_.state.q);
+  recorder_->observe(judge_->clearance_m(), certified_, plant_->node().v, scene_.step_s);
+  if (watch_->at_node) watch_->at_node(plant_->node().time_s, plant_->node().q);
 }
 
 void ClosedLoop::certify() {
-  const auto verdict = judge_->certify(arm_.state.q, arm_.v);
+  const auto verdict = judge_->certify(plant_->node().q, plant_->node().v);
   certified_ = verdict.certified;
   ++checked_steps_;
   if (certified_) ++certified_steps_;
@@ -197,13 +235,13 @@ void ClosedLoop::certify() {
           ? ""
           : fmt::format("of {} ", judge_->self_field()->describe(verdict.self_pair));
   finish(log::Outcome::collision, fmt::format("contact {}between the nodes {} and {}", parts,
-                                              arm_.state.k - 1, arm_.state.k));
+                                              plant_->node().k - 1, plant_->node().k));
 }
 
 void ClosedLoop::reveal_obstacles() {
   for (const int found : judge_->revealed()) {
     scene::Obstacle obstacle = judge_->environment().obstacles()[static_cast<std::size_t>(found)];
-    recorder_->event(arm_.state.time_s,
+    recorder_->event(plant_->node().time_s,
                      fmt::format("obstacle '{}' becomes visible", obstacle.name));
     obstacle.known = true;
     controller_->world().set_obstacle(std::move(obstacle));
@@ -218,53 +256,89 @@ void ClosedLoop::change_map() {
   report_event(false, change);
   for (const auto& changes = scene_.map->changes;
        next_map_change_ < changes.size() &&
-       changes[next_map_change_].time_s <= arm_.state.time_s + 1e-9;
+       changes[next_map_change_].time_s <= plant_->node().time_s + 1e-9;
        ++next_map_change_)
     controller_->world().change_map(changes[next_map_change_]);
-  judge_->look(arm_.state.q, arm_.state.time_s);
+  judge_->look(plant_->node().q, plant_->node().time_s);
   min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
   touching_ = touching_ || judge_->clearance_m() <= 0.0;
 }
 
 void ClosedLoop::check_outcome() {
-  const auto& state = arm_.state;
-  if (!arm_.v.allFinite() || !state.q.allFinite())
+  const Plant::Node& node = plant_->node();
+  if (!node.v.allFinite() || !node.q.allFinite())
     return finish(log::Outcome::diverged,
-                  fmt::format("step {}: the state is no longer finite", state.k));
-  if (touching_ && state.k > 0) return finish(log::Outcome::collision, judge_->describe_contact());
-  if (touching_) return refuse();
+                  fmt::format("step {}: the state is no longer finite", node.k));
+  count_contacts();
+  const bool contact = touching_ || contacts_.count > 0;
+  if (contact && node.k > 0) return finish(log::Outcome::collision, describe_contact());
+  if (contact) return refuse();
   if (done_) return;
-  const bool tick = actuation_->asks_planner(state.k);
+  const bool tick = actuation_->asks_planner(node.k);
   if (tick) let_controller_observe();
   const control::ControlState now = controller_->answer().state;
-  if (now == control::ControlState::reached)
+  if (now == control::ControlState::reached && arrived())
     finish(log::Outcome::reached, "");
   else if (tick && now == control::ControlState::stalled)
     finish(log::Outcome::stalled,
            fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
-  else if (state.k == steps_)
+  else if (node.k == steps_)
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
-  else if (recorder_->stopped(state.k))
+  else if (recorder_->stopped(node.k))
     finish(log::Outcome::interrupted, "stopped from outside");
 }
 
+bool ClosedLoop::arrived() const {
+  if (scene_.actuation.type != scene::ActuationType::position) return true;
+  dynamics::Workspace ws(model_);
+  dynamics::forward_kinematics(model_, ws, plant_->node().q);
+  return control::goal_error(controller_->goals().goal(), model_, ws, plant_->node().q,
+                             plant_->node().v)
+      .reached;
+}
+
+void ClosedLoop::count_contacts() {
+  const Plant::Description& plant = plant_->description();
+  if (!plant.detects_contacts) return;
+  if (!result_.plant) result_.plant = {plant.type, plant.version, 0, 0, {}};
+  // A contact that the judge found between two nodes has ended the run already.
+  if (touching_ || done_) ++result_.plant->judge_contacts;
+  if (contacts_.count == 0) return;
+  ++result_.plant->contacts;
+  result_.plant->deepest_m =
+      std::min(result_.plant->deepest_m.value_or(contacts_.deepest_m), contacts_.deepest_m);
+}
+
+std::string ClosedLoop::describe_contact() const {
+  const Plant::Description& plant = plant_->description();
+  if (!plant.detects_contacts) return judge_->describe_contact();
+  std::string judged =
+      fmt::format("counts none at a clearance of {:.2g} mm",
+                  1e3 * std::min(judge_->clearance_m(),
+                                 judge_->has_self() ? judge_->self_clearance_m() : infinity));
+  if (touching_)
+    judged = judge_->describe_contact();
+  else if (done_)
+    judged = result_.cause;
+  return fmt::format("{} {}; the judge: {}", plant.name,
+                     contacts_.count > 0 ? plant_->describe_contact() : "counts no contact",
+                     judged);
+}
+
 void ClosedLoop::refuse() {
-  std::string cause = judge_->describe_contact();
-  if (judge_->clearance_m() > 0.0)
+  std::string cause = describe_contact();
+  if (touching_ && judge_->clearance_m() > 0.0)
     cause += fmt::format("; {}", scene::self_contact_remedy(scene_.robot));
   finish(log::Outcome::refused, std::move(cause));
 }
 
 void ClosedLoop::let_controller_observe() {
-  observed_k_ = arm_.state.k;
-  q_measured_ = arm_.state.q;
-  if (scene_.actuation.joint_noise_rad > 0.0 &&
-      scene_.actuation.type == scene::ActuationType::sampled)
-    for (auto& angle : q_measured_) angle += scene_.actuation.joint_noise_rad * noise_.normal();
-  controller_->observe(arm_.state.time_s, q_measured_, arm_.v);
+  observed_k_ = plant_->node().k;
+  actuation_->observe(q_shown_, v_shown_);
+  controller_->observe(plant_->node().time_s, q_shown_, v_shown_);
   const control::GoalTracker& goals = controller_->goals();
   while (goals_reached_ < goals.index())
-    recorder_->event(arm_.state.time_s,
+    recorder_->event(plant_->node().time_s,
                      fmt::format("goal {} of {} reached", ++goals_reached_, goals.size()));
 }
 
@@ -279,53 +353,53 @@ bool ClosedLoop::planner_answered() {
   const control::Answer& answer = controller_->answer();
   if (answer.channels != nullptr) return true;
   finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
-                                           arm_.state.k, answer.cause));
+                                           plant_->node().k, answer.cause));
   return false;
 }
 
 void ClosedLoop::apply_answer() {
   const planning::CommandBuffers& channels = *controller_->answer().channels;
-  actuation_->book(arm_, channels, *audit_);
-  finish_if(audit_->fault(arm_));
+  actuation_->book(channels, *audit_);
+  finish_if(audit_->fault(*plant_));
   const std::string fault = audit_->fault_of_planner(channels.raw());
   if (!fault.empty())
     finish_if(
-        fmt::format("planner '{}' at step {}: {}", scene_.planner->name, arm_.state.k, fault));
-  if (!done_) actuation_->apply(arm_, controller_->answer(), *audit_);
+        fmt::format("planner '{}' at step {}: {}", scene_.planner->name, plant_->node().k, fault));
+  if (!done_) actuation_->apply(controller_->answer(), *audit_);
 }
 
 // Only the planner knows a control potential's value and its gradient for the closing half-kick.
 void ClosedLoop::book_last_node() {
-  if (arm_.state.k == 0 || result_.outcome == log::Outcome::diverged) return;
+  if (plant_->node().k == 0 || result_.outcome == log::Outcome::diverged) return;
   if (!actuation_->needs_answer_at_end()) {
-    audit_->book_node(arm_);
+    audit_->book_node(*plant_);
   } else {
-    if (observed_k_ != arm_.state.k) let_controller_observe();
+    if (observed_k_ != plant_->node().k) let_controller_observe();
     controller_->decide();
     if (controller_->answer().channels == nullptr) return;
-    actuation_->book(arm_, *controller_->answer().channels, *audit_);
+    actuation_->book(*controller_->answer().channels, *audit_);
   }
-  if (result_.outcome != log::Outcome::collision) finish_if(audit_->fault(arm_));
+  if (result_.outcome != log::Outcome::collision) finish_if(audit_->fault(*plant_));
 }
 
 void ClosedLoop::write_tick() {
-  if (recorder_->wants_tick(arm_.state.k) || (done_ && recorder_->logging()))
+  if (recorder_->wants_tick(plant_->node().k) || (done_ && recorder_->logging()))
     log_->tick(certified_, done_ ? nullptr : controller_->answer().channels);
 }
 
 void ClosedLoop::step() {
-  judge_->depart(arm_.state.q, actuation_->departure_velocity(arm_));
+  judge_->depart(plant_->node().q, actuation_->departure_velocity());
   if (actuation_->saturated()) ++saturated_steps_;
-  const bool converged = arm_.step(scene_.step_s);
-  recorder_->step(arm_.report);
+  const bool converged = actuation_->step(scene_.step_s);
+  recorder_->step(plant_->report());
   if (!converged) {
-    finish(log::Outcome::diverged,
-           fmt::format("step {} of {} s found no root", arm_.state.k + 1, scene_.step_s));
+    finish(log::Outcome::diverged, fmt::format("step {} of {} s {}", plant_->node().k + 1,
+                                               scene_.step_s, plant_->description().failure));
     if (recorder_->logging()) log_->tick(certified_, nullptr);
     return;
   }
-  audit_->book_step(arm_.report);
-  recorder_->progress(arm_.state.k, arm_.state.time_s, scene_.duration_s);
+  audit_->book_step(plant_->report());
+  recorder_->progress(plant_->node().k, plant_->node().time_s, scene_.duration_s);
 }
 
 void ClosedLoop::finish(log::Outcome outcome, std::string cause) {
@@ -372,15 +446,16 @@ void ClosedLoop::fill_result() {
   if (const auto* change = actuation_->torque_change()) result_.torque_change = *change;
   result_.scene = scene_.name;
   result_.planner = controller_->plugin().name();
-  result_.time_s = arm_.state.time_s;
-  result_.steps = arm_.state.k;
-  result_.q = arm_.state.q;
-  result_.v = arm_.v;
+  result_.time_s = plant_->node().time_s;
+  result_.steps = plant_->node().k;
+  result_.q = plant_->node().q;
+  result_.v = plant_->node().v;
   result_.seed = scene_.seed;
-  dynamics::forward_kinematics(model_, arm_.ws, arm_.state.q);
+  dynamics::Workspace ws(model_);
+  dynamics::forward_kinematics(model_, ws, plant_->node().q);
   const control::GoalTracker& goals = controller_->goals();
   const control::GoalError error =
-      control::goal_error(goals.goal(), model_, arm_.ws, arm_.state.q, arm_.v);
+      control::goal_error(goals.goal(), model_, ws, plant_->node().q, plant_->node().v);
   log::Result::Goal out;
   out.type = scene::type_name(goals.goal());
   out.index = goals.index();
@@ -393,13 +468,13 @@ void ClosedLoop::fill_result() {
         static_cast<double>(certified_steps_) / static_cast<double>(checked_steps_);
   for (const auto& warning : judge_->environment().summary().warnings)
     result_.warnings.push_back(warning);
-  if (actuation_->limited() && arm_.state.k > 0) {
+  if (actuation_->limited() && plant_->node().k > 0) {
     result_.saturated_share =
-        static_cast<double>(saturated_steps_) / static_cast<double>(arm_.state.k);
+        static_cast<double>(saturated_steps_) / static_cast<double>(plant_->node().k);
     if (saturated_steps_ > 0)
       result_.warnings.push_back(
           fmt::format("torque limits cut the planner's answer in {} of {} steps", saturated_steps_,
-                      arm_.state.k));
+                      plant_->node().k));
   }
 }
 

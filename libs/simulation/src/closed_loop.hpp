@@ -7,22 +7,21 @@
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/world_view.hpp"
-#include "hamelin/core/rng.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "recorder.hpp"
-#include "simulated_arm.hpp"
 #include "tick_log.hpp"
 
 namespace hamelin::simulation {
 
-/// A scene that is ready to run: the controller, the simulated arm, the actuation that carries out
+/// A scene that is ready to run: the controller, the plant, the actuation that carries out
 /// the controller's answers, and a judge who sees all obstacles and watches every step. It also
 /// plays the sensor that shows the controller obstacles and changes of the map. One object per run.
 class ClosedLoop {
  public:
   /// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
   ClosedLoop(const scene::Scene& scene,
-             const std::vector<std::filesystem::path>& plugin_directories);
+             const std::vector<std::filesystem::path>& plugin_directories,
+             const PlantFactory& plant_factory);
   [[nodiscard]] log::Result run(const Watch& watch);
 
  private:
@@ -31,6 +30,8 @@ class ClosedLoop {
   /// Reports an event to the log and to diagnostics.
   void report_event(bool warning, const std::string& text);
   [[nodiscard]] bool has_diagnostics(int level) const;
+  /// Makes the plant, at the scene's start, and the actuation that drives it.
+  void make_plant(const PlantFactory& factory);
   void start(const Watch& watch);
   void warn_of_goals_in_contact(const Watch& watch);
 
@@ -43,6 +44,12 @@ class ClosedLoop {
   void change_map();
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
+  /// Whether the arm itself is at the last goal, when its set point is.
+  [[nodiscard]] bool arrived() const;
+  /// Counts the contacts of this node for the result, if the plant counts, too.
+  void count_contacts();
+  /// Describes the contact at this node, and who counted it if the plant counts, too.
+  [[nodiscard]] std::string describe_contact() const;
   /// Ends a run whose start is in contact.
   void refuse();
   /// Lets the controller look at the arm, as it measures it, and at its goals.
@@ -63,9 +70,8 @@ class ClosedLoop {
 
   const scene::Scene& scene_;
   model::Model model_;
-  integration::Parameters options_;
   long steps_ = 0;
-  SimulatedArm arm_;
+  std::unique_ptr<Plant> plant_;
   Json planner_params_;
   std::vector<log::Input> inputs_;
   log::Result result_;
@@ -75,8 +81,7 @@ class ClosedLoop {
   std::unique_ptr<control::WorldView> own_judge_;
   control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
-  Rng noise_;
-  Eigen::VectorXd q_measured_;
+  Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
   // State of the run.
   std::unique_ptr<Recorder> recorder_;
@@ -89,7 +94,8 @@ class ClosedLoop {
   };
   std::vector<Message> early_messages_;  ///< of the planner, before the log was open
   bool certified_ = true;                ///< whether the step that led to this node was certified
-  bool touching_ = false;
+  bool touching_ = false;                ///< by the judge
+  Plant::Contacts contacts_;             ///< by the plant
   bool done_ = false;
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;

@@ -18,13 +18,13 @@ constexpr double account_share = 0.02;
 
 }  // namespace
 
-void EnergyAudit::book_node(SimulatedArm& arm, double control_J) {
-  const auto energy = arm.integrator->energy(arm.state);
+void EnergyAudit::book_node(Plant& plant, double control_J) {
+  const auto energy = plant.energy();
   ledger_.kinetic = energy.kinetic_J;
   ledger_.potential = energy.potential_J;
   ledger_.control = control_J;
   const Ledger& last = recorder_.last_node();
-  if (arm.state.k > 0)
+  if (plant.node().k > 0)
     for (const auto account :
          {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
       exchanged_J_ += std::abs(ledger_.*account - last.*account);
@@ -41,12 +41,12 @@ void EnergyAudit::book_filter(const hamelin_command& answer) noexcept {
   ledger_.recovery += answer.recovery_work_J;
 }
 
-std::string EnergyAudit::fault(const SimulatedArm& arm) const {
-  if (!closes_ || arm.state.k == 0) return {};
-  const double gyroscopic_work = arm.report.gyroscopic_work_J;
+std::string EnergyAudit::fault(const Plant& plant) const {
+  if (!closes_ || plant.node().k == 0) return {};
+  const double gyroscopic_work = plant.report().gyroscopic_work_J;
   if (std::abs(gyroscopic_work) > rounding_share * (ledger_.kinetic + 1.0))
-    return fmt::format("step {}: gyroscopic terms did {:.3g} J of work, expected none", arm.state.k,
-                       gyroscopic_work);
+    return fmt::format("step {}: gyroscopic terms did {:.3g} J of work, expected none",
+                       plant.node().k, gyroscopic_work);
   if (has_potential_ ||
       !(recorder_.energy_error() > account_share * (exchanged_J_ + ledger_.kinetic)))
     return {};
@@ -54,7 +54,7 @@ std::string EnergyAudit::fault(const SimulatedArm& arm) const {
       "step {}: the energy account is off by {:.3g} J, with {:.3g} J of kinetic energy and {:.3g} "
       "J exchanged; "
       "expected less than {} of their sum; try a smaller step",
-      arm.state.k, recorder_.energy_error(), ledger_.kinetic, exchanged_J_, account_share);
+      plant.node().k, recorder_.energy_error(), ledger_.kinetic, exchanged_J_, account_share);
 }
 
 std::string EnergyAudit::fault_of_planner(const hamelin_command& answer) const {

@@ -2,8 +2,8 @@
 #include <string>
 
 #include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/simulation/plant.hpp"
 #include "recorder.hpp"
-#include "simulated_arm.hpp"
 
 namespace hamelin::simulation {
 
@@ -15,9 +15,9 @@ class EnergyAudit {
   EnergyAudit(Recorder& recorder, bool closes) : recorder_(recorder), closes_(closes) {}
 
   /// Books a node's energies. @param control_J value of the planner's control potential
-  void book_node(SimulatedArm& arm, double control_J);
+  void book_node(Plant& plant, double control_J);
   /// As book_node, with the control potential's last known value.
-  void book_node(SimulatedArm& arm) { book_node(arm, ledger_.control); }
+  void book_node(Plant& plant) { book_node(plant, ledger_.control); }
   /// Notes that a control potential acted. The planner may change it over time, so from then on the
   /// balance is reported but not checked.
   void note_potential() noexcept { has_potential_ = true; }
@@ -27,7 +27,7 @@ class EnergyAudit {
   void book_step(const integration::StepReport& report) noexcept { ledger_.book(report); }
 
   /// What is wrong with the node's account or the last step's gyroscopic work; empty if nothing.
-  [[nodiscard]] std::string fault(const SimulatedArm& arm) const;
+  [[nodiscard]] std::string fault(const Plant& plant) const;
   /// What is wrong with the planner's own accounts; empty if nothing.
   [[nodiscard]] std::string fault_of_planner(const hamelin_command& answer) const;
 

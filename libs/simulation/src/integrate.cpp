@@ -8,8 +8,8 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
-#include "plant.hpp"
 #include "recorder.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
@@ -21,6 +21,7 @@ FreeMotion free_motion(const scene::Scene& given, const model::Model& model) {
   scene.map.reset();
   scene.obstacles.clear();
   scene.actuation = {};
+  scene.plant = scene::PlantType::hamelin;
   scene.actuation.control_period_s = scene.step_s;
   FreeMotion motion;
   motion.name = scene.name;
@@ -101,7 +102,8 @@ FreeRun::FreeRun(const model::Model& model, const FreeMotion& motion, const Watc
       controlled_(integrator_->adaptive()),
       steps_(controlled_ ? first_steps_in(motion.duration_s, motion.step_s)
                          : step_count(motion.duration_s, motion.step_s)),
-      recorder_(result_, watch, *integrator_),
+      recorder_(result_, watch, integrator_->name(), integrator_->criterion(),
+                integrator_->tolerance()),
       state_(integrator_->start(motion.q0, motion.v0)),
       v_(model.dof()) {
   channels_.damping = motion.damping;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hamelin/core/error.hpp"
 
@@ -19,12 +20,12 @@ void raise_to_magnitude(Eigen::VectorXd& largest, const Eigen::VectorXd& v) {
 
 }  // namespace
 
-Recorder::Recorder(log::Result& result, const Watch& watch,
-                   const integration::Integrator& integrator)
+Recorder::Recorder(log::Result& result, const Watch& watch, std::string integrator,
+                   std::string criterion, double tolerance)
     : result_(result), watch_(watch) {
-  result_.integrator = integrator.name();
-  result_.solver.criterion = integrator.criterion();
-  result_.solver.tolerance = integrator.tolerance();
+  result_.integrator = std::move(integrator);
+  result_.solver.criterion = std::move(criterion);
+  result_.solver.tolerance = tolerance;
 }
 
 void Recorder::header(Json fields, const model::Robot& robot, long steps) {

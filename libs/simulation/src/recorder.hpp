@@ -38,7 +38,9 @@ struct Ledger {
 /// Collects the figures of a run and writes its log.
 class Recorder {
  public:
-  Recorder(log::Result& result, const Watch& watch, const integration::Integrator& integrator);
+  /// @param integrator, criterion, tolerance of the scheme that makes the steps
+  Recorder(log::Result& result, const Watch& watch, std::string integrator, std::string criterion,
+           double tolerance);
 
   /// @param steps the largest number of steps
   void header(Json fields, const model::Robot& robot, long steps);

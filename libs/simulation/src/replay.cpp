@@ -286,23 +286,24 @@ Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_di
 }
 
 log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin_directories,
-                   const Watch& watch) {
+                   const Watch& watch, const PlantFactory& plant_factory) {
   if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front().text);
   if (recorded.program == Recorded::Program::run)
-    return run(recorded.scene, plugin_directories, watch);
+    return run(recorded.scene, plugin_directories, watch, plant_factory);
   const model::Model model = control::load_model(recorded.scene);
   return integrate(model, free_motion(recorded.scene, model), watch);
 }
 
 Verdict verify(const Recorded& recorded, const fs::path& log, double tolerance,
-               const std::vector<fs::path>& plugin_directories, const Watch& watch) {
+               const std::vector<fs::path>& plugin_directories, const Watch& watch,
+               const PlantFactory& plant_factory) {
   Comparison comparison(log, tolerance);
   Watch compared = watch;
   compared.log = &comparison;
   compared.every = recorded.every;
   compared.stop_at = logged_stop_step(log);
   compared.announce = nullptr;
-  (void)repeat(recorded, plugin_directories, compared);
+  (void)repeat(recorded, plugin_directories, compared, plant_factory);
   comparison.finish();
   Verdict verdict = comparison.verdict();
   verdict.stopped = watch.stop != nullptr && watch.stop->load();

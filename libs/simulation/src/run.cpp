@@ -1,12 +1,13 @@
 #include "closed_loop.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
-#include "plant.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
 log::Result run(const scene::Scene& scene,
-                const std::vector<std::filesystem::path>& plugin_directories, const Watch& watch) {
-  return ClosedLoop(scene, plugin_directories).run(watch);
+                const std::vector<std::filesystem::path>& plugin_directories, const Watch& watch,
+                const PlantFactory& plant_factory) {
+  return ClosedLoop(scene, plugin_directories, plant_factory).run(watch);
 }
 
 Json full_config(const scene::Scene& scene,

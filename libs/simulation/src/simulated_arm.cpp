@@ -1,7 +1,7 @@
 #include "simulated_arm.hpp"
 
-#include "hamelin/control/planner_setup.hpp"
-#include "plant.hpp"
+#include "hamelin/core/error.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
@@ -12,26 +12,43 @@ SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm,
     : model(arm),
       ws(arm),
       integrator(integration::make_integrator(scene.integrator.name, arm, options)),
-      own_damping(plant_damping(scene, arm.robot())) {
+      own_damping(plant_damping(scene, arm.robot())),
+      description_{"hamelin",
+                   "hamelin",
+                   std::string(version()),
+                   integrator->name(),
+                   integrator->criterion(),
+                   integrator->tolerance(),
+                   "found no root",
+                   false} {
   const VectorXd zero = VectorXd::Zero(arm.dof());
-  v = zero;
   channels.coulomb = plant_friction(scene, arm.robot());
   channels.coulomb_speed = scene.model.friction_speed;
-  if (scene.actuation.coulomb_friction_share > 0.0) {
-    if (channels.coulomb.size() == 0) channels.coulomb = zero;
-    channels.coulomb += scene.actuation.coulomb_friction_share *
-                        control::joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
-  }
   channels.held_torque = zero;
   channels.damping = own_damping.size() > 0 ? own_damping : zero;
-  state = integrator->start(scene.start_q.size() > 0 ? scene.start_q : zero,
-                            scene.start_v.size() > 0 ? scene.start_v : zero);
 }
 
-bool SimulatedArm::step(double step_s) {
-  report = integrator->step(state, channels, step_s);
-  if (report.converged) state.time_s = static_cast<double>(state.k) * step_s;
-  return report.converged;
+void SimulatedArm::start(const VectorXd& q, const VectorXd& v) {
+  state = integrator->start(q, v);
+  node_ = {0, 0.0, q, v};
+  update_velocity();
+}
+
+bool SimulatedArm::step(const VectorXd& torque, double step_s) {
+  channels.held_torque = torque;
+  if (!step_channels(step_s)) return false;
+  update_velocity();
+  return true;
+}
+
+bool SimulatedArm::step_channels(double step_s) {
+  report_ = integrator->step(state, channels, step_s);
+  if (!report_.converged) return false;
+  state.time_s = static_cast<double>(state.k) * step_s;
+  node_.k = state.k;
+  node_.time_s = state.time_s;
+  node_.q = state.q;
+  return true;
 }
 
 }  // namespace hamelin::simulation

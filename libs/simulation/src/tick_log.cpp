@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "hamelin/core/rng.hpp"
-#include "plant.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
@@ -26,28 +26,28 @@ void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, 
               {"seed", scene.seed},
               {"generator", Rng::name},
               {"config", std::move(config)},
-              {"robot_notes", arm_.model.robot().notes},
+              {"robot_notes", model_.robot().notes},
               {"plugin",
                {{"name", plugin.name()},
                 {"version", plugin.version()},
                 {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
               {"provenance", provenance}};
-  recorder_.header(std::move(fields), arm_.model.robot(), steps);
+  recorder_.header(std::move(fields), model_.robot(), steps);
 }
 
 void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   Json channels = Json::object();
-  if (answer != nullptr) actuation_.torques(arm_, *answer, torque_, channels);
-  Json fields{{"k", arm_.state.k},
-              {"time_s", arm_.state.time_s},
-              {"q", to_json(arm_.state.q)},
-              {"v", to_json(arm_.v)},
+  if (answer != nullptr) actuation_.torques(*answer, torque_, channels);
+  Json fields{{"k", plant_.node().k},
+              {"time_s", plant_.node().time_s},
+              {"q", to_json(plant_.node().q)},
+              {"v", to_json(plant_.node().v)},
               {"tau", to_json(torque_)},
               {"goal_index", goals_.index()},
               {"clearance_m", nullptr},
               {"closest", nullptr},
               {"energy", energy_json(recorder_.last_node())},
-              {"solver", solver_json(arm_.report)},
+              {"solver", solver_json(plant_.report())},
               {"certified", certified}};
   if (answer != nullptr) fields["channels"] = std::move(channels);
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
@@ -58,7 +58,7 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
       fields["closest"] = {{"sphere", nearest->sphere},
                            {"obstacle", obstacle_name(world_.environment(), nearest->obstacle)}};
   }
-  recorder_.tick(arm_.state.k, std::move(fields));
+  recorder_.tick(plant_.node().k, std::move(fields));
 }
 
 }  // namespace hamelin::simulation

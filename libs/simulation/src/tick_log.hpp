@@ -13,10 +13,15 @@ namespace hamelin::simulation {
 class TickLog {
  public:
   /// @param world all obstacles, those that the planner does not know included
-  TickLog(Recorder& recorder, SimulatedArm& arm, const control::WorldView& world,
-          const control::GoalTracker& goals, Actuation& actuation)
-      : recorder_(recorder), arm_(arm), world_(world), goals_(goals), actuation_(actuation) {
-    torque_.setZero(arm.model.dof());
+  TickLog(Recorder& recorder, const model::Model& model, const Plant& plant,
+          const control::WorldView& world, const control::GoalTracker& goals, Actuation& actuation)
+      : recorder_(recorder),
+        model_(model),
+        plant_(plant),
+        world_(world),
+        goals_(goals),
+        actuation_(actuation) {
+    torque_.setZero(model.dof());
   }
 
   /// @param params the planner's, with defaults
@@ -28,7 +33,8 @@ class TickLog {
 
  private:
   Recorder& recorder_;
-  SimulatedArm& arm_;
+  const model::Model& model_;
+  const Plant& plant_;
   const control::WorldView& world_;
   const control::GoalTracker& goals_;
   Actuation& actuation_;

@@ -77,6 +77,11 @@ void add_run(GroupData& data, const MergedRun& merged) {
     append(data.self_clearances, number_at(judge.value("self", Json()), "clearance_m"));
     g.judged += judge["obstacles"].is_object() || judge["self"].is_object() ? 1U : 0U;
   }
+  if (const Json plant = result.is_object() ? result.value("plant", Json()) : Json();
+      plant.is_object()) {
+    ++g.plant_runs;
+    g.plant_contacts += number_at(plant, "contacts").value_or(0.0) > 0.0 ? 1U : 0U;
+  }
   append(data.shares, number_at(result, "certified_share"));
   if (result.is_object())
     append(data.torque_changes, number_at(result.value("torque_change", Json()), "mean"));
@@ -286,6 +291,10 @@ Json to_json(const Merged& merged) {
                    {"timing",
                     {{"tick_us_p50_median", or_null(g.tick_us_p50_median)},
                      {"tick_us_p99_median", or_null(g.tick_us_p99_median)}}}});
+    if (g.plant_runs > 0) {
+      all.back()["plant_runs"] = g.plant_runs;
+      all.back()["plant_contacts"] = g.plant_contacts;
+    }
   }
   for (const auto& g : merged.gains)
     gains.push_back({{"planner", g.planner},
@@ -378,6 +387,14 @@ std::string to_table(const Merged& merged) {
     rows.front().emplace_back(head);
   for (const auto& g : merged.groups) rows.push_back(table_row(g));
   std::string text = aligned(rows, merged.by.size());
+  for (const auto& g : merged.groups)
+    if (g.plant_runs > 0)
+      text +=
+          fmt::format("\n{}: the plant's own collision detection counted contact in {} of {} runs",
+                      fmt::join(g.key, ", "), g.plant_contacts, g.plant_runs);
+  if (std::any_of(merged.groups.begin(), merged.groups.end(),
+                  [](const Group& g) { return g.plant_runs > 0; }))
+    text += "\n";
   for (const auto& g : merged.gains)
     text += fmt::format(
         "\n{}, gain sets: reached {} of {}; {} of {} that reach the goal without the obstacle "

@@ -78,8 +78,8 @@ std::vector<log::Result> run_pairs(const scene::Scene& scene, const std::vector<
       while (const auto index = queue.take()) {
         simulation::Watch watch;
         watch.stop = runs.stop;
-        queue.put(*index,
-                  simulation::run(scene_of(scene, pairs[*index]), runs.plugin_directories, watch));
+        queue.put(*index, simulation::run(scene_of(scene, pairs[*index]), runs.plugin_directories,
+                                          watch, runs.plant_factory));
       }
     } catch (...) {
       queue.fail(std::current_exception());

@@ -105,6 +105,30 @@ TEST_CASE("Wilson's interval solves its defining inequality and agrees with publ
   CHECK(wilson_interval(0, 0).high == 1.0);
 }
 
+TEST_CASE("contacts that a plant counts itself are counted apart from the judge's",
+          "[sweep][unit]") {
+  auto runs = hand_made();
+  for (std::size_t i = 0; i < 3; ++i)
+    runs[i].record["result"]["plant"] = {{"type", "mujoco"}, {"contacts", i == 1 ? 1 : 0}};
+  runs[3].record["result"]["plant"] = nullptr;
+  Merged merged;
+  merged.by = {"planner"};
+  merged.groups = group(runs, merged.by);
+  CHECK(merged.groups[0].plant_runs == 0);
+  CHECK(merged.groups[1].plant_runs == 3);
+  CHECK(merged.groups[1].plant_contacts == 1);
+  CHECK(merged.groups[1].contacts == 0);
+  const Json json = to_json(merged);
+  CHECK_FALSE(json["groups"][0].contains("plant_runs"));
+  CHECK(json["groups"][1]["plant_contacts"] == 1);
+  check_shipped_schema(json, "summary", "merged");
+  CHECK_THAT(
+      to_table(merged),
+      Catch::Contains("hybrid: the plant's own collision detection counted contact in 1 of 3 "
+                      "runs") &&
+          !Catch::Contains("apf: the plant's own"));
+}
+
 TEST_CASE("made-up records are grouped and counted", "[sweep][unit]") {
   const auto groups = group(hand_made(), {"planner"});
   REQUIRE(groups.size() == 2);

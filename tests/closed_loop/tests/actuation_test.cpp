@@ -25,12 +25,6 @@ Json scene_of(const Json& params, const std::string& actuation = "ideal") {
   return scene;
 }
 
-model::Robot strong(double effort) {
-  model::Robot robot = test::planar4();
-  for (auto& link : robot.links) link.joint.effort_max = effort;
-  return robot;
-}
-
 struct Logged {
   log::Result result;
   std::vector<Json> ticks, events;
@@ -105,7 +99,7 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and only tak
   Json scene = scene_of({{"torque", {4.0, -4.0, 4.0, -4.0}}}, actuation);
   scene["actuation"]["coulomb_friction_share"] = 0.05;
   scene["duration_s"] = 4.0;
-  const auto held = run_scene(folder, scene, {}, strong(100.0));
+  const auto held = run_scene(folder, scene, {}, test::strong(100.0));
   // 5 Nm tanh(v / 0.01) = 4 Nm
   const double creep = 0.01 * std::atanh(0.8);
   CHECK((held.v - creep * Eigen::Vector4d(1.0, -1.0, 1.0, -1.0)).lpNorm<Eigen::Infinity>() <
@@ -116,7 +110,7 @@ TEST_CASE("Coulomb friction holds a torque below it nearly at rest, and only tak
   scene["planner"]["params"] = Json::object();
   scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
   scene["duration_s"] = 20.0;
-  const auto swung = run_scene(folder, scene, {}, strong(100.0));
+  const auto swung = run_scene(folder, scene, {}, test::strong(100.0));
   CHECK(swung.v.lpNorm<Eigen::Infinity>() < 1e-3);
   CHECK(swung.dissipated_J == Approx(swung.energy_initial_J).epsilon(1e-3));
 
@@ -134,7 +128,7 @@ TEST_CASE("dry friction of the model and of the actuation act alike and add up",
   const auto final_q = [&](const Json& model, double share) {
     scene["model"] = model;
     scene["actuation"]["coulomb_friction_share"] = share;
-    model::Robot robot = strong(100.0);
+    model::Robot robot = test::strong(100.0);
     for (auto& link : robot.links) link.joint.friction = 5.0;
     return run_scene(folder, scene, {}, robot).q;
   };
@@ -181,7 +175,7 @@ TEST_CASE("the error of a goal of the tip is reported also if the planner's mass
 TEST_CASE("torque limits scale a node's change of velocity as a whole, and that is counted",
           "[simulation][actuation]") {
   const TemporaryFolder folder;
-  const model::Robot robot = strong(10.0);
+  const model::Robot robot = test::strong(10.0);
   const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
   Json scene = scene_of({{"velocity", {1.0, 0.0, 0.0, 0.0}}, {"torque", {2.0, 0.0, 0.0, 0.0}}});

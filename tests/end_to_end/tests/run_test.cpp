@@ -41,6 +41,36 @@ TEST_CASE("in example 5.2 apf stalls, and gyro and hybrid reach the goal without
   }
 }
 
+TEST_CASE("the arm moves in MuJoCo where the build has it, and one line says so where not",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const std::vector<std::string> arguments{"--plant", "mujoco", "--set", "/actuation/type=sampled"};
+#ifdef HAMELIN_WITH_MUJOCO
+  const Json result = run_scene(sandbox, "clutter", 0, arguments);
+  CHECK(result["outcome"] == "reached");
+  CHECK(result["integrator"] == "mujoco-euler");
+  CHECK(result["plant"]["type"] == "mujoco");
+  CHECK(result["plant"]["contacts"] == 0);
+  CHECK(result["plant"]["judge_contacts"] == 0);
+  CHECK_FALSE(std::filesystem::exists(sandbox.path("MUJOCO_LOG.TXT")));
+#else
+  std::vector<std::string> command{"run", "data/scenes/clutter.json"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  const auto missing = sandbox.run(command);
+  CHECK(missing.exit_code == 2);
+  CHECK(missing.err ==
+        "hamelin: data/scenes/clutter.json: /plant/type: is mujoco, which this build of hamelin is "
+        "without, expected hamelin; to build with MuJoCo, install libmujoco-dev and configure "
+        "again\n");
+#endif
+  const auto ideal = sandbox.run({"run", "data/scenes/clutter.json", "--plant", "mujoco"});
+  CHECK(ideal.exit_code == 2);
+  CHECK_THAT(ideal.err, Catch::Contains("/actuation/type: is ideal, expected sampled or position"));
+  const Json own = run_scene(sandbox, "clutter", 0, {"--plant", "hamelin"});
+  CHECK(own["integrator"] == "hamel-variational");
+  CHECK_FALSE(own.contains("plant"));
+}
+
 TEST_CASE("energy-neutral steering does no work at any step size", "[end_to_end]") {
   Sandbox sandbox;
   for (const char* scene : {"paper_52_gyro", "paper_52_hybrid"})

@@ -5,7 +5,7 @@ namespace hamelin::control {
 
 /// Joint velocities from measured joint positions. The estimate follows the motion that the nominal
 /// model predicts and corrects position, velocity and an unexplained acceleration by the error of
-/// the measured position. All errors decay with one rate: docs/theory.md (8.14), (8.15).
+/// the measured position. All errors decay with one rate: docs/theory.md (8.16), (8.17).
 class StateEstimator {
  public:
   /// @param period_s time between two measurements @param bandwidth rate at which errors decay

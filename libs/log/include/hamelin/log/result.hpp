@@ -81,6 +81,13 @@ struct Result {
   std::optional<double> saturated_share;  ///< of all steps; null if torque limits are not modelled
   std::optional<double> certified_share;  ///< of all steps; null if nothing can be hit
   std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified
+  /// A plant other than hamelin's own, with the contacts that it and the judge counted.
+  struct Plant {
+    std::string type, version;
+    long contacts = 0, judge_contacts = 0;  ///< nodes in contact
+    std::optional<double> deepest_m;        ///< of the plant's contacts, negative inside
+  };
+  std::optional<Plant> plant;
   std::uint64_t seed = 0;
   std::vector<std::string> warnings;
   // The rest depends on clock and machine.

@@ -73,9 +73,15 @@ struct ModelFlags {
   std::optional<Payload> payload;
 };
 
-enum class ActuationType : std::int32_t { ideal, sampled };
+enum class ActuationType : std::int32_t { ideal, sampled, position };
 
 [[nodiscard]] std::string_view to_string(ActuationType type) noexcept;
+
+/// Gains of position servos: one value for all joints, or one per joint.
+struct ServoGains {
+  std::vector<double> kp;  ///< torque per position error [Nm/rad or N/m]
+  std::vector<double> kv;  ///< torque per velocity error [Nms/rad or Ns/m]
+};
 
 struct Actuation {
   ActuationType type = ActuationType::ideal;
@@ -89,7 +95,13 @@ struct Actuation {
   /// Sampled: of each joint's held torque [Nm/s or N/s].
   std::optional<double> torque_rate_max_Nm_s;
   double coulomb_friction_share = 0.0;  ///< of the effort limits; unknown to the planner
+  ServoGains servo;                     ///< position
 };
+
+/// What simulates the arm: hamelin's own integrators, or MuJoCo.
+enum class PlantType : std::int32_t { hamelin, mujoco };
+
+[[nodiscard]] std::string_view to_string(PlantType type) noexcept;
 
 /// A planner or integrator by name, with its own parameters.
 struct Choice {
@@ -115,6 +127,7 @@ struct Scene {
   std::vector<Obstacle> obstacles;
   ModelFlags model;
   Actuation actuation;
+  PlantType plant = PlantType::hamelin;
   std::optional<Choice> planner;
   Choice integrator{"hamel-variational", Json::object()};
   std::optional<StallRule> stall;

@@ -41,7 +41,7 @@ struct Recorded {
 /// @throws Error as run() and integrate() do
 [[nodiscard]] log::Result repeat(const Recorded& recorded,
                                  const std::vector<std::filesystem::path>& plugin_directories,
-                                 const Watch& watch);
+                                 const Watch& watch, const PlantFactory& plant_factory = {});
 
 /// Comparison of a repeated run with its log.
 struct Verdict {
@@ -73,6 +73,6 @@ struct Verdict {
 [[nodiscard]] Verdict verify(const Recorded& recorded, const std::filesystem::path& log,
                              double tolerance,
                              const std::vector<std::filesystem::path>& plugin_directories,
-                             const Watch& watch);
+                             const Watch& watch, const PlantFactory& plant_factory = {});
 
 }  // namespace hamelin::simulation

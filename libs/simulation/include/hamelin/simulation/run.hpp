@@ -12,6 +12,7 @@
 #include "hamelin/log/result.hpp"
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/simulation/plant.hpp"
 
 namespace spdlog {
 class logger;
@@ -69,10 +70,12 @@ struct FreeMotion {
 /// Runs a scene in closed loop with its planner. Each tick consists of kinematics, closest points,
 /// the planner, one integrator step, and a check that the motion between the ticks stayed clear.
 /// @param plugin_directories where planners are searched for, in order
+/// @param plant_factory makes the plant if the scene's is not hamelin's own; empty: such scenes are
+///        refused
 /// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
 [[nodiscard]] log::Result run(const scene::Scene& scene,
                               const std::vector<std::filesystem::path>& plugin_directories,
-                              const Watch& watch);
+                              const Watch& watch, const PlantFactory& plant_factory = {});
 
 /// The scene as a document with all defaults, including the planner's and the integrator's: the
 /// `config` of a log. Paths are relative to the working directory.

@@ -46,8 +46,10 @@ struct Group {
   std::map<std::string, std::size_t> outcomes;  ///< of all runs, including "crashed"
   std::size_t contacts = 0;                     ///< runs in which the judge saw contact
   std::size_t judged = 0;                       ///< runs in which the judge measured a distance
-  std::optional<double> min_clearance_m;        ///< the judge's, from obstacles
-  std::optional<double> min_self_clearance_m;   ///< the judge's, of the arm from itself
+  /// Runs with a plant that detects contacts itself, and those in which it counted one.
+  std::size_t plant_runs = 0, plant_contacts = 0;
+  std::optional<double> min_clearance_m;       ///< the judge's, from obstacles
+  std::optional<double> min_self_clearance_m;  ///< the judge's, of the arm from itself
   std::optional<double> certified_share_mean, certified_share_min;
   std::optional<double> reached_time_s_median;
   /// Mean over runs of the mean change of the torque from tick to tick [Nm or N]; none under ideal

@@ -12,6 +12,7 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/log/result.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/simulation/plant.hpp"
 
 namespace hamelin::sweep {
 
@@ -48,6 +49,7 @@ struct DrawnPairs {
 /// Options for running pairs.
 struct PairRuns {
   std::vector<std::filesystem::path> plugin_directories;
+  simulation::PlantFactory plant_factory;   ///< see simulation::run
   std::size_t jobs = 1;                     ///< threads; only `timing` in the results depends on it
   const std::atomic<bool>* stop = nullptr;  ///< once set, runs end as interrupted
   /// Called once per run, in the order of the pairs, never concurrently.

@@ -13,7 +13,8 @@ namespace hamelin::simulation {
 /// @throws Error invalid if there is neither one value nor one per joint
 [[nodiscard]] Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& robot);
 
-/// Dry friction of each joint [Nm or N], as the scene's model specifies it; empty: none.
+/// Dry friction of each joint [Nm or N], as model and actuation of the scene specify it; empty:
+/// none.
 /// @throws Error invalid if there is neither one value nor one per joint
 [[nodiscard]] Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot);
 

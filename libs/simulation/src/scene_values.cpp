@@ -1,5 +1,6 @@
-#include "plant.hpp"
+#include "scene_values.hpp"
 
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
 
 namespace hamelin::simulation {
@@ -10,8 +11,12 @@ Eigen::VectorXd plant_damping(const scene::Scene& scene, const model::Robot& rob
 }
 
 Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot) {
-  return control::joint_numbers(scene, scene.model.friction, "friction", robot,
-                                &model::Joint::friction);
+  Eigen::VectorXd friction = control::joint_numbers(scene, scene.model.friction, "friction", robot,
+                                                    &model::Joint::friction);
+  const double share = scene.actuation.coulomb_friction_share;
+  if (share == 0.0) return friction;
+  if (friction.size() == 0) friction = Eigen::VectorXd::Zero(robot.dof());
+  return friction + share * control::joint_limits(robot, &model::Joint::effort_max, 0.0);
 }
 
 std::vector<log::Input> inputs_of(const scene::Scene& scene) {
