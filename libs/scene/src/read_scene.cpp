@@ -250,7 +250,10 @@ void read_servo(const Reader& in, Actuation& actuation) {
                               : "is not allowed, expected position actuation");
   if (!position) return;
   const Reader servo = in.child("servo");
-  actuation.servo = {read_numbers(servo, "kp"), read_numbers(servo, "kv")};
+  actuation.servo = {read_numbers(servo, "kp"), read_numbers(servo, "kv"),
+                     servo.get<std::string>("feedforward", "dynamics") == "gravity"
+                         ? Feedforward::gravity
+                         : Feedforward::dynamics};
 }
 
 PlantType read_plant(const Reader& in, const Reader& plant, ActuationType actuation) {

@@ -119,7 +119,8 @@ Json actuation_json(const Actuation& actuation) {
            {"coulomb_friction_share", actuation.coulomb_friction_share}};
   if (actuation.type == ActuationType::position)
     out["servo"] = {{"kp", one_or_list(actuation.servo.kp)},
-                    {"kv", one_or_list(actuation.servo.kv)}};
+                    {"kv", one_or_list(actuation.servo.kv)},
+                    {"feedforward", to_string(actuation.servo.feedforward)}};
   return out;
 }
 
@@ -158,6 +159,16 @@ std::string_view to_string(ActuationType type) noexcept {
       return "position";
   }
   return "unknown";
+}
+
+std::string_view to_string(Feedforward feedforward) noexcept {
+  switch (feedforward) {
+    case Feedforward::dynamics:
+      return "dynamics";
+    case Feedforward::gravity:
+      return "gravity";
+  }
+  return "";
 }
 
 std::string_view to_string(PlantType type) noexcept {

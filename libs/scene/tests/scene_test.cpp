@@ -203,7 +203,9 @@ TEST_CASE("position actuation has servos, and MuJoCo takes torques", "[scene][un
   const Json resolved = resolved_json(read());
   CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
   CHECK(resolved["plant"]["type"] == "mujoco");
-  CHECK(resolved["actuation"]["servo"] == document["actuation"]["servo"]);
+  Json servo = document["actuation"]["servo"];
+  servo["feedforward"] = "dynamics";
+  CHECK(resolved["actuation"]["servo"] == servo);
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
   document["actuation"]["torque_rate_max_Nm_s"] = 1000.0;
   CHECK_THROWS_WITH(read(), Catch::Contains("/actuation/torque_rate_max_Nm_s: is not allowed"));
@@ -425,6 +427,27 @@ TEST_CASE("the largest tip speed at a goal is read, and read back", "[scene][uni
   CHECK(resolved["goals"][1]["tip_speed_max_m_s"] == 0.05);
   CHECK(resolved["goals"][2]["tip_speed_max_m_s"].is_null());
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+}
+
+TEST_CASE("a velocity estimator is read, read back, and refused where nothing is sampled",
+          "[scene][unit]") {
+  Json document = small_document();
+  document["actuation"] = {
+      {"type", "sampled"}, {"joint_velocity", "estimated"}, {"estimator_bandwidth", 30.0}};
+  const Scene scene = scene_from_json(document, ".", "x.json");
+  CHECK(scene.actuation.estimates_velocity);
+  CHECK(scene.actuation.estimator_bandwidth == 30.0);
+  const Json resolved = resolved_json(scene);
+  CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+  document["actuation"]["estimator_bandwidth"] = 0.0;
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
+                    Catch::Contains("/actuation/estimator_bandwidth"));
+  document["actuation"]["estimator_bandwidth"] = 30.0;
+  document["actuation"]["type"] = "ideal";
+  CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
+                    "x.json: /actuation/joint_velocity: 'estimated' is not allowed, expected "
+                    "sampled actuation");
 }
 
 TEST_CASE("friction and the torque rate limit are read, and read back", "[scene][unit]") {

@@ -273,13 +273,16 @@ class ServoActuation final : public SampledActuation {
       : SampledActuation(plant, period_steps),
         kp_(servo_gains(scene, model, scene.actuation.servo.kp, "kp")),
         kv_(servo_gains(scene, model, scene.actuation.servo.kv, "kv")),
+        dynamic_(scene.actuation.servo.feedforward == scene::Feedforward::dynamics),
+        period_s_(scene.actuation.control_period_s),
         nominal_(control::scaled_masses(model, scene.actuation.planner_mass_scale)),
         ws_(nominal_),
         encoders_(scene),
         point_{plant.node().q, plant.node().v},
         sent_(point_),
         delayed_(delay_ticks, point_) {
-    torque_ = measured_ = VectorXd::Zero(model.dof());
+    torque_ = measured_ = acceleration_ = feedforward_ = VectorXd::Zero(model.dof());
+    feed_forward();
     if (scene.model.torque_limits)
       effort_max_ = control::joint_limits(model.robot(), &model::Joint::effort_max, infinity);
     check_stability(scene, model);
@@ -333,14 +336,24 @@ class ServoActuation final : public SampledActuation {
   void receive(const control::Answer& decided, long tick) override {
     sent_.q = decided.q_next;
     sent_.v = decided.v_next;
-    point_ = delayed_.exchange(tick, sent_);
+    const SetPoint& next = delayed_.exchange(tick, sent_);
+    acceleration_ = (next.v - point_.v) / period_s_;
+    point_ = next;
+    feed_forward();
+  }
+
+  // The model's torque for the set point's motion, or for holding it.
+  void feed_forward() {
+    if (dynamic_)
+      dynamics::inverse_dynamics(nominal_, ws_, point_.q, point_.v, acceleration_, feedforward_);
+    else
+      dynamics::gravity_torque(nominal_, ws_, point_.q, feedforward_);
   }
 
   void form_torque() override {
     encoders_.measure(plant_.node().q, measured_);
-    dynamics::gravity_torque(nominal_, ws_, measured_, torque_);
-    torque_ +=
-        kp_.cwiseProduct(point_.q - measured_) + kv_.cwiseProduct(point_.v - plant_.node().v);
+    torque_ = feedforward_ + kp_.cwiseProduct(point_.q - measured_) +
+              kv_.cwiseProduct(point_.v - plant_.node().v);
     saturated_ = false;
     if (effort_max_.size() == 0) return;
     saturated_ = (torque_.cwiseAbs().array() > effort_max_.array()).any();
@@ -348,10 +361,12 @@ class ServoActuation final : public SampledActuation {
   }
 
   VectorXd kp_, kv_, effort_max_;
+  bool dynamic_;  ///< whether the set point's motion is fed forward
+  double period_s_;
   model::Model nominal_;  ///< the arm as its drives know it
   dynamics::Workspace ws_;
   Encoders encoders_;
-  VectorXd measured_;
+  VectorXd measured_, acceleration_, feedforward_;
   SetPoint point_;  ///< that the servos follow now
   SetPoint sent_;   ///< the controller's last one
   DelayLine<SetPoint> delayed_;

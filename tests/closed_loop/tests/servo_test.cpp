@@ -50,6 +50,8 @@ TEST_CASE("a servo's torque follows the set point, which arrives after the delay
   scene["actuation"]["servo"]["kv"] = {30.0, 20.0, 10.0, 5.0};
   const int delay_ticks = GENERATE(0, 2);
   scene["actuation"]["delay_s"] = delay_ticks * period_s;
+  const bool dynamic = GENERATE(true, false);
+  if (!dynamic) scene["actuation"]["servo"]["feedforward"] = "gravity";
   const auto ticks = logged_ticks(folder, scene);
 
   const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
@@ -58,8 +60,13 @@ TEST_CASE("a servo's torque follows the set point, which arrives after the delay
   Eigen::VectorXd a(4);
   dynamics::forward_dynamics(model, ws, zero, zero, vector_of(given), a);
   const Eigen::VectorXd v = period_s * a, q = period_s * v;
-  const Eigen::VectorXd expected =
+  Eigen::VectorXd expected =
       500.0 * q + Eigen::Vector4d(30.0, 20.0, 10.0, 5.0).cwiseProduct(v);
+  if (dynamic) {  // without gravity in the plane
+    Eigen::VectorXd feedforward(4);
+    dynamics::inverse_dynamics(model, ws, q, v, a, feedforward);
+    expected += feedforward;
+  }
   for (int k = 0; k < delay_ticks; ++k)
     CHECK(vector_of(ticks.at(static_cast<std::size_t>(k))["tau"]).isZero(0.0));
   const Eigen::VectorXd found = vector_of(ticks.at(static_cast<std::size_t>(delay_ticks))["tau"]);
@@ -74,11 +81,27 @@ TEST_CASE("stiffer servos keep the arm nearer to the motion that the planner ask
   ideal["actuation"] = {{"type", "sampled"}};
   const Eigen::VectorXd wanted = run_scene(folder, ideal).q;
   const auto error = [&](double kp, double kv) {
-    return (run_scene(folder, servo_scene(torque, kp, kv)).q - wanted).norm();
+    Json scene = servo_scene(torque, kp, kv);
+    scene["actuation"]["servo"]["feedforward"] = "gravity";
+    return (run_scene(folder, scene).q - wanted).norm();
   };
   const double soft = error(100.0, 10.0), stiff = error(1e4, 400.0);
   CHECK(stiff < 0.05 * wanted.norm());
   CHECK(soft > 10.0 * stiff);
+}
+
+TEST_CASE("an arm whose servos know its dynamics follows its set points when these accelerate",
+          "[simulation][servo]") {
+  const TemporaryFolder folder;
+  Json scene = servo_scene({3.0, -1.0, 0.5, 0.2}, 100.0, 10.0);
+  Json ideal = scene;
+  ideal["actuation"] = {{"type", "sampled"}};
+  const Eigen::VectorXd wanted = run_scene(folder, ideal).q;
+  const double known = (run_scene(folder, scene).q - wanted).norm();
+  scene["actuation"]["servo"]["feedforward"] = "gravity";
+  const double unknown = (run_scene(folder, scene).q - wanted).norm();
+  CHECK(known < 0.05 * wanted.norm());
+  CHECK(unknown > 10.0 * known);
 }
 
 TEST_CASE("servos keep the torque limits, and that is counted", "[simulation][servo]") {

@@ -77,10 +77,17 @@ enum class ActuationType : std::int32_t { ideal, sampled, position };
 
 [[nodiscard]] std::string_view to_string(ActuationType type) noexcept;
 
-/// Gains of position servos: one value for all joints, or one per joint.
-struct ServoGains {
+/// Which torques of the planner's model a servo adds to those of its gains: for the motion of the set
+/// points, or only for holding them against gravity.
+enum class Feedforward : std::int32_t { dynamics, gravity };
+
+[[nodiscard]] std::string_view to_string(Feedforward feedforward) noexcept;
+
+/// Position servos. Gains: one value for all joints, or one per joint.
+struct Servo {
   std::vector<double> kp;  ///< torque per position error [Nm/rad or N/m]
   std::vector<double> kv;  ///< torque per velocity error [Nms/rad or Ns/m]
+  Feedforward feedforward = Feedforward::dynamics;
 };
 
 struct Actuation {
@@ -90,12 +97,12 @@ struct Actuation {
   double joint_noise_rad = 0.0;
   /// Whether the controller estimates joint velocities from the measured positions.
   bool estimates_velocity = false;
-  double estimator_bandwidth = 60.0;  ///< [1/s]
+  double estimator_bandwidth = 45.0;  ///< [1/s]
   double planner_mass_scale = 1.0;
   /// Sampled: of each joint's held torque [Nm/s or N/s].
   std::optional<double> torque_rate_max_Nm_s;
   double coulomb_friction_share = 0.0;  ///< of the effort limits; unknown to the planner
-  ServoGains servo;                     ///< position
+  Servo servo;                     ///< position
 };
 
 /// What simulates the arm: hamelin's own integrators, or MuJoCo.

@@ -1,0 +1,82 @@
+#include "hamelin/control/state_estimator.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "hamelin/core/rng.hpp"
+
+using namespace hamelin;
+using control::StateEstimator;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+// One period of the errors of (q, v, d), as a matrix: from the errors of the estimator itself, which
+// starts with one of (1, 0, 0) while the arm rests at zero.
+Matrix3d error_step(double period_s, double bandwidth) {
+  const VectorXd zero = VectorXd::Zero(1);
+  StateEstimator estimator(1, period_s, bandwidth);
+  estimator.start(VectorXd::Ones(1));
+  Matrix3d before, after;
+  for (int k = 0; k < 4; ++k) {
+    const Vector3d error(estimator.q()[0], estimator.v()[0], estimator.disturbance()[0]);
+    if (k < 3) before.col(k) = error;
+    if (k > 0) after.col(k - 1) = error;
+    estimator.update(zero, zero);
+  }
+  return after * before.inverse();
+}
+
+}  // namespace
+
+TEST_CASE("all errors of the estimate decay with one rate", "[control][estimator][unit]") {
+  const double period_s = 0.01, bandwidth = GENERATE(5.0, 45.0, 100.0);
+  const double theta = std::exp(-bandwidth * period_s);
+  // The characteristic polynomial (z - theta)^3, by its coefficients.
+  const Matrix3d A = error_step(period_s, bandwidth);
+  const double minors = 0.5 * (A.trace() * A.trace() - (A * A).trace());
+  CHECK(A.trace() == Approx(3.0 * theta).epsilon(1e-9));
+  CHECK(minors == Approx(3.0 * theta * theta).epsilon(1e-9));
+  CHECK(A.determinant() == Approx(theta * theta * theta).epsilon(1e-9));
+}
+
+TEST_CASE("an unknown constant acceleration leaves no error", "[control][estimator][unit]") {
+  const double period_s = 0.001;
+  StateEstimator estimator(2, period_s, 45.0);
+  const VectorXd known = Eigen::Vector2d(0.3, -1.0), unknown = Eigen::Vector2d(-2.0, 0.5);
+  const VectorXd acceleration = known + unknown, q0 = Eigen::Vector2d(0.4, -0.2);
+  estimator.start(q0);
+  double time_s = 0.0;
+  VectorXd q(2), v(2);
+  for (int k = 1; k <= 1000; ++k) {
+    time_s = period_s * k;
+    q = q0 + 0.5 * time_s * time_s * acceleration;
+    v = time_s * acceleration;
+    estimator.update(q, known);
+  }
+  CHECK((estimator.q() - q).norm() < 1e-10);
+  CHECK((estimator.v() - v).norm() < 1e-9);
+  CHECK((estimator.disturbance() - unknown).norm() < 1e-6);
+}
+
+TEST_CASE("noise of positions reaches the velocity as theory says", "[control][estimator][unit]") {
+  const double period_s = 0.001, sigma = 1e-4, bandwidth = GENERATE(45.0, 200.0);
+  const double theta = std::exp(-bandwidth * period_s), rest = 1.0 - theta;
+  const double expected =
+      sigma * std::sqrt(rest * rest * rest * (13.0 + 50.0 * theta + 49.0 * theta * theta) /
+                        (2.0 * period_s * period_s * std::pow(1.0 + theta, 5)));
+  StateEstimator estimator(1, period_s, bandwidth);
+  const VectorXd zero = VectorXd::Zero(1);
+  estimator.start(zero);
+  Rng random(7);
+  constexpr int settle = 2000, samples = 400'000;
+  double sum = 0.0;
+  for (int k = 0; k < settle + samples; ++k) {
+    estimator.update(VectorXd::Constant(1, sigma * random.normal()), zero);
+    if (k >= settle) sum += estimator.v()[0] * estimator.v()[0];
+  }
+  // About samples * rest / 4 of the values are independent, so the deviation is below 2 %.
+  CHECK(std::sqrt(sum / samples) == Approx(expected).epsilon(0.05));
+}
