@@ -117,6 +117,10 @@ Json actuation_json(const Actuation& actuation) {
            {"planner_mass_scale", actuation.planner_mass_scale},
            {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
            {"coulomb_friction_share", actuation.coulomb_friction_share}};
+  if (actuation.estimates_velocity) {
+    out["joint_velocity"] = "estimated";
+    out["estimator_bandwidth"] = actuation.estimator_bandwidth;
+  }
   if (actuation.type == ActuationType::position)
     out["servo"] = {{"kp", one_or_list(actuation.servo.kp)},
                     {"kv", one_or_list(actuation.servo.kv)},

@@ -129,6 +129,21 @@ TEST_CASE("contacts that a plant counts itself are counted apart from the judge'
           !Catch::Contains("apf: the plant's own"));
 }
 
+TEST_CASE("changes of the torque are averaged where torques are sampled", "[sweep][unit]") {
+  auto runs = hand_made();
+  runs[0].record["result"]["torque_change"] = {{"mean", 0.25}, {"max", 3.0}};
+  runs[1].record["result"]["torque_change"] = {{"mean", 0.5}, {"max", 1.0}};
+  Merged merged;
+  merged.by = {"planner"};
+  merged.groups = group(runs, merged.by);
+  CHECK(merged.groups[1].torque_change_mean == 0.375);
+  CHECK_FALSE(merged.groups[0].torque_change_mean.has_value());
+  const Json json = to_json(merged);
+  CHECK(json["groups"][0]["torque_change_mean"].is_null());
+  check_shipped_schema(json, "summary", "merged");
+  CHECK_THAT(to_table(merged), Catch::Contains("dtau") && Catch::Contains("0.375"));
+}
+
 TEST_CASE("made-up records are grouped and counted", "[sweep][unit]") {
   const auto groups = group(hand_made(), {"planner"});
   REQUIRE(groups.size() == 2);

@@ -5,6 +5,7 @@
 #include "../scratch_scene.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/test/scene_data.hpp"
 
 using namespace hamelin;
 using log::Outcome;
@@ -154,6 +155,43 @@ TEST_CASE(
     CAPTURE(scale, result.v.transpose());
     CHECK((result.v - expected).norm() < 1e-3 * expected.norm());
   }
+}
+
+TEST_CASE("with exact positions an estimated velocity is as good as a measured one",
+          "[simulation][actuation]") {
+  const TemporaryFolder folder;
+  Json scene = scene_of({{"torque", {9.0, -4.0, 12.0, 1.0}}}, "sampled");
+  scene["actuation"]["delay_s"] = GENERATE(0.0, 0.003);
+  scene["planner"] = {{"name", "hybrid"}};
+  scene["goals"] = {{{"type", "joint"}, {"q", {0.4, -0.3, 0.5, 0.2}}}};
+  scene["duration_s"] = 0.6;
+  const auto measured = run_scene(folder, scene);
+  scene["actuation"]["joint_velocity"] = "estimated";
+  const auto estimated = run_scene(folder, scene);
+  CAPTURE(measured.q.transpose(), estimated.q.transpose());
+  CHECK(measured.v.norm() > 0.1);
+  CHECK((measured.q - estimated.q).norm() < 1e-4);
+  CHECK((measured.v - estimated.v).norm() < 1e-3);
+}
+
+TEST_CASE("noisy positions are enough for a smooth torque that keeps its distance",
+          "[simulation][actuation]") {
+  scene::Scene scene = scene::read_scene(test::data / "scenes" / "clutter.json");
+  scene.actuation.type = scene::ActuationType::sampled;
+  scene.actuation.control_period_s = scene.step_s = 0.001;
+  scene.actuation.delay_s = 0.001;
+  scene.actuation.joint_noise_rad = 1e-4;
+  scene.actuation.estimates_velocity = true;
+  scene.actuation.coulomb_friction_share = 0.02;
+  scene.actuation.planner_mass_scale = GENERATE(0.95, 1.05);
+  scene.actuation.torque_rate_max_Nm_s = 1000.0;
+  const auto result = simulation::run(scene, {HAMELIN_TEST_PLUGIN_DIR}, {});
+  CAPTURE(result.cause);
+  CHECK(result.outcome == Outcome::reached);
+  CHECK(*result.min_clearance_m > 0.002);
+  REQUIRE(result.torque_change);
+  CHECK(result.torque_change->mean() < 0.5);
+  CHECK(result.torque_change->max <= 1.0 + 1e-9);  // 1000 Nm/s for 1 ms
 }
 
 TEST_CASE("the error of a goal of the tip is reported also if the planner's masses are wrong",
