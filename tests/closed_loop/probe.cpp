@@ -49,7 +49,7 @@ class Probe : public Planner {
     if (const auto rate = setup.effort_rate_max()) rates = std::to_string((*rate)[0]);
     host.info("sampled " + std::to_string(setup.sampled() ? 1 : 0) + ", delay " +
               std::to_string(setup.delay_s()) + ", rate " + rates + ", path " +
-              std::to_string(setup.path(setup.goal(0)).cols()));
+              std::to_string(setup.path(setup.goals()[0]).cols()));
   }
 
   void tick(const Tick& tick, Command& command) override {

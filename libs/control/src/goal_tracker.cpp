@@ -14,7 +14,7 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals,
                          const std::optional<scene::StallRule>& rule, const model::Model& model)
-    : goals_(goals), rule_(rule), model_(model) {}
+    : goals_(&goals), rule_(rule), model_(model) {}
 
 double GoalTracker::tip_speed(const dynamics::Workspace& ws, const Eigen::VectorXd& v) const {
   const Eigen::Vector3d tip = dynamics::tip_pose(model_, ws).p();

@@ -113,7 +113,8 @@ Json actuation_json(const Actuation& actuation) {
           {"joint_noise_rad", actuation.joint_noise_rad},
           {"planner_mass_scale", actuation.planner_mass_scale},
           {"torque_rate_max_Nm_s", or_null(actuation.torque_rate_max_Nm_s)},
-          {"coulomb_friction_share", actuation.coulomb_friction_share}};
+          {"coulomb_friction_share", actuation.coulomb_friction_share},
+          {"deadline_s", or_null(actuation.deadline_s)}};
 }
 
 Json start_json(const Scene& scene) {

@@ -109,7 +109,7 @@ class Hybrid final : public planning::Planner {
         max_escapes_(params["max_escapes"]),
         search_steps_(params["search_steps"]),
         horizon_s_(setup.control_period_s()),
-        path_(setup.dof(), max_path_points(setup)) {
+        path_(setup.dof(), static_cast<Eigen::Index>(setup.path_points_max())) {
     if (setup.sampled()) {
       const double period = setup.control_period_s();
       horizon_s_ = std::max(period, params["horizon_s"].get<double>());
@@ -143,8 +143,8 @@ class Hybrid final : public planning::Planner {
   void tick(const planning::Tick& tick, planning::Command& command) override {
     q_ = tick.q();
     v_ = tick.v();
-    const auto& goal = setup_.goals()[tick.goal_index()];
-    if (goal_ != &goal) set_goal(goal, tick.time_s());
+    const auto& goal = tick.goal();
+    if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
     prepare(tick);
 
     const Target target = choose_target();
@@ -194,19 +194,15 @@ class Hybrid final : public planning::Planner {
     return margins;
   }
 
-  static Eigen::Index max_path_points(const planning::Setup& setup) {
-    std::size_t most = 0;
-    for (const auto& goal : setup.goals()) most = std::max(most, goal.path_points);
-    return static_cast<Eigen::Index>(most);
-  }
-
   void enter(Mode mode, double time_s) {
     mode_ = mode;
     stall_.restart(time_s);
   }
 
-  void set_goal(const hamelin_goal& goal, double time_s) {
+  void set_goal(const planning::Tick& tick) {
+    const hamelin_goal& goal = tick.goal();
     goal_ = &goal;
+    goal_number_ = tick.goal_number();
     memory_.restart();
     escapes_ = 0;
     margins_.set_goal(surroundings_, goal, contact_radius_);
@@ -214,7 +210,7 @@ class Hybrid final : public planning::Planner {
     const auto path = setup_.path(goal);
     for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
-    enter(Mode::goal, time_s);
+    enter(Mode::goal, tick.time_s());
   }
 
   void prepare(const planning::Tick& tick) {
@@ -270,18 +266,20 @@ class Hybrid final : public planning::Planner {
   void bound_steering(planning::Command& command) {
     steering_.setZero();
     const auto effort = setup_.effort_max();
-    if (!effort || command.gyroscopic().empty()) return;
+    if (!effort || command.gyroscopic_count() == 0) return;
     terms_.clear();
-    for (const auto& term : command.gyroscopic())
+    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i) {
+      const auto& term = command.gyroscopic(i);
       terms_.push_back(
           {term.link, planning::vec3(term.point_link_m), planning::vec3(term.w_world)});
+    }
     dynamics::gyroscopic_torque(model_, ws_, q_, v_, terms_, steering_);
     double scale = 1.0;
     for (int k = 0; k < setup_.dof(); ++k)
       scale =
           std::min(scale, steering_share * (*effort)[k] / std::max(1e-12, std::abs(steering_[k])));
-    for (auto& term : command.gyroscopic())
-      for (auto& w : term.w_world) w *= scale;
+    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i)
+      for (auto& w : command.gyroscopic(i).w_world) w *= scale;
     steering_ *= scale;
   }
 
@@ -488,7 +486,8 @@ class Hybrid final : public planning::Planner {
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
-  const hamelin_goal* goal_ = nullptr;
+  const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
+  std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
   bool held_back_ = false;  ///< by the filter or a near obstacle
   int escapes_ = 0;

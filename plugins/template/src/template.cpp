@@ -19,7 +19,7 @@ class Template : public Planner {
 
   void tick(const Tick& tick, Command& command) override {
     arm_.update(tick);
-    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    const hamelin_goal& goal = tick.goal();
     tau_.setZero();
     if (goal.type == HAMELIN_GOAL_JOINT) {
       tau_ = -stiffness_ * (arm_.q() - ConstVectorMap(goal.q, setup_.dof()));
