@@ -15,7 +15,8 @@ namespace {
 class EmptyHost final : public planning::HostServices {
  public:
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+  std::size_t closest_points(std::span<const double>, double,
+                             planning::ArrayOut<hamelin_contact>) override {
     return 0;
   }
 };
@@ -51,8 +52,13 @@ std::vector<double> numbers_of(const planning::CommandBuffers& out) {
 std::vector<double> answers_of(const planning::Plugin& plugin, const Json& params,
                                const model::Model& arm, std::int32_t goal_type) {
   EmptyHost host;
-  auto planner = plugin.create(setup_for(arm, goal_type), host, params);
-  planning::CommandBuffers out(static_cast<std::size_t>(arm.dof()), 8);
+  planning::SetupData setup = setup_for(arm, goal_type);
+  const Eigen::Vector2d q_goal = Eigen::Vector2d::Constant(0.2);
+  hamelin_goal goal = setup.goals.front();
+  goal.struct_size = sizeof goal;
+  goal.q = goal_type == HAMELIN_GOAL_JOINT ? q_goal.data() : nullptr;
+  auto planner = plugin.create(std::move(setup), host, params);
+  planning::CommandBuffers out(static_cast<std::size_t>(arm.dof()), 8, planner.series().size());
   hamelin_contact contact{};
   contact.distance_m = 0.05;
   contact.direction_world[1] = 1.0;
@@ -60,17 +66,17 @@ std::vector<double> answers_of(const planning::Plugin& plugin, const Json& param
   std::vector<double> all;
   const std::array<double, 2> q{0.1, 0.2}, still{0.0, 0.0}, moving{0.3, -0.4};
   for (std::uint64_t k = 0; k < 3; ++k) {
-    const hamelin_tick tick{sizeof(hamelin_tick),
-                            k,
-                            1e-3 * static_cast<double>(k),
-                            q.data(),
-                            k == 0 ? still.data() : moving.data(),
-                            &contact,
-                            k == 2 ? 1u : 0u,
-                            0,
-                            1.0,
-                            nullptr,
-                            0};
+    hamelin_tick tick{};
+    tick.struct_size = sizeof tick;
+    tick.k = k;
+    tick.time_s = 1e-3 * static_cast<double>(k);
+    tick.q = q.data();
+    tick.v = k == 0 ? still.data() : moving.data();
+    tick.contacts = &contact;
+    tick.contact_count = k == 2 ? 1 : 0;
+    tick.contact_stride = sizeof contact;
+    tick.goal = &goal;
+    tick.speed_scale = 1.0;
     if (!planner.tick(tick, out))
       throw Error(ErrorCode::plugin, fmt::format("tick {}: {}", k, planner.error()));
     const auto numbers = numbers_of(out);

@@ -96,7 +96,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
   check_goals(goals, scene_, nominal_, path_points_max_);
-  const std::lock_guard lock(updates_mutex_);
+  const std::lock_guard lock(goals_mutex_);
   new_goals_.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
   return goals_number_;
 }
@@ -105,7 +105,7 @@ void Controller::set_planner_params(const Json& changes) {
   if (!changes.is_object())
     throw Error(ErrorCode::invalid,
                 fmt::format("parameters of planner '{}': /: expected an object", plugin().name()));
-  const std::lock_guard lock(updates_mutex_);
+  const std::lock_guard lock(params_mutex_);
   Json all = params_;
   all.update(changes);
   all = planning::check_params(plugin(), all);
@@ -117,7 +117,7 @@ void Controller::set_planner_params(const Json& changes) {
 }
 
 Json Controller::planner_params() const {
-  const std::lock_guard lock(updates_mutex_);
+  const std::lock_guard lock(params_mutex_);
   return params_;
 }
 

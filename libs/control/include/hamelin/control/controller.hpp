@@ -167,7 +167,9 @@ class Controller {
   World world_;
   WorldView view_;
   PlannerHost planner_;
-  mutable std::mutex updates_mutex_;  ///< among writers; the tick never takes it
+  // Each is among writers; the tick takes none.
+  std::mutex goals_mutex_;
+  mutable std::mutex params_mutex_;
   std::uint64_t goals_number_ = 0, params_number_ = 0;  ///< of the newest, for writers
   Json params_;
   Newest<GoalList> new_goals_;
