@@ -139,7 +139,8 @@ void ClosedLoop::start(const Watch& watch) {
   log_ = std::make_unique<TickLog>(*recorder_, arm_, *judge_, controller_->goals(), *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging())
-    log_->header(scene_, controller_->plugin(), planner_params_, result_.provenance, steps_);
+    log_->header(scene_, controller_->plugin(), planner_params_, controller_->series(),
+                 result_.provenance, steps_);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = judge_->influence_m();
   min_self_clearance_ = judge_->self_influence_m();
@@ -270,6 +271,7 @@ void ClosedLoop::let_controller_observe() {
 
 void ClosedLoop::ask_planner() {
   controller_->decide();
+  recorder_->planner_time(controller_->answer().planner_s);
   if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
     finish(log::Outcome::stalled, std::string(controller_->answer().cause));
   if (done_ && !actuation_->needs_answer_at_end()) book_last_node();
@@ -376,6 +378,8 @@ void ClosedLoop::fill_result() {
   result_.q = arm_.state.q;
   result_.v = arm_.v;
   result_.seed = scene_.seed;
+  result_.deadline_us = 1e6 * controller_->deadline_s();
+  result_.late_ticks = controller_->answer().overruns;
   dynamics::forward_kinematics(model_, arm_.ws, arm_.state.q);
   const control::GoalTracker& goals = controller_->goals();
   const control::GoalError error = goals.error(arm_.ws, arm_.state.q, arm_.v);

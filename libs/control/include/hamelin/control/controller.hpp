@@ -144,6 +144,8 @@ class Controller {
   }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
+  /// Wall time that the planner should not exceed in a tick [s], see Answer::overruns.
+  [[nodiscard]] double deadline_s() const noexcept { return deadline_s_; }
 
  private:
   /// The planner's parameters on their way to the tick.
