@@ -1,4 +1,6 @@
 #pragma once
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,9 +13,20 @@ struct PluginCheck {
   std::string failure;  ///< empty: passed
 };
 
-/// Tests a loaded plugin: its schema and defaults, and a planner for each kind of goal on a
-/// two-link arm, with ticks at rest, in motion and next to an obstacle. Equal ticks must give equal
-/// answers.
-[[nodiscard]] std::vector<PluginCheck> check_plugin(const planning::Plugin& plugin);
+struct PluginCheckOptions {
+  std::vector<std::filesystem::path> scenes;  ///< in which it is tried, besides the built-in ones
+  std::optional<double> deadline_s;           ///< none: that of each scene
+};
+
+/// The scenes of data/ that a check uses: those installed with the program, else those below the
+/// working directory.
+[[nodiscard]] std::vector<std::filesystem::path> installed_scenes();
+
+/// Tests a loaded plugin against the contract of the plugin interface: its schema and the range of
+/// its parameters; valid answers in several scenes, while goals and obstacles change; what it
+/// declares about memory and threads; equal answers in equal runs; its time. Each part runs in a
+/// process of its own, so that a crash is a failure like any other.
+[[nodiscard]] std::vector<PluginCheck> check_plugin(const planning::Plugin& plugin,
+                                                    const PluginCheckOptions& options);
 
 }  // namespace hamelin::app

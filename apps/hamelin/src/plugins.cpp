@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 
 #include "command_line.hpp"
 #include "commands.hpp"
@@ -19,7 +20,8 @@ struct ListOptions {
 
 struct CheckOptions {
   std::string plugin;
-  std::vector<std::filesystem::path> plugin_path;
+  std::vector<std::filesystem::path> plugin_path, scenes;
+  std::optional<double> deadline_s;
   bool json = false;
 };
 
@@ -66,7 +68,8 @@ void list(const ListOptions& options) {
 int check(const CheckOptions& options) {
   const planning::Plugin plugin =
       planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
-  const auto results = check_plugin(plugin);
+  const auto results = check_plugin(
+      plugin, {options.scenes.empty() ? installed_scenes() : options.scenes, options.deadline_s});
   Json all = Json::array();
   bool failed = false;
   for (const auto& result : results) {
@@ -106,9 +109,10 @@ void add_plugins(CLI::App& app, int& exit_code) {
   list_command->callback([list_options] { list(*list_options); });
 
   auto* check_command =
-      add_command(*plugins, "check", "Load a planner and test it on a two-link arm",
+      add_command(*plugins, "check", "Test a planner against the contract of the plugin interface",
                   "hamelin plugins check gyro\n"
-                  "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
+                  "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so\n"
+                  "hamelin plugins check hybrid --scene cell.json --deadline 0.0005");
   const auto check_options = std::make_shared<CheckOptions>();
   check_command->add_option("plugin", check_options->plugin, "planner plugin, by name or path")
       ->required()
@@ -118,6 +122,17 @@ void add_plugins(CLI::App& app, int& exit_code) {
                    "directory to search first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
+  check_command
+      ->add_option("--scene", check_options->scenes,
+                   "scene to try it in, besides the built-in ones; may be repeated (default: "
+                   "those installed with hamelin)")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  check_command
+      ->add_option("--deadline", check_options->deadline_s,
+                   "wall time for 99 % of its answers (default: that of each scene)")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber);
   check_command->add_flag("--json", check_options->json, "print JSON");
   check_command->callback([check_options, &exit_code] { exit_code = check(*check_options); });
 }

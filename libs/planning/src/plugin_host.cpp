@@ -295,6 +295,12 @@ bool Plugin::tick_allocates() const noexcept {
 bool Plugin::uses_threads() const noexcept {
   return (library_->raw->properties & HAMELIN_USES_THREADS) != 0;
 }
+bool Plugin::can_change_params() const noexcept {
+  return library_->raw->prepare_params != nullptr;
+}
+bool Plugin::can_reset() const noexcept {
+  return library_->raw->reset != nullptr;
+}
 std::uint32_t Plugin::abi_version() const noexcept {
   return std::min(library_->raw->abi_version, HAMELIN_PLUGIN_ABI_VERSION);
 }
@@ -603,17 +609,13 @@ const std::vector<Series>& LoadedPlanner::series() const noexcept {
   return instance_->series;
 }
 
-bool LoadedPlanner::can_change_params() const noexcept {
-  return instance_->plugin.library_->raw->prepare_params != nullptr;
-}
-
 PreparedParams LoadedPlanner::prepare_params(const Json& checked_params) const {
   const Plugin& plugin = instance_->plugin;
   const auto fail = [&](std::string_view reason) {
     throw Error(ErrorCode::invalid, one_line(fmt::format("parameters of planner '{}': {}",
                                                          plugin.name(), reason)));
   };
-  if (!can_change_params()) fail("cannot be changed while it runs");
+  if (!plugin.can_change_params()) fail("cannot be changed while it runs");
   const std::string text = checked_params.dump();
   std::array<char, 512> error{};
   // made first, so that what the plugin makes has an owner

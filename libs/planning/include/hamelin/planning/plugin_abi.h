@@ -104,8 +104,8 @@ typedef struct hamelin_box {
 
 enum { HAMELIN_GOAL_JOINT = 0, HAMELIN_GOAL_POSITION = 1, HAMELIN_GOAL_POSE = 2 };
 
-/* Later versions of the interface may add types of goals: a planner answers a tick whose goal it
- * does not know by giving up. Targets that move (a pose and a twist per tick) are such a type. */
+/* Later versions of the interface may add types of goals, as targets that move (a pose and a twist
+ * per tick). Planners that support older versions only do not get them. */
 typedef struct hamelin_goal {
   uint32_t struct_size;
   int32_t type;

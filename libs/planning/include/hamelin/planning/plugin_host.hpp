@@ -209,6 +209,10 @@ class Plugin {
   /// Whether its tick may use the heap, and whether it starts threads, by its own declaration.
   [[nodiscard]] bool tick_allocates() const noexcept;
   [[nodiscard]] bool uses_threads() const noexcept;
+  /// Whether its planners' parameters can be changed while they run, and whether they can be told of
+  /// a new start.
+  [[nodiscard]] bool can_change_params() const noexcept;
+  [[nodiscard]] bool can_reset() const noexcept;
   /// The version of the interface that this program and the plugin use.
   [[nodiscard]] std::uint32_t abi_version() const noexcept;
 
@@ -256,8 +260,6 @@ class LoadedPlanner {
 
   /// The series that the planner declared, in order.
   [[nodiscard]] const std::vector<Series>& series() const noexcept;
-  /// Whether its parameters can be changed while it runs.
-  [[nodiscard]] bool can_change_params() const noexcept;
   /// Prepares parameters for apply_params(). On any thread, also during tick().
   /// @param checked_params the result of check_params
   /// @throws Error invalid with the planner's reason, also if it cannot change parameters
