@@ -64,6 +64,7 @@ std::string run_in_child(const std::function<std::string()>& action, double time
   if (child < 0) throw Error(ErrorCode::io, fmt::format("fork: {}", std::strerror(errno)));
   if (child == 0) {
     ::close(pipe_ends[0]);
+    ::dup2(STDERR_FILENO, STDOUT_FILENO);
     // The mark says that the action came to its end.
     send(pipe_ends[1], line_of(action) + '\0');
     ::_exit(0);

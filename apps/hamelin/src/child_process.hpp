@@ -5,6 +5,7 @@
 namespace hamelin::app {
 
 /// Runs an action in a child process, so that a crash or an endless loop ends only the child.
+/// What the action prints goes to standard error.
 /// @param action returns one line that says what went wrong; empty: nothing. What it throws is such
 ///        a line, too.
 /// @return that line, or how the child ended without one

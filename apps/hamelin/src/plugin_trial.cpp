@@ -83,11 +83,11 @@ class Loop {
     if (made > 0 && out.allocating_tick < 0) out.allocating_tick = state_.k;
     out.allocations += made;
     if (answer.state == control::ControlState::stopping) {
-      out.failure = fmt::format("{}: tick {}: {}", trial_.name, state_.k, answer.cause);
+      out.failure = fmt::format("tick {}: {}", state_.k, answer.cause);
       return false;
     }
     append(answers, answer);
-    planner_s_.push_back(answer.planner_s);
+    out.tick_s.push_back(answer.planner_s);
     step(answer.torque);
     return true;
   }
@@ -105,11 +105,6 @@ class Loop {
     if (k == 150) world.remove_obstacle(ball.name);
     if (k == 180 && controller_.plugin().can_change_params())
       controller_.set_planner_params(params_);
-  }
-
-  [[nodiscard]] double planner_p99_s() {
-    std::sort(planner_s_.begin(), planner_s_.end());
-    return planner_s_.empty() ? 0.0 : planner_s_[planner_s_.size() * 99 / 100];
   }
 
  private:
@@ -142,7 +137,6 @@ class Loop {
   integration::State state_;
   integration::Channels channels_;
   VectorXd v_;
-  std::vector<double> planner_s_;
 };
 
 scene::Scene scene_beside_ball(const scene::Goal& goal) {
@@ -188,26 +182,46 @@ TrialScene read_trial_scene(const std::filesystem::path& file) {
   return {file.filename().string(), std::move(scene), std::move(arm)};
 }
 
+std::optional<std::string> refusal(const Error& error) {
+  const std::string text = error.what(), mark = "cannot start: ";
+  const std::size_t at = text.find(mark);
+  if (error.code() != ErrorCode::plugin || at == std::string::npos) return std::nullopt;
+  std::string reason = text.substr(at + mark.size());
+  if (reason == "no reason given" || reason == "create returned no planner") return std::nullopt;
+  return reason;
+}
+
+namespace {
+
+void run_trial(Loop& loop, const planning::Plugin& plugin, const TrialScene& scene, int ticks,
+               int threads_before, Trial& out) {
+  out.deadline_s = loop.controller().deadline_s();
+  for (long k = 0; k < ticks; ++k) {
+    loop.change(k);
+    if (!loop.tick(out, out.answers)) return;
+    if (k % 16 == 0) out.threads = std::max(out.threads, thread_count() - threads_before);
+  }
+  if (!plugin.can_reset()) return;
+  loop.controller().reset();
+  loop.controller().set_goals(scene.scene.goals);
+  loop.restart();
+  for (long k = 0; k < 60; ++k)
+    if (!loop.tick(out, out.answers_after_reset)) return;
+}
+
+}  // namespace
+
 Trial try_planner(const planning::Plugin& plugin, const Json& params, const TrialScene& scene,
                   int ticks) {
   Trial out;
   const int threads = thread_count();
-  {
+  try {
     Loop loop(plugin, params, scene);
-    out.deadline_s = loop.controller().deadline_s();
-    for (long k = 0; k < ticks; ++k) {
-      loop.change(k);
-      if (!loop.tick(out, out.answers)) break;
-      if (k % 16 == 0) out.threads = std::max(out.threads, thread_count() - threads);
-    }
-    out.planner_p99_s = loop.planner_p99_s();
-    if (plugin.can_reset() && out.failure.empty()) {
-      loop.controller().reset();
-      loop.controller().set_goals(scene.scene.goals);
-      loop.restart();
-      for (long k = 0; k < 60; ++k)
-        if (!loop.tick(out, out.answers_after_reset)) break;
-    }
+    run_trial(loop, plugin, scene, ticks, threads, out);
+  } catch (const Error& e) {
+    const auto reason = refusal(e);
+    if (!reason) throw;
+    out.refusal = *reason;
   }
   // A thread may need a moment to disappear after it was joined.
   for (int i = 0; i < 100 && thread_count() > threads; ++i)

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "command_line.hpp"
 #include "commands.hpp"
@@ -20,8 +19,8 @@ struct ListOptions {
 
 struct CheckOptions {
   std::string plugin;
-  std::vector<std::filesystem::path> plugin_path, scenes;
-  std::optional<double> deadline_s;
+  std::vector<std::filesystem::path> plugin_path;
+  PluginCheckOptions how;
   bool json = false;
 };
 
@@ -65,22 +64,34 @@ void list(const ListOptions& options) {
   }
 }
 
+const char* to_string(PluginCheck::Outcome outcome) {
+  switch (outcome) {
+    case PluginCheck::Outcome::ok:
+      return "ok";
+    case PluginCheck::Outcome::failed:
+      return "failed";
+    case PluginCheck::Outcome::skipped:
+      return "skipped";
+  }
+  return "";
+}
+
 int check(const CheckOptions& options) {
   const planning::Plugin plugin =
       planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
-  const auto results = check_plugin(
-      plugin, {options.scenes.empty() ? installed_scenes() : options.scenes, options.deadline_s});
+  PluginCheckOptions how = options.how;
+  if (how.scenes.empty()) how.scenes = scenes_of_checkout();
+  const auto results = check_plugin(plugin, how);
   Json all = Json::array();
   bool failed = false;
   for (const auto& result : results) {
-    const bool ok = result.failure.empty();
-    failed = failed || !ok;
+    failed = failed || result.outcome == PluginCheck::Outcome::failed;
     all.push_back({{"check", result.name},
-                   {"ok", ok},
-                   {"failure", ok ? Json(nullptr) : Json(result.failure)}});
+                   {"outcome", to_string(result.outcome)},
+                   {"text", result.text.empty() ? Json(nullptr) : Json(result.text)}});
     if (!options.json)
-      fmt::print("{:<7} {}{}{}\n", ok ? "ok" : "failed", result.name, ok ? "" : ": ",
-                 result.failure);
+      fmt::print("{:<8} {}{}{}\n", to_string(result.outcome), result.name,
+                 result.text.empty() ? "" : ": ", result.text);
   }
   if (options.json) print_json(all);
   return failed ? 1 : 0;
@@ -123,14 +134,20 @@ void add_plugins(CLI::App& app, int& exit_code) {
       ->type_name("DIR")
       ->allow_extra_args(false);
   check_command
-      ->add_option("--scene", check_options->scenes,
-                   "scene to try it in, besides the built-in ones; may be repeated (default: "
-                   "those installed with hamelin)")
+      ->add_option("--scene", check_options->how.scenes,
+                   "scene to try it in, besides three built-in ones; may be repeated (default: "
+                   "some of data/scenes, if the working directory has that folder)")
       ->type_name("FILE")
       ->allow_extra_args(false);
   check_command
-      ->add_option("--deadline", check_options->deadline_s,
-                   "wall time for 99 % of its answers (default: that of each scene)")
+      ->add_option("--deadline", check_options->how.deadline_s,
+                   "time that 99 % of its ticks may take (default: the scene's "
+                   "/actuation/deadline_s, else the control period)")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber);
+  check_command
+      ->add_option("--timeout", check_options->how.timeout_s,
+                   "time after which a part of the test has failed (default: 120)")
       ->type_name("S")
       ->check(CLI::PositiveNumber);
   check_command->add_flag("--json", check_options->json, "print JSON");
