@@ -82,7 +82,7 @@ std::string run_in_child(const std::function<std::string()>& action, double time
   if (WIFSIGNALED(status))
     return fmt::format("ended the program by signal {} ({})", WTERMSIG(status),
                        strsignal(WTERMSIG(status)));
-  return "ended the program";
+  return fmt::format("ended the program with exit code {}", WEXITSTATUS(status));
 }
 
 }  // namespace hamelin::app
