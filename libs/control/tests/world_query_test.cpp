@@ -30,8 +30,8 @@ struct QueryRig {
     query.refresh();
   }
   static scene::Scene with_balls() {
-    scene::Scene scene = scene::read_scene(std::filesystem::path(HAMELIN_SOURCE_DIR) /
-                                           "data/scenes/clutter.json");
+    scene::Scene scene =
+        scene::read_scene(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/clutter.json");
     scene.model.self_collision = true;
     scene::Obstacle still, moving;
     still.name = "still";
@@ -76,9 +76,10 @@ struct QueryRig {
 
 }  // namespace
 
-TEST_CASE("the clearance of a configuration is that of obstacles and of the arm itself, and ends "
-          "early below a bound",
-          "[control][query]") {
+TEST_CASE(
+    "the clearance of a configuration is that of obstacles and of the arm itself, and ends "
+    "early below a bound",
+    "[control][query]") {
   QueryRig rig;
   long contacts = 0, by_self = 0;
   for (int i = 0; i < 300; ++i) {
@@ -198,9 +199,8 @@ TEST_CASE("distances of points have their gradients, and boxes cover exactly wha
     const double distance = rig.query.distance(p, 0.0, 0.15, gradient);
     bool in_box = false;
     for (std::size_t k = 0; k < count; ++k) {
-      const Vector3d offset =
-          (p - Vector3d::Map(boxes[k].center_world_m)).cwiseAbs() -
-          Vector3d::Map(boxes[k].half_size_m);
+      const Vector3d offset = (p - Vector3d::Map(boxes[k].center_world_m)).cwiseAbs() -
+                              Vector3d::Map(boxes[k].half_size_m);
       in_box = in_box || offset.maxCoeff() < 0.0;
     }
     CHECK(in_box == (distance < 0.0));
@@ -215,9 +215,10 @@ TEST_CASE("distances of points have their gradients, and boxes cover exactly wha
   CHECK(checked > 200);
 }
 
-TEST_CASE("after a refresh a query sees the newest world, before it the old one; answers do not "
-          "allocate",
-          "[control][query]") {
+TEST_CASE(
+    "after a refresh a query sees the newest world, before it the old one; answers do not "
+    "allocate",
+    "[control][query]") {
   QueryRig rig;
   const VectorXd q = rig.scene.start_q;
   const double before = rig.query.clearance(q.data(), 0.0, -1.0);

@@ -163,8 +163,7 @@ hamelin_setup SetupData::view() {
 
 // ---- CommandBuffers
 
-CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity,
-                               std::size_t series)
+CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity, std::size_t series)
     : gyroscopic_(gyroscopic_capacity), series_(series) {
   for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_})
     x->resize(static_cast<Eigen::Index>(dof));
@@ -424,8 +423,8 @@ struct LoadedPlanner::Instance {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
     self.guarded([&] {
-      count = self.services->closest_points({q, self.setup.dof}, influence_m,
-                                            {out, capacity, stride});
+      count =
+          self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity, stride});
     });
     return count;
   }
@@ -612,8 +611,8 @@ const std::vector<Series>& LoadedPlanner::series() const noexcept {
 PreparedParams LoadedPlanner::prepare_params(const Json& checked_params) const {
   const Plugin& plugin = instance_->plugin;
   const auto fail = [&](std::string_view reason) {
-    throw Error(ErrorCode::invalid, one_line(fmt::format("parameters of planner '{}': {}",
-                                                         plugin.name(), reason)));
+    throw Error(ErrorCode::invalid,
+                one_line(fmt::format("parameters of planner '{}': {}", plugin.name(), reason)));
   };
   if (!plugin.can_change_params()) fail("cannot be changed while it runs");
   const std::string text = checked_params.dump();

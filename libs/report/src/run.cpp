@@ -78,7 +78,8 @@ VectorXd numbers(const Json& object, const char* key, int count, const char* of_
   const Json* at = find(object, key);
   if (at == nullptr) return {};
   if (!at->is_array() || at->size() != static_cast<std::size_t>(count))
-    throw line_error(reader, fmt::format("{}: expected {} numbers, one per {}", key, count, of_each));
+    throw line_error(reader,
+                     fmt::format("{}: expected {} numbers, one per {}", key, count, of_each));
   VectorXd x(count);
   for (int i = 0; i < count; ++i) {
     const Json& value = (*at)[static_cast<std::size_t>(i)];
@@ -274,7 +275,8 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   row[tick_us] = number(timing, "tick_us", reader);
   row[tick_us_max] = number(timing, "tick_us_max", reader);
   if (series_count_ > 0) {
-    const VectorXd series = numbers(line, "series", static_cast<int>(series_count_), "series", reader);
+    const VectorXd series =
+        numbers(line, "series", static_cast<int>(series_count_), "series", reader);
     if (series.size() > 0) std::copy_n(series.data(), series_count_, row + columns);
   }
   if (!extrema.empty()) {

@@ -23,17 +23,16 @@ void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, 
                      long steps) {
   Json config = resolved_config(scene);
   config["planner"]["params"] = params;
-  Json fields{{"program", "run"},
-              {"scene", scene.name},
-              {"seed", scene.seed},
-              {"generator", Rng::name},
-              {"config", std::move(config)},
-              {"robot_notes", arm_.model.robot().notes},
-              {"plugin",
-               {{"name", plugin.name()},
-                {"version", plugin.version()},
-                {"abi", plugin.abi_version()}}},
-              {"provenance", provenance}};
+  Json fields{
+      {"program", "run"},
+      {"scene", scene.name},
+      {"seed", scene.seed},
+      {"generator", Rng::name},
+      {"config", std::move(config)},
+      {"robot_notes", arm_.model.robot().notes},
+      {"plugin",
+       {{"name", plugin.name()}, {"version", plugin.version()}, {"abi", plugin.abi_version()}}},
+      {"provenance", provenance}};
   for (const auto& one : series)
     fields["series"].push_back({{"name", one.name}, {"unit", one.unit}});
   recorder_.header(std::move(fields), arm_.model.robot(), steps);

@@ -68,8 +68,7 @@ class Gyro : public Planner {
           }
         });
     if (!steering || keep_attraction_)  // Algorithm II of Shen, Wang, Shi (2021)
-      arm_.add_mapped_attraction(tick.goal(), k_p_ * tick.speed_scale(), k_v_,
-                                 tau_);
+      arm_.add_mapped_attraction(tick.goal(), k_p_ * tick.speed_scale(), k_v_, tau_);
     if (gravity_compensation_) arm_.add_gravity(tau_);
     command.held_torque() = tau_;
   }

@@ -493,7 +493,7 @@ class Hybrid final : public planning::Planner {
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
   std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
-  bool held_back_ = false;  ///< by the filter or a near obstacle
+  bool held_back_ = false;       ///< by the filter or a near obstacle
   bool measure_margins_ = true;  ///< whether goal or margins have changed
   int escapes_ = 0;
   double path_position_ = 0.0, escape_position_ = 0.0, via_until_s_ = 0.0;

@@ -118,8 +118,8 @@ class Scene {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t s = 0; s < data_.shapes.size(); ++s)
       for (const auto& ball : balls_)
-        least = std::min(
-            least, (placed(s) - ball.center).norm() - data_.shapes[s].radius_m - ball.radius);
+        least = std::min(least,
+                         (placed(s) - ball.center).norm() - data_.shapes[s].radius_m - ball.radius);
     return least;
   }
   /// The smallest distance along the straight lines of a path, checked every `step`.

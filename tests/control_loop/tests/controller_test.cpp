@@ -7,10 +7,10 @@
 #include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
-using test::Loop;
-using test::sampled;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using test::Loop;
+using test::sampled;
 
 TEST_CASE("a controller without a simulation takes an arm to its goals, each step proved clear",
           "[control][controller]") {

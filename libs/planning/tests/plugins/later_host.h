@@ -14,8 +14,10 @@ typedef struct later_answer {
 
 /* Runs one tick of the plugin in the file: an arm of three joints, four shapes of radius 0.5, two
  * goals of tolerance 0.25, the contacts' distances 1, 2 and 3, and those of closest_points 4 and 5.
- * The host was built with the header of a later version: all structs are longer, versions 4 to 6. */
-void later_host_tick(const char* plugin_file, const char* robot_json, const char* params_json, later_answer* out);
+ * The host was built with the header of a later version: all structs are longer, versions 4 to 6.
+ */
+void later_host_tick(const char* plugin_file, const char* robot_json, const char* params_json,
+                     later_answer* out);
 
 #ifdef __cplusplus
 }

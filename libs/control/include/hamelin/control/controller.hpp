@@ -60,8 +60,8 @@ struct ControllerOptions {
   bool position = false;           ///< fill Answer::q_next and v_next
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
   double acceleration_max = 15.0, jerk_max = 5000.0;
-  /// The largest number of way-points of a goal's path, also of goals that are set later; none: that
-  /// of the scene's goals, at least 256.
+  /// The largest number of way-points of a goal's path, also of goals that are set later; none:
+  /// that of the scene's goals, at least 256.
   std::optional<std::size_t> path_points_max;
   PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
 };

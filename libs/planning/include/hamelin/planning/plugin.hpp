@@ -307,8 +307,7 @@ class Host {
   /// @throws Error plugin if the name is empty or in use
   [[nodiscard]] std::int32_t declare_series(const std::string& name,
                                             const std::string& unit) const {
-    const std::int32_t series =
-        raw_->declare_series(raw_->context, name.c_str(), unit.c_str());
+    const std::int32_t series = raw_->declare_series(raw_->context, name.c_str(), unit.c_str());
     if (series < 0)
       throw Error(ErrorCode::plugin, "series '" + name + "': its name is empty or in use");
     return series;
@@ -414,12 +413,13 @@ class Query {
 /// params), which reports bad input by throwing Error; params are complete and checked against the
 /// plugin's schema. It may also have any of these, which are found by their names:
 ///
-///     static double influence_m(const Json& params);  // distance up to which it needs contacts [m]
-///     static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS;
-///     T prepare_params(const Json& params) const;  // any thread, while tick() runs; throws Error
-///     void apply_params(const T& params);          // before a tick; does not allocate or throw
-///     void reset(ConstVectorMap q, ConstVectorMap v);  // a new start; does not throw
-///     void world_changed(std::uint64_t world);         // before a tick; does not throw
+///     static double influence_m(const Json& params);  // distance up to which it needs contacts
+///     [m] static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES |
+///     HAMELIN_USES_THREADS; T prepare_params(const Json& params) const;  // any thread, while
+///     tick() runs; throws Error void apply_params(const T& params);          // before a tick;
+///     does not allocate or throw void reset(ConstVectorMap q, ConstVectorMap v);  // a new start;
+///     does not throw void world_changed(std::uint64_t world);         // before a tick; does not
+///     throw
 class Planner {
  public:
   Planner() = default;
@@ -499,8 +499,8 @@ struct Glue {
                                  std::size_t error_size) noexcept {
         return guarded(error, error_size, [&] {
           const auto& planner = static_cast<const Instance*>(instance)->planner;
-          *out = std::make_unique<Params>(planner.prepare_params(
-                                              parse_json({params_json, params_size}, "params")))
+          *out = std::make_unique<Params>(
+                     planner.prepare_params(parse_json({params_json, params_size}, "params")))
                      .release();
         });
       };
@@ -527,12 +527,12 @@ struct Glue {
     out.destroy = &destroy;
     out.influence_m = &influence_m;
     add_params_functions(out);
-    if constexpr (requires(Type& planner, ConstVectorMap x) { planner.reset(x, x); })
+    if constexpr (requires(Type & planner, ConstVectorMap x) { planner.reset(x, x); })
       out.reset = [](void* instance, const double* q, const double* v) noexcept {
         const auto dof = static_cast<Eigen::Index>(static_cast<Instance*>(instance)->dof);
         planner_of(instance).reset(ConstVectorMap(q, dof), ConstVectorMap(v, dof));
       };
-    if constexpr (requires(Type& planner) { planner.world_changed(std::uint64_t{}); })
+    if constexpr (requires(Type & planner) { planner.world_changed(std::uint64_t{}); })
       out.world_changed = [](void* instance, std::uint64_t world) noexcept {
         planner_of(instance).world_changed(world);
       };

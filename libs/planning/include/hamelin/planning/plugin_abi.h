@@ -85,12 +85,12 @@ enum { HAMELIN_OBSTACLE_SPHERE = 0, HAMELIN_OBSTACLE_BOX = 1, HAMELIN_OBSTACLE_C
 
 /* An obstacle at some time. */
 typedef struct hamelin_obstacle_state {
-  int32_t id;       /* as in hamelin_contact.obstacle */
-  int32_t shape;    /* HAMELIN_OBSTACLE_SPHERE, _BOX, _CYLINDER */
-  const char* name; /* unique among the obstacles */
-  double radius_m;  /* sphere, cylinder */
-  double length_m;  /* cylinder, along its z axis */
-  double size_m[3]; /* box: full edges */
+  int32_t id;                                     /* as in hamelin_contact.obstacle */
+  int32_t shape;                                  /* HAMELIN_OBSTACLE_SPHERE, _BOX, _CYLINDER */
+  const char* name;                               /* unique among the obstacles */
+  double radius_m;                                /* sphere, cylinder */
+  double length_m;                                /* cylinder, along its z axis */
+  double size_m[3];                               /* box: full edges */
   double position_world_m[3], quaternion_wxyz[4]; /* of its centre and axes */
   double velocity_world_m_s[3];
 } hamelin_obstacle_state;
@@ -176,9 +176,9 @@ typedef struct hamelin_tick {
    * whenever the goal is another one: the next of the list, or the first of a new list. */
   const hamelin_goal* goal;
   uint64_t goal_number;
-  size_t goal_index;   /* of the goal in its list */
-  uint64_t world;      /* number of the world's snapshot: changes with obstacles and map */
-  double speed_scale;  /* 1, or less in unknown space if the scene's policy is "slow" */
+  size_t goal_index;  /* of the goal in its list */
+  uint64_t world;     /* number of the world's snapshot: changes with obstacles and map */
+  double speed_scale; /* 1, or less in unknown space if the scene's policy is "slow" */
 } hamelin_tick;
 
 /* DETECTS_STALLS: running, and the planner detects its stalls itself: the scene's stall rule is
@@ -289,8 +289,7 @@ typedef struct hamelin_host {
    * distance is limit_m and the gradient zero. The map is known within the arm's reach plus
    * hamelin_setup.influence_m only. */
   void (*query_distance)(hamelin_query* query, const double* points_world_m, size_t count,
-                         double time_ahead_s, double limit_m, double* distance_m,
-                         double* gradient);
+                         double time_ahead_s, double limit_m, double* distance_m, double* gradient);
   /* Lists the map's boxes that meet the axis-aligned region from low to high of the world; with a
    * rotated map also some close by. Boxes of unknown space are listed where it blocks. */
   size_t (*query_boxes)(hamelin_query* query, const double low_world_m[3],

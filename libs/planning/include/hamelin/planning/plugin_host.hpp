@@ -209,8 +209,8 @@ class Plugin {
   /// Whether its tick may use the heap, and whether it starts threads, by its own declaration.
   [[nodiscard]] bool tick_allocates() const noexcept;
   [[nodiscard]] bool uses_threads() const noexcept;
-  /// Whether its planners' parameters can be changed while they run, and whether they can be told of
-  /// a new start.
+  /// Whether its planners' parameters can be changed while they run, and whether they can be told
+  /// of a new start.
   [[nodiscard]] bool can_change_params() const noexcept;
   [[nodiscard]] bool can_reset() const noexcept;
   /// The version of the interface that this program and the plugin use.
