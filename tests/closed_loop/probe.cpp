@@ -22,6 +22,7 @@ constexpr const char* schema = R"({
     "filter_work_J": {"type": "number", "default": 0},
     "recovery_work_J": {"type": "number", "default": 0},
     "books_at_tick": {"type": "integer", "minimum": 0, "default": 0},
+    "series": {"type": "boolean", "default": false},
     "think_of": {"type": "array", "items": {"type": "number"}, "default": []},
     "influence_m": {"type": "number", "default": 0.3}
   }
@@ -45,11 +46,15 @@ class Probe : public Planner {
         books_at_(params.at("books_at_tick").get<std::uint64_t>()),
         contacts_(10000),
         self_(100) {
+    if (params.at("series").get<bool>()) {
+      time_series_ = host.declare_series("time", "s");
+      even_series_ = host.declare_series("even ticks", "");
+    }
     std::string rates = "none";
     if (const auto rate = setup.effort_rate_max()) rates = std::to_string((*rate)[0]);
     host.info("sampled " + std::to_string(setup.sampled() ? 1 : 0) + ", delay " +
               std::to_string(setup.delay_s()) + ", rate " + rates + ", path " +
-              std::to_string(setup.path(setup.goal(0)).cols()));
+              std::to_string(setup.path(setup.goals()[0]).cols()));
   }
 
   void tick(const Tick& tick, Command& command) override {
@@ -74,6 +79,8 @@ class Probe : public Planner {
       command.held_torque() = ConstVectorMap(torque_.data(), setup_.dof());
     if (velocity_.size() == dof)
       command.node_velocity() = ConstVectorMap(velocity_.data(), setup_.dof());
+    command.set_series(time_series_, tick.time_s());
+    if (tick.k() % 2 == 0) command.set_series(even_series_, 2.0);
     if (tick.k() == books_at_) command.set_accounts(filter_, recovery_);
   }
 
@@ -101,6 +108,7 @@ class Probe : public Planner {
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_;
   std::size_t thought_ = 0, shown_ = 0;
+  std::int32_t time_series_ = -1, even_series_ = -1;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hamelin/io/file.hpp"
@@ -22,6 +23,20 @@ namespace hamelin::test {
 struct Output {
   int exit_code = -1;
   std::string out, err;
+};
+
+/// Sets an environment variable of this process and its children until destruction.
+class EnvironmentVariable {
+ public:
+  EnvironmentVariable(std::string name, const std::string& value) : name_(std::move(name)) {
+    ::setenv(name_.c_str(), value.c_str(), 1);
+  }
+  EnvironmentVariable(const EnvironmentVariable&) = delete;
+  EnvironmentVariable& operator=(const EnvironmentVariable&) = delete;
+  ~EnvironmentVariable() { ::unsetenv(name_.c_str()); }
+
+ private:
+  std::string name_;
 };
 
 /// A temporary working directory in which `data` links to the checkout's data; removed by the

@@ -8,7 +8,8 @@ namespace {
 
 struct Services : hamelin::planning::HostServices {
   void log(std::int32_t, std::string_view line) override { std::cout << line << '\n'; }
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+  std::size_t closest_points(std::span<const double>, double,
+                             hamelin::planning::ArrayOut<hamelin_contact>) override {
     return 0;
   }
 };
@@ -36,6 +37,7 @@ int main(int argc, char** argv) try {
   const Plugin plugin = Plugin::load(argv[1]);
   SetupData setup(pendulum());
   hamelin_goal goal{};
+  goal.struct_size = sizeof goal;
   goal.type = HAMELIN_GOAL_POSITION;
   goal.position_world_m[2] = 0.5;
   setup.add_goal(goal);
@@ -47,6 +49,7 @@ int main(int argc, char** argv) try {
   tick.struct_size = sizeof tick;
   tick.q = &q;
   tick.v = &v;
+  tick.goal = &goal;
   tick.speed_scale = 1.0;
   if (!planner.tick(tick, out)) {
     std::cerr << planner.error() << '\n';

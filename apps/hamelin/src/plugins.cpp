@@ -20,6 +20,7 @@ struct ListOptions {
 struct CheckOptions {
   std::string plugin;
   std::vector<std::filesystem::path> plugin_path;
+  PluginCheckOptions how;
   bool json = false;
 };
 
@@ -63,21 +64,34 @@ void list(const ListOptions& options) {
   }
 }
 
+const char* to_string(PluginCheck::Outcome outcome) {
+  switch (outcome) {
+    case PluginCheck::Outcome::ok:
+      return "ok";
+    case PluginCheck::Outcome::failed:
+      return "failed";
+    case PluginCheck::Outcome::skipped:
+      return "skipped";
+  }
+  return "";
+}
+
 int check(const CheckOptions& options) {
   const planning::Plugin plugin =
       planning::find_plugin(options.plugin, plugin_path(options.plugin_path));
-  const auto results = check_plugin(plugin);
+  PluginCheckOptions how = options.how;
+  if (how.scenes.empty()) how.scenes = scenes_of_checkout();
+  const auto results = check_plugin(plugin, how);
   Json all = Json::array();
   bool failed = false;
   for (const auto& result : results) {
-    const bool ok = result.failure.empty();
-    failed = failed || !ok;
+    failed = failed || result.outcome == PluginCheck::Outcome::failed;
     all.push_back({{"check", result.name},
-                   {"ok", ok},
-                   {"failure", ok ? Json(nullptr) : Json(result.failure)}});
+                   {"outcome", to_string(result.outcome)},
+                   {"text", result.text.empty() ? Json(nullptr) : Json(result.text)}});
     if (!options.json)
-      fmt::print("{:<7} {}{}{}\n", ok ? "ok" : "failed", result.name, ok ? "" : ": ",
-                 result.failure);
+      fmt::print("{:<8} {}{}{}\n", to_string(result.outcome), result.name,
+                 result.text.empty() ? "" : ": ", result.text);
   }
   if (options.json) print_json(all);
   return failed ? 1 : 0;
@@ -106,9 +120,10 @@ void add_plugins(CLI::App& app, int& exit_code) {
   list_command->callback([list_options] { list(*list_options); });
 
   auto* check_command =
-      add_command(*plugins, "check", "Load a planner and test it on a two-link arm",
+      add_command(*plugins, "check", "Test a planner against the contract of the plugin interface",
                   "hamelin plugins check gyro\n"
-                  "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so");
+                  "hamelin plugins check build/lib/hamelin/plugins/mine.hamelin.so\n"
+                  "hamelin plugins check hybrid --scene cell.json --deadline 0.0005");
   const auto check_options = std::make_shared<CheckOptions>();
   check_command->add_option("plugin", check_options->plugin, "planner plugin, by name or path")
       ->required()
@@ -118,6 +133,23 @@ void add_plugins(CLI::App& app, int& exit_code) {
                    "directory to search first; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
+  check_command
+      ->add_option("--scene", check_options->how.scenes,
+                   "scene to try it in, besides three built-in ones; may be repeated (default: "
+                   "some of data/scenes, if the working directory has that folder)")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  check_command
+      ->add_option("--deadline", check_options->how.deadline_s,
+                   "time that 99 % of its ticks may take (default: the scene's "
+                   "/actuation/deadline_s, else the control period)")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber);
+  check_command
+      ->add_option("--timeout", check_options->how.timeout_s,
+                   "time after which a part of the test has failed (default: 120)")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber);
   check_command->add_flag("--json", check_options->json, "print JSON");
   check_command->callback([check_options, &exit_code] { exit_code = check(*check_options); });
 }

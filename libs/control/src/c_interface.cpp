@@ -127,8 +127,46 @@ void hamelin_controller_tick(hamelin_controller* controller, double time_s, cons
   full.certified = !verdict || verdict->certified ? 1 : 0;
   full.margin_m = verdict ? verdict->margin_m : full.clearance_m;
   full.saturated = answer.saturated ? 1 : 0;
+  full.goals = answer.goals_number;
+  full.planner_s = answer.planner_s;
   // A caller that was built against an earlier header has a shorter struct.
   std::memcpy(out, &full, std::min<std::size_t>(out->struct_size, sizeof full));
+}
+
+std::int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, const double* q,
+                                               double tolerance_rad, std::uint64_t* number,
+                                               char* error, std::size_t error_size) {
+  return update(number, error, error_size, [&] {
+    scene::Goal goal =
+        scene::joint_goal(Eigen::Map<const Eigen::VectorXd>(q, controller->q.size()));
+    if (tolerance_rad > 0.0) goal.tolerance_rad = tolerance_rad;
+    return controller->controller.set_goal(std::move(goal));
+  });
+}
+
+std::int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller,
+                                              const double position_m[3],
+                                              const double quaternion_wxyz[4], double tolerance_m,
+                                              double tolerance_rad, std::uint64_t* number,
+                                              char* error, std::size_t error_size) {
+  return update(number, error, error_size, [&] {
+    scene::Goal goal = quaternion_wxyz == nullptr
+                           ? scene::position_goal(Eigen::Map<const Eigen::Vector3d>(position_m))
+                           : scene::pose_goal(pose_of(position_m, quaternion_wxyz));
+    if (tolerance_m > 0.0) goal.tolerance_m = tolerance_m;
+    if (tolerance_rad > 0.0) goal.tolerance_rad = tolerance_rad;
+    return controller->controller.set_goal(std::move(goal));
+  });
+}
+
+std::int32_t hamelin_controller_set_planner_params(hamelin_controller* controller,
+                                                   const char* params_json, char* error,
+                                                   std::size_t error_size) {
+  return guarded(error, error_size, [&] {
+    const std::string place = "params_json";
+    controller->controller.set_planner_params(
+        parse_json(required(params_json, "params_json"), place));
+  });
 }
 
 std::int32_t hamelin_controller_set_obstacle(hamelin_controller* controller,

@@ -145,6 +145,13 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   return verdict;
 }
 
+double Certificate::longest_path(const VectorXd& dq) const {
+  double longest = 0.0;
+  for (Index s = 0; s < lever_.rows(); ++s)
+    longest = std::max(longest, lever_.row(s).dot(dq.cwiseAbs()));
+  return longest;
+}
+
 double Certificate::clearance_of_appearing(const scene::Shapes& shape, double time_s,
                                            double clearance) const {
   for (const std::size_t k : appearing_)

@@ -1,11 +1,15 @@
 #include "hamelin/control/controller.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 
 namespace hamelin::control {
@@ -18,6 +22,8 @@ namespace {
 constexpr double default_influence_m = 0.2;
 // Time in which an arm whose planner failed loses most of its speed, as far as accelerations allow.
 constexpr double brake_time_s = 0.05;
+// The longest path of goals that are set later, if the caller gives no other.
+constexpr std::size_t default_path_points = 256;
 
 double period_of(const scene::Scene& scene) {
   return scene.actuation.type == scene::ActuationType::ideal ? scene.step_s
@@ -30,6 +36,13 @@ TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
               ? joint_limits(model.robot(), &model::Joint::effort_max, infinity)
               : VectorXd(),
           scene.actuation.torque_rate_max_Nm_s};
+}
+
+planning::SetupData setup_of(const scene::Scene& scene, const model::Model& nominal,
+                             const WorldView& view, double period_s, std::size_t path_points_max) {
+  planning::SetupData setup = planner_setup(scene, nominal, view, period_s);
+  setup.path_points_max = path_points_max;
+  return setup;
 }
 
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
@@ -52,21 +65,28 @@ Controller::Controller(const scene::Scene& scene,
 
 Controller::Controller(const scene::Scene& scene, const model::Model& arm,
                        const planning::Plugin& plugin, Options options)
-    : Controller(scene, arm, plugin, planner_params(scene, plugin), std::move(options)) {}
+    : Controller(scene, arm, plugin, control::planner_params(scene, plugin), std::move(options)) {}
 
 Controller::Controller(const scene::Scene& given, const model::Model& arm,
                        const planning::Plugin& plugin, const Json& params, Options options)
     : scene_(given),
       options_(std::move(options)),
       period_s_(options_.period_s.value_or(period_of(scene_))),
+      deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
+      path_points_max_(std::max(longest_path(scene_.goals),
+                                options_.path_points_max.value_or(default_path_points))),
       nominal_(nominal_of(scene_, arm)),
       world_(scene_, nominal_,
              {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
               options_.prepare_maps}),
       view_(scene_, nominal_, world_),
-      planner_(plugin, planner_setup(scene_, nominal_, view_, period_s_), params, view_,
-               options_.log),
-      goals_(scene_.goals, scene_.stall, nominal_),
+      planner_(plugin, setup_of(scene_, nominal_, view_, period_s_, path_points_max_), params,
+               nominal_, world_, view_, options_.log),
+      params_(params),
+      new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
+      new_params_(std::make_unique<NewParams>()),
+      goal_list_(&new_goals_.take()),
+      goals_(goal_list_->goals, scene_.stall, nominal_),
       limits_(limits_of(scene_, nominal_)),
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
@@ -79,8 +99,51 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
 }
 
+std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
+  check_goals(goals, scene_, nominal_, path_points_max_);
+  const std::lock_guard lock(goals_mutex_);
+  new_goals_.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
+  return goals_number_;
+}
+
+void Controller::set_planner_params(const Json& changes) {
+  if (!changes.is_object())
+    throw Error(ErrorCode::invalid,
+                fmt::format("parameters of planner '{}': /: expected an object", plugin().name()));
+  const std::lock_guard lock(params_mutex_);
+  Json all = params_;
+  all.update(changes);
+  all = planning::check_params(plugin(), all);
+  auto fresh = std::make_unique<NewParams>();
+  fresh->params.emplace(planner_.prepare_params(all));
+  fresh->number = ++params_number_;
+  new_params_.publish(std::move(fresh));
+  params_ = std::move(all);
+}
+
+Json Controller::planner_params() const {
+  const std::lock_guard lock(params_mutex_);
+  return params_;
+}
+
+void Controller::take_goals() {
+  const GoalList& newest = new_goals_.take();
+  if (&newest == goal_list_) return;
+  goal_list_ = &newest;
+  goals_.set_goals(newest.goals);
+  goal_ = {nullptr, goal_.number + 1, 0};
+}
+
+void Controller::take_params() {
+  const NewParams& newest = new_params_.take();
+  if (newest.number == used_params_) return;
+  used_params_ = newest.number;
+  planner_.apply_params(*newest.params);
+}
+
 void Controller::reset() {
   k_ = 0;
+  reset_ = true;
   goals_.restart();
   verdict_.reset();
   answer_.state = ControlState::running;
@@ -107,6 +170,8 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
     view_.look(q_, time_s);
   }
   answer_.snapshot = view_.snapshot();
+  take_goals();
+  answer_.goals_number = goal_list_->number;
   if (answer_.state == ControlState::stopping) return;
   answer_.state = ControlState::running;
   answer_.cause = {};
@@ -114,7 +179,7 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   answer_.goal_index = goals_.index();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
-  else if (!planner_.has_own_stall_rule() && goals_.stalled(view_.poses(), v_, period_s_))
+  else if (!planner_.detects_stalls() && goals_.stalled(view_.poses(), v_, period_s_))
     answer_.state = ControlState::stalled;
 }
 
@@ -151,9 +216,8 @@ void Controller::decide() {
     answer_.v_next = v_;
     command_rate_.setZero();
   }
-  const std::size_t goal = std::min(goals_.index(), goals_.size() - 1);
   if (answer_.state != ControlState::stopping) {
-    if (!planner_.tick(k_, time_s_, q_, v_, goal)) {
+    if (!ask_planner()) {
       answer_.state = ControlState::stopping;
       answer_.cause = planner_.error();
     } else if (planner_.gave_up()) {
@@ -162,6 +226,7 @@ void Controller::decide() {
     }
   }
   answer_.channels = answer_.state == ControlState::stopping ? nullptr : &planner_.command();
+  answer_.series = planner_.command().series();
   if (forms_torque()) form_torque();
   if (options_.position) form_position();
   if (estimator_)
@@ -169,6 +234,22 @@ void Controller::decide() {
         options_.position ? command_rate_ : answer_.torque;
   if (options_.certify) view_.depart(q_, v_);
   ++k_;
+}
+
+bool Controller::ask_planner() {
+  take_params();
+  if (reset_) planner_.reset(q_, v_);
+  const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
+  const hamelin_goal* const goal = &goal_list_->for_planner[index];
+  if (reset_ || (goal_.goal != nullptr && goal_.goal != goal)) ++goal_.number;
+  goal_ = {goal, goal_.number, index};
+  reset_ = false;
+  const auto since = std::chrono::steady_clock::now();
+  const bool valid = planner_.tick(k_, time_s_, q_, v_, goal_);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - since;
+  answer_.planner_s = took.count();
+  if (answer_.planner_s > deadline_s_) ++answer_.overruns;
+  return valid;
 }
 
 void Controller::form_torque() {

@@ -41,7 +41,7 @@ GoalError goal_error(const scene::Goal& goal, const model::Model& model,
 
 GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals,
                          const std::optional<scene::StallRule>& rule, const model::Model& model)
-    : goals_(goals), rule_(rule), model_(model) {}
+    : goals_(&goals), rule_(rule), model_(model) {}
 
 bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                           const Eigen::VectorXd& v) {

@@ -1,28 +1,11 @@
 #include "hamelin/control/planner_setup.hpp"
 
+#include "hamelin/control/goal_list.hpp"
 #include "hamelin/core/numbers.hpp"
 
 namespace hamelin::control {
 
 using Eigen::VectorXd;
-
-namespace {
-
-hamelin_goal to_c(const scene::Goal& goal) {
-  hamelin_goal out{};
-  out.type = goal.type == scene::GoalType::joint      ? HAMELIN_GOAL_JOINT
-             : goal.type == scene::GoalType::position ? HAMELIN_GOAL_POSITION
-                                                      : HAMELIN_GOAL_POSE;
-  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(goal.pose.R());
-  for (int i = 0; i < 3; ++i) out.position_world_m[i] = goal.pose.p()[i];
-  for (int i = 0; i < 4; ++i) out.quaternion_wxyz[i] = wxyz[i];
-  out.tolerance_m = goal.tolerance_m;
-  out.tolerance_rad = goal.tolerance_rad;
-  out.speed_max = goal.speed_max;
-  return out;
-}
-
-}  // namespace
 
 VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Joint::*limit,
                       double unlimited) {
@@ -52,6 +35,7 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
   // Under position actuation the planner is shown the set points, which change without delay.
   if (scene.actuation.type == scene::ActuationType::sampled) data.delay_s = scene.actuation.delay_s;
   data.control_period_s = control_period_s;
+  data.deadline_s = scene.actuation.deadline_s.value_or(control_period_s);
   data.self_collision = scene.model.self_collision;
   data.influence_m = world.influence_m();
   data.map_resolution_m = world.environment().summary().resolution_m;

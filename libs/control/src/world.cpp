@@ -61,7 +61,10 @@ std::uint64_t World::publish(scene::Environment environment, std::vector<std::in
       WorldSnapshot{number, std::move(environment), std::move(ids)});
   auto view = std::make_unique<View>(
       View{snapshot, scene::Environment::Scratch(snapshot->environment, model_.shapes().size())});
-  latest_ = std::move(snapshot);
+  {
+    const std::lock_guard lock(latest_mutex_);
+    latest_.swap(snapshot);
+  }
   if (newest_)
     newest_->publish(std::move(view));
   else
@@ -151,7 +154,7 @@ std::uint64_t World::change_map(const scene::MapChangeSpec& change) {
 }
 
 std::shared_ptr<const WorldSnapshot> World::latest() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(latest_mutex_);
   return latest_;
 }
 

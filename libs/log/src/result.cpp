@@ -45,6 +45,19 @@ Json solver(const SolverSummary& s) {
           {"tolerance", s.tolerance}};
 }
 
+Json times(const std::optional<Result::TickTime>& t) {
+  if (!t) return nullptr;
+  return {{"p50", t->p50}, {"p99", t->p99}, {"max", t->max}};
+}
+
+Json timing(const Result& r) {
+  return {{"cpu_s", r.cpu_s},
+          {"tick_us", times(r.tick_us)},
+          {"planner_wall_us", times(r.planner_us)},
+          {"deadline_us", optional(r.deadline_us)},
+          {"late_ticks", r.deadline_us ? Json(r.late_ticks) : Json(nullptr)}};
+}
+
 }  // namespace
 
 std::string_view to_string(Outcome outcome) noexcept {
@@ -92,9 +105,6 @@ int exit_code(Outcome outcome) noexcept {
 }
 
 Json to_json(const Result& r) {
-  Json tick_us = nullptr;
-  if (r.tick_us)
-    tick_us = {{"p50", r.tick_us->p50}, {"p99", r.tick_us->p99}, {"max", r.tick_us->max}};
   Json document = {
       {"schema", "hamelin.result/1"},
       {"version", std::string(version())},
@@ -128,7 +138,7 @@ Json to_json(const Result& r) {
       {"tightest_step_m", optional(r.tightest_step_m)},
       {"seed", r.seed},
       {"warnings", r.warnings},
-      {"timing", {{"cpu_s", r.cpu_s}, {"tick_us", tick_us}}},
+      {"timing", timing(r)},
       {"provenance", r.provenance}};
   if (r.torque_change)
     document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};

@@ -1,7 +1,6 @@
 #include "hamelin/planning/plugin.hpp"
 
 #include <Eigen/Geometry>
-#include <cstddef>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
@@ -33,8 +32,6 @@ void write_line(std::string_view text, char* error, std::size_t error_size) noex
 }  // namespace
 
 void take_instruction_set(const hamelin_setup& setup) noexcept {
-  if (setup.struct_size < offsetof(hamelin_setup, instruction_set) + sizeof setup.instruction_set)
-    return;
   if (setup.instruction_set == nullptr) return;
   try {
     set_default_isa(isa_from_name(setup.instruction_set, "instruction_set"));

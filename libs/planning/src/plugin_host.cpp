@@ -8,10 +8,12 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <utility>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/text.hpp"
 #include "hamelin/description/robot_io.hpp"
 
@@ -57,7 +59,7 @@ bool finite(const double (&x)[3]) {
 // Describes the first error in a planner's answer, or returns null.
 const char* defect(const CommandBuffers& out, std::size_t dof, std::size_t gyroscopic_capacity) {
   const hamelin_command& raw = out.raw();
-  if (raw.state < HAMELIN_PLANNER_RUNNING || raw.state > HAMELIN_PLANNER_OWN_STALL_RULE)
+  if (raw.state < HAMELIN_PLANNER_RUNNING || raw.state > HAMELIN_PLANNER_DETECTS_STALLS)
     return "unknown planner state";
   if (std::find(std::begin(raw.cause), std::end(raw.cause), '\0') == std::end(raw.cause))
     return "cause is not nul-terminated";
@@ -94,7 +96,7 @@ SetupData::SetupData(const model::Model& nominal)
   for (const auto& shape : nominal.shapes()) {
     const auto& link = nominal.robot().links[static_cast<std::size_t>(shape.link)];
     const auto index = static_cast<std::size_t>(shape.index_in_link);
-    hamelin_sphere out{};
+    hamelin_shape out{};
     out.link = shape.link;
     out.index_in_link = shape.index_in_link;
     out.radius_m = shape.radius;
@@ -107,7 +109,7 @@ SetupData::SetupData(const model::Model& nominal)
         out.center_link_m[i] = link.spheres[index].center_m[i];
       }
     }
-    spheres.push_back(out);
+    shapes.push_back(out);
   }
 }
 
@@ -120,9 +122,11 @@ void SetupData::add_goal(const hamelin_goal& goal, const Eigen::VectorXd& q,
 
 hamelin_setup SetupData::view() {
   for (std::size_t i = 0; i < goals.size(); ++i) {
+    goals[i].struct_size = sizeof goals[i];
     goals[i].q = goals_q[i].size() > 0 ? goals_q[i].data() : nullptr;
     goals[i].path = paths[i].size() > 0 ? paths[i].data() : nullptr;
     goals[i].path_points = static_cast<std::size_t>(paths[i].cols());
+    path_points_max = std::max(path_points_max, goals[i].path_points);
   }
   hamelin_setup raw{};
   raw.struct_size = sizeof raw;
@@ -132,10 +136,13 @@ hamelin_setup SetupData::view() {
   std::copy_n(gravity_world_m_s2.data(), 3, raw.gravity_world_m_s2);
   std::copy_n(base_position_world_m.data(), 3, raw.base_position_world_m);
   std::copy_n(base_quaternion_wxyz.data(), 4, raw.base_quaternion_wxyz);
-  raw.spheres = spheres.data();
-  raw.sphere_count = spheres.size();
+  raw.shapes = shapes.data();
+  raw.shape_count = shapes.size();
+  raw.shape_stride = sizeof(hamelin_shape);
   raw.goals = goals.data();
   raw.goal_count = goals.size();
+  raw.goal_stride = sizeof(hamelin_goal);
+  raw.path_points_max = path_points_max;
   const auto numbers = [](const Eigen::VectorXd& x) { return x.size() > 0 ? x.data() : nullptr; };
   raw.q_lower = numbers(q_lower);
   raw.q_upper = numbers(q_upper);
@@ -143,6 +150,7 @@ hamelin_setup SetupData::view() {
   raw.effort_max = numbers(effort_max);
   raw.effort_rate_max = numbers(effort_rate_max);
   raw.control_period_s = control_period_s;
+  raw.deadline_s = deadline_s;
   raw.sampled = sampled ? 1 : 0;
   raw.delay_s = delay_s;
   raw.self_collision = self_collision ? 1 : 0;
@@ -155,8 +163,8 @@ hamelin_setup SetupData::view() {
 
 // ---- CommandBuffers
 
-CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity)
-    : gyroscopic_(gyroscopic_capacity) {
+CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity, std::size_t series)
+    : gyroscopic_(gyroscopic_capacity), series_(series) {
   for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_})
     x->resize(static_cast<Eigen::Index>(dof));
   clear();
@@ -164,14 +172,18 @@ CommandBuffers::CommandBuffers(std::size_t dof, std::size_t gyroscopic_capacity)
 
 void CommandBuffers::clear() noexcept {
   for (auto* x : {&potential_gradient_, &damping_, &held_torque_, &node_velocity_}) x->setZero();
+  std::fill(series_.begin(), series_.end(), std::numeric_limits<double>::quiet_NaN());
   raw_ = {};
   raw_.struct_size = sizeof raw_;
   raw_.potential_gradient = potential_gradient_.data();
   raw_.damping = damping_.data();
   raw_.gyroscopic = gyroscopic_.data();
   raw_.gyroscopic_capacity = gyroscopic_.size();
+  raw_.gyroscopic_stride = sizeof(hamelin_gyroscopic_term);
   raw_.held_torque = held_torque_.data();
   raw_.node_velocity = node_velocity_.data();
+  raw_.series = series_.data();
+  raw_.series_count = series_.size();
 }
 
 // ---- Plugin
@@ -196,6 +208,31 @@ struct Plugin::Library {
   Json params_schema;
 };
 
+namespace {
+
+// The versions come first, because the meaning of the other fields depends on them. Before version
+// 4 a plugin stated one version only, where its struct now has the newest.
+void check_versions(const fs::path& path, const hamelin_plugin& raw) {
+  constexpr std::uint32_t newest = HAMELIN_PLUGIN_ABI_VERSION,
+                          oldest = HAMELIN_PLUGIN_ABI_VERSION_MIN;
+  const auto range = [](std::uint32_t from, std::uint32_t to) {
+    return from == to ? fmt::format("{}", to) : fmt::format("{} to {}", from, to);
+  };
+  if (raw.abi_version < oldest)
+    refuse(path, fmt::format("built for version {} of the plugin interface, expected {}; rebuild "
+                             "it with this version's headers",
+                             raw.abi_version, range(oldest, newest)));
+  if (raw.abi_version_min > newest)
+    refuse(path, fmt::format("needs version {} of the plugin interface, expected {}; it needs a "
+                             "later hamelin",
+                             range(raw.abi_version_min, raw.abi_version), range(oldest, newest)));
+  if (!HAMELIN_HAS_FIELD(&raw, hamelin_plugin, world_changed))
+    refuse(path, fmt::format("hamelin_plugin has {} bytes, expected at least {}", raw.struct_size,
+                             sizeof(hamelin_plugin)));
+}
+
+}  // namespace
+
 Plugin Plugin::load(const fs::path& file) {
   std::error_code code;
   const fs::path path = fs::absolute(file, code);
@@ -210,17 +247,13 @@ Plugin Plugin::load(const fs::path& file) {
   // POSIX guarantees that a void* can hold the address of a function.
   const auto* raw = reinterpret_cast<hamelin_plugin_entry_fn>(symbol)();
   if (raw == nullptr) refuse(path, fmt::format("{} returned null", HAMELIN_PLUGIN_ENTRY_NAME));
-  // The ABI number comes first, because the meaning of the other fields depends on it.
-  if (raw->abi_version != HAMELIN_PLUGIN_ABI_VERSION)
-    refuse(path, fmt::format("built for plugin ABI {}, expected ABI {}", raw->abi_version,
-                             HAMELIN_PLUGIN_ABI_VERSION));
-  if (raw->struct_size < sizeof(hamelin_plugin))
-    refuse(path, fmt::format("hamelin_plugin has {} bytes, expected at least {}", raw->struct_size,
-                             sizeof(hamelin_plugin)));
+  check_versions(path, *raw);
   using Required = std::pair<const char*, bool>;
   for (const auto& [function, present] :
        {Required{"create", raw->create != nullptr}, Required{"tick", raw->tick != nullptr},
-        Required{"destroy", raw->destroy != nullptr}})
+        Required{"destroy", raw->destroy != nullptr},
+        Required{"apply_params", raw->apply_params != nullptr || raw->prepare_params == nullptr},
+        Required{"free_params", raw->free_params != nullptr || raw->prepare_params == nullptr}})
     if (!present) refuse(path, fmt::format("function '{}' is null", function));
   if (raw->name == nullptr || *raw->name == '\0') refuse(path, "the plugin has no name");
   const auto text = [](const char* string) { return one_line(string != nullptr ? string : ""); };
@@ -255,6 +288,22 @@ const Json& Plugin::params_schema() const noexcept {
   return library_->params_schema;
 }
 
+bool Plugin::tick_allocates() const noexcept {
+  return (library_->raw->properties & HAMELIN_TICK_ALLOCATES) != 0;
+}
+bool Plugin::uses_threads() const noexcept {
+  return (library_->raw->properties & HAMELIN_USES_THREADS) != 0;
+}
+bool Plugin::can_change_params() const noexcept {
+  return library_->raw->prepare_params != nullptr;
+}
+bool Plugin::can_reset() const noexcept {
+  return library_->raw->reset != nullptr;
+}
+std::uint32_t Plugin::abi_version() const noexcept {
+  return std::min(library_->raw->abi_version, HAMELIN_PLUGIN_ABI_VERSION);
+}
+
 std::optional<double> Plugin::influence_m(const Json& checked_params) const {
   if (library_->raw->influence_m == nullptr) return std::nullopt;
   const std::string text = checked_params.dump();
@@ -271,6 +320,54 @@ Json check_params(const Plugin& plugin, const Json& params) {
   return with_defaults(given, plugin.params_schema());
 }
 
+// ---- QueryServices
+
+namespace {
+
+/// Empty space.
+class NoObstacles final : public QueryServices {
+ public:
+  Snapshot refresh() override { return {}; }
+  void clearance(const double*, std::size_t count, double, double, double* out) override {
+    std::fill_n(out, count, infinity);
+  }
+  std::size_t contacts(const double*, double, double, ArrayOut<hamelin_contact>) override {
+    return 0;
+  }
+  std::size_t self_contacts(const double*, double, ArrayOut<hamelin_self_contact>) override {
+    return 0;
+  }
+  bool motion_clear(const double*, const double*, double, double, double& margin_m) override {
+    margin_m = infinity;
+    return true;
+  }
+  void distance(const double*, std::size_t count, double, double limit_m, double* distance_m,
+                double* gradient) override {
+    std::fill_n(distance_m, count, limit_m);
+    if (gradient != nullptr) std::fill_n(gradient, 3 * count, 0.0);
+  }
+  std::size_t boxes(const Eigen::Vector3d&, const Eigen::Vector3d&,
+                    ArrayOut<hamelin_box>) override {
+    return 0;
+  }
+  std::size_t obstacles(double, ArrayOut<hamelin_obstacle_state>) override { return 0; }
+};
+
+}  // namespace
+
+std::unique_ptr<QueryServices> HostServices::open_query() {
+  return std::make_unique<NoObstacles>();
+}
+
+}  // namespace hamelin::planning
+
+/// A query handle.
+struct hamelin_query {
+  std::unique_ptr<hamelin::planning::QueryServices> services;
+};
+
+namespace hamelin::planning {
+
 // ---- LoadedPlanner
 
 struct LoadedPlanner::Instance {
@@ -278,10 +375,18 @@ struct LoadedPlanner::Instance {
       : plugin(std::move(p)), setup_data(std::move(s)), services(&h) {
     setup = setup_data.view();
     host.struct_size = sizeof host;
+    host.abi_version = HAMELIN_PLUGIN_ABI_VERSION;
+    host.abi_version_min = HAMELIN_PLUGIN_ABI_VERSION_MIN;
     host.context = this;
     host.log = &Instance::log;
     host.closest_points = &Instance::closest_points;
     host.closest_self = &Instance::closest_self;
+    host.obstacles = &Instance::obstacles;
+    host.declare_series = &Instance::declare_series;
+    host.open_query = &Instance::open_query;
+    host.close_query = [](hamelin_query* query) noexcept { delete query; };
+    host.query_refresh = &Instance::query_refresh;
+    add_query_functions(host);
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -313,22 +418,105 @@ struct LoadedPlanner::Instance {
     self.guarded([&] { self.services->log(level, {text, size}); });
   }
   static std::size_t closest_points(void* context, const double* q, double influence_m,
-                                    hamelin_contact* out, std::size_t capacity) noexcept {
+                                    hamelin_contact* out, std::size_t capacity,
+                                    std::size_t stride) noexcept {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
     self.guarded([&] {
-      count = self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity});
+      count =
+          self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity, stride});
     });
     return count;
   }
   static std::size_t closest_self(void* context, const double* q, double influence_m,
-                                  hamelin_self_contact* out, std::size_t capacity) noexcept {
+                                  hamelin_self_contact* out, std::size_t capacity,
+                                  std::size_t stride) noexcept {
     auto& self = *static_cast<Instance*>(context);
     std::size_t count = 0;
     self.guarded([&] {
-      count = self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity});
+      count =
+          self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity, stride});
     });
     return count;
+  }
+  static std::size_t obstacles(void* context, hamelin_obstacle_state* out, std::size_t capacity,
+                               std::size_t stride) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::size_t count = 0;
+    self.guarded([&] { count = self.services->obstacles({out, capacity, stride}); });
+    return count;
+  }
+  static std::int32_t declare_series(void* context, const char* name, const char* unit) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::int32_t index = -1;
+    self.guarded([&] {
+      const std::string text = name != nullptr ? name : "";
+      const bool used = std::any_of(self.series.begin(), self.series.end(),
+                                    [&](const Series& other) { return other.name == text; });
+      if (text.empty() || used) return;
+      self.series.push_back({text, unit != nullptr ? unit : ""});
+      index = static_cast<std::int32_t>(self.series.size()) - 1;
+    });
+    return index;
+  }
+
+  // Queries may come from any thread, so they must not touch `error`.
+  static hamelin_query* open_query(void* context) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    try {
+      return std::make_unique<hamelin_query>(hamelin_query{self.services->open_query()}).release();
+    } catch (const std::exception&) {
+      return nullptr;
+    }
+  }
+  static std::int32_t query_refresh(hamelin_query* query, std::uint64_t* world,
+                                    double* time_s) noexcept {
+    try {
+      const QueryServices::Snapshot now = query->services->refresh();
+      if (world != nullptr) *world = now.world;
+      if (time_s != nullptr) *time_s = now.time_s;
+      return 0;
+    } catch (const std::exception&) {
+      return 1;
+    }
+  }
+  static void add_query_functions(hamelin_host& host) noexcept {
+    host.query_clearance = [](hamelin_query* query, const double* q, std::size_t count,
+                              double time_ahead_s, double at_least_m, double* out) noexcept {
+      query->services->clearance(q, count, time_ahead_s, at_least_m, out);
+    };
+    host.query_contacts = [](hamelin_query* query, const double* q, double time_ahead_s,
+                             double influence_m, hamelin_contact* out, std::size_t capacity,
+                             std::size_t stride) noexcept {
+      return query->services->contacts(q, time_ahead_s, influence_m, {out, capacity, stride});
+    };
+    host.query_self_contacts = [](hamelin_query* query, const double* q, double influence_m,
+                                  hamelin_self_contact* out, std::size_t capacity,
+                                  std::size_t stride) noexcept {
+      return query->services->self_contacts(q, influence_m, {out, capacity, stride});
+    };
+    host.query_motion_clear = [](hamelin_query* query, const double* q0, const double* q1,
+                                 double t0_s, double t1_s, double* margin_m) noexcept {
+      double margin = 0.0;
+      const bool clear = query->services->motion_clear(q0, q1, t0_s, t1_s, margin);
+      if (clear && margin_m != nullptr) *margin_m = margin;
+      return static_cast<std::int32_t>(clear ? 1 : 0);
+    };
+    host.query_distance = [](hamelin_query* query, const double* points, std::size_t count,
+                             double time_ahead_s, double limit_m, double* distance_m,
+                             double* gradient) noexcept {
+      query->services->distance(points, count, time_ahead_s, limit_m, distance_m, gradient);
+    };
+    host.query_boxes = [](hamelin_query* query, const double* low, const double* high,
+                          hamelin_box* out, std::size_t capacity, std::size_t stride) noexcept {
+      return query->services->boxes(Eigen::Vector3d::Map(low), Eigen::Vector3d::Map(high),
+                                    {out, capacity, stride});
+    };
+    host.query_obstacles = [](hamelin_query* query, double time_ahead_s,
+                              hamelin_obstacle_state* out, std::size_t capacity,
+                              std::size_t stride) noexcept {
+      return query->services->obstacles(time_ahead_s, {out, capacity, stride});
+    };
   }
 
   Plugin plugin;
@@ -336,10 +524,28 @@ struct LoadedPlanner::Instance {
   HostServices* services;
   hamelin_setup setup{};
   hamelin_host host{};
+  std::vector<Series> series;
   void* planner = nullptr;
   bool host_failed = false;
   std::array<char, 512> error{};
 };
+
+// ---- PreparedParams
+
+struct PreparedParams::Data {
+  Plugin plugin;
+  void* raw = nullptr;
+  ~Data() {
+    if (raw != nullptr) plugin.library_->raw->free_params(raw);
+  }
+  Data(Plugin of, void* params) : plugin(std::move(of)), raw(params) {}
+  Data(const Data&) = delete;
+  Data& operator=(const Data&) = delete;
+};
+
+PreparedParams::PreparedParams(std::unique_ptr<Data> data) : data_(std::move(data)) {}
+PreparedParams::~PreparedParams() = default;
+PreparedParams::PreparedParams(PreparedParams&&) noexcept = default;
 
 LoadedPlanner Plugin::create(SetupData setup, HostServices& services,
                              const Json& checked_params) const {
@@ -396,6 +602,42 @@ bool LoadedPlanner::tick(const hamelin_tick& tick, CommandBuffers& out) noexcept
 
 std::string_view LoadedPlanner::error() const noexcept {
   return instance_->error.data();
+}
+
+const std::vector<Series>& LoadedPlanner::series() const noexcept {
+  return instance_->series;
+}
+
+PreparedParams LoadedPlanner::prepare_params(const Json& checked_params) const {
+  const Plugin& plugin = instance_->plugin;
+  const auto fail = [&](std::string_view reason) {
+    throw Error(ErrorCode::invalid,
+                one_line(fmt::format("parameters of planner '{}': {}", plugin.name(), reason)));
+  };
+  if (!plugin.can_change_params()) fail("cannot be changed while it runs");
+  const std::string text = checked_params.dump();
+  std::array<char, 512> error{};
+  // made first, so that what the plugin makes has an owner
+  auto data = std::make_unique<PreparedParams::Data>(plugin, nullptr);
+  const auto failed = plugin.library_->raw->prepare_params(
+      instance_->planner, text.data(), text.size(), &data->raw, error.data(), error.size());
+  error.back() = '\0';
+  if (failed != 0) fail(error.front() != '\0' ? error.data() : "no reason given");
+  return PreparedParams(std::move(data));
+}
+
+void LoadedPlanner::apply_params(const PreparedParams& params) noexcept {
+  instance_->plugin.library_->raw->apply_params(instance_->planner, params.data_->raw);
+}
+
+void LoadedPlanner::reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept {
+  const auto* raw = instance_->plugin.library_->raw;
+  if (raw->reset != nullptr) raw->reset(instance_->planner, q.data(), v.data());
+}
+
+void LoadedPlanner::world_changed(std::uint64_t world) noexcept {
+  const auto* raw = instance_->plugin.library_->raw;
+  if (raw->world_changed != nullptr) raw->world_changed(instance_->planner, world);
 }
 
 // ---- finding plugins

@@ -61,8 +61,8 @@ constexpr std::size_t elements = std::is_array_v<T> ? std::extent_v<T> : 1;
 
 }  // namespace
 
-TEST_CASE("plugin interface: the layout in C++ is that of ABI 3", "[planning][unit]") {
-  REQUIRE(HAMELIN_PLUGIN_ABI_VERSION == 3);
+TEST_CASE("plugin interface: the layout in C++ is that of version 4", "[planning][unit]") {
+  REQUIRE(HAMELIN_PLUGIN_ABI_VERSION == 4);
   for (const auto& [pinned, seen, same_type] : rows()) {
     INFO(pinned.name);
     CHECK(seen.offset == pinned.offset);
@@ -71,7 +71,7 @@ TEST_CASE("plugin interface: the layout in C++ is that of ABI 3", "[planning][un
   }
 }
 
-TEST_CASE("plugin interface: the layout in C is that of ABI 3", "[planning][unit]") {
+TEST_CASE("plugin interface: the layout in C is that of version 4", "[planning][unit]") {
   REQUIRE(layout_in_c_count == rows().size());
   for (std::size_t i = 0; i < layout_in_c_count; ++i) {
     const auto& pinned = rows()[i].pinned;
@@ -96,13 +96,13 @@ TEST_CASE("plugin interface: no struct has a field that is not pinned", "[planni
 TEST_CASE("plugin interface: constants keep their values", "[planning][unit]") {
   CHECK(HAMELIN_OBSTACLE_MAP == -1);
   CHECK(HAMELIN_OBSTACLE_UNKNOWN == -2);
-  CHECK(HAMELIN_SPHERE_OF_BASE == -1);
+  CHECK(HAMELIN_SHAPE_OF_BASE == -1);
   CHECK(HAMELIN_GOAL_JOINT == 0);
   CHECK(HAMELIN_GOAL_POSITION == 1);
   CHECK(HAMELIN_GOAL_POSE == 2);
   CHECK(HAMELIN_PLANNER_RUNNING == 0);
   CHECK(HAMELIN_PLANNER_GAVE_UP == 1);
-  CHECK(HAMELIN_PLANNER_OWN_STALL_RULE == 2);
+  CHECK(HAMELIN_PLANNER_DETECTS_STALLS == 2);
   CHECK(HAMELIN_LOG_INFO == 0);
   CHECK(HAMELIN_LOG_WARNING == 1);
 }
@@ -115,7 +115,7 @@ TEST_CASE("plugin interface: a plugin in C exports the symbol that the host look
   void* symbol = ::dlsym(library, HAMELIN_PLUGIN_ENTRY_NAME);
   REQUIRE(symbol != nullptr);
   const hamelin_plugin* plugin = reinterpret_cast<hamelin_plugin_entry_fn>(symbol)();
-  CHECK(plugin->struct_size == 72);
-  CHECK(plugin->abi_version == 3);
+  CHECK(plugin->struct_size == 120);
+  CHECK(plugin->abi_version == 4);
   ::dlclose(library);
 }

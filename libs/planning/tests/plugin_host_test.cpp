@@ -45,9 +45,11 @@ struct Services : HostServices {
     lines.push_back(std::to_string(level) + " " + std::string(line));
   }
   std::size_t closest_points(std::span<const double> q, double influence_m,
-                             std::span<hamelin_contact> out) override {
+                             ArrayOut<hamelin_contact> out) override {
     if (throws) throw std::runtime_error("the map is gone");
-    out[0].distance_m = q[0] + influence_m;
+    hamelin_contact contact{};
+    contact.distance_m = q[0] + influence_m;
+    out.set(0, contact);
     return out.size() + 3;
   }
   std::vector<std::string> lines;
@@ -99,8 +101,12 @@ TEST_CASE("a file that is not a valid plugin is refused with one line that names
   };
   expect("no_entry", "no symbol hamelin_plugin_entry, expected a planner plugin");
   expect("null_entry", "hamelin_plugin_entry returned null");
-  expect("wrong_abi", "built for plugin ABI 9, expected ABI 3");
-  expect("short_struct", "hamelin_plugin has 64 bytes, expected at least 72");
+  expect("old_abi",
+         "built for version 3 of the plugin interface, expected 4; rebuild it with this version's "
+         "headers");
+  expect("future_abi",
+         "needs version 9 to 10 of the plugin interface, expected 4; it needs a later hamelin");
+  expect("short_struct", "hamelin_plugin has 112 bytes, expected at least 120");
   expect("null_create", "function 'create' is null");
   expect("null_tick", "function 'tick' is null");
   expect("null_destroy", "function 'destroy' is null");
@@ -140,8 +146,12 @@ TEST_CASE("a planner written in plain C answers ticks and keeps its library load
   hamelin_tick tick{};
   tick.struct_size = sizeof tick;
   tick.q = tick.v = zero.data();
-  CommandBuffers out(3, 0);
+  tick.goal_number = 5;
+  CommandBuffers out(3, 0, planner->series().size());
   REQUIRE(planner->tick(tick, out));
+  REQUIRE(planner->series().size() == 2);
+  CHECK(planner->series()[0].name == "goal");
+  CHECK(out.series()[0] == 5.0);
   CHECK(out.damping() == Eigen::Vector3d::Ones());
   CHECK(out.held_torque() == zero);
   CHECK(services.lines == std::vector<std::string>{"0 made in C"});
@@ -228,20 +238,19 @@ TEST_CASE("the setup passes the nominal model to the plugin", "[planning][plugin
   CHECK(back.dof() == 4);
   CHECK(back.gravity() == model.gravity());
   CHECK((back.base().matrix() - base.matrix()).norm() < 1e-15);
-  CHECK(setup.goal(0).q[3] == 4.0);
-  CHECK_THROWS_AS(setup.goal(1), Error);
+  CHECK(setup.goals()[0].q[3] == 4.0);
   CHECK(setup.q_lower()->minCoeff() == -2.0);
   CHECK_FALSE(setup.effort_max().has_value());
-  REQUIRE(setup.spheres().size() == 5);
-  CHECK(vec3(setup.spheres()[2].center_link_m) == model.robot().links[2].spheres[0].center_m);
-  CHECK(vec3(setup.spheres()[2].half_axis_link_m).isZero(0.0));
-  const hamelin_sphere& capsule = setup.spheres()[3];  // a segment of radius zero is not a shape
+  REQUIRE(setup.shapes().size() == 5);
+  CHECK(vec3(setup.shapes()[2].center_link_m) == model.robot().links[2].spheres[0].center_m);
+  CHECK(vec3(setup.shapes()[2].half_axis_link_m).isZero(0.0));
+  const hamelin_shape& capsule = setup.shapes()[3];  // a segment of radius zero is not a shape
   CHECK(capsule.link == 2);
   CHECK(capsule.index_in_link == 1);
   CHECK(vec3(capsule.center_link_m).isApprox(Eigen::Vector3d(0.0, 0.2, 0.0)));
   CHECK(vec3(capsule.half_axis_link_m).isApprox(Eigen::Vector3d(0.0, 0.1, 0.1)));
   CHECK(capsule.radius_m == 0.03);
-  CHECK(setup.spheres()[4].link == 3);
+  CHECK(setup.shapes()[4].link == 3);
   for (int i = 0; i < 4; ++i) {
     const auto& a = back.robot().links[static_cast<std::size_t>(i)];
     const auto& b = model.robot().links[static_cast<std::size_t>(i)];
@@ -280,7 +289,7 @@ TEST_CASE("a missing planner is reported with all directories and a similar name
   fs::create_directories(root / "one");
   fs::create_directories(root / "two");
   fs::copy_file(test_plugin("plain_c"), root / "two/plain_c.hamelin.so");
-  fs::copy_file(test_plugin("wrong_abi"), root / "two/old.hamelin.so");
+  fs::copy_file(test_plugin("old_abi"), root / "two/old.hamelin.so");
   const std::vector<fs::path> directories{root / "one", root / "two", root / "three"};
 
   CHECK(error_of([&] { (void)find_plugin("plain-c", directories); }) ==
@@ -294,7 +303,7 @@ TEST_CASE("a missing planner is reported with all directories and a similar name
   const auto listed = list_plugins(directories);
   REQUIRE(listed.size() == 2);
   CHECK_FALSE(listed[0].plugin.has_value());
-  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for plugin ABI 9"));
+  CHECK_THAT(listed[0].refusal, Catch::Contains("old.hamelin.so: built for version 3"));
   REQUIRE(listed[1].plugin.has_value());
   CHECK(listed[1].plugin->version() == "1.0");
 }

@@ -72,20 +72,26 @@ double number(const Json& object, const char* key, const log::LogReader& reader)
   return at->get<double>();
 }
 
-// One number per joint; null becomes NaN. Empty if the member is missing.
-VectorXd joint_vector(const Json& object, const char* key, int dof, const log::LogReader& reader) {
+// `count` numbers; null becomes NaN. Empty if the member is missing.
+VectorXd numbers(const Json& object, const char* key, int count, const char* of_each,
+                 const log::LogReader& reader) {
   const Json* at = find(object, key);
   if (at == nullptr) return {};
-  if (!at->is_array() || at->size() != static_cast<std::size_t>(dof))
-    throw line_error(reader, fmt::format("{}: expected {} numbers, one per joint", key, dof));
-  VectorXd x(dof);
-  for (int i = 0; i < dof; ++i) {
+  if (!at->is_array() || at->size() != static_cast<std::size_t>(count))
+    throw line_error(reader,
+                     fmt::format("{}: expected {} numbers, one per {}", key, count, of_each));
+  VectorXd x(count);
+  for (int i = 0; i < count; ++i) {
     const Json& value = (*at)[static_cast<std::size_t>(i)];
     if (!value.is_number() && !value.is_null())
       throw line_error(reader, fmt::format("{}/{}: expected a number", key, i));
     x[i] = value.is_null() ? unknown : value.get<double>();
   }
   return x;
+}
+
+VectorXd joint_vector(const Json& object, const char* key, int dof, const log::LogReader& reader) {
+  return numbers(object, key, dof, "joint", reader);
 }
 
 std::size_t frames_of(const Options& options, int dof) {
@@ -102,7 +108,8 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       ws_(world.model),
       plotted_joints_(
           std::min<std::size_t>(static_cast<std::size_t>(world.model.dof()), plotted_joints_max)),
-      row_(3 * plotted_joints_ + columns, unknown),
+      series_count_(header.value("series", Json::array()).size()),
+      row_(3 * plotted_joints_ + columns + series_count_, unknown),
       bins_(row_.size(), options.plot_points_max),
       sample_(frames_of(options, world.model.dof())),
       config_(header["config"]),
@@ -170,6 +177,24 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   add("residual", "solver residual", "1", true, {{"residual", residual}});
   add("tick_us", "time of one tick", "µs", true,
       {{"tick", tick_us}, {"longest since the previous line", tick_us_max}});
+  add_series_plots(header, column + columns);
+}
+
+void Run::add_series_plots(const Json& header, std::size_t column) {
+  const std::size_t first = plots_.size();
+  for (std::size_t i = 0; i < series_count_; ++i) {
+    const Json& series = header["series"][i];
+    const auto name = series.at("name").get<std::string>(),
+               series_unit = series.at("unit").get<std::string>();
+    auto plot = std::find_if(plots_.begin() + static_cast<std::ptrdiff_t>(first), plots_.end(),
+                             [&](const Plot& other) { return other.unit == series_unit; });
+    if (plot == plots_.end()) {
+      const char* const title = "series of the planner";
+      plots_.push_back({fmt::format("series {}", series_unit), title, series_unit, {}, false});
+      plot = plots_.end() - 1;
+    }
+    plot->lines.emplace_back(name, column + i);
+  }
 }
 
 void Run::add_line(Json line, const log::LogReader& reader) {
@@ -249,6 +274,11 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   row[residual] = number(solver, "residual", reader);
   row[tick_us] = number(timing, "tick_us", reader);
   row[tick_us_max] = number(timing, "tick_us_max", reader);
+  if (series_count_ > 0) {
+    const VectorXd series =
+        numbers(line, "series", static_cast<int>(series_count_), "series", reader);
+    if (series.size() > 0) std::copy_n(series.data(), series_count_, row + columns);
+  }
   if (!extrema.empty()) {
     if (!std::isnan(row[clearance])) row[clearance] = number(extrema, "clearance_m", reader);
     row[energy_error] = number(extrema, "energy_error_J", reader);

@@ -33,11 +33,13 @@ class Run {
 
  private:
   struct Plot {
-    const char* id;
+    std::string id;
     std::string title, unit;
     std::vector<std::pair<std::string, std::size_t>> lines;  ///< label and column
     bool wide_range;                                         ///< values cover many powers of ten
   };
+  /// A plot for each unit of the planner's own series.
+  void add_series_plots(const Json& header, std::size_t column);
   void add_tick(const Json& line, const log::LogReader& reader);
   void set_goal_distance(const Frame& frame);
   [[nodiscard]] Json plots_json(Container& container) const;
@@ -46,7 +48,7 @@ class Run {
   const World& world_;
   simulation::Recorded recorded_;
   dynamics::Workspace ws_;
-  std::size_t plotted_joints_;
+  std::size_t plotted_joints_, series_count_;
   std::vector<Plot> plots_;
   std::vector<double> row_;  ///< the columns of one tick
   Bins bins_;

@@ -345,3 +345,41 @@ TEST_CASE("equal inputs give equal bytes", "[report]") {
   const std::string page = "<x>" + std::string(report::token) + "</x>";
   CHECK(report::make_page(page, data, "t") == report::make_page(page, data, "t"));
 }
+
+TEST_CASE("the planner's own series are plotted, one plot for each unit", "[report]") {
+  const auto folder = test::scratch("series");
+  (void)test::log_run(test::shelf(0.2), folder / "plain.jsonl");
+  std::string text;
+  for (Json line : log::read_log(folder / "plain.jsonl").lines) {
+    if (line["type"] == "header")
+      line["series"] = Json::parse(R"([{"name": "a", "unit": "m"}, {"name": "b", "unit": ""},
+                                       {"name": "c", "unit": "m"}])");
+    if (line["type"] == "tick" && line.contains("channels")) {
+      const double k = line["k"].get<double>();
+      line["series"] = {k, nullptr, -k};
+      if (k == 7.0) line["series"][1] = 5.0;
+    }
+    text += line.dump() + "\n";
+  }
+  write_file_atomically(folder / "series.jsonl", text);
+  const auto data = report::make_data({folder / "series.jsonl"}, {100, 1500});
+  const Decoded page(data.bytes);
+  const Json& metres = page.plot(0, "series m");
+  REQUIRE(metres["series"].size() == 2);
+  CHECK(metres["series"][0]["label"] == "a");
+  CHECK(metres["series"][1]["label"] == "c");
+  const auto a = page(metres["series"][0]["y"]), c = page(metres["series"][1]["y"]);
+  REQUIRE(a.size() > 40);
+  for (std::size_t i = 0; i + 1 < a.size(); ++i) {
+    CHECK(a[i] == Approx(static_cast<double>(i)).margin(0.01));
+    CHECK(c[i] == Approx(-static_cast<double>(i)).margin(0.01));
+  }
+  const auto b = page(page.plot(0, "series ")["series"][0]["y"]);
+  CHECK(b[7] == 5.0);
+  CHECK(std::isnan(b[6]));
+
+  text.replace(text.find("\"series\":[1.0,null,-1.0]"), 24, "\"series\":[1.0,null]");
+  write_file_atomically(folder / "short.jsonl", text);
+  CHECK_THROWS_WITH((void)report::make_data({folder / "short.jsonl"}, {100, 1500}),
+                    Catch::Contains("series: expected 3 numbers, one per series"));
+}

@@ -173,13 +173,22 @@ MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& fol
   return change;
 }
 
-Goal read_goal(const Reader& in) {
+Goal default_goal(GoalType type) {
+  const bool joint = type == GoalType::joint, pose = type == GoalType::pose;
   Goal goal;
+  goal.type = type;
+  goal.tolerance_m = joint ? 0.0 : pose ? 0.01 : 0.02;
+  goal.tolerance_rad = joint ? 0.05 : pose ? 0.26 : 0.0;
+  goal.speed_max = joint ? 0.05 : std::numeric_limits<double>::infinity();
+  return goal;
+}
+
+Goal read_goal(const Reader& in) {
   const auto type = in.get<std::string>("type", "");
   const bool path = type == "path";
-  goal.type = type == "joint" || path ? GoalType::joint
-              : type == "position"    ? GoalType::position
-                                      : GoalType::pose;
+  Goal goal = default_goal(type == "joint" || path ? GoalType::joint
+                           : type == "position"    ? GoalType::position
+                                                   : GoalType::pose);
   const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose;
   const std::string kind = type + " goal";
   joint ? in.require("q", kind) : in.refuse("q", kind);
@@ -196,9 +205,9 @@ Goal read_goal(const Reader& in) {
   }
   goal.pose = in.pose();
   goal.quaternion_wxyz = in.quaternion();
-  goal.tolerance_m = in.get("tolerance_m", joint ? 0.0 : pose ? 0.01 : 0.02);
-  goal.tolerance_rad = in.get("tolerance_rad", joint ? 0.05 : pose ? 0.26 : 0.0);
-  goal.speed_max = in.get("speed_max", joint ? 0.05 : std::numeric_limits<double>::infinity());
+  goal.tolerance_m = in.get("tolerance_m", goal.tolerance_m);
+  goal.tolerance_rad = in.get("tolerance_rad", goal.tolerance_rad);
+  goal.speed_max = in.get("speed_max", goal.speed_max);
   goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
   return goal;
 }
@@ -277,6 +286,7 @@ Actuation read_actuation(const Reader& in, double step_s) {
   actuation.planner_mass_scale = in.get("planner_mass_scale", 1.0);
   actuation.torque_rate_max_Nm_s = in.maybe<double>("torque_rate_max_Nm_s");
   actuation.coulomb_friction_share = in.get("coulomb_friction_share", 0.0);
+  actuation.deadline_s = in.maybe<double>("deadline_s");
   const double steps = actuation.control_period_s / step_s;
   if (!(std::round(steps) >= 1.0 && std::abs(steps - std::round(steps)) <= 1e-9 * steps))
     in.fail("control_period_s", fmt::format("{} s is not an integer multiple of the step {} s",
@@ -382,6 +392,24 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   for (const MapChangeSpec& change : scene.map->changes)
     if (change.file) files.push_back(*change.file);
   return files;
+}
+
+Goal joint_goal(Eigen::VectorXd q) {
+  Goal goal = default_goal(GoalType::joint);
+  goal.q = std::move(q);
+  return goal;
+}
+
+Goal position_goal(const Eigen::Vector3d& position_m) {
+  Goal goal = default_goal(GoalType::position);
+  goal.pose = {Eigen::Matrix3d::Identity(), position_m};
+  return goal;
+}
+
+Goal pose_goal(const geometry::SE3& pose) {
+  Goal goal = default_goal(GoalType::pose);
+  goal.pose = pose;
+  return goal;
 }
 
 Scene read_scene(const std::filesystem::path& file) {

@@ -125,6 +125,7 @@ Json actuation_json(const Actuation& actuation) {
     out["servo"] = {{"kp", one_or_list(actuation.servo.kp)},
                     {"kv", one_or_list(actuation.servo.kv)},
                     {"feedforward", to_string(actuation.servo.feedforward)}};
+  if (actuation.deadline_s) out["deadline_s"] = *actuation.deadline_s;
   return out;
 }
 

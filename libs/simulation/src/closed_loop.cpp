@@ -91,6 +91,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
+  options.path_points_max = 0;  // no more than the scene's
   options.certify = false;  // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
@@ -173,7 +174,8 @@ void ClosedLoop::start(const Watch& watch) {
                                    *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging())
-    log_->header(scene_, controller_->plugin(), planner_params_, result_.provenance, steps_);
+    log_->header(scene_, controller_->plugin(), planner_params_, controller_->series(),
+                 result_.provenance, steps_);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = judge_->influence_m();
   min_self_clearance_ = judge_->self_influence_m();
@@ -344,6 +346,7 @@ void ClosedLoop::let_controller_observe() {
 
 void ClosedLoop::ask_planner() {
   controller_->decide();
+  recorder_->planner_time(controller_->answer().planner_s);
   if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
     finish(log::Outcome::stalled, std::string(controller_->answer().cause));
   if (done_ && !actuation_->needs_answer_at_end()) book_last_node();
@@ -451,6 +454,8 @@ void ClosedLoop::fill_result() {
   result_.q = plant_->node().q;
   result_.v = plant_->node().v;
   result_.seed = scene_.seed;
+  result_.deadline_us = 1e6 * controller_->deadline_s();
+  result_.late_ticks = controller_->answer().overruns;
   dynamics::Workspace ws(model_);
   dynamics::forward_kinematics(model_, ws, plant_->node().q);
   const control::GoalTracker& goals = controller_->goals();

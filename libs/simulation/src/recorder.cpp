@@ -137,9 +137,12 @@ void Recorder::close(const Ledger& ledger) {
   result_.recovery_work_J = ledger.recovery;
   write_waiting_tick();
   result_.cpu_s = thread_cpu_s() - started_cpu_s_;
-  if (tick_us_.count() > 0)
-    result_.tick_us =
-        log::Result::TickTime{tick_us_.quantile(0.5), tick_us_.quantile(0.99), tick_us_.largest()};
+  const auto times = [](const TimeHistogram& us) -> std::optional<log::Result::TickTime> {
+    if (us.count() == 0) return std::nullopt;
+    return log::Result::TickTime{us.quantile(0.5), us.quantile(0.99), us.largest()};
+  };
+  result_.tick_us = times(tick_us_);
+  result_.planner_us = times(planner_us_);
   if (watch_.log != nullptr) watch_.log->write("result", log::to_json(result_));
 }
 

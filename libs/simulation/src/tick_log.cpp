@@ -1,5 +1,6 @@
 #include "tick_log.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "hamelin/core/rng.hpp"
@@ -18,20 +19,22 @@ std::string obstacle_name(const scene::Environment& environment, int obstacle) {
 }  // namespace
 
 void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-                     const Json& provenance, long steps) {
+                     const std::vector<planning::Series>& series, const Json& provenance,
+                     long steps) {
   Json config = resolved_config(scene);
   config["planner"]["params"] = params;
-  Json fields{{"program", "run"},
-              {"scene", scene.name},
-              {"seed", scene.seed},
-              {"generator", Rng::name},
-              {"config", std::move(config)},
-              {"robot_notes", model_.robot().notes},
-              {"plugin",
-               {{"name", plugin.name()},
-                {"version", plugin.version()},
-                {"abi", HAMELIN_PLUGIN_ABI_VERSION}}},
-              {"provenance", provenance}};
+  Json fields{
+      {"program", "run"},
+      {"scene", scene.name},
+      {"seed", scene.seed},
+      {"generator", Rng::name},
+      {"config", std::move(config)},
+      {"robot_notes", model_.robot().notes},
+      {"plugin",
+       {{"name", plugin.name()}, {"version", plugin.version()}, {"abi", plugin.abi_version()}}},
+      {"provenance", provenance}};
+  for (const auto& one : series)
+    fields["series"].push_back({{"name", one.name}, {"unit", one.unit}});
   recorder_.header(std::move(fields), model_.robot(), steps);
 }
 
@@ -50,6 +53,9 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
               {"solver", solver_json(plant_.report())},
               {"certified", certified}};
   if (answer != nullptr) fields["channels"] = std::move(channels);
+  if (answer != nullptr)
+    for (const double value : answer->series())
+      fields["series"].push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_.has_self()) fields["self_clearance_m"] = world_.self_clearance_m();
   if (world_.has_obstacles()) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "actuation.hpp"
 #include "hamelin/control/goal_tracker.hpp"
@@ -24,9 +25,9 @@ class TickLog {
     torque_.setZero(model.dof());
   }
 
-  /// @param params the planner's, with defaults
+  /// @param params the planner's, with defaults @param series that it declared
   void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-              const Json& provenance, long steps);
+              const std::vector<planning::Series>& series, const Json& provenance, long steps);
   /// Writes the line of this node. @param answer the planner's, which acts from here on; null at
   /// the last node
   void tick(bool certified, const planning::CommandBuffers* answer);

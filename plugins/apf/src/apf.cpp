@@ -86,17 +86,16 @@ class Apf : public Planner {
 
   /// Attraction and repulsion, each mapped at its own point: docs/theory.md (9.1), (9.2), (9.4).
   void operational(const Tick& tick, Command& command) {
-    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    const hamelin_goal& goal = tick.goal();
     const GoalScale scale = goal_scale(goal_distance_squared(goal));
     double attraction = k_p_ * tick.speed_scale();
     tau_.setZero();
-    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0,
-                     [&](const hamelin_contact& c, int link) {
-                       const Vector3d f =
-                           scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
-                       arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
-                       attraction += scale.gradient_factor * repulsion_.potential(c.distance_m);
-                     });
+    for_each_nearest(
+        tick.contacts(), setup_.shapes(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
+          const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+          arm_.add_mapped(link, vec3(c.arm_point_world_m), f, tau_);
+          attraction += scale.gradient_factor * repulsion_.potential(c.distance_m);
+        });
     arm_.add_mapped_attraction(goal, attraction, k_v_, tau_);
     command.held_torque() = tau_;
   }
@@ -104,20 +103,19 @@ class Apf : public Planner {
   /// The potential V = ½ k_p r² + Σ V(ρ), for wang2018 with the sum multiplied by r^n, and its
   /// gradient in joint space: docs/theory.md (9.7), (9.8).
   void potential(const Tick& tick, Command& command) {
-    const hamelin_goal& goal = setup_.goal(tick.goal_index());
+    const hamelin_goal& goal = tick.goal();
     const double distance_squared = goal_distance_squared(goal), k_p = k_p_ * tick.speed_scale();
     const GoalScale scale = goal_scale(distance_squared);
     double attraction = k_p, value = 0.5 * k_p * distance_squared;
     tau_.setZero();  // −∂V
-    for_each_nearest(tick.contacts(), setup_.spheres(), repulsion_.rho0,
-                     [&](const hamelin_contact& c, int link) {
-                       const double V = repulsion_.potential(c.distance_m);
-                       const Vector3d f =
-                           scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
-                       arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
-                       attraction += scale.gradient_factor * V;
-                       value += scale.value * V;
-                     });
+    for_each_nearest(
+        tick.contacts(), setup_.shapes(), repulsion_.rho0, [&](const hamelin_contact& c, int link) {
+          const double V = repulsion_.potential(c.distance_m);
+          const Vector3d f = scale.value * repulsion_.force(c.distance_m) * vec3(c.direction_world);
+          arm_.add_force(link, vec3(c.arm_point_world_m), f, tau_);
+          attraction += scale.gradient_factor * V;
+          value += scale.value * V;
+        });
     if (goal.type == HAMELIN_GOAL_JOINT) {
       tau_ -= attraction * (arm_.q() - ConstVectorMap(goal.q, arm_.q().size()));
     } else {

@@ -122,7 +122,7 @@ TEST_CASE("both mappings of wang2018 apply Ge and Cui's forces, as forces or as 
     for (const auto& c : loop.contacts()) {  // one sphere per link, so each is its link's nearest
       const double s = 1.0 / c.distance_m - 1.0 / rho0;
       const Eigen::Vector3d away = Eigen::Map<const Eigen::Vector3d>(c.direction_world);
-      add(c.sphere, Eigen::Map<const Eigen::Vector3d>(c.arm_point_world_m),
+      add(c.shape, Eigen::Map<const Eigen::Vector3d>(c.arm_point_world_m),
           eta * s / (c.distance_m * c.distance_m) * std::pow(r, n) * away);
       add(model.robot().tip.link, tip, 0.5 * n * eta * s * s * std::pow(r, n - 1.0) * to_goal);
     }

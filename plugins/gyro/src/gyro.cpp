@@ -49,7 +49,7 @@ class Gyro : public Planner {
     tau_.setZero();
     bool steering = false;
     for_each_nearest(
-        tick.contacts(), setup_.spheres(), rho0_, [&](const hamelin_contact& c, int link) {
+        tick.contacts(), setup_.shapes(), rho0_, [&](const hamelin_contact& c, int link) {
           const Vector3d point = vec3(c.arm_point_world_m), to_obstacle = -vec3(c.direction_world);
           const Vector3d velocity = arm_.point_velocity(link, point);
           if (!(to_obstacle.dot(velocity) > 0.0)) return;
@@ -68,8 +68,7 @@ class Gyro : public Planner {
           }
         });
     if (!steering || keep_attraction_)  // Algorithm II of Shen, Wang, Shi (2021)
-      arm_.add_mapped_attraction(setup_.goal(tick.goal_index()), k_p_ * tick.speed_scale(), k_v_,
-                                 tau_);
+      arm_.add_mapped_attraction(tick.goal(), k_p_ * tick.speed_scale(), k_v_, tau_);
     if (gravity_compensation_) arm_.add_gravity(tau_);
     command.held_torque() = tau_;
   }

@@ -44,7 +44,7 @@ std::vector<ReferenceContact> reference_contacts(test::ArmLoop& loop, const mode
   std::vector<ReferenceContact> all;
   for (const auto& c : loop.contacts()) {
     dynamics::Matrix3Xd J(3, model.dof());
-    dynamics::point_jacobian(model, ws, c.sphere, vec(c.arm_point_world_m), J);
+    dynamics::point_jacobian(model, ws, c.shape, vec(c.arm_point_world_m), J);
     ReferenceContact contact;
     contact.velocity = J * loop.v;
     contact.rho = -vec(c.direction_world);  // in contact the two points are interchanged
@@ -143,7 +143,7 @@ TEST_CASE("the neutral torque is Jᵀ ½(MΓ + ΓM) ẋ with the published Γ", 
   Eigen::VectorXd neutral = Eigen::VectorXd::Zero(4), published = neutral;
   int turned = 0;
   for (const auto& c : contacts) {  // one sphere per link, so each is its link's nearest
-    const int link = c.sphere;
+    const int link = c.shape;
     const Eigen::Vector3d x = Eigen::Map<const Eigen::Vector3d>(c.arm_point_world_m);
     const Eigen::Vector3d rho = Eigen::Map<const Eigen::Vector3d>(c.obstacle_point_world_m) - x;
     dynamics::forward_kinematics(model, ws, loop.q);

@@ -25,6 +25,7 @@
 #include "surroundings.hpp"
 #include "torque_ramp.hpp"
 #include "tree.hpp"
+#include "tuning.hpp"
 #include "vias.hpp"
 
 namespace hamelin::hybrid {
@@ -32,7 +33,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double voxel_at_goal = 0.4;     // share of a voxel that is kept near a tip goal
 constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint limit [1/s]
 constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
 constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
@@ -45,20 +45,6 @@ constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 constexpr double path_beyond = 1.0, path_regained = 2.0;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
 constexpr double via_reached = 0.1, escape_end_reached = 0.08;
-
-double value_or(const Json& value, double otherwise) {
-  return value.is_null() ? otherwise : value.get<double>();
-}
-
-// A law ë = −k_p e − k_v ė is equivalent to following the velocity (k_p/k_v) e with the gain k_v.
-LawParams law_params(const Json& params, bool own_gains) {
-  const double gain = !own_gains || params["k_p"].is_null()
-                          ? 0.0
-                          : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
-  return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
-          params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
-          params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
-}
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -91,27 +77,19 @@ class Hybrid final : public planning::Planner {
         setup_(setup),
         model_(setup.model()),
         ws_(model_),
-        law_(setup, model_, law_params(params, true)),
+        initial_params_(params),
+        law_(setup, model_, Tuning(setup, params).law),
         obstacles_(setup, params["contact_radius_m"]),
         surroundings_(host, setup),
-        margins_(setup, margin_params(setup, params)),
+        margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), Obstacles::max_points),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
-        velocity_gain_(value_or(params["k_v"], params["velocity_gain"])),
-        follow_gain_(params["velocity_gain"]),
-        drive_acceleration_(params["drive_acceleration"]),
-        acceleration_max_(params["acceleration_max"]),
-        brake_(params["brake_acceleration"]),
-        rate_(params["approach_rate"]),
-        joint_damping_(params["joint_damping"]),
         contact_radius_(params["contact_radius_m"]),
-        passes_(params["filter_passes"]),
         max_escapes_(params["max_escapes"]),
-        search_steps_(params["search_steps"]),
         horizon_s_(setup.control_period_s()),
-        path_(setup.dof(), max_path_points(setup)) {
+        path_(setup.dof(), static_cast<Eigen::Index>(setup.path_points_max())) {
     if (setup.sampled()) {
       const double period = setup.control_period_s();
       horizon_s_ = std::max(period, params["horizon_s"].get<double>());
@@ -122,10 +100,9 @@ class Hybrid final : public planning::Planner {
     const std::string escape = params["escape"];
     uses_memory_ = escape == "memory";
     if (escape == "rollouts" || escape == "tree") {
-      rollout_ = std::make_unique<Rollout>(setup_, model_, law_params(params, false), margins_,
-                                           surroundings_);
-      roots_ =
-          std::make_unique<Roots>(setup_, model_, law_params(params, false), box_, surroundings_);
+      const LawParams law = Tuning(setup, params).search_law;
+      rollout_ = std::make_unique<Rollout>(setup_, model_, law, margins_, surroundings_);
+      roots_ = std::make_unique<Roots>(setup_, model_, law, box_, surroundings_);
       if (escape == "tree")
         search_ = std::make_unique<Tree>(setup_, *rollout_, *roots_, box_, margins_, surroundings_,
                                          params["search_budget"].get<int>());
@@ -136,9 +113,41 @@ class Hybrid final : public planning::Planner {
     for (auto* x : {&q_, &v_, &w_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_,
                     &steering_})
       *x = VectorXd::Zero(n);
+    torque_ = VectorXd::Zero(n);
     M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
     terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // allocates its memory
+    apply_params(Tuning(setup, params));
+  }
+
+  [[nodiscard]] Tuning prepare_params(const Json& params) const {
+    check_fixed_params(params, initial_params_);
+    return {setup_, params};
+  }
+  void apply_params(const Tuning& tuning) {
+    law_.set_params(tuning.law);
+    if (rollout_) rollout_->set_params(tuning.search_law);
+    if (roots_) roots_->set_params(tuning.search_law);
+    margins_.set_params(tuning.margins);
+    measure_margins_ = true;
+    velocity_gain_ = tuning.velocity_gain;
+    follow_gain_ = tuning.follow_gain;
+    drive_acceleration_ = tuning.drive_acceleration;
+    acceleration_max_ = tuning.acceleration_max;
+    brake_ = tuning.brake_acceleration;
+    rate_ = tuning.approach_rate;
+    joint_damping_ = tuning.joint_damping;
+    stall_.set_stall_time(tuning.stall_time_s);
+    passes_ = tuning.filter_passes;
+    search_steps_ = tuning.search_steps;
+  }
+
+  // A new start has a new goal_number, so set_goal() forgets what belongs to the goal.
+  void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
+    memory_.reset();
+    if (search_) search_->reset();
+    if (observer_) observer_->reset();
+    held_back_ = false;
   }
 
   static double influence_m(const Json& params) { return params["contact_radius_m"]; }
@@ -146,8 +155,9 @@ class Hybrid final : public planning::Planner {
   void tick(const planning::Tick& tick, planning::Command& command) override {
     q_ = tick.q();
     v_ = tick.v();
-    const auto& goal = setup_.goals()[tick.goal_index()];
-    if (goal_ != &goal) set_goal(goal, tick.time_s());
+    const auto& goal = tick.goal();
+    if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
+    if (measure_margins_) measure_margins();
     prepare(tick);
 
     const Target target = choose_target();
@@ -185,39 +195,28 @@ class Hybrid final : public planning::Planner {
   // escape path.
   enum class Mode { goal, via, search, escape_path };
 
-  static MarginParams margin_params(const planning::Setup& setup, const Json& params) {
-    MarginParams margins{};
-    // A map may lack objects that fill less than half of a voxel.
-    const double voxel = setup.map_resolution_m();
-    margins.full_m = std::max(params["margin_m"].get<double>(), voxel);
-    margins.goal_m = std::min(
-        std::max(params["goal_margin_m"].get<double>(), voxel_at_goal * voxel), margins.full_m);
-    margins.slack_m = std::min(params["goal_margin_m"].get<double>(), margins.full_m);
-    margins.self_m = params["self_margin_m"];
-    return margins;
-  }
-
-  static Eigen::Index max_path_points(const planning::Setup& setup) {
-    std::size_t most = 0;
-    for (const auto& goal : setup.goals()) most = std::max(most, goal.path_points);
-    return static_cast<Eigen::Index>(most);
-  }
-
   void enter(Mode mode, double time_s) {
     mode_ = mode;
     stall_.restart(time_s);
   }
 
-  void set_goal(const hamelin_goal& goal, double time_s) {
+  void set_goal(const planning::Tick& tick) {
+    const hamelin_goal& goal = tick.goal();
     goal_ = &goal;
+    goal_number_ = tick.goal_number();
     memory_.restart();
     escapes_ = 0;
-    margins_.set_goal(surroundings_, goal, contact_radius_);
+    measure_margins_ = true;
     path_.clear();
     const auto path = setup_.path(goal);
     for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
-    enter(Mode::goal, time_s);
+    enter(Mode::goal, tick.time_s());
+  }
+
+  void measure_margins() {
+    margins_.set_goal(surroundings_, *goal_, contact_radius_);
+    measure_margins_ = false;
   }
 
   void prepare(const planning::Tick& tick) {
@@ -281,18 +280,20 @@ class Hybrid final : public planning::Planner {
   void bound_steering(planning::Command& command) {
     steering_.setZero();
     const auto effort = setup_.effort_max();
-    if (!effort || command.gyroscopic().empty()) return;
+    if (!effort || command.gyroscopic_count() == 0) return;
     terms_.clear();
-    for (const auto& term : command.gyroscopic())
+    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i) {
+      const auto& term = command.gyroscopic(i);
       terms_.push_back(
           {term.link, planning::vec3(term.point_link_m), planning::vec3(term.w_world)});
+    }
     dynamics::gyroscopic_torque(model_, ws_, q_, v_, terms_, steering_);
     double scale = 1.0;
     for (int k = 0; k < setup_.dof(); ++k)
       scale =
           std::min(scale, steering_share * (*effort)[k] / std::max(1e-12, std::abs(steering_[k])));
-    for (auto& term : command.gyroscopic())
-      for (auto& w : term.w_world) w *= scale;
+    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i)
+      for (auto& w : command.gyroscopic(i).w_world) w *= scale;
     steering_ *= scale;
   }
 
@@ -482,6 +483,7 @@ class Hybrid final : public planning::Planner {
   planning::Setup setup_;
   model::Model model_;
   dynamics::Workspace ws_;
+  Json initial_params_;
   Law law_;
   Obstacles obstacles_;
   Surroundings surroundings_;
@@ -493,9 +495,9 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
-  double velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, brake_, rate_,
-      joint_damping_, contact_radius_;
-  int passes_, max_escapes_, search_steps_;
+  double velocity_gain_ = 0.0, follow_gain_ = 0.0, drive_acceleration_ = 0.0,
+         acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
+  int passes_ = 1, max_escapes_, search_steps_ = 1;
   double horizon_s_;                  ///< time after which the velocity is to be x
   std::optional<Observer> observer_;  ///< only under sampled actuation
   std::optional<TorqueRamp> ramp_;    ///< only where the rate of the torque is limited
@@ -505,9 +507,11 @@ class Hybrid final : public planning::Planner {
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
-  const hamelin_goal* goal_ = nullptr;
+  const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
+  std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
-  bool held_back_ = false;  ///< by the filter or a near obstacle
+  bool held_back_ = false;       ///< by the filter or a near obstacle
+  bool measure_margins_ = true;  ///< whether goal or margins have changed
   int escapes_ = 0;
   double path_position_ = 0.0, escape_position_ = 0.0, via_until_s_ = 0.0;
 };

@@ -26,6 +26,7 @@ struct LawParams {
 class Law {
  public:
   Law(const planning::Setup& setup, const model::Model& model, const LawParams& params);
+  void set_params(const LawParams& params) noexcept { params_ = params; }
 
   /// The distance of q from the target: |q* − q| for a joint vector q*, for the tip
   /// 2 |position error| + ½ |rotation angle|. docs/theory.md (10.24)

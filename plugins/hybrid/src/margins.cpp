@@ -14,7 +14,7 @@ Margins::Margins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),
       goal_q_(Eigen::VectorXd::Zero(setup.dof())),
       self_at_goal_(params.self_m),
-      clearance_at_goal_(setup.spheres().size()) {}
+      clearance_at_goal_(setup.shapes().size()) {}
 
 void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius) {
   joint_goal_ = goal.type == HAMELIN_GOAL_JOINT;
@@ -24,7 +24,7 @@ void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, dou
   goal_q_ = planning::ConstVectorMap(goal.q, goal_q_.size());
   surroundings.query(goal_q_, radius, 2.0 * params_.self_m + params_.slack_m);
   for (const auto& contact : surroundings.contacts()) {
-    auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contact.sphere)];
+    auto& clearance = clearance_at_goal_[static_cast<std::size_t>(contact.shape)];
     clearance = std::min(clearance, contact.distance_m);
   }
   for (const auto& contact : surroundings.self_contacts())
@@ -36,7 +36,7 @@ double Margins::at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_;
   if (!joint_goal_) return params_.goal_m;
   const double remaining =
-      clearance_at_goal_[static_cast<std::size_t>(point.sphere)] - params_.slack_m;
+      clearance_at_goal_[static_cast<std::size_t>(point.shape)] - params_.slack_m;
   return std::min(params_.full_m, std::max(smallest_margin_m, remaining));
 }
 
@@ -49,7 +49,7 @@ void Margins::set(std::span<NearPoint> points, double weight) const {
 
 bool Margins::tight_at_goal(const NearPoint& point) const {
   if (point.obstacle == NearPoint::self) return self_at_goal_ < params_.self_m;
-  return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.sphere)] < params_.full_m;
+  return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.shape)] < params_.full_m;
 }
 
 }  // namespace hamelin::hybrid

@@ -20,6 +20,8 @@ struct MarginParams {
 class Margins {
  public:
   Margins(const planning::Setup& setup, const MarginParams& params);
+  /// To be followed by set_goal().
+  void set_params(const MarginParams& params) noexcept { params_ = params; }
   /// Measures the clearances at the goal. @param radius clearances up to this one are measured [m]
   void set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius);
   /// Sets the margin of each point. @param weight Law::margin_weight: 0 at the goal, 1 far from it

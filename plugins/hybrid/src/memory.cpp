@@ -12,7 +12,8 @@ constexpr double memory_global_share = 0.2;  // share of candidates from all of 
 
 EscapeMemory::EscapeMemory(const planning::Setup& setup, const JointBox& box, int max_escapes)
     : box_(box),
-      rng_(setup.seed()),
+      seed_(setup.seed()),
+      rng_(seed_),
       via_(Eigen::VectorXd::Zero(setup.dof())),
       draw_(setup.dof()),
       drawn_(setup.dof(), candidates),

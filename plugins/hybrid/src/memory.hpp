@@ -18,6 +18,11 @@ class EscapeMemory {
   [[nodiscard]] const Eigen::VectorXd& via() const noexcept { return via_; }
   /// Forgets all stalls, for instance at a new goal.
   void restart() { visited_count_ = 0, count_ = 0; }
+  /// Also repeats the random numbers from the first one on.
+  void reset() {
+    restart();
+    rng_ = Rng(seed_);
+  }
   /// Chooses the next way-point after a stall at q, by the score of docs/theory.md (10.28).
   /// @param distance function: distance of a way-point from the target
   /// @param clear function: whether a way-point is clear of obstacles; called for the best few only
@@ -50,6 +55,7 @@ class EscapeMemory {
   void draw_all(const Eigen::VectorXd& q);
 
   const JointBox& box_;
+  std::uint64_t seed_;
   Rng rng_;
   Eigen::VectorXd via_, draw_;
   Eigen::MatrixXd drawn_;  ///< one column per candidate

@@ -19,6 +19,14 @@ class Observer {
         predicted_(Eigen::VectorXd::Zero(dof)),
         scratch_(Eigen::VectorXd::Zero(dof)) {}
 
+  /// Forgets everything, for a new start.
+  void reset() {
+    disturbance_.setZero();
+    predicted_.setZero();
+    next_ = 0;
+    ready_ = false;
+  }
+
   /// The estimate δ of the unexplained acceleration [rad/s² or m/s²].
   [[nodiscard]] const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }
   /// The torque issued last.

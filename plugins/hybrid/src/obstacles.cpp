@@ -12,16 +12,16 @@ constexpr double same_direction = 0.95, same_place_m = 0.04;
 
 Obstacles::Obstacles(const planning::Setup& setup, double radius)
     : radius_(radius), points_(max_points), row_(setup.dof()) {
-  for (const auto& sphere : setup.spheres()) sphere_link_.push_back(sphere.link);
+  for (const auto& shape : setup.shapes()) shape_link_.push_back(shape.link);
   for (auto& point : points_) point.row = Eigen::VectorXd::Zero(setup.dof());
   chosen_.reserve(max_points);
-  near_.reserve(setup.spheres().size() * 32 + 64);
+  near_.reserve(setup.shapes().size() * 32 + 64);
 }
 
 // Nearest first. The spheres of a link have many contacts with almost the same row. A contact is
 // left out if it is close to a nearer one of its link and obstacle and has almost the same
 // direction.
-void Obstacles::select(std::span<const hamelin_contact> contacts) {
+void Obstacles::select(const planning::Contacts& contacts) {
   const auto nearer = [&](std::size_t a, std::size_t b) {
     return contacts[a].distance_m != contacts[b].distance_m
                ? contacts[a].distance_m < contacts[b].distance_m
@@ -34,7 +34,7 @@ void Obstacles::select(std::span<const hamelin_contact> contacts) {
   }
   std::sort(near_.begin(), near_.end(), nearer);
   const auto link_of = [&](const hamelin_contact& c) {
-    return sphere_link_[static_cast<std::size_t>(c.sphere)];
+    return shape_link_[static_cast<std::size_t>(c.shape)];
   };
   chosen_.clear();
   for (const std::size_t i : near_) {
@@ -59,8 +59,8 @@ void Obstacles::add_self(const model::Model& model, const dynamics::Workspace& w
   clearance_ = std::min(clearance_, contact.distance_m);
   if (contact.distance_m > self_radius_m || count_ == points_.size()) return;
   NearPoint& point = points_[count_++];
-  point.sphere = contact.sphere_a;
-  point.link = sphere_link_[static_cast<std::size_t>(contact.sphere_a)];
+  point.shape = contact.shape_a;
+  point.link = shape_link_[static_cast<std::size_t>(contact.shape_a)];
   point.obstacle = NearPoint::self;
   point.distance = contact.distance_m;
   point.arm_point = planning::vec3(contact.point_a_world_m);
@@ -68,16 +68,16 @@ void Obstacles::add_self(const model::Model& model, const dynamics::Workspace& w
   point.obstacle_speed = 0.0;
   dynamics::point_jacobian_transpose(model, ws, point.link, point.arm_point, point.direction,
                                      point.row);
-  if (contact.sphere_b == HAMELIN_SPHERE_OF_BASE) return;
+  if (contact.shape_b == HAMELIN_SHAPE_OF_BASE) return;
   dynamics::point_jacobian_transpose(
-      model, ws, sphere_link_[static_cast<std::size_t>(contact.sphere_b)],
+      model, ws, shape_link_[static_cast<std::size_t>(contact.shape_b)],
       planning::vec3(contact.point_b_world_m), point.direction, row_);
   point.row -= row_;
 }
 
 void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
-                       std::span<const hamelin_contact> contacts,
-                       std::span<const hamelin_self_contact> self_contacts) {
+                       const planning::Contacts& contacts,
+                       const planning::SelfContacts& self_contacts) {
   clearance_ = radius_;
   count_ = 0;
   for (const auto& contact : self_contacts) add_self(model, ws, contact);
@@ -85,8 +85,8 @@ void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
   for (const std::size_t i : chosen_) {
     const auto& contact = contacts[i];
     NearPoint& point = points_[count_++];
-    point.sphere = contact.sphere;
-    point.link = sphere_link_[static_cast<std::size_t>(contact.sphere)];
+    point.shape = contact.shape;
+    point.link = shape_link_[static_cast<std::size_t>(contact.shape)];
     point.obstacle = contact.obstacle;
     point.distance = contact.distance_m;
     point.arm_point = planning::vec3(contact.arm_point_world_m);

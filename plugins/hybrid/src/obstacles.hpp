@@ -11,7 +11,7 @@ namespace hamelin::hybrid {
 /// law and the safety filter: docs/theory.md (10.1).
 struct NearPoint {
   static constexpr int self = -100;  ///< value of `obstacle`: another part of the arm
-  int sphere = 0, link = 0;
+  int shape = 0, link = 0;
   int obstacle = HAMELIN_OBSTACLE_MAP;
   double distance = 0.0;                 ///< [m]
   double margin = 0.0;                   ///< distance to keep [m]
@@ -31,20 +31,19 @@ class Obstacles {
   /// Selects near points from the contacts at a configuration q and computes their rows. ws must
   /// contain the forward kinematics at q.
   void update(const model::Model& model, const dynamics::Workspace& ws,
-              std::span<const hamelin_contact> contacts,
-              std::span<const hamelin_self_contact> self_contacts);
+              const planning::Contacts& contacts, const planning::SelfContacts& self_contacts);
   [[nodiscard]] std::span<NearPoint> points() noexcept { return {points_.data(), count_}; }
   /// The smallest distance [m] to an obstacle or between parts of the arm, or the radius if all
   /// distances exceed it.
   [[nodiscard]] double clearance() const noexcept { return clearance_; }
 
  private:
-  void select(std::span<const hamelin_contact> contacts);
+  void select(const planning::Contacts& contacts);
   void add_self(const model::Model& model, const dynamics::Workspace& ws,
                 const hamelin_self_contact& contact);
 
   double radius_, clearance_ = 0.0;
-  std::vector<int> sphere_link_;
+  std::vector<int> shape_link_;
   std::vector<NearPoint> points_;
   std::vector<std::size_t> near_, chosen_;
   std::size_t count_ = 0;

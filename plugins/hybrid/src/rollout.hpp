@@ -15,6 +15,10 @@ class Rollout {
   Rollout(const planning::Setup& setup, const model::Model& model, const LawParams& law,
           const Margins& margins, Surroundings& surroundings);
 
+  void set_params(const LawParams& law) noexcept {
+    law_.set_params(law);
+    params_ = law;
+  }
   /// Sets the goal near which margins shrink.
   void set_goal(const hamelin_goal& goal) { goal_ = &goal; }
   /// Starts at q towards a joint vector. @param tolerance largest |error| of a joint on arrival

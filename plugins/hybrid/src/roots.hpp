@@ -27,6 +27,7 @@ class Roots {
   Roots(const planning::Setup& setup, const model::Model& model, const LawParams& law,
         const JointBox& box, Surroundings& surroundings);
 
+  void set_params(const LawParams& law) noexcept { law_.set_params(law); }
   /// Starts to look for roots from q.
   /// @param path the goal's path, or null
   /// @param from the arc length at which the arm is on it

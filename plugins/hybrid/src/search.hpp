@@ -13,6 +13,8 @@ class Search {
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
   virtual ~Search() = default;
+  /// Repeats the random numbers from the first one on, for a new start.
+  virtual void reset() = 0;
   /// Starts a new search at q.
   /// @param goal_path the goal's path, or null
   /// @param from the arc length at which the arm is on it

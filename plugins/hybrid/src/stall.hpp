@@ -10,6 +10,7 @@ namespace hamelin::hybrid {
 class StallDetector {
  public:
   explicit StallDetector(double stall_time_s) : stall_time_s_(stall_time_s) {}
+  void set_stall_time(double seconds) noexcept { stall_time_s_ = seconds; }
   void restart(double time_s) {
     best_ = std::numeric_limits<double>::infinity();
     since_s_ = time_s;

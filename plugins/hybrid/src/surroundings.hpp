@@ -13,8 +13,8 @@ class Surroundings {
   Surroundings(const planning::Host& host, const planning::Setup& setup)
       : host_(host),
         self_collision_(setup.self_collision()),
-        contacts_(setup.spheres().size() * 4 + 16),
-        self_contacts_(self_collision_ ? setup.spheres().size() * 4 + 16 : 0) {}
+        contacts_(setup.shapes().size() * 4 + 16),
+        self_contacts_(self_collision_ ? setup.shapes().size() * 4 + 16 : 0) {}
 
   /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
   /// `self_radius` [m].

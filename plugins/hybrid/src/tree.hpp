@@ -14,6 +14,7 @@ class Tree final : public Search {
   Tree(const planning::Setup& setup, Rollout& rollout, Roots& roots, const JointBox& box,
        const Margins& margins, Surroundings& surroundings, int budget);
 
+  void reset() override { rng_ = Rng(seed_); }
   void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* goal_path,
              double from) override;
   [[nodiscard]] bool advance(int units) override;
@@ -46,6 +47,7 @@ class Tree final : public Search {
   Rollout& rollout_;
   Roots& roots_;
   Surroundings& surroundings_;
+  std::uint64_t seed_;
   Rng rng_;
   int budget_;
   std::array<Branches, 2> trees_;  ///< from the arm; from the roots

@@ -11,6 +11,10 @@ class Vias final : public Search {
  public:
   Vias(const planning::Setup& setup, Rollout& rollout, Roots& roots, const JointBox& box);
 
+  void reset() override {
+    rng_ = Rng(seed_);
+    stalls_ = 0;
+  }
   void begin(const hamelin_goal& goal, const Eigen::VectorXd& q, const JointPath* goal_path,
              double from) override;
   [[nodiscard]] bool advance(int units) override;
@@ -29,6 +33,7 @@ class Vias final : public Search {
   const JointBox& box_;
   Rollout& rollout_;
   Roots& roots_;
+  std::uint64_t seed_;
   Rng rng_;
   const hamelin_goal* goal_ = nullptr;
   bool follows_path_ = false;

@@ -84,7 +84,7 @@ class Scene {
         q_(Eigen::VectorXd::Zero(model.dof())),
         data_(fill(task, model)),
         raw_setup_(data_.view()),
-        raw_host_{sizeof raw_host_, this, &log, &closest_points, &closest_self},
+        raw_host_(host()),
         setup(raw_setup_),
         surroundings(planning::Host(raw_host_), setup),
         margins(setup, margin_params),
@@ -116,10 +116,10 @@ class Scene {
   double clearance(const Eigen::VectorXd& q) {
     dynamics::forward_kinematics(model, ws_, q);
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t s = 0; s < data_.spheres.size(); ++s)
+    for (std::size_t s = 0; s < data_.shapes.size(); ++s)
       for (const auto& ball : balls_)
-        least = std::min(
-            least, (placed(s) - ball.center).norm() - data_.spheres[s].radius_m - ball.radius);
+        least = std::min(least,
+                         (placed(s) - ball.center).norm() - data_.shapes[s].radius_m - ball.radius);
     return least;
   }
   /// The smallest distance along the straight lines of a path, checked every `step`.
@@ -152,24 +152,33 @@ class Scene {
     return data;
   }
   [[nodiscard]] Eigen::Vector3d placed(std::size_t s) const {
-    const auto& sphere = data_.spheres[s];
+    const auto& sphere = data_.shapes[s];
     return dynamics::point_position(model, ws_, sphere.link, planning::vec3(sphere.center_link_m));
   }
 
+  hamelin_host host() {
+    hamelin_host out{};
+    out.struct_size = sizeof out;
+    out.context = this;
+    out.log = &log;
+    out.closest_points = &closest_points;
+    out.closest_self = &closest_self;
+    return out;
+  }
   static void log(void*, std::int32_t, const char*, std::size_t) {}
   void place(const double* q) {
     q_ = planning::ConstVectorMap(q, model.dof());
     dynamics::forward_kinematics(model, ws_, q_);
   }
   static std::size_t closest_points(void* context, const double* q, double influence,
-                                    hamelin_contact* out, std::size_t capacity) {
+                                    hamelin_contact* out, std::size_t capacity, std::size_t) {
     auto& self = *static_cast<Scene*>(context);
     ++self.queries_;
     self.place(q);
     std::size_t count = 0;
-    for (std::size_t s = 0; s < self.data_.spheres.size(); ++s) {
+    for (std::size_t s = 0; s < self.data_.shapes.size(); ++s) {
       const Eigen::Vector3d at = self.placed(s);
-      const double radius = self.data_.spheres[s].radius_m;
+      const double radius = self.data_.shapes[s].radius_m;
       for (std::size_t b = 0; b < self.balls_.size(); ++b) {
         const auto& ball = self.balls_[b];
         const Eigen::Vector3d offset = at - ball.center, n = offset.normalized();
@@ -177,7 +186,7 @@ class Scene {
         if (distance > influence || count++ >= capacity) continue;
         hamelin_contact& contact = out[count - 1];
         contact = {};
-        contact.sphere = static_cast<std::int32_t>(s);
+        contact.shape = static_cast<std::int32_t>(s);
         contact.obstacle = static_cast<std::int32_t>(b);
         contact.distance_m = distance;
         planning::VectorMap(contact.arm_point_world_m, 3) = at - radius * n;
@@ -189,9 +198,9 @@ class Scene {
   }
   // Finds the nearest pair of spheres for each two links that share no joint.
   static std::size_t closest_self(void* context, const double* q, double influence,
-                                  hamelin_self_contact* out, std::size_t capacity) {
+                                  hamelin_self_contact* out, std::size_t capacity, std::size_t) {
     auto& self = *static_cast<Scene*>(context);
-    const auto& spheres = self.data_.spheres;
+    const auto& spheres = self.data_.shapes;
     self.place(q);
     std::size_t count = 0;
     for (int b = 0; b < self.model.dof(); ++b)
@@ -205,8 +214,8 @@ class Scene {
                                   n = (at - from).normalized();
             const double distance = (at - from).norm() - spheres[i].radius_m - spheres[j].radius_m;
             if (distance >= nearest.distance_m) continue;
-            nearest.sphere_a = static_cast<std::int32_t>(i);
-            nearest.sphere_b = static_cast<std::int32_t>(j);
+            nearest.shape_a = static_cast<std::int32_t>(i);
+            nearest.shape_b = static_cast<std::int32_t>(j);
             nearest.distance_m = distance;
             planning::VectorMap(nearest.point_a_world_m, 3) = at - spheres[i].radius_m * n;
             planning::VectorMap(nearest.point_b_world_m, 3) = from + spheres[j].radius_m * n;

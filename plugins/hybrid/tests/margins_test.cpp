@@ -15,7 +15,7 @@ namespace {
 
 NearPoint of_sphere(int sphere, double distance = 0.05) {
   NearPoint point;
-  point.sphere = sphere;
+  point.shape = sphere;
   point.distance = distance;
   return point;
 }

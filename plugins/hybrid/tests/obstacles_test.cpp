@@ -34,7 +34,7 @@ std::vector<hamelin_contact> random_contacts(Rng& rng, std::size_t spheres, std:
   std::vector<hamelin_contact> contacts;
   for (std::size_t i = 0; i < count; ++i) {
     hamelin_contact contact{};
-    contact.sphere = static_cast<std::int32_t>(rng.below(spheres));
+    contact.shape = static_cast<std::int32_t>(rng.below(spheres));
     contact.obstacle = static_cast<std::int32_t>(rng.below(3)) - 1;
     contact.distance_m = rng.uniform(-0.01, 0.3);
     Vector3d n = test::random_vector(rng);
@@ -49,7 +49,7 @@ std::vector<hamelin_contact> random_contacts(Rng& rng, std::size_t spheres, std:
 bool covers(const NearPoint& point, const hamelin_contact& contact, int link) {
   return point.link == link && point.obstacle == contact.obstacle &&
          point.distance <= contact.distance_m &&
-         (point.sphere == contact.sphere && point.distance == contact.distance_m
+         (point.shape == contact.shape && point.distance == contact.distance_m
               ? true
               : point.direction.dot(planning::vec3(contact.direction_world)) > 0.95 &&
                     (point.arm_point - planning::vec3(contact.arm_point_world_m)).norm() < 0.04);
@@ -67,7 +67,7 @@ TEST_CASE("each near contact is chosen, or a nearer and similar one of its link"
     CAPTURE(seed);
     Rng rng(seed);
     const auto contacts =
-        random_contacts(rng, scene.setup.spheres().size(), 10 + rng.below(140), 0.06);
+        random_contacts(rng, scene.setup.shapes().size(), 10 + rng.below(140), 0.06);
     chosen.update(VectorXd::Zero(4), contacts);
     const auto points = chosen.obstacles.points();
     REQUIRE(points.size() <= Obstacles::max_points);
@@ -76,7 +76,7 @@ TEST_CASE("each near contact is chosen, or a nearer and similar one of its link"
     if (points.size() == Obstacles::max_points) farthest = points.back().distance, ++full;
     for (const auto& contact : contacts) {
       least = std::min(least, contact.distance_m);
-      const int link = scene.setup.spheres()[static_cast<std::size_t>(contact.sphere)].link;
+      const int link = scene.setup.shapes()[static_cast<std::size_t>(contact.shape)].link;
       const auto covering =
           std::count_if(points.begin(), points.end(),
                         [&](const NearPoint& point) { return covers(point, contact, link); });
@@ -101,7 +101,7 @@ TEST_CASE("no two chosen points are similar", "[hybrid][obstacles]") {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     CAPTURE(seed);
     Rng rng(seed);
-    chosen.update(VectorXd::Zero(4), random_contacts(rng, scene.setup.spheres().size(), 100, 0.03));
+    chosen.update(VectorXd::Zero(4), random_contacts(rng, scene.setup.shapes().size(), 100, 0.03));
     const auto points = chosen.obstacles.points();
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t j = 0; j < i; ++j)
@@ -123,10 +123,10 @@ TEST_CASE("an obstacle's row is the gradient of its distance", "[hybrid][obstacl
     const VectorXd q = test::random_joints(rng, 6);
     const Vector3d from = test::random_vector(rng);
     const auto sphere = static_cast<std::size_t>(rng.below(6));
-    const double radius = scene.setup.spheres()[sphere].radius_m;
+    const double radius = scene.setup.shapes()[sphere].radius_m;
     const Vector3d offset = scene.center(q, sphere) - from;
     hamelin_contact contact{};
-    contact.sphere = static_cast<std::int32_t>(sphere);
+    contact.shape = static_cast<std::int32_t>(sphere);
     contact.distance_m = offset.norm() - radius;
     planning::VectorMap(contact.direction_world, 3) = offset.normalized();
     planning::VectorMap(contact.arm_point_world_m, 3) =
@@ -166,15 +166,15 @@ TEST_CASE("a self contact's row is the gradient of the distance between two part
       return scene.center(at, a) - (base ? base_point : scene.center(at, b));
     };
     const Vector3d n = separation(q).normalized();
-    const double radius_a = scene.setup.spheres()[a].radius_m;
+    const double radius_a = scene.setup.shapes()[a].radius_m;
     hamelin_self_contact contact{};
-    contact.sphere_a = static_cast<std::int32_t>(a);
-    contact.sphere_b = base ? HAMELIN_SPHERE_OF_BASE : static_cast<std::int32_t>(b);
+    contact.shape_a = static_cast<std::int32_t>(a);
+    contact.shape_b = base ? HAMELIN_SHAPE_OF_BASE : static_cast<std::int32_t>(b);
     contact.distance_m = 0.05;  // near enough to be used; rows depend only on points and directions
     planning::VectorMap(contact.direction_world, 3) = n;
     planning::VectorMap(contact.point_a_world_m, 3) = scene.center(q, a) - radius_a * n;
     planning::VectorMap(contact.point_b_world_m, 3) =
-        base ? base_point : Vector3d(scene.center(q, b) + scene.setup.spheres()[b].radius_m * n);
+        base ? base_point : Vector3d(scene.center(q, b) + scene.setup.shapes()[b].radius_m * n);
     chosen.update(q, {}, {&contact, 1});
     REQUIRE(chosen.obstacles.points().size() == 1);
     const auto& point = chosen.obstacles.points().front();
@@ -194,7 +194,7 @@ TEST_CASE("self contacts beyond their radius are ignored", "[hybrid][obstacles]"
   const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
   ObstacleFixture chosen(scene, 0.15);
   hamelin_self_contact contact{};
-  contact.sphere_a = 19;
+  contact.shape_a = 19;
   contact.direction_world[0] = 1.0;
   contact.distance_m = Obstacles::self_radius_m + 1e-9;
   chosen.update(VectorXd::Zero(4), {}, {&contact, 1});
@@ -208,7 +208,7 @@ TEST_CASE("self contacts may use up the whole capacity", "[hybrid][obstacles]") 
   const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
   ObstacleFixture chosen(scene, 0.15);
   hamelin_self_contact contact{};
-  contact.sphere_a = 19;
+  contact.shape_a = 19;
   contact.direction_world[0] = 1.0;
   contact.distance_m = 0.01;
   const std::vector<hamelin_self_contact> many(Obstacles::max_points, contact);

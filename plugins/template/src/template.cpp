@@ -11,32 +11,50 @@ class Template : public Planner {
   Template(const Host& host, const Setup& setup, const hamelin::Json& params)
       : setup_(setup),
         arm_(setup),
-        stiffness_(params.at("stiffness").get<double>()),
-        damping_(params.at("damping").get<double>()),
-        tau_(setup.dof()) {
+        gains_(prepare_params(params)),
+        tau_(setup.dof()),
+        energy_series_(host.declare_series("energy of the spring", "J")) {
     host.info("template: obstacles are ignored");
   }
 
   void tick(const Tick& tick, Command& command) override {
     arm_.update(tick);
-    const hamelin_goal& goal = setup_.goal(tick.goal_index());
     tau_.setZero();
-    if (goal.type == HAMELIN_GOAL_JOINT) {
-      tau_ = -stiffness_ * (arm_.q() - ConstVectorMap(goal.q, setup_.dof()));
-    } else {
-      const Eigen::Vector3d tip = arm_.tip_position();
-      arm_.add_force(arm_.tip_link(), tip, -stiffness_ * (tip - vec3(goal.position_world_m)), tau_);
-    }
+    const double distance = add_spring(tick.goal());
     arm_.add_gravity(tau_);
     command.held_torque() = tau_;
-    command.damping().setConstant(damping_);
+    command.damping().setConstant(gains_.damping);
+    command.set_series(energy_series_, 0.5 * gains_.stiffness * distance * distance);
   }
 
+  // The rest is optional. With these two, parameters can change while the planner runs: the first
+  // runs on any thread and may allocate, the second before a tick.
+  struct Gains {
+    double stiffness, damping;
+  };
+  [[nodiscard]] Gains prepare_params(const hamelin::Json& params) const {
+    return {params.at("stiffness").get<double>(), params.at("damping").get<double>()};
+  }
+  void apply_params(const Gains& gains) { gains_ = gains; }
+
  private:
+  // @return the length of the spring
+  double add_spring(const hamelin_goal& goal) {
+    if (goal.type == HAMELIN_GOAL_JOINT) {
+      const ConstVectorMap q_goal(goal.q, setup_.dof());
+      tau_ -= gains_.stiffness * (arm_.q() - q_goal);
+      return (arm_.q() - q_goal).norm();
+    }
+    const Eigen::Vector3d tip = arm_.tip_position(), to_tip = tip - vec3(goal.position_world_m);
+    arm_.add_force(arm_.tip_link(), tip, -gains_.stiffness * to_tip, tau_);
+    return to_tip.norm();
+  }
+
   Setup setup_;
   NominalArm arm_;
-  double stiffness_, damping_;
+  Gains gains_;
   Eigen::VectorXd tau_;
+  std::int32_t energy_series_;
 };
 
 }  // namespace

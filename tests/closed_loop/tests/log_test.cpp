@@ -138,3 +138,38 @@ TEST_CASE("the extrema in a log with fewer ticks are those of the ticks between"
   for (const auto& tick : all) fastest = std::max(fastest, std::abs(tick["v"][2].get<double>()));
   CHECK(result["v_abs_max"][2] == fastest);
 }
+
+TEST_CASE("series that a planner declares are in the header and in each tick",
+          "[simulation][log]") {
+  const TemporaryFolder folder;
+  Json scene = logged_scene({{"name", "probe"}, {"params", {{"series", true}}}});
+  scene["duration_s"] = 0.01;
+  log::RunLog log(folder.path() / "run.jsonl");
+  simulation::Watch watch;
+  watch.log = &log;
+  const log::Result result = run_scene(folder, scene, watch);
+  std::size_t ticks = 0;
+  for (const auto& line : log::read_log(log.file()).lines) {
+    log::check_line(line, "line");
+    if (line["type"] == "header")
+      CHECK(line["series"] == Json::parse(R"([{"name": "time", "unit": "s"},
+                                              {"name": "even ticks", "unit": ""}])"));
+    if (line["type"] != "tick" || !line.contains("channels")) continue;
+    const long k = line["k"].get<long>();
+    CHECK(line["series"] == Json::array({line["time_s"], k % 2 == 0 ? Json(2.0) : Json(nullptr)}));
+    ++ticks;
+  }
+  CHECK(ticks == 10);
+
+  scene["planner"]["params"] = Json::object();
+  for (const auto& tick : ticks_of(folder, scene, 1)) CHECK_FALSE(tick.contains("series"));
+  // the time of the planner is in the result, with the period as its deadline
+  REQUIRE(result.planner_us.has_value());
+  CHECK(result.planner_us->max >= result.planner_us->p50);
+  CHECK(result.deadline_us == Approx(1000.0));
+  scene["actuation"] = {{"deadline_s", 1e-9}};
+  const log::Result late = run_scene(folder, scene);
+  CHECK(late.deadline_us == Approx(1e-3));
+  CHECK(late.late_ticks == 10);  // no planner answers within a nanosecond
+  CHECK(late.outcome == result.outcome);
+}

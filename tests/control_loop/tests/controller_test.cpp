@@ -1,62 +1,16 @@
-#include "hamelin/control/controller.hpp"
-
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <random>
 #include <thread>
 
-#include "hamelin/control/preparation.hpp"
-#include "hamelin/integration/integrator.hpp"
-#include "hamelin/simulation/run.hpp"
+#include "../loop.hpp"
 #include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-namespace {
-
-const std::filesystem::path data_folder = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
-
-// A scene of data/, controlled by one torque per millisecond as a robot is.
-scene::Scene sampled(const std::string& name) {
-  scene::Scene scene = scene::read_scene(data_folder / "scenes" / name);
-  scene.actuation.type = scene::ActuationType::sampled;
-  scene.actuation.control_period_s = scene.step_s = 0.001;
-  return scene;
-}
-
-// An arm that is simulated by an integrator alone, and a controller that moves it.
-struct Loop {
-  explicit Loop(const scene::Scene& scene, control::Controller::Options options = {},
-                const Json& params = Json::object())
-      : arm(control::load_model(scene)),
-        plugin(planning::find_plugin(scene.planner->name,
-                                     {HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR})),
-        controller(scene, arm, plugin, planning::check_params(plugin, params), std::move(options)),
-        integrator(integration::make_integrator("hamel-variational", arm)),
-        state(integrator->start(scene.start_q, VectorXd::Zero(arm.dof()))),
-        v(VectorXd::Zero(arm.dof())) {}
-
-  const control::Answer& tick() { return controller.tick(state.time_s, state.q, v); }
-
-  void step(const VectorXd& torque) {
-    channels.held_torque = torque;
-    REQUIRE(integrator->step(state, channels, 0.001).converged);
-    state.time_s = 0.001 * static_cast<double>(state.k);
-    integrator->velocity(state, v);
-  }
-
-  model::Model arm;
-  planning::Plugin plugin;
-  control::Controller controller;
-  std::unique_ptr<integration::Integrator> integrator;
-  integration::State state;
-  integration::Channels channels;
-  VectorXd v;
-};
-
-}  // namespace
+using test::Loop;
+using test::sampled;
 
 TEST_CASE("a controller without a simulation takes an arm to its goals, each step proved clear",
           "[control][controller]") {

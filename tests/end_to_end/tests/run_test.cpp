@@ -170,16 +170,6 @@ TEST_CASE(
   CHECK(test::run_json(sandbox, {"plugins", "list"}).is_structured());
 }
 
-TEST_CASE("plugins check passes for every planner of the project", "[end_to_end]") {
-  Sandbox sandbox;
-  for (const char* name : {"apf", "gyro", "hybrid", "template"}) {
-    const auto output = sandbox.run({"plugins", "check", name});
-    CAPTURE(name, output.out, output.err);
-    CHECK(output.exit_code == 0);
-    CHECK_THAT(output.out, Catch::StartsWith("ok"));
-  }
-}
-
 TEST_CASE("the scene that --print-config prints runs to the same result", "[end_to_end]") {
   Sandbox sandbox;
   for (const char* command : {"run", "integrate"}) {

@@ -1,5 +1,4 @@
-#include <hamelin/control/planner_host.hpp>
-#include <hamelin/control/planner_setup.hpp>
+#include <hamelin/control/controller.hpp>
 #include <hamelin/description/robot_io.hpp>
 #include <hamelin/integration/integrator.hpp>
 #include <iostream>
@@ -17,13 +16,8 @@ int main(int, char** argv) {  // first PREFIX/share/hamelin PREFIX/lib/hamelin/p
   std::cout << "energy after 1 s of free fall: " << integrator->energy(state).total() << " J\n";
 
   const scene::Scene scene = scene::read_scene(data / "scenes/shelf.json");
-  control::WorldView world(scene, arm, 0.5);  // sees obstacles within 0.5 m
-  world.look(scene.start_q, 0.0);
-  std::cout << "nearest obstacle: " << world.clearance_m() << " m\n";
-
-  const planning::Plugin plugin = planning::find_plugin("hybrid", {argv[2]});
-  control::PlannerHost planner(plugin, control::planner_setup(scene, arm, world, 1e-3),
-                               planning::check_params(plugin, nullptr), world, {});
-  if (!planner.tick(0, 0.0, scene.start_q, Eigen::VectorXd::Zero(7), 0)) return 1;
-  std::cout << "the planner holds: " << planner.command().held_torque().transpose() << " Nm\n";
+  control::Controller controller(scene, {argv[2]});  // with the scene's planner
+  const control::Answer& answer = controller.tick(0.0, scene.start_q, Eigen::VectorXd::Zero(7));
+  std::cout << "nearest obstacle: " << controller.view().clearance_m() << " m\n";
+  std::cout << "the planner holds: " << answer.torque.transpose() << " Nm\n";
 }

@@ -58,6 +58,8 @@ class Awkward : public Planner {
       for (int i = 0; i < 100; ++i)
         command.add_gyroscopic(0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     if (fault_ == "state") command.raw().state = 17;
+    if (fault_ == "sum")  // as plain_c.c
+      command.held_torque() << sum_of_contacts(tick), sum_of_query(tick), sum_of_setup();
     if (fault_ == "node velocity") command.node_velocity() = 0.5 * tick.v();
     if (fault_ == "closest points") {
       const auto q = tick.q();
@@ -68,6 +70,27 @@ class Awkward : public Planner {
   }
 
  private:
+  static double sum_of_contacts(const Tick& tick) {
+    double sum = 0.0;
+    for (const auto& contact : tick.contacts()) sum += contact.distance_m;
+    return sum;
+  }
+  double sum_of_query(const Tick& tick) {
+    const auto q = tick.q();
+    const auto count =
+        host_.closest_points({q.data(), static_cast<std::size_t>(q.size())}, 0.5, contacts_);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < std::min(count, contacts_.size()); ++i)
+      sum += contacts_[i].distance_m;
+    return sum;
+  }
+  [[nodiscard]] double sum_of_setup() const {
+    double sum = 0.0;
+    for (const auto& goal : setup_.goals()) sum += goal.tolerance_m;
+    for (std::size_t i = 0; i < setup_.shapes().size(); ++i) sum += setup_.shapes()[i].radius_m;
+    return sum;
+  }
+
   Host host_;
   Setup setup_;
   std::string fault_;

@@ -1,11 +1,18 @@
-/* A planner in plain C that answers with damping only. A macro on the compiler's command line
- * selects a fault. */
+/* A planner in plain C. Its answer says what it was given:
+ *  damping         1
+ *  held_torque[0]  sum of the distances of the tick's contacts
+ *  held_torque[1]  sum of the distances that closest_points finds, if the tick lists contacts
+ *  held_torque[2]  sum of all goals' tolerances and of all shapes' radii
+ *  series          number of the goal; 1 if the tick has the field of a later version
+ * A macro on the compiler's command line selects a fault. */
 #include "hamelin/planning/plugin_abi.h"
 
 #include <stdlib.h>
 
 typedef struct planner {
-  size_t dof;
+  const hamelin_host* host;
+  const hamelin_setup* setup;
+  int32_t goal_series, later_series;
 } planner;
 
 static int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json, size_t params_size,
@@ -14,7 +21,10 @@ static int32_t create(const hamelin_host* host, const hamelin_setup* setup, cons
 #ifndef CREATES_NOTHING
   planner* self = malloc(sizeof *self);
   if (self == NULL) return 1;
-  self->dof = setup->dof;
+  self->host = host;
+  self->setup = setup;
+  self->goal_series = host->declare_series(host->context, "goal", "");
+  self->later_series = host->declare_series(host->context, "later", "");
   *out = self;
   host->log(host->context, HAMELIN_LOG_INFO, "made in C", 9);
 #else
@@ -23,10 +33,40 @@ static int32_t create(const hamelin_host* host, const hamelin_setup* setup, cons
   return 0;
 }
 
-static int32_t tick(void* self, const hamelin_tick* input, hamelin_command* command, char* error, size_t error_size) {
+static double sum_of_setup(const hamelin_setup* setup) {
+  double sum = 0.0;
   size_t i;
-  (void)input, (void)error, (void)error_size;
-  for (i = 0; i < ((planner*)self)->dof; ++i) command->damping[i] = 1.0;
+  for (i = 0; i < setup->goal_count; ++i)
+    sum += HAMELIN_ELEMENT(hamelin_goal, setup->goals, setup->goal_stride, i)->tolerance_m;
+  for (i = 0; i < setup->shape_count; ++i)
+    sum += HAMELIN_ELEMENT(hamelin_shape, setup->shapes, setup->shape_stride, i)->radius_m;
+  return sum;
+}
+
+static int has_later_field(const hamelin_tick* input) {
+#ifdef LATER_HEADER
+  return HAMELIN_HAS_FIELD(input, hamelin_tick, appended_b) &&
+         HAMELIN_ELEMENT_HAS_FIELD(input->contacts, input->contact_stride, hamelin_contact, appended_b);
+#else
+  return HAMELIN_HAS_FIELD(input, hamelin_tick, speed_scale) ? 0 : -1;
+#endif
+}
+
+static int32_t tick(void* planner_, const hamelin_tick* input, hamelin_command* command, char* error, size_t error_size) {
+  const planner* self = planner_;
+  hamelin_contact found[4];
+  size_t i, count;
+  (void)error, (void)error_size;
+  for (i = 0; i < self->setup->dof; ++i) command->damping[i] = 1.0;
+  if (self->goal_series >= 0) command->series[self->goal_series] = (double)input->goal_number;
+  if (self->later_series >= 0) command->series[self->later_series] = has_later_field(input);
+  if (input->contact_count == 0) return 0;
+  for (i = 0; i < input->contact_count; ++i)
+    command->held_torque[0] +=
+        HAMELIN_ELEMENT(hamelin_contact, input->contacts, input->contact_stride, i)->distance_m;
+  count = self->host->closest_points(self->host->context, input->q, 0.5, found, 4, sizeof found[0]);
+  for (i = 0; i < count && i < 4; ++i) command->held_torque[1] += found[i].distance_m;
+  command->held_torque[2] = sum_of_setup(self->setup);
   return 0;
 }
 
@@ -34,42 +74,39 @@ static void destroy(void* self) { free(self); }
 
 static const hamelin_plugin plugin = {
 #ifdef SHORT_STRUCT
-    sizeof(hamelin_plugin) - sizeof(void*),
+    .struct_size = sizeof(hamelin_plugin) - sizeof(void*),
 #else
-    sizeof(hamelin_plugin),
+    .struct_size = sizeof(hamelin_plugin),
 #endif
-#ifdef WRONG_ABI
-    HAMELIN_PLUGIN_ABI_VERSION + 6,
+#ifdef OLD_ABI
+    .abi_version = 3,
+#elif defined(FUTURE_ABI)
+    .abi_version = HAMELIN_PLUGIN_ABI_VERSION + 6,
+    .abi_version_min = HAMELIN_PLUGIN_ABI_VERSION + 5,
 #else
-    HAMELIN_PLUGIN_ABI_VERSION,
+    .abi_version = HAMELIN_PLUGIN_ABI_VERSION,
+    .abi_version_min = HAMELIN_PLUGIN_ABI_VERSION_MIN,
 #endif
-#ifdef NO_NAME
-    NULL,
-#else
-    "plain_c",
+#ifndef NO_NAME
+    .name = "plain_c",
 #endif
-    "1.0", "damping only",
+    .version = "1.0",
+    .description = "says what it was given",
 #ifdef BAD_SCHEMA
-    "{\"type\":",
+    .params_schema = "{\"type\":",
 #else
-    "{\"type\": \"object\"}",
+    .params_schema = "{\"type\": \"object\"}",
 #endif
-#ifdef NULL_CREATE
-    NULL,
-#else
-    create,
+#ifndef NULL_CREATE
+    .create = create,
 #endif
-#ifdef NULL_TICK
-    NULL,
-#else
-    tick,
+#ifndef NULL_TICK
+    .tick = tick,
 #endif
-#ifdef NULL_DESTROY
-    NULL,
-#else
-    destroy,
+#ifndef NULL_DESTROY
+    .destroy = destroy,
 #endif
-    NULL};
+};
 
 #ifdef NO_ENTRY
 #define ENTRY some_other_symbol

@@ -59,6 +59,9 @@ class Certificate {
   [[nodiscard]] Verdict check(dynamics::Workspace& ws, const scene::Environment& environment,
                               const Node& from, const Node& to);
 
+  /// Upper bound of the path of any point of the arm on a straight joint motion by dq [m].
+  [[nodiscard]] double longest_path(const Eigen::VectorXd& dq) const;
+
  private:
   /// What a bound is for: a shape against the obstacles, or a pair of parts.
   struct Subject {

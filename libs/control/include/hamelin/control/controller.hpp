@@ -2,11 +2,16 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
+#include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/newest.hpp"
 #include "hamelin/control/planner_host.hpp"
 #include "hamelin/control/state_estimator.hpp"
 #include "hamelin/control/torque_limits.hpp"
@@ -32,9 +37,17 @@ struct Answer {
   bool saturated = false;  ///< whether a limit reduced it
   /// For arms that are controlled by position: joint positions and velocities one period ahead.
   Eigen::VectorXd q_next, v_next;
-  std::size_t goal_index = 0;  ///< of the current goal; the number of goals after the last
+  /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
+  std::uint64_t goals_number = 0;
+  std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
   /// Number of the World's snapshot that the answer is for.
   std::uint64_t snapshot = 0;
+  /// The planner's own figures, see Controller::series(); NaN where it set none.
+  std::span<const double> series;
+  /// Wall time that the planner took [s], and how many ticks took longer than the deadline since
+  /// the start. Nothing depends on them.
+  double planner_s = 0.0;
+  std::uint64_t overruns = 0;
 };
 
 /// What a Controller is made with.
@@ -48,12 +61,16 @@ struct ControllerOptions {
   bool position = false;           ///< fill Answer::q_next and v_next
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
   double acceleration_max = 15.0, jerk_max = 5000.0;
+  /// The largest number of way-points of a goal's path, also of goals that are set later; none:
+  /// that of the scene's goals, at least 256.
+  std::optional<std::size_t> path_points_max;
   PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
 };
 
 /// The control loop of an arm: the world that it sees, its planner, goals and limits, without a
-/// plant and without a clock. One thread calls tick(); it neither allocates nor locks. Any thread
-/// may update world().
+/// plant. Time comes from the caller; a clock is read only to report how long the planner took. One
+/// thread calls tick(); it neither allocates nor locks, unless the planner declares that it does.
+/// Any thread may update world(), goals and the planner's parameters.
 class Controller {
  public:
   using Options = ControllerOptions;
@@ -80,6 +97,23 @@ class Controller {
   /// The surroundings; updates take effect at the next tick.
   [[nodiscard]] World& world() noexcept { return world_; }
 
+  /// Replaces the goals, from the next tick on. Any thread.
+  /// @param goals in the order in which they must be reached; scene::joint_goal() and the like have
+  ///        default tolerances
+  /// @return the number of the list, see Answer::goals_number
+  /// @throws Error invalid for goals that do not fit the arm, a path longer than
+  ///         Options::path_points_max, or no goal; nothing changes then
+  std::uint64_t set_goals(std::vector<scene::Goal> goals);
+  std::uint64_t set_goal(scene::Goal goal) { return set_goals({std::move(goal)}); }
+
+  /// Changes parameters of the planner, from the next tick on. Any thread.
+  /// @param changes an object with those that change; the others stay
+  /// @throws Error invalid for values that the planner's schema or the planner refuses, also if it
+  ///         cannot change parameters while it runs; nothing changes then
+  void set_planner_params(const Json& changes);
+  /// All parameters of the planner, as last set.
+  [[nodiscard]] Json planner_params() const;
+
   /// observe() and decide().
   /// @param time_s of the measurement; must increase from tick to tick
   /// @param q, v measured joint positions and velocities; dof numbers each. v is not used if the
@@ -98,7 +132,8 @@ class Controller {
   [[nodiscard]] const std::optional<Certificate::Verdict>& verdict() const noexcept {
     return verdict_;
   }
-  /// Forgets goals that were reached, the last motion and limits' history, for a new start.
+  /// Forgets goals that were reached, the last motion and limits' history, for a new start; so does
+  /// the planner at the next tick, if it can. For the thread of tick().
   void reset();
 
   /// What it sees. A caller may look() at and certify() the motion between ticks with it.
@@ -108,11 +143,26 @@ class Controller {
   [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
   [[nodiscard]] const GoalTracker& goals() const noexcept { return goals_; }
   [[nodiscard]] const planning::Plugin& plugin() const noexcept { return planner_.plugin(); }
+  /// The numeric series that the planner declared, in the order of Answer::series.
+  [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
+    return planner_.series();
+  }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
+  /// Wall time that the planner should not exceed in a tick [s], see Answer::overruns.
+  [[nodiscard]] double deadline_s() const noexcept { return deadline_s_; }
 
  private:
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// The planner's parameters on their way to the tick.
+  struct NewParams {
+    std::uint64_t number = 0;
+    std::optional<planning::PreparedParams> params;
+  };
+  void take_goals();
+  void take_params();
+  /// Calls the planner. @return whether its answer is valid
+  [[nodiscard]] bool ask_planner();
   void form_torque();
   void form_position();
   void brake();
@@ -121,11 +171,22 @@ class Controller {
 
   scene::Scene scene_;
   Options options_;
-  double period_s_;
+  double period_s_, deadline_s_;
+  std::size_t path_points_max_;
   model::Model nominal_;  ///< the planner's model of the arm
   World world_;
   WorldView view_;
   PlannerHost planner_;
+  // Each is among writers; the tick takes none.
+  std::mutex goals_mutex_;
+  mutable std::mutex params_mutex_;
+  std::uint64_t goals_number_ = 0, params_number_ = 0;  ///< of the newest, for writers
+  Json params_;
+  Newest<GoalList> new_goals_;
+  Newest<NewParams> new_params_;
+  const GoalList* goal_list_;  ///< that the tick uses
+  std::uint64_t used_params_ = 0;
+  PlannerGoal goal_{};
   GoalTracker goals_;
   std::optional<StateEstimator> estimator_;
   std::vector<Eigen::VectorXd> issued_;  ///< for the estimator: torques, or accelerations
@@ -136,6 +197,7 @@ class Controller {
   std::optional<Certificate::Verdict> verdict_;
 
   long k_ = 0;
+  bool reset_ = false;  ///< whether the planner is to be told of a new start
   double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
 };

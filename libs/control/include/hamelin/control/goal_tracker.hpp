@@ -24,8 +24,8 @@ struct GoalError {
 /// Keeps track of the current goal, and detects stalls: an arm at rest away from the goal.
 class GoalTracker {
  public:
-  /// @param goals at least one @param rule none: stalls are not detected; `goals` and `rule` must
-  ///        outlive this
+  /// @param goals at least one; must outlive this, or stay until set_goals()
+  /// @param rule none: stalls are not detected; must outlive this
   GoalTracker(const std::vector<scene::Goal>& goals, const std::optional<scene::StallRule>& rule,
               const model::Model& model);
 
@@ -33,18 +33,24 @@ class GoalTracker {
   /// @return whether it was
   [[nodiscard]] bool advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                              const Eigen::VectorXd& v);
+  /// Starts with the first of other goals.
+  /// @param goals as for the constructor
+  void set_goals(const std::vector<scene::Goal>& goals) noexcept {
+    goals_ = &goals;
+    restart();
+  }
   /// Starts again with the first goal.
   void restart() noexcept {
     index_ = 0;
     rest_s_ = 0.0;
   }
-  [[nodiscard]] bool all_reached() const noexcept { return index_ == goals_.size(); }
+  [[nodiscard]] bool all_reached() const noexcept { return index_ == goals_->size(); }
   /// Index of the current goal; size() after the last.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }
-  [[nodiscard]] std::size_t size() const noexcept { return goals_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return goals_->size(); }
   /// The current goal, or the last one.
   [[nodiscard]] const scene::Goal& goal() const {
-    return goals_[std::min(index_, goals_.size() - 1)];
+    return (*goals_)[std::min(index_, goals_->size() - 1)];
   }
 
   /// Evaluates the scene's stall rule; to be called once per step of dt_s. A stall is a tip whose
@@ -53,7 +59,7 @@ class GoalTracker {
   [[nodiscard]] bool stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s);
 
  private:
-  const std::vector<scene::Goal>& goals_;
+  const std::vector<scene::Goal>* goals_;
   const std::optional<scene::StallRule>& rule_;
   const model::Model& model_;
   std::size_t index_ = 0;

@@ -7,8 +7,9 @@
  * size in bytes, and fields are only appended to them. SI units and radians; poses are in the world
  * frame.
  *
- * hamelin_controller_tick is called by one thread. It neither allocates nor locks. All functions
- * that change the world may be called by any thread at any time.
+ * hamelin_controller_tick is called by one thread. It neither allocates nor locks, unless the
+ * planner declares that it does. All functions that change goals, parameters or the world may be
+ * called by any thread at any time.
  */
 #include <stddef.h>
 #include <stdint.h>
@@ -53,6 +54,8 @@ typedef struct hamelin_answer {
   int32_t certified;             /* 1: the motion since the last tick was proved clear */
   double margin_m;               /* by so much at least */
   int32_t saturated;             /* 1: a limit reduced the torque */
+  uint64_t goals;                /* number of the list of goals: 0 for the scene's */
+  double planner_s;              /* wall time that the planner took */
 } hamelin_answer;
 
 enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2 };
@@ -77,6 +80,23 @@ double hamelin_controller_period_s(const hamelin_controller* controller);
 /* q and v: measured joint positions and velocities. */
 void hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
                              const double* v, hamelin_answer* answer);
+
+/* The goals, replaced by one, from the next tick on; by any thread. *number, unless null, receives
+ * what hamelin_answer.goals will be. Tolerances of zero or less select the defaults of scene files.
+ * A target that moves from tick to tick is to get a function of its own. */
+int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, const double* q,
+                                          double tolerance_rad, uint64_t* number, char* error,
+                                          size_t error_size);
+/* Of the tip; without quaternion_wxyz (null) only its position counts. */
+int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const double position_m[3],
+                                         const double quaternion_wxyz[4], double tolerance_m,
+                                         double tolerance_rad, uint64_t* number, char* error,
+                                         size_t error_size);
+/* Changes parameters of the planner, from the next tick on; by any thread. params_json: an object
+ * with those that change. */
+int32_t hamelin_controller_set_planner_params(hamelin_controller* controller,
+                                              const char* params_json, char* error,
+                                              size_t error_size);
 
 /* Changes of the world. *snapshot, unless null, receives the number of the first snapshot that
  * contains the change. */

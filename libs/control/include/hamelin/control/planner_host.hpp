@@ -1,16 +1,27 @@
 #pragma once
 #include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
 #include <functional>
+#include <memory>
 #include <string_view>
 #include <vector>
 
+#include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 
 namespace hamelin::control {
 
+/// The goal of a tick. `number` is another one whenever the goal is another one.
+struct PlannerGoal {
+  const hamelin_goal* goal;
+  std::uint64_t number;
+  std::size_t index;
+};
+
 /// Owns a planner, passes it the state of the world and receives its answers. One thread; a tick
-/// does not allocate.
+/// does not allocate. The planner may query the world on threads of its own.
 class PlannerHost final : private planning::HostServices {
  public:
   /// Receives the planner's log lines: level HAMELIN_LOG_INFO or HAMELIN_LOG_WARNING. May be called
@@ -18,17 +29,30 @@ class PlannerHost final : private planning::HostServices {
   using LineSink = std::function<void(std::int32_t level, std::string_view line)>;
 
   /// @param setup nominal arm of the planner, goals and limits
-  /// @param world the surroundings that it is shown; must outlive this
+  /// @param nominal the planner's model of the arm; must outlive this, as `world` and `view`
+  /// @param view the surroundings that it is shown, a view of `world`
   /// @throws Error plugin with the planner's own message if it refuses to start
   PlannerHost(const planning::Plugin& plugin, planning::SetupData setup, const Json& params,
-              WorldView& world, LineSink sink);
+              const model::Model& nominal, const World& world, WorldView& view, LineSink sink);
 
   /// Calls the planner with the contacts of the world's last look().
   /// @param k, time_s index and time of the tick
   /// @param q, v as measured; dof numbers each
   /// @return false if the planner failed: see error()
   [[nodiscard]] bool tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                          std::size_t goal_index);
+                          const PlannerGoal& goal);
+  /// Tells the planner that the next tick is a new start.
+  void reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept { planner_.reset(q, v); }
+  /// See LoadedPlanner.
+  [[nodiscard]] planning::PreparedParams prepare_params(const Json& checked) const {
+    return planner_.prepare_params(checked);
+  }
+  void apply_params(const planning::PreparedParams& params) noexcept {
+    planner_.apply_params(params);
+  }
+  [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
+    return planner_.series();
+  }
   /// Its last answer.
   [[nodiscard]] const planning::CommandBuffers& command() const noexcept { return command_; }
   /// Why the last tick failed.
@@ -36,9 +60,9 @@ class PlannerHost final : private planning::HostServices {
   [[nodiscard]] bool gave_up() const noexcept {
     return command_.raw().state == HAMELIN_PLANNER_GAVE_UP;
   }
-  /// Whether it has its own stall rule, so that the scene's rule does not apply.
-  [[nodiscard]] bool has_own_stall_rule() const noexcept {
-    return command_.raw().state == HAMELIN_PLANNER_OWN_STALL_RULE;
+  /// Whether it detects its stalls itself, so that the scene's rule does not apply.
+  [[nodiscard]] bool detects_stalls() const noexcept {
+    return command_.raw().state == HAMELIN_PLANNER_DETECTS_STALLS;
   }
   [[nodiscard]] const planning::Plugin& plugin() const noexcept { return planner_.plugin(); }
 
@@ -46,19 +70,25 @@ class PlannerHost final : private planning::HostServices {
   // planning::HostServices
   void log(std::int32_t level, std::string_view line) override;
   std::size_t closest_points(std::span<const double> q, double influence_m,
-                             std::span<hamelin_contact> out) override;
+                             planning::ArrayOut<hamelin_contact> out) override;
   std::size_t closest_self(std::span<const double> q, double influence_m,
-                           std::span<hamelin_self_contact> out) override;
+                           planning::ArrayOut<hamelin_self_contact> out) override;
+  std::size_t obstacles(planning::ArrayOut<hamelin_obstacle_state> out) override;
+  std::unique_ptr<planning::QueryServices> open_query() override;
 
-  WorldView& world_;
+  const model::Model& nominal_;
+  const World& world_;
+  WorldView& view_;
   LineSink sink_;
   Eigen::VectorXd query_q_;
   std::vector<scene::Contact> query_contacts_;
   std::vector<scene::SelfContact> query_self_contacts_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
+  std::atomic<double> time_s_{0.0};  ///< of the last tick
+  std::uint64_t world_number_ = 0;   ///< that the planner knows
+  planning::LoadedPlanner planner_;  ///< its constructor uses the members before it
   planning::CommandBuffers command_;
-  planning::LoadedPlanner planner_;  ///< last member: its constructor uses the others
 };
 
 }  // namespace hamelin::control

@@ -67,7 +67,8 @@ class World {
   /// @throws Error io, parse or invalid, also if there is no map
   std::uint64_t change_map(const scene::MapChangeSpec& change);
 
-  /// The newest snapshot, for queries on any thread but that of the control loop: this locks.
+  /// The newest snapshot, for queries on any thread but that of the control loop: this locks, but
+  /// never for longer than it takes to copy a pointer.
   [[nodiscard]] std::shared_ptr<const WorldSnapshot> latest() const;
 
   /// A snapshot with the working memory of queries on it.
@@ -96,7 +97,8 @@ class World {
   scene::Scene scene_;  ///< name, base and start
   const model::Model& model_;
   std::size_t contacts_max_ = 0;
-  mutable std::mutex mutex_;  ///< among writers; the control loop never takes it
+  std::mutex mutex_;                 ///< among writers; the control loop never takes it
+  mutable std::mutex latest_mutex_;  ///< of `latest_`, which only writers change
   std::int32_t next_id_ = 0;
   /// Obstacles of the scene that are not known at first, with their indices in the scene.
   std::vector<std::pair<std::string, std::int32_t>> reserved_;

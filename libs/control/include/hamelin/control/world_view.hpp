@@ -111,6 +111,8 @@ class WorldView {
   [[nodiscard]] std::int32_t obstacle_id(int obstacle) const noexcept {
     return obstacle < 0 || ids_.empty() ? obstacle : ids_[static_cast<std::size_t>(obstacle)];
   }
+  /// The ids of environment().obstacles(); empty without a World.
+  [[nodiscard]] std::span<const std::int32_t> obstacle_ids() const noexcept { return ids_; }
   [[nodiscard]] const scene::SelfField* self_field() const noexcept { return self_.get(); }
   [[nodiscard]] double influence_m() const noexcept { return influence_; }
   [[nodiscard]] double self_influence_m() const noexcept { return self_influence_; }

@@ -93,9 +93,12 @@ struct Result {
   // The rest depends on clock and machine.
   double cpu_s = 0.0;
   struct TickTime {
-    double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [µs], thread CPU time
+    double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [µs]
   };
-  std::optional<TickTime> tick_us;
+  std::optional<TickTime> tick_us;     ///< thread CPU time
+  std::optional<TickTime> planner_us;  ///< wall time of the planner alone
+  std::optional<double> deadline_us;   ///< wall time that a planner should not exceed
+  std::uint64_t late_ticks = 0;        ///< how often it did
   Json provenance = Json::object();
 };
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <span>
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
@@ -58,10 +57,9 @@ class NominalArm {
 /// blocks as another. Of equal distances the first counts.
 /// @param contacts in the order in which a tick lists them
 template <class F>
-void for_each_nearest(std::span<const hamelin_contact> contacts,
-                      std::span<const hamelin_sphere> spheres, double range, F&& f) {
+void for_each_nearest(const Contacts& contacts, const ControlShapes& shapes, double range, F&& f) {
   const auto link_of = [&](std::size_t i) {
-    return spheres[static_cast<std::size_t>(contacts[i].sphere)].link;
+    return shapes[static_cast<std::size_t>(contacts[i].shape)].link;
   };
   for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
     const auto link = link_of(begin);

@@ -143,6 +143,8 @@ class Environment {
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
   [[nodiscard]] const MapField& map_field() const noexcept { return *map_; }
+  /// The space that the map does not know; empty where it is free.
+  [[nodiscard]] const MapField& unknown_field() const noexcept { return *unknown_; }
   /// Pose of the map's frame in the world; map_field() is in that frame.
   [[nodiscard]] const geometry::SE3& map_pose() const noexcept { return map_pose_; }
   [[nodiscard]] const Summary& summary() const noexcept { return summary_; }

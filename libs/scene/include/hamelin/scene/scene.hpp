@@ -41,6 +41,11 @@ struct Goal {
   std::optional<double> tip_speed_max_m_s;  ///< position, pose: of the tip at arrival
 };
 
+/// Goals with the tolerances that a scene file gets by default.
+[[nodiscard]] Goal joint_goal(Eigen::VectorXd q);
+[[nodiscard]] Goal position_goal(const Eigen::Vector3d& position_m);
+[[nodiscard]] Goal pose_goal(const geometry::SE3& pose);
+
 /// The goal's "type" in a scene file: "path" is a joint goal with way-points.
 [[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
@@ -102,7 +107,10 @@ struct Actuation {
   /// Sampled: of each joint's held torque [Nm/s or N/s].
   std::optional<double> torque_rate_max_Nm_s;
   double coulomb_friction_share = 0.0;  ///< of the effort limits; unknown to the planner
-  Servo servo;                     ///< position
+  /// Wall time within which a tick should be answered; none: the time between two ticks. Only
+  /// reported.
+  std::optional<double> deadline_s;
+  Servo servo;  ///< position
 };
 
 /// What simulates the arm: hamelin's own integrators, or MuJoCo.

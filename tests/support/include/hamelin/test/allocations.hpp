@@ -2,39 +2,14 @@
 // Eigen comes first: its includes declare posix_memalign again, which clang refuses after the
 // definition below.
 #include <Eigen/Core>
-#include <catch2/catch.hpp>
 #include <cerrno>
 #include <cstdlib>
+
+#include "hamelin/test/allocation_count.hpp"
 
 /// Counts the heap allocations of a test program: calls of malloc and related functions, which
 /// operator new and Eigen use. This header replaces them in the whole program, so include it in
 /// exactly one source file.
-
-#if defined(__GLIBC__) && !defined(HAMELIN_SANITIZED)  // sanitizers replace the heap
-#define HAMELIN_COUNTS_ALLOCATIONS 1
-#else
-#define HAMELIN_COUNTS_ALLOCATIONS 0
-#endif
-
-namespace hamelin::test {
-
-inline thread_local long allocation_count = 0;
-
-/// Allocations made by f() on this thread.
-template <class F>
-long allocations_in(F&& f) {
-  const long before = allocation_count;
-  f();
-  return allocation_count - before;
-}
-
-/// Whether allocations are counted in this build; if not, it warns that the test is skipped.
-inline bool counts_allocations() {
-  if (HAMELIN_COUNTS_ALLOCATIONS == 0) WARN("skipped: this build does not count allocations");
-  return HAMELIN_COUNTS_ALLOCATIONS != 0;
-}
-
-}  // namespace hamelin::test
 
 #if HAMELIN_COUNTS_ALLOCATIONS
 

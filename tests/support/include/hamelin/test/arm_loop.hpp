@@ -78,17 +78,20 @@ class ArmLoop : public planning::HostServices {
     influence_ = plugin.influence_m(params).value_or(0.5);
     setup.influence_m = influence_;
     setup.control_period_s = 0.004;
-    hamelin_goal target{};
+    target.struct_size = sizeof target;
     target.type = q_goal.size() > 0 ? HAMELIN_GOAL_JOINT : HAMELIN_GOAL_POSITION;
     std::copy_n(goal.data(), 3, target.position_world_m);
     setup.add_goal(target, q_goal);
-    spheres_ = setup.spheres;
+    q_goal_ = q_goal;
+    if (q_goal_.size() > 0) target.q = q_goal_.data();
+    shapes_ = setup.shapes;
     contacts_.reserve(4096);
     planner_.emplace_back(plugin.create(std::move(setup), *this, params));
   }
 
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+  std::size_t closest_points(std::span<const double>, double,
+                             planning::ArrayOut<hamelin_contact>) override {
     return 0;
   }
 
@@ -97,15 +100,15 @@ class ArmLoop : public planning::HostServices {
     dynamics::forward_kinematics(model_, ws_, q);
     contacts_.clear();
     clearance = std::numeric_limits<double>::infinity();
-    for (std::size_t s = 0; s < spheres_.size(); ++s) {
-      const auto& sphere = spheres_[s];
+    for (std::size_t s = 0; s < shapes_.size(); ++s) {
+      const auto& sphere = shapes_[s];
       const Eigen::Vector3d center = dynamics::point_position(
           model_, ws_, sphere.link, Eigen::Map<const Eigen::Vector3d>(sphere.center_link_m));
       const std::size_t first = contacts_.size();
       for (std::size_t b = 0; b < balls_.size(); ++b) {
         const Eigen::Vector3d away = center - balls_[b].center, direction = away.normalized();
         hamelin_contact c{};
-        c.sphere = static_cast<std::int32_t>(s);
+        c.shape = static_cast<std::int32_t>(s);
         c.obstacle = static_cast<std::int32_t>(b);
         c.distance_m = away.norm() - sphere.radius_m - balls_[b].radius;
         clearance = std::min(clearance, c.distance_m);
@@ -133,6 +136,8 @@ class ArmLoop : public planning::HostServices {
     input.v = v.data();
     input.contacts = near.data();
     input.contact_count = near.size();
+    input.contact_stride = sizeof(hamelin_contact);
+    input.goal = &target;
     input.speed_scale = 1.0;
     return planner_.front().tick(input, buffers);
   }
@@ -186,14 +191,16 @@ class ArmLoop : public planning::HostServices {
   dynamics::Workspace ws_;
   std::vector<Ball> balls_;
   Eigen::Vector3d goal_;
+  Eigen::VectorXd q_goal_;
   double influence_ = 0.0;
-  std::vector<hamelin_sphere> spheres_;
+  std::vector<hamelin_shape> shapes_;
   std::vector<hamelin_contact> contacts_;
   std::vector<planning::LoadedPlanner> planner_;
   std::uint64_t k_ = 0;
 
  public:
   Eigen::VectorXd q, v;
+  hamelin_goal target{};
   planning::CommandBuffers buffers;
   double clearance = 0.0;
 };

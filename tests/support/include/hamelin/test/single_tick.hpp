@@ -16,7 +16,8 @@ class SingleTick : public planning::HostServices {
   explicit SingleTick(std::string plugin_file) : plugin_file_(std::move(plugin_file)) {}
 
   void log(std::int32_t, std::string_view) override {}
-  std::size_t closest_points(std::span<const double>, double, std::span<hamelin_contact>) override {
+  std::size_t closest_points(std::span<const double>, double,
+                             planning::ArrayOut<hamelin_contact>) override {
     return 0;
   }
 
@@ -39,8 +40,8 @@ class SingleTick : public planning::HostServices {
     const auto plugin = planning::Plugin::load(plugin_file_);
     auto planner = plugin.create(std::move(setup), *this, planning::check_params(plugin, params));
     hamelin_self_contact touching{};
-    touching.sphere_a = 3;
-    touching.sphere_b = 0;
+    touching.shape_a = 3;
+    touching.shape_b = 0;
     touching.distance_m = 1e-3;
     touching.direction_world[0] = 1.0;
     hamelin_tick tick{};
@@ -49,9 +50,15 @@ class SingleTick : public planning::HostServices {
     tick.v = near.v.data();
     tick.contacts = contacts.data();
     tick.contact_count = contacts.size();
+    tick.contact_stride = sizeof(hamelin_contact);
+    hamelin_goal current = goal;
+    current.struct_size = sizeof current;
+    if (q_goal.size() > 0) current.q = q_goal.data();
+    tick.goal = &current;
     tick.speed_scale = 1.0;
     tick.self_contacts = &touching;
     tick.self_contact_count = self ? 1 : 0;
+    tick.self_contact_stride = sizeof touching;
     planning::CommandBuffers buffers(4, contacts.size());
     REQUIRE(planner.tick(tick, buffers));
     Eigen::VectorXd all(8);

@@ -1,0 +1,102 @@
+#include "hamelin/control/goal_list.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::control {
+
+namespace {
+
+void check(bool right, std::size_t goal, std::string_view message) {
+  if (!right) throw Error(ErrorCode::invalid, fmt::format("goal {}: {}", goal + 1, message));
+}
+
+void check_joint_goal(const scene::Goal& goal, std::size_t i, const scene::Scene& scene,
+                      const model::Model& model, std::size_t path_points_max) {
+  const int dof = model.dof();
+  check(goal.q.size() == dof, i,
+        fmt::format("q: {} values given, expected {} (one per joint of '{}')", goal.q.size(), dof,
+                    model.robot().name));
+  check(goal.q.allFinite(), i, "q: is not finite, expected finite numbers");
+  check(goal.tolerance_rad > 0.0, i,
+        fmt::format("tolerance_rad: {} is not allowed, expected more than 0", goal.tolerance_rad));
+  if (scene.model.joint_limits)
+    for (int k = 0; k < dof; ++k) {
+      const auto& joint = model.robot().links[static_cast<std::size_t>(k)].joint;
+      check(goal.q[k] >= joint.lower.value_or(goal.q[k]) &&
+                goal.q[k] <= joint.upper.value_or(goal.q[k]),
+            i,
+            fmt::format("q: {} is beyond a limit of joint '{}', expected {} to {}", goal.q[k],
+                        joint.name, joint.lower.value_or(goal.q[k]),
+                        joint.upper.value_or(goal.q[k])));
+    }
+  if (goal.path.size() == 0) return;
+  check(goal.path.rows() == dof && goal.path.allFinite(), i,
+        fmt::format("path: expected {} finite numbers per way-point", dof));
+  check(goal.path.rightCols(1) == goal.q, i, "path: its end is not q, expected q as its end");
+  check(static_cast<std::size_t>(goal.path.cols()) <= path_points_max, i,
+        fmt::format("path: {} way-points, expected at most {} (path_points_max)", goal.path.cols(),
+                    path_points_max));
+}
+
+void check_tip_goal(const scene::Goal& goal, std::size_t i) {
+  check(goal.pose.p().allFinite() && goal.pose.R().allFinite(), i,
+        "pose: is not finite, expected finite numbers");
+  check(goal.tolerance_m > 0.0, i,
+        fmt::format("tolerance_m: {} is not allowed, expected more than 0", goal.tolerance_m));
+  check(goal.type != scene::GoalType::pose || goal.tolerance_rad > 0.0, i,
+        fmt::format("tolerance_rad: {} is not allowed, expected more than 0", goal.tolerance_rad));
+}
+
+}  // namespace
+
+GoalList::GoalList(std::uint64_t of_number, std::vector<scene::Goal> all)
+    : number(of_number), goals(std::move(all)) {
+  for (const auto& goal : goals) for_planner.push_back(to_c(goal));
+}
+
+hamelin_goal to_c(const scene::Goal& goal) {
+  const bool joint = goal.type == scene::GoalType::joint;
+  hamelin_goal out{};
+  out.struct_size = sizeof out;
+  out.type = joint                                    ? HAMELIN_GOAL_JOINT
+             : goal.type == scene::GoalType::position ? HAMELIN_GOAL_POSITION
+                                                      : HAMELIN_GOAL_POSE;
+  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(goal.pose.R());
+  std::copy_n(goal.pose.p().data(), 3, out.position_world_m);
+  std::copy_n(wxyz.data(), 4, out.quaternion_wxyz);
+  out.tolerance_m = goal.tolerance_m;
+  out.tolerance_rad = goal.tolerance_rad;
+  out.speed_max = goal.speed_max;
+  out.q = joint ? goal.q.data() : nullptr;
+  out.path = goal.path.size() > 0 ? goal.path.data() : nullptr;
+  out.path_points = static_cast<std::size_t>(goal.path.cols());
+  return out;
+}
+
+void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scene,
+                 const model::Model& model, std::size_t path_points_max) {
+  if (goals.empty())
+    throw Error(ErrorCode::invalid, "goals: none are given, expected at least one");
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    const scene::Goal& goal = goals[i];
+    if (goal.type == scene::GoalType::joint)
+      check_joint_goal(goal, i, scene, model, path_points_max);
+    else
+      check_tip_goal(goal, i);
+    check(goal.speed_max > 0.0, i,
+          fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
+  }
+}
+
+std::size_t longest_path(const std::vector<scene::Goal>& goals) {
+  Eigen::Index longest = 0;
+  for (const auto& goal : goals) longest = std::max(longest, goal.path.cols());
+  return static_cast<std::size_t>(longest);
+}
+
+}  // namespace hamelin::control

@@ -1,0 +1,137 @@
+// A plugin and a host that were built with headers of different versions work together.
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/planning/plugin.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/test/robots.hpp"
+#include "plugins/later_host.h"
+
+using namespace hamelin;
+using namespace hamelin::planning;
+
+namespace {
+
+std::string plugin_file(const std::string& name) {
+  return HAMELIN_TEST_BINARY_DIR "/lib/hamelin/test_plugins/" + name + ".hamelin.so";
+}
+
+later_answer in_later_host(const std::string& plugin, const Json& params = Json::object()) {
+  const model::Model arm(test::random_robot(7, 3));
+  later_answer answer;
+  later_host_tick(plugin_file(plugin).c_str(),
+                  description::robot_to_json(arm.robot()).dump().c_str(), params.dump().c_str(),
+                  &answer);
+  return answer;
+}
+
+struct NearHost : HostServices {
+  void log(std::int32_t, std::string_view) override {}
+  std::size_t closest_points(std::span<const double>, double,
+                             ArrayOut<hamelin_contact> out) override {
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, out.size()); ++i) {
+      hamelin_contact contact{};
+      contact.distance_m = 4.0 + static_cast<double>(i);
+      out.set(i, contact);
+    }
+    return 2;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a plugin of version 4 works in a host of a later version", "[planning][plugin]") {
+  const bool cpp = GENERATE(false, true);
+  const later_answer answer =
+      cpp ? in_later_host("awkward", {{"fault", "sum"}, {"gain", 2}, {"nested", {{"depth", 3}}}})
+          : in_later_host("plain_c");
+  CAPTURE(cpp);
+  CHECK(std::string(answer.error).empty());
+  CHECK(answer.held_torque[0] == 6.0);
+  CHECK(answer.held_torque[1] == 9.0);
+  CHECK(answer.held_torque[2] == 2.5);
+  CHECK(answer.damping[2] == (cpp ? 2.0 : 1.0));
+  CHECK(answer.gyroscopic_link == (cpp ? 2.0 : -1.0));
+  CHECK(answer.overwritten == 0);
+  if (cpp) return;
+  CHECK(answer.series[0] == 7.0);
+  CHECK(answer.series[1] == 0.0);
+}
+
+TEST_CASE("a plugin of a later version finds its own fields in its own host",
+          "[planning][plugin]") {
+  const later_answer answer = in_later_host("later");
+  CHECK(std::string(answer.error).empty());
+  CHECK(answer.held_torque[0] == 6.0);
+  CHECK(answer.held_torque[1] == 9.0);
+  CHECK(answer.series[1] == 1.0);
+  CHECK(answer.overwritten == 0);
+}
+
+TEST_CASE("a plugin of a later version that still supports this one works here",
+          "[planning][plugin]") {
+  const Plugin plugin = Plugin::load(plugin_file("later"));
+  CHECK(plugin.abi_version() == 4);
+  NearHost services;
+  const model::Model arm(test::random_robot(7, 3));
+  SetupData data(arm);
+  double expected = 0.0;
+  for (const auto& shape : data.shapes) expected += shape.radius_m;
+  hamelin_goal goal{};
+  goal.type = HAMELIN_GOAL_POSITION;
+  goal.tolerance_m = 0.25;
+  data.add_goal(goal);
+  data.add_goal(goal);
+  auto planner = plugin.create(std::move(data), services, Json::object());
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  std::vector<hamelin_contact> contacts(3);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    contacts[i].distance_m = 1.0 + static_cast<double>(i);
+  hamelin_tick tick{};
+  tick.struct_size = sizeof tick;
+  tick.q = tick.v = zero.data();
+  tick.contacts = contacts.data();
+  tick.contact_count = contacts.size();
+  tick.contact_stride = sizeof(hamelin_contact);
+  tick.goal = &goal;
+  CommandBuffers out(3, 4, planner.series().size());
+  REQUIRE(planner.tick(tick, out));
+  CHECK(out.held_torque()[0] == 6.0);
+  CHECK(out.held_torque()[1] == 9.0);
+  CHECK(out.held_torque()[2] == Approx(0.5 + expected));
+  CHECK(out.series()[1] == 0.0);  // its own field is not there, and it noticed
+}
+
+TEST_CASE("arrays are read and written by their stride", "[planning][unit]") {
+  struct Longer : hamelin_box {
+    double more;
+  };
+  std::vector<Longer> longer(3);
+  for (std::size_t i = 0; i < longer.size(); ++i) {
+    longer[i].obstacle = static_cast<std::int32_t>(i);
+    longer[i].more = 1.0;
+  }
+  const StridedArray<hamelin_box> view(longer.data(), longer.size(), sizeof(Longer));
+  std::int32_t next = 0;
+  for (const auto& box : view) CHECK(box.obstacle == next++);
+  CHECK(next == 3);
+  CHECK(view.has_field(offsetof(hamelin_box, quaternion_wxyz), sizeof(double[4])));
+  CHECK_FALSE(view.has_field(sizeof(Longer), sizeof(double)));
+
+  hamelin_box box{};
+  box.obstacle = 9;
+  const ArrayOut<hamelin_box> out(longer.data(), longer.size(), sizeof(Longer));
+  out.set(1, box);
+  CHECK(longer[1].obstacle == 9);
+  CHECK(longer[1].more == 0.0);  // what the writer does not know is zero
+  CHECK(longer[2].more == 1.0);
+
+  std::array<std::int32_t, 3> shorter{1, 2, 3};  // structs that end after `obstacle`
+  const ArrayOut<hamelin_box> narrow(reinterpret_cast<hamelin_box*>(shorter.data()), 3,
+                                     sizeof(std::int32_t));
+  narrow.set(1, box);
+  CHECK(shorter == std::array<std::int32_t, 3>{1, 9, 3});
+}

@@ -1,0 +1,68 @@
+#include "tuning.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+namespace hamelin::hybrid {
+
+namespace {
+
+constexpr double voxel_at_goal = 0.4;  // share of a voxel that is kept near a tip goal
+
+// These determine the crop of the map, the kind of search, or the size of memory.
+constexpr std::array fixed{"contact_radius_m", "escape", "search_budget", "max_escapes",
+                           "horizon_s"};
+
+double value_or(const Json& value, double otherwise) {
+  return value.is_null() ? otherwise : value.get<double>();
+}
+
+// A law ë = −k_p e − k_v ė is equivalent to following the velocity (k_p/k_v) e with the gain k_v.
+LawParams law_params(const Json& params, bool own_gains) {
+  const double gain = !own_gains || params["k_p"].is_null()
+                          ? 0.0
+                          : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
+  return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
+          params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
+          params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
+}
+
+MarginParams margin_params(const planning::Setup& setup, const Json& params) {
+  MarginParams margins{};
+  // A map may lack objects that fill less than half of a voxel.
+  const double voxel = setup.map_resolution_m();
+  margins.full_m = std::max(params["margin_m"].get<double>(), voxel);
+  margins.goal_m = std::min(std::max(params["goal_margin_m"].get<double>(), voxel_at_goal * voxel),
+                            margins.full_m);
+  margins.slack_m = std::min(params["goal_margin_m"].get<double>(), margins.full_m);
+  margins.self_m = params["self_margin_m"];
+  return margins;
+}
+
+}  // namespace
+
+Tuning::Tuning(const planning::Setup& setup, const Json& params)
+    : law(law_params(params, true)),
+      search_law(law_params(params, false)),
+      margins(margin_params(setup, params)),
+      velocity_gain(value_or(params["k_v"], params["velocity_gain"])),
+      follow_gain(params["velocity_gain"]),
+      drive_acceleration(params["drive_acceleration"]),
+      acceleration_max(params["acceleration_max"]),
+      brake_acceleration(params["brake_acceleration"]),
+      approach_rate(params["approach_rate"]),
+      joint_damping(params["joint_damping"]),
+      stall_time_s(params["stall_time_s"]),
+      filter_passes(params["filter_passes"]),
+      search_steps(params["search_steps"]) {}
+
+void check_fixed_params(const Json& params, const Json& initial) {
+  for (const char* key : fixed)
+    if (params.at(key) != initial.at(key))
+      throw Error(ErrorCode::invalid, std::string("/") + key +
+                                          ": cannot be changed while it runs, expected " +
+                                          initial.at(key).dump());
+}
+
+}  // namespace hamelin::hybrid

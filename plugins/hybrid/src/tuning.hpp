@@ -1,0 +1,23 @@
+#pragma once
+#include "hamelin/io/json.hpp"
+#include "law.hpp"
+#include "margins.hpp"
+
+namespace hamelin::hybrid {
+
+/// The parameters that can change while the planner runs: those that need no memory of their own.
+struct Tuning {
+  Tuning(const planning::Setup& setup, const Json& params);
+
+  LawParams law;         ///< of the arm
+  LawParams search_law;  ///< of searches, which ignore k_p and k_v
+  MarginParams margins;
+  double velocity_gain, follow_gain, drive_acceleration, acceleration_max, brake_acceleration,
+      approach_rate, joint_damping, stall_time_s;
+  int filter_passes, search_steps;
+};
+
+/// @throws Error invalid if `params` differ from `initial` in one that cannot change
+void check_fixed_params(const Json& params, const Json& initial);
+
+}  // namespace hamelin::hybrid
