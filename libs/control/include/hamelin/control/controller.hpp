@@ -43,8 +43,8 @@ struct Answer {
   std::uint64_t snapshot = 0;
   /// The planner's own figures, see Controller::series(); NaN where it set none.
   std::span<const double> series;
-  /// Wall time that the planner took [s], and how many ticks took longer than the deadline since
-  /// the start. Nothing depends on them.
+  /// Wall time that the planner took [s], and in how many ticks it took longer than the deadline
+  /// since the start. Nothing depends on them: a late answer is used like any other.
   double planner_s = 0.0;
   std::uint64_t overruns = 0;
 };
@@ -57,13 +57,17 @@ struct ControllerOptions {
   bool certify = true;
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
   bool torque = true;              ///< fill Answer::torque
-  bool position = false;           ///< fill Answer::q_next and v_next
+  bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
   double acceleration_max = 15.0, jerk_max = 5000.0;
-  /// The largest number of way-points of a goal's path, also of goals that are set later; none: that
-  /// of the scene's goals, at least 256.
+  /// The largest number of way-points of a goal's path, also of goals that are set later; none:
+  /// that of the scene's goals, at least 256.
   std::optional<std::size_t> path_points_max;
-  PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
+  /// Receives the planner's messages on the thread that calls the planner; empty: none.
+  PlannerHost::LineSink log;
+  /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
+  /// measured time, so it differs from run to run.
+  bool log_overrun = true;
 };
 
 /// The control loop of an arm: the world that it sees, its planner, goals and limits, without a
@@ -157,6 +161,9 @@ class Controller {
   void take_params();
   /// Calls the planner. @return whether its answer is valid
   [[nodiscard]] bool ask_planner();
+  void log_first_overrun();
+  [[nodiscard]] double braking_time_s() const;
+  void start_braking(std::string_view cause);
   void form_torque();
   void form_position();
   void brake();
@@ -190,6 +197,7 @@ class Controller {
   bool reset_ = false;  ///< whether the planner is to be told of a new start
   double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
+  Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest
 };
 
 }  // namespace hamelin::control
