@@ -1,5 +1,4 @@
-#include <hamelin/control/planner_host.hpp>
-#include <hamelin/control/planner_setup.hpp>
+#include <hamelin/control/controller.hpp>
 #include <hamelin/description/robot_io.hpp>
 #include <hamelin/integration/integrator.hpp>
 #include <iostream>
@@ -21,9 +20,8 @@ int main(int, char** argv) {  // first PREFIX/share/hamelin PREFIX/lib/hamelin/p
   world.look(scene.start_q, 0.0);
   std::cout << "nearest obstacle: " << world.clearance_m() << " m\n";
 
-  const planning::Plugin plugin = planning::find_plugin("hybrid", {argv[2]});
-  control::PlannerHost planner(plugin, control::planner_setup(scene, arm, world, 1e-3),
-                               planning::check_params(plugin, nullptr), world, {});
-  if (!planner.tick(0, 0.0, scene.start_q, Eigen::VectorXd::Zero(7), 0)) return 1;
-  std::cout << "the planner holds: " << planner.command().held_torque().transpose() << " Nm\n";
+  control::Controller controller(scene, arm, planning::find_plugin("hybrid", {argv[2]}), {});
+  const control::Answer& answer =
+      controller.tick(0.0, scene.start_q, Eigen::VectorXd::Zero(arm.dof()));
+  std::cout << "the first torque: " << answer.torque.transpose() << " Nm\n";
 }
