@@ -355,7 +355,8 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
       "{} answers computed again, of which {} would differ with the next recorded snapshot; "
       "{} left out\n",
       checker.checked(), checker.distinguished(), unrecorded);
-  fmt::print("{} allocations, {} locks\n", totals.allocations, totals.locks);
+  if (HAMELIN_COUNTS_ALLOCATIONS != 0)
+    fmt::print("{} allocations, {} locks\n", totals.allocations, totals.locks);
   return judge(totals, checker, counts, history);
 }
 
