@@ -28,6 +28,12 @@ geometry::SE3 random_pose(Rng& rng) {
   return {geometry::rotation_from_wxyz(wxyz.normalized()), random_place(rng)};
 }
 
+void pause(Rng& rng, double longest_s) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(rng.uniform(0.0, longest_s)));
+}
+
+}  // namespace
+
 scene::Obstacle random_obstacle(Rng& rng, std::string name) {
   scene::Obstacle obstacle;
   obstacle.name = std::move(name);
@@ -47,12 +53,6 @@ Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot) {
   }
   return q;
 }
-
-void pause(Rng& rng, double longest_s) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(rng.uniform(0.0, longest_s)));
-}
-
-}  // namespace
 
 Updates::Updates(control::Controller& controller, const scene::Scene& scene,
                  const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record)

@@ -12,6 +12,11 @@
 
 namespace hamelin::test {
 
+/// A sphere, box or cylinder that the arm of data/ can reach, or nearly so.
+[[nodiscard]] scene::Obstacle random_obstacle(Rng& rng, std::string name);
+/// A configuration within the limits of the joints.
+[[nodiscard]] Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot);
+
 /// Two threads that change the world, the goals and the parameters of a controller at random, until
 /// it is destroyed. Some of the changes are bad and must be refused.
 class Updates {
