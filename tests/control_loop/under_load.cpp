@@ -30,7 +30,7 @@ using SnapshotPointer = std::shared_ptr<const control::WorldSnapshot>;
 
 constexpr long samples_per_run = 5000;
 constexpr std::size_t checked_min = 1000;
-constexpr std::uint64_t snapshots_min = 100;
+constexpr std::uint64_t snapshots_min = 100, goals_min = 20;
 constexpr std::size_t series_count = 5;  // of the planner `reporting`
 
 /// What the controller answered in one tick.
@@ -68,6 +68,7 @@ class Checker {
   void check(const Sample& sample, const control::WorldSnapshot& snapshot,
              const std::vector<scene::Goal>& goals) {
     ++checked_;
+    if (sample.goal_index > 0) ++advanced_;
     const Nearest nearest = nearest_of(sample, snapshot);
     const auto expect = [&](bool right, const char* what) {
       if (!right) faults_.push_back(fmt::format("tick at {} s: {}", sample.time_s, what));
@@ -94,6 +95,8 @@ class Checker {
 
   [[nodiscard]] std::size_t checked() const { return checked_; }
   [[nodiscard]] std::size_t distinguished() const { return distinguished_; }
+  /// How many samples were not at the first goal of their list.
+  [[nodiscard]] std::size_t advanced() const { return advanced_; }
   [[nodiscard]] const std::set<double>& gains() const { return gains_; }
   [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
 
@@ -128,7 +131,7 @@ class Checker {
   double influence_m_;
   bool reporting_;
   std::vector<scene::Contact> contacts_;
-  std::size_t checked_ = 0, distinguished_ = 0;
+  std::size_t checked_ = 0, distinguished_ = 0, advanced_ = 0;
   std::set<double> gains_;
   std::vector<std::string> faults_;
 };
@@ -247,15 +250,18 @@ test::Updates::Record recorder(History& history, const std::string& param) {
           }};
 }
 
-/// Ticks an arm whose servos follow every command. Goes on after `ticks` until enough snapshots
-/// were seen, in case the other threads have had no time.
+/// Ticks an arm whose servos follow every command. Goes on after `ticks` until enough snapshots and
+/// goals were seen, in case the other threads have had no time.
 Totals run(control::Controller& controller, const scene::Scene& scene, long ticks,
            std::atomic<double>& now_s, Samples& samples) {
   Totals totals;
   VectorXd q = scene.start_q, v = VectorXd::Zero(q.size());
   std::uint64_t snapshot = 0, goals = 0;
   const long stride = std::max(1L, ticks / samples_per_run);
-  for (long k = 0; k < ticks || (totals.snapshots < snapshots_min && k < 100 * ticks); ++k) {
+  const auto enough = [&] {
+    return totals.snapshots >= snapshots_min && totals.goals >= goals_min;
+  };
+  for (long k = 0; k < ticks || (!enough() && k < 100 * ticks); ++k) {
     const double time_s = controller.period_s() * static_cast<double>(k);
     now_s = time_s;
     const control::Answer* answer = nullptr;
@@ -307,8 +313,9 @@ int judge(const Totals& totals, const Checker& checker, const test::Updates::Cou
     return fail(fmt::format("{} updates were accepted or refused wrongly", counts.wrong.load()));
   for (const double gain : checker.gains())
     if (!history.params.contains(gain)) return fail("the planner used a gain that nobody set");
-  if (totals.snapshots < snapshots_min || checker.checked() < checked_min ||
-      checker.distinguished() == 0 || counts.params < 2 || counts.refused == 0)
+  if (totals.snapshots < snapshots_min || totals.goals < goals_min ||
+      checker.checked() < checked_min || checker.distinguished() == 0 || checker.advanced() == 0 ||
+      counts.params < 2 || counts.refused == 0)
     return fail("too few updates were made for a verdict");
   return 0;
 }

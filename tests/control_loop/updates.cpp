@@ -135,6 +135,10 @@ void Updates::change_rest(std::uint64_t seed) {
 void Updates::set_goals(Rng& rng) {
   const bool good = rng.below(8) != 0;
   std::vector<scene::Goal> goals{scene::joint_goal(random_joints(rng, robot_))};
+  if (rng.below(2) == 0) {  // some are reached at once, so that the next one becomes current
+    goals.front().tolerance_rad = 10.0;
+    goals.front().speed_max = 10.0;
+  }
   if (rng.below(2) == 0) goals.push_back(scene::position_goal(random_place(rng)));
   if (!good) goals.back() = scene::position_goal({0.0, nan, 0.0});
   attempt(good, counts_.goals, [&] {
