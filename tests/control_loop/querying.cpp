@@ -1,6 +1,6 @@
-// A planner whose own threads query the world while its tick goes on. It holds the arm at rest. Each
-// thread checks that the answers of its handle agree with each other; a contradiction fails the next
-// tick.
+// A planner whose own threads query the world while its tick goes on. It holds the arm at rest.
+// Each thread checks that the answers of its handle agree with each other; a contradiction fails
+// the next tick.
 #include <atomic>
 #include <cmath>
 #include <stdexcept>
@@ -78,12 +78,13 @@ class Querying : public Planner {
         check_configuration(query, std::span(q).subspan(i * dof, dof), clearance[i], contacts,
                             self);
       const std::span from = std::span(q).first(dof), to = std::span(q).subspan(dof, dof);
-      if (query.motion_clear(from, to, 0.1, 0.1)) expect(clearance[0] > 0.0 && clearance[1] > 0.0, 2);
+      if (query.motion_clear(from, to, 0.1, 0.1))
+        expect(clearance[0] > 0.0 && clearance[1] > 0.0, 2);
       Eigen::Vector3d gradient;
       const Eigen::Vector3d point(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform());
       const double distance = query.distance(point, 0.1, 0.2, &gradient);
-      expect(distance <= 0.2 && (gradient.isZero() ? distance == 0.2
-                                                   : std::abs(gradient.norm() - 1.0) < 1e-9),
+      expect(distance <= 0.2 &&
+                 (gradient.isZero() ? distance == 0.2 : std::abs(gradient.norm() - 1.0) < 1e-9),
              3);
       expect(query.boxes({-1.0, -1.0, 0.0}, {1.0, 1.0, 1.0}, boxes) > 0, 4);
       const std::size_t count = query.obstacles(0.1, obstacles);

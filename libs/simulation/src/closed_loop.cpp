@@ -89,8 +89,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
-  options.path_points_max = 0;   // no more than the scene's
-  options.certify = false;  // the judge does, for every step and with all obstacles
+  options.path_points_max = 0;  // no more than the scene's
+  options.certify = false;      // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type == scene::ActuationType::sampled;
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
   options.log_overrun = false;  // counted in the result; a log must not depend on the clock

@@ -168,7 +168,7 @@ std::vector<BadCall> bad_calls(const std::string& bad_map) {
 
 }  // namespace
 
-TEST_CASE("in C, bad updates return one line and leave the motion as it is",
+TEST_CASE("in C, bad updates return one line and do not change the motion",
           "[control][bad_input]") {
   const test::TemporaryFolder folder;
   CLoop disturbed(folder.path(), "hybrid", Json::object()),

@@ -158,9 +158,7 @@ TEST_CASE("parameters change at the next tick, from any thread, without allocati
     long allocations = 0;
     for (int k = 0; k < 600; ++k) {
       if (k == 20 && cruise > 0.0)
-        std::thread([&] {
-          loop.controller.set_planner_params({{"cruise_speed", cruise}});
-        }).join();
+        std::thread([&] { loop.controller.set_planner_params({{"cruise_speed", cruise}}); }).join();
       const control::Answer* answer = nullptr;
       allocations += test::allocations_in([&] { answer = &loop.tick(); });
       loop.step(answer->torque);
@@ -194,8 +192,9 @@ TEST_CASE("parameters that cannot be changed are refused with the reason and cha
   scene::Scene other = sampled("clutter.json");
   other.planner->name = "breaking";
   Loop fixed(other, {}, {{"how", "never"}});
-  CHECK(refusal([&] { fixed.controller.set_planner_params({{"at_tick", 3}}); }) ==
-        "parameters of planner 'breaking': cannot be changed while it runs");
+  CHECK(refusal([&] {
+          fixed.controller.set_planner_params({{"at_tick", 3}});
+        }) == "parameters of planner 'breaking': cannot be changed while it runs");
 }
 
 TEST_CASE("a new start repeats a run, because the planner forgets the first one",

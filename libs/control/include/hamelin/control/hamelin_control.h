@@ -90,8 +90,7 @@ int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, const 
                                           double tolerance_rad, uint64_t* number, char* error,
                                           size_t error_size);
 /* Of the tip; without quaternion_wxyz (null) only its position counts. */
-int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller,
-                                         const double position_m[3],
+int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const double position_m[3],
                                          const double quaternion_wxyz[4], double tolerance_m,
                                          double tolerance_rad, uint64_t* number, char* error,
                                          size_t error_size);
