@@ -2,12 +2,14 @@
 #include <Eigen/Core>
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
 
 namespace hamelin::test {
@@ -20,6 +22,16 @@ inline scene::Scene sampled(const std::string& name) {
   scene.actuation.type = scene::ActuationType::sampled;
   scene.actuation.control_period_s = scene.step_s = 0.001;
   return scene;
+}
+
+/// The message with which an update is refused.
+inline std::string refusal(const std::function<void()>& update) {
+  try {
+    update();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "no error";
 }
 
 /// An arm that is simulated by an integrator alone, and a controller that moves it.

@@ -54,14 +54,16 @@ std::int32_t update(std::uint64_t* snapshot, char* error, std::size_t error_size
   });
 }
 
+template <class T>
+const T* required(const T* pointer, const char* what) {
+  if (pointer == nullptr)
+    throw Error(ErrorCode::usage, std::string(what) + ": is null, expected its value");
+  return pointer;
+}
+
 geometry::SE3 pose_of(const double* position, const double* wxyz) {
   return {geometry::rotation_from_wxyz(Eigen::Map<const Eigen::Vector4d>(wxyz)),
           Eigen::Map<const Eigen::Vector3d>(position)};
-}
-
-const char* required(const char* text, const char* what) {
-  if (text == nullptr) throw Error(ErrorCode::usage, std::string(what) + ": is null");
-  return text;
 }
 
 }  // namespace
@@ -77,6 +79,12 @@ hamelin_controller* hamelin_controller_create(const hamelin_controller_options* 
     control::Controller::Options chosen;
     if (options->obstacles_max > 0) chosen.obstacles_max = options->obstacles_max;
     chosen.position = options->position != 0;
+    if (options->late_answers_max < 0)
+      throw Error(ErrorCode::usage,
+                  fmt::format("late_answers_max: is {}, expected 0 or more",
+                              options->late_answers_max));
+    if (options->late_answers_max > 0) chosen.clock_s = control::steady_clock_s;
+    chosen.late_answers_max = options->late_answers_max;
     if (options->acceleration_max > 0.0) chosen.acceleration_max = options->acceleration_max;
     if (options->jerk_max > 0.0) chosen.jerk_max = options->jerk_max;
     if (options->log != nullptr)
@@ -129,6 +137,7 @@ void hamelin_controller_tick(hamelin_controller* controller, double time_s, cons
   full.saturated = answer.saturated ? 1 : 0;
   full.goals = answer.goals_number;
   full.planner_s = answer.planner_s;
+  full.overruns = answer.overruns;
   // A caller that was built against an earlier header has a shorter struct.
   std::memcpy(out, &full, std::min<std::size_t>(out->struct_size, sizeof full));
 }
@@ -137,8 +146,8 @@ std::int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, c
                                                double tolerance_rad, std::uint64_t* number,
                                                char* error, std::size_t error_size) {
   return update(number, error, error_size, [&] {
-    scene::Goal goal =
-        scene::joint_goal(Eigen::Map<const Eigen::VectorXd>(q, controller->q.size()));
+    scene::Goal goal = scene::joint_goal(
+        Eigen::Map<const Eigen::VectorXd>(required(q, "goal: q"), controller->q.size()));
     if (tolerance_rad > 0.0) goal.tolerance_rad = tolerance_rad;
     return controller->controller.set_goal(std::move(goal));
   });
@@ -150,6 +159,7 @@ std::int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller,
                                               double tolerance_rad, std::uint64_t* number,
                                               char* error, std::size_t error_size) {
   return update(number, error, error_size, [&] {
+    (void)required(position_m, "goal: position_m");
     scene::Goal goal = quaternion_wxyz == nullptr
                            ? scene::position_goal(Eigen::Map<const Eigen::Vector3d>(position_m))
                            : scene::pose_goal(pose_of(position_m, quaternion_wxyz));
@@ -200,8 +210,11 @@ std::int32_t hamelin_controller_move_obstacle(hamelin_controller* controller, co
                                               std::size_t error_size) {
   return update(snapshot, error, error_size, [&] {
     return controller->controller.world().move_obstacle(
-        required(name, "obstacle: name"), pose_of(position_m, quaternion_wxyz),
-        Eigen::Map<const Eigen::Vector3d>(velocity_m_s), time_s);
+        required(name, "obstacle: name"),
+        pose_of(required(position_m, "obstacle: position_m"),
+                required(quaternion_wxyz, "obstacle: quaternion_wxyz")),
+        Eigen::Map<const Eigen::Vector3d>(required(velocity_m_s, "obstacle: velocity_m_s")),
+        time_s);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -20,8 +21,9 @@ namespace {
 
 // Obstacles are searched within this distance if the planner gives no other.
 constexpr double default_influence_m = 0.2;
-// Time in which an arm whose planner failed loses most of its speed, as far as accelerations allow.
-constexpr double brake_time_s = 0.05;
+// Time in which an arm whose planner failed loses most of its speed, as far as accelerations allow;
+// it takes at least so many periods, because the feedback of a shorter time would oscillate.
+constexpr double brake_time_s = 0.05, brake_periods = 10.0;
 // The longest path of goals that are set later, if the caller gives no other.
 constexpr std::size_t default_path_points = 256;
 
@@ -92,11 +94,16 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       ws_(nominal_) {
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = zero;
-  q_ = v_ = rate_ = command_rate_ = zero;
+  q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth);
   const double delay = std::round(scene_.actuation.delay_s / period_s_);
   issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
+}
+
+double steady_clock_s() {
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now().time_since_epoch();
+  return time.count();
 }
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
@@ -144,6 +151,7 @@ void Controller::take_params() {
 void Controller::reset() {
   k_ = 0;
   reset_ = true;
+  late_answers_ = 0;
   goals_.restart();
   verdict_.reset();
   answer_.state = ControlState::running;
@@ -218,8 +226,7 @@ void Controller::decide() {
   }
   if (answer_.state != ControlState::stopping) {
     if (!ask_planner()) {
-      answer_.state = ControlState::stopping;
-      answer_.cause = planner_.error();
+      start_braking(failure_);
     } else if (planner_.gave_up()) {
       answer_.state = ControlState::gave_up;
       answer_.cause = planner_.command().raw().cause;
@@ -244,12 +251,49 @@ bool Controller::ask_planner() {
   if (reset_ || (goal_.goal != nullptr && goal_.goal != goal)) ++goal_.number;
   goal_ = {goal, goal_.number, index};
   reset_ = false;
-  const auto since = std::chrono::steady_clock::now();
-  const bool valid = planner_.tick(k_, time_s_, q_, v_, goal_);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - since;
-  answer_.planner_s = took.count();
-  if (answer_.planner_s > deadline_s_) ++answer_.overruns;
-  return valid;
+  const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
+  if (!planner_.tick(k_, time_s_, q_, v_, goal_)) {
+    failure_ = planner_.error();
+    return false;
+  }
+  return options_.clock_s == nullptr || in_time(options_.clock_s() - since_s);
+}
+
+bool Controller::in_time(double planner_s) {
+  answer_.planner_s = planner_s;
+  late_answers_ = planner_s > deadline_s_ ? late_answers_ + 1 : 0;
+  if (late_answers_ > 0 && ++answer_.overruns == 1) log_first_overrun();
+  if (options_.late_answers_max == 0 || late_answers_ < options_.late_answers_max) return true;
+  const auto end =
+      fmt::format_to_n(late_line_.data(), late_line_.size(),
+                       "the last {} answers were late, expected answers within {} s; the last one "
+                       "took {:.3g} s",
+                       late_answers_, deadline_s_, planner_s);
+  failure_ = {late_line_.data(), std::min(late_line_.size(), static_cast<std::size_t>(end.size))};
+  return false;
+}
+
+// Later ones are counted only: an arm that is always late would fill a log.
+void Controller::log_first_overrun() {
+  if (!options_.log || !options_.log_overrun) return;
+  std::array<char, 256> line{};  // not a string, which would be allocated
+  const auto end = fmt::format_to_n(line.data(), line.size(),
+                                    "planner '{}' took {:.3g} s in the tick at {} s, expected at "
+                                    "most its deadline of {} s; later overruns are only counted",
+                                    plugin().name(), answer_.planner_s, time_s_, deadline_s_);
+  options_.log(HAMELIN_LOG_WARNING,
+               {line.data(), std::min(line.size(), static_cast<std::size_t>(end.size))});
+}
+
+double Controller::braking_time_s() const {
+  return std::max(brake_time_s, brake_periods * period_s_);
+}
+
+void Controller::start_braking(std::string_view cause) {
+  answer_.state = ControlState::stopping;
+  answer_.cause = cause;
+  brake_q_ = q_;
+  brake_v_ = v_;
 }
 
 void Controller::form_torque() {
@@ -260,18 +304,26 @@ void Controller::form_torque() {
   answer_.saturated = limits_.limit(answer_.torque, period_s_);
 }
 
-// Accelerates against the velocity, with gravity and Coriolis torques compensated.
+// Follows a motion that loses its velocity and then rests, with gravity and Coriolis torques
+// compensated. Without the two terms of feedback, errors of the nominal masses would let the arm
+// sink; with them it rests off by the error of its acceleration times the square of the time.
 void Controller::brake() {
-  rate_ =
-      (-v_ / brake_time_s).cwiseMin(options_.acceleration_max).cwiseMax(-options_.acceleration_max);
+  const double time_s = braking_time_s(), a = options_.acceleration_max;
+  brake_rate_ = (-brake_v_ / time_s).cwiseMin(a).cwiseMax(-a);
+  rate_ = brake_rate_ + 2.0 / time_s * (brake_v_ - v_) + (brake_q_ - q_) / (time_s * time_s);
+  rate_ = rate_.cwiseMin(a).cwiseMax(-a);
   dynamics::inverse_dynamics(nominal_, ws_, q_, v_, rate_, answer_.torque);
+  brake_v_ += period_s_ * brake_rate_;
+  brake_q_ += period_s_ * brake_v_;
 }
 
-// The velocity follows the planner's, or the one that the torque causes, within bounds of
-// acceleration and jerk; the position integrates it.
+// The velocity goes to zero if the planner failed. Otherwise it follows the planner's, or the one
+// that the torque causes, within bounds of acceleration and jerk; the position integrates it.
 void Controller::form_position() {
   const double T = period_s_;
-  if (answer_.channels != nullptr && answer_.channels->raw().has_node_velocity != 0) {
+  if (answer_.channels == nullptr) {
+    rate_ = -answer_.v_next / braking_time_s();
+  } else if (answer_.channels->raw().has_node_velocity != 0) {
     rate_ = (answer_.channels->node_velocity() - answer_.v_next) / T;
   } else {
     dynamics::forward_dynamics(nominal_, ws_, q_, v_, answer_.torque, rate_);

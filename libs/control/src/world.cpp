@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/text.hpp"
 
 namespace hamelin::control {
 
@@ -20,6 +21,10 @@ void check_update(const scene::Obstacle& obstacle) {
   if (!obstacle.pose.p().allFinite() || !obstacle.pose.R().allFinite())
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: its pose is not finite, expected finite numbers", where));
+  if (!obstacle.known || obstacle.judge_only)
+    throw Error(ErrorCode::invalid, fmt::format("{}: is hidden from the planner (known, "
+                                                "judge_only), expected one that it is shown",
+                                                where));
   scene::check(obstacle, where);
 }
 
@@ -82,9 +87,14 @@ std::size_t World::find(std::string_view name) const {
 
 std::size_t World::require(std::string_view name) const {
   const std::size_t found = find(name);
-  if (found == latest_->environment.obstacles().size())
-    throw Error(ErrorCode::invalid, fmt::format("obstacle '{}': there is none of this name", name));
-  return found;
+  const auto& obstacles = latest_->environment.obstacles();
+  if (found < obstacles.size()) return found;
+  std::vector<std::string> names;
+  for (const auto& obstacle : obstacles) names.push_back(obstacle.name);
+  throw Error(ErrorCode::invalid,
+              fmt::format("obstacle '{}': there is none of this name, expected one of the {} that "
+                          "exist{}",
+                          name, names.size(), did_you_mean(name, names)));
 }
 
 std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
@@ -101,8 +111,8 @@ std::uint64_t World::set_obstacle(scene::Obstacle obstacle) {
     obstacles[found] = std::move(obstacle);
   } else {
     if (obstacles.size() == options_.obstacles_max)
-      throw Error(ErrorCode::invalid, fmt::format("obstacle '{}': there are {} already, the most "
-                                                  "that this world was made for",
+      throw Error(ErrorCode::invalid, fmt::format("obstacle '{}': there are {} already, expected "
+                                                  "fewer (obstacles_max)",
                                                   obstacle.name, obstacles.size()));
     const auto reserved = std::find_if(reserved_.begin(), reserved_.end(), [&](const auto& entry) {
       return entry.first == obstacle.name;

@@ -10,6 +10,7 @@
 
 using namespace hamelin;
 using Catch::Contains;
+using Catch::Equals;
 using Eigen::Vector3d;
 
 namespace {
@@ -69,7 +70,8 @@ TEST_CASE("an update that cannot be applied names what is wrong and changes noth
   const auto before = world.latest();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const geometry::SE3 here;
-  CHECK_THAT(message_of([&] { world.remove_obstacle("b"); }), Contains("obstacle 'b'"));
+  CHECK_THAT(message_of([&] { world.remove_obstacle("b"); }),
+             Equals("obstacle 'b': there is none of this name, expected one of the 1 that exist"));
   CHECK_THAT(message_of([&] { world.move_obstacle("b", here, Vector3d::Zero(), 0.0); }),
              Contains("obstacle 'b'"));
   CHECK_THAT(message_of([&] {
@@ -88,6 +90,12 @@ TEST_CASE("an update that cannot be applied names what is wrong and changes noth
                world.set_obstacle(ball("", {0.0, 0.0, 0.0}));
              }),
              Contains("no name"));
+  CHECK_THAT(message_of([&] {
+               scene::Obstacle hidden = ball("a", {0.0, 0.0, 0.0});
+               hidden.known = false;
+               world.set_obstacle(hidden);
+             }),
+             Contains("obstacle 'a'") && Contains("hidden from the planner"));
   CHECK_THAT(message_of([&] {
                world.set_obstacle(ball("b", {0.0, 0.0, 0.0}));
              }),

@@ -96,6 +96,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
+  options.clock_s = control::steady_clock_s;
+  options.late_answers_max = 0;  // no decision depends on the clock
+  options.log_overrun = false;   // nor does a log; the result has the number
   options.log = [this](std::int32_t level, std::string_view line) {
     log_planner_message(level, line);
   };

@@ -1,16 +1,15 @@
 // Goals and parameters that change while a controller runs.
 #include <atomic>
 #include <catch2/catch.hpp>
-#include <functional>
 #include <thread>
 
 #include "../loop.hpp"
 #include "hamelin/control/hamelin_control.h"
-#include "hamelin/core/error.hpp"
 #include "hamelin/test/allocation_count.hpp"
 
 using namespace hamelin;
 using test::Loop;
+using test::refusal;
 using test::sampled;
 
 namespace {
@@ -27,15 +26,6 @@ long run_to_goals(Loop& loop, std::uint64_t goals_number, int steps) {
   }
   FAIL("goals not reached");
   return allocations;
-}
-
-std::string refusal(const std::function<void()>& update) {
-  try {
-    update();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 }  // namespace

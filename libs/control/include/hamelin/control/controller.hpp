@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -44,11 +45,14 @@ struct Answer {
   std::uint64_t snapshot = 0;
   /// The planner's own figures, see Controller::series(); NaN where it set none.
   std::span<const double> series;
-  /// Wall time that the planner took [s], and how many ticks took longer than the deadline since
-  /// the start. Nothing depends on them.
+  /// Time that the planner took by Options::clock_s [s], and in how many ticks since the start it
+  /// took longer than the deadline; 0 without a clock.
   double planner_s = 0.0;
   std::uint64_t overruns = 0;
 };
+
+/// Seconds of the computer's steady clock.
+[[nodiscard]] double steady_clock_s();
 
 /// What a Controller is made with.
 struct ControllerOptions {
@@ -58,17 +62,27 @@ struct ControllerOptions {
   bool certify = true;
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
   bool torque = true;              ///< fill Answer::torque
-  bool position = false;           ///< fill Answer::q_next and v_next
+  bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
   double acceleration_max = 15.0, jerk_max = 5000.0;
   /// The largest number of way-points of a goal's path, also of goals that are set later; none:
   /// that of the scene's goals, at least 256.
   std::optional<std::size_t> path_points_max;
-  PlannerHost::LineSink log;  ///< receives the planner's messages; empty: none
+  /// Returns seconds, for measuring how long the planner takes: steady_clock_s(), or a clock of the
+  /// caller; null: no clock is read.
+  double (*clock_s)() = nullptr;
+  /// The planner has failed after so many answers in a row beyond the deadline; 0: never. Single
+  /// late answers are used. Without a clock none is late.
+  int late_answers_max = 10;
+  /// Receives the planner's messages on the thread that calls the planner; empty: none.
+  PlannerHost::LineSink log;
+  /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
+  /// measured time, so it differs from run to run.
+  bool log_overrun = true;
 };
 
 /// The control loop of an arm: the world that it sees, its planner, goals and limits, without a
-/// plant. Time comes from the caller; a clock is read only to report how long the planner took. One
+/// plant. Time comes from the caller, also the clock by which the planner is late. One
 /// thread calls tick(); it neither allocates nor locks, unless the planner declares that it does.
 /// Any thread may update world(), goals and the planner's parameters.
 class Controller {
@@ -149,20 +163,24 @@ class Controller {
   }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
-  /// Wall time that the planner should not exceed in a tick [s], see Answer::overruns.
+  /// Time that the planner should not exceed in a tick [s], see Answer::overruns.
   [[nodiscard]] double deadline_s() const noexcept { return deadline_s_; }
 
  private:
-  void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// The planner's parameters on their way to the tick.
   struct NewParams {
     std::uint64_t number = 0;
     std::optional<planning::PreparedParams> params;
   };
+  void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_goals();
   void take_params();
-  /// Calls the planner. @return whether its answer is valid
+  /// Calls the planner. @return whether it has not failed; else failure_ says why
   [[nodiscard]] bool ask_planner();
+  [[nodiscard]] bool in_time(double planner_s);
+  void log_first_overrun();
+  [[nodiscard]] double braking_time_s() const;
+  void start_braking(std::string_view cause);
   void form_torque();
   void form_position();
   void brake();
@@ -197,9 +215,13 @@ class Controller {
   std::optional<Certificate::Verdict> verdict_;
 
   long k_ = 0;
-  bool reset_ = false;  ///< whether the planner is to be told of a new start
+  std::string_view failure_;
+  int late_answers_ = 0;             ///< in a row
+  std::array<char, 192> late_line_;  ///< memory of failure_ where answers were late
+  bool reset_ = false;               ///< whether the planner is to be told of a new start
   double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
+  Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest
 };
 
 }  // namespace hamelin::control

@@ -27,10 +27,14 @@ typedef struct hamelin_controller_options {
   size_t obstacles_max;              /* the largest number of obstacles at a time; 0: 64 */
   int32_t position;                  /* 1: q_next and v_next are computed */
   double acceleration_max, jerk_max; /* bounds of that motion; 0: 15 rad/s^2, 5000 rad/s^3 */
-  /* Receives the planner's messages (not nul-terminated), with HAMELIN_LOG_INFO or _WARNING of the
-   * plugin interface as level; may be null. */
+  /* Receives the planner's messages (not nul-terminated) and the first overrun of its deadline, on
+   * the thread that calls the planner, with HAMELIN_LOG_INFO or _WARNING of the plugin interface as
+   * level; may be null. */
   void (*log)(void* context, int32_t level, const char* text, size_t size);
   void* log_context;
+  /* The planner has failed after so many answers in a row beyond its deadline. 0: no clock is read,
+   * and hamelin_answer has neither planner_s nor overruns. */
+  int32_t late_answers_max;
 } hamelin_controller_options;
 
 enum {
@@ -56,6 +60,7 @@ typedef struct hamelin_answer {
   int32_t saturated;             /* 1: a limit reduced the torque */
   uint64_t goals;                /* number of the list of goals: 0 for the scene's */
   double planner_s;              /* wall time that the planner took */
+  uint64_t overruns;             /* in so many ticks it took longer than its deadline */
 } hamelin_answer;
 
 enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2 };

@@ -48,8 +48,8 @@ class World {
 
   /// Adds an obstacle, or replaces the one of the same name, which keeps its id.
   /// @return the number of the snapshot from which on it exists, as do all updates
-  /// @throws Error invalid for an obstacle that check() refuses, a pose that is not finite, or more
-  ///         obstacles than obstacles_max
+  /// @throws Error invalid for an obstacle that check() refuses or that is hidden from planners, a
+  ///         pose that is not finite, or more obstacles than obstacles_max
   std::uint64_t set_obstacle(scene::Obstacle obstacle);
   /// Moves an obstacle: at time_s it is at the pose, from where it goes on with the velocity
   /// [m/s].

@@ -1,0 +1,241 @@
+// The same as bad_input_test.cpp, through the interface in C.
+#include <array>
+#include <catch2/catch.hpp>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "../loop.hpp"
+#include "hamelin/control/hamelin_control.h"
+#include "hamelin/io/file.hpp"
+#include "hamelin/test/temporary.hpp"
+
+using namespace hamelin;
+using Catch::Contains;
+using Eigen::VectorXd;
+using test::sampled;
+
+namespace {
+
+struct CLogLine {
+  std::int32_t level;
+  std::string text;
+};
+
+/// A controller in C, and an arm that it moves.
+struct CLoop {
+  CLoop(const std::filesystem::path& folder, const std::string& planner, const Json& params,
+        std::int32_t late_answers_max = 0) {
+    Json document =
+        parse_json(read_file(test::data_folder / "scenes/clutter.json"), "clutter.json");
+    document["robot"]["file"] = (test::data_folder / "robots/arm7.urdf").string();
+    document["robot"]["spheres"] = (test::data_folder / "robots/arm7.spheres.json").string();
+    document["map"]["file"] = (test::data_folder / "maps/clutter.bt").string();
+    document["planner"] = {{"name", planner}, {"params", params}};
+    document["actuation"] = {
+        {"type", "sampled"}, {"control_period_s", 0.001}, {"deadline_s", 0.001}};
+    const std::filesystem::path file = folder / "scene.json";
+    write_file_atomically(file, document.dump());
+    scene = scene::read_scene(file);
+
+    const std::array<const char*, 2> plugins{HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR};
+    const std::string name = file.string();
+    hamelin_controller_options options{};
+    options.struct_size = sizeof options;
+    options.scene_file = name.c_str();
+    options.plugin_directories = plugins.data();
+    options.plugin_directory_count = plugins.size();
+    options.position = 1;
+    options.late_answers_max = late_answers_max;
+    options.log = [](void* context, std::int32_t level, const char* text, std::size_t size) {
+      static_cast<CLoop*>(context)->lines.push_back({level, std::string(text, size)});
+    };
+    options.log_context = this;
+    controller = hamelin_controller_create(&options, error.data(), error.size());
+    INFO(error.data());
+    REQUIRE(controller != nullptr);
+    answer.struct_size = sizeof answer;
+    model.emplace(control::load_model(scene));
+    integrator = integration::make_integrator("hamel-variational", *model);
+    v = VectorXd::Zero(model->dof());
+    state = integrator->start(scene.start_q, v);
+  }
+  CLoop(const CLoop&) = delete;
+  CLoop& operator=(const CLoop&) = delete;
+  ~CLoop() { hamelin_controller_destroy(controller); }
+
+  void tick() {
+    hamelin_controller_tick(controller, state.time_s, state.q.data(), v.data(), &answer);
+  }
+  void step() {
+    channels.held_torque = VectorXd::Map(answer.torque, v.size());
+    REQUIRE(integrator->step(state, channels, 0.001).converged);
+    integrator->velocity(state, v);
+  }
+
+  scene::Scene scene;
+  std::optional<model::Model> model;
+  std::unique_ptr<integration::Integrator> integrator;
+  integration::State state;
+  integration::Channels channels;
+  VectorXd v;
+  hamelin_controller* controller = nullptr;
+  hamelin_answer answer{};
+  std::array<char, 512> error{};
+  std::vector<CLogLine> lines;
+};
+
+constexpr std::array<double, 4> upright{1.0, 0.0, 0.0, 0.0};
+constexpr std::array<double, 3> origin{0.0, 0.0, 0.0};
+
+hamelin_obstacle c_ball() {
+  hamelin_obstacle ball{};
+  ball.struct_size = sizeof ball;
+  ball.name = "ball";
+  ball.shape = HAMELIN_SPHERE;
+  ball.radius_m = 0.05;
+  std::copy_n(std::array{0.6, 0.3, 0.9}.begin(), 3, ball.position_m);
+  std::copy(upright.begin(), upright.end(), ball.quaternion_wxyz);
+  return ball;
+}
+
+struct BadCall {
+  std::string message;  ///< that it must contain
+  /// The call, with number, error and its size last.
+  std::function<std::int32_t(hamelin_controller*, std::uint64_t*, char*, std::size_t)> make;
+};
+
+std::vector<BadCall> bad_obstacles() {
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  static constexpr std::array<double, 3> nowhere{nan, 0.0, 0.0};
+  return {
+      {"obstacle 'crate': there is none of this name",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         return hamelin_controller_move_obstacle(c, "crate", origin.data(), upright.data(),
+                                                 origin.data(), 0.0, number, error, size);
+       }},
+      {"obstacle 'crate': there is none of this name",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         return hamelin_controller_remove_obstacle(c, "crate", number, error, size);
+       }},
+      {"obstacle 'ball': its pose is not finite",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         return hamelin_controller_move_obstacle(c, "ball", nowhere.data(), upright.data(),
+                                                 origin.data(), 0.0, number, error, size);
+       }},
+      {"obstacle: velocity_m_s: is null",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         return hamelin_controller_move_obstacle(c, "ball", origin.data(), upright.data(), nullptr,
+                                                 0.0, number, error, size);
+       }},
+      {"obstacle 'ball': its pose is not finite",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.position_m[2] = nan;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
+      {"quaternion_wxyz: the norm is",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.quaternion_wxyz[0] = nan;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
+  };
+}
+
+std::vector<BadCall> bad_calls(const std::string& bad_map) {
+  std::vector<BadCall> calls = bad_obstacles();
+  calls.push_back({bad_map, [bad_map](auto* c, auto* number, char* error, std::size_t size) {
+                     return hamelin_controller_set_map(c, bad_map.c_str(), number, error, size);
+                   }});
+  calls.push_back(
+      {"beyond a limit of joint", [](auto* c, auto* number, char* error, std::size_t size) {
+         const std::vector<double> q(hamelin_controller_dof(c), 100.0);
+         return hamelin_controller_set_joint_goal(c, q.data(), 0.0, number, error, size);
+       }});
+  calls.push_back({"position_m: is null", [](auto* c, auto* number, char* error, std::size_t size) {
+                     return hamelin_controller_set_pose_goal(c, nullptr, nullptr, 0.0, 0.0, number,
+                                                             error, size);
+                   }});
+  calls.push_back({"unknown key 'cruise_sped'", [](auto* c, auto*, char* error, std::size_t size) {
+                     return hamelin_controller_set_planner_params(c, R"({"cruise_sped": 1})", error,
+                                                                  size);
+                   }});
+  calls.push_back({"params_json", [](auto* c, auto*, char* error, std::size_t size) {
+                     return hamelin_controller_set_planner_params(c, "{", error, size);
+                   }});
+  return calls;
+}
+
+}  // namespace
+
+TEST_CASE("in C, bad updates return one line and do not change the motion",
+          "[control][bad_input]") {
+  const test::TemporaryFolder folder;
+  CLoop disturbed(folder.path(), "hybrid", Json::object()),
+      undisturbed(folder.path(), "hybrid", Json::object());
+  const hamelin_obstacle ball = c_ball();
+  for (CLoop* loop : {&disturbed, &undisturbed})
+    REQUIRE(hamelin_controller_set_obstacle(loop->controller, &ball, nullptr, nullptr, 0) == 0);
+  const std::string bad_map = (folder.path() / "no_map.bt").string();
+  write_file_atomically(bad_map, "this is not a map");
+  const auto calls = bad_calls(bad_map);
+  for (std::size_t k = 0; k < 60 * calls.size(); ++k) {
+    if (k % 50 == 25) {
+      const BadCall& bad = calls[(k / 50) % calls.size()];
+      std::uint64_t number = 77;
+      CHECK(bad.make(disturbed.controller, &number, disturbed.error.data(),
+                     disturbed.error.size()) != 0);
+      const std::string message = disturbed.error.data();
+      CHECK_THAT(message, Contains(bad.message));
+      CHECK(message.find('\n') == std::string::npos);
+      CHECK(number == 77);
+    }
+    disturbed.tick();
+    undisturbed.tick();
+    REQUIRE(std::equal(disturbed.answer.torque, disturbed.answer.torque + disturbed.v.size(),
+                       undisturbed.answer.torque));
+    REQUIRE(std::equal(disturbed.answer.q_next, disturbed.answer.q_next + disturbed.v.size(),
+                       undisturbed.answer.q_next));
+    CHECK(disturbed.answer.snapshot == 1);
+    CHECK(disturbed.answer.goals == 0);
+    disturbed.step();
+    undisturbed.step();
+  }
+}
+
+TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",
+          "[control][bad_input]") {
+  const test::TemporaryFolder folder;
+  const auto [how, cause] =
+      GENERATE(table<std::string, std::string>({{"throw", "out of ideas"}, {"nan", "not finite"}}));
+  CLoop loop(folder.path(), "breaking", {{"at_tick", 100}, {"how", how}});
+  for (int k = 0; k < 1500; ++k) {
+    loop.tick();
+    CHECK((loop.answer.state == HAMELIN_CONTROL_STOPPING) == (k >= 100));
+    loop.step();
+  }
+  CHECK_THAT(loop.answer.cause, Contains(cause));
+  CHECK(loop.v.lpNorm<Eigen::Infinity>() < 1e-4);
+  CHECK(VectorXd::Map(loop.answer.v_next, loop.v.size()).lpNorm<Eigen::Infinity>() < 1e-4);
+}
+
+TEST_CASE("in C, late answers are counted and reported once, and then the arm is brought to rest",
+          "[control][bad_input]") {
+  const test::TemporaryFolder folder;
+  CLoop loop(folder.path(), "reporting", {{"sleep_s", 0.002}}, 30);
+  for (int k = 0; k < 400; ++k) {
+    loop.tick();
+    CHECK(loop.answer.overruns == static_cast<std::uint64_t>(std::min(k + 1, 30)));
+    CHECK(loop.answer.state ==
+          (k < 29 ? HAMELIN_CONTROL_RUNNING : HAMELIN_CONTROL_STOPPING));
+    loop.step();
+  }
+  CHECK(loop.answer.planner_s >= 0.002);
+  REQUIRE(loop.lines.size() == 1);
+  CHECK(loop.lines.front().level == HAMELIN_LOG_WARNING);
+  CHECK_THAT(loop.lines.front().text, Contains("expected at most its deadline of 0.001 s"));
+  CHECK_THAT(loop.answer.cause, Contains("the last 30 answers were late"));
+  CHECK(loop.v.lpNorm<Eigen::Infinity>() < 1e-3);
+}

@@ -1,0 +1,177 @@
+#include "updates.hpp"
+
+#include <array>
+#include <chrono>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::test {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr std::size_t names = 12;  // of obstacles
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+// A place that the arm can reach, or nearly so.
+Vector3d random_place(Rng& rng) {
+  return {rng.uniform(-0.9, 0.9), rng.uniform(-0.9, 0.9), rng.uniform(0.0, 1.1)};
+}
+
+geometry::SE3 random_pose(Rng& rng) {
+  Eigen::Vector4d wxyz(rng.normal(), rng.normal(), rng.normal(), rng.normal());
+  return {geometry::rotation_from_wxyz(wxyz.normalized()), random_place(rng)};
+}
+
+void pause(Rng& rng, double longest_s) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(rng.uniform(0.0, longest_s)));
+}
+
+}  // namespace
+
+scene::Obstacle random_obstacle(Rng& rng, std::string name) {
+  scene::Obstacle obstacle;
+  obstacle.name = std::move(name);
+  obstacle.shape = static_cast<scene::Shape>(rng.below(3));
+  obstacle.radius_m = rng.uniform(0.03, 0.1);
+  obstacle.length_m = rng.uniform(0.05, 0.4);
+  obstacle.size_m = {rng.uniform(0.05, 0.3), rng.uniform(0.05, 0.3), rng.uniform(0.05, 0.3)};
+  obstacle.pose = random_pose(rng);
+  return obstacle;
+}
+
+Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot) {
+  Eigen::VectorXd q(robot.dof());
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
+    const auto& joint = robot.links[static_cast<std::size_t>(i)].joint;
+    q[i] = rng.uniform(joint.lower.value_or(-3.0), joint.upper.value_or(3.0));
+  }
+  return q;
+}
+
+Updates::Updates(control::Controller& controller, const scene::Scene& scene,
+                 const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record)
+    : controller_(controller),
+      scene_(scene),
+      robot_(control::load_model(scene).robot()),
+      now_s_(now_s),
+      param_(std::move(param)),
+      record_(std::move(record)),
+      obstacles_([this, seed] { change_obstacles(2 * seed); }),
+      rest_([this, seed] { change_rest(2 * seed + 1); }) {}
+
+void Updates::stop() {
+  stop_ = true;
+  if (obstacles_.joinable()) obstacles_.join();
+  if (rest_.joinable()) rest_.join();
+}
+
+template <class F>
+bool Updates::attempt(bool good, std::atomic<long>& count, F&& change) {
+  bool accepted = true;
+  try {
+    change();
+  } catch (const Error&) {
+    accepted = false;
+  }
+  ++(accepted ? count : counts_.refused);
+  if (accepted != good) ++counts_.wrong;
+  return accepted;
+}
+
+template <class F>
+void Updates::change_world(bool good, std::atomic<long>& count, F&& change) {
+  if (attempt(good, count, std::forward<F>(change)) && record_.world)
+    record_.world(controller_.world().latest());
+}
+
+void Updates::change_obstacles(std::uint64_t seed) {
+  Rng rng(seed);
+  std::set<std::string> present;
+  control::World& world = controller_.world();
+  while (!stop_) {
+    const std::string name = "thing " + std::to_string(rng.below(names));
+    const bool there = present.contains(name);
+    const std::uint64_t choice = rng.below(16);
+    if (choice < 8) {
+      const bool room = there || present.size() < world.obstacles_max();
+      change_world(room, counts_.obstacles,
+                   [&] { world.set_obstacle(random_obstacle(rng, name)); });
+      if (room) present.insert(name);
+    } else if (choice < 12) {
+      const Vector3d velocity = 0.2 * random_place(rng);
+      change_world(there, counts_.obstacles,
+                   [&] { world.move_obstacle(name, random_pose(rng), velocity, now_s_); });
+    } else if (choice < 15) {
+      change_world(there, counts_.obstacles, [&] { world.remove_obstacle(name); });
+      present.erase(name);
+    } else {
+      change_world(false, counts_.obstacles, [&] {
+        world.move_obstacle(name, {Eigen::Matrix3d::Identity(), {nan, 0.0, 0.0}}, Vector3d::Zero(),
+                            now_s_);
+      });
+    }
+    pause(rng, 1e-4);
+  }
+}
+
+void Updates::change_rest(std::uint64_t seed) {
+  Rng rng(seed);
+  while (!stop_) {
+    set_goals(rng);
+    pause(rng, 1e-3);
+    set_params(rng);
+    pause(rng, 1e-3);
+    change_map(rng);
+    pause(rng, 1e-3);
+  }
+}
+
+void Updates::set_goals(Rng& rng) {
+  const bool good = rng.below(8) != 0;
+  std::vector<scene::Goal> goals{scene::joint_goal(random_joints(rng, robot_))};
+  if (rng.below(2) == 0) {  // some are reached at once, so that the next one becomes current
+    goals.front().tolerance_rad = 10.0;
+    goals.front().speed_max = 10.0;
+  }
+  if (rng.below(2) == 0) goals.push_back(scene::position_goal(random_place(rng)));
+  if (!good) goals.back() = scene::position_goal({0.0, nan, 0.0});
+  attempt(good, counts_.goals, [&] {
+    const std::uint64_t number = controller_.set_goals(goals);
+    if (record_.goals) record_.goals(number, goals);
+  });
+}
+
+void Updates::set_params(Rng& rng) {
+  const bool good = rng.below(8) != 0;
+  const Json params{{param_.name, good ? rng.uniform(param_.low, param_.high) : -1.0}};
+  if (good && record_.before_params) record_.before_params(params);
+  attempt(good, counts_.params, [&] { controller_.set_planner_params(params); });
+}
+
+void Updates::change_map(Rng& rng) {
+  control::World& world = controller_.world();
+  const std::uint64_t choice = rng.below(64);
+  if (choice < 8) {
+    scene::MapChangeSpec change;
+    const Vector3d low = random_place(rng), edges = Vector3d::Constant(rng.uniform(0.02, 0.2));
+    (rng.below(2) == 0 ? change.occupied_m : change.free_m).push_back({low, low + edges});
+    change_world(true, counts_.maps, [&] { world.change_map(change); });
+  } else if (choice == 8) {
+    scene::MapSpec map = *scene_.map;
+    const std::array files{"clutter.bt", "shelf.bt"};
+    map.file = map.file.parent_path() / files[rng.below(2)];
+    change_world(true, counts_.maps, [&] { world.set_map(map); });
+  } else if (choice == 9) {
+    scene::MapSpec map = *scene_.map;
+    map.file = map.file.parent_path() / "clutter.primitives.json";  // not a map
+    change_world(false, counts_.maps, [&] { world.set_map(map); });
+  }
+}
+
+}  // namespace hamelin::test
