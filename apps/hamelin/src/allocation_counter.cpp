@@ -33,12 +33,14 @@ bool counts_allocations() noexcept {
 // The program's own definitions replace those of the C library, which does the work under its
 // internal names. They are visible, so that plugins use them too.
 #define HAMELIN_COUNTED extern "C" [[gnu::visibility("default")]]
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): names of the C library
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 HAMELIN_COUNTED void* malloc(std::size_t size) noexcept {
   ++allocation_count;

@@ -81,10 +81,9 @@ std::string answers_or_refuses(const planning::Plugin& plugin, const Json& param
 std::string fails_at_extremes(const planning::Plugin& plugin, double timeout_s) {
   for (const auto& [key, rule] : properties_of(plugin).items())
     for (const Json& value : extremes(rule)) {
+      const Json given{{key, value}};
       const std::string failure = run_in_child(
-          [&] {
-            return answers_or_refuses(plugin, planning::check_params(plugin, {{key, value}}));
-          },
+          [&] { return answers_or_refuses(plugin, planning::check_params(plugin, given)); },
           timeout_s);
       if (!failure.empty())
         return fmt::format("'{}' = {}: {}, expected valid answers or a reason why it cannot start",
