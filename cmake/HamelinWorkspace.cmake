@@ -180,7 +180,10 @@ function(hamelin_benchmarks)
   find_package(Catch2 REQUIRED)
   set(target hamelin_${arg_NAME}_bench)
   add_executable(${target} ${benches} "${PROJECT_SOURCE_DIR}/cmake/bench_main.cpp")
-  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin_options Catch2::Catch2)
+  # It defines main by including Catch2 with a macro that the other sources must not see.
+  set_source_files_properties("${PROJECT_SOURCE_DIR}/cmake/bench_main.cpp" PROPERTIES
+    SKIP_UNITY_BUILD_INCLUSION ON)
+  target_link_libraries(${target} PRIVATE ${arg_LINKS} fmt::fmt hamelin_options Catch2::Catch2)
   target_compile_definitions(${target} PRIVATE CATCH_CONFIG_ENABLE_BENCHMARKING
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   set_property(GLOBAL APPEND PROPERTY HAMELIN_BENCHES ${target})
