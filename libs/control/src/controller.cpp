@@ -192,6 +192,8 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
 }
 
 void Controller::measure(const VectorXd& q, const VectorXd& v) {
+  measured_ = q.allFinite() && (estimator_ || v.allFinite());
+  if (!measured_) return take_braking_state();
   if (!estimator_) {
     q_ = q;
     v_ = v;
@@ -212,6 +214,15 @@ void Controller::measure(const VectorXd& q, const VectorXd& v) {
   v_ = estimator_->v();
 }
 
+// Without a measurement the arm is where braking was to bring it.
+void Controller::take_braking_state() {
+  if (k_ == 0)
+    throw Error(ErrorCode::invalid, "the first measured q or v is not finite, expected numbers");
+  if (answer_.state != ControlState::stopping) return;
+  q_ = brake_q_;
+  v_ = brake_v_;
+}
+
 void Controller::decide() {
   if (k_ == 0 && forms_torque()) {
     dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
@@ -225,7 +236,9 @@ void Controller::decide() {
     command_rate_.setZero();
   }
   if (answer_.state != ControlState::stopping) {
-    if (!ask_planner()) {
+    if (!measured_) {
+      start_braking("the measured q or v is not finite, expected numbers");
+    } else if (!ask_planner()) {
       start_braking(failure_);
     } else if (planner_.gave_up()) {
       answer_.state = ControlState::gave_up;

@@ -6,12 +6,14 @@ namespace hamelin::hybrid {
 
 namespace {
 
-constexpr double smallest_margin_m = 0.001;
+// Motors that act late, with friction and noise, let the arm come about a millimetre nearer.
+constexpr double smallest_m = 0.001, smallest_sampled_m = 0.003;
 
 }  // namespace
 
 Margins::Margins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),
+      smallest_m_(setup.sampled() ? smallest_sampled_m : smallest_m),
       goal_q_(Eigen::VectorXd::Zero(setup.dof())),
       self_at_goal_(params.self_m),
       clearance_at_goal_(setup.shapes().size()) {}
@@ -29,7 +31,7 @@ void Margins::set_goal(Surroundings& surroundings, const hamelin_goal& goal, dou
   }
   for (const auto& contact : surroundings.self_contacts())
     self_at_goal_ =
-        std::min(self_at_goal_, std::max(smallest_margin_m, contact.distance_m - params_.slack_m));
+        std::min(self_at_goal_, std::max(smallest_m_, contact.distance_m - params_.slack_m));
 }
 
 double Margins::at_goal(const NearPoint& point) const {
@@ -37,7 +39,7 @@ double Margins::at_goal(const NearPoint& point) const {
   if (!joint_goal_) return params_.goal_m;
   const double remaining =
       clearance_at_goal_[static_cast<std::size_t>(point.shape)] - params_.slack_m;
-  return std::min(params_.full_m, std::max(smallest_margin_m, remaining));
+  return std::min(params_.full_m, std::max(smallest_m_, remaining));
 }
 
 void Margins::set(std::span<NearPoint> points, double weight) const {

@@ -254,3 +254,26 @@ TEST_CASE("without a clock no answer is late", "[control][bad_input]") {
   CHECK(loop.controller.answer().overruns == 0);
   CHECK(loop.controller.answer().planner_s == 0.0);
 }
+
+TEST_CASE("measurements that are not finite bring the arm to rest from the last good ones",
+          "[control][bad_input]") {
+  const scene::Scene scene = sampled("clutter.json");
+  Loop loop(scene);
+  const VectorXd nowhere =
+      VectorXd::Constant(loop.v.size(), std::numeric_limits<double>::quiet_NaN());
+  CHECK_THROWS_WITH(loop.controller.tick(0.0, nowhere, loop.v),
+                    "the first measured q or v is not finite, expected numbers");
+  for (int k = 0; k < 300; ++k) loop.step(loop.tick().torque);
+  REQUIRE(loop.v.norm() > 0.1);
+  const bool again = GENERATE(false, true);  // whether measurements are good again
+  for (int k = 0; k < 1500; ++k) {
+    const bool good = again && k > 0;
+    const control::Answer& answer = loop.controller.tick(
+        loop.state.time_s, good ? loop.state.q : nowhere, good ? loop.v : nowhere);
+    CHECK(answer.state == control::ControlState::stopping);
+    CHECK(answer.cause == "the measured q or v is not finite, expected numbers");
+    REQUIRE(answer.torque.allFinite());
+    loop.step(answer.torque);
+  }
+  CHECK(loop.v.lpNorm<Eigen::Infinity>() < (again ? 1e-4 : 0.02));
+}

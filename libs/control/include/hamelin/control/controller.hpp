@@ -131,7 +131,9 @@ class Controller {
   /// observe() and decide().
   /// @param time_s of the measurement; must increase from tick to tick
   /// @param q, v measured joint positions and velocities; dof numbers each. v is not used if the
-  ///        scene lets the controller estimate velocities.
+  ///        scene lets the controller estimate velocities. If they are not finite, the arm is
+  ///        brought to rest.
+  /// @throws Error invalid if those of the first tick are not finite
   const Answer& tick(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
 
   /// The first half of a tick: takes the newest snapshot, finds near obstacles, checks goals and
@@ -173,6 +175,7 @@ class Controller {
     std::optional<planning::PreparedParams> params;
   };
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  void take_braking_state();
   void take_goals();
   void take_params();
   /// Calls the planner. @return whether it has not failed; else failure_ says why
@@ -215,6 +218,7 @@ class Controller {
   std::optional<Certificate::Verdict> verdict_;
 
   long k_ = 0;
+  bool measured_ = true;  ///< whether the last measurement is finite
   std::string_view failure_;
   int late_answers_ = 0;             ///< in a row
   std::array<char, 192> late_line_;  ///< memory of failure_ where answers were late
