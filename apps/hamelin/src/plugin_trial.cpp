@@ -54,6 +54,8 @@ control::Controller::Options options_of_trial() {
   control::Controller::Options options;
   options.obstacles_max = 8;
   options.period_s = period_s;
+  options.clock_s = control::steady_clock_s;
+  options.late_answers_max = 0;  // late answers are a finding, no failure
   return options;
 }
 

@@ -64,9 +64,9 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                                        100.0 * r["certified_share"].get<double>(),
                                        number(r["tightest_step_m"]))));
   if (r.contains("torque_change"))
-    line("torque", fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
-                               number(r["torque_change"]["mean"], 3),
-                               number(r["torque_change"]["max"], 3)));
+    line("torque",
+         fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
+                     number(r["torque_change"]["mean"], 3), number(r["torque_change"]["max"], 3)));
   if (r.contains("plant"))
     line(
         "plant",

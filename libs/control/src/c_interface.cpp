@@ -82,9 +82,8 @@ hamelin_controller* hamelin_controller_create(const hamelin_controller_options* 
     if (options->obstacles_max > 0) chosen.obstacles_max = options->obstacles_max;
     chosen.position = options->position != 0;
     if (options->late_answers_max < 0)
-      throw Error(ErrorCode::usage,
-                  fmt::format("late_answers_max: is {}, expected 0 or more",
-                              options->late_answers_max));
+      throw Error(ErrorCode::usage, fmt::format("late_answers_max: is {}, expected 0 or more",
+                                                options->late_answers_max));
     if (options->late_answers_max > 0) chosen.clock_s = control::steady_clock_s;
     chosen.late_answers_max = options->late_answers_max;
     if (options->acceleration_max > 0.0) chosen.acceleration_max = options->acceleration_max;

@@ -13,8 +13,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// One period of the errors of (q, v, d), as a matrix: from the errors of the estimator itself, which
-// starts with one of (1, 0, 0) while the arm rests at zero.
+// One period of the errors of (q, v, d), as a matrix: from the errors of the estimator itself,
+// which starts with one of (1, 0, 0) while the arm rests at zero.
 Matrix3d error_step(double period_s, double bandwidth) {
   const VectorXd zero = VectorXd::Zero(1);
   StateEstimator estimator(1, period_s, bandwidth);

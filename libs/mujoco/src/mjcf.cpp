@@ -101,8 +101,8 @@ class Writer {
     add("/></body>\n");
   }
 
-  // The plant gives these boxes their places and sizes. Shapes that the compiler sees at the origin of
-  // their body stay there.
+  // The plant gives these boxes their places and sizes. Shapes that the compiler sees at the origin
+  // of their body stay there.
   void add_map() {
     const geometry::SE3& pose = environment_.map_pose();
     add("<body name='{}' pos='{}' quat='{}'>", map_body_name, text(pose.p()), rotation(pose.R()));

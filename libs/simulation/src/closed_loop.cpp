@@ -47,10 +47,9 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
 // Whether nothing is hidden from the controller, nothing changes, and it is shown the arm as it is:
 // then one view of the world serves controller and judge.
 bool controller_sees_all(const scene::Scene& scene) {
-  const bool exact = scene.actuation.joint_noise_rad == 0.0 &&
-                     scene.actuation.planner_mass_scale == 1.0 &&
-                     !scene.actuation.estimates_velocity &&
-                     scene.actuation.type != scene::ActuationType::position;
+  const bool exact =
+      scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
+      !scene.actuation.estimates_velocity && scene.actuation.type != scene::ActuationType::position;
   return exact && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
@@ -92,7 +91,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
   options.path_points_max = 0;  // no more than the scene's
-  options.certify = false;  // the judge does, for every step and with all obstacles
+  options.certify = false;      // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;

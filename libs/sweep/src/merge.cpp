@@ -17,7 +17,8 @@ namespace {
 /// Values that a group collects before they are summarized.
 struct GroupData {
   Group group;
-  std::vector<double> torque_changes, clearances, self_clearances, shares, times, p50, p99, recovery, filter;
+  std::vector<double> torque_changes, clearances, self_clearances, shares, times, p50, p99,
+      recovery, filter;
 };
 
 std::optional<double> number_at(const Json& object, const char* key) {

@@ -15,8 +15,8 @@ struct MarginParams {
 
 /// Margins that shrink near the goal, docs/theory.md (10.2), because goals are often closer to
 /// something than the arm should come elsewhere. At a joint goal the margin of a shape is its
-/// clearance there less `slack_m`, at least 1 mm (3 mm if actuation is sampled) and at most the full
-/// margin. At a goal of the tip it is `goal_m`.
+/// clearance there less `slack_m`, at least 1 mm (3 mm if actuation is sampled) and at most the
+/// full margin. At a goal of the tip it is `goal_m`.
 class Margins {
  public:
   Margins(const planning::Setup& setup, const MarginParams& params);
@@ -34,7 +34,7 @@ class Margins {
   [[nodiscard]] double at_goal(const NearPoint& point) const;
 
   MarginParams params_;
-  double smallest_m_;  ///< of a margin at a joint goal
+  double smallest_m_;       ///< of a margin at a joint goal
   Eigen::VectorXd goal_q_;  ///< of a joint goal; sized once, since a tick does not allocate
   bool joint_goal_ = false;
   double self_at_goal_ = 0.0;

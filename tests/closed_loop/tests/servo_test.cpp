@@ -60,8 +60,7 @@ TEST_CASE("a servo's torque follows the set point, which arrives after the delay
   Eigen::VectorXd a(4);
   dynamics::forward_dynamics(model, ws, zero, zero, vector_of(given), a);
   const Eigen::VectorXd v = period_s * a, q = period_s * v;
-  Eigen::VectorXd expected =
-      500.0 * q + Eigen::Vector4d(30.0, 20.0, 10.0, 5.0).cwiseProduct(v);
+  Eigen::VectorXd expected = 500.0 * q + Eigen::Vector4d(30.0, 20.0, 10.0, 5.0).cwiseProduct(v);
   if (dynamic) {  // without gravity in the plane
     Eigen::VectorXd feedforward(4);
     dynamics::inverse_dynamics(model, ws, q, v, a, feedforward);

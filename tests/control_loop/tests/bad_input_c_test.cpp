@@ -228,8 +228,7 @@ TEST_CASE("in C, late answers are counted and reported once, and then the arm is
   for (int k = 0; k < 400; ++k) {
     loop.tick();
     CHECK(loop.answer.overruns == static_cast<std::uint64_t>(std::min(k + 1, 30)));
-    CHECK(loop.answer.state ==
-          (k < 29 ? HAMELIN_CONTROL_RUNNING : HAMELIN_CONTROL_STOPPING));
+    CHECK(loop.answer.state == (k < 29 ? HAMELIN_CONTROL_RUNNING : HAMELIN_CONTROL_STOPPING));
     loop.step();
   }
   CHECK(loop.answer.planner_s >= 0.002);

@@ -294,7 +294,7 @@ TEST_CASE("bash completes commands, options, values, planners and files", "[comm
   CHECK(completions({"scene", ""}) == Strings{"crop", "info", "make"});
   CHECK(completions({"help", "scene", "m"}) == Strings{"make"});
   CHECK(completions({"-q", "plugins", "l"}) == Strings{"list"});
-  CHECK(completions({"run", "--pl"}) == Strings{"--planner", "--plugin-path"});
+  CHECK(completions({"run", "--pl"}) == Strings{"--planner", "--plant", "--plugin-path"});
   CHECK(completions({"scene", "info", "--qu"}) == Strings{"--quiet"});
   CHECK(completions({"integrate", "x.json", "--integrator", "hamel-"}) ==
         Strings{"hamel-midpoint", "hamel-variational"});

@@ -17,8 +17,8 @@ static void log_line(void* context, int32_t level, const char* text, size_t size
 }
 
 /* Writes as much of each struct as the planner's array has room for. */
-static size_t closest_points(void* context, const double* q, double influence_m, hamelin_contact* out, size_t capacity,
-                             size_t stride) {
+static size_t closest_points(void* context, const double* q, double influence_m,
+                             hamelin_contact* out, size_t capacity, size_t stride) {
   size_t i;
   (void)context, (void)q, (void)influence_m;
   for (i = 0; i < 2 && i < capacity; ++i) {
@@ -36,7 +36,8 @@ static int32_t declare_series(void* context, const char* name, const char* unit)
   return series_count < 2 ? series_count++ : -1;
 }
 
-static void fill_setup(hamelin_setup* setup, hamelin_goal* goals, hamelin_shape* shapes, const char* robot_json) {
+static void fill_setup(hamelin_setup* setup, hamelin_goal* goals, hamelin_shape* shapes,
+                       const char* robot_json) {
   size_t i;
   memset(setup, 0, sizeof *setup);
   memset(goals, 0, 2 * sizeof *goals);
@@ -67,7 +68,8 @@ static void fill_setup(hamelin_setup* setup, hamelin_goal* goals, hamelin_shape*
   setup->appended_a = setup->appended_b = MARK;
 }
 
-static void run(const hamelin_plugin* plugin, const char* robot_json, const char* params_json, later_answer* out) {
+static void run(const hamelin_plugin* plugin, const char* robot_json, const char* params_json,
+                later_answer* out) {
   static hamelin_host host; /* static: larger than zero-initialised locals need to be */
   static hamelin_setup setup;
   static hamelin_goal goals[2];
@@ -76,7 +78,8 @@ static void run(const hamelin_plugin* plugin, const char* robot_json, const char
   static hamelin_gyroscopic_term terms[4];
   hamelin_tick tick;
   hamelin_command command;
-  double q[3] = {0.1, 0.2, 0.3}, v[3] = {1.0, 2.0, 3.0}, gradient[3] = {0.0, 0.0, 0.0}, node[3] = {0.0, 0.0, 0.0};
+  double q[3] = {0.1, 0.2, 0.3}, v[3] = {1.0, 2.0, 3.0}, gradient[3] = {0.0, 0.0, 0.0},
+         node[3] = {0.0, 0.0, 0.0};
   void* planner = NULL;
   size_t i;
   memset(&host, 0, sizeof host);
@@ -88,7 +91,8 @@ static void run(const hamelin_plugin* plugin, const char* robot_json, const char
   host.declare_series = declare_series;
   fill_setup(&setup, goals, shapes, robot_json);
   series_count = 0;
-  if (plugin->create(&host, &setup, params_json, strlen(params_json), &planner, out->error, sizeof out->error) != 0)
+  if (plugin->create(&host, &setup, params_json, strlen(params_json), &planner, out->error,
+                     sizeof out->error) != 0)
     return;
   memset(contacts, 0, sizeof contacts);
   memset(terms, 0, sizeof terms);
@@ -121,13 +125,16 @@ static void run(const hamelin_plugin* plugin, const char* robot_json, const char
   command.series_count = 2;
   command.appended_a = command.appended_b = MARK;
   plugin->tick(planner, &tick, &command, out->error, sizeof out->error);
-  out->gyroscopic_link = command.gyroscopic_count > 0 ? terms[command.gyroscopic_count - 1].link : -1;
+  out->gyroscopic_link =
+      command.gyroscopic_count > 0 ? terms[command.gyroscopic_count - 1].link : -1;
   out->overwritten = command.appended_a != MARK || command.appended_b != MARK;
-  for (i = 0; i < 4; ++i) out->overwritten |= terms[i].appended_a != MARK || terms[i].appended_b != MARK;
+  for (i = 0; i < 4; ++i)
+    out->overwritten |= terms[i].appended_a != MARK || terms[i].appended_b != MARK;
   plugin->destroy(planner);
 }
 
-void later_host_tick(const char* plugin_file, const char* robot_json, const char* params_json, later_answer* out) {
+void later_host_tick(const char* plugin_file, const char* robot_json, const char* params_json,
+                     later_answer* out) {
   void* library = dlopen(plugin_file, RTLD_NOW | RTLD_LOCAL);
   union {
     void* symbol;
@@ -143,7 +150,8 @@ void later_host_tick(const char* plugin_file, const char* robot_json, const char
     snprintf(out->error, sizeof out->error, "no entry");
   } else {
     const hamelin_plugin* plugin = entry.call();
-    if (plugin->abi_version_min > HAMELIN_PLUGIN_ABI_VERSION || plugin->abi_version < HAMELIN_PLUGIN_ABI_VERSION_MIN)
+    if (plugin->abi_version_min > HAMELIN_PLUGIN_ABI_VERSION ||
+        plugin->abi_version < HAMELIN_PLUGIN_ABI_VERSION_MIN)
       snprintf(out->error, sizeof out->error, "versions do not overlap");
     else
       run(plugin, robot_json, params_json, out);

@@ -15,8 +15,8 @@ typedef struct planner {
   int32_t goal_series, later_series;
 } planner;
 
-static int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json, size_t params_size,
-                      void** out, char* error, size_t error_size) {
+static int32_t create(const hamelin_host* host, const hamelin_setup* setup, const char* params_json,
+                      size_t params_size, void** out, char* error, size_t error_size) {
   (void)params_json, (void)params_size, (void)error, (void)error_size;
 #ifndef CREATES_NOTHING
   planner* self = malloc(sizeof *self);
@@ -46,13 +46,15 @@ static double sum_of_setup(const hamelin_setup* setup) {
 static int has_later_field(const hamelin_tick* input) {
 #ifdef LATER_HEADER
   return HAMELIN_HAS_FIELD(input, hamelin_tick, appended_b) &&
-         HAMELIN_ELEMENT_HAS_FIELD(input->contacts, input->contact_stride, hamelin_contact, appended_b);
+         HAMELIN_ELEMENT_HAS_FIELD(input->contacts, input->contact_stride, hamelin_contact,
+                                   appended_b);
 #else
   return HAMELIN_HAS_FIELD(input, hamelin_tick, speed_scale) ? 0 : -1;
 #endif
 }
 
-static int32_t tick(void* planner_, const hamelin_tick* input, hamelin_command* command, char* error, size_t error_size) {
+static int32_t tick(void* planner_, const hamelin_tick* input, hamelin_command* command,
+                    char* error, size_t error_size) {
   const planner* self = planner_;
   hamelin_contact found[4];
   size_t i, count;
@@ -70,7 +72,9 @@ static int32_t tick(void* planner_, const hamelin_tick* input, hamelin_command* 
   return 0;
 }
 
-static void destroy(void* self) { free(self); }
+static void destroy(void* self) {
+  free(self);
+}
 
 static const hamelin_plugin plugin = {
 #ifdef SHORT_STRUCT

@@ -9,7 +9,8 @@ namespace hamelin::control {
 class StateEstimator {
  public:
   /// @param period_s time between two measurements @param bandwidth rate at which errors decay
-  ///        [1/s]; a higher one follows disturbances faster and passes on more noise
+  ///        [1/s]; a higher one follows disturbances faster and passes on more noise,
+  ///        docs/theory.md (8.18)
   StateEstimator(Eigen::Index dof, double period_s, double bandwidth);
 
   /// Starts at a measured position, at rest.

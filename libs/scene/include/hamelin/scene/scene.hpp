@@ -82,8 +82,8 @@ enum class ActuationType : std::int32_t { ideal, sampled, position };
 
 [[nodiscard]] std::string_view to_string(ActuationType type) noexcept;
 
-/// Which torques of the planner's model a servo adds to those of its gains: for the motion of the set
-/// points, or only for holding them against gravity.
+/// Which torques of the planner's model a servo adds to those of its gains: for the motion of the
+/// set points, or only for holding them against gravity.
 enum class Feedforward : std::int32_t { dynamics, gravity };
 
 [[nodiscard]] std::string_view to_string(Feedforward feedforward) noexcept;
