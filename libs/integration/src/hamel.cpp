@@ -117,7 +117,7 @@ void Hamel::node_velocity(const State& state, VectorRef v) const {
   dynamics::solve_mass(model_, ws_, state.q, correction_, v);
 }
 
-Energy Hamel::node_energy(const State& state) const {
+Energy Hamel::node_energy(const State& state, const ConstVectorRef&) const {
   if (state.step_previous == 0.0) {
     rate_ = state.memory.tail(model_.dof());  // the velocity that was set
     return {dynamics::kinetic_energy(model_, ws_, state.q, rate_),

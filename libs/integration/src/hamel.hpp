@@ -24,7 +24,8 @@ class Hamel final : public Integrator {
   Hamel(const Model& model, const HamelOptions& options, bool midpoint);
   void node_velocity(const State& state, VectorRef v) const override;
   /// docs/theory.md (3.13), of the last step.
-  [[nodiscard]] Energy node_energy(const State& state) const override;
+  using Integrator::node_energy;
+  [[nodiscard]] Energy node_energy(const State& state, const ConstVectorRef& v) const override;
   void begin(State& state, const ConstVectorRef& v0) override;
   void add_momentum(State& state, const ConstVectorRef& dp) override;
   void replace_velocity(State& state, const ConstVectorRef& v) override;

@@ -111,6 +111,12 @@ Energy Integrator::energy(const State& state) const {
   return node_energy(state);
 }
 
+Energy Integrator::energy(const State& state, const ConstVectorRef& v) const {
+  check("energy", state);
+  check_size("energy", "v", v.size());
+  return node_energy(state, v);
+}
+
 void Integrator::kick(State& state, const ConstVectorRef& dp) {
   check("kick", state);
   check_size("kick", "dp", dp.size());
@@ -231,7 +237,11 @@ void Integrator::halve(State& state, const Channels& channels, double h, int dep
 
 Energy Integrator::node_energy(const State& state) const {
   node_velocity(state, velocity_);
-  return {dynamics::kinetic_energy(model_, ws_, state.q, velocity_),
+  return node_energy(state, velocity_);
+}
+
+Energy Integrator::node_energy(const State& state, const ConstVectorRef& v) const {
+  return {dynamics::kinetic_energy(model_, ws_, state.q, v),
           dynamics::potential_energy(model_, ws_, state.q)};
 }
 

@@ -129,7 +129,7 @@ TEST_CASE("arrays are read and written by their stride", "[planning][unit]") {
   CHECK(longer[1].more == 0.0);  // what the writer does not know is zero
   CHECK(longer[2].more == 1.0);
 
-  std::array<std::int32_t, 3> shorter{1, 2, 3};  // structs that end after `obstacle`
+  std::vector<std::int32_t> shorter{1, 2, 3};  // structs that end after `obstacle`
   const ArrayOut<hamelin_box> narrow(reinterpret_cast<hamelin_box*>(shorter.data()), 3,
                                      sizeof(std::int32_t));
   narrow.set(1, box);

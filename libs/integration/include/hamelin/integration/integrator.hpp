@@ -105,6 +105,8 @@ class Integrator {
   void velocity(const State& state, VectorRef v) const;
   /// Energy at the node, as the scheme defines it.
   [[nodiscard]] Energy energy(const State& state) const;
+  /// The same for callers that have the node's velocity. @param v what velocity() gives
+  [[nodiscard]] Energy energy(const State& state, const ConstVectorRef& v) const;
   /// Adds an impulse at the node: p += dp [Nm s], e.g. docs/theory.md (8.1).
   void kick(State& state, const ConstVectorRef& dp);
   /// Sets the velocity at the node: p = M(θ^k) v, docs/theory.md (8.3).
@@ -136,7 +138,8 @@ class Integrator {
   /// Sets the scheme's part of a state whose q is set.
   virtual void begin(State& state, const ConstVectorRef& v0) = 0;
   virtual void node_velocity(const State& state, VectorRef v) const = 0;
-  [[nodiscard]] virtual Energy node_energy(const State& state) const;
+  [[nodiscard]] virtual Energy node_energy(const State& state, const ConstVectorRef& v) const;
+  [[nodiscard]] Energy node_energy(const State& state) const;
   virtual void add_momentum(State& state, const ConstVectorRef& dp) = 0;
   virtual void replace_velocity(State& state, const ConstVectorRef& v) = 0;
   /// One undivided step. If it does not converge, the state is unchanged.
