@@ -29,9 +29,7 @@ using namespace hamelin;
 
 void write_line(std::string_view line, char* out, std::size_t size) noexcept {
   if (out == nullptr || size == 0) return;
-  const std::size_t length = std::min(line.size(), size - 1);
-  std::memcpy(out, line.data(), length);
-  out[length] = '\0';
+  out[line.copy(out, size - 1)] = '\0';
 }
 
 // Runs f; what it throws becomes a line. @return 0, or 1 if it threw
