@@ -19,9 +19,7 @@ class SimulatedArm final : public Plant {
   [[nodiscard]] const Description& description() const noexcept override { return description_; }
   void start(const Eigen::VectorXd& q, const Eigen::VectorXd& v) override;
   [[nodiscard]] bool step(const Eigen::VectorXd& torque, double step_s) override;
-  [[nodiscard]] integration::Energy energy() override {
-    return integrator->energy(state, node_.v);
-  }
+  [[nodiscard]] integration::Energy energy() override { return integrator->energy(state, node_.v); }
 
   /// Advances with the channels as they are. The node's velocity is updated by update_velocity().
   [[nodiscard]] bool step_channels(double step_s);
