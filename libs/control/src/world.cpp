@@ -90,6 +90,7 @@ std::size_t World::require(std::string_view name) const {
   const auto& obstacles = latest_->environment.obstacles();
   if (found < obstacles.size()) return found;
   std::vector<std::string> names;
+  names.reserve(obstacles.size());
   for (const auto& obstacle : obstacles) names.push_back(obstacle.name);
   throw Error(ErrorCode::invalid,
               fmt::format("obstacle '{}': there is none of this name, expected one of the {} that "

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "loading.hpp"
+
 namespace hamelin::mujoco {
 
 using Eigen::Vector3d;
@@ -19,7 +21,7 @@ int NearBoxes::choose(const scene::BoxField& field, const geometry::SE3& map_pos
   chosen_.clear();
   chosen_.reserve(field.boxes().size());
   for (std::size_t i = 0; i < arm_shapes_.size(); ++i)
-    reference_[i] = Eigen::Map<const Vector3d>(data.geom_xpos + 3 * arm_shapes_[i]);
+    reference_[i] = Eigen::Map<const Vector3d>(vector_of(data.geom_xpos, arm_shapes_[i]));
   for (std::size_t k = 0; k < field.boxes().size(); ++k) {
     if (!field.alive(k)) continue;
     const scene::Box& box = field.boxes()[k];
@@ -41,7 +43,7 @@ int NearBoxes::choose(const scene::BoxField& field, const geometry::SE3& map_pos
 double NearBoxes::moved_m(const mjData& data) const {
   double square = 0.0;
   for (std::size_t i = 0; i < arm_shapes_.size(); ++i) {
-    const Eigen::Map<const Vector3d> now(data.geom_xpos + 3 * arm_shapes_[i]);
+    const Eigen::Map<const Vector3d> now(vector_of(data.geom_xpos, arm_shapes_[i]));
     square = std::max(square, (now - reference_[i]).squaredNorm());
   }
   return std::sqrt(square);
@@ -52,8 +54,8 @@ void NearBoxes::place(const scene::BoxField& field, mjModel& model, int map_body
   for (const int k : chosen_) {
     const scene::Box& box = field.boxes()[static_cast<std::size_t>(k)];
     const Vector3d center = 0.5 * (box.lo + box.hi), half = 0.5 * (box.hi - box.lo);
-    mju_copy3(model.geom_pos + 3 * geom, center.data());
-    mju_copy3(model.geom_size + 3 * geom, half.data());
+    mju_copy3(vector_of(model.geom_pos, geom), center.data());
+    mju_copy3(vector_of(model.geom_size, geom), half.data());
     model.geom_rbound[geom] = half.norm();
     ++geom;
   }

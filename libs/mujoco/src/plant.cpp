@@ -111,7 +111,7 @@ class MujocoPlant final : public simulation::Plant {
       const model::Link& link = links[static_cast<std::size_t>(i)];
       const int body = mj_name2id(model_.get(), mjOBJ_BODY, link_name(i).c_str());
       model_->body_mass[body] = link.mass_kg;
-      mju_copy3(model_->body_inertia + 3 * body, principal_inertia(link).moments.data());
+      mju_copy3(vector_of(model_->body_inertia, body), principal_inertia(link).moments.data());
     }
     mj_setConst(model_.get(), data_.get());
     find_obstacles();
@@ -147,7 +147,7 @@ class MujocoPlant final : public simulation::Plant {
       model_->geom_conaffinity[o.geom] = scene::exists(*o.obstacle, node_.time_s) ? 1 : 0;
       if (o.mocap < 0) continue;
       const Eigen::Vector3d at = scene::position_at(*o.obstacle, node_.time_s);
-      mju_copy3(data_->mocap_pos + 3 * o.mocap, at.data());
+      mju_copy3(vector_of(data_->mocap_pos, o.mocap), at.data());
     }
     mj_step1(model_.get(), data_.get());
     if (environment_.map_field().empty()) return;
