@@ -223,18 +223,20 @@ void Controller::take_braking_state() {
   v_ = brake_v_;
 }
 
+// Until the first answer acts, the arm is held against gravity.
+void Controller::start_outputs() {
+  answer_.q_next = q_;
+  answer_.v_next = v_;
+  command_rate_.setZero();
+  if (!forms_torque()) return;
+  dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
+  limits_.start_from(answer_.torque);
+  if (!options_.position)
+    for (auto& torque : issued_) torque = answer_.torque;
+}
+
 void Controller::decide() {
-  if (k_ == 0 && forms_torque()) {
-    dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
-    limits_.start_from(answer_.torque);
-    if (!options_.position)
-      for (auto& torque : issued_) torque = answer_.torque;
-  }
-  if (k_ == 0) {
-    answer_.q_next = q_;
-    answer_.v_next = v_;
-    command_rate_.setZero();
-  }
+  if (k_ == 0) start_outputs();
   if (answer_.state != ControlState::stopping) {
     if (!measured_) {
       start_braking("the measured q or v is not finite, expected numbers");

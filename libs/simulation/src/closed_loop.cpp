@@ -293,12 +293,14 @@ void ClosedLoop::check_outcome() {
 }
 
 bool ClosedLoop::arrived() const {
-  if (scene_.actuation.type != scene::ActuationType::position) return true;
+  return scene_.actuation.type != scene::ActuationType::position || goal_error().reached;
+}
+
+control::GoalError ClosedLoop::goal_error() const {
   dynamics::Workspace ws(model_);
   dynamics::forward_kinematics(model_, ws, plant_->node().q);
   return control::goal_error(controller_->goals().goal(), model_, ws, plant_->node().q,
-                             plant_->node().v)
-      .reached;
+                             plant_->node().v);
 }
 
 void ClosedLoop::count_contacts() {
@@ -458,11 +460,8 @@ void ClosedLoop::fill_result() {
   result_.seed = scene_.seed;
   result_.deadline_us = 1e6 * controller_->deadline_s();
   result_.late_ticks = controller_->answer().overruns;
-  dynamics::Workspace ws(model_);
-  dynamics::forward_kinematics(model_, ws, plant_->node().q);
   const control::GoalTracker& goals = controller_->goals();
-  const control::GoalError error =
-      control::goal_error(goals.goal(), model_, ws, plant_->node().q, plant_->node().v);
+  const control::GoalError error = goal_error();
   log::Result::Goal out;
   out.type = scene::type_name(goals.goal());
   out.index = goals.index();

@@ -46,6 +46,8 @@ class ClosedLoop {
   void check_outcome();
   /// Whether the arm itself is at the last goal, when its set point is.
   [[nodiscard]] bool arrived() const;
+  /// Of the arm itself, at the current goal or the last one.
+  [[nodiscard]] control::GoalError goal_error() const;
   /// Counts the contacts of this node for the result, if the plant counts, too.
   void count_contacts();
   /// Describes the contact at this node, and who counted it if the plant counts, too.

@@ -176,6 +176,7 @@ class Controller {
   };
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
+  void start_outputs();
   void take_goals();
   void take_params();
   /// Calls the planner. @return whether it has not failed; else failure_ says why
