@@ -96,7 +96,8 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   answer_.torque = answer_.q_next = answer_.v_next = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
   if (!scene_.actuation.estimates_velocity) return;
-  estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth);
+  estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
+                     scene_.actuation.joint_noise_rad);
   const double delay = std::round(scene_.actuation.delay_s / period_s_);
   issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
 }

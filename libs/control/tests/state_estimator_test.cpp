@@ -62,12 +62,15 @@ TEST_CASE("an unknown constant acceleration leaves no error", "[control][estimat
 }
 
 TEST_CASE("noise of positions reaches the velocity as theory says", "[control][estimator][unit]") {
-  const double period_s = 0.001, sigma = 1e-4, bandwidth = GENERATE(45.0, 200.0);
+  const double period_s = 0.001, sigma = 1e-4;
+  // A stated noise changes nothing as long as there is nothing else.
+  const auto [bandwidth, stated] =
+      GENERATE(table<double, double>({{30.0, 0.0}, {200.0, 0.0}, {30.0, 1e-4}}));
   const double theta = std::exp(-bandwidth * period_s), rest = 1.0 - theta;
   const double expected =
       sigma * std::sqrt(rest * rest * rest * (13.0 + 50.0 * theta + 49.0 * theta * theta) /
                         (2.0 * period_s * period_s * std::pow(1.0 + theta, 5)));
-  StateEstimator estimator(1, period_s, bandwidth);
+  StateEstimator estimator(1, period_s, bandwidth, stated);
   const VectorXd zero = VectorXd::Zero(1);
   estimator.start(zero);
   Rng random(7);
@@ -79,4 +82,23 @@ TEST_CASE("noise of positions reaches the velocity as theory says", "[control][e
   }
   // About samples * rest / 4 of the values are independent, so the deviation is below 2 %.
   CHECK(std::sqrt(sum / samples) == Approx(expected).epsilon(0.05));
+}
+
+TEST_CASE("a bandwidth that rises follows a growing disturbance", "[control][estimator][unit]") {
+  const double period_s = 1e-4, bandwidth = 30.0, growth = 100.0, sigma = 1e-4;
+  // Where the bandwidth settles: (8.19).
+  const double raised = std::pow(growth * bandwidth / sigma, 0.25);
+  StateEstimator fixed(1, period_s, bandwidth), adapting(1, period_s, bandwidth, sigma);
+  const VectorXd zero = VectorXd::Zero(1);
+  for (auto* estimator : {&fixed, &adapting}) estimator->start(zero);
+  double v = 0.0;
+  for (int k = 1; k <= 10'000; ++k) {
+    const double t = period_s * k;
+    const VectorXd q = VectorXd::Constant(1, growth * t * t * t / 6.0);
+    v = growth * t * t / 2.0;
+    for (auto* estimator : {&fixed, &adapting}) estimator->update(q, zero);
+  }
+  // The theory is that of short periods.
+  CHECK(v - fixed.v()[0] == Approx(3.0 * growth / (bandwidth * bandwidth)).epsilon(0.02));
+  CHECK(v - adapting.v()[0] == Approx(3.0 * growth / (raised * raised)).epsilon(0.02));
 }

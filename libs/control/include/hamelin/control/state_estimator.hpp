@@ -11,7 +11,10 @@ class StateEstimator {
   /// @param period_s time between two measurements @param bandwidth rate at which errors decay
   ///        [1/s]; a higher one follows disturbances faster and passes on more noise,
   ///        docs/theory.md (8.18)
-  StateEstimator(Eigen::Index dof, double period_s, double bandwidth);
+  /// @param noise standard deviation of the measured positions [rad or m]; with it the bandwidth of
+  ///        a joint rises while the error of its prediction is more than noise, docs/theory.md
+  ///        (8.19). 0 keeps the bandwidth.
+  StateEstimator(Eigen::Index dof, double period_s, double bandwidth, double noise = 0.0);
 
   /// Starts at a measured position, at rest.
   void start(const Eigen::VectorXd& q);
@@ -26,9 +29,14 @@ class StateEstimator {
   [[nodiscard]] const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }
 
  private:
-  double period_s_;
-  double position_gain_, velocity_gain_, disturbance_gain_;
-  Eigen::VectorXd q_, v_, disturbance_, error_;
+  struct Gains {
+    double position, velocity, disturbance;
+  };
+  [[nodiscard]] Gains gains(double bandwidth) const;
+
+  double period_s_, bandwidth_, noise_, smoothing_;
+  Gains usual_;
+  Eigen::VectorXd q_, v_, disturbance_, smooth_error_;
 };
 
 }  // namespace hamelin::control

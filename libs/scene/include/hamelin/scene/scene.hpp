@@ -102,7 +102,7 @@ struct Actuation {
   double joint_noise_rad = 0.0;
   /// Whether the controller estimates joint velocities from the measured positions.
   bool estimates_velocity = false;
-  double estimator_bandwidth = 45.0;  ///< [1/s]
+  double estimator_bandwidth = 30.0;  ///< [1/s]
   double planner_mass_scale = 1.0;
   /// Sampled: of each joint's held torque [Nm/s or N/s].
   std::optional<double> torque_rate_max_Nm_s;
