@@ -152,7 +152,8 @@ function(hamelin_tests)
   # in std::optional.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin::io hamelin_options Catch2::Catch2WithMain)
+  target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin::io hamelin_allocation_count
+    hamelin_options Catch2::Catch2WithMain)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/include")
   target_compile_definitions(${target} PRIVATE
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"

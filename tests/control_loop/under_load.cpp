@@ -337,7 +337,7 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
   History history;
   history.snapshots[0] = controller.world().latest();
   history.goals[0] = scene.goals;
-  if (HAMELIN_COUNTS_ALLOCATIONS == 0)
+  if (!counts_allocations())
     fmt::print("allocations and locks are not counted in this build\n");
   else if (!counters_work(history))
     return fail("the counters of allocations and locks do not count");
@@ -362,7 +362,7 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
       "{} answers computed again, of which {} would differ with the next recorded snapshot; "
       "{} left out\n",
       checker.checked(), checker.distinguished(), unrecorded);
-  if (HAMELIN_COUNTS_ALLOCATIONS != 0)
+  if (counts_allocations())
     fmt::print("{} allocations, {} locks\n", totals.allocations, totals.locks);
   return judge(totals, checker, counts, history);
 }

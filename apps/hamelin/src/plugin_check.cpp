@@ -6,9 +6,9 @@
 #include <initializer_list>
 #include <utility>
 
-#include "allocation_counter.hpp"
 #include "child_process.hpp"
 #include "empty_host.hpp"
+#include "hamelin/core/allocation_count.hpp"
 #include "hamelin/core/error.hpp"
 #include "plugin_trial.hpp"
 

@@ -9,9 +9,9 @@
 #include <thread>
 #include <utility>
 
-#include "allocation_counter.hpp"
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/core/allocation_count.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/model/make_chain.hpp"
 
@@ -79,9 +79,9 @@ class Loop {
 
   /// @return whether the planner's answer is valid
   bool tick(Trial& out, std::vector<std::uint64_t>& answers) {
-    const long before = allocations();
+    const long before = allocation_count();
     const control::Answer& answer = controller_.tick(state_.time_s, state_.q, v_);
-    const long made = allocations() - before;
+    const long made = allocation_count() - before;
     if (made > 0 && out.allocating_tick < 0) out.allocating_tick = state_.k;
     out.allocations += made;
     if (answer.state == control::ControlState::stopping) {

@@ -7,7 +7,7 @@
 
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/rng.hpp"
-#include "hamelin/test/allocation_count.hpp"
+#include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;

@@ -5,7 +5,7 @@
 
 #include "../loop.hpp"
 #include "hamelin/control/hamelin_control.h"
-#include "hamelin/test/allocation_count.hpp"
+#include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
 using test::Loop;

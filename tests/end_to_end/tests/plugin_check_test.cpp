@@ -1,7 +1,7 @@
 #include <string>
 
 #include "../program.hpp"
-#include "hamelin/test/allocation_count.hpp"
+#include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
 using test::Sandbox;

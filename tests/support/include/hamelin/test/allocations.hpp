@@ -1,55 +1,22 @@
 #pragma once
-// Eigen comes first: its includes declare posix_memalign again, which clang refuses after the
-// definition below.
-#include <Eigen/Core>
-#include <cerrno>
-#include <cstdlib>
+#include <catch2/catch.hpp>
 
-#include "hamelin/test/allocation_count.hpp"
+#include "hamelin/core/allocation_count.hpp"
 
-/// Counts the heap allocations of a test program: calls of malloc and related functions, which
-/// operator new and Eigen use. This header replaces them in the whole program, so include it in
-/// exactly one source file.
+namespace hamelin::test {
 
-#if HAMELIN_COUNTS_ALLOCATIONS
-
-// The replacements call the C library's heap by its internal names. They are visible, so that
-// allocations of shared libraries and plugins are counted too. free() stays that of the C library.
-#define HAMELIN_COUNTED extern "C" [[gnu::visibility("default")]]
-extern "C" {
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
+/// Allocations made by f() on this thread.
+template <class F>
+long allocations_in(F&& f) {
+  const long before = allocation_count();
+  f();
+  return allocation_count() - before;
 }
 
-HAMELIN_COUNTED void* malloc(std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  return __libc_malloc(size);
+/// Whether allocations are counted in this build; if not, it warns that the test is skipped.
+inline bool counts_allocations() {
+  if (!hamelin::counts_allocations()) WARN("skipped: this build does not count allocations");
+  return hamelin::counts_allocations();
 }
-HAMELIN_COUNTED void* calloc(std::size_t count, std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  return __libc_calloc(count, size);
-}
-HAMELIN_COUNTED void* realloc(void* p, std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  return __libc_realloc(p, size);
-}
-HAMELIN_COUNTED void* memalign(std::size_t alignment, std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  return __libc_memalign(alignment, size);
-}
-HAMELIN_COUNTED void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  return __libc_memalign(alignment, size);
-}
-HAMELIN_COUNTED int posix_memalign(void** p, std::size_t alignment, std::size_t size) noexcept {
-  ++hamelin::test::allocation_count;
-  void* const memory = __libc_memalign(alignment, size);
-  if (memory == nullptr) return ENOMEM;
-  *p = memory;
-  return 0;
-}
-#undef HAMELIN_COUNTED
 
-#endif
+}  // namespace hamelin::test

@@ -2,8 +2,6 @@
 #include <dlfcn.h>
 #include <pthread.h>
 
-#include "hamelin/test/allocation_count.hpp"
-
 /// Counts the calls of a test program, its plugins and its shared libraries that lock a mutex, a
 /// read-write lock or a spin lock; a wait on a condition needs a mutex first. This header replaces
 /// these functions in the whole program, so include it in exactly one source file. Where
@@ -23,7 +21,9 @@ long locks_in(F&& f) {
 
 }  // namespace hamelin::test
 
-#if HAMELIN_COUNTS_ALLOCATIONS
+// As for allocations: sanitizers intercept these functions, and other C libraries name them
+// otherwise.
+#if defined(__GLIBC__) && !defined(HAMELIN_SANITIZED)
 
 // Counts a call and passes it on to the C library.
 #define HAMELIN_COUNTED_LOCK(function, type)                                                 \
