@@ -332,7 +332,8 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
     const Json* at = object.is_object() ? find(object, key) : nullptr;
     return at != nullptr && at->is_string() ? *at : Json(nullptr);
   };
-  const Json outcome = text(result_, "outcome"), cause = text(result_, "cause");
+  const Json outcome = text(result_, "outcome"), cause = text(result_, "cause"),
+             integrator = text(result_, "integrator");
   summary.outcome = outcome.is_null() ? "unfinished" : outcome.get<std::string>();
   summary.time_s = time_s_;
   summary.ticks = ticks_;
@@ -342,7 +343,8 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["log"] = summary.log.filename().string();
   run["scene"] = recorded_.scene.name;
   run["planner"] = recorded_.scene.planner ? Json(recorded_.scene.planner->name) : Json(nullptr);
-  run["integrator"] = recorded_.scene.integrator.name;
+  // A plant that is not hamelin's own has its own integrator.
+  run["integrator"] = integrator.is_null() ? Json(recorded_.scene.integrator.name) : integrator;
   run["outcome"] = summary.outcome;
   run["cause"] = cause == "" ? Json(nullptr) : cause;
   run["result"] = std::move(result_);

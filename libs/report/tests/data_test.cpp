@@ -337,6 +337,18 @@ TEST_CASE("runs of one scene share a world and have different names", "[report]"
   CHECK(page.head["runs"][0]["config"]["planner"]["name"] == "hybrid");
 }
 
+TEST_CASE("the integrator is that of the plant", "[report]") {
+  const auto folder = test::scratch("integrator");
+  (void)test::log_run(test::shelf(0.02), folder / "own.jsonl");
+  std::string text = read_file(folder / "own.jsonl");
+  const std::string own = R"("integrator":"hamel-variational")";
+  text.replace(text.rfind(own), own.size(), R"("integrator":"mujoco-euler")");  // in the result
+  std::ofstream(folder / "other.jsonl", std::ios::binary) << text;
+  const Decoded page(report::make_data({folder / "own.jsonl", folder / "other.jsonl"}).bytes);
+  CHECK(page.head["runs"][0]["integrator"] == "hamel-variational");
+  CHECK(page.head["runs"][1]["integrator"] == "mujoco-euler");
+}
+
 TEST_CASE("equal inputs give equal bytes", "[report]") {
   const auto folder = test::scratch("same");
   (void)test::log_run(test::shelf(0.1), folder / "a.jsonl");
