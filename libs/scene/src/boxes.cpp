@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <iterator>
@@ -184,6 +185,73 @@ bool join(std::vector<VoxelBox>& boxes, std::size_t axis) {
   return any;
 }
 
+/// The grains, cubes of so many voxels, whose centres are in a ball.
+class GrainsInBall {
+ public:
+  GrainsInBall(const Ball& ball, std::int32_t grain, double resolution)
+      : ball_(ball), grain_(grain), resolution_(resolution), radius2_(ball.radius * ball.radius) {}
+
+  /// Whether that of this voxel is one.
+  [[nodiscard]] bool contains(const std::array<std::int32_t, 3>& voxel) const {
+    return squared(0, index(voxel[0])) + squared(1, index(voxel[1])) +
+               squared(2, index(voxel[2])) <=
+           radius2_;
+  }
+
+  /// Volume in voxels of those in a cell that is larger than a grain, column by column.
+  [[nodiscard]] double volume(const Cell& cell) const {
+    std::array<Range, 3> range;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const std::int32_t first = index(cell.lo[axis]);
+      range[axis] = within(axis, 0.0, {first, first + cell.size / grain_});
+    }
+    double count = 0.0;
+    for (std::int32_t x = range[0].begin; x < range[0].end; ++x)
+      for (std::int32_t y = range[1].begin; y < range[1].end; ++y) {
+        const Range column = within(2, squared(0, x) + squared(1, y), range[2]);
+        count += column.end - column.begin;
+      }
+    const double edge = grain_;
+    return count * edge * edge * edge;
+  }
+
+ private:
+  struct Range {
+    std::int32_t begin, end;
+  };
+
+  [[nodiscard]] std::int32_t index(std::int32_t voxel) const {
+    return (voxel & ~(grain_ - 1)) / grain_;
+  }
+  /// Square of the distance of a grain's centre from that of the ball along an axis.
+  [[nodiscard]] double squared(unsigned axis, std::int32_t grain) const {
+    const double lo = resolution_ * (grain * grain_), hi = resolution_ * ((grain + 1) * grain_);
+    const double offset = 0.5 * (lo + hi) - ball_.center[axis];
+    return offset * offset;
+  }
+  /// The part of a range of grains along an axis that is in the ball, given the squares along the
+  /// other axes. The root gives its ends to rounding, the sum of squares decides.
+  [[nodiscard]] Range within(unsigned axis, double others, Range range) const {
+    const auto in = [&](std::int32_t grain) { return others + squared(axis, grain) <= radius2_; };
+    const double edge = resolution_ * grain_, center = ball_.center[axis] / edge - 0.5,
+                 half = std::sqrt(std::max(0.0, radius2_ - others)) / edge;
+    const auto clamped = [&](double x) {
+      return static_cast<std::int32_t>(
+          std::clamp(x, static_cast<double>(range.begin), static_cast<double>(range.end)));
+    };
+    Range found{clamped(std::ceil(center - half)), clamped(std::floor(center + half) + 1.0)};
+    while (found.begin > range.begin && in(found.begin - 1)) --found.begin;
+    while (found.end < range.end && in(found.end)) ++found.end;
+    while (found.begin < found.end && !in(found.begin)) ++found.begin;
+    while (found.begin < found.end && !in(found.end - 1)) --found.end;
+    return found;
+  }
+
+  Ball ball_;
+  std::int32_t grain_;
+  double resolution_, radius2_;
+};
+
 }  // namespace
 
 std::vector<Cell> crop(const std::vector<Cell>& cells, double resolution, const Ball& ball) {
@@ -240,25 +308,18 @@ double volume_inside(const std::vector<Cell>& cells, double resolution, const Ba
   // divided into cells.
   std::int32_t grain = 1;
   while (2.0 * grain * 128.0 * resolution <= ball.radius && grain < (1 << 15)) grain *= 2;
-  std::vector<Cell> stack(cells.rbegin(), cells.rend());
-  while (!stack.empty()) {
-    const Cell cell = stack.back();
-    stack.pop_back();
+  const GrainsInBall grains(ball, grain, resolution);
+  for (const Cell& cell : cells) {
     const double edge = cell.size, volume = edge * edge * edge;
     if (cell.size <= grain) {
-      Cell around{cell.lo, grain};
-      for (std::int32_t& lo : around.lo) lo &= ~(grain - 1);
-      const Box box = to_metres(around, resolution);
-      if ((0.5 * (box.lo + box.hi) - ball.center).squaredNorm() <= radius2) voxels += volume;
+      if (grains.contains(cell.lo)) voxels += volume;
       continue;
     }
     const Box box = to_metres(cell, resolution);
     if (squared_distance(ball.center, box) > radius2) continue;
-    if (squared_distance_to_farthest_corner(ball.center, box) <= radius2) {
-      voxels += volume;
-    } else {
-      push_children(cell, stack);
-    }
+    voxels += squared_distance_to_farthest_corner(ball.center, box) <= radius2
+                  ? volume
+                  : grains.volume(cell);
   }
   return voxels * resolution * resolution * resolution;
 }

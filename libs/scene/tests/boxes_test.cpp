@@ -142,6 +142,29 @@ TEST_CASE("the volume inside a ball is that of the ball, to the voxels at its su
         Approx(ball / 8.0).epsilon(0.01));
 }
 
+TEST_CASE("volumes inside a ball add up to the voxel", "[scene][unit]") {
+  // Voxels of half the size of a grain, and of grains.
+  const double resolution = GENERATE(0.02, 0.004);
+  const Ball ball{{0.0123, -0.3, 0.171}, 0.83};
+  const double voxel = resolution * resolution * resolution;
+  const auto voxels = [&](std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t size) {
+    return std::round(volume_inside({{{x, y, z}, size}}, resolution, ball) / voxel);
+  };
+  // Each of these cells is the sum of the smaller ones in it, down to voxels.
+  const auto check_parts = [&](std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t size,
+                               std::int32_t part) {
+    double sum = 0.0;
+    for (std::int32_t i = 0; i < size; i += part)
+      for (std::int32_t j = 0; j < size; j += part)
+        for (std::int32_t k = 0; k < size; k += part) sum += voxels(x + i, y + j, z + k, part);
+    CHECK(sum == voxels(x, y, z, size));
+    return sum;
+  };
+  CHECK(check_parts(-512, -512, -512, 1024, 128) > 2.9e5);
+  for (const std::int32_t x : {-128, 0}) (void)check_parts(x, -128, 0, 128, 32);
+  CHECK(check_parts(32, -32, 0, 32, 1) > 0.0);
+}
+
 TEST_CASE("cutting out a ball removes every voxel that touches it and no other", "[scene][unit]") {
   const std::vector<Cell> cells{{{-32, -32, -32}, 64}};
   const Ball ball{{0.02, -0.03, 0.01}, 0.13};
