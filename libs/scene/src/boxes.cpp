@@ -191,14 +191,14 @@ class GrainsInBall {
   GrainsInBall(const Ball& ball, std::int32_t grain, double resolution)
       : ball_(ball), grain_(grain), resolution_(resolution), radius2_(ball.radius * ball.radius) {}
 
-  /// Whether that of this voxel is one.
+  /// Whether the grain of this voxel is one.
   [[nodiscard]] bool contains(const std::array<std::int32_t, 3>& voxel) const {
     return squared(0, index(voxel[0])) + squared(1, index(voxel[1])) +
                squared(2, index(voxel[2])) <=
            radius2_;
   }
 
-  /// Volume in voxels of those in a cell that is larger than a grain, column by column.
+  /// Their volume in a cell that is larger than a grain, in voxels, column by column.
   [[nodiscard]] double volume(const Cell& cell) const {
     std::array<Range, 3> range;
     for (unsigned axis = 0; axis < 3; ++axis) {
