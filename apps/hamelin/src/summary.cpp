@@ -38,6 +38,17 @@ std::string goal_line(const Json& goal) {
   return text;
 }
 
+std::string shield_line(const Json& shield) {
+  std::string causes;
+  for (const auto& [cause, count] : shield["causes"].items())
+    causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", cause, count.get<long>());
+  const long refused = shield["refused"].get<long>(), stops = shield["stops"].get<long>();
+  return fmt::format("{} of {} steps refused{}; margin {} mm at most", refused,
+                     shield["steps"].get<long>(),
+                     stops == 0 ? "" : fmt::format(" in {} stops ({})", stops, causes),
+                     number(1e3 * shield["margin_m"].get<double>(), 2));
+}
+
 }  // namespace
 
 std::string summary(const Json& r, const std::vector<std::filesystem::path>& written) {
@@ -67,6 +78,7 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
     line("torque",
          fmt::format("changes by {} Nm from tick to tick on the mean, by {} Nm at most",
                      number(r["torque_change"]["mean"], 3), number(r["torque_change"]["max"], 3)));
+  if (r.contains("shield")) line("shield", shield_line(r["shield"]));
   if (r.contains("plant"))
     line(
         "plant",

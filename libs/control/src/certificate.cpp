@@ -11,11 +11,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-bool slides(const model::Model& model, Index joint) {
-  return model.robot().links[static_cast<std::size_t>(joint)].joint.type ==
-         model::JointType::prismatic;
-}
-
 // Largest chord of any point of a shape's axis, attained at an end: docs/theory.md (12.8).
 double chord(const scene::Shapes& before, const scene::Shapes& after, std::size_t shape) {
   const Vector3d center = after.centers[shape] - before.centers[shape];
@@ -32,58 +27,11 @@ Certificate::Certificate(const model::Model& model, double limit, const scene::S
       limit_(limit),
       self_(self),
       self_limit_(self_limit),
-      frame_distance_(VectorXd::Zero(model.dof())),
-      travel_(VectorXd::Zero(model.dof())),
-      lever_(Eigen::MatrixXd::Zero(static_cast<Index>(model.shapes().size()), model.dof())),
-      pair_lever_(Eigen::MatrixXd::Zero(
-          self != nullptr ? static_cast<Index>(self->pairs().size()) : 0, model.dof())),
+      levers_(model, self),
       arm_(model) {
   appearing_.reserve(obstacles_max);
   const Index n = model.dof();
   for (auto* x : {&q_, &dq_, &stray_, &curvature_, &rest_, &q_middle_, &rate_}) x->setZero(n);
-  dynamics::Workspace ws(model);
-  dynamics::forward_kinematics(model, ws, q_);
-  for (Index j = 0; j < n; ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    if (j > 0) frame_distance_[j] = (ws.frames[at].p - ws.frames[at - 1].p).norm();
-    const auto& joint = model.robot().links[at].joint;
-    if (slides(model, j))
-      travel_[j] =
-          std::max(std::abs(joint.lower.value_or(0.0)), std::abs(joint.upper.value_or(0.0)));
-  }
-  set_levers();
-}
-
-// docs/theory.md (12.3), (12.11)
-void Certificate::set_levers() {
-  for (std::size_t s = 0; s < model_.shapes().size(); ++s) {
-    const auto& shape = model_.shapes()[s];
-    double length =
-        std::max((shape.center - shape.half_axis).norm(), (shape.center + shape.half_axis).norm());
-    for (Index j = shape.link; j >= 0; --j) {
-      lever_(static_cast<Index>(s), j) = slides(model_, j) ? 1.0 : length;
-      length += frame_distance_[j] + travel_[j];
-    }
-  }
-  for (Index k = 0; k < pair_lever_.rows(); ++k) {
-    const auto& pair = self_->pairs()[static_cast<std::size_t>(k)];
-    const auto* inner = &self_->parts()[static_cast<std::size_t>(pair.part_a)];
-    const auto* outer = &self_->parts()[static_cast<std::size_t>(pair.part_b)];
-    if (inner->body > outer->body) std::swap(inner, outer);
-    for (int j = inner->body + 1; j <= outer->body; ++j)
-      for (const int s : outer->shapes)
-        pair_lever_(k, j) = std::max(pair_lever_(k, j), lever_(s, j));
-  }
-}
-
-void Certificate::extend_travel(const VectorXd& q) {
-  bool extended = false;
-  for (Index j = 0; j < q.size(); ++j)
-    if (slides(model_, j) && std::abs(q[j]) + stray_[j] > travel_[j]) {
-      travel_[j] = 2.0 * (std::abs(q[j]) + stray_[j]);
-      extended = true;
-    }
-  if (extended) set_levers();
 }
 
 Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
@@ -95,14 +43,9 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   time_s_ = from.time_s;
   h_ = to.time_s - from.time_s;
   stray_ = 0.25 * h_ * (to.v - from.v).cwiseAbs();  // docs/theory.md (12.2)
-  extend_travel(from.q);
-  extend_travel(to.q);
-  double rotation = 0.0;  // Σ |Δq_i| of the revolute joints i < j
-  for (Index j = 0; j < dq_.size(); ++j) {
-    const double own = std::abs(dq_[j]), own_rotation = slides(model_, j) ? 0.0 : own;
-    curvature_[j] = own * (own_rotation + 2.0 * rotation);  // docs/theory.md (12.5)
-    rotation += own_rotation;
-  }
+  levers_.extend_travel(from.q, stray_);
+  levers_.extend_travel(to.q, stray_);
+  levers_.curvature(dq_, curvature_);
   rest_ = 0.125 * curvature_ + stray_;
   obstacle_travel_ = 0.0;
   appearing_.clear();
@@ -147,8 +90,8 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
 
 double Certificate::longest_path(const VectorXd& dq) const {
   double longest = 0.0;
-  for (Index s = 0; s < lever_.rows(); ++s)
-    longest = std::max(longest, lever_.row(s).dot(dq.cwiseAbs()));
+  for (Index s = 0; s < levers_.shapes().rows(); ++s)
+    longest = std::max(longest, levers_.shapes().row(s).dot(dq.cwiseAbs()));
   return longest;
 }
 

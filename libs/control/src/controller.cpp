@@ -95,6 +95,8 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
+  if (scene_.safety.type == scene::SafetyType::shield)
+    shield_ = std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_);
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
@@ -238,6 +240,10 @@ void Controller::start_outputs() {
 
 void Controller::decide() {
   if (k_ == 0) start_outputs();
+  if (shield_ && !shielded_) {
+    shield_->start(surroundings(), {q_, v_});
+    shielded_ = true;
+  }
   if (answer_.state != ControlState::stopping) {
     if (!measured_) {
       start_braking("the measured q or v is not finite, expected numbers");

@@ -58,6 +58,21 @@ Json timing(const Result& r) {
           {"late_ticks", r.deadline_us ? Json(r.late_ticks) : Json(nullptr)}};
 }
 
+Json shield(const Result::Shield& s) {
+  Json causes = Json::object();
+  for (const auto& [cause, count] : s.causes) causes[cause] = count;
+  return {{"margin_m", s.margin_m},
+          {"steps", s.steps},
+          {"refused", s.refused},
+          {"refused_at_rest", s.refused_at_rest},
+          {"stops", s.stops},
+          {"longest_stop_steps", s.longest_stop_steps},
+          {"causes", std::move(causes)},
+          {"strayed_rad", s.strayed_rad},
+          {"overtaken", s.overtaken},
+          {"work_J", s.work_J}};
+}
+
 }  // namespace
 
 std::string_view to_string(Outcome outcome) noexcept {
@@ -142,6 +157,7 @@ Json to_json(const Result& r) {
       {"provenance", r.provenance}};
   if (r.torque_change)
     document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
+  if (r.shield) document["shield"] = shield(*r.shield);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},
                          {"version", r.plant->version},

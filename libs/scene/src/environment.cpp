@@ -293,6 +293,34 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
   return smallest;
 }
 
+Environment::Standing Environment::nearest_standing(const Eigen::Vector3d& a,
+                                                    const Eigen::Vector3d& b, double limit,
+                                                    double time_s, std::int32_t& hint, View view,
+                                                    std::span<const std::uint8_t> seen) const {
+  Standing nearest{limit, Contact::map};
+  if (view != View::hidden) {
+    const Eigen::Vector3d from = map_pose_inverse_ * a, to = map_pose_inverse_ * b;
+    nearest.distance = map_->distance(from, to, limit, hint);
+    if (summary_.unknown == UnknownPolicy::block) {
+      std::int32_t none = -1;
+      const double distance = unknown_->distance(from, to, nearest.distance, none);
+      if (distance < nearest.distance) nearest = {distance, Contact::unknown};
+    }
+  }
+  const double half = 0.5 * (b - a).norm();
+  for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+    const Obstacle& obstacle = obstacles_[k];
+    if (max_speed(obstacle) > 0.0 || !in_view(k, time_s, view, seen)) continue;
+    const Eigen::Vector3d& at = obstacle.pose.p();
+    const double near = nearest.distance + bounding_radius(obstacle) + half;
+    if ((0.5 * (a + b) - at).squaredNorm() >= near * near) continue;
+    const double distance = half > 0.0 ? closest_on(obstacle, at, a, b).distance
+                                       : closest_on(obstacle, at, a).distance;
+    if (distance < nearest.distance) nearest = {distance, static_cast<int>(k)};
+  }
+  return nearest;
+}
+
 bool Environment::in_slow_space(const Shapes& arm) const {
   if (summary_.unknown != UnknownPolicy::slow || unknown_->empty()) return false;
   BoxHit hit;

@@ -240,6 +240,17 @@ bool MapField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doubl
   return true;
 }
 
+double MapField::distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                          std::int32_t& hint) const {
+  if (empty()) return limit;
+  const NearTable::Answer near = near_.query(boxes_, 0.5 * (a + b));
+  if (static_cast<double>(near.lower) > limit + 0.5 * (b - a).norm()) return limit;
+  SegmentHit hit;
+  if (!boxes_.nearest(a, b, limit, hit, hint < 0 ? near.hint : hint)) return limit;
+  hint = hit.box;
+  return std::max(0.0, hit.distance);
+}
+
 std::size_t MapField::nearest_distinct(const Eigen::Vector3d& p, double limit, Scratch& scratch,
                                        std::span<BoxHit, points_max> out) const {
   if (static_cast<double>(near_.query(boxes_, p).lower) > limit) return 0;

@@ -307,6 +307,23 @@ Actuation read_actuation(const Reader& in, double step_s) {
   return actuation;
 }
 
+// What the arm could touch or pass is modelled.
+bool has_hazards(const Scene& scene) {
+  return scene.map || !scene.obstacles.empty() || scene.model.self_collision ||
+         scene.model.joint_limits || scene.model.velocity_limits;
+}
+
+Safety read_safety(const Reader& in, const Scene& scene) {
+  Safety safety;
+  const auto type = in.get<std::string>("type", has_hazards(scene) ? "shield" : "none");
+  if (type == "shield") safety.type = SafetyType::shield;
+  if (type == "certificate") safety.type = SafetyType::certificate;
+  safety.margin_m = in.get("margin_m", safety.margin_m);
+  safety.torque_share = in.get("torque_share", safety.torque_share);
+  safety.tracking_rad = in.get("tracking_rad", safety.tracking_rad);
+  return safety;
+}
+
 RobotRef read_robot_ref(const Reader& in, const std::filesystem::path& folder) {
   const auto path = [&](const char* key) -> std::optional<std::filesystem::path> {
     const auto text = in.maybe<std::string>(key);
@@ -380,6 +397,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.seed = in.get<std::uint64_t>("seed", 1);
   scene.actuation = read_actuation(in.child("actuation"), scene.step_s);
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
+  scene.safety = read_safety(in.child("safety"), scene);
   return scene;
 }
 

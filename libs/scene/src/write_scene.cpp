@@ -109,6 +109,15 @@ Json model_json(const ModelFlags& model) {
   return out;
 }
 
+Json safety_json(const Safety& safety) {
+  Json out{{"type", to_string(safety.type)}};
+  if (safety.type != SafetyType::shield) return out;
+  out["margin_m"] = safety.margin_m;
+  out["torque_share"] = safety.torque_share;
+  out["tracking_rad"] = safety.tracking_rad;
+  return out;
+}
+
 Json actuation_json(const Actuation& actuation) {
   Json out{{"type", to_string(actuation.type)},
            {"control_period_s", actuation.control_period_s},
@@ -176,6 +185,15 @@ std::string_view to_string(Feedforward feedforward) noexcept {
   return "";
 }
 
+std::string_view to_string(SafetyType type) noexcept {
+  switch (type) {
+    case SafetyType::shield: return "shield";
+    case SafetyType::certificate: return "certificate";
+    case SafetyType::none: break;
+  }
+  return "none";
+}
+
 std::string_view to_string(PlantType type) noexcept {
   switch (type) {
     case PlantType::hamelin:
@@ -234,6 +252,7 @@ Json resolved_json(const Scene& scene) {
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};
+  out["safety"] = safety_json(scene.safety);
   out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
   out["integrator"] = choice_json(scene.integrator);
   out["stall"] = nullptr;

@@ -26,10 +26,13 @@ class Actuation {
   virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
   /// Whether the planner is called at node k.
   [[nodiscard]] virtual bool asks_planner(long k) const = 0;
-  /// Books the node's energies with the planner's answer at the node.
+  /// Books the last node's energies with the planner's answer at the node.
   virtual void book(const planning::CommandBuffers& answer, EnergyAudit& audit) = 0;
-  /// Makes the answer act from this node on.
-  virtual void apply(const control::Answer& answer, EnergyAudit& audit) = 0;
+  /// Books the node and makes the controller's answer act from it on, unless a shield refuses it.
+  /// Without an answer, the shield's stop acts.
+  virtual void apply(control::Controller& controller, EnergyAudit& audit) = 0;
+  /// Whether a stop of the shield acts from this node on.
+  [[nodiscard]] virtual bool stopping() const { return false; }
   /// Lets the plant step. @return whether it converged
   [[nodiscard]] virtual bool step(double step_s) = 0;
   /// Whether the account of the last node needs one more answer of the planner.

@@ -61,6 +61,24 @@ model::Model load_checked(const scene::Scene& scene) {
   return model;
 }
 
+log::Result::Shield shield_figures(const control::Shield& shield, double work_J) {
+  const control::Shield::Counts& counts = shield.counts();
+  log::Result::Shield out;
+  out.margin_m = shield.largest_margin_m();
+  out.steps = counts.steps;
+  out.refused = counts.refused;
+  out.refused_at_rest = counts.at_rest;
+  out.stops = counts.stops;
+  out.longest_stop_steps = counts.longest;
+  for (std::size_t i = 0; i < counts.causes.size(); ++i)
+    if (counts.causes[i] > 0)
+      out.causes.emplace_back(to_string(static_cast<control::StopCause>(i)), counts.causes[i]);
+  out.strayed_rad = counts.strayed;
+  out.overtaken = counts.overtaken;
+  out.work_J = work_J;
+  return out;
+}
+
 /// CPU time of a tick without writing its log line.
 class TickTimer {
  public:
@@ -106,6 +124,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   if (!controller_sees_all(scene))
     own_judge_ =
         std::make_unique<control::WorldView>(scene, model_, controller_->view().influence_m());
+  certifies_ = scene.safety.type != scene::SafetyType::none;
   judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
   if (judge_->has_self() && !judge_->self_field()->note().empty())
     result_.warnings.push_back(judge_->self_field()->note());
@@ -173,7 +192,7 @@ void ClosedLoop::start(const Watch& watch) {
   audit_ =
       std::make_unique<EnergyAudit>(*recorder_, ideal && plant.integrator == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, controller_->goals(),
-                                   *actuation_);
+                                   *actuation_, controller_->shield());
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging())
     log_->header(scene_, controller_->plugin(), planner_params_, controller_->series(),
@@ -220,7 +239,8 @@ void ClosedLoop::observe_node() {
   min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
   touching_ = judge_->touching();
   contacts_ = plant_->contacts();
-  if (plant_->node().k > 0 && (judge_->has_obstacles() || judge_->has_self())) certify();
+  if (plant_->node().k > 0 && certifies_ && (judge_->has_obstacles() || judge_->has_self()))
+    certify();
   change_map();
   recorder_->observe(judge_->clearance_m(), certified_, plant_->node().v, scene_.step_s);
   if (watch_->at_node) watch_->at_node(plant_->node().time_s, plant_->node().q);
@@ -286,6 +306,8 @@ void ClosedLoop::check_outcome() {
   else if (tick && now == control::ControlState::stalled)
     finish(log::Outcome::stalled,
            fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
+  else if (halting_ && (controller_->shield()->at_rest() || node.k == steps_))
+    finish(result_.outcome, result_.cause);
   else if (node.k == steps_)
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(node.k))
@@ -349,7 +371,12 @@ void ClosedLoop::let_controller_observe() {
 }
 
 void ClosedLoop::ask_planner() {
-  controller_->decide();
+  try {
+    controller_->decide();
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::invalid || plant_->node().k > 0) throw;
+    return finish(log::Outcome::refused, e.what());
+  }
   recorder_->planner_time(controller_->answer().planner_s);
   if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
     finish(log::Outcome::stalled, std::string(controller_->answer().cause));
@@ -359,20 +386,38 @@ void ClosedLoop::ask_planner() {
 bool ClosedLoop::planner_answered() {
   const control::Answer& answer = controller_->answer();
   if (answer.channels != nullptr) return true;
-  finish(log::Outcome::defect, fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
-                                           plant_->node().k, answer.cause));
+  finish_at_rest(log::Outcome::defect,
+                 fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
+                             plant_->node().k, answer.cause));
   return false;
 }
 
+void ClosedLoop::finish_at_rest(log::Outcome outcome, std::string cause) {
+  if (controller_->shield() == nullptr) return finish(outcome, std::move(cause));
+  if (!halting_) {
+    result_.outcome = outcome;
+    result_.cause = std::move(cause);
+  }
+  halting_ = true;
+}
+
+void ClosedLoop::report_stop() {
+  const control::Shield* const shield = controller_->shield();
+  if (shield == nullptr || !actuation_->stopping() || !shield->stop_began()) return;
+  report_event(false, fmt::format("the shield stops the arm: {}",
+                                  shield->describe(controller_->view().environment())));
+}
+
 void ClosedLoop::apply_answer() {
-  const planning::CommandBuffers& channels = *controller_->answer().channels;
-  actuation_->book(channels, *audit_);
+  actuation_->apply(*controller_, *audit_);
+  report_stop();
   finish_if(audit_->fault(*plant_));
-  const std::string fault = audit_->fault_of_planner(channels.raw());
+  const planning::CommandBuffers* const channels = controller_->answer().channels;
+  if (channels == nullptr || actuation_->stopping()) return;
+  const std::string fault = audit_->fault_of_planner(channels->raw());
   if (!fault.empty())
     finish_if(
         fmt::format("planner '{}' at step {}: {}", scene_.planner->name, plant_->node().k, fault));
-  if (!done_) actuation_->apply(controller_->answer(), *audit_);
 }
 
 // Only the planner knows a control potential's value and its gradient for the closing half-kick.
@@ -405,7 +450,7 @@ void ClosedLoop::step() {
     if (recorder_->logging()) log_->tick(certified_, nullptr);
     return;
   }
-  audit_->book_step(plant_->report());
+  audit_->book_step(plant_->report(), actuation_->stopping());
   recorder_->progress(plant_->node().k, plant_->node().time_s, scene_.duration_s);
 }
 
@@ -451,6 +496,8 @@ void ClosedLoop::fill_result() {
   if (judge_->has_obstacles()) result_.min_clearance_m = min_clearance_;
   if (judge_->has_self()) result_.min_self_clearance_m = min_self_clearance_;
   if (const auto* change = actuation_->torque_change()) result_.torque_change = *change;
+  if (const control::Shield* const shield = controller_->shield())
+    result_.shield = shield_figures(*shield, audit_->ledger().stop);
   result_.scene = scene_.name;
   result_.planner = controller_->plugin().name();
   result_.time_s = plant_->node().time_s;

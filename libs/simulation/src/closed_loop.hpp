@@ -57,8 +57,13 @@ class ClosedLoop {
   /// Lets the controller look at the arm, as it measures it, and at its goals.
   void let_controller_observe();
   void ask_planner();
-  /// Ends the run if the controller's planner failed. @return whether it did not
+  /// Ends the run if the controller's planner failed, at rest if a shield can stop the arm.
+  /// @return whether it did not
   bool planner_answered();
+  /// Ends the run now, or once the shield has brought the arm to rest.
+  void finish_at_rest(log::Outcome outcome, std::string cause);
+  /// Logs where a stop of the shield begins.
+  void report_stop();
   /// Books the node and applies the answer.
   void apply_answer();
   /// Books the last node: nothing acts any more, but its energies belong to the account.
@@ -95,10 +100,12 @@ class ClosedLoop {
     std::string text;
   };
   std::vector<Message> early_messages_;  ///< of the planner, before the log was open
+  bool certifies_ = true;                ///< whether the scene asks for proofs
   bool certified_ = true;                ///< whether the step that led to this node was certified
   bool touching_ = false;                ///< by the judge
   Plant::Contacts contacts_;             ///< by the plant
   bool done_ = false;
+  bool halting_ = false;  ///< whether the run ends when the shield's stop does
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;
   std::size_t next_map_change_ = 0, goals_reached_ = 0;

@@ -18,15 +18,15 @@ constexpr double account_share = 0.02;
 
 }  // namespace
 
-void EnergyAudit::book_node(Plant& plant, double control_J) {
-  const auto energy = plant.energy();
+void EnergyAudit::book_node(long k, const integration::Energy& energy, double control_J) {
   ledger_.kinetic = energy.kinetic_J;
   ledger_.potential = energy.potential_J;
   ledger_.control = control_J;
   const Ledger& last = recorder_.last_node();
-  if (plant.node().k > 0)
+  if (k > 0)
     for (const auto account :
-         {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::dissipated, &Ledger::node})
+         {&Ledger::kinetic, &Ledger::potential, &Ledger::held, &Ledger::stop,
+          &Ledger::dissipated, &Ledger::node})
       exchanged_J_ += std::abs(ledger_.*account - last.*account);
   recorder_.node(ledger_);
 }

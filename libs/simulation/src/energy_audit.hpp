@@ -14,8 +14,12 @@ class EnergyAudit {
   /// @param closes whether the scheme's gyroscopic work is zero and its account closes
   EnergyAudit(Recorder& recorder, bool closes) : recorder_(recorder), closes_(closes) {}
 
-  /// Books a node's energies. @param control_J value of the planner's control potential
-  void book_node(Plant& plant, double control_J);
+  /// Books the energies of node k. @param control_J value of the planner's control potential
+  void book_node(long k, const integration::Energy& energy, double control_J);
+  /// The same for the node at which a plant is.
+  void book_node(Plant& plant, double control_J) {
+    book_node(plant.node().k, plant.energy(), control_J);
+  }
   /// As book_node, with the control potential's last known value.
   void book_node(Plant& plant) { book_node(plant, ledger_.control); }
   /// Notes that a control potential acted. The planner may change it over time, so from then on the
@@ -24,7 +28,10 @@ class EnergyAudit {
   /// Books the work of a node velocity, docs/theory.md (8.6), and how the planner splits it.
   void book_node_velocity(double work_J, const hamelin_command& answer) noexcept;
   void book_filter(const hamelin_command& answer) noexcept;
-  void book_step(const integration::StepReport& report) noexcept { ledger_.book(report); }
+  /// @param stopping whether a stop of the shield held the torque
+  void book_step(const integration::StepReport& report, bool stopping) noexcept {
+    ledger_.book(report, stopping);
+  }
 
   /// What is wrong with the node's account or the last step's gyroscopic work; empty if nothing.
   [[nodiscard]] std::string fault(const Plant& plant) const;

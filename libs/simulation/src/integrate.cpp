@@ -166,7 +166,7 @@ bool FreeRun::step() {
   else if (report_.step_s == left)
     state_.time_s = motion_.duration_s;
   recorder_.step(report_);
-  ledger_.book(report_);
+  ledger_.book(report_, false);
   recorder_.progress(state_.k, state_.time_s, motion_.duration_s);
   if (report_.converged) return true;
   result_.outcome = log::Outcome::diverged;

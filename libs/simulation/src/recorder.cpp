@@ -153,11 +153,13 @@ Json to_json(const Eigen::VectorXd& x) {
 }
 
 Json energy_json(const Ledger& ledger) {
-  return {{"kinetic_J", ledger.kinetic},       {"potential_J", ledger.potential},
-          {"control_J", ledger.control},       {"gyroscopic_work_J", ledger.gyroscopic},
-          {"filter_work_J", ledger.filter},    {"recovery_work_J", ledger.recovery},
-          {"dissipated_J", ledger.dissipated}, {"held_work_J", ledger.held},
-          {"node_work_J", ledger.node}};
+  Json out{{"kinetic_J", ledger.kinetic},       {"potential_J", ledger.potential},
+           {"control_J", ledger.control},       {"gyroscopic_work_J", ledger.gyroscopic},
+           {"filter_work_J", ledger.filter},    {"recovery_work_J", ledger.recovery},
+           {"dissipated_J", ledger.dissipated}, {"held_work_J", ledger.held},
+           {"node_work_J", ledger.node}};
+  if (ledger.stop != 0.0) out["stop_work_J"] = ledger.stop;
+  return out;
 }
 
 Json solver_json(const integration::StepReport& report) {

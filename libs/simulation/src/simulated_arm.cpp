@@ -43,12 +43,22 @@ bool SimulatedArm::step(const VectorXd& torque, double step_s) {
 
 bool SimulatedArm::step_channels(double step_s) {
   report_ = integrator->step(state, channels, step_s);
-  if (!report_.converged) return false;
+  if (report_.converged) reach(step_s);
+  return report_.converged;
+}
+
+void SimulatedArm::accept(const integration::State& stepped, const integration::StepReport& report,
+                          double step_s) {
+  state = stepped;
+  report_ = report;
+  reach(step_s);
+}
+
+void SimulatedArm::reach(double step_s) {
   state.time_s = static_cast<double>(state.k) * step_s;
   node_.k = state.k;
   node_.time_s = state.time_s;
   node_.q = state.q;
-  return true;
 }
 
 }  // namespace hamelin::simulation

@@ -23,6 +23,9 @@ class SimulatedArm final : public Plant {
 
   /// Advances with the channels as they are. The node's velocity is updated by update_velocity().
   [[nodiscard]] bool step_channels(double step_s);
+  /// Takes a step that was made from the present state with step() of the integrator.
+  void accept(const integration::State& stepped, const integration::StepReport& report,
+              double step_s);
   /// Sets the node's velocity to that of the state, after a step, a kick or a new velocity.
   void update_velocity() { integrator->velocity(state, node_.v); }
 
@@ -34,6 +37,8 @@ class SimulatedArm final : public Plant {
   integration::Channels channels;  ///< friction and damping of the joints included
 
  private:
+  /// Makes the state the node.
+  void reach(double step_s);
   Description description_;
 };
 

@@ -5,6 +5,7 @@
 #include "actuation.hpp"
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/shield.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "recorder.hpp"
 
@@ -15,21 +16,23 @@ class TickLog {
  public:
   /// @param world all obstacles, those that the planner does not know included
   TickLog(Recorder& recorder, const model::Model& model, const Plant& plant,
-          const control::WorldView& world, const control::GoalTracker& goals, Actuation& actuation)
+          const control::WorldView& world, const control::GoalTracker& goals, Actuation& actuation,
+          const control::Shield* shield)
       : recorder_(recorder),
         model_(model),
         plant_(plant),
         world_(world),
         goals_(goals),
-        actuation_(actuation) {
+        actuation_(actuation),
+        shield_(shield) {
     torque_.setZero(model.dof());
   }
 
   /// @param params the planner's, with defaults @param series that it declared
   void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
               const std::vector<planning::Series>& series, const Json& provenance, long steps);
-  /// Writes the line of this node. @param answer the planner's, which acts from here on; null at
-  /// the last node
+  /// Writes the line of this node. @param answer the planner's, which acts from here on; null if
+  /// there is none
   void tick(bool certified, const planning::CommandBuffers* answer);
 
  private:
@@ -39,6 +42,7 @@ class TickLog {
   const control::WorldView& world_;
   const control::GoalTracker& goals_;
   Actuation& actuation_;
+  const control::Shield* shield_;  ///< null if the scene asks for none
   Eigen::VectorXd torque_;  ///< of the last node with an answer
 };
 

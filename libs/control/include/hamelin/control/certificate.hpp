@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "hamelin/control/levers.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/self_collision.hpp"
@@ -73,9 +74,6 @@ class Certificate {
     double from, to;   ///< clearances at its ends
   };
 
-  void set_levers();
-  /// Extends the travel of prismatic joints if q exceeds it.
-  void extend_travel(const Eigen::VectorXd& q);
   /// Lower bound of the subject's clearance on the piece.
   double prove(dynamics::Workspace& ws, Subject subject, const Piece& piece);
   /// Largest |dc/ds| of any point of the subject's axes at the posture of ws [m].
@@ -87,7 +85,7 @@ class Certificate {
   [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape, double time_s,
                                               double clearance) const;
   [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const {
-    return (subject.is_pair ? pair_lever_ : lever_).row(static_cast<Eigen::Index>(subject.index));
+    return (subject.is_pair ? levers_.pairs() : levers_.shapes()).row(static_cast<Eigen::Index>(subject.index));
   }
 
   const model::Model& model_;
@@ -95,10 +93,7 @@ class Certificate {
   double limit_;
   const scene::SelfField* self_;
   double self_limit_;
-  Eigen::VectorXd frame_distance_;  ///< of successive joint frames at q = 0 [m]
-  Eigen::VectorXd travel_;          ///< largest |q| of prismatic joints [m]
-  Eigen::MatrixXd lever_;           ///< shapes × dof, docs/theory.md (12.3) [m/rad or 1]
-  Eigen::MatrixXd pair_lever_;      ///< pairs × dof, docs/theory.md (12.11) [m/rad or 1]
+  Levers levers_;
 
   // of the step that is checked
   Eigen::VectorXd q_, dq_, stray_;  ///< stray: σ

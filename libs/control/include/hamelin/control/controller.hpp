@@ -14,6 +14,7 @@
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/newest.hpp"
 #include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/shield.hpp"
 #include "hamelin/control/state_estimator.hpp"
 #include "hamelin/control/torque_limits.hpp"
 #include "hamelin/control/world.hpp"
@@ -140,6 +141,7 @@ class Controller {
   /// stalls. answer().state is running, reached or stalled afterwards.
   void observe(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// The second half: calls the planner for what observe() found, and forms the outputs.
+  /// @throws Error invalid at the first tick if the shield finds no way to stop there
   void decide();
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
@@ -151,6 +153,13 @@ class Controller {
   /// Forgets goals that were reached, the last motion and limits' history, for a new start; so does
   /// the planner at the next tick, if it can. For the thread of tick().
   void reset();
+
+  /// The scene's shield; null if it asks for none.
+  [[nodiscard]] Shield* shield() noexcept { return shield_.get(); }
+  /// What the shield keeps the arm from, at the last tick.
+  [[nodiscard]] Shield::Surroundings surroundings() const noexcept {
+    return {view_.environment(), view_.snapshot(), time_s_};
+  }
 
   /// What it sees. A caller may look() at and certify() the motion between ticks with it.
   [[nodiscard]] WorldView& view() noexcept { return view_; }
@@ -215,6 +224,8 @@ class Controller {
   TorqueLimits limits_;
   ChannelSum sum_;
   dynamics::Workspace ws_;
+  std::unique_ptr<Shield> shield_;
+  bool shielded_ = false;  ///< whether the shield has started
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
 

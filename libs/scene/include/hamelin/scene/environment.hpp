@@ -109,6 +109,20 @@ class Environment {
                                  View view = View::judge,
                                  std::span<const std::uint8_t> seen = {}) const;
 
+  /// The nearest of all that stands still: the map, unknown space that blocks, and the obstacles
+  /// without motion.
+  struct Standing {
+    double distance = 0.0;        ///< from the segment [m]; zero or below is contact
+    int obstacle = Contact::map;  ///< as Contact::obstacle, if nearer than the limit
+  };
+  /// Distance of the segment from a to b in the world from what stands still at a time and in a
+  /// view, or `limit` if that is less. No allocation.
+  /// @param hint of the map, see BoxField::nearest; changes
+  [[nodiscard]] Standing nearest_standing(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                          double limit, double time_s, std::int32_t& hint,
+                                          View view = View::judge,
+                                          std::span<const std::uint8_t> seen = {}) const;
+
   /// Whether a shape touches unknown space where the policy is `slow`.
   [[nodiscard]] bool in_slow_space(const Shapes& arm) const;
 

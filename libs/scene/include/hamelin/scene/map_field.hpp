@@ -71,6 +71,11 @@ class MapField {
   [[nodiscard]] bool nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
                              SegmentHit& hit, std::int32_t hint = -1) const;
 
+  /// Distance of the segment from a to b, zero if it enters the union, or `limit` if that is less.
+  /// @param hint see BoxField::nearest; becomes the nearest box if there is one within the limit
+  [[nodiscard]] double distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                                std::int32_t& hint) const;
+
   /// Nearest points in distinct directions no farther than `limit`, nearest first; inside the union
   /// only the one in the exit direction. @return how many. No allocation, except at the first query
   /// inside.

@@ -113,6 +113,20 @@ struct Actuation {
   Servo servo;  ///< position
 };
 
+/// How a run is kept safe. shield: each step is verified before it is made; certificate: after it
+/// was made; none: only contacts are looked for.
+enum class SafetyType : std::int32_t { shield, certificate, none };
+
+[[nodiscard]] std::string_view to_string(SafetyType type) noexcept;
+
+/// The safety of a run, with bounds of the errors that the shield's margins cover.
+struct Safety {
+  SafetyType type = SafetyType::none;
+  double margin_m = 0.0;      ///< distance kept beyond what the bounds require
+  double torque_share = 0.8;  ///< of the torque limits, that a stop may use
+  double tracking_rad = 1e-5; ///< by how much a joint strays from the motion of a stop [rad or m]
+};
+
 /// What simulates the arm: hamelin's own integrators, or MuJoCo.
 enum class PlantType : std::int32_t { hamelin, mujoco };
 
@@ -143,6 +157,7 @@ struct Scene {
   ModelFlags model;
   Actuation actuation;
   PlantType plant = PlantType::hamelin;
+  Safety safety;
   std::optional<Choice> planner;
   Choice integrator{"hamel-variational", Json::object()};
   std::optional<StallRule> stall;

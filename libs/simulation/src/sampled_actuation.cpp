@@ -20,139 +20,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-control::TorqueLimits torque_limits(const scene::Scene& scene, const model::Model& model) {
-  return {model,
-          scene.model.torque_limits
-              ? control::joint_limits(model.robot(), &model::Joint::effort_max, infinity)
-              : VectorXd(),
-          scene.actuation.torque_rate_max_Nm_s};
-}
-
-/// Each channel acts directly: the potential as half-kicks at both nodes of a step, damping and
-/// gyroscopic terms at the step's own velocity, the node velocity at once: docs/theory.md
-/// (8.1)–(8.3).
-class IdealActuation final : public Actuation {
- public:
-  IdealActuation(const scene::Scene& scene, SimulatedArm& arm)
-      : arm_(arm), step_s_(scene.step_s), limits_(torque_limits(scene, arm.model)) {
-    gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ =
-        VectorXd::Zero(arm.model.dof());
-  }
-
-  // The closing half-kick of the last step uses the previous gradient; book() corrects it,
-  // docs/theory.md (8.4).
-  void reach_node() override {
-    if (kicked_) {
-      impulse_ = -0.5 * step_s_ * gradient_before_;
-      arm_.integrator->kick(arm_.state, impulse_);
-    }
-    arm_.update_velocity();
-  }
-
-  void reserve(std::size_t gyroscopic_terms) override {
-    arm_.channels.gyroscopic.reserve(gyroscopic_terms);
-  }
-  void observe(VectorXd& q, VectorXd& v) override {
-    q = arm_.node().q;
-    v = arm_.node().v;
-  }
-  bool asks_planner(long) const override { return true; }
-
-  void book(const planning::CommandBuffers& answer, EnergyAudit& audit) override {
-    gradient_ = answer.potential_gradient();
-    if (kicked_) {
-      impulse_ = 0.5 * step_s_ * (gradient_before_ - gradient_);
-      arm_.integrator->kick(arm_.state, impulse_);
-      arm_.update_velocity();
-    }
-    if (has_potential(answer)) audit.note_potential();
-    audit.book_node(arm_, answer.raw().potential_J);
-  }
-
-  void apply(const control::Answer& decided, EnergyAudit& audit) override {
-    const planning::CommandBuffers& answer = *decided.channels;
-    auto& channels = arm_.channels;
-    channels.held_torque = answer.held_torque();
-    channels.damping = answer.damping();
-    control::copy_gyroscopic_terms(answer, channels.gyroscopic);
-    saturated_ = limits_.limit(arm_.ws, arm_.state.q, arm_.node().v, channels);
-    node_velocity_ = arm_.node().v;
-    if (answer.raw().has_node_velocity != 0) set_node_velocity(answer, audit);
-    if (arm_.own_damping.size() > 0) channels.damping += arm_.own_damping;
-    const bool potential = has_potential(answer);
-    if (potential) {
-      impulse_ = -0.5 * step_s_ * gradient_;
-      arm_.integrator->kick(arm_.state, impulse_);
-    }
-    gradient_before_ = gradient_;
-    kicked_ = kicked_ || potential;
-  }
-
-  bool step(double step_s) override { return arm_.step_channels(step_s); }
-  bool needs_answer_at_end() const override { return kicked_; }
-
-  const VectorXd& departure_velocity() override {
-    if (!kicked_) return node_velocity_;
-    arm_.integrator->velocity(arm_.state, departure_);
-    return departure_;
-  }
-
-  void torques(const planning::CommandBuffers& answer, VectorXd& sum, Json& by_channel) override {
-    sum = arm_.channels.held_torque;
-    if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
-    const auto add = [&](const char* channel, const VectorXd& torque) {
-      sum += torque;
-      by_channel[channel] = to_json(torque);
-    };
-    if (!gradient_.isZero(0.0)) add("potential", -gradient_);
-    if (!answer.damping().isZero(0.0))
-      add("damping", -answer.damping().cwiseProduct(arm_.node().v));
-    if (!arm_.channels.gyroscopic.empty()) {
-      dynamics::gyroscopic_torque(arm_.model, arm_.ws, arm_.state.q, arm_.node().v,
-                                  arm_.channels.gyroscopic, impulse_);
-      add("gyroscopic", impulse_);
-    }
-    if (answer.raw().has_node_velocity != 0) {
-      // The torque that would make the node's change of velocity within one step: M (x − v) / h.
-      departure_ = (node_velocity_ - arm_.node().v) / step_s_;
-      dynamics::momentum(arm_.model, arm_.ws, arm_.state.q, departure_, impulse_);
-      add("node", impulse_);
-    }
-  }
-
-  bool saturated() const override { return saturated_; }
-  bool limited() const override { return limits_.any(); }
-
- private:
-  bool has_potential(const planning::CommandBuffers& answer) const {
-    return answer.raw().potential_J != 0.0 || !gradient_.isZero(0.0);
-  }
-
-  void set_node_velocity(const planning::CommandBuffers& answer, EnergyAudit& audit) {
-    departure_ = answer.node_velocity() - arm_.node().v;
-    const double share = limits_.share_of_velocity_change(arm_.ws, arm_.state.q, departure_,
-                                                          step_s_, arm_.channels.held_torque);
-    if (share < 1.0) {
-      saturated_ = true;
-      node_velocity_ += share * departure_;
-    } else {
-      node_velocity_ = answer.node_velocity();
-    }
-    arm_.integrator->set_velocity(arm_.state, node_velocity_);
-    const double kinetic =
-        dynamics::kinetic_energy(arm_.model, arm_.ws, arm_.state.q, node_velocity_);
-    audit.book_node_velocity(kinetic - audit.ledger().kinetic, answer.raw());
-  }
-
-  SimulatedArm& arm_;
-  double step_s_;
-  control::TorqueLimits limits_;
-  VectorXd gradient_, gradient_before_, impulse_, departure_;
-  VectorXd node_velocity_;  ///< the node's velocity after limits
-  bool kicked_ = false;     ///< whether a closing half-kick is due
-  bool saturated_ = false;
-};
-
 /// Values that arrive a number of ticks after they were sent.
 template <class T>
 class DelayLine {
@@ -180,7 +47,9 @@ class SampledActuation : public Actuation {
   void book(const planning::CommandBuffers&, EnergyAudit& audit) override {
     audit.book_node(plant_, 0.0);
   }
-  void apply(const control::Answer& decided, EnergyAudit& audit) override {
+  void apply(control::Controller& controller, EnergyAudit& audit) override {
+    const control::Answer& decided = controller.answer();
+    audit.book_node(plant_, 0.0);
     const long k = plant_.node().k;
     if (asks_planner(k)) {
       if (decided.channels->raw().has_node_velocity != 0)
@@ -387,10 +256,6 @@ long steps_per_tick(const scene::Scene& scene) {
   if (scene.actuation.type == scene::ActuationType::ideal) return 1;
   return std::max(1L, integer_multiple(scene.actuation.control_period_s, scene.step_s, scene.name,
                                        "control_period_s"));
-}
-
-std::unique_ptr<Actuation> make_ideal_actuation(const scene::Scene& scene, SimulatedArm& arm) {
-  return std::make_unique<IdealActuation>(scene, arm);
 }
 
 std::unique_ptr<Actuation> make_sampled_actuation(const scene::Scene& scene,

@@ -1,0 +1,154 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "hamelin/control/braking_rate.hpp"
+#include "hamelin/control/levers.hpp"
+#include "hamelin/control/line_check.hpp"
+#include "hamelin/control/stop_motion.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/scene.hpp"
+#include "hamelin/scene/self_collision.hpp"
+#include "hamelin/scene/shapes.hpp"
+
+namespace hamelin::control {
+
+/// Why a step is refused: what the arm could touch or pass if it made the step and then stopped.
+/// torque: no stop within the torque limits exists after it. answer: there is no usable answer.
+enum class StopCause : std::int32_t {
+  map,
+  unknown_space,
+  obstacle,
+  self,
+  joint_limit,
+  velocity_limit,
+  torque,
+  answer
+};
+inline constexpr std::size_t stop_causes = 8;
+[[nodiscard]] std::string_view to_string(StopCause cause) noexcept;
+
+/// Lets a step of the arm pass only if a verified way to stop exists after it: chapter 14 of
+/// docs/theory.md. Verified means that the arm stays clear of all that stands still and of itself,
+/// within its joint limits and within a share of its torque limits, until it rests, by margins that
+/// cover the errors that the scene states. If a step is refused, the last verified stop goes on
+/// instead; it ends with the first step that is accepted. Obstacles that move are not considered,
+/// because a stop is no safe answer to them. One object per thread; no allocation after
+/// construction.
+class Shield {
+ public:
+  /// A configuration and a velocity.
+  struct Node {
+    const Eigen::VectorXd& q;
+    const Eigen::VectorXd& v;
+  };
+  /// What the arm must not touch, and when.
+  struct Surroundings {
+    const scene::Environment& environment;
+    std::uint64_t snapshot;  ///< differs if the environment is another one
+    double time_s;
+  };
+  /// Why and where a step was refused.
+  struct Refusal {
+    StopCause cause = StopCause::answer;
+    LineCheck::Blocker blocker;  ///< map, unknown_space, obstacle, self
+    int joint = -1;              ///< joint_limit, velocity_limit, torque
+  };
+  struct Counts {
+    long steps = 0;     ///< that were asked for
+    long refused = 0;   ///< of them
+    long at_rest = 0;   ///< refused while the arm rested
+    long stops = 0;     ///< runs of refused steps
+    long longest = 0;   ///< the longest of them, in steps
+    std::array<long, stop_causes> causes{};  ///< of the stops' beginnings
+    double strayed = 0.0;  ///< largest deviation of a joint from a stop's motion [rad or m]
+    /// Stops that went on although the world had changed so that they are not clear any more.
+    long overtaken = 0;
+  };
+
+  /// @param model the controller's model of the arm, kept by reference
+  /// @param self null if self-collision is not modelled; kept by reference
+  /// @param period_s time between two steps
+  Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
+         double period_s);
+
+  /// Begins at a node, which must have a verified stop itself.
+  /// @throws Error invalid if it has none, with the bound that would do
+  void start(const Surroundings& world, const Node& node);
+  /// Decides on a step. @param from the node at which the arm leaves, with its velocity there
+  /// @param to what the step would lead to
+  /// @return whether it is accepted; else see refusal()
+  [[nodiscard]] bool accept(const Surroundings& world, const Node& from, const Node& to);
+  /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
+  void refuse();
+  /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.13).
+  void stop_torque(const Node& node, Eigen::VectorXd& torque);
+
+  /// Whether the last step was refused.
+  [[nodiscard]] bool stopping() const noexcept { return stopping_; }
+  /// Whether the stop has ended.
+  [[nodiscard]] bool at_rest() const noexcept { return stop_time_ >= stop_.duration_s(); }
+  /// Whether the last step was the first of a stop.
+  [[nodiscard]] bool stop_began() const noexcept { return stopping_ && run_ == 1; }
+  [[nodiscard]] const Refusal& refusal() const noexcept { return refusal_; }
+  [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
+  /// The motion by which the arm stops if the next step is refused.
+  [[nodiscard]] const StopMotion& stop() const noexcept { return stop_; }
+  /// The bound of each joint's deviation that the margins cover [rad or m].
+  [[nodiscard]] const Eigen::VectorXd& joint_margin() const noexcept { return stray_; }
+  /// The largest margin of any shape [m].
+  [[nodiscard]] double largest_margin_m() const;
+  /// Describes what was in the way: "link 'hand' would come too near the map".
+  [[nodiscard]] std::string describe(const scene::Environment& environment) const;
+
+ private:
+  [[nodiscard]] bool verify(const Surroundings& world, const Node& from, const Node& to);
+  [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
+  [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
+  [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,
+                              const LineCheck::End& from, const LineCheck::End& to,
+                              const Eigen::VectorXd& stray);
+  /// Forgets what is known of obstacles if they are others than before.
+  void notice(const Surroundings& world);
+  /// Counts the stop in force if it is not clear any more.
+  void check_overtaken(const Surroundings& world, const Node& node);
+  void count_refusal();
+  LineCheck::End place(const Eigen::VectorXd& q, scene::PlacedShapes& arm);
+
+  const model::Model& model_;
+  const scene::SelfField* self_;
+  std::string scene_name_;
+  double period_s_, margin_m_;
+  long dwell_;               ///< steps that a stop lasts at least, unless it ends before
+  double feedback_rate_;     ///< ω [1/s]
+  // of size zero: not modelled
+  Eigen::VectorXd lower_, upper_, velocity_max_, effort_max_, damping_, friction_;
+  double friction_speed_, torque_share_;
+  Eigen::VectorXd stray_;
+  Levers levers_;
+  LineCheck step_line_, stop_line_;
+  BrakingRate braking_;
+  dynamics::Workspace ws_;
+  StopMotion stop_, tried_;
+  scene::PlacedShapes arm_from_, arm_to_, arm_end_;
+  Eigen::VectorXd step_stray_, zero_;
+  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_;
+
+  std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
+  std::size_t existing_ = 0;               ///< obstacles at the last call
+  bool changed_ = false;  ///< whether obstacles changed since the stop was verified
+  bool stopping_ = false;
+  double stop_time_ = 0.0;
+  long run_ = 0;
+  Refusal refusal_;
+  Counts counts_;
+};
+
+}  // namespace hamelin::control

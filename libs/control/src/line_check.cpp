@@ -1,0 +1,211 @@
+#include "hamelin/control/line_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+// Distances are searched this much beyond what is needed, so that later calls need no query [m].
+constexpr double reserve_m = 0.1;
+// Bounds from anchors are reduced by this, far above what rounding can add [m].
+constexpr double rounding_m = 1e-12;
+// In how many pieces a line is divided, one after the other, until it is proved.
+constexpr std::array<int, 3> sphere_pieces{1, 2, 8};
+constexpr std::array<int, 3> two_ended_pieces{1, 4, 16};
+
+}  // namespace
+
+LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scene::SelfField* self)
+    : model_(model),
+      levers_(levers),
+      self_(self),
+      anchors_(model.shapes().size()),
+      divisions_(pieces_max - 1, Division{VectorXd::Zero(model.dof()), scene::PlacedShapes(model)}) {
+  const Index n = model.dof(), shapes = static_cast<Index>(model.shapes().size()),
+              pairs = levers.pairs().rows();
+  for (auto* x : {&dq_, &curvature_, &tube_, &way_}) x->setZero(n);
+  bend_ = straying_ = VectorXd::Zero(shapes);
+  pair_stray_ = VectorXd::Zero(pairs);
+  pair_q_.setZero(n, pairs);
+  pair_distance_.setConstant(pairs, -1.0);
+}
+
+void LineCheck::forget() {
+  for (Anchor& anchor : anchors_) anchor = {};
+}
+
+std::optional<LineCheck::Blocker> LineCheck::check(dynamics::Workspace& ws,
+                                                   const scene::Environment* obstacles,
+                                                   double time_s, const End& from, const End& to,
+                                                   const VectorXd& stray, double margin_m) {
+  ws_ = &ws;
+  obstacles_ = obstacles;
+  time_s_ = time_s;
+  margin_ = margin_m;
+  from_ = &from;
+  to_ = &to;
+  dq_ = to.q - from.q;
+  for (Division& division : divisions_) division.placed = false;
+  Blocker blocker;
+  pair_stray_.noalias() = levers_.pairs() * stray;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(pair_stray_.size()); ++k)
+    if (!pair_is_clear(k, blocker)) return blocker;
+  if (obstacles_ == nullptr) return std::nullopt;
+  levers_.curvature(dq_, curvature_);
+  tube_ = 0.125 * curvature_;
+  bend_.noalias() = levers_.shapes() * tube_;
+  straying_.noalias() = levers_.shapes() * stray;
+  for (std::size_t i = 0; i < anchors_.size(); ++i)
+    if (!shape_is_clear(i, blocker)) return blocker;
+  return std::nullopt;
+}
+
+double LineCheck::need(std::size_t shape, int pieces) const {
+  const auto i = static_cast<Index>(shape);
+  return model_.shapes()[shape].radius + margin_ + straying_[i] +
+         bend_[i] / (static_cast<double>(pieces) * pieces);
+}
+
+double LineCheck::moved(std::size_t shape, const scene::Shapes& from,
+                        const scene::Shapes& to) const {
+  const Anchor& anchor = anchors_[shape];
+  if (!from.is_capsule(shape))
+    return std::sqrt(std::max((from.centers[shape] - anchor.a).squaredNorm(),
+                              (to.centers[shape] - anchor.b).squaredNorm()));
+  return std::sqrt(std::max({(from.from(shape) - anchor.a).squaredNorm(),
+                             (from.to(shape) - anchor.b).squaredNorm(),
+                             (to.from(shape) - anchor.a).squaredNorm(),
+                             (to.to(shape) - anchor.b).squaredNorm()}));
+}
+
+double LineCheck::anchored_bound(std::size_t shape, const End& from, const End& to) const {
+  return anchors_[shape].distance - moved(shape, from.arm, to.arm) - rounding_m;
+}
+
+bool LineCheck::shape_is_clear(std::size_t shape, Blocker& blocker) {
+  if (anchors_[shape].distance - moved(shape, from_->arm, to_->arm) - rounding_m > need(shape, 1))
+    return true;
+  return from_->arm.is_capsule(shape) ? capsule_is_clear(shape, blocker)
+                                      : sphere_is_clear(shape, blocker);
+}
+
+scene::Environment::Standing LineCheck::query(const Vector3d& a, const Vector3d& b, double limit,
+                                              std::int32_t& hint) {
+  ++queries_;
+  return obstacles_->nearest_standing(a, b, limit, time_s_, hint);
+}
+
+scene::Shapes LineCheck::at(int i, int pieces) {
+  if (i == 0) return from_->arm;
+  if (i == pieces) return to_->arm;
+  const int slot = i * (pieces_max / pieces);
+  Division& division = divisions_[static_cast<std::size_t>(slot - 1)];
+  if (!division.placed) {
+    division.q = from_->q + (static_cast<double>(slot) / pieces_max) * dq_;
+    dynamics::forward_kinematics(model_, *ws_, division.q);
+    division.arm.place(model_, *ws_);
+    division.placed = true;
+  }
+  return division.arm.view();
+}
+
+// A sphere sweeps a tube around its chord: one query for a capsule without ends.
+bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
+  Anchor& anchor = anchors_[shape];
+  for (const int pieces : sphere_pieces) {
+    const double radius = need(shape, pieces), limit = radius + (pieces == 1 ? reserve_m : 0.0);
+    bool clear = true;
+    for (int i = 0; i < pieces && clear; ++i) {
+      const Vector3d& a = at(i, pieces).centers[shape];
+      const Vector3d& b = at(i + 1, pieces).centers[shape];
+      const auto nearest = query(a, b, limit, anchor.hint);
+      clear = pieces == 1 ? nearest.distance > radius : nearest.distance >= radius;
+      if (!clear) {
+        blocker = {static_cast<int>(shape), nearest.obstacle, -1, radius - nearest.distance};
+        anchor.distance = -1.0;
+      } else if (pieces == 1) {
+        anchor.a = a;
+        anchor.b = b;
+        anchor.distance = nearest.distance;
+      }
+    }
+    if (clear) return true;
+    if (dq_.isZero(0.0)) break;
+  }
+  return false;
+}
+
+// A capsule sweeps no simple body: distances at the ends of each piece bound those between them.
+bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
+  Anchor& anchor = anchors_[shape];
+  for (const int pieces : two_ended_pieces) {
+    const double radius = need(shape, pieces);
+    double before = 0.0;
+    bool clear = true;
+    for (int i = 0; i <= pieces && clear; ++i) {
+      const scene::Shapes arm = at(i, pieces);
+      const auto nearest = query(arm.from(shape), arm.to(shape), radius + reserve_m, anchor.hint);
+      if (i == 0) {
+        anchor.a = arm.from(shape);
+        anchor.b = arm.to(shape);
+        anchor.distance = nearest.distance;
+      }
+      double bound = nearest.distance;
+      if (i > 0) {
+        const scene::Shapes last = at(i - 1, pieces);
+        const double chord = std::max((arm.from(shape) - last.from(shape)).norm(),
+                                      (arm.to(shape) - last.to(shape)).norm());
+        bound = std::min(bound, 0.5 * (before + nearest.distance - chord));
+      }
+      clear = bound > radius;
+      if (!clear) blocker = {static_cast<int>(shape), nearest.obstacle, -1, radius - bound};
+      before = nearest.distance;
+    }
+    if (clear) return true;
+    if (dq_.isZero(0.0)) break;
+  }
+  return false;
+}
+
+// Only the joints between two parts change their distance: docs/theory.md (12.12).
+bool LineCheck::pair_is_clear(std::size_t pair, Blocker& blocker) {
+  const auto k = static_cast<Index>(pair);
+  const auto lever = levers_.pairs().row(k);
+  const double stray = pair_stray_[k] + margin_;
+  const auto bound = [&] {
+    way_ = (from_->q - pair_q_.col(k)).cwiseAbs().cwiseMax((to_->q - pair_q_.col(k)).cwiseAbs());
+    return pair_distance_[k] - lever.dot(way_) - stray - rounding_m;
+  };
+  if (pair_distance_[k] > 0.0 && bound() > 0.0) return true;
+  // Larger distances are not asked for, because few pairs are ever nearer.
+  constexpr double far_m = 0.3;
+  pair_q_.col(k) = from_->q + 0.5 * dq_;
+  pair_distance_[k] = self_->distance(pair, at(1, 2), far_m);
+  if (bound() > 0.0) return true;
+  way_ = dq_.cwiseAbs();
+  const double way = lever.dot(way_);
+  for (const int pieces : two_ended_pieces) {
+    double before = 0.0;
+    bool clear = true;
+    for (int i = 0; i <= pieces && clear; ++i) {
+      const double distance = self_->distance(pair, at(i, pieces), far_m);
+      const double bounded =
+          i == 0 ? distance : std::min(distance, 0.5 * (before + distance - way / pieces));
+      clear = bounded > stray;
+      if (!clear) blocker = {-1, scene::Contact::map, static_cast<int>(pair), stray - bounded};
+      before = distance;
+    }
+    if (clear) return true;
+    if (dq_.isZero(0.0)) break;
+  }
+  return false;
+}
+
+}  // namespace hamelin::control
