@@ -319,7 +319,8 @@ Safety read_safety(const Reader& in, const Scene& scene) {
   if (type == "shield") safety.type = SafetyType::shield;
   if (type == "certificate") safety.type = SafetyType::certificate;
   safety.margin_m = in.get("margin_m", safety.margin_m);
-  safety.torque_share = in.get("torque_share", safety.torque_share);
+  safety.torque_share =
+      in.get("torque_share", scene.actuation.type == ActuationType::ideal ? 0.95 : 0.8);
   safety.tracking_rad = in.get("tracking_rad", safety.tracking_rad);
   return safety;
 }
