@@ -132,7 +132,7 @@ void Shield::start(const Surroundings& world, const Node& node) {
   stopping_ = false;
   run_ = 0;
   notice(world);
-  if (verify(world, node, node)) {
+  if (verify(world, {node, node.v, node})) {
     std::swap(stop_, tried_);
     stop_time_ = 0.0;
     changed_ = false;
@@ -164,11 +164,12 @@ void Shield::start(const Surroundings& world, const Node& node) {
   throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, expected));
 }
 
-bool Shield::accept(const Surroundings& world, const Node& from, const Node& to) {
+bool Shield::accept(const Surroundings& world, const Step& step) {
+  const Node& to = step.to;
   ++counts_.steps;
   notice(world);
   const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
-  if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, from, to)) {
+  if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
     std::swap(stop_, tried_);
     stop_time_ = 0.0;
     stopping_ = changed_ = false;
@@ -176,7 +177,7 @@ bool Shield::accept(const Surroundings& world, const Node& from, const Node& to)
     return true;
   }
   if (!to.q.allFinite() || !to.v.allFinite()) refusal_ = {};
-  if (changed_) check_overtaken(world, from);
+  if (changed_) check_overtaken(world, step.from);
   count_refusal();
   return false;
 }
@@ -241,8 +242,9 @@ bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineChec
 }
 
 // In the order of cost: docs/theory.md (14.14).
-bool Shield::verify(const Surroundings& world, const Node& from, const Node& to) {
-  if (!within_velocity(from.v, to.v)) return false;
+bool Shield::verify(const Surroundings& world, const Step& step) {
+  const auto& [from, departure, to] = step;
+  if (!within_velocity(from.v, to.v) || !within_velocity(from.v, departure)) return false;
   const std::optional<double> rate = braking_.find(to.q, to.v);
   if (!rate) {
     refusal_ = {StopCause::torque, {}, -1};
@@ -255,8 +257,10 @@ bool Shield::verify(const Surroundings& world, const Node& from, const Node& to)
   levers_.extend_travel(tried_.end(), stray_);
   const LineCheck::End at_from = place(from.q, arm_from_), at_to = place(to.q, arm_to_),
                        at_end = place(tried_.end(), arm_end_);
-  if (!is_clear(stop_line_, world, at_to, at_end, stray_)) return false;
-  step_stray_ = stray_ + 0.25 * period_s_ * (to.v - from.v).cwiseAbs();  // docs/theory.md (12.2)
+  // each step of the stop bends by as much as any other, docs/theory.md (12.2)
+  step_stray_ = stray_ + 0.25 * period_s_ * period_s_ * *rate * to.v.cwiseAbs();
+  if (!is_clear(stop_line_, world, at_to, at_end, step_stray_)) return false;
+  step_stray_ = stray_ + 0.25 * period_s_ * (to.v - departure).cwiseAbs();
   return is_clear(step_line_, world, at_from, at_to, step_stray_);
 }
 

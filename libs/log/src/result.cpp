@@ -157,6 +157,8 @@ Json to_json(const Result& r) {
       {"provenance", r.provenance}};
   if (r.torque_change)
     document["torque_change"] = {{"mean", r.torque_change->mean()}, {"max", r.torque_change->max}};
+  if (r.position_excess) document["position_excess"] = *r.position_excess;
+  if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},

@@ -8,6 +8,7 @@
 #include <array>
 #include <utility>
 
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
@@ -99,6 +100,12 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       model_(load_checked(scene)),
       q_shown_(VectorXd::Zero(model_.dof())),
       v_shown_(q_shown_) {
+  if (scene.model.joint_limits) {
+    q_lower_ = control::joint_limits(model_.robot(), &model::Joint::lower, -infinity);
+    q_upper_ = control::joint_limits(model_.robot(), &model::Joint::upper, infinity);
+  }
+  if (scene.model.velocity_limits)
+    v_max_ = control::joint_limits(model_.robot(), &model::Joint::velocity_max, infinity);
   make_plant(plant_factory);
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
@@ -234,6 +241,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
 void ClosedLoop::observe_node() {
   actuation_->reach_node();
   judge_->look(plant_->node().q, plant_->node().time_s);
+  note_limits();
   reveal_obstacles();
   min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
   min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
@@ -244,6 +252,17 @@ void ClosedLoop::observe_node() {
   change_map();
   recorder_->observe(judge_->clearance_m(), certified_, plant_->node().v, scene_.step_s);
   if (watch_->at_node) watch_->at_node(plant_->node().time_s, plant_->node().q);
+}
+
+void ClosedLoop::note_limits() {
+  const Plant::Node& node = plant_->node();
+  const auto raise = [](std::optional<double>& most, double excess) {
+    most = std::max(most.value_or(0.0), excess);
+  };
+  if (q_lower_.size() > 0)
+    raise(result_.position_excess,
+          std::max((node.q - q_upper_).maxCoeff(), (q_lower_ - node.q).maxCoeff()));
+  if (v_max_.size() > 0) raise(result_.speed_excess, (node.v.cwiseAbs() - v_max_).maxCoeff());
 }
 
 void ClosedLoop::certify() {

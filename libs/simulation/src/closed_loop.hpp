@@ -39,6 +39,8 @@ class ClosedLoop {
   /// stayed clear, and changes of the map that are due.
   void observe_node();
   void certify();
+  /// Notes by how much joints are beyond their limits.
+  void note_limits();
   /// Shows the controller obstacles that come into sight.
   void reveal_obstacles();
   void change_map();
@@ -88,6 +90,7 @@ class ClosedLoop {
   std::unique_ptr<control::WorldView> own_judge_;
   control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
+  Eigen::VectorXd q_lower_, q_upper_, v_max_;  ///< of size zero: not modelled
   Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
   // State of the run.

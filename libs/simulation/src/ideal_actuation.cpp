@@ -190,7 +190,8 @@ class IdealActuation final : public Actuation {
     } else {
       arm_.integrator->velocity(after_, v_next_);
     }
-    tried_ = shield.accept(world, {at_node_.q, departure_velocity()}, {after_.q, v_next_});
+    tried_ =
+        shield.accept(world, {{at_node_.q, v_}, departure_velocity(), {after_.q, v_next_}});
     return tried_;
   }
 

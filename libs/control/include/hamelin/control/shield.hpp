@@ -82,10 +82,14 @@ class Shield {
   /// Begins at a node, which must have a verified stop itself.
   /// @throws Error invalid if it has none, with the bound that would do
   void start(const Surroundings& world, const Node& node);
-  /// Decides on a step. @param from the node at which the arm leaves, with its velocity there
-  /// @param to what the step would lead to
-  /// @return whether it is accepted; else see refusal()
-  [[nodiscard]] bool accept(const Surroundings& world, const Node& from, const Node& to);
+  /// A step of the arm.
+  struct Step {
+    const Node& from;                     ///< the node as it was verified
+    const Eigen::VectorXd& departure;     ///< velocity with which the arm would leave it
+    const Node& to;                       ///< what the step would lead to
+  };
+  /// Decides on a step. @return whether it is accepted; else see refusal()
+  [[nodiscard]] bool accept(const Surroundings& world, const Step& step);
   /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
   void refuse();
   /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.13).
@@ -109,7 +113,7 @@ class Shield {
   [[nodiscard]] std::string describe(const scene::Environment& environment) const;
 
  private:
-  [[nodiscard]] bool verify(const Surroundings& world, const Node& from, const Node& to);
+  [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
   [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,

@@ -61,6 +61,9 @@ struct Result {
   double time_s = 0.0;
   long steps = 0;
   Eigen::VectorXd q, v;
+  /// By how much a joint was beyond its limits at any node, where limits are modelled: of position
+  /// [rad or m] and of speed [rad/s or m/s]; zero if never.
+  std::optional<double> position_excess, speed_excess;
   // Largest values of each joint, empty in free motion; h is the step.
   Eigen::VectorXd v_abs_max;     ///< speed at any node [rad/s or m/s]
   Eigen::VectorXd a_abs_max;     ///< |Δv/h| between two nodes
