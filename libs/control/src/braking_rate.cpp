@@ -13,8 +13,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-// A rate is kept if it uses at least this share of the allowed torque.
-constexpr double least_utilisation = 0.7;
 // A rate that is tried is below the largest one that the last line allowed by this factor.
 constexpr double below_largest = 0.97;
 constexpr int tries_max = 8;
@@ -81,7 +79,8 @@ std::pair<double, double> BrakingRate::allowed_rates(double rate) {
   return {low, high};
 }
 
-std::optional<double> BrakingRate::find(const VectorXd& q, const VectorXd& w) {
+std::optional<double> BrakingRate::find(const VectorXd& q, const VectorXd& w,
+                                         double least_utilisation) {
   const double largest = upper_rate(w);
   utilisation_ = 0.0;
   if (effort_max_.size() == 0) return largest;

@@ -96,12 +96,26 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   answer_.torque = answer_.q_next = answer_.v_next = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
   if (scene_.safety.type == scene::SafetyType::shield)
-    shield_ = std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_);
+    make_shield();
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
   const double delay = std::round(scene_.actuation.delay_s / period_s_);
   issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
+}
+
+void Controller::make_shield() {
+  Shield::Drive drive;
+  if (options_.position) {
+    drive.acceleration_max = options_.acceleration_max;
+    drive.jerk_max = options_.jerk_max;
+  } else if (options_.torque) {
+    drive.torque_rate = scene_.actuation.torque_rate_max_Nm_s.value_or(0.0);
+    const double delay = std::round(scene_.actuation.delay_s / period_s_);
+    pipeline_.emplace(nominal_, static_cast<std::size_t>(delay), period_s_);
+  }
+  shield_ = std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_, drive);
+  point_q_ = point_v_ = VectorXd::Zero(nominal_.dof());
 }
 
 double steady_clock_s() {
@@ -230,10 +244,15 @@ void Controller::take_braking_state() {
 void Controller::start_outputs() {
   answer_.q_next = q_;
   answer_.v_next = v_;
+  if (shield_) {
+    point_q_ = q_;
+    point_v_ = v_;
+  }
   command_rate_.setZero();
   if (!forms_torque()) return;
   dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
   limits_.start_from(answer_.torque);
+  if (pipeline_) pipeline_->start_from(answer_.torque);
   if (!options_.position)
     for (auto& torque : issued_) torque = answer_.torque;
 }
@@ -258,6 +277,11 @@ void Controller::decide() {
   answer_.series = planner_.command().series();
   if (forms_torque()) form_torque();
   if (options_.position) form_position();
+  answer_.stopping = false;
+  if (shield_ && options_.position)
+    shield_position();
+  else if (pipeline_)
+    shield_torque();
   if (estimator_)
     issued_[static_cast<std::size_t>(k_) % issued_.size()] =
         options_.position ? command_rate_ : answer_.torque;
@@ -324,6 +348,45 @@ void Controller::form_torque() {
   else
     sum_.sum(ws_, *answer_.channels, q_, v_, q_, period_s_, 1.0, answer_.torque);
   answer_.saturated = limits_.limit(answer_.torque, period_s_);
+}
+
+void Controller::shield_torque() {
+  pipeline_->observe(ws_, q_, v_);
+  pipeline_->predict(ws_, q_, v_);
+  const Shield::Node from{pipeline_->q(), pipeline_->v()};
+  if (answer_.channels != nullptr) {
+    pipeline_->advance(ws_, answer_.torque);
+    const Shield::Node to{pipeline_->q_next(), pipeline_->v_next()};
+    answer_.stopping = !shield_->accept(
+        surroundings(), {from, from.v, to, pipeline_->acceleration(), answer_.torque,
+                         pipeline_->disturbance()});
+  } else {
+    shield_->refuse();
+    answer_.stopping = true;
+  }
+  if (answer_.stopping) {
+    shield_->stop_torque(from, pipeline_->disturbance(), answer_.torque);
+    limits_.start_from(pipeline_->last());
+    answer_.saturated = limits_.limit(answer_.torque, period_s_);
+  }
+  pipeline_->send(answer_.torque);
+}
+
+void Controller::shield_position() {
+  const Shield::Node from{point_q_, point_v_}, to{answer_.q_next, answer_.v_next};
+  if (answer_.channels != nullptr) {
+    answer_.stopping = !shield_->accept(
+        surroundings(), {from, from.v, to, command_rate_, answer_.torque, command_rate_});
+  } else {
+    shield_->refuse();
+    answer_.stopping = true;
+  }
+  if (answer_.stopping) {
+    shield_->stop_point(answer_.q_next, answer_.v_next);
+    command_rate_ = (answer_.v_next - point_v_) / period_s_;
+  }
+  point_q_ = answer_.q_next;
+  point_v_ = answer_.v_next;
 }
 
 // Follows a motion that loses its velocity and then rests, with gravity and Coriolis torques

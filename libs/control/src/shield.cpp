@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "hamelin/control/planner_setup.hpp"
@@ -63,7 +64,7 @@ std::string_view to_string(StopCause cause) noexcept {
 }
 
 Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-               double period_s)
+               double period_s, const Drive& drive)
     : model_(model),
       self_(self),
       scene_name_(scene.name),
@@ -84,29 +85,27 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       friction_speed_(scene.model.friction_speed),
       torque_share_(scene.safety.torque_share),
       levers_(model, self),
+      drive_(drive),
       step_line_(model, levers_, self),
+      ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
-      braking_(model, torque_share_ * effort_max_, VectorXd(),
+      braking_(model, torque_share_ * effort_max_,
+               drive.acceleration_max > 0.0 ? VectorXd::Constant(model.dof(), drive.acceleration_max)
+                                            : VectorXd(),
                1.0 / smallest_rest_time(scene, period_s)),
       ws_(model),
       stop_(model.dof()),
       tried_(model.dof()),
       arm_from_(model),
       arm_to_(model),
+      arm_line_(model),
       arm_end_(model) {
   const Index n = model.dof();
   const double coarse = std::max(1.0, period_s / usual_step_s);
-  stray_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse);
+  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse);
   for (auto* x :
-       {&step_stray_, &zero_, &reference_q_, &reference_v_, &q_, &v_, &rate_})
+       {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_, &q_, &v_, &rate_, &hold_})
     x->setZero(n);
-}
-
-double Shield::largest_margin_m() const {
-  double largest = 0.0;
-  for (Index i = 0; i < levers_.shapes().rows(); ++i)
-    largest = std::max(largest, levers_.shapes().row(i).dot(stray_));
-  return largest + margin_m_;
 }
 
 LineCheck::End Shield::place(const VectorXd& q, scene::PlacedShapes& arm) {
@@ -124,6 +123,7 @@ void Shield::notice(const Surroundings& world) {
   snapshot_ = world.snapshot;
   existing_ = existing;
   step_line_.forget();
+  ramp_line_.forget();
   stop_line_.forget();
 }
 
@@ -132,10 +132,13 @@ void Shield::start(const Surroundings& world, const Node& node) {
   stopping_ = false;
   run_ = 0;
   notice(world);
-  if (verify(world, {node, node.v, node})) {
+  dynamics::gravity_torque(model_, ws_, node.q, hold_);
+  if (verify(world, {node, node.v, node, zero_, hold_, zero_})) {
     std::swap(stop_, tried_);
+    std::swap(stray_, tried_stray_);
     stop_time_ = 0.0;
     changed_ = false;
+    largest_margin_ = stop_line_.largest_stray_m();
     return;
   }
   std::string expected;
@@ -159,7 +162,8 @@ void Shield::start(const Surroundings& world, const Node& node) {
                                    std::max(0.0, margin_m_ - missing))
                      : fmt::format("/safety: at the start, {} by the margin of {:.3g} m that its "
                                    "bounds require, expected bounds that require {:.3g} m less",
-                                   describe(world.environment), largest_margin_m(), missing);
+                                   describe(world.environment), stop_line_.largest_stray_m(),
+                                   missing);
   }
   throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, expected));
 }
@@ -171,9 +175,11 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
     std::swap(stop_, tried_);
+    std::swap(stray_, tried_stray_);
     stop_time_ = 0.0;
     stopping_ = changed_ = false;
     run_ = 0;
+    largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
     return true;
   }
   if (!to.q.allFinite() || !to.v.allFinite()) refusal_ = {};
@@ -221,7 +227,7 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < lower_.size(); ++j) {
     const auto beyond = [&](const VectorXd& q) {
-      return std::max({q[j] - (upper_[j] - stray_[j]), lower_[j] + stray_[j] - q[j], 0.0});
+      return std::max({q[j] - (upper_[j] - tried_stray_[j]), lower_[j] + tried_stray_[j] - q[j], 0.0});
     };
     const double now = beyond(from);
     if (beyond(to) <= now && beyond(tried_.line_start()) <= now && beyond(tried_.end()) <= now)
@@ -243,35 +249,120 @@ bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineChec
 
 // In the order of cost: docs/theory.md (14.14).
 bool Shield::verify(const Surroundings& world, const Step& step) {
-  const auto& [from, departure, to] = step;
-  if (!within_velocity(from.v, to.v) || !within_velocity(from.v, departure)) return false;
-  const std::optional<double> rate = braking_.find(to.q, to.v);
-  if (!rate) {
-    refusal_ = {StopCause::torque, {}, -1};
-    return false;
+  const Node &from = step.from, &to = step.to;
+  if (!within_velocity(from.v, to.v) || !within_velocity(from.v, step.departure)) return false;
+  if (!find_stop(step, BrakingRate::usual_utilisation)) return false;
+  if (!stop_is_safe(world, step)) {
+    // the shortest stop may be safe where a longer one is not
+    const double rate = tried_.braking().rate;
+    const Refusal refusal = refusal_;
+    const bool shorter = find_stop(step, BrakingRate::full_utilisation) &&
+                         tried_.braking().rate > 1.01 * rate && stop_is_safe(world, step);
+    if (!shorter) {
+      refusal_ = refusal;
+      return false;
+    }
   }
-  tried_.set(to.q, to.v, zero_, {*rate, 0.0, 0.0});
-  if (!within_joint_limits(from.q, to.q)) return false;
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
-  levers_.extend_travel(to.q, stray_);
-  levers_.extend_travel(tried_.end(), stray_);
-  const LineCheck::End at_from = place(from.q, arm_from_), at_to = place(to.q, arm_to_),
-                       at_end = place(tried_.end(), arm_end_);
-  // each step of the stop bends by as much as any other, docs/theory.md (12.2)
-  step_stray_ = stray_ + 0.25 * period_s_ * period_s_ * *rate * to.v.cwiseAbs();
-  if (!is_clear(stop_line_, world, at_to, at_end, step_stray_)) return false;
-  step_stray_ = stray_ + 0.25 * period_s_ * (to.v - departure).cwiseAbs();
-  return is_clear(step_line_, world, at_from, at_to, step_stray_);
+  const LineCheck::End at_from = place(from.q, arm_from_), at_to = place(to.q, arm_to_);
+  line_stray_ = tried_stray_ + 0.25 * period_s_ * (to.v - step.departure).cwiseAbs();
+  return is_clear(step_line_, world, at_from, at_to, line_stray_);
 }
 
-void Shield::stop_torque(const Node& node, VectorXd& torque) {
+bool Shield::stop_is_safe(const Surroundings& world, const Step& step) {
+  if (!within_velocity(step.from.v, tried_.line_velocity())) return false;
+  if (!within_joint_limits(step.from.q, step.to.q)) return false;
+  if (!world.environment.has_obstacles() && self_ == nullptr) return true;
+  levers_.extend_travel(step.to.q, tried_stray_);
+  levers_.extend_travel(tried_.end(), tried_stray_);
+  return stop_is_clear(world, place(step.to.q, arm_to_));
+}
+
+bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_to) {
+  const auto [rate, ramp, fade] = tried_.braking();
+  const LineCheck::End at_end = place(tried_.end(), arm_end_);
+  // each step of the stop bends by as much as any other, docs/theory.md (12.2)
+  line_stray_ =
+      tried_stray_ + 0.25 * period_s_ * period_s_ * rate * tried_.line_velocity().cwiseAbs();
+  if (ramp == 0.0) return is_clear(stop_line_, world, at_to, at_end, line_stray_);
+  const LineCheck::End at_line = place(tried_.line_start(), arm_line_);
+  if (!is_clear(stop_line_, world, at_line, at_end, line_stray_)) return false;
+  line_stray_ += 0.125 * ramp * ramp *
+                 tried_.acceleration().cwiseAbs().cwiseMax(rate * tried_.line_velocity().cwiseAbs());
+  return is_clear(ramp_line_, world, at_to, at_line, line_stray_);
+}
+
+std::pair<double, double> Shield::transition_times(const Step& step, double rate) {
+  double ramp = 0.0, fade = 0.0;
+  if (drive_.torque_rate > 0.0) {
+    rate_ = -rate * w_ - step.disturbance;
+    dynamics::inverse_dynamics(model_, ws_, step.to.q, w_, rate_, q_);
+    ramp = (q_ - step.torque).cwiseAbs().maxCoeff() / drive_.torque_rate;
+  }
+  for (Index j = 0; j < w_.size(); ++j) {
+    if (drive_.jerk_max > 0.0) {
+      ramp = std::max(ramp, std::abs(step.acceleration[j] + rate * w_[j]) / drive_.jerk_max);
+      fade = std::max(fade, std::abs(rate * w_[j]) / drive_.jerk_max);
+    }
+  }
+  return {ramp, fade};
+}
+
+// docs/theory.md (14.12): the rate of braking and the time to reach it depend on each other.
+bool Shield::find_stop(const Step& step, double least_utilisation) {
+  constexpr int tries = 3;
+  constexpr double whole = 1.0;  // of docs/theory.md (14.12)
+  const Node& to = step.to;
+  double ramp = 0.0, fade = 0.0, rate = 0.0;
+  w_ = to.v;
+  for (int i = 0; i < tries; ++i) {
+    reference_q_ = to.q + ramp * to.v;
+    const std::optional<double> found = braking_.find(reference_q_, w_, least_utilisation);
+    if (!found) {
+      refusal_ = {StopCause::torque, {}, -1};
+      return false;
+    }
+    rate = *found;
+    if (drive_.torque_rate == 0.0 && drive_.jerk_max == 0.0) break;
+    std::tie(ramp, fade) = transition_times(step, rate);
+    // faster braking would take longer to begin
+    for (int k = 0; k < tries && rate * (ramp + fade) > whole; ++k) {
+      rate *= std::sqrt(whole / (rate * (ramp + fade)));
+      std::tie(ramp, fade) = transition_times(step, rate);
+    }
+    if (rate * (ramp + fade) > 1.9 * whole) rate = 1.9 * whole / (ramp + fade);
+    w_ = to.v + 0.5 * ramp * step.acceleration;
+  }
+  tried_.set(to.q, to.v, step.acceleration, {rate, ramp, fade});
+  bound_straying();
+  return true;
+}
+
+// docs/theory.md (14.16)
+void Shield::bound_straying() {
+  tried_stray_ = tracking_ + 0.25 * period_s_ * period_s_ * tried_.braking().rate *
+                                 tried_.line_velocity().cwiseAbs();
+}
+
+// Whether the bounds that the scene states hold can be seen by what a stop does.
+void Shield::note_straying(const VectorXd& q) {
+  for (Index j = 0; j < q.size(); ++j) {
+    const double strayed = std::abs(q[j] - reference_q_[j]);
+    counts_.strayed = std::max(counts_.strayed, strayed);
+    if (!(strayed > counts_.strayed_share * stray_[j])) continue;
+    counts_.strayed_share = strayed / stray_[j];
+    counts_.strayed_joint = static_cast<int>(j);
+  }
+}
+
+void Shield::stop_torque(const Node& node, const VectorXd& disturbance, VectorXd& torque) {
   const double middle = stop_time_ + 0.5 * period_s_, end = stop_time_ + period_s_;
   stop_.at(stop_time_, reference_q_, reference_v_);
-  counts_.strayed = std::max(counts_.strayed, (node.q - reference_q_).cwiseAbs().maxCoeff());
+  note_straying(node.q);
   rate_ = feedback_rate_ * (feedback_rate_ * (reference_q_ - node.q) +
                             2.0 * (reference_v_ - node.v));
   stop_.at(end, q_, v_);
-  rate_ += (v_ - reference_v_) / period_s_;
+  rate_ += (v_ - reference_v_) / period_s_ - disturbance;
   stop_.at(middle, q_, v_);
   dynamics::inverse_dynamics(model_, ws_, q_, v_, rate_, torque);
   if (damping_.size() > 0) torque += damping_.cwiseProduct(v_);
@@ -279,6 +370,11 @@ void Shield::stop_torque(const Node& node, VectorXd& torque) {
     torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
   if (effort_max_.size() > 0) torque = torque.cwiseMin(effort_max_).cwiseMax(-effort_max_);
   stop_time_ = end;
+}
+
+void Shield::stop_point(VectorXd& q, VectorXd& v) {
+  stop_time_ += period_s_;
+  stop_.at(stop_time_, q, v);
 }
 
 std::string Shield::describe(const scene::Environment& environment) const {

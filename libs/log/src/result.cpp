@@ -69,6 +69,7 @@ Json shield(const Result::Shield& s) {
           {"longest_stop_steps", s.longest_stop_steps},
           {"causes", std::move(causes)},
           {"strayed_rad", s.strayed_rad},
+          {"strayed_share", s.strayed_share},
           {"overtaken", s.overtaken},
           {"work_J", s.work_J}};
 }

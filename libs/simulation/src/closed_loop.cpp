@@ -75,9 +75,18 @@ log::Result::Shield shield_figures(const control::Shield& shield, double work_J)
     if (counts.causes[i] > 0)
       out.causes.emplace_back(to_string(static_cast<control::StopCause>(i)), counts.causes[i]);
   out.strayed_rad = counts.strayed;
+  out.strayed_share = counts.strayed_share;
   out.overtaken = counts.overtaken;
   out.work_J = work_J;
   return out;
+}
+
+std::string shield_warning(const control::Shield& shield, const model::Model& model) {
+  const control::Shield::Counts& counts = shield.counts();
+  const auto joint = static_cast<std::size_t>(counts.strayed_joint);
+  return fmt::format("the bounds of /safety do not hold: joint '{}' strayed from the motion of a "
+                     "stop by {:.2g} times the bound that follows from them",
+                     model.robot().links[joint].joint.name, counts.strayed_share);
 }
 
 /// CPU time of a tick without writing its log line.
@@ -517,6 +526,8 @@ void ClosedLoop::fill_result() {
   if (const auto* change = actuation_->torque_change()) result_.torque_change = *change;
   if (const control::Shield* const shield = controller_->shield())
     result_.shield = shield_figures(*shield, audit_->ledger().stop);
+  if (result_.shield && result_.shield->strayed_share > 1.0)
+    result_.warnings.push_back(shield_warning(*controller_->shield(), model_));
   result_.scene = scene_.name;
   result_.planner = controller_->plugin().name();
   result_.time_s = plant_->node().time_s;

@@ -25,7 +25,7 @@ class IdealActuation final : public Actuation {
  public:
   IdealActuation(const scene::Scene& scene, SimulatedArm& arm)
       : arm_(arm), step_s_(scene.step_s), limits_(torque_limits(scene, arm.model)) {
-    gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ = v_next_ =
+    gradient_ = gradient_before_ = impulse_ = node_velocity_ = departure_ = v_next_ = zero_ =
         VectorXd::Zero(arm.model.dof());
   }
 
@@ -190,8 +190,8 @@ class IdealActuation final : public Actuation {
     } else {
       arm_.integrator->velocity(after_, v_next_);
     }
-    tried_ =
-        shield.accept(world, {{at_node_.q, v_}, departure_velocity(), {after_.q, v_next_}});
+    const control::Shield::Node from{at_node_.q, v_}, to{after_.q, v_next_};
+    tried_ = shield.accept(world, {from, departure_velocity(), to, zero_, zero_, zero_});
     return tried_;
   }
 
@@ -205,7 +205,7 @@ class IdealActuation final : public Actuation {
       channels.damping = arm_.own_damping;
     else
       channels.damping.setZero();
-    shield.stop_torque({at_node_.q, v_}, channels.held_torque);
+    shield.stop_torque({at_node_.q, v_}, zero_, channels.held_torque);
     gradient_.setZero();
     gradient_before_.setZero();
     node_velocity_ = v_;
@@ -224,7 +224,7 @@ class IdealActuation final : public Actuation {
 
   // with a shield
   integration::State at_node_, after_, at_next_;
-  VectorXd v_, v_next_;
+  VectorXd v_, v_next_, zero_;
   integration::StepReport report_;
   bool tried_ = false;     ///< whether after_ is the accepted next state
   bool stopping_ = false;  ///< whether a stop acts

@@ -52,7 +52,8 @@ class SampledActuation : public Actuation {
     audit.book_node(plant_, 0.0);
     const long k = plant_.node().k;
     if (asks_planner(k)) {
-      if (decided.channels->raw().has_node_velocity != 0)
+      stopping_ = decided.stopping;
+      if (!stopping_ && decided.channels->raw().has_node_velocity != 0)
         audit.book_filter(decided.channels->raw());
       receive(decided, k / period_steps_);
     }
@@ -63,9 +64,10 @@ class SampledActuation : public Actuation {
   const VectorXd& departure_velocity() override { return plant_.node().v; }
   void torques(const planning::CommandBuffers&, VectorXd& sum, Json& by_channel) override {
     sum = torque_;
-    if (!sum.isZero(0.0)) by_channel["held"] = to_json(sum);
+    if (!sum.isZero(0.0)) by_channel[stopping_ ? "stop" : "held"] = to_json(sum);
   }
   bool saturated() const override { return saturated_; }
+  bool stopping() const override { return stopping_; }
 
  protected:
   /// Takes the answer of a tick.
@@ -78,6 +80,7 @@ class SampledActuation : public Actuation {
   bool saturated_ = false;
 
  private:
+  bool stopping_ = false;
   long period_steps_;
 };
 

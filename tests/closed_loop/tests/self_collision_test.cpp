@@ -21,6 +21,7 @@ Json closing_square(double speed, double open = 0.3) {
   const double right = 0.5 * std::acos(-1.0);
   scene["start"] = {{"q", {0.0, right, right, right - open}}, {"v", {0.0, 0.0, 0.0, speed}}};
   scene["model"] = {{"self_collision", true}};
+  scene["safety"] = {{"type", "certificate"}};  // a shield would stop the arm
   scene["planner"] = {{"name", "probe"}, {"params", {{"velocity", {0.0, 0.0, 0.0, speed}}}}};
   scene["step_s"] = 0.001;
   scene["duration_s"] = 1.0;

@@ -17,10 +17,14 @@ class BrakingRate {
   BrakingRate(const model::Model& model, Eigen::VectorXd effort_max,
               Eigen::VectorXd acceleration_max, double rate_max);
 
-  /// A rate at which the arm can stop from q with velocity w: at least 70 % of the largest one, so
-  /// that the rate of the last call can often be kept.
+  /// A rate at which the arm can stop from q with velocity w. The rate of the last call is kept if
+  /// it uses enough of the allowed torque.
+  /// @param least_utilisation of the allowed torque; lower values accept slower stops, and are
+  ///        found faster
   /// @return none if there is no such rate
-  [[nodiscard]] std::optional<double> find(const Eigen::VectorXd& q, const Eigen::VectorXd& w);
+  [[nodiscard]] std::optional<double> find(const Eigen::VectorXd& q, const Eigen::VectorXd& w,
+                                           double least_utilisation);
+  static constexpr double usual_utilisation = 0.7, full_utilisation = 0.95;
   /// The largest |torque| that the motion of the last call of find() requires at the rate that was
   /// tried last, as a share of what is allowed.
   [[nodiscard]] double utilisation() const noexcept { return utilisation_; }

@@ -17,6 +17,7 @@
 #include "hamelin/control/shield.hpp"
 #include "hamelin/control/state_estimator.hpp"
 #include "hamelin/control/torque_limits.hpp"
+#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
@@ -37,6 +38,8 @@ struct Answer {
   /// Sum of all channels within the limits of torque and its rate [Nm or N], docs/theory.md (8.7).
   Eigen::VectorXd torque;
   bool saturated = false;  ///< whether a limit reduced it
+  /// Whether the shield refused the planner's answer, and torque or position are those of its stop.
+  bool stopping = false;
   /// For arms that are controlled by position: joint positions and velocities one period ahead.
   Eigen::VectorXd q_next, v_next;
   /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
@@ -183,6 +186,7 @@ class Controller {
     std::uint64_t number = 0;
     std::optional<planning::PreparedParams> params;
   };
+  void make_shield();
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
   void start_outputs();
@@ -196,6 +200,9 @@ class Controller {
   void start_braking(std::string_view cause);
   void form_torque();
   void form_position();
+  /// Replaces an output that the shield refuses by that of its stop.
+  void shield_torque();
+  void shield_position();
   void brake();
   /// Positions follow from the torque where the planner sets no velocity.
   [[nodiscard]] bool forms_torque() const noexcept { return options_.torque || options_.position; }
@@ -226,6 +233,8 @@ class Controller {
   dynamics::Workspace ws_;
   std::unique_ptr<Shield> shield_;
   bool shielded_ = false;  ///< whether the shield has started
+  std::optional<TorquePipeline> pipeline_;  ///< with a shield, where torques are the output
+  Eigen::VectorXd point_q_, point_v_;       ///< set point of the last tick
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
 

@@ -48,6 +48,10 @@ class LineCheck {
   /// Forgets all anchors, because obstacles have changed.
   void forget();
 
+  /// Σ_j l_j σ_j of the last check, the largest of any shape [m].
+  [[nodiscard]] double largest_stray_m() const {
+    return straying_.size() > 0 ? straying_.maxCoeff() : 0.0;
+  }
   /// Distance queries since the start, for benchmarks and tests.
   [[nodiscard]] long queries() const noexcept { return queries_; }
   /// The lower bound of the distance of a shape's chord from all obstacles that its anchor gives,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "hamelin/control/braking_rate.hpp"
 #include "hamelin/control/levers.hpp"
@@ -69,15 +70,25 @@ class Shield {
     long longest = 0;   ///< the longest of them, in steps
     std::array<long, stop_causes> causes{};  ///< of the stops' beginnings
     double strayed = 0.0;  ///< largest deviation of a joint from a stop's motion [rad or m]
+    double strayed_share = 0.0;  ///< the same as a share of the bound that the margins cover
+    int strayed_joint = -1;      ///< whose share that is
     /// Stops that went on although the world had changed so that they are not clear any more.
     long overtaken = 0;
   };
 
+  /// What bounds the changes of the arm's motion.
+  struct Drive {
+    /// Largest rate of change of each torque [Nm/s or N/s]; zero: unbounded.
+    double torque_rate = 0.0;
+    /// For arms that are controlled by position: of each joint [rad/s² or m/s²] and [rad/s³ or
+    /// m/s³]; zero: unbounded.
+    double acceleration_max = 0.0, jerk_max = 0.0;
+  };
   /// @param model the controller's model of the arm, kept by reference
   /// @param self null if self-collision is not modelled; kept by reference
   /// @param period_s time between two steps
   Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-         double period_s);
+         double period_s, const Drive& drive);
 
   /// Begins at a node, which must have a verified stop itself.
   /// @throws Error invalid if it has none, with the bound that would do
@@ -87,13 +98,23 @@ class Shield {
     const Node& from;                     ///< the node as it was verified
     const Eigen::VectorXd& departure;     ///< velocity with which the arm would leave it
     const Node& to;                       ///< what the step would lead to
+    /// Acceleration and torque with which the arm would go on after the step, where these change at
+    /// a bounded rate only, and the acceleration that acts besides that of the torque; else not
+    /// used.
+    const Eigen::VectorXd& acceleration;
+    const Eigen::VectorXd& torque;
+    const Eigen::VectorXd& disturbance;
   };
   /// Decides on a step. @return whether it is accepted; else see refusal()
   [[nodiscard]] bool accept(const Surroundings& world, const Step& step);
   /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
   void refuse();
   /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.13).
-  void stop_torque(const Node& node, Eigen::VectorXd& torque);
+  /// @param disturbance acceleration that acts besides that of the torques [rad/s² or m/s²]
+  void stop_torque(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
+
+  /// Goes on with the stop for a period, for arms that are controlled by position.
+  void stop_point(Eigen::VectorXd& q, Eigen::VectorXd& v);
 
   /// Whether the last step was refused.
   [[nodiscard]] bool stopping() const noexcept { return stopping_; }
@@ -105,15 +126,23 @@ class Shield {
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   /// The motion by which the arm stops if the next step is refused.
   [[nodiscard]] const StopMotion& stop() const noexcept { return stop_; }
-  /// The bound of each joint's deviation that the margins cover [rad or m].
-  [[nodiscard]] const Eigen::VectorXd& joint_margin() const noexcept { return stray_; }
-  /// The largest margin of any shape [m].
-  [[nodiscard]] double largest_margin_m() const;
+  /// The largest margin of any shape that any stop required [m].
+  [[nodiscard]] double largest_margin_m() const { return largest_margin_ + margin_m_; }
   /// Describes what was in the way: "link 'hand' would come too near the map".
   [[nodiscard]] std::string describe(const scene::Environment& environment) const;
 
  private:
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
+  /// Sets tried_ to a stop after the step. @return whether there is one
+  [[nodiscard]] bool find_stop(const Step& step, double least_utilisation);
+  /// Whether the stop after the step keeps the joint limits and stays clear.
+  [[nodiscard]] bool stop_is_safe(const Surroundings& world, const Step& step);
+  /// The ramp and the fade that the drive's bounds require for a rate.
+  [[nodiscard]] std::pair<double, double> transition_times(const Step& step, double rate);
+  void note_straying(const Eigen::VectorXd& q);
+  /// Sets tried_stray_.
+  void bound_straying();
+  [[nodiscard]] bool stop_is_clear(const Surroundings& world, const LineCheck::End& at_to);
   [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,
@@ -135,15 +164,18 @@ class Shield {
   // of size zero: not modelled
   Eigen::VectorXd lower_, upper_, velocity_max_, effort_max_, damping_, friction_;
   double friction_speed_, torque_share_;
-  Eigen::VectorXd stray_;
+  Eigen::VectorXd tracking_;  ///< bound of the deviation from a stop, but for what follows
   Levers levers_;
-  LineCheck step_line_, stop_line_;
+  Drive drive_;
+  LineCheck step_line_, ramp_line_, stop_line_;
   BrakingRate braking_;
   dynamics::Workspace ws_;
   StopMotion stop_, tried_;
-  scene::PlacedShapes arm_from_, arm_to_, arm_end_;
-  Eigen::VectorXd step_stray_, zero_;
-  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_;
+  scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
+  Eigen::VectorXd stray_, tried_stray_;  ///< bounds for stop_ and tried_ [rad or m]
+  double largest_margin_ = 0.0;
+  Eigen::VectorXd line_stray_, zero_, w_;
+  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
   std::size_t existing_ = 0;               ///< obstacles at the last call

@@ -27,6 +27,8 @@ class StopMotion {
   /// Where the line begins, and where the motion ends.
   [[nodiscard]] const Eigen::VectorXd& line_start() const noexcept { return q_line_; }
   [[nodiscard]] const Eigen::VectorXd& end() const noexcept { return q_end_; }
+  /// a₀ [rad/s² or m/s²].
+  [[nodiscard]] const Eigen::VectorXd& acceleration() const noexcept { return a_; }
   /// w [rad/s or m/s].
   [[nodiscard]] const Eigen::VectorXd& line_velocity() const noexcept { return w_; }
   [[nodiscard]] const Braking& braking() const noexcept { return braking_; }

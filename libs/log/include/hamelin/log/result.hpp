@@ -92,6 +92,7 @@ struct Result {
     long stops = 0, longest_stop_steps = 0;
     std::vector<std::pair<std::string, long>> causes;  ///< of stops, those that occurred
     double strayed_rad = 0.0;  ///< largest deviation of a joint from a stop's motion [rad or m]
+    double strayed_share = 0.0;  ///< the same as a share of the bound; above 1 it was exceeded
     long overtaken = 0;        ///< stops that are not clear any more since the world changed
     double work_J = 0.0;       ///< of the torques of stops
   };
