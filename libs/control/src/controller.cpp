@@ -40,13 +40,6 @@ TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
           scene.actuation.torque_rate_max_Nm_s};
 }
 
-planning::SetupData setup_of(const scene::Scene& scene, const model::Model& nominal,
-                             const WorldView& view, double period_s, std::size_t path_points_max) {
-  planning::SetupData setup = planner_setup(scene, nominal, view, period_s);
-  setup.path_points_max = path_points_max;
-  return setup;
-}
-
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
   check_numbers(scene, arm);
   return scaled_masses(arm, scene.actuation.planner_mass_scale);
@@ -82,8 +75,8 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
              {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
               options_.prepare_maps}),
       view_(scene_, nominal_, world_),
-      planner_(plugin, setup_of(scene_, nominal_, view_, period_s_, path_points_max_), params,
-               nominal_, world_, view_, options_.log),
+      shield_(make_shield()),
+      planner_(plugin, make_setup(), params, nominal_, world_, view_, options_.log),
       params_(params),
       new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
       new_params_(std::make_unique<NewParams>()),
@@ -93,10 +86,12 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
-  answer_.torque = answer_.q_next = answer_.v_next = zero;
+  answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
-  if (scene_.safety.type == scene::SafetyType::shield)
-    make_shield();
+  if (shield_ && options_.torque && !options_.position) {
+    const double delay = std::round(scene_.actuation.delay_s / period_s_);
+    pipeline_.emplace(nominal_, static_cast<std::size_t>(delay), period_s_);
+  }
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
@@ -104,18 +99,24 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
 }
 
-void Controller::make_shield() {
+planning::SetupData Controller::make_setup() {
+  planning::SetupData setup =
+      planner_setup(scene_, nominal_, view_, period_s_,
+                    shield_ ? shield_->limit_reserve() : LimitReserve{});
+  setup.path_points_max = path_points_max_;
+  return setup;
+}
+
+std::unique_ptr<Shield> Controller::make_shield() {
+  if (scene_.safety.type != scene::SafetyType::shield) return nullptr;
   Shield::Drive drive;
   if (options_.position) {
     drive.acceleration_max = options_.acceleration_max;
     drive.jerk_max = options_.jerk_max;
   } else if (options_.torque) {
     drive.torque_rate = scene_.actuation.torque_rate_max_Nm_s.value_or(0.0);
-    const double delay = std::round(scene_.actuation.delay_s / period_s_);
-    pipeline_.emplace(nominal_, static_cast<std::size_t>(delay), period_s_);
   }
-  shield_ = std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_, drive);
-  point_q_ = point_v_ = VectorXd::Zero(nominal_.dof());
+  return std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_, drive);
 }
 
 double steady_clock_s() {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "hamelin/core/numbers.hpp"
+
 namespace hamelin::control {
 
 using Eigen::Index;
@@ -44,33 +46,54 @@ void LineCheck::forget() {
 std::optional<LineCheck::Blocker> LineCheck::check(dynamics::Workspace& ws,
                                                    const scene::Environment* obstacles,
                                                    double time_s, const End& from, const End& to,
-                                                   const VectorXd& stray, double margin_m) {
+                                                   const Stray& stray) {
   ws_ = &ws;
   obstacles_ = obstacles;
   time_s_ = time_s;
-  margin_ = margin_m;
+  margin_ = stray.margin_m;
   from_ = &from;
   to_ = &to;
   dq_ = to.q - from.q;
   for (Division& division : divisions_) division.placed = false;
   Blocker blocker;
-  pair_stray_.noalias() = levers_.pairs() * stray;
+  pair_stray_.noalias() = levers_.pairs() * stray.joints;
+  if (stray.shapes_m.size() > 0)
+    for (Index k = 0; k < pair_stray_.size(); ++k)
+      pair_stray_[k] += pair_addition(static_cast<std::size_t>(k), stray.shapes_m);
   for (std::size_t k = 0; k < static_cast<std::size_t>(pair_stray_.size()); ++k)
     if (!pair_is_clear(k, blocker)) return blocker;
   if (obstacles_ == nullptr) return std::nullopt;
   levers_.curvature(dq_, curvature_);
   tube_ = 0.125 * curvature_;
   bend_.noalias() = levers_.shapes() * tube_;
-  straying_.noalias() = levers_.shapes() * stray;
+  straying_.noalias() = levers_.shapes() * stray.joints;
+  if (stray.shapes_m.size() > 0) straying_ += stray.shapes_m;
   for (std::size_t i = 0; i < anchors_.size(); ++i)
     if (!shape_is_clear(i, blocker)) return blocker;
   return std::nullopt;
+}
+
+double LineCheck::pair_addition(std::size_t pair, const VectorXd& shapes_m) const {
+  const auto largest = [&](int part) {
+    double most = 0.0;
+    for (const int s : self_->parts()[static_cast<std::size_t>(part)].shapes)
+      if (s >= 0) most = std::max(most, shapes_m[s]);
+    return most;
+  };
+  const auto& both = self_->pairs()[pair];
+  return largest(both.part_a) + largest(both.part_b);
 }
 
 double LineCheck::need(std::size_t shape, int pieces) const {
   const auto i = static_cast<Index>(shape);
   return model_.shapes()[shape].radius + margin_ + straying_[i] +
          bend_[i] / (static_cast<double>(pieces) * pieces);
+}
+
+double LineCheck::need_from(std::size_t shape, int pieces, double distance_at_start) const {
+  const double tube = model_.shapes()[shape].radius +
+                      bend_[static_cast<Index>(shape)] / (static_cast<double>(pieces) * pieces);
+  return std::max(tube, std::min(need(shape, pieces), distance_at_start - rounding_m));
 }
 
 double LineCheck::moved(std::size_t shape, const scene::Shapes& from,
@@ -119,8 +142,10 @@ scene::Shapes LineCheck::at(int i, int pieces) {
 // A sphere sweeps a tube around its chord: one query for a capsule without ends.
 bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
   Anchor& anchor = anchors_[shape];
+  double start = infinity;
   for (const int pieces : sphere_pieces) {
-    const double radius = need(shape, pieces), limit = radius + (pieces == 1 ? reserve_m : 0.0);
+    const double radius = need_from(shape, pieces, start);
+    const double limit = radius + (pieces == 1 ? reserve_m : 0.0);
     bool clear = true;
     for (int i = 0; i < pieces && clear; ++i) {
       const Vector3d& a = at(i, pieces).centers[shape];
@@ -138,6 +163,10 @@ bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
     }
     if (clear) return true;
     if (dq_.isZero(0.0)) break;
+    if (pieces == 1) {
+      const Vector3d& a = from_->arm.centers[shape];
+      start = query(a, a, radius, anchor.hint).distance;
+    }
   }
   return false;
 }
@@ -145,14 +174,20 @@ bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
 // A capsule sweeps no simple body: distances at the ends of each piece bound those between them.
 bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
   Anchor& anchor = anchors_[shape];
+  double start = infinity;
   for (const int pieces : two_ended_pieces) {
-    const double radius = need(shape, pieces);
+    double radius = need_from(shape, pieces, start);
     double before = 0.0;
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       const scene::Shapes arm = at(i, pieces);
       const auto nearest = query(arm.from(shape), arm.to(shape), radius + reserve_m, anchor.hint);
       if (i == 0) {
+        // two-ended bounds are less than the distance, by the way of a piece at most
+        way_ = dq_.cwiseAbs();
+        start = nearest.distance -
+                levers_.shapes().row(static_cast<Index>(shape)).dot(way_) / pieces;
+        radius = need_from(shape, pieces, start);
         anchor.a = arm.from(shape);
         anchor.b = arm.to(shape);
         anchor.distance = nearest.distance;
@@ -194,11 +229,14 @@ bool LineCheck::pair_is_clear(std::size_t pair, Blocker& blocker) {
   for (const int pieces : two_ended_pieces) {
     double before = 0.0;
     bool clear = true;
+    double needed = stray;
     for (int i = 0; i <= pieces && clear; ++i) {
       const double distance = self_->distance(pair, at(i, pieces), far_m);
       const double bounded =
           i == 0 ? distance : std::min(distance, 0.5 * (before + distance - way / pieces));
-      clear = bounded > stray;
+      // a line that begins nearer may lead away, but not nearer still
+      if (i == 0) needed = std::clamp(distance - way / pieces, 0.0, stray);
+      clear = bounded > needed;
       if (!clear) blocker = {-1, scene::Contact::map, static_cast<int>(pair), stray - bounded};
       before = distance;
     }

@@ -15,8 +15,28 @@ VectorXd joint_limits(const model::Robot& robot, std::optional<double> model::Jo
   return limits;
 }
 
+namespace {
+
+// Limits inside those of the shield, but not beyond the start or a goal.
+void narrow(const scene::Scene& scene, const VectorXd& reserve, VectorXd& lower, VectorXd& upper) {
+  VectorXd low = reserve, high = reserve;
+  const auto include = [&](const VectorXd& q) {
+    if (q.size() != reserve.size()) return;
+    low = low.cwiseMin(q - lower).cwiseMax(0.0);
+    high = high.cwiseMin(upper - q).cwiseMax(0.0);
+  };
+  include(scene.start_q);
+  for (const auto& goal : scene.goals)
+    if (goal.type == scene::GoalType::joint) include(goal.q);
+  lower += low;
+  upper -= high;
+}
+
+}  // namespace
+
 planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
-                                  const WorldView& world, double control_period_s) {
+                                  const WorldView& world, double control_period_s,
+                                  const LimitReserve& reserve) {
   planning::SetupData data(nominal);
   for (const auto& goal : scene.goals)
     data.add_goal(to_c(goal), goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
@@ -24,9 +44,11 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
   if (scene.model.joint_limits) {
     data.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
     data.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
+    if (reserve.position.size() > 0) narrow(scene, reserve.position, data.q_lower, data.q_upper);
   }
   if (scene.model.velocity_limits)
-    data.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
+    data.velocity_max = (1.0 - reserve.speed_share) *
+                        joint_limits(robot, &model::Joint::velocity_max, infinity);
   if (scene.model.torque_limits)
     data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   if (scene.actuation.torque_rate_max_Nm_s)

@@ -28,6 +28,18 @@ constexpr double dwell_s = 0.005;
 constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // The deviation from a stop's motion grows with the square of the step from here on.
 constexpr double usual_step_s = 0.001;
+// By how much a joint strays per unexplained acceleration, in units of 1/ω²: the feedback of a stop
+// and the estimate of the disturbance together, docs/theory.md (14.17).
+constexpr double stop_compliance = 0.25;
+// What planners are kept from limits beyond the shield's own margins: most of them pass their bounds
+// a little [rad or m], and as a share of the speed limits where velocities are not exact.
+constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
+// Deviations at other postures than that of the start may be larger by this factor.
+constexpr double other_postures = 2.0;
+// An arm at rest is disturbed, too: it counts as a stop of this length [s].
+constexpr double hold_time_s = 0.01;
+// Noise is covered up to so many standard deviations.
+constexpr double noise_deviations = 4.0;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
@@ -68,6 +80,8 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
     : model_(model),
       self_(self),
       scene_name_(scene.name),
+      start_q_(scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(model.dof())),
+      sampled_(scene.actuation.type != scene::ActuationType::ideal),
       period_s_(period_s),
       margin_m_(scene.safety.margin_m),
       dwell_(std::lround(dwell_s / period_s)),
@@ -84,6 +98,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
                               &model::Joint::friction)),
       friction_speed_(scene.model.friction_speed),
       torque_share_(scene.safety.torque_share),
+      mass_error_(scene.safety.mass_error),
       levers_(model, self),
       drive_(drive),
       step_line_(model, levers_, self),
@@ -102,7 +117,23 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       arm_end_(model) {
   const Index n = model.dof();
   const double coarse = std::max(1.0, period_s / usual_step_s);
-  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse);
+  const bool estimates = scene.actuation.estimates_velocity;
+  const double bandwidth = scene.actuation.estimator_bandwidth;
+  const double noise = noise_deviations * scene.safety.joint_noise_rad *
+                       (estimates ? std::sqrt(bandwidth * period_s) : 1.0);
+  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse + noise);
+  compliance_s2_ = stop_compliance / (feedback_rate_ * feedback_rate_) +
+                   (estimates ? 1.0 / (std::exp(1.0) * feedback_rate_ * bandwidth) : 0.0);
+  response_ = jacobian_ = dynamics::Matrix6Xd::Zero(6, n);
+  joint_stray_ = stop_joint_stray_ = VectorXd::Zero(n);
+  if (mass_error_ > 0.0 || scene.safety.friction_share > 0.0)
+    shape_stray_ = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
+  mass_ = mass_inverse_ = Eigen::MatrixXd::Identity(n, n);
+  factors_.compute(mass_);  // allocates its memory
+  unmodelled_friction_ = VectorXd::Zero(n);
+  if (scene.safety.friction_share > 0.0)
+    unmodelled_friction_ = scene.safety.friction_share *
+                           joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
   for (auto* x :
        {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_, &q_, &v_, &rate_, &hold_})
     x->setZero(n);
@@ -136,6 +167,7 @@ void Shield::start(const Surroundings& world, const Node& node) {
   if (verify(world, {node, node.v, node, zero_, hold_, zero_})) {
     std::swap(stop_, tried_);
     std::swap(stray_, tried_stray_);
+    stop_joint_stray_ = joint_stray_;
     stop_time_ = 0.0;
     changed_ = false;
     largest_margin_ = stop_line_.largest_stray_m();
@@ -176,6 +208,7 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
     std::swap(stop_, tried_);
     std::swap(stray_, tried_stray_);
+    stop_joint_stray_ = joint_stray_;
     stop_time_ = 0.0;
     stopping_ = changed_ = false;
     run_ = 0;
@@ -208,7 +241,8 @@ void Shield::count_refusal() {
 void Shield::check_overtaken(const Surroundings& world, const Node& node) {
   changed_ = false;
   const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.end(), arm_end_);
-  if (stop_line_.check(ws_, &world.environment, world.time_s, from, end, zero_, 0.0))
+  if (stop_line_.check(ws_, &world.environment, world.time_s, from, end,
+                       {zero_, no_addition_, 0.0}))
     ++counts_.overtaken;
 }
 
@@ -226,8 +260,9 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 // An arm that is beyond a limit may come back.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < lower_.size(); ++j) {
+    const double reserve = tried_stray_[j] + joint_stray_[j];
     const auto beyond = [&](const VectorXd& q) {
-      return std::max({q[j] - (upper_[j] - tried_stray_[j]), lower_[j] + tried_stray_[j] - q[j], 0.0});
+      return std::max({q[j] - (upper_[j] - reserve), lower_[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
     if (beyond(to) <= now && beyond(tried_.line_start()) <= now && beyond(tried_.end()) <= now)
@@ -241,7 +276,7 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
 bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineCheck::End& from,
                       const LineCheck::End& to, const VectorXd& stray) {
   const auto blocker = line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
-                                  world.time_s, from, to, stray, margin_m_);
+                                  world.time_s, from, to, {stray, shape_stray_, margin_m_});
   if (!blocker) return true;
   refusal_ = {cause_of(*blocker), *blocker, -1};
   return false;
@@ -295,9 +330,13 @@ bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_t
 std::pair<double, double> Shield::transition_times(const Step& step, double rate) {
   double ramp = 0.0, fade = 0.0;
   if (drive_.torque_rate > 0.0) {
+    // as with torques, the rest is for the feedback
+    const double torque_rate = torque_share_ * drive_.torque_rate;
     rate_ = -rate * w_ - step.disturbance;
     dynamics::inverse_dynamics(model_, ws_, step.to.q, w_, rate_, q_);
-    ramp = (q_ - step.torque).cwiseAbs().maxCoeff() / drive_.torque_rate;
+    ramp = (q_ - step.torque).cwiseAbs().maxCoeff() / torque_rate;
+    dynamics::momentum(model_, ws_, step.to.q, w_, q_);
+    fade = rate * q_.cwiseAbs().maxCoeff() / torque_rate;
   }
   for (Index j = 0; j < w_.size(); ++j) {
     if (drive_.jerk_max > 0.0) {
@@ -342,6 +381,64 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
 void Shield::bound_straying() {
   tried_stray_ = tracking_ + 0.25 * period_s_ * period_s_ * tried_.braking().rate *
                                  tried_.line_velocity().cwiseAbs();
+  if (mass_error_ > 0.0 || !unmodelled_friction_.isZero(0.0)) add_model_errors();
+}
+
+// docs/theory.md (14.17)
+void Shield::add_model_errors() {
+  const VectorXd& q = tried_.line_start();
+  const double time_s = tried_.duration_s() + hold_time_s;
+  const double compliance = std::min(compliance_s2_, 0.5 * time_s * time_s);
+  invert_mass(q);
+  rate_ = tried_.braking().rate * tried_.line_velocity();
+  q_.noalias() = mass_ * rate_;
+  dynamics::bias_torque(model_, ws_, q, tried_.line_velocity(), v_);
+  rate_ = mass_error_ * (q_.cwiseAbs() + v_.cwiseAbs()) + unmodelled_friction_;
+  bound_shapes(rate_, compliance);
+  for (Index j = 0; j < rate_.size(); ++j)
+    joint_stray_[j] = compliance * mass_inverse_.col(j).cwiseAbs().dot(rate_);
+}
+
+void Shield::invert_mass(const VectorXd& q) {
+  dynamics::mass_matrix(model_, ws_, q, mass_);
+  factors_.compute(mass_);
+  mass_inverse_.setIdentity();
+  factors_.solveInPlace(mass_inverse_);
+}
+
+LimitReserve Shield::limit_reserve() {
+  LimitReserve reserve{VectorXd::Constant(model_.dof(), planner_reserve) + tracking_,
+                       sampled_ ? planner_speed_reserve : 0.0};
+  if (shape_stray_.size() == 0) return reserve;
+  invert_mass(start_q_);
+  dynamics::gravity_torque(model_, ws_, start_q_, q_);
+  rate_ = mass_error_ * q_.cwiseAbs() + unmodelled_friction_;
+  for (Index j = 0; j < rate_.size(); ++j)
+    reserve.position[j] += other_postures * compliance_s2_ *
+                           mass_inverse_.col(j).cwiseAbs().dot(rate_);
+  return reserve;
+}
+
+// The response of a point to all torques together is far less than the sum of what each joint would
+// do alone: docs/theory.md (14.18).
+void Shield::bound_shapes(const VectorXd& torque, double compliance_s2) {
+  dynamics::forward_kinematics(model_, ws_, tried_.line_start());
+  int link = -1;
+  double turning = 0.0, moving = 0.0;
+  for (std::size_t i = 0; i < model_.shapes().size(); ++i) {
+    const auto& shape = model_.shapes()[i];
+    if (shape.link != link) {
+      link = shape.link;
+      dynamics::frame_jacobian(model_, ws_, link, dynamics::link_pose(model_, ws_, link).p(),
+                               jacobian_);
+      response_.noalias() = jacobian_ * mass_inverse_;
+      turning = response_.topRows<3>().colwise().norm().dot(torque);
+      moving = response_.bottomRows<3>().colwise().norm().dot(torque);
+    }
+    shape_stray_[static_cast<Index>(i)] =
+        compliance_s2 *
+        (moving + turning * (shape.center.norm() + shape.half_axis.norm()));
+  }
 }
 
 // Whether the bounds that the scene states hold can be seen by what a stop does.
@@ -349,8 +446,9 @@ void Shield::note_straying(const VectorXd& q) {
   for (Index j = 0; j < q.size(); ++j) {
     const double strayed = std::abs(q[j] - reference_q_[j]);
     counts_.strayed = std::max(counts_.strayed, strayed);
-    if (!(strayed > counts_.strayed_share * stray_[j])) continue;
-    counts_.strayed_share = strayed / stray_[j];
+    const double bound = stray_[j] + stop_joint_stray_[j];
+    if (!(strayed > counts_.strayed_share * bound)) continue;
+    counts_.strayed_share = strayed / bound;
     counts_.strayed_joint = static_cast<int>(j);
   }
 }

@@ -115,6 +115,9 @@ Json safety_json(const Safety& safety) {
   out["margin_m"] = safety.margin_m;
   out["torque_share"] = safety.torque_share;
   out["tracking_rad"] = safety.tracking_rad;
+  out["mass_error"] = safety.mass_error;
+  out["friction_share"] = safety.friction_share;
+  out["joint_noise_rad"] = safety.joint_noise_rad;
   return out;
 }
 

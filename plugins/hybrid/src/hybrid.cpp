@@ -34,9 +34,6 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint limit [1/s]
-// Distance kept from joint limits, because bounded torques let the arm pass its bounds a little
-// [rad or m].
-constexpr double joint_limit_inset = 0.002;
 constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
 constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
 constexpr double steering_share = 0.1;    // largest share of the torque limits for steering
@@ -328,10 +325,8 @@ class Hybrid final : public planning::Planner {
     for (int k = 0; k < setup_.dof(); ++k) {
       double low = -std::numeric_limits<double>::infinity(), high = -low;
       if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
-      if (q_lower)
-        low = std::max(low, joint_approach(k, (*q_lower)[k] + inset(k, (*q_lower)[k]) - q_[k], -1.0));
-      if (q_upper)
-        high = std::min(high, joint_approach(k, (*q_upper)[k] - inset(k, (*q_upper)[k]) - q_[k], 1.0));
+      if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
+      if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
       // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
       // approached with the hardest braking.
       const double slowest = w_[k] - dt * acceleration_max_,
@@ -342,13 +337,6 @@ class Hybrid final : public planning::Planner {
         lower_[k] = upper_[k] = std::clamp(0.5 * (low + high), slowest, fastest);
     }
     filter_.set_box(lower_, upper_);
-  }
-
-  // The distance to keep from a joint limit; less if the goal is nearer to it.
-  [[nodiscard]] double inset(int k, double limit) const {
-    return goal_->type == HAMELIN_GOAL_JOINT
-               ? std::min(joint_limit_inset, std::abs(goal_->q[k] - limit))
-               : joint_limit_inset;
   }
 
   // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at

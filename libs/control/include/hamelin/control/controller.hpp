@@ -186,7 +186,8 @@ class Controller {
     std::uint64_t number = 0;
     std::optional<planning::PreparedParams> params;
   };
-  void make_shield();
+  [[nodiscard]] std::unique_ptr<Shield> make_shield();
+  [[nodiscard]] planning::SetupData make_setup();
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
   void start_outputs();
@@ -214,6 +215,8 @@ class Controller {
   model::Model nominal_;  ///< the planner's model of the arm
   World world_;
   WorldView view_;
+  std::unique_ptr<Shield> shield_;
+  bool shielded_ = false;  ///< whether the shield has started
   PlannerHost planner_;
   // Each is among writers; the tick takes none.
   std::mutex goals_mutex_;
@@ -231,8 +234,6 @@ class Controller {
   TorqueLimits limits_;
   ChannelSum sum_;
   dynamics::Workspace ws_;
-  std::unique_ptr<Shield> shield_;
-  bool shielded_ = false;  ///< whether the shield has started
   std::optional<TorquePipeline> pipeline_;  ///< with a shield, where torques are the output
   Eigen::VectorXd point_q_, point_v_;       ///< set point of the last tick
   Answer answer_;

@@ -37,18 +37,22 @@ class LineCheck {
     double missing_m = 0.0;                 ///< by how much the bound falls short of the margin
   };
 
+  /// How far the arm may be from the line.
+  struct Stray {
+    const Eigen::VectorXd& joints;    ///< σ [rad or m]
+    const Eigen::VectorXd& shapes_m;  ///< of each shape, in addition; of size zero: none
+    double margin_m = 0.0;            ///< distance that must remain to obstacles and between parts
+  };
   /// @param obstacles null: only pairs of parts are checked
-  /// @param stray σ [rad or m]
-  /// @param margin_m distance that must remain to obstacles and between parts
   /// @return the first that is found; none if the line is proved clear
   [[nodiscard]] std::optional<Blocker> check(dynamics::Workspace& ws,
                                              const scene::Environment* obstacles, double time_s,
                                              const End& from, const End& to,
-                                             const Eigen::VectorXd& stray, double margin_m);
+                                             const Stray& stray);
   /// Forgets all anchors, because obstacles have changed.
   void forget();
 
-  /// Σ_j l_j σ_j of the last check, the largest of any shape [m].
+  /// Σ_j l_j σ_j and the addition of the last check, the largest of any shape [m].
   [[nodiscard]] double largest_stray_m() const {
     return straying_.size() > 0 ? straying_.maxCoeff() : 0.0;
   }
@@ -73,7 +77,8 @@ class LineCheck {
   };
   static constexpr int pieces_max = 16;
 
-  void set_needs(const Eigen::VectorXd& stray, double margin_m);
+  /// The largest addition of two shapes that belong to a pair of parts.
+  [[nodiscard]] double pair_addition(std::size_t pair, const Eigen::VectorXd& shapes_m) const;
   /// How far shape i may be from its anchor's chord.
   [[nodiscard]] double moved(std::size_t shape, const scene::Shapes& from,
                              const scene::Shapes& to) const;
@@ -82,6 +87,8 @@ class LineCheck {
   bool capsule_is_clear(std::size_t shape, Blocker& blocker);
   /// Tube radius, margin and own radius of a shape on a piece of length 1/pieces.
   [[nodiscard]] double need(std::size_t shape, int pieces) const;
+  /// The same, or less if the line begins nearer: then it may lead away, but not nearer still.
+  [[nodiscard]] double need_from(std::size_t shape, int pieces, double distance_at_start) const;
   bool pair_is_clear(std::size_t pair, Blocker& blocker);
   /// The shapes at i/pieces of the line.
   scene::Shapes at(int i, int pieces);

@@ -14,12 +14,20 @@ namespace hamelin::control {
                                            std::optional<double> model::Joint::*limit,
                                            double unlimited);
 
+/// By how much the limits that a planner is told lie inside those that hold, so that a shield that
+/// keeps these has nothing to refuse.
+struct LimitReserve {
+  Eigen::VectorXd position;  ///< of each joint [rad or m]; of size zero: none
+  double speed_share = 0.0;  ///< of the velocity limits
+};
+
 /// The data that a planner is given before its first tick: goals, limits and timing of a scene, the
 /// shapes of the arm and the distance up to which it is shown obstacles.
 /// @param nominal the planner's model of the arm
 /// @param control_period_s time between two ticks [s]
 [[nodiscard]] planning::SetupData planner_setup(const scene::Scene& scene,
                                                 const model::Model& nominal, const WorldView& world,
-                                                double control_period_s);
+                                                double control_period_s,
+                                                const LimitReserve& reserve = {});
 
 }  // namespace hamelin::control

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
@@ -12,6 +13,7 @@
 #include "hamelin/control/braking_rate.hpp"
 #include "hamelin/control/levers.hpp"
 #include "hamelin/control/line_check.hpp"
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/stop_motion.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
@@ -90,6 +92,9 @@ class Shield {
   Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
          double period_s, const Drive& drive);
 
+  /// By how much the planner's limits should lie inside those that this keeps.
+  [[nodiscard]] LimitReserve limit_reserve();
+
   /// Begins at a node, which must have a verified stop itself.
   /// @throws Error invalid if it has none, with the bound that would do
   void start(const Surroundings& world, const Node& node);
@@ -140,6 +145,12 @@ class Shield {
   /// The ramp and the fade that the drive's bounds require for a rate.
   [[nodiscard]] std::pair<double, double> transition_times(const Step& step, double rate);
   void note_straying(const Eigen::VectorXd& q);
+  /// Adds what errors of the model cause.
+  void add_model_errors();
+  /// Sets mass_ and mass_inverse_.
+  void invert_mass(const Eigen::VectorXd& q);
+  /// Sets shape_stray_. @param torque unexplained torques [Nm or N]
+  void bound_shapes(const Eigen::VectorXd& torque, double compliance_s2);
   /// Sets tried_stray_.
   void bound_straying();
   [[nodiscard]] bool stop_is_clear(const Surroundings& world, const LineCheck::End& at_to);
@@ -158,12 +169,21 @@ class Shield {
   const model::Model& model_;
   const scene::SelfField* self_;
   std::string scene_name_;
+  Eigen::VectorXd start_q_;  ///< of the scene
+  bool sampled_;             ///< whether actuation is not ideal
   double period_s_, margin_m_;
   long dwell_;               ///< steps that a stop lasts at least, unless it ends before
   double feedback_rate_;     ///< ω [1/s]
   // of size zero: not modelled
   Eigen::VectorXd lower_, upper_, velocity_max_, effort_max_, damping_, friction_;
   double friction_speed_, torque_share_;
+  /// Bounds of torques that the model does not explain: share of the model's own, and friction of
+  /// each joint [Nm or N].
+  double mass_error_;
+  Eigen::VectorXd unmodelled_friction_;
+  double compliance_s2_ = 0.0;  ///< by how much a joint strays per unexplained acceleration
+  Eigen::MatrixXd mass_, mass_inverse_;
+  Eigen::LLT<Eigen::MatrixXd> factors_;
   Eigen::VectorXd tracking_;  ///< bound of the deviation from a stop, but for what follows
   Levers levers_;
   Drive drive_;
@@ -172,6 +192,10 @@ class Shield {
   dynamics::Workspace ws_;
   StopMotion stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
+  Eigen::VectorXd shape_stray_;  ///< by model errors, of tried_; of size zero: none [m]
+  dynamics::Matrix6Xd jacobian_, response_;  ///< response: acceleration of a link per torque
+  Eigen::VectorXd joint_stray_, stop_joint_stray_;  ///< by model errors, of tried_ and stop_
+  Eigen::VectorXd no_addition_;                     ///< of size zero
   Eigen::VectorXd stray_, tried_stray_;  ///< bounds for stop_ and tried_ [rad or m]
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
