@@ -1,6 +1,6 @@
-// A planner that drives the arm into the nearest obstacle, into itself, past its limits, or anywhere,
-// as hard as it can, through every channel, with answers that are late, stale or not numbers. What it
-// does follows from the scene's seed. For tests of the shield.
+// A planner that drives the arm into the nearest obstacle, into itself, past its limits, or
+// anywhere, as hard as it can, through every channel, with answers that are late, stale or not
+// numbers. What it does follows from the scene's seed. For tests of the shield.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -70,7 +70,8 @@ class Adversary : public Planner {
   template <class T>
   T draw(const std::vector<int>& from) {
     const auto last = static_cast<double>(from.size());
-    return static_cast<T>(from[std::min(from.size() - 1, static_cast<std::size_t>(rng_.uniform(0.0, last)))]);
+    return static_cast<T>(
+        from[std::min(from.size() - 1, static_cast<std::size_t>(rng_.uniform(0.0, last)))]);
   }
 
   void begin_attack(double now) {
@@ -154,7 +155,8 @@ class Adversary : public Planner {
         command.held_torque() += bias_;
         command.node_velocity() = 3.0 * strength_ * direction_;
         break;
-      default: gyrate(tick, command);
+      default:
+        gyrate(tick, command);
     }
   }
 
@@ -187,4 +189,5 @@ class Adversary : public Planner {
 
 }  // namespace
 
-HAMELIN_PLANNER_PLUGIN(Adversary, "adversary", "0.0.1", "drives the arm into whatever is near", schema);
+HAMELIN_PLANNER_PLUGIN(Adversary, "adversary", "0.0.1", "drives the arm into whatever is near",
+                       schema);

@@ -56,8 +56,7 @@ double BrakingRate::evaluate(const VectorXd& q, const VectorXd& w, double rate) 
   dynamics::inverse_dynamics(model_, ws_, q_, v_, a_, with_rate_);
   utilisation_ = 0.0;
   for (Index j = 0; j < effort_max_.size(); ++j)
-    utilisation_ =
-        std::max(utilisation_, with_rate_.row(j).cwiseAbs().maxCoeff() / effort_max_[j]);
+    utilisation_ = std::max(utilisation_, with_rate_.row(j).cwiseAbs().maxCoeff() / effort_max_[j]);
   return utilisation_;
 }
 
@@ -80,7 +79,7 @@ std::pair<double, double> BrakingRate::allowed_rates(double rate) {
 }
 
 std::optional<double> BrakingRate::find(const VectorXd& q, const VectorXd& w,
-                                         double least_utilisation) {
+                                        double least_utilisation) {
   const double largest = upper_rate(w);
   utilisation_ = 0.0;
   if (effort_max_.size() == 0) return largest;

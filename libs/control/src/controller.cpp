@@ -100,9 +100,8 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
 }
 
 planning::SetupData Controller::make_setup() {
-  planning::SetupData setup =
-      planner_setup(scene_, nominal_, view_, period_s_,
-                    shield_ ? shield_->limit_reserve() : LimitReserve{});
+  planning::SetupData setup = planner_setup(scene_, nominal_, view_, period_s_,
+                                            shield_ ? shield_->limit_reserve() : LimitReserve{});
   setup.path_points_max = path_points_max_;
   return setup;
 }
@@ -359,8 +358,8 @@ void Controller::shield_torque() {
     pipeline_->advance(ws_, answer_.torque);
     const Shield::Node to{pipeline_->q_next(), pipeline_->v_next()};
     answer_.stopping = !shield_->accept(
-        surroundings(), {from, from.v, to, pipeline_->acceleration(), answer_.torque,
-                         pipeline_->disturbance()});
+        surroundings(),
+        {from, from.v, to, pipeline_->acceleration(), answer_.torque, pipeline_->disturbance()});
   } else {
     shield_->refuse();
     answer_.stopping = true;

@@ -22,6 +22,38 @@ constexpr double rounding_m = 1e-12;
 constexpr std::array<int, 3> sphere_pieces{1, 2, 8};
 constexpr std::array<int, 3> two_ended_pieces{1, 4, 16};
 
+/// Distances at the ends of the pieces of a line, one after the other: docs/theory.md (14.7). Where
+/// the line begins nearer than it needs to be, it must not come nearer at any end.
+class TwoEnded {
+ public:
+  /// @param least what is needed in any case @param way the longest way on a piece
+  TwoEnded(double need, double least, double way)
+      : need_(need), between_(need), least_(least), way_(way) {}
+  /// @param chord of the piece that ends here @return whether it is clear so far
+  bool goes_on(double distance, double chord) {
+    if (first_) {
+      if (distance <= need_) {
+        missing_ = need_ - distance;
+        need_ = distance - rounding_m;
+        between_ = std::max(least_, need_ - way_);
+      }
+      first_ = false;
+      last_ = distance;
+      return way_ > 0.0 ? need_ > least_ : missing_ == 0.0;
+    }
+    const double bound = 0.5 * (last_ + distance - chord);
+    last_ = distance;
+    missing_ = std::max({missing_, need_ - distance, between_ - bound});
+    return distance > need_ && bound > between_;
+  }
+  /// By how much the line falls short of what it needs.
+  [[nodiscard]] double missing() const noexcept { return missing_; }
+
+ private:
+  double need_, between_, least_, way_, last_ = 0.0, missing_ = 0.0;
+  bool first_ = true;
+};
+
 }  // namespace
 
 LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scene::SelfField* self)
@@ -29,7 +61,8 @@ LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scen
       levers_(levers),
       self_(self),
       anchors_(model.shapes().size()),
-      divisions_(pieces_max - 1, Division{VectorXd::Zero(model.dof()), scene::PlacedShapes(model)}) {
+      divisions_(pieces_max - 1,
+                 Division{VectorXd::Zero(model.dof()), scene::PlacedShapes(model)}) {
   const Index n = model.dof(), shapes = static_cast<Index>(model.shapes().size()),
               pairs = levers.pairs().rows();
   for (auto* x : {&dq_, &curvature_, &tube_, &way_}) x->setZero(n);
@@ -102,10 +135,9 @@ double LineCheck::moved(std::size_t shape, const scene::Shapes& from,
   if (!from.is_capsule(shape))
     return std::sqrt(std::max((from.centers[shape] - anchor.a).squaredNorm(),
                               (to.centers[shape] - anchor.b).squaredNorm()));
-  return std::sqrt(std::max({(from.from(shape) - anchor.a).squaredNorm(),
-                             (from.to(shape) - anchor.b).squaredNorm(),
-                             (to.from(shape) - anchor.a).squaredNorm(),
-                             (to.to(shape) - anchor.b).squaredNorm()}));
+  return std::sqrt(std::max(
+      {(from.from(shape) - anchor.a).squaredNorm(), (from.to(shape) - anchor.b).squaredNorm(),
+       (to.from(shape) - anchor.a).squaredNorm(), (to.to(shape) - anchor.b).squaredNorm()}));
 }
 
 double LineCheck::anchored_bound(std::size_t shape, const End& from, const End& to) const {
@@ -174,34 +206,28 @@ bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
 // A capsule sweeps no simple body: distances at the ends of each piece bound those between them.
 bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
   Anchor& anchor = anchors_[shape];
-  double start = infinity;
+  way_ = dq_.cwiseAbs();
+  const double way = levers_.shapes().row(static_cast<Index>(shape)).dot(way_);
+  const double tube = model_.shapes()[shape].radius;
   for (const int pieces : two_ended_pieces) {
-    double radius = need_from(shape, pieces, start);
-    double before = 0.0;
+    TwoEnded line(need(shape, pieces), tube, way / pieces);
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       const scene::Shapes arm = at(i, pieces);
-      const auto nearest = query(arm.from(shape), arm.to(shape), radius + reserve_m, anchor.hint);
+      const auto nearest = query(arm.from(shape), arm.to(shape), need(shape, pieces) + reserve_m,
+                                 anchor.hint);
+      double chord = 0.0;
       if (i == 0) {
-        // two-ended bounds are less than the distance, by the way of a piece at most
-        way_ = dq_.cwiseAbs();
-        start = nearest.distance -
-                levers_.shapes().row(static_cast<Index>(shape)).dot(way_) / pieces;
-        radius = need_from(shape, pieces, start);
         anchor.a = arm.from(shape);
         anchor.b = arm.to(shape);
         anchor.distance = nearest.distance;
-      }
-      double bound = nearest.distance;
-      if (i > 0) {
+      } else {
         const scene::Shapes last = at(i - 1, pieces);
-        const double chord = std::max((arm.from(shape) - last.from(shape)).norm(),
-                                      (arm.to(shape) - last.to(shape)).norm());
-        bound = std::min(bound, 0.5 * (before + nearest.distance - chord));
+        chord = std::max((arm.from(shape) - last.from(shape)).norm(),
+                         (arm.to(shape) - last.to(shape)).norm());
       }
-      clear = bound > radius;
-      if (!clear) blocker = {static_cast<int>(shape), nearest.obstacle, -1, radius - bound};
-      before = nearest.distance;
+      clear = line.goes_on(nearest.distance, chord);
+      if (!clear) blocker = {static_cast<int>(shape), nearest.obstacle, -1, line.missing()};
     }
     if (clear) return true;
     if (dq_.isZero(0.0)) break;
@@ -227,18 +253,11 @@ bool LineCheck::pair_is_clear(std::size_t pair, Blocker& blocker) {
   way_ = dq_.cwiseAbs();
   const double way = lever.dot(way_);
   for (const int pieces : two_ended_pieces) {
-    double before = 0.0;
+    TwoEnded line(stray, 0.0, way / pieces);
     bool clear = true;
-    double needed = stray;
     for (int i = 0; i <= pieces && clear; ++i) {
-      const double distance = self_->distance(pair, at(i, pieces), far_m);
-      const double bounded =
-          i == 0 ? distance : std::min(distance, 0.5 * (before + distance - way / pieces));
-      // a line that begins nearer may lead away, but not nearer still
-      if (i == 0) needed = std::clamp(distance - way / pieces, 0.0, stray);
-      clear = bounded > needed;
-      if (!clear) blocker = {-1, scene::Contact::map, static_cast<int>(pair), stray - bounded};
-      before = distance;
+      clear = line.goes_on(self_->distance(pair, at(i, pieces), far_m), way / pieces);
+      if (!clear) blocker = {-1, scene::Contact::map, static_cast<int>(pair), line.missing()};
     }
     if (clear) return true;
     if (dq_.isZero(0.0)) break;

@@ -47,8 +47,8 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     if (reserve.position.size() > 0) narrow(scene, reserve.position, data.q_lower, data.q_upper);
   }
   if (scene.model.velocity_limits)
-    data.velocity_max = (1.0 - reserve.speed_share) *
-                        joint_limits(robot, &model::Joint::velocity_max, infinity);
+    data.velocity_max =
+        (1.0 - reserve.speed_share) * joint_limits(robot, &model::Joint::velocity_max, infinity);
   if (scene.model.torque_limits)
     data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   if (scene.actuation.torque_rate_max_Nm_s)

@@ -29,15 +29,17 @@ constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // The deviation from a stop's motion grows with the square of the step from here on.
 constexpr double usual_step_s = 0.001;
 // By how much a joint strays per unexplained acceleration, in units of 1/ω²: the feedback of a stop
-// and the estimate of the disturbance together, docs/theory.md (14.17).
+// and the estimate of the disturbance together, docs/theory.md (14.16).
 constexpr double stop_compliance = 0.25;
-// What planners are kept from limits beyond the shield's own margins: most of them pass their bounds
-// a little [rad or m], and as a share of the speed limits where velocities are not exact.
+// What planners are kept from limits beyond the shield's own margins: most of them pass their
+// bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
 // Deviations at other postures than that of the start may be larger by this factor.
 constexpr double other_postures = 2.0;
 // An arm at rest is disturbed, too: it counts as a stop of this length [s].
 constexpr double hold_time_s = 0.01;
+// Steps in which a margin is sought that would do [m].
+constexpr double smallest_m = 1e-9;
 // Noise is covered up to so many standard deviations.
 constexpr double noise_deviations = 4.0;
 // Velocities may exceed their limit by rounding.
@@ -63,14 +65,22 @@ StopCause cause_of(const LineCheck::Blocker& blocker) {
 
 std::string_view to_string(StopCause cause) noexcept {
   switch (cause) {
-    case StopCause::map: return "map";
-    case StopCause::unknown_space: return "unknown_space";
-    case StopCause::obstacle: return "obstacle";
-    case StopCause::self: return "self";
-    case StopCause::joint_limit: return "joint_limit";
-    case StopCause::velocity_limit: return "velocity_limit";
-    case StopCause::torque: return "torque";
-    case StopCause::answer: break;
+    case StopCause::map:
+      return "map";
+    case StopCause::unknown_space:
+      return "unknown_space";
+    case StopCause::obstacle:
+      return "obstacle";
+    case StopCause::self:
+      return "self";
+    case StopCause::joint_limit:
+      return "joint_limit";
+    case StopCause::velocity_limit:
+      return "velocity_limit";
+    case StopCause::torque:
+      return "torque";
+    case StopCause::answer:
+      break;
   }
   return "answer";
 }
@@ -105,8 +115,9 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
       braking_(model, torque_share_ * effort_max_,
-               drive.acceleration_max > 0.0 ? VectorXd::Constant(model.dof(), drive.acceleration_max)
-                                            : VectorXd(),
+               drive.acceleration_max > 0.0
+                   ? VectorXd::Constant(model.dof(), drive.acceleration_max)
+                   : VectorXd(),
                1.0 / smallest_rest_time(scene, period_s)),
       ws_(model),
       stop_(model.dof()),
@@ -132,10 +143,10 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
   factors_.compute(mass_);  // allocates its memory
   unmodelled_friction_ = VectorXd::Zero(n);
   if (scene.safety.friction_share > 0.0)
-    unmodelled_friction_ = scene.safety.friction_share *
-                           joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
-  for (auto* x :
-       {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_, &q_, &v_, &rate_, &hold_})
+    unmodelled_friction_ =
+        scene.safety.friction_share * joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
+  for (auto* x : {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_,
+                  &q_, &v_, &rate_, &hold_})
     x->setZero(n);
 }
 
@@ -173,31 +184,38 @@ void Shield::start(const Surroundings& world, const Node& node) {
     largest_margin_ = stop_line_.largest_stray_m();
     return;
   }
-  std::string expected;
-  const double missing = refusal_.blocker.missing_m;
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
+}
+
+std::string Shield::defect_at_start(const Surroundings& world, const Node& node) {
+  const std::string what = describe(world.environment);
   switch (refusal_.cause) {
     case StopCause::torque:
-      expected = fmt::format("/safety/torque_share: {} of the torque limits is too little to stop "
-                             "at the start and hold the arm there, expected at least {:.2g}",
-                             torque_share_, torque_share_ * braking_.utilisation());
-      break;
+      return fmt::format(
+          "/safety/torque_share: {} of the torque limits is too little to stop at the start and hold "
+          "the arm there, expected at least {}",
+          torque_share_, std::ceil(1e3 * torque_share_ * braking_.utilisation()) / 1e3);
     case StopCause::joint_limit:
     case StopCause::velocity_limit:
-      expected = fmt::format("/start: {}, expected a start from which the arm can stop",
-                             describe(world.environment));
-      break;
+      return fmt::format("/start: {}, expected a start from which the arm can stop", what);
     default:
-      expected = margin_m_ >= missing
-                     ? fmt::format("/safety/margin_m: at the start, {} by {} m, expected at most "
-                                   "{:.3g} m",
-                                   describe(world.environment), margin_m_,
-                                   std::max(0.0, margin_m_ - missing))
-                     : fmt::format("/safety: at the start, {} by the margin of {:.3g} m that its "
-                                   "bounds require, expected bounds that require {:.3g} m less",
-                                   describe(world.environment), stop_line_.largest_stray_m(),
-                                   missing);
+      break;
   }
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, expected));
+  // The first that is in the way need not be the nearest.
+  const double stated = margin_m_;
+  bool enough = false;
+  while (!enough && margin_m_ > 0.0) {
+    margin_m_ = std::max(0.0, margin_m_ - refusal_.blocker.missing_m - smallest_m);
+    enough = verify(world, {node, node.v, node, zero_, hold_, zero_});
+  }
+  const double would_do = std::exchange(margin_m_, stated);
+  if (enough)
+    return fmt::format("/safety/margin_m: at the start, {} by {} m, expected at most {:.3g} m", what,
+                       stated, would_do);
+  return fmt::format(
+      "/safety: at the start, {} by the margin of {:.3g} m that its bounds require, expected bounds "
+      "that require {:.3g} m less",
+      what, stop_line_.largest_stray_m(), refusal_.blocker.missing_m);
 }
 
 bool Shield::accept(const Surroundings& world, const Step& step) {
@@ -275,14 +293,15 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
 
 bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineCheck::End& from,
                       const LineCheck::End& to, const VectorXd& stray) {
-  const auto blocker = line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
-                                  world.time_s, from, to, {stray, shape_stray_, margin_m_});
+  const auto blocker =
+      line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
+                 world.time_s, from, to, {stray, shape_stray_, margin_m_});
   if (!blocker) return true;
   refusal_ = {cause_of(*blocker), *blocker, -1};
   return false;
 }
 
-// In the order of cost: docs/theory.md (14.14).
+// In the order of cost.
 bool Shield::verify(const Surroundings& world, const Step& step) {
   const Node &from = step.from, &to = step.to;
   if (!within_velocity(from.v, to.v) || !within_velocity(from.v, step.departure)) return false;
@@ -322,8 +341,9 @@ bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_t
   if (ramp == 0.0) return is_clear(stop_line_, world, at_to, at_end, line_stray_);
   const LineCheck::End at_line = place(tried_.line_start(), arm_line_);
   if (!is_clear(stop_line_, world, at_line, at_end, line_stray_)) return false;
-  line_stray_ += 0.125 * ramp * ramp *
-                 tried_.acceleration().cwiseAbs().cwiseMax(rate * tried_.line_velocity().cwiseAbs());
+  line_stray_ +=
+      0.125 * ramp * ramp *
+      tried_.acceleration().cwiseAbs().cwiseMax(rate * tried_.line_velocity().cwiseAbs());
   return is_clear(ramp_line_, world, at_to, at_line, line_stray_);
 }
 
@@ -377,7 +397,7 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
   return true;
 }
 
-// docs/theory.md (14.16)
+// docs/theory.md (14.15)
 void Shield::bound_straying() {
   tried_stray_ = tracking_ + 0.25 * period_s_ * period_s_ * tried_.braking().rate *
                                  tried_.line_velocity().cwiseAbs();
@@ -414,8 +434,8 @@ LimitReserve Shield::limit_reserve() {
   dynamics::gravity_torque(model_, ws_, start_q_, q_);
   rate_ = mass_error_ * q_.cwiseAbs() + unmodelled_friction_;
   for (Index j = 0; j < rate_.size(); ++j)
-    reserve.position[j] += other_postures * compliance_s2_ *
-                           mass_inverse_.col(j).cwiseAbs().dot(rate_);
+    reserve.position[j] +=
+        other_postures * compliance_s2_ * mass_inverse_.col(j).cwiseAbs().dot(rate_);
   return reserve;
 }
 
@@ -436,8 +456,7 @@ void Shield::bound_shapes(const VectorXd& torque, double compliance_s2) {
       moving = response_.bottomRows<3>().colwise().norm().dot(torque);
     }
     shape_stray_[static_cast<Index>(i)] =
-        compliance_s2 *
-        (moving + turning * (shape.center.norm() + shape.half_axis.norm()));
+        compliance_s2 * (moving + turning * (shape.center.norm() + shape.half_axis.norm()));
   }
 }
 
@@ -457,8 +476,8 @@ void Shield::stop_torque(const Node& node, const VectorXd& disturbance, VectorXd
   const double middle = stop_time_ + 0.5 * period_s_, end = stop_time_ + period_s_;
   stop_.at(stop_time_, reference_q_, reference_v_);
   note_straying(node.q);
-  rate_ = feedback_rate_ * (feedback_rate_ * (reference_q_ - node.q) +
-                            2.0 * (reference_v_ - node.v));
+  rate_ =
+      feedback_rate_ * (feedback_rate_ * (reference_q_ - node.q) + 2.0 * (reference_v_ - node.v));
   stop_.at(end, q_, v_);
   rate_ += (v_ - reference_v_) / period_s_ - disturbance;
   stop_.at(middle, q_, v_);
@@ -487,11 +506,14 @@ std::string Shield::describe(const scene::Environment& environment) const {
       return fmt::format("joint '{}' would pass its position limit", joint());
     case StopCause::velocity_limit:
       return fmt::format("joint '{}' would pass its velocity limit", joint());
-    case StopCause::torque: return "no stop within the torque limits would remain";
-    case StopCause::answer: return "there is no usable answer";
+    case StopCause::torque:
+      return "no stop within the torque limits would remain";
+    case StopCause::answer:
+      return "there is no usable answer";
     case StopCause::self:
       return fmt::format("{} would come too near each other", self_->describe(blocker.pair));
-    default: break;
+    default:
+      break;
   }
   return fmt::format("{} would come too near {}",
                      model_.describe(model_.shapes()[static_cast<std::size_t>(blocker.shape)]),

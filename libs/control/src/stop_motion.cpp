@@ -31,8 +31,7 @@ void StopMotion::set(const VectorXd& q, const VectorXd& v, const VectorXd& a,
   speed_ = 1.0 - 0.5 * alpha * ramp;
   const double at_fade = 0.5 * alpha * fade;  // s where the fade begins
   steady_s_ = std::max(0.0, (speed_ - at_fade) / alpha);
-  const double sigma =
-      0.5 * (speed_ + at_fade) * steady_s_ + alpha * fade * fade / 6.0;
+  const double sigma = 0.5 * (speed_ + at_fade) * steady_s_ + alpha * fade * fade / 6.0;
   q_end_ = q_line_ + sigma * w_;
   duration_ = ramp + steady_s_ + fade;
 }

@@ -19,7 +19,8 @@ TorquePipeline::TorquePipeline(const model::Model& model, std::size_t delay_peri
       waiting_(delay_periods, VectorXd::Zero(model.dof())),
       gain_((1.0 - std::exp(-observer_bandwidth * period_s)) / period_s) {
   for (auto* x : {&q_, &v_, &q_next_, &v_next_, &rate_, &last_, &disturbance_, &q_before_,
-                  &v_before_, &acting_}) x->setZero(model.dof());
+                  &v_before_, &acting_})
+    x->setZero(model.dof());
 }
 
 // The acceleration changes so little in a period that its value at the start is taken for all of

@@ -265,9 +265,10 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
       {dissipated, "dissipated_J"}, {held, "held_work_J"},
       {node, "node_work_J"}};
   for (const auto& [column, key] : entries) row[column] = number(energy, key, reader);
-  const double balance = row[kinetic] + row[potential] + row[control] -
-                         (row[gyroscopic] + row[held] - row[dissipated] + row[node]) -
-                         (energy.contains("stop_work_J") ? number(energy, "stop_work_J", reader) : 0.0);
+  const double balance =
+      row[kinetic] + row[potential] + row[control] -
+      (row[gyroscopic] + row[held] - row[dissipated] + row[node]) -
+      (energy.contains("stop_work_J") ? number(energy, "stop_work_J", reader) : 0.0);
   if (ticks_ == 0) first_balance_ = balance;
   row[energy_error] = std::abs(balance - first_balance_);
   row[updates] = number(solver, "updates", reader);

@@ -314,8 +314,8 @@ Environment::Standing Environment::nearest_standing(const Eigen::Vector3d& a,
     const Eigen::Vector3d& at = obstacle.pose.p();
     const double near = nearest.distance + bounding_radius(obstacle) + half;
     if ((0.5 * (a + b) - at).squaredNorm() >= near * near) continue;
-    const double distance = half > 0.0 ? closest_on(obstacle, at, a, b).distance
-                                       : closest_on(obstacle, at, a).distance;
+    const double distance =
+        half > 0.0 ? closest_on(obstacle, at, a, b).distance : closest_on(obstacle, at, a).distance;
     if (distance < nearest.distance) nearest = {distance, static_cast<int>(k)};
   }
   return nearest;

@@ -190,9 +190,12 @@ std::string_view to_string(Feedforward feedforward) noexcept {
 
 std::string_view to_string(SafetyType type) noexcept {
   switch (type) {
-    case SafetyType::shield: return "shield";
-    case SafetyType::certificate: return "certificate";
-    case SafetyType::none: break;
+    case SafetyType::shield:
+      return "shield";
+    case SafetyType::certificate:
+      return "certificate";
+    case SafetyType::none:
+      break;
   }
   return "none";
 }

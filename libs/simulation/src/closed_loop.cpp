@@ -84,10 +84,14 @@ log::Result::Shield shield_figures(const control::Shield& shield, double work_J)
 std::string shield_warning(const control::Shield& shield, const model::Model& model) {
   const control::Shield::Counts& counts = shield.counts();
   const auto joint = static_cast<std::size_t>(counts.strayed_joint);
-  return fmt::format("the bounds of /safety do not hold: joint '{}' strayed from the motion of a "
-                     "stop by {:.2g} times the bound that follows from them",
-                     model.robot().links[joint].joint.name, counts.strayed_share);
+  return fmt::format(
+      "the bounds of /safety do not hold: joint '{}' strayed from the motion of a "
+      "stop by {:.2g} times the bound that follows from them",
+      model.robot().links[joint].joint.name, counts.strayed_share);
 }
+
+// An arm that is slower has come to rest [rad/s or m/s].
+constexpr double resting_speed = 2e-3;
 
 /// CPU time of a tick without writing its log line.
 class TickTimer {
@@ -334,12 +338,17 @@ void ClosedLoop::check_outcome() {
   else if (tick && now == control::ControlState::stalled)
     finish(log::Outcome::stalled,
            fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
-  else if (halting_ && (controller_->shield()->at_rest() || node.k == steps_))
+  else if (halting_ && (rests() || node.k == steps_))
     finish(result_.outcome, result_.cause);
   else if (node.k == steps_)
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(node.k))
     finish(log::Outcome::interrupted, "stopped from outside");
+}
+
+bool ClosedLoop::rests() const {
+  return controller_->shield()->at_rest() &&
+         plant_->node().v.lpNorm<Eigen::Infinity>() < resting_speed;
 }
 
 bool ClosedLoop::arrived() const {
@@ -415,8 +424,8 @@ bool ClosedLoop::planner_answered() {
   const control::Answer& answer = controller_->answer();
   if (answer.channels != nullptr) return true;
   finish_at_rest(log::Outcome::defect,
-                 fmt::format("planner '{}' at step {}: {}", scene_.planner->name,
-                             plant_->node().k, answer.cause));
+                 fmt::format("planner '{}' at step {}: {}", scene_.planner->name, plant_->node().k,
+                             answer.cause));
   return false;
 }
 

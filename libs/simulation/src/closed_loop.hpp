@@ -46,6 +46,8 @@ class ClosedLoop {
   void change_map();
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
+  /// Whether the shield's stop has brought the arm to rest.
+  [[nodiscard]] bool rests() const;
   /// Whether the arm itself is at the last goal, when its set point is.
   [[nodiscard]] bool arrived() const;
   /// Of the arm itself, at the current goal or the last one.
@@ -91,7 +93,7 @@ class ClosedLoop {
   control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
   Eigen::VectorXd q_lower_, q_upper_, v_max_;  ///< of size zero: not modelled
-  Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
+  Eigen::VectorXd q_shown_, v_shown_;          ///< to the controller
 
   // State of the run.
   std::unique_ptr<Recorder> recorder_;

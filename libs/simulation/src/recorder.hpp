@@ -22,7 +22,7 @@ namespace hamelin::simulation {
 struct Ledger {
   double kinetic = 0.0, potential = 0.0, control = 0.0;
   double gyroscopic = 0.0, held = 0.0, dissipated = 0.0;  ///< dissipated counts positive
-  double stop = 0.0;                    ///< of the shield's stops
+  double stop = 0.0;                                      ///< of the shield's stops
   double node = 0.0;                    ///< of node velocities: law, filter and recovery together
   double filter = 0.0, recovery = 0.0;  ///< parts of `node`, by the planner's account
 

@@ -43,7 +43,7 @@ class TickLog {
   const control::GoalTracker& goals_;
   Actuation& actuation_;
   const control::Shield* shield_;  ///< null if the scene asks for none
-  Eigen::VectorXd torque_;  ///< of the last node with an answer
+  Eigen::VectorXd torque_;         ///< of the last node with an answer
 };
 
 }  // namespace hamelin::simulation

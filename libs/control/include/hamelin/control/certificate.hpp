@@ -85,7 +85,8 @@ class Certificate {
   [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape, double time_s,
                                               double clearance) const;
   [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const {
-    return (subject.is_pair ? levers_.pairs() : levers_.shapes()).row(static_cast<Eigen::Index>(subject.index));
+    return (subject.is_pair ? levers_.pairs() : levers_.shapes())
+        .row(static_cast<Eigen::Index>(subject.index));
   }
 
   const model::Model& model_;

@@ -31,10 +31,10 @@ class LineCheck {
   };
   /// What is not proved to stay clear.
   struct Blocker {
-    int shape = -1;                         ///< that may touch an obstacle, or −1
-    int obstacle = scene::Contact::map;     ///< as Contact::obstacle
-    int pair = -1;                          ///< of parts that may touch each other, or −1
-    double missing_m = 0.0;                 ///< by how much the bound falls short of the margin
+    int shape = -1;                      ///< that may touch an obstacle, or −1
+    int obstacle = scene::Contact::map;  ///< as Contact::obstacle
+    int pair = -1;                       ///< of parts that may touch each other, or −1
+    double missing_m = 0.0;              ///< by how much the bound falls short of the margin
   };
 
   /// How far the arm may be from the line.
@@ -47,8 +47,7 @@ class LineCheck {
   /// @return the first that is found; none if the line is proved clear
   [[nodiscard]] std::optional<Blocker> check(dynamics::Workspace& ws,
                                              const scene::Environment* obstacles, double time_s,
-                                             const End& from, const End& to,
-                                             const Stray& stray);
+                                             const End& from, const End& to, const Stray& stray);
   /// Forgets all anchors, because obstacles have changed.
   void forget();
 

@@ -65,13 +65,13 @@ class Shield {
     int joint = -1;              ///< joint_limit, velocity_limit, torque
   };
   struct Counts {
-    long steps = 0;     ///< that were asked for
-    long refused = 0;   ///< of them
-    long at_rest = 0;   ///< refused while the arm rested
-    long stops = 0;     ///< runs of refused steps
-    long longest = 0;   ///< the longest of them, in steps
+    long steps = 0;                          ///< that were asked for
+    long refused = 0;                        ///< of them
+    long at_rest = 0;                        ///< refused while the arm rested
+    long stops = 0;                          ///< runs of refused steps
+    long longest = 0;                        ///< the longest of them, in steps
     std::array<long, stop_causes> causes{};  ///< of the stops' beginnings
-    double strayed = 0.0;  ///< largest deviation of a joint from a stop's motion [rad or m]
+    double strayed = 0.0;        ///< largest deviation of a joint from a stop's motion [rad or m]
     double strayed_share = 0.0;  ///< the same as a share of the bound that the margins cover
     int strayed_joint = -1;      ///< whose share that is
     /// Stops that went on although the world had changed so that they are not clear any more.
@@ -100,9 +100,9 @@ class Shield {
   void start(const Surroundings& world, const Node& node);
   /// A step of the arm.
   struct Step {
-    const Node& from;                     ///< the node as it was verified
-    const Eigen::VectorXd& departure;     ///< velocity with which the arm would leave it
-    const Node& to;                       ///< what the step would lead to
+    const Node& from;                  ///< the node as it was verified
+    const Eigen::VectorXd& departure;  ///< velocity with which the arm would leave it
+    const Node& to;                    ///< what the step would lead to
     /// Acceleration and torque with which the arm would go on after the step, where these change at
     /// a bounded rate only, and the acceleration that acts besides that of the torque; else not
     /// used.
@@ -137,6 +137,8 @@ class Shield {
   [[nodiscard]] std::string describe(const scene::Environment& environment) const;
 
  private:
+  /// Why the arm cannot begin at a node, and what would do.
+  [[nodiscard]] std::string defect_at_start(const Surroundings& world, const Node& node);
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
   /// Sets tried_ to a stop after the step. @return whether there is one
   [[nodiscard]] bool find_stop(const Step& step, double least_utilisation);
@@ -172,8 +174,8 @@ class Shield {
   Eigen::VectorXd start_q_;  ///< of the scene
   bool sampled_;             ///< whether actuation is not ideal
   double period_s_, margin_m_;
-  long dwell_;               ///< steps that a stop lasts at least, unless it ends before
-  double feedback_rate_;     ///< ω [1/s]
+  long dwell_;            ///< steps that a stop lasts at least, unless it ends before
+  double feedback_rate_;  ///< ω [1/s]
   // of size zero: not modelled
   Eigen::VectorXd lower_, upper_, velocity_max_, effort_max_, damping_, friction_;
   double friction_speed_, torque_share_;
@@ -192,11 +194,11 @@ class Shield {
   dynamics::Workspace ws_;
   StopMotion stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
-  Eigen::VectorXd shape_stray_;  ///< by model errors, of tried_; of size zero: none [m]
+  Eigen::VectorXd shape_stray_;              ///< by model errors, of tried_; of size zero: none [m]
   dynamics::Matrix6Xd jacobian_, response_;  ///< response: acceleration of a link per torque
   Eigen::VectorXd joint_stray_, stop_joint_stray_;  ///< by model errors, of tried_ and stop_
   Eigen::VectorXd no_addition_;                     ///< of size zero
-  Eigen::VectorXd stray_, tried_stray_;  ///< bounds for stop_ and tried_ [rad or m]
+  Eigen::VectorXd stray_, tried_stray_;             ///< bounds for stop_ and tried_ [rad or m]
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
   Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_;

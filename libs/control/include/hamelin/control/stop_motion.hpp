@@ -13,9 +13,9 @@ class StopMotion {
 
   /// How the motion brakes.
   struct Braking {
-    double rate = 0.0;     ///< α [1/s]
-    double ramp_s = 0.0;   ///< t_r
-    double fade_s = 0.0;   ///< t_e; α (t_r + t_e) ≤ 2
+    double rate = 0.0;    ///< α [1/s]
+    double ramp_s = 0.0;  ///< t_r
+    double fade_s = 0.0;  ///< t_e; α (t_r + t_e) ≤ 2
   };
   /// @param a initial acceleration, not used without a ramp
   void set(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,

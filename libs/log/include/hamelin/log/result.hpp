@@ -87,14 +87,14 @@ struct Result {
   std::optional<double> tightest_step_m;  ///< smallest margin by which a step was certified
   /// What the scene's shield did; docs/theory.md chapter 14.
   struct Shield {
-    double margin_m = 0.0;                          ///< the largest of any shape
+    double margin_m = 0.0;  ///< the largest of any shape
     long steps = 0, refused = 0, refused_at_rest = 0;
     long stops = 0, longest_stop_steps = 0;
     std::vector<std::pair<std::string, long>> causes;  ///< of stops, those that occurred
-    double strayed_rad = 0.0;  ///< largest deviation of a joint from a stop's motion [rad or m]
+    double strayed_rad = 0.0;    ///< largest deviation of a joint from a stop's motion [rad or m]
     double strayed_share = 0.0;  ///< the same as a share of the bound; above 1 it was exceeded
-    long overtaken = 0;        ///< stops that are not clear any more since the world changed
-    double work_J = 0.0;       ///< of the torques of stops
+    long overtaken = 0;          ///< stops that are not clear any more since the world changed
+    double work_J = 0.0;         ///< of the torques of stops
   };
   std::optional<Shield> shield;
   /// A plant other than hamelin's own, with the contacts that it and the judge counted.

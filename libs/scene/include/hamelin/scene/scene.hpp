@@ -122,13 +122,14 @@ enum class SafetyType : std::int32_t { shield, certificate, none };
 /// The safety of a run, with bounds of the errors that the shield's margins cover.
 struct Safety {
   SafetyType type = SafetyType::none;
-  double margin_m = 0.0;      ///< distance kept beyond what the bounds require
-  double torque_share = 0.8;  ///< of the torque limits, that a stop may use
+  double margin_m = 0.0;       ///< distance kept beyond what the bounds require
+  double torque_share = 0.8;   ///< of the torque limits, that a stop may use
   double tracking_rad = 1e-5;  ///< by how much a joint strays from the motion of a stop if all is
                                ///< as modelled [rad or m]
-  double mass_error = 0.0;      ///< of the controller's masses and inertias, as a share of the true ones
-  double friction_share = 0.0;  ///< dry friction that is not modelled, of the effort limits
-  double joint_noise_rad = 0.0; ///< standard deviation of measured joint positions [rad or m]
+  double mass_error =
+      0.0;  ///< of the controller's masses and inertias, as a share of the true ones
+  double friction_share = 0.0;   ///< dry friction that is not modelled, of the effort limits
+  double joint_noise_rad = 0.0;  ///< standard deviation of measured joint positions [rad or m]
 };
 
 /// What simulates the arm: hamelin's own integrators, or MuJoCo.

@@ -1,0 +1,281 @@
+#include "hamelin/control/shield.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/core/numbers.hpp"
+#include "hamelin/core/rng.hpp"
+#include "hamelin/test/allocations.hpp"
+
+using namespace hamelin;
+using control::BrakingRate;
+using control::LineCheck;
+using control::Shield;
+using control::StopMotion;
+using Eigen::VectorXd;
+
+namespace {
+
+scene::Scene shelf() {
+  return scene::read_scene(HAMELIN_SOURCE_DIR "/data/scenes/shelf.json");
+}
+
+VectorXd random_q(const model::Model& model, Rng& rng) {
+  VectorXd q(model.dof());
+  for (int i = 0; i < model.dof(); ++i) {
+    const auto& joint = model.robot().links[static_cast<std::size_t>(i)].joint;
+    q[i] = rng.uniform(joint.lower.value_or(-3.0), joint.upper.value_or(3.0));
+  }
+  return q;
+}
+
+VectorXd random_vector(Eigen::Index n, double size, Rng& rng) {
+  VectorXd x(n);
+  for (auto& value : x) value = rng.uniform(-size, size);
+  return x;
+}
+
+}  // namespace
+
+TEST_CASE("a stop's motion is the integral of its acceleration and ends at rest", "[shield]") {
+  const VectorXd q = VectorXd::LinSpaced(3, -1.0, 1.0), v = VectorXd::LinSpaced(3, 0.5, -1.5),
+                 a = VectorXd::LinSpaced(3, 4.0, -3.0);
+  StopMotion stop(3);
+  for (const StopMotion::Braking braking :
+       {StopMotion::Braking{8.0, 0.0, 0.0}, StopMotion::Braking{8.0, 0.05, 0.02},
+        StopMotion::Braking{3.0, 0.2, 0.4}}) {
+    stop.set(q, v, a, braking);
+    VectorXd at(3), rate(3), before(3), rate_before(3), end(3);
+    stop.at(0.0, before, rate_before);
+    CHECK((before - q).norm() < 1e-14);
+    CHECK((rate_before - v).norm() < 1e-13);
+    const int steps = 20000;
+    const double h = stop.duration_s() / steps;
+    double largest_jerk = 0.0;
+    VectorXd last_acceleration = braking.ramp_s > 0.0 ? a : VectorXd(-braking.rate * v);
+    for (int k = 1; k <= steps; ++k) {
+      stop.at(k * h, at, rate);
+      // the trapezoidal rule, which is exact for linear velocities
+      CHECK((at - before - 0.5 * h * (rate + rate_before)).norm() < 1e-9);
+      const VectorXd acceleration = (rate - rate_before) / h;
+      largest_jerk = std::max(largest_jerk, (acceleration - last_acceleration).norm() / h);
+      last_acceleration = acceleration;
+      before = at;
+      rate_before = rate;
+    }
+    CHECK((at - stop.end()).norm() < 1e-12);
+    CHECK(rate.norm() < 1e-12);
+    if (braking.fade_s > 0.0)  // docs/theory.md (14.1), (14.3): linear changes only
+      CHECK(largest_jerk < 1.1 * std::max((a + braking.rate * stop.line_velocity()).norm() /
+                                              braking.ramp_s,
+                                          braking.rate * stop.line_velocity().norm() /
+                                              braking.fade_s));
+    // the line: docs/theory.md (14.2)
+    VectorXd beginning(3);
+    stop.at(braking.ramp_s, beginning, rate);
+    CHECK((beginning - stop.line_start()).norm() < 1e-12);
+    const VectorXd way = stop.end() - stop.line_start(), w = stop.line_velocity();
+    CHECK((way - way.dot(w) / w.squaredNorm() * w).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("the rate of braking is near the largest that the torques allow", "[shield]") {
+  const scene::Scene scene = shelf();
+  const model::Model model = control::load_model(scene);
+  const VectorXd effort = control::joint_limits(model.robot(), &model::Joint::effort_max, infinity);
+  dynamics::Workspace ws(model);
+  Rng rng(3);
+  const VectorXd allowed = 0.8 * effort;
+  const auto used = [&](const VectorXd& q, const VectorXd& w, double rate) {
+    double most = 0.0;
+    VectorXd tau(model.dof());
+    for (int k = 0; k <= 200; ++k) {
+      const double x = k / 200.0;
+      dynamics::inverse_dynamics(model, ws, q + 0.5 * x / rate * w, std::sqrt(1.0 - x) * w,
+                                 -rate * w, tau);
+      most = std::max(most, (tau.array().abs() / allowed.array()).maxCoeff());
+    }
+    return most;
+  };
+  int found = 0;
+  for (int i = 0; i < 300; ++i) {
+    const VectorXd q = random_q(model, rng), w = random_vector(model.dof(), 1.5, rng);
+    BrakingRate braking(model, allowed, VectorXd(), 1000.0);
+    const auto rate = braking.find(q, w, BrakingRate::full_utilisation);
+    if (!rate) continue;
+    ++found;
+    CHECK(used(q, w, *rate) < 1.02);           // between the points, too
+    CHECK(used(q, w, 1.4 * *rate) > 1.0);      // not much faster
+  }
+  CHECK(found > 280);
+  BrakingRate unlimited(model, VectorXd(), VectorXd(), 100.0);
+  CHECK(unlimited.find(random_q(model, rng), effort, 0.7) == 100.0);
+}
+
+TEST_CASE("bounds from anchors are below the distances themselves", "[shield][slow]") {
+  scene::Scene scene = shelf();
+  scene.model.self_collision = true;
+  const model::Model model = control::load_model(scene);
+  const scene::Environment environment = scene::make_environment(scene, model, 0.2);
+  const scene::SelfField self(model);
+  const control::Levers levers(model, &self);
+  LineCheck line(model, levers, &self);
+  dynamics::Workspace ws(model);
+  scene::PlacedShapes arm_from(model), arm_to(model), arm(model);
+  const VectorXd none = VectorXd::Zero(model.dof()), no_addition;
+  const auto place = [&](const VectorXd& q, scene::PlacedShapes& out) {
+    dynamics::forward_kinematics(model, ws, q);
+    out.place(model, ws);
+  };
+  Rng rng(5);
+  long lines = 0, clear = 0, bounds = 0;
+  for (int start = 0; start < 20; ++start) {
+    VectorXd q = random_q(model, rng), v = random_vector(model.dof(), 1.5, rng);
+    line.forget();
+    for (int k = 0; k < 300; ++k) {
+      q += 0.001 * v;
+      v += random_vector(model.dof(), 0.05, rng);
+      const VectorXd end = q + 0.3 * v;
+      place(q, arm_from);
+      place(end, arm_to);
+      const LineCheck::End from{q, arm_from.view()}, to{end, arm_to.view()};
+      const double margin = 0.002;
+      const bool proved =
+          !line.check(ws, &environment, 0.0, from, to, {none, no_addition, margin}).has_value();
+      ++lines;
+      clear += proved ? 1 : 0;
+      for (std::size_t s = 0; s < model.shapes().size(); ++s) {
+        const double bound = line.anchored_bound(s, from, to);
+        if (bound <= 0.0) continue;
+        ++bounds;
+        for (double t = 0.0; t <= 1.0; t += 0.25) {
+          const Eigen::Vector3d c = arm_from.view().centers[s] +
+                                    t * (arm_to.view().centers[s] - arm_from.view().centers[s]);
+          std::int32_t hint = -1;
+          const double distance = environment.nearest_standing(c, c, bound + 1.0, 0.0, hint).distance;
+          if (distance < bound) FAIL_CHECK("shape " << s << ": " << distance << " < " << bound);
+        }
+      }
+      if (!proved) continue;
+      // a proved line is clear at all of its points, by the margin
+      for (int i = 0; i <= 10; ++i) {
+        place(q + 0.1 * i * (end - q), arm);
+        if (environment.clearance(arm.view(), 0.0, 0.1) < margin) FAIL_CHECK("touches the map");
+        for (std::size_t p = 0; p < self.pairs().size(); ++p)
+          if (self.distance(p, arm.view(), 0.1) < margin) FAIL_CHECK("touches itself");
+      }
+    }
+  }
+  CHECK(clear > 200);
+  CHECK(lines - clear > 200);
+  CHECK(bounds > 10000);
+  CHECK(line.queries() < lines * static_cast<long>(model.shapes().size()) / 4);
+}
+
+TEST_CASE("an arm that is nearer than its margin may only move away", "[shield]") {
+  const model::Model model(model::make_chain({1, "z", 1.0, 1.0, 0.05}));
+  scene::Obstacle ball;
+  ball.name = "ball";
+  ball.radius_m = 0.1;
+  ball.pose = {Eigen::Matrix3d::Identity(), Eigen::Vector3d(-std::sin(0.3), std::cos(0.3), 0.0)};
+  const scene::Environment environment(std::nullopt, {ball}, geometry::SE3{}, model.reach(), 0.5);
+  const control::Levers levers(model, nullptr);
+  LineCheck line(model, levers, nullptr);
+  dynamics::Workspace ws(model);
+  scene::PlacedShapes arm_from(model), arm_to(model);
+  const VectorXd none = VectorXd::Zero(1), no_addition;
+  const auto clear = [&](double a, double b) {
+    const VectorXd q = VectorXd::Constant(1, a), p = VectorXd::Constant(1, b);
+    dynamics::forward_kinematics(model, ws, q);
+    arm_from.place(model, ws);
+    dynamics::forward_kinematics(model, ws, p);
+    arm_to.place(model, ws);
+    const auto blocker = line.check(ws, &environment, 0.0, {q, arm_from.view()},
+                                    {p, arm_to.view()}, {none, no_addition, 0.05});
+    if (blocker) CHECK(blocker->obstacle == 0);
+    return !blocker.has_value();
+  };
+  CHECK(clear(-1.0, -0.5));
+  CHECK_FALSE(clear(-1.0, 0.2));       // into the ball
+  const double near = 0.3 - 0.17;      // 2 cm from it, less than the margin
+  CHECK_FALSE(clear(near, near + 0.001));
+  CHECK(clear(near, near - 0.1));
+}
+
+TEST_CASE("the shield refuses bounds that cannot hold, with the number that would do",
+          "[shield]") {
+  scene::Scene scene = shelf();
+  const model::Model model = control::load_model(scene);
+  const scene::Environment environment = scene::make_environment(scene, model, 0.2);
+  const VectorXd rest = VectorXd::Zero(model.dof());
+  const auto refused = [&]() -> std::string {
+    Shield shield(scene, model, nullptr, 0.001, {});
+    try {
+      shield.start({environment, 0, 0.0}, {scene.start_q, rest});
+    } catch (const Error& e) {
+      CHECK(e.code() == ErrorCode::invalid);
+      return e.what();
+    }
+    return {};
+  };
+  CHECK(refused().empty());
+  scene.safety.margin_m = 1.0;
+  const std::string far = refused();
+  CHECK_THAT(far, Catch::Contains("/safety/margin_m") && Catch::Contains("expected at most"));
+  const double would_do = std::stod(far.substr(far.rfind("most ") + 5));
+  scene.safety.margin_m = 0.99 * would_do;
+  CHECK(refused().empty());
+  scene.safety.margin_m = 1.02 * would_do;
+  CHECK_FALSE(refused().empty());
+
+  scene.safety.margin_m = 0.0;
+  scene.model.torque_limits = true;
+  scene.safety.torque_share = 0.01;
+  const std::string weak = refused();
+  CHECK_THAT(weak, Catch::Contains("/safety/torque_share") && Catch::Contains("at least"));
+  scene.safety.torque_share = 1.02 * std::stod(weak.substr(weak.rfind("least ") + 6));
+  CHECK(refused().empty());
+}
+
+TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
+  if (!test::counts_allocations()) return;
+  scene::Scene scene = shelf();
+  scene.model.self_collision = scene.model.torque_limits = scene.model.joint_limits = true;
+  scene.safety.mass_error = 0.1;
+  scene.safety.friction_share = 0.05;
+  const model::Model model = control::load_model(scene);
+  const scene::Environment environment = scene::make_environment(scene, model, 0.2);
+  environment.prepare();
+  const scene::SelfField self(model);
+  Shield shield(scene, model, &self, 0.001, {1000.0, 0.0, 0.0});
+  VectorXd q = scene.start_q, v = VectorXd::Zero(model.dof()), a = v, tau = v, q1 = v, v1 = v;
+  const VectorXd zero = v;
+  shield.start({environment, 0, 0.0}, {q, v});
+  Rng rng(7);
+  long refused = 0;
+  const auto made = test::allocations_in([&] {
+    for (int k = 0; k < 3000; ++k) {
+      if (k % 300 == 0)
+        for (auto& x : a) x = rng.uniform(-1.0, 1.0) < 0.0 ? -8.0 : 8.0;
+      q1 = q + 0.001 * v;
+      v1 = v + 0.001 * a;
+      const Shield::Node from{q, v}, to{q1, v1};
+      if (shield.accept({environment, 0, 0.001 * k}, {from, v, to, a, tau, zero})) {
+        q = q1;
+        v = v1;
+      } else {
+        ++refused;
+        shield.stop_torque(from, zero, tau);
+        v *= 0.98;
+        q += 0.001 * v;
+      }
+    }
+  });
+  CHECK(made == 0);
+  CHECK(refused > 0);
+  CHECK(refused < 3000);
+}

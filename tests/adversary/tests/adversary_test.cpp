@@ -1,0 +1,92 @@
+#include <catch2/catch.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hamelin/simulation/run.hpp"
+
+using namespace hamelin;
+using log::Outcome;
+
+namespace {
+
+const std::vector<std::filesystem::path> plugins{HAMELIN_TEST_ONLY_PLUGIN_DIR,
+                                                 HAMELIN_TEST_PLUGIN_DIR};
+
+scene::Scene under_attack(const char* name, std::uint64_t seed) {
+  scene::Scene scene =
+      scene::read_scene(std::string(HAMELIN_SOURCE_DIR "/data/scenes/") + name + ".json");
+  scene.planner = scene::Choice{"adversary", Json::object()};
+  scene.model.joint_limits = scene.model.velocity_limits = true;
+  scene.model.torque_limits = scene.model.self_collision = true;
+  scene.stall.reset();
+  scene.duration_s = 1.5;
+  scene.seed = seed;
+  return scene;
+}
+
+// What the shield promises of any planner.
+void check_safe(const scene::Scene& scene, const log::Result& result) {
+  CAPTURE(scene.name, scene.seed, result.cause);
+  CHECK((result.outcome == Outcome::timeout || result.outcome == Outcome::defect ||
+         result.outcome == Outcome::reached));
+  REQUIRE(result.min_clearance_m);
+  CHECK(*result.min_clearance_m > 0.0);
+  CHECK(*result.min_self_clearance_m > 0.0);
+  CHECK(result.position_excess == 0.0);
+  REQUIRE(result.shield);
+  CHECK(result.shield->strayed_share <= 1.0);
+  CHECK(result.shield->overtaken == 0);
+  if (result.outcome == Outcome::defect)  // a planner that fails leaves the arm at rest
+    CHECK(result.v.lpNorm<Eigen::Infinity>() < 1e-2);
+}
+
+scene::Scene sampled(scene::Scene scene) {
+  scene.actuation.type = scene::ActuationType::sampled;
+  scene.actuation.control_period_s = 0.001;
+  scene.actuation.delay_s = 0.001;
+  scene.safety.torque_share = 0.8;
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("whatever a planner does, the arm touches nothing and keeps its limits", "[adversary]") {
+  long refused = 0, defects = 0;
+  for (const char* name : {"clutter", "shelf"})
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      const scene::Scene scene = under_attack(name, seed);
+      const log::Result result = simulation::run(scene, plugins, {});
+      check_safe(scene, result);
+      CHECK(result.certified_share == 1.0);
+      CHECK(result.speed_excess == 0.0);
+      refused += result.shield->refused;
+      defects += result.outcome == Outcome::defect ? 1 : 0;
+    }
+  CHECK(refused > 1000);
+  CHECK(defects > 0);
+}
+
+TEST_CASE("without the shield, the same planners touch", "[adversary]") {
+  int contacts = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    scene::Scene scene = under_attack("clutter", seed);
+    scene.safety.type = scene::SafetyType::certificate;
+    contacts += simulation::run(scene, plugins, {}).outcome == Outcome::collision ? 1 : 0;
+  }
+  CHECK(contacts >= 5);
+}
+
+TEST_CASE("late torques with friction, wrong masses and a limited rate are safe within stated bounds",
+          "[adversary]") {
+  for (const char* name : {"clutter", "shelf"})
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      scene::Scene scene = sampled(under_attack(name, seed));
+      scene.actuation.coulomb_friction_share = scene.safety.friction_share = 0.02;
+      scene.actuation.planner_mass_scale = seed % 2 == 0 ? 0.95 : 1.05;
+      scene.safety.mass_error = 0.05;
+      scene.actuation.torque_rate_max_Nm_s = 1000.0;
+      check_safe(scene, simulation::run(scene, plugins, {}));
+    }
+}
