@@ -86,7 +86,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
-  answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = zero;
+  answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
   if (shield_ && options_.torque && !options_.position) {
     const double delay = std::round(scene_.actuation.delay_s / period_s_);
@@ -212,7 +212,7 @@ void Controller::measure(const VectorXd& q, const VectorXd& v) {
   measured_ = q.allFinite() && (estimator_ || v.allFinite());
   if (!measured_) return take_braking_state();
   if (!estimator_) {
-    q_ = q;
+    q_ = q_measured_ = q;
     v_ = v;
     return;
   }
@@ -229,6 +229,7 @@ void Controller::measure(const VectorXd& q, const VectorXd& v) {
   }
   q_ = estimator_->q();
   v_ = estimator_->v();
+  q_measured_ = q;
 }
 
 // Without a measurement the arm is where braking was to bring it.
@@ -236,7 +237,7 @@ void Controller::take_braking_state() {
   if (k_ == 0)
     throw Error(ErrorCode::invalid, "the first measured q or v is not finite, expected numbers");
   if (answer_.state != ControlState::stopping) return;
-  q_ = brake_q_;
+  q_ = q_measured_ = brake_q_;
   v_ = brake_v_;
 }
 
@@ -352,7 +353,7 @@ void Controller::form_torque() {
 
 void Controller::shield_torque() {
   pipeline_->observe(ws_, q_, v_);
-  pipeline_->predict(ws_, q_, v_);
+  pipeline_->predict(ws_, q_measured_, v_);
   const Shield::Node from{pipeline_->q(), pipeline_->v()};
   if (answer_.channels != nullptr) {
     pipeline_->advance(ws_, answer_.torque);

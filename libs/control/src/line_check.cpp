@@ -214,8 +214,8 @@ bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       const scene::Shapes arm = at(i, pieces);
-      const auto nearest = query(arm.from(shape), arm.to(shape), need(shape, pieces) + reserve_m,
-                                 anchor.hint);
+      const auto nearest =
+          query(arm.from(shape), arm.to(shape), need(shape, pieces) + reserve_m, anchor.hint);
       double chord = 0.0;
       if (i == 0) {
         anchor.a = arm.from(shape);

@@ -30,10 +30,14 @@ constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 constexpr double usual_step_s = 0.001;
 // By how much a joint strays per unexplained acceleration, in units of 1/ω²: the feedback of a stop
 // and the estimate of the disturbance together, docs/theory.md (14.16).
-constexpr double stop_compliance = 0.25;
+constexpr double stop_compliance = 0.3;
+// The same while torques change as fast as they may, in units of the square of that time.
+constexpr double ramp_compliance = 0.1;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
 // bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
+// What the shield keeps from speed limits, as a share, because velocities are not exact.
+constexpr double sampled_speed_reserve = 0.005, estimated_speed_reserve = 0.06;
 // Deviations at other postures than that of the start may be larger by this factor.
 constexpr double other_postures = 2.0;
 // An arm at rest is disturbed, too: it counts as a stop of this length [s].
@@ -130,14 +134,14 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
   const double coarse = std::max(1.0, period_s / usual_step_s);
   const bool estimates = scene.actuation.estimates_velocity;
   const double bandwidth = scene.actuation.estimator_bandwidth;
-  const double noise = noise_deviations * scene.safety.joint_noise_rad *
-                       (estimates ? std::sqrt(bandwidth * period_s) : 1.0);
-  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse + noise);
+  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse);
+  if (sampled_) speed_reserve_ = estimates ? estimated_speed_reserve : sampled_speed_reserve;
+  noise_ = noise_deviations * scene.safety.joint_noise_rad;
   compliance_s2_ = stop_compliance / (feedback_rate_ * feedback_rate_) +
                    (estimates ? 1.0 / (std::exp(1.0) * feedback_rate_ * bandwidth) : 0.0);
   response_ = jacobian_ = dynamics::Matrix6Xd::Zero(6, n);
   joint_stray_ = stop_joint_stray_ = VectorXd::Zero(n);
-  if (mass_error_ > 0.0 || scene.safety.friction_share > 0.0)
+  if (mass_error_ > 0.0 || scene.safety.friction_share > 0.0 || noise_ > 0.0)
     shape_stray_ = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
   mass_ = mass_inverse_ = Eigen::MatrixXd::Identity(n, n);
   factors_.compute(mass_);  // allocates its memory
@@ -192,7 +196,8 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
   switch (refusal_.cause) {
     case StopCause::torque:
       return fmt::format(
-          "/safety/torque_share: {} of the torque limits is too little to stop at the start and hold "
+          "/safety/torque_share: {} of the torque limits is too little to stop at the start and "
+          "hold "
           "the arm there, expected at least {}",
           torque_share_, std::ceil(1e3 * torque_share_ * braking_.utilisation()) / 1e3);
     case StopCause::joint_limit:
@@ -210,10 +215,11 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
   }
   const double would_do = std::exchange(margin_m_, stated);
   if (enough)
-    return fmt::format("/safety/margin_m: at the start, {} by {} m, expected at most {:.3g} m", what,
-                       stated, would_do);
+    return fmt::format("/safety/margin_m: at the start, {} by {} m, expected at most {:.3g} m",
+                       what, stated, would_do);
   return fmt::format(
-      "/safety: at the start, {} by the margin of {:.3g} m that its bounds require, expected bounds "
+      "/safety: at the start, {} by the margin of {:.3g} m that its bounds require, expected "
+      "bounds "
       "that require {:.3g} m less",
       what, stop_line_.largest_stray_m(), refusal_.blocker.missing_m);
 }
@@ -266,7 +272,7 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
 
 bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < velocity_max_.size(); ++j) {
-    if (std::abs(to[j]) <= velocity_max_[j] * (1.0 + velocity_rounding) ||
+    if (std::abs(to[j]) <= velocity_max_[j] * (1.0 - speed_reserve_ + velocity_rounding) ||
         std::abs(to[j]) <= std::abs(from[j]))
       continue;
     refusal_ = {StopCause::velocity_limit, {}, static_cast<int>(j)};
@@ -275,7 +281,8 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
   return true;
 }
 
-// An arm that is beyond a limit may come back.
+// An arm that is beyond a limit may come back. Within half of what is kept from a limit it may
+// stay; beyond that it must come back by more than noise can pretend.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < lower_.size(); ++j) {
     const double reserve = tried_stray_[j] + joint_stray_[j];
@@ -283,7 +290,9 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
       return std::max({q[j] - (upper_[j] - reserve), lower_[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
-    if (beyond(to) <= now && beyond(tried_.line_start()) <= now && beyond(tried_.end()) <= now)
+    const double allowed = std::min(now, std::max(0.5 * reserve, now - 2.0 * noise_));
+    if (beyond(to) <= allowed && beyond(tried_.line_start()) <= allowed &&
+        beyond(tried_.end()) <= allowed)
       continue;
     refusal_ = {StopCause::joint_limit, {}, static_cast<int>(j)};
     return false;
@@ -401,14 +410,19 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
 void Shield::bound_straying() {
   tried_stray_ = tracking_ + 0.25 * period_s_ * period_s_ * tried_.braking().rate *
                                  tried_.line_velocity().cwiseAbs();
+  shape_stray_.setZero();
+  joint_stray_.setZero();
   if (mass_error_ > 0.0 || !unmodelled_friction_.isZero(0.0)) add_model_errors();
+  if (noise_ > 0.0) add_noise();
 }
 
 // docs/theory.md (14.17)
 void Shield::add_model_errors() {
   const VectorXd& q = tried_.line_start();
   const double time_s = tried_.duration_s() + hold_time_s;
-  const double compliance = std::min(compliance_s2_, 0.5 * time_s * time_s);
+  const double ramp = drive_.torque_rate > 0.0 ? tried_.braking().ramp_s : 0.0;
+  const double compliance =
+      std::min(compliance_s2_ + ramp_compliance * ramp * ramp, 0.5 * time_s * time_s);
   invert_mass(q);
   rate_ = tried_.braking().rate * tried_.line_velocity();
   q_.noalias() = mass_ * rate_;
@@ -419,6 +433,12 @@ void Shield::add_model_errors() {
     joint_stray_[j] = compliance * mass_inverse_.col(j).cwiseAbs().dot(rate_);
 }
 
+// Errors of different joints are independent: docs/theory.md (14.19).
+void Shield::add_noise() {
+  shape_stray_ += noise_ * levers_.shapes().rowwise().norm();
+  joint_stray_.array() += 2.0 * noise_;  // at both ends of a stop
+}
+
 void Shield::invert_mass(const VectorXd& q) {
   dynamics::mass_matrix(model_, ws_, q, mass_);
   factors_.compute(mass_);
@@ -427,9 +447,9 @@ void Shield::invert_mass(const VectorXd& q) {
 }
 
 LimitReserve Shield::limit_reserve() {
-  LimitReserve reserve{VectorXd::Constant(model_.dof(), planner_reserve) + tracking_,
-                       sampled_ ? planner_speed_reserve : 0.0};
-  if (shape_stray_.size() == 0) return reserve;
+  LimitReserve reserve{VectorXd::Constant(model_.dof(), planner_reserve + noise_) + tracking_,
+                       sampled_ ? speed_reserve_ + planner_speed_reserve : 0.0};
+  if (mass_error_ == 0.0 && unmodelled_friction_.isZero(0.0)) return reserve;
   invert_mass(start_q_);
   dynamics::gravity_torque(model_, ws_, start_q_, q_);
   rate_ = mass_error_ * q_.cwiseAbs() + unmodelled_friction_;

@@ -70,10 +70,9 @@ TEST_CASE("a stop's motion is the integral of its acceleration and ends at rest"
     CHECK((at - stop.end()).norm() < 1e-12);
     CHECK(rate.norm() < 1e-12);
     if (braking.fade_s > 0.0)  // docs/theory.md (14.1), (14.3): linear changes only
-      CHECK(largest_jerk < 1.1 * std::max((a + braking.rate * stop.line_velocity()).norm() /
-                                              braking.ramp_s,
-                                          braking.rate * stop.line_velocity().norm() /
-                                              braking.fade_s));
+      CHECK(largest_jerk <
+            1.1 * std::max((a + braking.rate * stop.line_velocity()).norm() / braking.ramp_s,
+                           braking.rate * stop.line_velocity().norm() / braking.fade_s));
     // the line: docs/theory.md (14.2)
     VectorXd beginning(3);
     stop.at(braking.ramp_s, beginning, rate);
@@ -108,8 +107,8 @@ TEST_CASE("the rate of braking is near the largest that the torques allow", "[sh
     const auto rate = braking.find(q, w, BrakingRate::full_utilisation);
     if (!rate) continue;
     ++found;
-    CHECK(used(q, w, *rate) < 1.02);           // between the points, too
-    CHECK(used(q, w, 1.4 * *rate) > 1.0);      // not much faster
+    CHECK(used(q, w, *rate) < 1.02);       // between the points, too
+    CHECK(used(q, w, 1.4 * *rate) > 1.0);  // not much faster
   }
   CHECK(found > 280);
   BrakingRate unlimited(model, VectorXd(), VectorXd(), 100.0);
@@ -156,7 +155,8 @@ TEST_CASE("bounds from anchors are below the distances themselves", "[shield][sl
           const Eigen::Vector3d c = arm_from.view().centers[s] +
                                     t * (arm_to.view().centers[s] - arm_from.view().centers[s]);
           std::int32_t hint = -1;
-          const double distance = environment.nearest_standing(c, c, bound + 1.0, 0.0, hint).distance;
+          const double distance =
+              environment.nearest_standing(c, c, bound + 1.0, 0.0, hint).distance;
           if (distance < bound) FAIL_CHECK("shape " << s << ": " << distance << " < " << bound);
         }
       }
@@ -194,20 +194,19 @@ TEST_CASE("an arm that is nearer than its margin may only move away", "[shield]"
     arm_from.place(model, ws);
     dynamics::forward_kinematics(model, ws, p);
     arm_to.place(model, ws);
-    const auto blocker = line.check(ws, &environment, 0.0, {q, arm_from.view()},
-                                    {p, arm_to.view()}, {none, no_addition, 0.05});
+    const auto blocker = line.check(ws, &environment, 0.0, {q, arm_from.view()}, {p, arm_to.view()},
+                                    {none, no_addition, 0.05});
     if (blocker) CHECK(blocker->obstacle == 0);
     return !blocker.has_value();
   };
   CHECK(clear(-1.0, -0.5));
-  CHECK_FALSE(clear(-1.0, 0.2));       // into the ball
-  const double near = 0.3 - 0.17;      // 2 cm from it, less than the margin
+  CHECK_FALSE(clear(-1.0, 0.2));   // into the ball
+  const double near = 0.3 - 0.17;  // 2 cm from it, less than the margin
   CHECK_FALSE(clear(near, near + 0.001));
   CHECK(clear(near, near - 0.1));
 }
 
-TEST_CASE("the shield refuses bounds that cannot hold, with the number that would do",
-          "[shield]") {
+TEST_CASE("the shield refuses bounds that cannot hold, with the number that would do", "[shield]") {
   scene::Scene scene = shelf();
   const model::Model model = control::load_model(scene);
   const scene::Environment environment = scene::make_environment(scene, model, 0.2);

@@ -321,7 +321,9 @@ Safety read_safety(const Reader& in, const Scene& scene) {
   safety.margin_m = in.get("margin_m", safety.margin_m);
   safety.torque_share =
       in.get("torque_share", scene.actuation.type == ActuationType::ideal ? 0.95 : 0.8);
-  safety.tracking_rad = in.get("tracking_rad", safety.tracking_rad);
+  // Torques that act late, and are held, are followed less exactly.
+  safety.tracking_rad =
+      in.get("tracking_rad", scene.actuation.type == ActuationType::ideal ? 1e-5 : 2e-4);
   safety.mass_error = in.get("mass_error", safety.mass_error);
   safety.friction_share = in.get("friction_share", safety.friction_share);
   safety.joint_noise_rad = in.get("joint_noise_rad", scene.actuation.joint_noise_rad);

@@ -78,8 +78,9 @@ TEST_CASE("without the shield, the same planners touch", "[adversary]") {
   CHECK(contacts >= 5);
 }
 
-TEST_CASE("late torques with friction, wrong masses and a limited rate are safe within stated bounds",
-          "[adversary]") {
+TEST_CASE(
+    "late torques with friction, wrong masses and a limited rate are safe within stated bounds",
+    "[adversary]") {
   for (const char* name : {"clutter", "shelf"})
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       scene::Scene scene = sampled(under_attack(name, seed));

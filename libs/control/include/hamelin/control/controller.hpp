@@ -235,7 +235,9 @@ class Controller {
   ChannelSum sum_;
   dynamics::Workspace ws_;
   std::optional<TorquePipeline> pipeline_;  ///< with a shield, where torques are the output
-  Eigen::VectorXd point_q_, point_v_;       ///< set point of the last tick
+  /// What the shield starts from: where friction is not known, an estimate lags behind.
+  Eigen::VectorXd q_measured_;
+  Eigen::VectorXd point_q_, point_v_;  ///< set point of the last tick
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
 

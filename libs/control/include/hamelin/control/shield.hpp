@@ -149,6 +149,7 @@ class Shield {
   void note_straying(const Eigen::VectorXd& q);
   /// Adds what errors of the model cause.
   void add_model_errors();
+  void add_noise();
   /// Sets mass_ and mass_inverse_.
   void invert_mass(const Eigen::VectorXd& q);
   /// Sets shape_stray_. @param torque unexplained torques [Nm or N]
@@ -183,6 +184,8 @@ class Shield {
   /// each joint [Nm or N].
   double mass_error_;
   Eigen::VectorXd unmodelled_friction_;
+  double speed_reserve_ = 0.0;  ///< share of the velocity limits
+  double noise_ = 0.0;          ///< of measured joint positions, a bound [rad or m]
   double compliance_s2_ = 0.0;  ///< by how much a joint strays per unexplained acceleration
   Eigen::MatrixXd mass_, mass_inverse_;
   Eigen::LLT<Eigen::MatrixXd> factors_;
