@@ -37,6 +37,8 @@ constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint lim
 constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
 constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
 constexpr double steering_share = 0.1;    // largest share of the torque limits for steering
+// Share of the torque limits that friction and wrong masses may explain.
+constexpr double disturbance_share = 0.3;
 constexpr double torque_share = 0.98;     // share of the torque limits for the momentum box
 constexpr double steering_fade = 0.5;     // distance from the target below which steering fades
 // Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
@@ -225,7 +227,13 @@ class Hybrid final : public planning::Planner {
     M_inv_ = identity_;
     llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
-    if (observer_) observer_->update(v_);
+    if (observer_) {
+      observer_->update(v_);
+      if (const auto effort = setup_.effort_max()) {
+        scratch_ = disturbance_share * *effort;
+        observer_->limit(M_, scratch_);
+      }
+    }
     w_ = v_;
     if (ramp_ && observer_->ready()) {
       scratch_ = bias_;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -38,6 +39,16 @@ class Observer {
   /// Updates the estimate with the velocity at a tick.
   void update(const Eigen::VectorXd& v) {
     if (ready_) disturbance_ += gain_ / period_s_ * (v - predicted_);
+  }
+  /// Scales the estimate down to what explains at most these torques, so that it cannot wind up
+  /// while something else, like a shield, holds the arm.
+  void limit(const Eigen::MatrixXd& M, const Eigen::VectorXd& torque_max) {
+    scratch_.noalias() = M * disturbance_;
+    double scale = 1.0;
+    for (Eigen::Index k = 0; k < scratch_.size(); ++k)
+      if (std::abs(scratch_[k]) > torque_max[k])
+        scale = std::min(scale, torque_max[k] / std::abs(scratch_[k]));
+    disturbance_ *= scale;
   }
   /// Records the torque issued at this tick and predicts the next velocity. The first call assumes
   /// that `bias` was issued before.
