@@ -37,7 +37,9 @@ constexpr double ramp_compliance = 0.1;
 // bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
 // What the shield keeps from speed limits, as a share, because velocities are not exact.
-constexpr double sampled_speed_reserve = 0.005, estimated_speed_reserve = 0.06;
+constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.06;
+// How long torques take to change for a stop, where their rate is bounded [s].
+constexpr double usual_ramp_s = 0.05;
 // Deviations at other postures than that of the start may be larger by this factor.
 constexpr double other_postures = 2.0;
 // An arm at rest is disturbed, too: it counts as a stop of this length [s].
@@ -282,7 +284,7 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 }
 
 // An arm that is beyond a limit may come back. Within half of what is kept from a limit it may
-// stay; beyond that it must come back by more than noise can pretend.
+// move; beyond that it must come back by more than noise can pretend.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < lower_.size(); ++j) {
     const double reserve = tried_stray_[j] + joint_stray_[j];
@@ -290,7 +292,7 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
       return std::max({q[j] - (upper_[j] - reserve), lower_[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
-    const double allowed = std::min(now, std::max(0.5 * reserve, now - 2.0 * noise_));
+    const double allowed = now > 0.0 ? std::max(0.5 * reserve, now - 2.0 * noise_) : 0.0;
     if (beyond(to) <= allowed && beyond(tried_.line_start()) <= allowed &&
         beyond(tried_.end()) <= allowed)
       continue;
@@ -453,9 +455,10 @@ LimitReserve Shield::limit_reserve() {
   invert_mass(start_q_);
   dynamics::gravity_torque(model_, ws_, start_q_, q_);
   rate_ = mass_error_ * q_.cwiseAbs() + unmodelled_friction_;
+  const double ramp = drive_.torque_rate > 0.0 ? usual_ramp_s : 0.0;
+  const double compliance = compliance_s2_ + ramp_compliance * ramp * ramp;
   for (Index j = 0; j < rate_.size(); ++j)
-    reserve.position[j] +=
-        other_postures * compliance_s2_ * mass_inverse_.col(j).cwiseAbs().dot(rate_);
+    reserve.position[j] += other_postures * compliance * mass_inverse_.col(j).cwiseAbs().dot(rate_);
   return reserve;
 }
 

@@ -39,8 +39,8 @@ constexpr double least_brake = 0.3;       // braking that every row counts on [m
 constexpr double steering_share = 0.1;    // largest share of the torque limits for steering
 // Share of the torque limits that friction and wrong masses may explain.
 constexpr double disturbance_share = 0.3;
-constexpr double torque_share = 0.98;     // share of the torque limits for the momentum box
-constexpr double steering_fade = 0.5;     // distance from the target below which steering fades
+constexpr double torque_share = 0.98;  // share of the torque limits for the momentum box
+constexpr double steering_fade = 0.5;  // distance from the target below which steering fades
 // Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
