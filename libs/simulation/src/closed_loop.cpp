@@ -90,6 +90,8 @@ std::string shield_warning(const control::Shield& shield, const model::Model& mo
       model.robot().links[joint].joint.name, counts.strayed_share);
 }
 
+// Stops that follow each other sooner are one event in the log [s].
+constexpr double stop_again_s = 0.25;
 // An arm that is slower has come to rest [rad/s or m/s].
 constexpr double resting_speed = 2e-3;
 
@@ -441,6 +443,8 @@ void ClosedLoop::finish_at_rest(log::Outcome outcome, std::string cause) {
 void ClosedLoop::report_stop() {
   const control::Shield* const shield = controller_->shield();
   if (shield == nullptr || !actuation_->stopping() || !shield->stop_began()) return;
+  const double last_s = std::exchange(stopped_at_s_, plant_->node().time_s);
+  if (stopped_at_s_ - last_s < stop_again_s) return;
   report_event(false, fmt::format("the shield stops the arm: {}",
                                   shield->describe(controller_->view().environment())));
 }

@@ -66,7 +66,7 @@ class ClosedLoop {
   bool planner_answered();
   /// Ends the run now, or once the shield has brought the arm to rest.
   void finish_at_rest(log::Outcome outcome, std::string cause);
-  /// Logs where a stop of the shield begins.
+  /// Logs where a stop of the shield begins, unless it follows another one at once.
   void report_stop();
   /// Books the node and applies the answer.
   void apply_answer();
@@ -110,7 +110,8 @@ class ClosedLoop {
   bool touching_ = false;                ///< by the judge
   Plant::Contacts contacts_;             ///< by the plant
   bool done_ = false;
-  bool halting_ = false;  ///< whether the run ends when the shield's stop does
+  double stopped_at_s_ = -1.0;  ///< beginning of the shield's last stop
+  bool halting_ = false;        ///< whether the run ends when the shield's stop does
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;
   std::size_t next_map_change_ = 0, goals_reached_ = 0;
