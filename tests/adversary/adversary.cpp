@@ -45,7 +45,7 @@ class Adversary : public Planner {
     effort_ = setup.effort_max() ? VectorXd(*setup.effort_max()) : VectorXd::Constant(n, 100.0);
     for (auto& effort : effort_)
       if (!std::isfinite(effort)) effort = 100.0;
-    for (auto* x : {&direction_, &row_, &other_, &stale_, &bias_}) x->setZero(n);
+    for (auto* x : {&direction_, &row_, &other_, &bias_}) x->setZero(n);
     if (rng_.uniform(0.0, 1.0) < params.at("nan_share").get<double>())
       nan_at_s_ = rng_.uniform(0.0, 2.0);
   }
@@ -177,7 +177,7 @@ class Adversary : public Planner {
   dynamics::Workspace ws_;
   Rng rng_;
   std::vector<int> aims_, channels_;
-  VectorXd effort_, direction_, row_, other_, stale_, bias_;
+  VectorXd effort_, direction_, row_, other_, bias_;
   double nan_at_s_ = std::numeric_limits<double>::infinity();
   Aim aim_ = Aim::random;
   Channel channel_ = Channel::torque;

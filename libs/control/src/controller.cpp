@@ -88,15 +88,14 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
-  if (shield_ && options_.torque && !options_.position) {
-    const double delay = std::round(scene_.actuation.delay_s / period_s_);
-    pipeline_.emplace(nominal_, static_cast<std::size_t>(delay), period_s_);
-  }
+  const auto delay_ticks =
+      static_cast<std::size_t>(std::round(scene_.actuation.delay_s / period_s_));
+  if (shield_ && options_.torque && !options_.position)
+    pipeline_.emplace(nominal_, delay_ticks, period_s_);
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
-  const double delay = std::round(scene_.actuation.delay_s / period_s_);
-  issued_.assign(static_cast<std::size_t>(delay) + 1, zero);
+  issued_.assign(delay_ticks + 1, zero);
 }
 
 planning::SetupData Controller::make_setup() {

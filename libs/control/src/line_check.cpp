@@ -145,8 +145,7 @@ double LineCheck::anchored_bound(std::size_t shape, const End& from, const End& 
 }
 
 bool LineCheck::shape_is_clear(std::size_t shape, Blocker& blocker) {
-  if (anchors_[shape].distance - moved(shape, from_->arm, to_->arm) - rounding_m > need(shape, 1))
-    return true;
+  if (anchored_bound(shape, *from_, *to_) > need(shape, 1)) return true;
   return from_->arm.is_capsule(shape) ? capsule_is_clear(shape, blocker)
                                       : sphere_is_clear(shape, blocker);
 }

@@ -199,8 +199,7 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
     case StopCause::torque:
       return fmt::format(
           "/safety/torque_share: {} of the torque limits is too little to stop at the start and "
-          "hold "
-          "the arm there, expected at least {}",
+          "hold the arm there, expected at least {}",
           torque_share_, std::ceil(1e3 * torque_share_ * braking_.utilisation()) / 1e3);
     case StopCause::joint_limit:
     case StopCause::velocity_limit:
@@ -221,8 +220,7 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
                        what, stated, would_do);
   return fmt::format(
       "/safety: at the start, {} by the margin of {:.3g} m that its bounds require, expected "
-      "bounds "
-      "that require {:.3g} m less",
+      "bounds that require {:.3g} m less",
       what, stop_line_.largest_stray_m(), refusal_.blocker.missing_m);
 }
 
@@ -329,7 +327,8 @@ bool Shield::verify(const Surroundings& world, const Step& step) {
     }
   }
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
-  const LineCheck::End at_from = place(from.q, arm_from_), at_to = place(to.q, arm_to_);
+  // stop_is_safe() has placed the arm at the step's end
+  const LineCheck::End at_from = place(from.q, arm_from_), at_to{to.q, arm_to_.view()};
   line_stray_ = tried_stray_ + 0.25 * period_s_ * (to.v - step.departure).cwiseAbs();
   return is_clear(step_line_, world, at_from, at_to, line_stray_);
 }
@@ -369,8 +368,8 @@ std::pair<double, double> Shield::transition_times(const Step& step, double rate
     dynamics::momentum(model_, ws_, step.to.q, w_, q_);
     fade = rate * q_.cwiseAbs().maxCoeff() / torque_rate;
   }
-  for (Index j = 0; j < w_.size(); ++j) {
-    if (drive_.jerk_max > 0.0) {
+  if (drive_.jerk_max > 0.0) {
+    for (Index j = 0; j < w_.size(); ++j) {
       ramp = std::max(ramp, std::abs(step.acceleration[j] + rate * w_[j]) / drive_.jerk_max);
       fade = std::max(fade, std::abs(rate * w_[j]) / drive_.jerk_max);
     }
