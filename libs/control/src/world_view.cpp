@@ -45,6 +45,7 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
       poses_(model),
       arm_(model),
       arm_before_(model),
+      vicinity_(model.shapes().size()),
       query_poses_(model),
       query_arm_(model) {
   if (world_ != nullptr) {
@@ -128,7 +129,7 @@ void WorldView::reveal_visible() {
 
 std::size_t WorldView::find(scene::View view, std::span<scene::Contact> out) {
   return std::min(out.size(), environment_->closest(arm_.view(), influence_, time_s_, *scratch_,
-                                                    out, view, seen_));
+                                                    out, view, seen_, &vicinity_));
 }
 
 void WorldView::update_clearances(std::span<const scene::Contact> contacts) {

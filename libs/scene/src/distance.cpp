@@ -201,6 +201,11 @@ void build_tree(std::vector<Box>& boxes, std::size_t first, const Eigen::Vector3
   boxes = std::move(ordered);
 }
 
+std::uint64_t next_revision() noexcept {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
 }  // namespace
 
 // docs/theory.md (11.1)–(11.3)
@@ -270,6 +275,7 @@ BoxField::BoxField(std::vector<Box> boxes, const Eigen::Vector3d& origin)
 }
 
 void BoxField::build_all() {
+  revision_ = next_revision();
   kernels_ = &kernel::select_tree_kernels(default_isa());
   nodes_.clear();
   first_added_ = 0;
@@ -293,6 +299,7 @@ void BoxField::change(std::span<const std::int32_t> removed, std::span<const Box
       node.lo[axis][static_cast<std::size_t>(place) % width] =
           node.hi[axis][static_cast<std::size_t>(place) % width] = float_infinity;
   }
+  revision_ = next_revision();
   const bool rebuild = first_added_ == 0 || added.size() > few + first_added_ / 4;
   if (rebuild) {
     boxes_.resize(first_added_);
@@ -389,10 +396,10 @@ namespace {
 // A point or an axis: the arguments of the kernels (see TreeKernels) and the exact result for a box
 // that they found.
 struct Point {
-  const Eigen::Vector3d& p;
-  [[nodiscard]] const double* first() const { return p.data(); }
+  const Eigen::Vector3d &a, &b;  ///< the same point
+  [[nodiscard]] const double* first() const { return a.data(); }
   [[nodiscard]] const double* second() const { return nullptr; }
-  [[nodiscard]] BoxHit on(const Box& box) const { return closest_on_box(p, box); }
+  [[nodiscard]] BoxHit on(const Box& box) const { return closest_on_box(a, box); }
 };
 struct Axis {
   const Eigen::Vector3d &a, &b;
@@ -416,25 +423,12 @@ bool nearest_of(const From& from, const kernel::TreeKernels& kernels, const kern
   return true;
 }
 
-template <class From, class Hit>
-std::size_t nearest_distinct_of(const From& from, const kernel::TreeKernels& kernels,
-                                const kernel::Tree& tree, const std::vector<Box>& boxes,
-                                double limit, double cone_cosine, kernel::QueueEntry* queue,
-                                std::span<Hit> out) {
-  std::array<kernel::Found, BoxField::distinct_max> found;
-  const auto count = static_cast<std::size_t>(kernels.nearest_distinct(
-      tree, from.first(), from.second(), limit, cone_cosine, queue, found.data(),
-      static_cast<int>(std::min(out.size(), BoxField::distinct_max))));
-  for (std::size_t i = 0; i < count; ++i) evaluate(from, boxes, found[i].box, out[i]);
-  return count;
-}
-
 }  // namespace
 
 bool BoxField::nearest(const Eigen::Vector3d& p, double limit, BoxHit& hit,
                        std::int32_t hint) const {
   if (boxes_.empty() || !(limit >= 0.0)) return false;
-  return nearest_of(Point{p}, *kernels_, tree(), boxes_, limit, valid_hint(hint), hit);
+  return nearest_of(Point{p, p}, *kernels_, tree(), boxes_, limit, valid_hint(hint), hit);
 }
 
 bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
@@ -443,21 +437,65 @@ bool BoxField::nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, doubl
   return nearest_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, valid_hint(hint), hit);
 }
 
-std::size_t BoxField::nearest_distinct(const Eigen::Vector3d& p, double limit, double cone_cosine,
-                                       Scratch& scratch, std::span<BoxHit> out) const {
+bool BoxField::Vicinity::covers(const BoxField& field, const Eigen::Vector3d& a,
+                                const Eigen::Vector3d& b, double limit) const noexcept {
+  constexpr double rounding = 1e-9;  // far above that of points and distances [m]
+  const double rest = reach_ - rounding - limit;
+  return revision_ == field.revision_ && rest >= 0.0 && (a - a_).squaredNorm() <= rest * rest &&
+         (b - b_).squaredNorm() <= rest * rest;
+}
+
+void BoxField::Vicinity::set_empty(const BoxField& field, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b, double reach) noexcept {
+  revision_ = field.revision_;
+  a_ = a;
+  b_ = b;
+  reach_ = reach;
+  node_count_ = 0;
+}
+
+void BoxField::Vicinity::gather(const BoxField& field, const Eigen::Vector3d& a,
+                                const Eigen::Vector3d& b, double limit) noexcept {
+  set_empty(field, a, b, limit + skin_m);
+  node_count_ = field.kernels_->gather(field.tree(), a.data(), a == b ? nullptr : b.data(), reach_,
+                                       nodes_.get(), static_cast<int>(nodes_max));
+}
+
+template <class From, class Hit>
+std::size_t BoxField::nearest_distinct_of(const From& from, double limit, double cone_cosine,
+                                          Scratch& scratch, std::span<Hit> out,
+                                          Vicinity* vicinity) const {
   if (boxes_.empty() || !(limit >= 0.0)) return 0;
-  scratch.fit(*this);
-  return nearest_distinct_of(Point{p}, *kernels_, tree(), boxes_, limit, cone_cosine,
-                             scratch.queue_.data(), out);
+  std::array<kernel::Found, distinct_max> found;
+  const int most = static_cast<int>(std::min(out.size(), distinct_max));
+  if (vicinity != nullptr && !vicinity->covers(*this, from.a, from.b, limit))
+    vicinity->gather(*this, from.a, from.b, limit);
+  int count = 0;
+  if (vicinity != nullptr && vicinity->node_count_ >= 0) {
+    std::array<float, Vicinity::nodes_max * width> bounds;
+    count = kernels_->nearest_distinct_among(tree(), vicinity->nodes_.get(), vicinity->node_count_,
+                                             from.first(), from.second(), limit, cone_cosine,
+                                             bounds.data(), found.data(), most);
+  } else {
+    scratch.fit(*this);
+    count = kernels_->nearest_distinct(tree(), from.first(), from.second(), limit, cone_cosine,
+                                       scratch.queue_.data(), found.data(), most);
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+    evaluate(from, boxes_, found[i].box, out[i]);
+  return static_cast<std::size_t>(count);
+}
+
+std::size_t BoxField::nearest_distinct(const Eigen::Vector3d& p, double limit, double cone_cosine,
+                                       Scratch& scratch, std::span<BoxHit> out,
+                                       Vicinity* vicinity) const {
+  return nearest_distinct_of(Point{p, p}, limit, cone_cosine, scratch, out, vicinity);
 }
 
 std::size_t BoxField::nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                        double limit, double cone_cosine, Scratch& scratch,
-                                       std::span<SegmentHit> out) const {
-  if (boxes_.empty() || !(limit >= 0.0)) return 0;
-  scratch.fit(*this);
-  return nearest_distinct_of(Axis{a, b}, *kernels_, tree(), boxes_, limit, cone_cosine,
-                             scratch.queue_.data(), out);
+                                       std::span<SegmentHit> out, Vicinity* vicinity) const {
+  return nearest_distinct_of(Axis{a, b}, limit, cone_cosine, scratch, out, vicinity);
 }
 
 NearTable::NearTable(const Ball& region, double edge) {

@@ -192,13 +192,14 @@ int Environment::reveal_visible(const Shapes& arm, double time_s,
 
 std::size_t Environment::closest(const Shapes& arm, double influence, double time_s,
                                  Scratch& scratch, std::span<Contact> out, View view,
-                                 std::span<const std::uint8_t> seen) const {
+                                 std::span<const std::uint8_t> seen, Vicinity* vicinity) const {
   scratch.found_.clear();
   if (view != View::hidden) {
-    add_map_contacts(*map_, Contact::map, arm, influence, scratch.map_, scratch.found_);
+    add_map_contacts(*map_, Contact::map, arm, influence, scratch.map_,
+                     vicinity != nullptr ? &vicinity->map_ : nullptr, scratch.found_);
     if (summary_.unknown == UnknownPolicy::block)
       add_map_contacts(*unknown_, Contact::unknown, arm, influence, scratch.unknown_,
-                       scratch.found_);
+                       vicinity != nullptr ? &vicinity->unknown_ : nullptr, scratch.found_);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
     if (in_view(k, time_s, view, seen))
@@ -209,6 +210,7 @@ std::size_t Environment::closest(const Shapes& arm, double influence, double tim
 
 void Environment::add_map_contacts(const MapField& field, int id, const Shapes& arm,
                                    double influence, MapField::Scratch& scratch,
+                                   std::vector<BoxField::Vicinity>* vicinity,
                                    std::vector<Contact>& found) const {
   if (field.empty()) return;
   std::array<BoxHit, points_per_sphere> hits;
@@ -216,11 +218,13 @@ void Environment::add_map_contacts(const MapField& field, int id, const Shapes& 
   for (std::size_t shape = 0; shape < arm.size(); ++shape) {
     const double limit = influence + arm.radii[shape];
     const bool capsule = arm.is_capsule(shape);
-    const std::size_t count =
-        capsule
-            ? field.nearest_distinct(map_pose_inverse_ * arm.from(shape),
-                                     map_pose_inverse_ * arm.to(shape), limit, scratch, axis_hits)
-            : field.nearest_distinct(map_pose_inverse_ * arm.centers[shape], limit, scratch, hits);
+    BoxField::Vicinity* const near = vicinity != nullptr ? &(*vicinity)[shape] : nullptr;
+    const std::size_t count = capsule
+                                  ? field.nearest_distinct(map_pose_inverse_ * arm.from(shape),
+                                                           map_pose_inverse_ * arm.to(shape), limit,
+                                                           scratch, axis_hits, near)
+                                  : field.nearest_distinct(map_pose_inverse_ * arm.centers[shape],
+                                                           limit, scratch, hits, near);
     for (std::size_t i = 0; i < count; ++i) {
       const BoxHit& hit = capsule ? axis_hits[i] : hits[i];
       const Eigen::Vector3d at = capsule ? map_pose_ * axis_hits[i].axis_point : arm.centers[shape];

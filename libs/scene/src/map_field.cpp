@@ -251,10 +251,23 @@ double MapField::distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b, do
   return std::max(0.0, hit.distance);
 }
 
+bool MapField::far(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                   BoxField::Vicinity* vicinity) const {
+  if (vicinity != nullptr && vicinity->covers(boxes_, a, b, limit))
+    return vicinity->node_count_ == 0;
+  const double lower =
+      static_cast<double>(near_.query(boxes_, 0.5 * (a + b)).lower) - 0.5 * (b - a).norm();
+  if (!(lower > limit)) return false;
+  if (vicinity != nullptr) vicinity->set_empty(boxes_, a, b, lower);
+  return true;
+}
+
 std::size_t MapField::nearest_distinct(const Eigen::Vector3d& p, double limit, Scratch& scratch,
-                                       std::span<BoxHit, points_max> out) const {
-  if (static_cast<double>(near_.query(boxes_, p).lower) > limit) return 0;
-  const std::size_t count = boxes_.nearest_distinct(p, limit, cone_cosine, scratch.boxes_, out);
+                                       std::span<BoxHit, points_max> out,
+                                       BoxField::Vicinity* vicinity) const {
+  if (far(p, p, limit, vicinity)) return 0;
+  const std::size_t count =
+      boxes_.nearest_distinct(p, limit, cone_cosine, scratch.boxes_, out, vicinity);
   if (count == 0 || out[0].distance > 0.0) return count;
   find_exit(p, out[0]);
   return 1;
@@ -262,10 +275,11 @@ std::size_t MapField::nearest_distinct(const Eigen::Vector3d& p, double limit, S
 
 std::size_t MapField::nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                        double limit, Scratch& scratch,
-                                       std::span<SegmentHit, points_max> out) const {
-  if (static_cast<double>(near_.query(boxes_, 0.5 * (a + b)).lower) > limit + 0.5 * (b - a).norm())
-    return 0;
-  const std::size_t count = boxes_.nearest_distinct(a, b, limit, cone_cosine, scratch.boxes_, out);
+                                       std::span<SegmentHit, points_max> out,
+                                       BoxField::Vicinity* vicinity) const {
+  if (far(a, b, limit, vicinity)) return 0;
+  const std::size_t count =
+      boxes_.nearest_distinct(a, b, limit, cone_cosine, scratch.boxes_, out, vicinity);
   if (count == 0 || out[0].distance > 0.0) return count;
   find_deepest(a, b, out[0]);
   return 1;

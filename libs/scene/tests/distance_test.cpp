@@ -272,6 +272,64 @@ TEST_CASE("nearest_distinct of a rugged floor is what its definition says, from 
   }
 }
 
+// What nearest_distinct() finds with and without a vicinity along a walk with small and large
+// steps. Returns how many of the queries found anything.
+std::size_t compare_along_walk(const BoxField& field, BoxField::Vicinity& near, Rng& rng) {
+  BoxField::Scratch scratch(field);
+  std::size_t found = 0;
+  const std::vector<Vector3d> places = test::points_near(field.boxes(), 12, 0.3, rng.below(1000));
+  Vector3d a = places.front();
+  Vector3d axis = 0.3 * test::random_direction(rng);
+  const double cosine = rng.below(3) == 0 ? rng.uniform(-0.5, 0.99) : 0.86602540378443865;
+  for (int i = 0; i < 120; ++i) {
+    a += 0.004 * test::random_direction(rng);
+    if (i % 10 == 0) a = places[static_cast<std::size_t>(i) / 10];
+    axis += 0.002 * test::random_direction(rng);
+    const Vector3d b = a + axis;
+    const double limit = rng.below(20) == 0 ? 0.3 : 0.2;
+    std::array<BoxHit, 3> hits, same;
+    const std::size_t count = field.nearest_distinct(a, limit, cosine, scratch, hits);
+    REQUIRE(field.nearest_distinct(a, limit, cosine, scratch, same, &near) == count);
+    for (std::size_t k = 0; k < count; ++k) {
+      CHECK(same[k].box == hits[k].box);
+      CHECK(same[k].distance == hits[k].distance);
+    }
+    std::array<SegmentHit, 3> axis_hits, same_axis;
+    const std::size_t on_axis = field.nearest_distinct(a, b, limit, cosine, scratch, axis_hits);
+    REQUIRE(field.nearest_distinct(a, b, limit, cosine, scratch, same_axis, &near) == on_axis);
+    for (std::size_t k = 0; k < on_axis; ++k) {
+      CHECK(same_axis[k].box == axis_hits[k].box);
+      CHECK(same_axis[k].distance == axis_hits[k].distance);
+    }
+    found += count > 0 ? 1 : 0;
+  }
+  return found;
+}
+
+TEST_CASE("with a vicinity nearest_distinct finds the same, also after changes of the field",
+          "[scene][property]") {
+  const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{12}));
+  CAPTURE(seed);
+  Rng rng(seed);
+  BoxField field(random_boxes(rng, 20 + rng.below(600)), {0.4, -0.1, 0.2});
+  BoxField::Vicinity near;
+  std::size_t found = 0;
+  for (int round = 0; round < 4; ++round) {
+    found += compare_along_walk(field, near, rng);
+    const auto removed = static_cast<std::int32_t>(rng.below(field.first_added()));
+    if (!field.alive(static_cast<std::size_t>(removed))) continue;
+    const Vector3d lo(1.5, 0.1 * round, 0.0);
+    field.change(std::array{removed}, std::array{Box{lo, lo + Vector3d::Constant(0.05)}});
+  }
+  CHECK(found > 100);
+  // another field, with more boxes near than a vicinity holds
+  std::vector<Box> fine;
+  for (int x = 0; x < 40; ++x)
+    for (int y = 0; y < 40; ++y)
+      fine.push_back({{0.01 * x, 0.01 * y, 0.0}, {0.01 * x + 0.01, 0.01 * y + 0.01, 0.01}});
+  CHECK(compare_along_walk(BoxField(fine), near, rng) > 50);
+}
+
 TEST_CASE("nearest and nearest_distinct of a segment are those of all boxes", "[scene][property]") {
   const auto seed = GENERATE(range(std::uint64_t{0}, std::uint64_t{10}));
   CAPTURE(seed);
@@ -375,6 +433,7 @@ TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
     std::vector<double> all;
     std::array<BoxHit, 3> hits;
     std::array<SegmentHit, 3> segment_hits;
+    BoxField::Vicinity vicinity;
     for (std::size_t i = 0; i < points.size(); ++i) {
       BoxHit hit;
       if (field.nearest(points[i], 1.0, hit))
@@ -384,6 +443,10 @@ TEST_CASE("all instruction sets give the same bits", "[scene][unit]") {
         all.insert(all.end(), {segment.distance, segment.along, static_cast<double>(segment.box)});
       const std::size_t n = field.nearest_distinct(points[i], 0.5, 0.8, scratch, hits);
       for (std::size_t k = 0; k < n; ++k)
+        all.insert(all.end(), {hits[k].distance, static_cast<double>(hits[k].box)});
+      const std::size_t n_near =
+          field.nearest_distinct(points[i], 0.2, 0.8, scratch, hits, &vicinity);
+      for (std::size_t k = 0; k < n_near; ++k)
         all.insert(all.end(), {hits[k].distance, static_cast<double>(hits[k].box)});
       const std::size_t m =
           field.nearest_distinct(points[i], ends[i], 0.5, 0.8, scratch, segment_hits);

@@ -37,6 +37,9 @@ HAMELIN_INLINE void store(Lanes x, float* to) {
 HAMELIN_INLINE float magnitude(float x) {
   return x < 0.0F ? -x : x;
 }
+HAMELIN_INLINE constexpr float infinity() {
+  return __builtin_inff();
+}
 
 // A bit mask of those of a node's eight numbers that are not above the bound.
 HAMELIN_INLINE unsigned not_above(const float* x, float bound) {
@@ -92,6 +95,12 @@ HAMELIN_INLINE Offset offset_from(const double* p, const double* box) {
 // A query point: bounds for nodes, keys and directions for boxes.
 class Point {
  public:
+  // What decides whether another box is a duplicate of this one.
+  struct Accepted {
+    double direction[3];
+    float direction_f[3];
+  };
+
   HAMELIN_INLINE Point(const Tree& tree, const double* p) noexcept : p_(p) {
     for (int i = 0; i < 3; ++i) {
       const float at = static_cast<float>(p[i] - tree.origin[i]);
@@ -117,13 +126,29 @@ class Point {
     }
   }
 
+  // Sets to infinity the bounds of those boxes of a node that are certainly duplicates of an
+  // accepted one and no farther than `limit`, docs/theory.md (11.39).
+  HAMELIN_INLINE void drop_duplicates(const TreeNode& node, const Accepted& accepted, float cosine,
+                                      float limit, float* bounds) const {
+    const float error = slack_ + 4e-6F * limit;
+    const Lanes least = splat(cosine * cosine * 1.00001F);
+    for (int half = 0; half < width; half += lanes) {
+      Lanes along{}, square = splat(error * (2.0F * limit + error));
+      for (int i = 0; i < 3; ++i) {
+        const Lanes above = max(splat(at_[i]) - load(node.hi[i] + half), Lanes{});
+        const Lanes below = max(load(node.lo[i] + half) - splat(at_[i]), Lanes{});
+        const Lanes offset = above - below;
+        along += offset * splat(accepted.direction_f[i]);
+        square += offset * offset;
+      }
+      along = max(along - splat(error), Lanes{});
+      const auto duplicate = along * along > least * square;
+      store(duplicate ? splat(infinity()) : load(bounds + half), bounds + half);
+    }
+  }
+
   HAMELIN_INLINE double key(const double* box) const { return offset_from(p_, box).key; }
 
-  // What decides whether another box is a duplicate of this one.
-  struct Accepted {
-    double direction[3];
-    float direction_f[3];
-  };
   HAMELIN_INLINE Accepted accept(const double* box) const {
     const Offset offset = offset_from(p_, box);
     Accepted accepted{};
@@ -243,6 +268,8 @@ class Segment {
   HAMELIN_INLINE bool hidden(const TreeNode&, int, const Accepted&, float, float) const {
     return false;
   }
+  HAMELIN_INLINE void drop_duplicates(const TreeNode&, const Accepted&, float, float,
+                                      float*) const {}
 
  private:
   Axis axis_;
@@ -401,6 +428,107 @@ HAMELIN_INLINE int nearest_distinct_of(const Tree& tree, const Query& query, dou
   return found;
 }
 
+// Copies all boxes that may be within `limit` to nodes without children.
+// @return the number of nodes, or −1 if `nodes_max` are too few
+template <class Query>
+HAMELIN_INLINE int gather_of(const Tree& tree, const Query& query, double limit, TreeNode* out,
+                             int nodes_max) {
+  const float bound = bound_of(limit * limit);
+  std::int32_t stack[512];  // see nearest_of()
+  int waiting = 0, boxes = 0;
+  stack[waiting++] = 0;
+  alignas(32) float squares[width];
+  while (waiting > 0) {
+    const TreeNode& node = tree.nodes[stack[--waiting]];
+    query.bounds(node, squares);
+    unsigned near = not_above(squares, bound) & ((1U << static_cast<unsigned>(node.count)) - 1U);
+    for (; near != 0; near &= near - 1U) {
+      const int slot = __builtin_ctz(near);
+      if (node.child[slot] >= 0) {
+        stack[waiting++] = node.child[slot];
+        continue;
+      }
+      if (boxes == nodes_max * width) return -1;
+      TreeNode& to = out[boxes / width];
+      const int at = boxes++ % width;
+      for (int i = 0; i < 3; ++i) {
+        to.lo[i][at] = node.lo[i][slot];
+        to.hi[i][at] = node.hi[i][slot];
+      }
+      to.child[at] = node.child[slot];
+      to.count = at + 1;
+    }
+  }
+  return (boxes + width - 1) / width;
+}
+
+// The slot of the least of all bounds.
+HAMELIN_INLINE int least_of(const float* bounds, int nodes) {
+  float least = infinity();
+  int slot = 0;
+  for (int n = 0; n < nodes; ++n) {
+    unsigned below = not_above(bounds + n * width, least);
+    for (; below != 0; below &= below - 1U) {
+      const int at = n * width + __builtin_ctz(below);
+      if (bounds[at] < least) {
+        least = bounds[at];
+        slot = at;
+      }
+    }
+  }
+  return slot;
+}
+
+// What nearest_distinct_of() finds, among boxes that gather_of() copied.
+template <class Query>
+HAMELIN_INLINE int nearest_distinct_among_of(const Tree& tree, const TreeNode* nodes,
+                                             int node_count, const Query& query, double limit,
+                                             double cone_cosine, float* bounds, Found* out,
+                                             int count) {
+  constexpr int most = 8;
+  typename Query::Accepted accepted[most];
+  for (int n = 0; n < node_count; ++n) query.bounds(nodes[n], bounds + n * width);
+  if (node_count > 0)
+    for (int slot = nodes[node_count - 1].count; slot < width; ++slot)
+      bounds[(node_count - 1) * width + slot] = infinity();
+  int found = 0;
+  while (found < count && found < most) {
+    Found best{limit * limit, -1};
+    int best_slot = -1;
+    const auto try_slot = [&](int slot) __attribute__((always_inline)) {
+      const std::int32_t box = -1 - nodes[slot / width].child[slot % width];
+      const double key = query.key(tree.boxes + 6 * static_cast<std::int64_t>(box));
+      if (key < best.key || (key == best.key && (best.box < 0 || box < best.box))) {
+        best = {key, box};
+        best_slot = slot;
+      }
+    };
+    // the box of the least bound first, then all that may be nearer
+    const int first = least_of(bounds, node_count);
+    if (node_count == 0 || !(bounds[first] <= bound_of(best.key))) break;
+    try_slot(first);
+    for (int n = 0; n < node_count; ++n)
+      for (unsigned near = not_above(bounds + n * width, bound_of(best.key)); near != 0;
+           near &= near - 1U)
+        try_slot(n * width + __builtin_ctz(near));
+    if (best_slot < 0) break;
+    bounds[best_slot] = infinity();
+    const typename Query::Accepted hit =
+        query.accept(tree.boxes + 6 * static_cast<std::int64_t>(best.box));
+    bool duplicate = false;
+    for (int i = 0; i < found; ++i)
+      duplicate = duplicate || query.is_duplicate(accepted[i], hit, cone_cosine);
+    if (duplicate) continue;
+    accepted[found] = hit;
+    out[found++] = best;
+    if (cone_cosine > 0.0)
+      for (int n = 0; n < node_count; ++n)
+        query.drop_duplicates(nodes[n], hit, static_cast<float>(cone_cosine),
+                              static_cast<float>(limit), bounds + n * width);
+  }
+  return found;
+}
+
 bool nearest(const Tree& tree, const double* p, const double* q, double limit,
              Found& found) noexcept {
   return q == nullptr ? nearest_of(tree, Point(tree, p), limit, found)
@@ -415,10 +543,25 @@ int nearest_distinct(const Tree& tree, const double* p, const double* q, double 
                                    count);
 }
 
+int gather(const Tree& tree, const double* p, const double* q, double limit, TreeNode* nodes,
+           int nodes_max) noexcept {
+  return q == nullptr ? gather_of(tree, Point(tree, p), limit, nodes, nodes_max)
+                      : gather_of(tree, Segment(tree, p, q), limit, nodes, nodes_max);
+}
+
+int nearest_distinct_among(const Tree& tree, const TreeNode* nodes, int node_count, const double* p,
+                           const double* q, double limit, double cone_cosine, float* bounds,
+                           Found* out, int count) noexcept {
+  return q == nullptr ? nearest_distinct_among_of(tree, nodes, node_count, Point(tree, p), limit,
+                                                  cone_cosine, bounds, out, count)
+                      : nearest_distinct_among_of(tree, nodes, node_count, Segment(tree, p, q),
+                                                  limit, cone_cosine, bounds, out, count);
+}
+
 }  // namespace
 
 extern const TreeKernels tree_kernels;
-constexpr TreeKernels tree_kernels{nearest, nearest_distinct};
+constexpr TreeKernels tree_kernels{nearest, nearest_distinct, gather, nearest_distinct_among};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::scene::kernel

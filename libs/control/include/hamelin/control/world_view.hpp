@@ -170,6 +170,8 @@ class WorldView {
   scene::PlacedShapes arm_before_;
   std::vector<double> clearance_before_, self_clearance_before_;
 
+  scene::Environment::Vicinity vicinity_;  ///< of the arm at the last look()
+
   // for queries at other configurations
   dynamics::Workspace query_poses_;
   scene::PlacedShapes query_arm_;

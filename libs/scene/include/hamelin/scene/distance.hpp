@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -98,20 +99,50 @@ class BoxField {
     std::vector<kernel::QueueEntry> queue_;
   };
 
+  /// The boxes around a query that moves little from call to call, such as one shape of an arm: as
+  /// long as they include all that are near enough, nearest_distinct() looks at no others. The
+  /// results are the same to the bit. One per query and thread; for any field, one after the other.
+  class Vicinity {
+   public:
+    /// Allocates all memory that it will use.
+    Vicinity() : nodes_(std::make_unique_for_overwrite<kernel::TreeNode[]>(nodes_max)) {}
+
+   private:
+    friend class BoxField;
+    friend class MapField;
+    static constexpr std::size_t nodes_max = 64;
+    static constexpr double skin_m = 0.02;  ///< how far the query may move before it gathers again
+    [[nodiscard]] bool covers(const BoxField& field, const Eigen::Vector3d& a,
+                              const Eigen::Vector3d& b, double limit) const noexcept;
+    void set_empty(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                   double reach) noexcept;
+    void gather(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                double limit) noexcept;
+
+    std::uint64_t revision_ = 0;  ///< of the field; zero: of none
+    Eigen::Vector3d a_ = Eigen::Vector3d::Zero(), b_ = Eigen::Vector3d::Zero();
+    double reach_ =
+        0.0;  ///< all boxes no farther than this from the segment from a_ to b_ are here
+    int node_count_ = 0;  ///< −1: there are too many
+    std::unique_ptr<kernel::TreeNode[]> nodes_;
+  };
+
   static constexpr std::size_t distinct_max = 8;
 
   /// Nearest boxes in distinct directions no farther than `limit`, nearest first, up to out.size()
   /// and distinct_max. A box is left out if the angle between its direction and that of an accepted
   /// one has a cosine above `cone_cosine`: a floor of many boxes is one obstacle. See
   /// docs/theory.md (11.22).
+  /// @param vicinity that of the query, or null
   /// @return how many were written. No allocation if the scratch was made for this field.
   std::size_t nearest_distinct(const Eigen::Vector3d& p, double limit, double cone_cosine,
-                               Scratch& scratch, std::span<BoxHit> out) const;
+                               Scratch& scratch, std::span<BoxHit> out,
+                               Vicinity* vicinity = nullptr) const;
   /// The same for a capsule's axis. Points more than a third of the axis apart are distinct for all
   /// directions.
   std::size_t nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
-                               double cone_cosine, Scratch& scratch,
-                               std::span<SegmentHit> out) const;
+                               double cone_cosine, Scratch& scratch, std::span<SegmentHit> out,
+                               Vicinity* vicinity = nullptr) const;
 
  private:
   [[nodiscard]] kernel::Tree tree() const noexcept;
@@ -121,7 +152,12 @@ class BoxField {
                : -1;
   }
   void build_all();
+  template <class From, class Hit>
+  std::size_t nearest_distinct_of(const From& from, double limit, double cone_cosine,
+                                  Scratch& scratch, std::span<Hit> out, Vicinity* vicinity) const;
 
+  /// Different for different boxes, in the whole program; copies have the same.
+  std::uint64_t revision_ = 0;
   std::vector<Box> boxes_;
   std::vector<kernel::TreeNode> nodes_;  ///< the root is the first
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();

@@ -78,13 +78,15 @@ class MapField {
 
   /// Nearest points in distinct directions no farther than `limit`, nearest first; inside the union
   /// only the one in the exit direction. @return how many. No allocation, except at the first query
-  /// inside.
+  /// inside. @param vicinity see BoxField::Vicinity, or null
   std::size_t nearest_distinct(const Eigen::Vector3d& p, double limit, Scratch& scratch,
-                               std::span<BoxHit, points_max> out) const;
+                               std::span<BoxHit, points_max> out,
+                               BoxField::Vicinity* vicinity = nullptr) const;
   /// The same, seen from a capsule's axis; points more than a third of the axis apart are distinct,
   /// too.
   std::size_t nearest_distinct(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
-                               Scratch& scratch, std::span<SegmentHit, points_max> out) const;
+                               Scratch& scratch, std::span<SegmentHit, points_max> out,
+                               BoxField::Vicinity* vicinity = nullptr) const;
 
   /// Computes now what the first query inside would compute, so that no query allocates or waits.
   void prepare() const {
@@ -101,6 +103,9 @@ class MapField {
     BoxField faces;
   };
   [[nodiscard]] const BoxField& faces() const;
+  /// Whether table or vicinity prove that nothing is within the limit of the segment.
+  [[nodiscard]] bool far(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
+                         BoxField::Vicinity* vicinity) const;
   /// Distance and exit direction of a point in the union or on its surface.
   void find_exit(const Eigen::Vector3d& p, BoxHit& hit) const;
   void find_deepest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, SegmentHit& hit) const;

@@ -43,6 +43,15 @@ struct TreeKernels {
   ///        found
   int (*nearest_distinct)(const Tree& tree, const double* p, const double* q, double limit,
                           double cone_cosine, QueueEntry* queue, Found* out, int count) noexcept;
+  /// Copies all boxes that may be within `limit` to nodes without children, of which only the last
+  /// is not full. @return the number of nodes, or −1 if `nodes_max` are too few
+  int (*gather)(const Tree& tree, const double* p, const double* q, double limit, TreeNode* nodes,
+                int nodes_max) noexcept;
+  /// nearest_distinct() among boxes that gather() copied: the same result if they include all
+  /// within `limit`. @param bounds memory for eight numbers per node
+  int (*nearest_distinct_among)(const Tree& tree, const TreeNode* nodes, int node_count,
+                                const double* p, const double* q, double limit, double cone_cosine,
+                                float* bounds, Found* out, int count) noexcept;
 };
 
 }  // namespace hamelin::scene::kernel
