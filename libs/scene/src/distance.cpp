@@ -455,8 +455,8 @@ void BoxField::Vicinity::set_empty(const BoxField& field, const Eigen::Vector3d&
 }
 
 void BoxField::Vicinity::gather(const BoxField& field, const Eigen::Vector3d& a,
-                                const Eigen::Vector3d& b, double limit) noexcept {
-  set_empty(field, a, b, limit + skin_m);
+                                const Eigen::Vector3d& b, double reach) noexcept {
+  set_empty(field, a, b, reach);
   node_count_ = field.kernels_->gather(field.tree(), a.data(), a == b ? nullptr : b.data(), reach_,
                                        nodes_.get(), static_cast<int>(nodes_max));
 }
@@ -468,12 +468,14 @@ std::size_t BoxField::nearest_distinct_of(const From& from, double limit, double
   if (boxes_.empty() || !(limit >= 0.0)) return 0;
   std::array<kernel::Found, distinct_max> found;
   const int most = static_cast<int>(std::min(out.size(), distinct_max));
-  if (vicinity != nullptr && !vicinity->covers(*this, from.a, from.b, limit))
-    vicinity->gather(*this, from.a, from.b, limit);
+  const bool moves = vicinity != nullptr;
+  Vicinity& near = moves ? *vicinity : scratch.once_;
+  if (!moves || !near.covers(*this, from.a, from.b, limit))
+    near.gather(*this, from.a, from.b, limit + (moves ? Vicinity::skin_m : 0.0));
   int count = 0;
-  if (vicinity != nullptr && vicinity->node_count_ >= 0) {
+  if (near.node_count_ >= 0) {
     std::array<float, Vicinity::nodes_max * width> bounds;
-    count = kernels_->nearest_distinct_among(tree(), vicinity->nodes_.get(), vicinity->node_count_,
+    count = kernels_->nearest_distinct_among(tree(), near.nodes_.get(), near.node_count_,
                                              from.first(), from.second(), limit, cone_cosine,
                                              bounds.data(), found.data(), most);
   } else {

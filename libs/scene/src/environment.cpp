@@ -34,19 +34,29 @@ Contact contact_of(const Shapes& arm, std::size_t shape, int obstacle, const Eig
 // Writes the nearest contacts, as many as fit into `out`, in the order of shapes and distances.
 void write_nearest(const std::vector<Contact>& found, std::vector<std::size_t>& order,
                    std::span<Contact> out) {
-  const auto nearer = [&](std::size_t a, std::size_t b) {
-    return found[a].distance != found[b].distance ? found[a].distance < found[b].distance : a < b;
+  const auto nearer = [](const Contact& a, const Contact& b) { return a.distance < b.distance; };
+  const auto before = [&](const Contact& a, const Contact& b) {
+    return a.sphere != b.sphere ? a.sphere < b.sphere : nearer(a, b);
+  };
+  const bool all = out.size() >= found.size();
+  if (all && std::is_sorted(found.begin(), found.end(), before)) {
+    std::copy(found.begin(), found.end(), out.begin());
+    return;
+  }
+  // equal ones in the order in which they were found
+  const auto indexed = [&](const auto& less) {
+    return [&found, less](std::size_t a, std::size_t b) {
+      return less(found[a], found[b]) || (!less(found[b], found[a]) && a < b);
+    };
   };
   order.resize(found.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  if (out.size() < found.size()) {
+  if (!all) {
     std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(out.size()),
-                     order.end(), nearer);
+                     order.end(), indexed(nearer));
     order.resize(out.size());
   }
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return found[a].sphere != found[b].sphere ? found[a].sphere < found[b].sphere : nearer(a, b);
-  });
+  std::sort(order.begin(), order.end(), indexed(before));
   for (std::size_t i = 0; i < order.size(); ++i) out[i] = found[order[i]];
 }
 

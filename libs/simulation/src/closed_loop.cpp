@@ -238,9 +238,9 @@ log::Result ClosedLoop::run(const Watch& watch) {
     else if (actuation_->asks_planner(plant_->node().k))
       ask_planner();
     if (!done_) apply_answer();
-    timer.pause();
+    if (recorder_->logging()) timer.pause();
     write_tick();
-    timer.resume();
+    if (recorder_->logging()) timer.resume();
     if (done_) break;
     // The time of a plant that is not hamelin's own is no part of a tick.
     if (scene_.plant != scene::PlantType::hamelin) timer.pause();

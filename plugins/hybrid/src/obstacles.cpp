@@ -16,41 +16,44 @@ Obstacles::Obstacles(const planning::Setup& setup, double radius)
   for (auto& point : points_) point.row = Eigen::VectorXd::Zero(setup.dof());
   chosen_.reserve(max_points);
   near_.reserve(setup.shapes().size() * 32 + 64);
+  const int links =
+      shape_link_.empty() ? 0 : *std::max_element(shape_link_.begin(), shape_link_.end()) + 1;
+  last_of_link_.resize(static_cast<std::size_t>(links));
 }
 
 // Nearest first. The spheres of a link have many contacts with almost the same row. A contact is
 // left out if it is close to a nearer one of its link and obstacle and has almost the same
 // direction.
 void Obstacles::select(const planning::Contacts& contacts) {
-  const auto nearer = [&](std::size_t a, std::size_t b) {
-    return contacts[a].distance_m != contacts[b].distance_m
-               ? contacts[a].distance_m < contacts[b].distance_m
-               : a < b;
-  };
   near_.clear();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    clearance_ = std::min(clearance_, contacts[i].distance_m);
-    if (contacts[i].distance_m <= radius_ && near_.size() < near_.capacity()) near_.push_back(i);
+    const double distance = contacts[i].distance_m;
+    clearance_ = std::min(clearance_, distance);
+    if (distance <= radius_ && near_.size() < near_.capacity()) near_.push_back({distance, i});
   }
-  std::sort(near_.begin(), near_.end(), nearer);
-  const auto link_of = [&](const hamelin_contact& c) {
-    return shape_link_[static_cast<std::size_t>(c.shape)];
-  };
+  std::sort(near_.begin(), near_.end(), [](const Near& a, const Near& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.contact < b.contact;
+  });
+  std::fill(last_of_link_.begin(), last_of_link_.end(), -1);
   chosen_.clear();
-  for (const std::size_t i : near_) {
+  for (const auto& near : near_) {
     if (count_ + chosen_.size() == points_.size()) return;
-    const hamelin_contact& contact = contacts[i];
+    const hamelin_contact& contact = contacts[near.contact];
+    const auto n = planning::vec3(contact.direction_world),
+               p = planning::vec3(contact.arm_point_world_m);
+    int& last = last_of_link_[static_cast<std::size_t>(
+        shape_link_[static_cast<std::size_t>(contact.shape)])];
     bool redundant = false;
-    for (std::size_t j = 0; j < chosen_.size() && !redundant; ++j) {
-      const hamelin_contact& other = contacts[chosen_[j]];
-      if (link_of(other) != link_of(contact) || other.obstacle != contact.obstacle) continue;
-      const auto n = planning::vec3(contact.direction_world),
-                 m = planning::vec3(other.direction_world);
-      const auto p = planning::vec3(contact.arm_point_world_m),
-                 r = planning::vec3(other.arm_point_world_m);
-      redundant = n.dot(m) > same_direction && (p - r).squaredNorm() < same_place_m * same_place_m;
+    for (int j = last; j >= 0 && !redundant; j = chosen_[static_cast<std::size_t>(j)].before) {
+      const hamelin_contact& other = contacts[chosen_[static_cast<std::size_t>(j)].contact];
+      redundant =
+          other.obstacle == contact.obstacle &&
+          n.dot(planning::vec3(other.direction_world)) > same_direction &&
+          (p - planning::vec3(other.arm_point_world_m)).squaredNorm() < same_place_m * same_place_m;
     }
-    if (!redundant) chosen_.push_back(i);
+    if (redundant) continue;
+    chosen_.push_back({near.contact, last});
+    last = static_cast<int>(chosen_.size()) - 1;
   }
 }
 
@@ -82,8 +85,8 @@ void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
   count_ = 0;
   for (const auto& contact : self_contacts) add_self(model, ws, contact);
   select(contacts);
-  for (const std::size_t i : chosen_) {
-    const auto& contact = contacts[i];
+  for (const auto& chosen : chosen_) {
+    const auto& contact = contacts[chosen.contact];
     NearPoint& point = points_[count_++];
     point.shape = contact.shape;
     point.link = shape_link_[static_cast<std::size_t>(contact.shape)];

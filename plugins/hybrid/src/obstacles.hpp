@@ -42,10 +42,21 @@ class Obstacles {
   void add_self(const model::Model& model, const dynamics::Workspace& ws,
                 const hamelin_self_contact& contact);
 
+  struct Near {
+    double distance;
+    std::size_t contact;
+  };
+  struct Chosen {
+    std::size_t contact;
+    int before;  ///< the last one of the same link before it; −1: none
+  };
+
   double radius_, clearance_ = 0.0;
   std::vector<int> shape_link_;
   std::vector<NearPoint> points_;
-  std::vector<std::size_t> near_, chosen_;
+  std::vector<Near> near_;
+  std::vector<Chosen> chosen_;
+  std::vector<int> last_of_link_;  ///< into chosen_; −1: none
   std::size_t count_ = 0;
   Eigen::VectorXd row_;
 };

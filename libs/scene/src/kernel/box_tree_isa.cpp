@@ -462,22 +462,66 @@ HAMELIN_INLINE int gather_of(const Tree& tree, const Query& query, double limit,
   return (boxes + width - 1) / width;
 }
 
-// The slot of the least of all bounds.
-HAMELIN_INLINE int least_of(const float* bounds, int nodes) {
-  float least = infinity();
-  int slot = 0;
-  for (int n = 0; n < nodes; ++n) {
-    unsigned below = not_above(bounds + n * width, least);
-    for (; below != 0; below &= below - 1U) {
-      const int at = n * width + __builtin_ctz(below);
-      if (bounds[at] < least) {
-        least = bounds[at];
-        slot = at;
-      }
+// Boxes that gather_of() copied, with a bound each, and those of their nodes that are still in use.
+class Candidates {
+ public:
+  HAMELIN_INLINE Candidates(const TreeNode* nodes, int count, float* bounds) noexcept
+      : nodes_(nodes), bounds_(bounds), count_(count) {
+    for (int n = 0; n < count; ++n) active_[n] = static_cast<std::uint8_t>(n);
+  }
+
+  // Calls change(node, bounds) for all nodes, and forgets those without a bound up to `limit`.
+  template <class Change>
+  HAMELIN_INLINE void update(float limit, const Change& change) {
+    int kept = 0;
+    for (int i = 0; i < count_; ++i) {
+      const int n = active_[i];
+      float* const bounds = bounds_ + n * width;
+      change(nodes_[n], bounds);
+      active_[kept] = static_cast<std::uint8_t>(n);
+      kept += not_above(bounds, limit) != 0 ? 1 : 0;
+    }
+    count_ = kept;
+  }
+
+  // Calls try_slot(slot) for each bound up to `limit`, which may fall meanwhile.
+  template <class TrySlot>
+  HAMELIN_INLINE void each(const float& limit, const TrySlot& try_slot) const {
+    for (int i = 0; i < count_; ++i) {
+      const int n = active_[i];
+      for (unsigned near = not_above(bounds_ + n * width, limit); near != 0; near &= near - 1U)
+        try_slot(n * width + __builtin_ctz(near));
     }
   }
-  return slot;
-}
+
+  // The slot of the least bound; −1 if there is none.
+  HAMELIN_INLINE int least() const {
+    Lanes least = splat(infinity());
+    for (int i = 0; i < count_; ++i)
+      for (int half = 0; half < width; half += lanes)
+        least = min(least, load(bounds_ + active_[i] * width + half));
+    float smallest = infinity();
+    for (int lane = 0; lane < lanes; ++lane)
+      smallest = least[lane] < smallest ? least[lane] : smallest;
+    if (!(smallest < infinity())) return -1;
+    for (int i = 0; i < count_; ++i) {
+      const unsigned here = not_above(bounds_ + active_[i] * width, smallest);
+      if (here != 0) return active_[i] * width + __builtin_ctz(here);
+    }
+    return -1;
+  }
+
+  HAMELIN_INLINE void remove(int slot) { bounds_[slot] = infinity(); }
+  HAMELIN_INLINE std::int32_t box(int slot) const {
+    return -1 - nodes_[slot / width].child[slot % width];
+  }
+
+ private:
+  const TreeNode* nodes_;
+  float* bounds_;
+  int count_;
+  std::uint8_t active_[256];
+};
 
 // What nearest_distinct_of() finds, among boxes that gather_of() copied.
 template <class Query>
@@ -487,32 +531,35 @@ HAMELIN_INLINE int nearest_distinct_among_of(const Tree& tree, const TreeNode* n
                                              int count) {
   constexpr int most = 8;
   typename Query::Accepted accepted[most];
-  for (int n = 0; n < node_count; ++n) query.bounds(nodes[n], bounds + n * width);
-  if (node_count > 0)
-    for (int slot = nodes[node_count - 1].count; slot < width; ++slot)
-      bounds[(node_count - 1) * width + slot] = infinity();
+  const float limit_bound = bound_of(limit * limit), limit_f = static_cast<float>(limit),
+              cosine = static_cast<float>(cone_cosine);
+  Candidates candidates(nodes, node_count, bounds);
+  candidates.update(
+      limit_bound, [&](const TreeNode& node, float* of) __attribute__((always_inline)) {
+        query.bounds(node, of);
+        for (int slot = node.count; slot < width; ++slot) of[slot] = infinity();
+      });
   int found = 0;
   while (found < count && found < most) {
     Found best{limit * limit, -1};
     int best_slot = -1;
+    float bound = limit_bound;
     const auto try_slot = [&](int slot) __attribute__((always_inline)) {
-      const std::int32_t box = -1 - nodes[slot / width].child[slot % width];
+      const std::int32_t box = candidates.box(slot);
       const double key = query.key(tree.boxes + 6 * static_cast<std::int64_t>(box));
       if (key < best.key || (key == best.key && (best.box < 0 || box < best.box))) {
         best = {key, box};
         best_slot = slot;
+        bound = bound_of(key);
       }
     };
     // the box of the least bound first, then all that may be nearer
-    const int first = least_of(bounds, node_count);
-    if (node_count == 0 || !(bounds[first] <= bound_of(best.key))) break;
+    const int first = candidates.least();
+    if (first < 0) break;
     try_slot(first);
-    for (int n = 0; n < node_count; ++n)
-      for (unsigned near = not_above(bounds + n * width, bound_of(best.key)); near != 0;
-           near &= near - 1U)
-        try_slot(n * width + __builtin_ctz(near));
+    candidates.each(bound, try_slot);
     if (best_slot < 0) break;
-    bounds[best_slot] = infinity();
+    candidates.remove(best_slot);
     const typename Query::Accepted hit =
         query.accept(tree.boxes + 6 * static_cast<std::int64_t>(best.box));
     bool duplicate = false;
@@ -521,10 +568,11 @@ HAMELIN_INLINE int nearest_distinct_among_of(const Tree& tree, const TreeNode* n
     if (duplicate) continue;
     accepted[found] = hit;
     out[found++] = best;
-    if (cone_cosine > 0.0)
-      for (int n = 0; n < node_count; ++n)
-        query.drop_duplicates(nodes[n], hit, static_cast<float>(cone_cosine),
-                              static_cast<float>(limit), bounds + n * width);
+    if (cone_cosine > 0.0 && found < count)
+      candidates.update(
+          limit_bound, [&](const TreeNode& node, float* of) __attribute__((always_inline)) {
+            query.drop_duplicates(node, hit, cosine, limit_f, of);
+          });
   }
   return found;
 }

@@ -84,21 +84,6 @@ class BoxField {
   [[nodiscard]] bool nearest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit,
                              SegmentHit& hit, std::int32_t hint = -1) const;
 
-  /// Working memory of nearest_distinct(); one per thread.
-  class Scratch {
-   public:
-    Scratch() = default;
-    explicit Scratch(const BoxField& field) { fit(field); }
-
-   private:
-    friend class BoxField;
-    void fit(const BoxField& field) {
-      const std::size_t size = field.nodes_.size() + field.boxes_.size();
-      if (queue_.size() < size) queue_.resize(size);
-    }
-    std::vector<kernel::QueueEntry> queue_;
-  };
-
   /// The boxes around a query that moves little from call to call, such as one shape of an arm: as
   /// long as they include all that are near enough, nearest_distinct() looks at no others. The
   /// results are the same to the bit. One per query and thread; for any field, one after the other.
@@ -111,13 +96,13 @@ class BoxField {
     friend class BoxField;
     friend class MapField;
     static constexpr std::size_t nodes_max = 64;
-    static constexpr double skin_m = 0.02;  ///< how far the query may move before it gathers again
+    static constexpr double skin_m = 0.01;  ///< how far the query may move before it gathers again
     [[nodiscard]] bool covers(const BoxField& field, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, double limit) const noexcept;
     void set_empty(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                    double reach) noexcept;
     void gather(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                double limit) noexcept;
+                double reach) noexcept;
 
     std::uint64_t revision_ = 0;  ///< of the field; zero: of none
     Eigen::Vector3d a_ = Eigen::Vector3d::Zero(), b_ = Eigen::Vector3d::Zero();
@@ -125,6 +110,22 @@ class BoxField {
         0.0;  ///< all boxes no farther than this from the segment from a_ to b_ are here
     int node_count_ = 0;  ///< −1: there are too many
     std::unique_ptr<kernel::TreeNode[]> nodes_;
+  };
+
+  /// Working memory of nearest_distinct(); one per thread.
+  class Scratch {
+   public:
+    Scratch() = default;
+    explicit Scratch(const BoxField& field) { fit(field); }
+
+   private:
+    friend class BoxField;
+    void fit(const BoxField& field) {
+      const std::size_t size = field.nodes_.size() + field.boxes_.size();
+      if (queue_.size() < size) queue_.resize(size);
+    }
+    Vicinity once_;
+    std::vector<kernel::QueueEntry> queue_;  ///< where there are more boxes than that holds
   };
 
   static constexpr std::size_t distinct_max = 8;
