@@ -32,6 +32,14 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
                 Own(scene::make_environment(scene, model, influence_m), model.shapes().size()),
                 nullptr, 0) {}
 
+WorldView::WorldView(const scene::Scene& scene, const model::Model& model, const WorldView& other)
+    : WorldView(scene, model, other.influence_,
+                Own(other.environment_->with_obstacles(
+                        scene.obstacles,
+                        scene.map ? scene.map->changes : std::vector<scene::MapChangeSpec>{}),
+                    model.shapes().size()),
+                nullptr, 0) {}
+
 WorldView::WorldView(const scene::Scene& scene, const model::Model& model, World& world)
     : WorldView(scene, model, world.influence_m(), std::nullopt, &world, world.contacts_max()) {}
 

@@ -81,16 +81,22 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   map_spec_ = map;
   map_spec_->changes.clear();
   map_ball_ = region.ball;
-  for (const MapChangeSpec& change : map->changes)
-    changes_.push_back(read_change(change, *map, region.resolution_m, region.ball));
+  read_changes(map->changes);
 }
 
-Environment Environment::with_obstacles(std::vector<Obstacle> obstacles) const {
+void Environment::read_changes(std::span<const MapChangeSpec> changes) {
+  for (const MapChangeSpec& change : changes)
+    changes_.push_back(read_change(change, *map_spec_, summary_.resolution_m, map_ball_));
+}
+
+Environment Environment::with_obstacles(std::vector<Obstacle> obstacles,
+                                        std::span<const MapChangeSpec> changes) const {
   for (const Obstacle& obstacle : obstacles)
     check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
   Environment copy = *this;
   copy.obstacles_ = std::move(obstacles);
   copy.summary_.obstacles = copy.obstacles_.size();
+  copy.read_changes(changes);
   return copy;
 }
 

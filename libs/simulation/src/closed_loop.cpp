@@ -144,8 +144,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   controller_ = std::make_unique<control::Controller>(scene, model_, plugin, planner_params_,
                                                       std::move(options));
   if (!controller_sees_all(scene))
-    own_judge_ =
-        std::make_unique<control::WorldView>(scene, model_, controller_->view().influence_m());
+    own_judge_ = std::make_unique<control::WorldView>(scene, model_, controller_->view());
   certifies_ = scene.safety.type != scene::SafetyType::none;
   judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
   if (judge_->has_self() && !judge_->self_field()->note().empty())

@@ -28,6 +28,9 @@ class WorldView {
   /// @throws Error io, parse or invalid for a map, an obstacle, or a robot without shapes if some
   ///        are needed
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m);
+  /// The same with the influence and the map of another view of the same scene, which is not read
+  /// again.
+  WorldView(const scene::Scene& scene, const model::Model& model, const WorldView& other);
   /// The obstacles of a world that other threads may update, as take_newest() finds them.
   /// @param scene says whether self-collision is modelled and unknown space is crossed slowly
   /// @param world must outlive this

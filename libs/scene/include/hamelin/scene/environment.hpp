@@ -157,8 +157,11 @@ class Environment {
   /// @return one line that describes them; empty if none was due
   std::string advance(double time_s);
 
-  /// A copy with other obstacles, which shares the map. @throws Error invalid for an obstacle
-  [[nodiscard]] Environment with_obstacles(std::vector<Obstacle> obstacles) const;
+  /// A copy with other obstacles, which shares the map until one of them changes it.
+  /// @param changes of the map, for advance()
+  /// @throws Error invalid for an obstacle; io, parse or invalid for a change
+  [[nodiscard]] Environment with_obstacles(std::vector<Obstacle> obstacles,
+                                           std::span<const MapChangeSpec> changes = {}) const;
   /// A copy in which voxels of the map are freed and occupied now; time_s of the change is not
   /// used. Queries may run on this environment at the same time.
   /// @throws Error io, parse or invalid, also if there is no map to change
@@ -189,6 +192,7 @@ class Environment {
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,
                                            double time_s, double limit);
 
+  void read_changes(std::span<const MapChangeSpec> changes);
   /// Applies one change to fields that no other environment shares.
   MapField::Changed apply(const MapChange& change);
 
