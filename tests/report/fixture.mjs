@@ -223,6 +223,12 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
     { t: duration * 0.62, text: 'safety filter active for 12 ticks' },
     { t: null, text: 'written without a wall clock' },
   ];
+  // A stop of the shield that ends 0.1 rad farther on in each joint; none of the planar arm.
+  const stops = robot.planar_normal ? [] : [[0.31, 'map', 0.012], [0.55, 'joint_limit', 0.08]].map(([share, cause, length]) => {
+    const from = share * duration;
+    const row = robot.joints.map((_, i) => path(from, i));
+    return { t: from, until: from + length, cause, q: row, q_end: row.map((x) => x + 0.1) };
+  });
   const result = {
     schema: 'hamelin.result/1', version: '0.1.0', scene: 'rack.json', planner, integrator: 'hamel-variational', outcome, cause: outcome === 'reached' ? null : 'the tip stood still 0.31 m from the goal',
     time_s: duration, steps: Math.round(duration * 1000), energy_initial_J: 41.2, energy_final_J: 38.9, energy_error_max_J: 1.3e-13,
@@ -243,7 +249,7 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
       contacts: { count: pack.add(counts, 'u8'), points: pack.add(points, 'i16', { scale: 2e-4, offset: 0 }) },
       forces,
     },
-    events, plots,
+    events, stops, plots,
   };
 }
 

@@ -150,6 +150,7 @@ async function panelsAndTablesAreComplete(page, { json, has }) {
   }
   const timed = json.runs.flatMap((run) => run.events.filter((event) => event.t !== null));
   assert.equal(await page.locator('.event-ticks button').count(), timed.length);
+  assert.equal(await page.locator('.stop-spans button').count(), json.runs.reduce((sum, run) => sum + (run.stops?.length ?? 0), 0));
 }
 
 for (const file of [...given, everything, planar].filter(Boolean)) {
@@ -488,6 +489,24 @@ async function eventsSetTheTime(page, { json }) {
   }
 }
 
+async function stopsAreShown(page, { json }) {
+  const stops = json.runs.flatMap((run) => run.stops);
+  const spans = page.locator('.stop-spans button');
+  assert.ok(stops.length > 0);
+  for (const [i, stop] of stops.entries()) {
+    await spans.nth(i).click();
+    assert.ok(near(await time(page), stop.t, 1e-9));
+    assert.ok((await page.locator('.event-tip').textContent()).includes(stop.cause.replace('_', ' ')));
+    assert.ok((await counts(page)).stopsShown.some(Boolean));
+    await flip(page, 'stops');
+  }
+  // nothing is drawn where no stop is
+  await setTime(page, 0);
+  await settle(page);
+  const before = await page.evaluate(() => window.hamelin.counts().stopsShown);
+  assert.ok(before.every((shown) => !shown), 'a stop is shown at the start');
+}
+
 async function fitsWindows(page) {
   for (const width of [800, 1280, 1920]) {
     await page.setViewportSize({ width, height: 700 });
@@ -526,6 +545,7 @@ const CONTROLS = [
   ['lines are hidden, and a plot gets a log scale', linesAreHidden],
   ['light and dark', coloursSwitch],
   ['events, configuration, provenance', eventsSetTheTime],
+  ['stops of the shield', stopsAreShown],
   ['it fits windows of 800 to 1920 pixels', fitsWindows],
 ];
 

@@ -21,7 +21,8 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 // Limits of the joint values, events and joints' lines in a page, for chains and logs of any
 // length.
-constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24;
+constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24,
+                      stops_max = 500, stop_values_max = 20000;
 
 // Columns of a tick's row after q, v and tau of the joints.
 enum Column : std::size_t {
@@ -112,6 +113,8 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       row_(3 * plotted_joints_ + columns + series_count_, unknown),
       bins_(row_.size(), options.plot_points_max),
       sample_(frames_of(options, world.model.dof())),
+      stops_(std::clamp<std::size_t>(
+          stop_values_max / static_cast<std::size_t>(2 * world.model.dof()), 1, stops_max)),
       config_(header["config"]),
       provenance_(header["provenance"]) {
   const auto& links = world.model.robot().links;
@@ -244,6 +247,8 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
       frame.channels[i] =
           joint_vector(object_member(line, "channels", reader), channel_names[i], dof, reader);
 
+  add_stop(line, frame, reader);
+
   std::fill(row_.begin(), row_.end(), unknown);
   const auto joints = [&](std::size_t at, const VectorXd& x) {
     if (x.size() > 0) std::copy_n(x.data(), plotted_joints_, &row_[at * plotted_joints_]);
@@ -299,6 +304,18 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   }
 }
 
+void Run::add_stop(const Json& line, const Frame& frame, const log::LogReader& reader) {
+  if (find(line, "stop") == nullptr) return stops_.add(frame.time_s, nullptr, frame.q, frame.q);
+  const Json& stop = object_member(line, "stop", reader);
+  const Json* cause = find(stop, "cause");
+  if (cause == nullptr || !cause->is_string())
+    throw line_error(reader, "/stop/cause: expected the name of a cause");
+  const VectorXd end = joint_vector(stop, "q_end", world_.model.dof(), reader);
+  if (end.size() == 0)
+    throw line_error(reader, "/stop/q_end: is missing, expected one number per joint");
+  stops_.add(frame.time_s, cause->get_ptr<const std::string*>(), frame.q, end);
+}
+
 void Run::set_goal_distance(const Frame& frame) {
   if (world_.goals.empty()) return;
   double* const row = &row_[3 * plotted_joints_];
@@ -326,6 +343,8 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
         "{} ticks have joint angles that are not finite; they are not drawn", not_finite_));
   if (events_left_out_ > 0)
     notes_.push_back(fmt::format("{} more events are in the log", events_left_out_));
+  if (stops_.left_out() > 0)
+    notes_.push_back(fmt::format("{} more stops are in the log", stops_.left_out()));
   notes_.insert(notes_.end(), world_.notes.begin(), world_.notes.end());
   if (recorded_.scene.map && world_.json["map"].is_null())
     notes_.push_back("without the map of the run there are no clearances and closest points");
@@ -357,6 +376,7 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   for (const Frame& frame : frames) columns.add(frame);
   run["frames"] = columns.json(container, recorded_.scene.step_s);
   run["events"] = std::move(events_);
+  run["stops"] = stops_.json();
   run["plots"] = plots_json(container);
   return run;
 }

@@ -11,6 +11,7 @@
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/replay.hpp"
+#include "stops.hpp"
 #include "world.hpp"
 
 namespace hamelin::report {
@@ -41,6 +42,7 @@ class Run {
   /// A plot for each unit of the planner's own series.
   void add_series_plots(const Json& header, std::size_t column);
   void add_tick(const Json& line, const log::LogReader& reader);
+  void add_stop(const Json& line, const Frame& frame, const log::LogReader& reader);
   void set_goal_distance(const Frame& frame);
   [[nodiscard]] Json plots_json(Container& container) const;
   [[nodiscard]] Json marks(const Plot& plot) const;
@@ -53,6 +55,7 @@ class Run {
   std::vector<double> row_;  ///< the columns of one tick
   Bins bins_;
   EvenSample<Frame> sample_;
+  Stops stops_;
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;
   double last_k_ = -1.0, time_s_ = 0.0, first_balance_ = 0.0;

@@ -395,3 +395,39 @@ TEST_CASE("the planner's own series are plotted, one plot for each unit", "[repo
   CHECK_THROWS_WITH((void)report::make_data({folder / "short.jsonl"}, {100, 1500}),
                     Catch::Contains("series: expected 3 numbers, one per series"));
 }
+
+TEST_CASE("the stops are those of the ticks", "[report]") {
+  const auto folder = test::scratch("stops");
+  scene::Scene scene = test::shelf(4.0);
+  scene.planner->name = "apf";
+  scene.planner->params = Json::object();
+  (void)test::log_run(scene, folder / "run.jsonl");
+  struct Stop {
+    double t, until;
+    Json cause, q, q_end;
+  };
+  std::vector<Stop> expected;
+  bool goes_on = false;
+  for (const Json& tick : test::ticks_of(folder / "run.jsonl")) {
+    const double t = tick["time_s"];
+    if (goes_on) expected.back().until = t;
+    const bool stops = tick.contains("stop") && !tick["stop"].is_null();
+    if (stops && !(goes_on && expected.back().q_end == tick["stop"]["q_end"]))
+      expected.push_back({t, t, tick["stop"]["cause"], tick["q"], tick["stop"]["q_end"]});
+    goes_on = stops;
+  }
+  REQUIRE(expected.size() > 3);
+  REQUIRE(expected.size() < 500);
+  const Decoded page(report::make_data({folder / "run.jsonl"}).bytes);
+  const Json& stops = page.head["runs"][0]["stops"];
+  REQUIRE(stops.size() == expected.size());
+  for (std::size_t i = 0; i < stops.size(); ++i) {
+    CHECK(stops[i]["t"] == expected[i].t);
+    CHECK(stops[i]["until"] == expected[i].until);
+    CHECK(stops[i]["cause"] == expected[i].cause);
+    for (const char* key : {"q", "q_end"}) {
+      const Json& exact = std::string_view(key) == "q" ? expected[i].q : expected[i].q_end;
+      CHECK((vector_of(stops[i][key]) - vector_of(exact)).lpNorm<Eigen::Infinity>() <= 0.51e-6);
+    }
+  }
+}

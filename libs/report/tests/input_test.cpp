@@ -62,6 +62,12 @@ TEST_CASE("a file that is not a log is refused in one line with its name", "[rep
       {text.substr(0, header) + "{\"type\":\"tock\"}\n", "line 2: type \"tock\""},
       {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":\"now\"}\n",
        "line 2: time_s: expected a number"},
+      {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":0,\"q\":[0,0,0,0,0,0,0],"
+                                "\"stop\":{\"cause\":\"map\",\"q_end\":[1]}}\n",
+       "line 2: q_end: expected 7 numbers"},
+      {text.substr(0, header) + "{\"type\":\"tick\",\"k\":0,\"time_s\":0,\"q\":[0,0,0,0,0,0,0],"
+                                "\"stop\":{\"cause\":1}}\n",
+       "line 2: /stop/cause: expected the name"},
   };
   for (const auto& [content, expected] : cases) {
     write(folder / "bad.jsonl", content);

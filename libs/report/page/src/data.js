@@ -85,6 +85,7 @@ function prepare(report) {
       run.frames.contacts = { count, first, points };
     }
     run.events ??= [];
+    run.stops ??= [];
     run.plots ??= [];
     run.notes ??= [];
   }

@@ -38,6 +38,9 @@ export function ticks(splits, increment, least = 3) {
 /** Seconds with milliseconds. */
 export const seconds = (t) => `${t.toFixed(3)} s`;
 
+/** Milliseconds of a time in seconds. */
+export const milliseconds = (t) => `${(1000 * t).toFixed(0)} ms`;
+
 const UNITS = [
   ['_wxyz', ''], ['_rad_s2', 'rad/s²'], ['_rad_s', 'rad/s'], ['_m_s2', 'm/s²'], ['_m_s', 'm/s'], ['_kg_m2', 'kg m²'], ['_Nm', 'N m'],
   ['_rad', 'rad'], ['_kg', 'kg'], ['_us', 'µs'], ['_ns', 'ns'], ['_Hz', 'Hz'], ['_J', 'J'], ['_W', 'W'], ['_N', 'N'], ['_m', 'm'], ['_s', 's'],

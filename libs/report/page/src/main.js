@@ -158,6 +158,7 @@ async function start() {
       plots: board.all.reduce((sum, group) => sum + group.cells.length, 0),
       voxels: view ? view.scenes.map((scene) => scene.voxels?.total ?? 0) : null,
       voxelsShown: view ? view.voxelsShown : null,
+      stopsShown: view ? view.scenes.map((scene) => scene.stop.stop !== null) : null,
       drawn: view?.drawn ?? 0,
     }),
     duration,

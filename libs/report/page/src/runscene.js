@@ -3,6 +3,7 @@ import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
 import { Arm } from './arm.js';
 import { runColor, theme } from './colors.js';
 import { Contacts, coordinateAxes, Floor, Forces, Goals, Obstacles, Spheres, Trail } from './markers.js';
+import { StopLine } from './stops.js';
 import { Voxels } from './voxels.js';
 
 export class RunScene {
@@ -23,12 +24,13 @@ export class RunScene {
     this.contacts = new Contacts(frames, reach);
     this.forces = new Forces(frames, reach);
     this.trail = new Trail(replay.tips, reach);
+    this.stop = new StopLine(replay.run, world.robot, reach);
     this.goals = new Goals(world);
     this.obstacles = new Obstacles(world.obstacles ?? [], world.robot.planar_normal);
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
     this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? coordinateAxes(0.07 * reach) : new Group();
     this.tipFrame.matrixAutoUpdate = false;
-    this.parts = [this.floor, this.voxels, this.obstacles, this.goals, this.arm, this.spheres, this.contacts, this.forces, this.trail].filter(Boolean);
+    this.parts = [this.floor, this.voxels, this.obstacles, this.goals, this.arm, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
     for (const part of this.parts) this.scene.add(part.group);
     this.scene.add(this.tipFrame);
     this.probes = this.probesOf(world.robot);
@@ -88,6 +90,7 @@ export class RunScene {
     this.forces.group.visible = show.forces;
     for (const arrow of this.forces.arrows) arrow.on = settings.channels[arrow.channel] ?? true;
     this.trail.group.visible = show.trail;
+    this.stop.group.visible = show.stops;
     this.goals.group.visible = show.goals;
     this.tipFrame.visible = show.goals;
     this.obstacles.group.visible = show.obstacles;
@@ -102,6 +105,7 @@ export class RunScene {
     this.contacts.update(replay.nearest);
     this.forces.update(tip, k, a, settings.metresPerNewton);
     this.trail.update(tip, k);
+    this.stop.update(t);
     this.goals.setCurrent(replay.goalIndex);
     this.obstacles.update(t);
     const pose = chain.link(replay.world.robot.tip_link);

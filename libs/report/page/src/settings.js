@@ -45,6 +45,7 @@ export class Settings {
       spheres: used.some((world) => world.robot.spheres.length),
       lines: runs.some((run) => run.frames.contacts),
       forces: runs.some((run) => run.frames.forces.length),
+      stops: runs.some((run) => run.stops.length),
       goals: used.some((world) => world.goals.length),
       obstacles: used.some((world) => world.obstacles?.length),
     };
@@ -56,7 +57,7 @@ export class Settings {
     this.near = null;
     this.clip = null;
     this.forceScale = 1;
-    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, goals: true, obstacles: true, floor: true };
+    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, stops: true, goals: true, obstacles: true, floor: true };
     this.channels = {};
 
     const planar = Boolean(view.planar);
@@ -69,7 +70,7 @@ export class Settings {
       h('fieldset', {}, h('legend', {}, 'View'), this.views),
       h('fieldset', { class: 'shows' }, h('legend', {}, 'Show'),
         toggle('map', 'map'), toggle('arm', 'arm'), toggle('spheres', 'collision spheres'), toggle('lines', 'closest points'),
-        toggle('trail', 'tip trail'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('floor', 'grid')),
+        toggle('trail', 'tip trail'), toggle('stops', 'stops'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('floor', 'grid')),
       has.map && this.mapControls(),
       has.forces && this.forceControls(runs),
     );

@@ -1,7 +1,7 @@
-// The bar at the bottom of the page: play, step, time, speed, and the events as ticks.
+// The bar at the bottom of the page: play, step, time, speed, the events as ticks, and the stops.
 import { runColor } from './colors.js';
 import { h, icon } from './dom.js';
-import { seconds } from './format.js';
+import { milliseconds, seconds } from './format.js';
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
@@ -27,10 +27,11 @@ export class Timeline {
     this.rate = h('select', { 'aria-label': 'Speed', title: 'Speed', onchange: () => { this.speed = Number(this.rate.value); } }, SPEEDS.map((s) => h('option', { value: s, selected: s === 1 }, `${s}×`)));
     this.tip = h('div', { class: 'event-tip', hidden: true });
     this.ticks = h('div', { class: 'event-ticks', style: `--rows:${runs.length}` });
+    this.stops = h('div', { class: 'stop-spans', style: `--rows:${runs.length}` });
     this.element = h('section', { class: 'timeline', 'aria-label': 'Time' },
       h('div', { class: 'buttons' }, button('start', 'Go to the start (Home)', () => this.jump(0)), button('back', 'Previous frame (left arrow)', () => this.step(-1)), this.play, button('forward', 'Next frame (right arrow)', () => this.step(1))),
       this.readout,
-      h('div', { class: 'track' }, this.ticks, this.range, this.tip),
+      h('div', { class: 'track' }, this.ticks, this.stops, this.range, this.tip),
       h('label', { class: 'speed' }, h('span', {}, 'Speed'), this.rate),
     );
     this.addTicks();
@@ -39,24 +40,37 @@ export class Timeline {
 
   addTicks() {
     this.runs.forEach((run, row) => {
+      const named = this.runs.length > 1 ? `${run.name}: ` : '';
       for (const event of run.events) {
         if (event.t === null || event.t === undefined) continue;
-        const text = `${seconds(event.t)} · ${this.runs.length > 1 ? `${run.name}: ` : ''}${event.text}`;
-        const tick = h('button', { type: 'button', tabIndex: -1, 'aria-label': text, onclick: () => this.jump(event.t) });
-        tick.dataset.run = row;
-        const share = this.duration > 0 ? event.t / this.duration : 0;
-        tick.style.setProperty('--at', share);
-        tick.style.setProperty('--row', row);
-        tick.addEventListener('pointerenter', () => {
-          this.tip.textContent = text;
-          this.tip.hidden = false;
-          this.tip.style.setProperty('--at', Math.min(0.93, Math.max(0.07, share)));
-        });
-        tick.addEventListener('pointerleave', () => { this.tip.hidden = true; });
-        this.ticks.append(tick);
+        this.addMark(this.ticks, row, event.t, `${seconds(event.t)} · ${named}${event.text}`);
+      }
+      for (const { t, until, cause } of run.stops) {
+        const mark = this.addMark(this.stops, row, t, `${seconds(t)} · ${named}stop of ${milliseconds(until - t)}: ${cause.replaceAll('_', ' ')}`);
+        mark.style.setProperty('--share', this.share(until - t));
       }
     });
     this.paint();
+  }
+
+  share(t) {
+    return this.duration > 0 ? t / this.duration : 0;
+  }
+
+  /** A mark at a time of a run, which jumps there and shows its text under the pointer. */
+  addMark(bar, row, t, text) {
+    const mark = h('button', { type: 'button', tabIndex: -1, 'aria-label': text, onclick: () => this.jump(t) });
+    mark.dataset.run = row;
+    mark.style.setProperty('--at', this.share(t));
+    mark.style.setProperty('--row', row);
+    mark.addEventListener('pointerenter', () => {
+      this.tip.textContent = text;
+      this.tip.hidden = false;
+      this.tip.style.setProperty('--at', Math.min(0.93, Math.max(0.07, this.share(t))));
+    });
+    mark.addEventListener('pointerleave', () => { this.tip.hidden = true; });
+    bar.append(mark);
+    return mark;
   }
 
   paint() {
