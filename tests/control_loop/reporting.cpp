@@ -37,7 +37,8 @@ class Reporting : public Planner {
         nearest_(host.declare_series("nearest contact", "m")),
         obstacle_(host.declare_series("obstacle of the nearest contact", "")),
         gain_(host.declare_series("gain", "1/s")),
-        goal_(host.declare_series("first number of the goal", "")) {}
+        goal_(host.declare_series("first number of the goal", "")),
+        sent_(host.declare_series("first torque sent", "Nm")) {}
 
   [[nodiscard]] Tuning prepare_params(const hamelin::Json& params) const {
     return {params.at("gain").get<double>(), params.at("sleep_s").get<double>()};
@@ -76,12 +77,14 @@ class Reporting : public Planner {
     command.set_series(gain_, tuning_.gain);
     command.set_series(goal_,
                        goal.type == HAMELIN_GOAL_JOINT ? goal.q[0] : goal.position_world_m[0]);
+    const auto sent = tick.torque();
+    command.set_series(sent_, sent ? (*sent)[0] : std::numeric_limits<double>::infinity());
   }
 
   NominalArm arm_;
   Tuning tuning_;
   Eigen::VectorXd torque_;
-  std::int32_t world_, nearest_, obstacle_, gain_, goal_;
+  std::int32_t world_, nearest_, obstacle_, gain_, goal_, sent_;
 };
 
 }  // namespace

@@ -298,7 +298,8 @@ bool Controller::ask_planner() {
   goal_ = {goal, goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
-  if (!planner_.tick(k_, time_s_, q_, v_, goal_)) {
+  const bool sends_torque = forms_torque() && !options_.position;
+  if (!planner_.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr)) {
     failure_ = planner_.error();
     return false;
   }

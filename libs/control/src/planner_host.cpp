@@ -84,7 +84,7 @@ PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData set
                planner_.series().size()) {}
 
 bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                       const PlannerGoal& goal) {
+                       const PlannerGoal& goal, const Eigen::VectorXd* torque) {
   time_s_ = time_s;
   if (const std::uint64_t world = view_.snapshot(); world != world_number_) {
     world_number_ = world;
@@ -112,6 +112,7 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
   tick.goal_index = goal.index;
   tick.world = world_number_;
   tick.speed_scale = view_.speed_scale();
+  tick.torque = torque != nullptr ? torque->data() : nullptr;
   return planner_.tick(tick, command_);
 }
 

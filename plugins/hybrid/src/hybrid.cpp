@@ -228,6 +228,7 @@ class Hybrid final : public planning::Planner {
     llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
     if (observer_) {
+      if (const auto sent = tick.torque()) observer_->correct(*sent);
       observer_->update(v_);
       if (const auto effort = setup_.effort_max()) {
         scratch_ = disturbance_share * *effort;

@@ -17,8 +17,11 @@ class Observer {
         gain_(1.0 - std::exp(-bandwidth * period_s)),
         issued_(static_cast<std::size_t>(delay_periods) + 1, Eigen::VectorXd::Zero(dof)),
         disturbance_(Eigen::VectorXd::Zero(dof)),
-        predicted_(Eigen::VectorXd::Zero(dof)),
-        scratch_(Eigen::VectorXd::Zero(dof)) {}
+        predicted_(disturbance_),
+        v_(disturbance_),
+        bias_(disturbance_),
+        scratch_(disturbance_),
+        M_inv_(Eigen::MatrixXd::Identity(dof, dof)) {}
 
   /// Forgets everything, for a new start.
   void reset() {
@@ -36,9 +39,18 @@ class Observer {
   }
   /// Whether any torque was issued yet.
   [[nodiscard]] bool ready() const noexcept { return ready_; }
+  /// Corrects the torque issued last, if something between planner and arm changed it.
+  void correct(const Eigen::Ref<const Eigen::VectorXd>& sent) {
+    if (ready_) issued_[(next_ + issued_.size() - 1) % issued_.size()] = sent;
+  }
   /// Updates the estimate with the velocity at a tick.
   void update(const Eigen::VectorXd& v) {
-    if (ready_) disturbance_ += gain_ / period_s_ * (v - predicted_);
+    if (!ready_) return;
+    // The oldest torque has acted since the last tick.
+    scratch_ = issued_[next_ % issued_.size()] - bias_;
+    predicted_.noalias() = M_inv_ * scratch_;
+    predicted_ = v_ + period_s_ * (predicted_ + disturbance_);
+    disturbance_ += gain_ / period_s_ * (v - predicted_);
   }
   /// Scales the estimate down to what explains at most these torques, so that it cannot wind up
   /// while something else, like a shield, holds the arm.
@@ -50,8 +62,7 @@ class Observer {
         scale = std::min(scale, torque_max[k] / std::abs(scratch_[k]));
     disturbance_ *= scale;
   }
-  /// Records the torque issued at this tick and predicts the next velocity. The first call assumes
-  /// that `bias` was issued before.
+  /// Records the torque issued at this tick. The first call assumes that `bias` was issued before.
   /// @param M_inv, bias of the nominal model at this tick's state
   void issue(const Eigen::VectorXd& torque, const Eigen::VectorXd& v, const Eigen::MatrixXd& M_inv,
              const Eigen::VectorXd& bias) {
@@ -59,10 +70,9 @@ class Observer {
       for (auto& previous : issued_) previous = bias;
     issued_[next_] = torque;
     next_ = (next_ + 1) % issued_.size();
-    // The oldest torque acts now.
-    scratch_ = issued_[next_ % issued_.size()] - bias;
-    predicted_.noalias() = M_inv * scratch_;
-    predicted_ = v + period_s_ * (predicted_ + disturbance_);
+    v_ = v;
+    M_inv_ = M_inv;
+    bias_ = bias;
     ready_ = true;
   }
 
@@ -72,7 +82,8 @@ class Observer {
   std::vector<Eigen::VectorXd> issued_;
   std::size_t next_ = 0;
   bool ready_ = false;
-  Eigen::VectorXd disturbance_, predicted_, scratch_;
+  Eigen::VectorXd disturbance_, predicted_, v_, bias_, scratch_;
+  Eigen::MatrixXd M_inv_;
 };
 
 }  // namespace hamelin::hybrid

@@ -85,3 +85,28 @@ TEST_CASE("an observer without the delay mistakes it for a disturbance", "[hybri
   }
   CHECK(most > 0.1);
 }
+
+TEST_CASE("an observer that is told which torque was sent does not take the rest for a disturbance",
+          "[hybrid][observer]") {
+  // something between planner and arm lets only half of each torque pass
+  const int delay_periods = GENERATE(0, 2);
+  const MatrixXd one = MatrixXd::Identity(3, 3);
+  const VectorXd zero = VectorXd::Zero(3);
+  const auto most = [&](bool told) {
+    Observer observer(3, period, delay_periods);
+    std::vector<VectorXd> sent(static_cast<std::size_t>(delay_periods) + 1, zero);
+    VectorXd v = zero;
+    double largest = 0.0;
+    for (int k = 0; k < 200; ++k) {
+      if (told) observer.correct(sent.back());
+      observer.update(v);
+      largest = std::max(largest, observer.disturbance().norm());
+      observer.issue(shaking(k), v, one, zero);
+      sent.emplace_back(0.5 * shaking(k));
+      v += period * sent[sent.size() - 1 - static_cast<std::size_t>(delay_periods)];
+    }
+    return largest;
+  };
+  CHECK(most(true) < 1e-9);
+  CHECK(most(false) > 0.1);
+}

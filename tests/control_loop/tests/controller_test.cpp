@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "../loop.hpp"
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/test/allocations.hpp"
 
 using namespace hamelin;
@@ -105,6 +106,31 @@ TEST_CASE("positions for the next period follow with bounded acceleration and je
   CHECK(state == control::ControlState::reached);
   CHECK(acceleration <= 10.0 * (1.0 + 1e-9));
   CHECK(jerk <= 2000.0 * (1.0 + 1e-6));
+}
+
+TEST_CASE("a planner is shown the torque that was sent, its own or that of a stop",
+          "[control][controller]") {
+  scene::Scene scene = sampled("clutter.json");
+  scene.planner->name = "reporting";  // drives through obstacles, as far as the shield lets it
+  Loop loop(scene);
+  double sent = 0.0;
+  int stopping = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const control::Answer& answer = loop.tick();
+    if (k > 0) REQUIRE(answer.series[5] == sent);
+    sent = answer.torque[0];
+    stopping += answer.stopping ? 1 : 0;
+    loop.step(answer.torque);
+  }
+  CHECK(stopping > 10);
+  CHECK(stopping < 2990);
+
+  control::Controller::Options positions;
+  positions.position = true;
+  Loop without(scene, positions);
+  for (int k = 0; k < 3; ++k)
+    CHECK(without.controller.tick(0.001 * k, scene.start_q, VectorXd::Zero(7)).series[5] ==
+          infinity);
 }
 
 TEST_CASE("ticks neither allocate nor tear while two threads change the world",

@@ -37,10 +37,10 @@ class PlannerHost final : private planning::HostServices {
 
   /// Calls the planner with the contacts of the world's last look().
   /// @param k, time_s index and time of the tick
-  /// @param q, v as measured; dof numbers each
+  /// @param q, v as measured; dof numbers each @param torque sent last, or null
   /// @return false if the planner failed: see error()
   [[nodiscard]] bool tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                          const PlannerGoal& goal);
+                          const PlannerGoal& goal, const Eigen::VectorXd* torque);
   /// Tells the planner that the next tick is a new start.
   void reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept { planner_.reset(q, v); }
   /// See LoadedPlanner.

@@ -201,6 +201,13 @@ class Tick {
   [[nodiscard]] std::uint64_t world() const { return raw_->world; }
   /// 1, or less where the scene requires slow motion.
   [[nodiscard]] double speed_scale() const { return raw_->speed_scale; }
+  /// The joint torques sent to the arm last [Nm or N]: within all limits, and not the planner's
+  /// where a shield stopped the arm. None under ideal actuation.
+  [[nodiscard]] std::optional<ConstVectorMap> torque() const {
+    if (!HAMELIN_HAS_FIELD(raw_, hamelin_tick, torque) || raw_->torque == nullptr)
+      return std::nullopt;
+    return ConstVectorMap(raw_->torque, dof_);
+  }
   [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
 
  private:

@@ -179,6 +179,9 @@ typedef struct hamelin_tick {
   size_t goal_index;  /* of the goal in its list */
   uint64_t world;     /* number of the world's snapshot: changes with obstacles and map */
   double speed_scale; /* 1, or less in unknown space if the scene's policy is "slow" */
+  /* The joint torques sent to the arm last [Nm or N], within all limits and not the planner's where
+   * a shield stopped the arm: dof numbers; null under ideal actuation. */
+  const double* torque;
 } hamelin_tick;
 
 /* DETECTS_STALLS: running, and the planner detects its stalls itself: the scene's stall rule is
