@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include <filesystem>
@@ -90,4 +91,44 @@ TEST_CASE(
       scene.actuation.torque_rate_max_Nm_s = 1000.0;
       check_safe(scene, simulation::run(scene, plugins, {}));
     }
+}
+
+TEST_CASE("a bound that does not hold is noticed by what stops do, and named", "[adversary]") {
+  struct Case {
+    const char* what;
+    void (*exceed)(scene::Scene&);
+    void (*state)(scene::Scene&);
+  };
+  const Case cases[] = {
+      {"friction", [](scene::Scene& scene) { scene.actuation.coulomb_friction_share = 0.05; },
+       [](scene::Scene& scene) { scene.safety.friction_share = 0.05; }},
+      {"masses", [](scene::Scene& scene) { scene.actuation.planner_mass_scale = 0.9; },
+       [](scene::Scene& scene) { scene.safety.mass_error = 0.12; }},
+      {"noise", [](scene::Scene& scene) { scene.actuation.joint_noise_rad = 5e-4; },
+       [](scene::Scene& scene) { scene.safety.joint_noise_rad = 5e-4; }},
+      {"tracking", [](scene::Scene& scene) { scene.safety.tracking_rad = 1e-7; },
+       [](scene::Scene& scene) { scene.safety.tracking_rad = 2e-4; }}};
+  for (const Case& one : cases) {
+    CAPTURE(one.what);
+    double exceeded = 0.0, stated = 0.0;
+    int named = 0;
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      scene::Scene scene = sampled(under_attack("shelf", seed));
+      scene.actuation.delay_s = 0.0;
+      one.exceed(scene);
+      const log::Result result = simulation::run(scene, plugins, {});
+      exceeded = std::max(exceeded, result.shield->strayed_share);
+      const bool warned = std::any_of(
+          result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+            return warning.find("the bounds of /safety do not hold: joint '") != std::string::npos;
+          });
+      CHECK(warned == (result.shield->strayed_share > 1.0));
+      named += warned ? 1 : 0;
+      one.state(scene);
+      stated = std::max(stated, simulation::run(scene, plugins, {}).shield->strayed_share);
+    }
+    CHECK(exceeded > 1.0);
+    CHECK(named > 0);
+    CHECK(stated <= 1.0);
+  }
 }
