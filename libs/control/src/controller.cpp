@@ -366,7 +366,7 @@ void Controller::shield_torque() {
     answer_.stopping = true;
   }
   if (answer_.stopping) {
-    shield_->stop_torque(from, pipeline_->disturbance(), answer_.torque);
+    shield_->stop_torque(from, pipeline_->disturbance(), pipeline_->last(), answer_.torque);
     limits_.start_from(pipeline_->last());
     answer_.saturated = limits_.limit(answer_.torque, period_s_);
   }

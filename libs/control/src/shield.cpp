@@ -46,6 +46,8 @@ constexpr double other_postures = 2.0;
 constexpr double hold_time_s = 0.01;
 // Steps in which a margin is sought that would do [m].
 constexpr double smallest_m = 1e-9;
+// The share of the torques' rate with which a stop is planned: the rest is for its feedback.
+constexpr double ramp_share = 0.5;
 // Noise is covered up to so many standard deviations.
 constexpr double noise_deviations = 4.0;
 // Velocities may exceed their limit by rounding.
@@ -152,7 +154,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
     unmodelled_friction_ =
         scene.safety.friction_share * joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
   for (auto* x : {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_,
-                  &q_, &v_, &rate_, &hold_})
+                  &q_, &v_, &rate_, &hold_, &acceleration_})
     x->setZero(n);
 }
 
@@ -360,8 +362,7 @@ bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_t
 std::pair<double, double> Shield::transition_times(const Step& step, double rate) {
   double ramp = 0.0, fade = 0.0;
   if (drive_.torque_rate > 0.0) {
-    // as with torques, the rest is for the feedback
-    const double torque_rate = torque_share_ * drive_.torque_rate;
+    const double torque_rate = ramp_share * drive_.torque_rate;
     rate_ = -rate * w_ - step.disturbance;
     dynamics::inverse_dynamics(model_, ws_, step.to.q, w_, rate_, q_);
     ramp = (q_ - step.torque).cwiseAbs().maxCoeff() / torque_rate;
@@ -484,17 +485,28 @@ void Shield::bound_shapes(const VectorXd& torque, double compliance_s2) {
 
 // Whether the bounds that the scene states hold can be seen by what a stop does.
 void Shield::note_straying(const VectorXd& q) {
-  for (Index j = 0; j < q.size(); ++j) {
-    const double strayed = std::abs(q[j] - reference_q_[j]);
-    counts_.strayed = std::max(counts_.strayed, strayed);
-    const double bound = stray_[j] + stop_joint_stray_[j];
-    if (!(strayed > counts_.strayed_share * bound)) continue;
-    counts_.strayed_share = strayed / bound;
-    counts_.strayed_joint = static_cast<int>(j);
-  }
+  for (Index j = 0; j < q.size(); ++j) note_straying(j, std::abs(q[j] - reference_q_[j]));
 }
 
-void Shield::stop_torque(const Node& node, const VectorXd& disturbance, VectorXd& torque) {
+void Shield::note_straying(Index joint, double strayed) {
+  counts_.strayed = std::max(counts_.strayed, strayed);
+  const double bound = stray_[joint] + stop_joint_stray_[joint];
+  if (!(strayed > counts_.strayed_share * bound)) return;
+  counts_.strayed_share = strayed / bound;
+  counts_.strayed_joint = static_cast<int>(joint);
+}
+
+void Shield::stop_torque(const Node& node, const VectorXd& disturbance, const VectorXd& last,
+                         VectorXd& torque) {
+  follow_stop(node, disturbance, torque);
+  if (has_lost_stop(node, torque, last)) {
+    begin_again(node, disturbance, last);
+    follow_stop(node, disturbance, torque);
+  }
+  stop_time_ += period_s_;
+}
+
+void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd& torque) {
   const double middle = stop_time_ + 0.5 * period_s_, end = stop_time_ + period_s_;
   stop_.at(stop_time_, reference_q_, reference_v_);
   note_straying(node.q);
@@ -508,7 +520,28 @@ void Shield::stop_torque(const Node& node, const VectorXd& disturbance, VectorXd
   if (friction_.size() > 0)
     torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
   if (effort_max_.size() > 0) torque = torque.cwiseMin(effort_max_).cwiseMax(-effort_max_);
-  stop_time_ = end;
+}
+
+bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const VectorXd& last) const {
+  return drive_.torque_rate > 0.0 &&
+         (torque - last).lpNorm<Eigen::Infinity>() > drive_.torque_rate / feedback_rate_ &&
+         ((node.q - reference_q_).cwiseAbs().array() > (stray_ + stop_joint_stray_).array()).any();
+}
+
+// Feedback that asks for more than the drives can follow makes the arm swing, docs/theory.md
+// (14.20). Where the stop ends now is as far from the verified one as the arm has strayed.
+void Shield::begin_again(const Node& node, const VectorXd& disturbance, const VectorXd& last) {
+  const Refusal refusal = refusal_;
+  dynamics::forward_dynamics(model_, ws_, node.q, node.v, last, acceleration_);
+  acceleration_ += disturbance;
+  if (find_stop({node, node.v, node, acceleration_, last, disturbance},
+                BrakingRate::usual_utilisation)) {
+    for (Index j = 0; j < node.q.size(); ++j)
+      note_straying(j, std::abs(tried_.end()[j] - stop_.end()[j]));
+    std::swap(stop_, tried_);
+    stop_time_ = 0.0;
+  }
+  refusal_ = refusal;
 }
 
 void Shield::stop_point(VectorXd& q, VectorXd& v) {

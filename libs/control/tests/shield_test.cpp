@@ -240,6 +240,39 @@ TEST_CASE("the shield refuses bounds that cannot hold, with the number that woul
   CHECK(refused().empty());
 }
 
+TEST_CASE("an arm that was pushed off its stop comes to rest, with torques of a bounded rate",
+          "[shield]") {
+  scene::Scene scene = shelf();
+  scene.model.torque_limits = true;
+  scene.safety.tracking_rad = 1e-3;
+  const model::Model model = control::load_model(scene);
+  const scene::Environment environment;
+  const double T = 0.001, torque_rate = GENERATE(1000.0, 300.0);
+  const double push = GENERATE(0.0, 0.5, 2.0);
+  CAPTURE(torque_rate, push);
+  Shield shield(scene, model, nullptr, T, {torque_rate, 0.0, 0.0});
+  dynamics::Workspace ws(model);
+  VectorXd q = scene.start_q, v = VectorXd::Constant(model.dof(), 0.2), a = v, tau = v, sent = v;
+  const VectorXd zero = VectorXd::Zero(model.dof());
+  dynamics::gravity_torque(model, ws, q, sent);
+  shield.start({environment, 0, 0.0}, {q, v});
+  double fastest = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    shield.refuse();
+    shield.stop_torque({q, v}, zero, sent, tau);
+    sent = tau.cwiseMin((sent.array() + T * torque_rate).matrix())
+               .cwiseMax((sent.array() - T * torque_rate).matrix());
+    dynamics::forward_dynamics(model, ws, q, v, sent, a);
+    v += T * a;
+    if (k == 10) v[0] += push;  // what no bound covers
+    q += T * v;
+    fastest = std::max(fastest, v.lpNorm<Eigen::Infinity>());
+  }
+  CHECK(v.lpNorm<Eigen::Infinity>() < 1e-3);
+  CHECK(fastest < 1.5 * (0.2 + push));
+  CHECK((shield.counts().strayed_share > 1.0) == (push > 0.0));
+}
+
 TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
   if (!test::counts_allocations()) return;
   scene::Scene scene = shelf();
@@ -268,7 +301,7 @@ TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
         v = v1;
       } else {
         ++refused;
-        shield.stop_torque(from, zero, tau);
+        shield.stop_torque(from, zero, zero, tau);
         v *= 0.98;
         q += 0.001 * v;
       }

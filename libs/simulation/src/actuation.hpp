@@ -40,7 +40,7 @@ class Actuation {
   /// Velocity with which the motion leaves the node.
   [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity() = 0;
   /// Torque of each channel that acts from this node on, and their sum, for the log.
-  virtual void torques(const planning::CommandBuffers& answer, Eigen::VectorXd& sum,
+  virtual void torques(const planning::CommandBuffers* answer, Eigen::VectorXd& sum,
                        Json& channels) = 0;
   /// Whether a limit cut the current answer.
   [[nodiscard]] virtual bool saturated() const = 0;

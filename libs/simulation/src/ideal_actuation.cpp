@@ -86,23 +86,23 @@ class IdealActuation final : public Actuation {
     return departure_;
   }
 
-  void torques(const planning::CommandBuffers& answer, VectorXd& sum, Json& by_channel) override {
+  void torques(const planning::CommandBuffers* answer, VectorXd& sum, Json& by_channel) override {
     sum = arm_.channels.held_torque;
     if (!sum.isZero(0.0)) by_channel[stopping_ ? "stop" : "held"] = to_json(sum);
-    if (stopping_) return;
+    if (stopping_ || answer == nullptr) return;
     const auto add = [&](const char* channel, const VectorXd& torque) {
       sum += torque;
       by_channel[channel] = to_json(torque);
     };
     if (!gradient_.isZero(0.0)) add("potential", -gradient_);
-    if (!answer.damping().isZero(0.0))
-      add("damping", -answer.damping().cwiseProduct(arm_.node().v));
+    if (!answer->damping().isZero(0.0))
+      add("damping", -answer->damping().cwiseProduct(arm_.node().v));
     if (!arm_.channels.gyroscopic.empty()) {
       dynamics::gyroscopic_torque(arm_.model, arm_.ws, arm_.state.q, arm_.node().v,
                                   arm_.channels.gyroscopic, impulse_);
       add("gyroscopic", impulse_);
     }
-    if (answer.raw().has_node_velocity != 0) {
+    if (answer->raw().has_node_velocity != 0) {
       // The torque that would make the node's change of velocity within one step: M (x − v) / h.
       departure_ = (node_velocity_ - arm_.node().v) / step_s_;
       dynamics::momentum(arm_.model, arm_.ws, arm_.state.q, departure_, impulse_);
@@ -205,7 +205,7 @@ class IdealActuation final : public Actuation {
       channels.damping = arm_.own_damping;
     else
       channels.damping.setZero();
-    shield.stop_torque({at_node_.q, v_}, zero_, channels.held_torque);
+    shield.stop_torque({at_node_.q, v_}, zero_, zero_, channels.held_torque);
     gradient_.setZero();
     gradient_before_.setZero();
     node_velocity_ = v_;

@@ -62,7 +62,7 @@ class SampledActuation : public Actuation {
   bool step(double step_s) override { return plant_.step(torque_, step_s); }
   bool needs_answer_at_end() const override { return false; }
   const VectorXd& departure_velocity() override { return plant_.node().v; }
-  void torques(const planning::CommandBuffers&, VectorXd& sum, Json& by_channel) override {
+  void torques(const planning::CommandBuffers*, VectorXd& sum, Json& by_channel) override {
     sum = torque_;
     if (!sum.isZero(0.0)) by_channel[stopping_ ? "stop" : "held"] = to_json(sum);
   }

@@ -39,8 +39,10 @@ void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, 
 }
 
 void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
+  // a planner that has failed answers no more, but the shield brings the arm to rest
+  const bool acts = answer != nullptr || actuation_.stopping();
   Json channels = Json::object();
-  if (answer != nullptr) actuation_.torques(*answer, torque_, channels);
+  if (acts) actuation_.torques(answer, torque_, channels);
   Json fields{{"k", plant_.node().k},
               {"time_s", plant_.node().time_s},
               {"q", to_json(plant_.node().q)},
@@ -52,11 +54,11 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
               {"energy", energy_json(recorder_.last_node())},
               {"solver", solver_json(plant_.report())},
               {"certified", certified}};
-  if (answer != nullptr) fields["channels"] = std::move(channels);
+  if (acts) fields["channels"] = std::move(channels);
   if (answer != nullptr)
     for (const double value : answer->series())
       fields["series"].push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
-  if (shield_ != nullptr && answer != nullptr && shield_->stopping())
+  if (shield_ != nullptr && acts && shield_->stopping())
     fields["stop"] = {{"cause", to_string(shield_->refusal().cause)},
                       {"q_end", to_json(shield_->stop().end())}};
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/log/read_log.hpp"
+#include "hamelin/log/run_log.hpp"
 #include "hamelin/simulation/run.hpp"
 
 using namespace hamelin;
@@ -131,4 +133,31 @@ TEST_CASE("a bound that does not hold is noticed by what stops do, and named", "
     CHECK(named > 0);
     CHECK(stated <= 1.0);
   }
+}
+
+TEST_CASE("after a planner has failed, the log has the stop that brings the arm to rest",
+          "[adversary]") {
+  const bool ideal = GENERATE(true, false);
+  const auto file = std::filesystem::path(HAMELIN_TEST_BINARY_DIR) / "adversary_failed.jsonl";
+  scene::Scene scene = under_attack("shelf", 1);
+  scene.planner = scene::Choice{"breaking", {{"at_tick", 20}, {"how", "nan"}}};
+  scene.start_v = Eigen::VectorXd::Constant(7, 0.2);
+  {
+    log::RunLog log(file);
+    simulation::Watch watch;
+    watch.log = &log;
+    const log::Result result = simulation::run(ideal ? scene : sampled(scene), plugins, watch);
+    CHECK(result.outcome == Outcome::defect);
+    CHECK(result.v.lpNorm<Eigen::Infinity>() < 1e-2);
+  }
+  constexpr std::size_t step = 20;
+  std::vector<Json> ticks;
+  for (auto& line : log::read_log(file).lines)
+    if (line["type"] == "tick") ticks.push_back(std::move(line));
+  REQUIRE(ticks.size() > step + 4);
+  for (std::size_t k = step; k + 1 < ticks.size(); ++k) {
+    REQUIRE(ticks[k].contains("stop"));
+    REQUIRE(ticks[k]["channels"]["stop"] == ticks[k]["tau"]);
+  }
+  CHECK(ticks[step]["tau"] != ticks[ticks.size() - 2]["tau"]);
 }

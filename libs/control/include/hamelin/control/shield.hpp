@@ -116,7 +116,9 @@ class Shield {
   void refuse();
   /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.13).
   /// @param disturbance acceleration that acts besides that of the torques [rad/s² or m/s²]
-  void stop_torque(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
+  /// @param last the torque of the period before, where torques change at a bounded rate
+  void stop_torque(const Node& node, const Eigen::VectorXd& disturbance,
+                   const Eigen::VectorXd& last, Eigen::VectorXd& torque);
 
   /// Goes on with the stop for a period, for arms that are controlled by position.
   void stop_point(Eigen::VectorXd& q, Eigen::VectorXd& v);
@@ -147,6 +149,16 @@ class Shield {
   /// The ramp and the fade that the drive's bounds require for a rate.
   [[nodiscard]] std::pair<double, double> transition_times(const Step& step, double rate);
   void note_straying(const Eigen::VectorXd& q);
+  void note_straying(Eigen::Index joint, double strayed);
+  /// The torque that keeps to the stop in the next period.
+  void follow_stop(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
+  /// Whether the arm has strayed beyond its bounds, and the torque that would bring it back is
+  /// farther from the last one than the drives can go in the time of the feedback.
+  [[nodiscard]] bool has_lost_stop(const Node& node, const Eigen::VectorXd& torque,
+                                   const Eigen::VectorXd& last) const;
+  /// Lets the stop begin again from where the arm is.
+  void begin_again(const Node& node, const Eigen::VectorXd& disturbance,
+                   const Eigen::VectorXd& last);
   /// Adds what errors of the model cause.
   void add_model_errors();
   void add_noise();
@@ -204,7 +216,7 @@ class Shield {
   Eigen::VectorXd stray_, tried_stray_;             ///< bounds for stop_ and tried_ [rad or m]
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
-  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_;
+  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_, acceleration_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
   std::size_t existing_ = 0;               ///< obstacles at the last call
