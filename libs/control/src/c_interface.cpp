@@ -84,8 +84,8 @@ hamelin_controller* hamelin_controller_create(const hamelin_controller_options* 
                                                 options->late_answers_max));
     if (options->late_answers_max > 0) chosen.clock_s = control::steady_clock_s;
     chosen.late_answers_max = options->late_answers_max;
-    if (options->acceleration_max > 0.0) chosen.acceleration_max = options->acceleration_max;
-    if (options->jerk_max > 0.0) chosen.jerk_max = options->jerk_max;
+    if (options->acceleration_max > 0.0) chosen.acceleration_max = {options->acceleration_max};
+    if (options->jerk_max > 0.0) chosen.jerk_max = {options->jerk_max};
     if (options->log != nullptr)
       chosen.log = [log = options->log, context = options->log_context](std::int32_t level,
                                                                         std::string_view line) {

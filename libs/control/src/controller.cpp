@@ -33,11 +33,22 @@ double period_of(const scene::Scene& scene) {
 }
 
 TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
-  return {model,
-          scene.model.torque_limits
-              ? joint_limits(model.robot(), &model::Joint::effort_max, infinity)
-              : VectorXd(),
+  return {model, modelled_limits(scene, model.robot()).effort_max,
           scene.actuation.torque_rate_max_Nm_s};
+}
+
+// One positive number for all joints, or one per joint.
+VectorXd per_joint(const scene::Scene& scene, const std::vector<double>& values, const char* key,
+                   int dof) {
+  const auto usable = [](double x) { return std::isfinite(x) && x > 0.0; };
+  const auto n = static_cast<std::size_t>(dof);
+  if ((values.size() != 1 && values.size() != n) ||
+      !std::all_of(values.begin(), values.end(), usable))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: {}: {} values given, expected 1 or {} positive numbers",
+                            scene.name, key, values.size(), n));
+  if (values.size() == 1) return VectorXd::Constant(dof, values.front());
+  return VectorXd::Map(values.data(), dof);
 }
 
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
@@ -71,6 +82,9 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       path_points_max_(std::max(longest_path(scene_.goals),
                                 options_.path_points_max.value_or(default_path_points))),
       nominal_(nominal_of(scene_, arm)),
+      acceleration_max_(
+          per_joint(scene_, options_.acceleration_max, "acceleration_max", nominal_.dof())),
+      jerk_max_(per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
       world_(scene_, nominal_,
              {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
               options_.prepare_maps}),
@@ -109,8 +123,8 @@ std::unique_ptr<Shield> Controller::make_shield() {
   if (scene_.safety.type != scene::SafetyType::shield) return nullptr;
   Shield::Drive drive;
   if (options_.position) {
-    drive.acceleration_max = options_.acceleration_max;
-    drive.jerk_max = options_.jerk_max;
+    drive.acceleration_max = acceleration_max_;
+    drive.jerk_max = jerk_max_;
   } else if (options_.torque) {
     drive.torque_rate = scene_.actuation.torque_rate_max_Nm_s.value_or(0.0);
   }
@@ -394,7 +408,8 @@ void Controller::shield_position() {
 // compensated. Without the two terms of feedback, errors of the nominal masses would let the arm
 // sink; with them it rests off by the error of its acceleration times the square of the time.
 void Controller::brake() {
-  const double time_s = braking_time_s(), a = options_.acceleration_max;
+  const double time_s = braking_time_s();
+  const VectorXd& a = acceleration_max_;
   brake_rate_ = (-brake_v_ / time_s).cwiseMin(a).cwiseMax(-a);
   rate_ = brake_rate_ + 2.0 / time_s * (brake_v_ - v_) + (brake_q_ - q_) / (time_s * time_s);
   rate_ = rate_.cwiseMin(a).cwiseMax(-a);
@@ -414,9 +429,9 @@ void Controller::form_position() {
   } else {
     dynamics::forward_dynamics(nominal_, ws_, q_, v_, answer_.torque, rate_);
   }
-  const double a = options_.acceleration_max, step = options_.jerk_max * T;
   for (Eigen::Index i = 0; i < rate_.size(); ++i) {
-    const double bounded = std::clamp(rate_[i], -a, a);
+    const double step = jerk_max_[i] * T;
+    const double bounded = std::clamp(rate_[i], -acceleration_max_[i], acceleration_max_[i]);
     command_rate_[i] = std::clamp(bounded, command_rate_[i] - step, command_rate_[i] + step);
   }
   answer_.v_next += T * command_rate_;

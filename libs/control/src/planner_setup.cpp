@@ -1,5 +1,7 @@
 #include "hamelin/control/planner_setup.hpp"
 
+#include <utility>
+
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/core/numbers.hpp"
 
@@ -34,23 +36,32 @@ void narrow(const scene::Scene& scene, const VectorXd& reserve, VectorXd& lower,
 
 }  // namespace
 
+ModelledLimits modelled_limits(const scene::Scene& scene, const model::Robot& robot) {
+  ModelledLimits limits;
+  if (scene.model.joint_limits) {
+    limits.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
+    limits.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
+  }
+  if (scene.model.velocity_limits)
+    limits.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
+  if (scene.model.torque_limits)
+    limits.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
+  return limits;
+}
+
 planning::SetupData planner_setup(const scene::Scene& scene, const model::Model& nominal,
                                   const WorldView& world, double control_period_s,
                                   const LimitReserve& reserve) {
   planning::SetupData data(nominal);
   for (const auto& goal : scene.goals)
     data.add_goal(to_c(goal), goal.type == scene::GoalType::joint ? goal.q : VectorXd(), goal.path);
-  const auto& robot = nominal.robot();
-  if (scene.model.joint_limits) {
-    data.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
-    data.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
-    if (reserve.position.size() > 0) narrow(scene, reserve.position, data.q_lower, data.q_upper);
-  }
-  if (scene.model.velocity_limits)
-    data.velocity_max =
-        (1.0 - reserve.speed_share) * joint_limits(robot, &model::Joint::velocity_max, infinity);
-  if (scene.model.torque_limits)
-    data.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
+  ModelledLimits limits = modelled_limits(scene, nominal.robot());
+  if (limits.q_lower.size() > 0 && reserve.position.size() > 0)
+    narrow(scene, reserve.position, limits.q_lower, limits.q_upper);
+  data.q_lower = std::move(limits.q_lower);
+  data.q_upper = std::move(limits.q_upper);
+  data.velocity_max = (1.0 - reserve.speed_share) * limits.velocity_max;
+  data.effort_max = std::move(limits.effort_max);
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);
   data.sampled = scene.actuation.type != scene::ActuationType::ideal;

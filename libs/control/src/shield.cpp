@@ -57,11 +57,6 @@ double smallest_rest_time(const scene::Scene& scene, double period_s) {
   return period_s * (scene.model.torque_limits ? stop_steps : unlimited_stop_steps);
 }
 
-VectorXd optional_limits(bool modelled, const model::Model& model,
-                         std::optional<double> model::Joint::*limit, double unlimited) {
-  return modelled ? joint_limits(model.robot(), limit, unlimited) : VectorXd();
-}
-
 StopCause cause_of(const LineCheck::Blocker& blocker) {
   if (blocker.pair >= 0) return StopCause::self;
   if (blocker.obstacle == scene::Contact::map) return StopCause::map;
@@ -104,12 +99,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       margin_m_(scene.safety.margin_m),
       dwell_(std::lround(dwell_s / period_s)),
       feedback_rate_(std::min(feedback_rate, feedback_per_step / period_s)),
-      lower_(optional_limits(scene.model.joint_limits, model, &model::Joint::lower, -infinity)),
-      upper_(optional_limits(scene.model.joint_limits, model, &model::Joint::upper, infinity)),
-      velocity_max_(optional_limits(scene.model.velocity_limits, model, &model::Joint::velocity_max,
-                                    infinity)),
-      effort_max_(
-          optional_limits(scene.model.torque_limits, model, &model::Joint::effort_max, infinity)),
+      limits_(modelled_limits(scene, model.robot())),
       damping_(joint_numbers(scene, scene.model.joint_damping, "joint_damping", model.robot(),
                              &model::Joint::damping)),
       friction_(joint_numbers(scene, scene.model.friction, "friction", model.robot(),
@@ -122,10 +112,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       step_line_(model, levers_, self),
       ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
-      braking_(model, torque_share_ * effort_max_,
-               drive.acceleration_max > 0.0
-                   ? VectorXd::Constant(model.dof(), drive.acceleration_max)
-                   : VectorXd(),
+      braking_(model, torque_share_ * limits_.effort_max, drive.acceleration_max,
                1.0 / smallest_rest_time(scene, period_s)),
       ws_(model),
       stop_(model.dof()),
@@ -273,8 +260,8 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
 }
 
 bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
-  for (Index j = 0; j < velocity_max_.size(); ++j) {
-    if (std::abs(to[j]) <= velocity_max_[j] * (1.0 - speed_reserve_ + velocity_rounding) ||
+  for (Index j = 0; j < limits_.velocity_max.size(); ++j) {
+    if (std::abs(to[j]) <= limits_.velocity_max[j] * (1.0 - speed_reserve_ + velocity_rounding) ||
         std::abs(to[j]) <= std::abs(from[j]))
       continue;
     refusal_ = {StopCause::velocity_limit, {}, static_cast<int>(j)};
@@ -286,10 +273,11 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 // An arm that is beyond a limit may come back. Within half of what is kept from a limit it may
 // move; beyond that it must come back by more than noise can pretend.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
-  for (Index j = 0; j < lower_.size(); ++j) {
+  for (Index j = 0; j < limits_.q_lower.size(); ++j) {
     const double reserve = tried_stray_[j] + joint_stray_[j];
     const auto beyond = [&](const VectorXd& q) {
-      return std::max({q[j] - (upper_[j] - reserve), lower_[j] + reserve - q[j], 0.0});
+      return std::max(
+          {q[j] - (limits_.q_upper[j] - reserve), limits_.q_lower[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
     const double allowed = now > 0.0 ? std::max(0.5 * reserve, now - 2.0 * noise_) : 0.0;
@@ -369,11 +357,9 @@ std::pair<double, double> Shield::transition_times(const Step& step, double rate
     dynamics::momentum(model_, ws_, step.to.q, w_, q_);
     fade = rate * q_.cwiseAbs().maxCoeff() / torque_rate;
   }
-  if (drive_.jerk_max > 0.0) {
-    for (Index j = 0; j < w_.size(); ++j) {
-      ramp = std::max(ramp, std::abs(step.acceleration[j] + rate * w_[j]) / drive_.jerk_max);
-      fade = std::max(fade, std::abs(rate * w_[j]) / drive_.jerk_max);
-    }
+  for (Index j = 0; j < drive_.jerk_max.size(); ++j) {
+    ramp = std::max(ramp, std::abs(step.acceleration[j] + rate * w_[j]) / drive_.jerk_max[j]);
+    fade = std::max(fade, std::abs(rate * w_[j]) / drive_.jerk_max[j]);
   }
   return {ramp, fade};
 }
@@ -393,7 +379,7 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
       return false;
     }
     rate = *found;
-    if (drive_.torque_rate == 0.0 && drive_.jerk_max == 0.0) break;
+    if (drive_.torque_rate == 0.0 && drive_.jerk_max.size() == 0) break;
     std::tie(ramp, fade) = transition_times(step, rate);
     // faster braking would take longer to begin
     for (int k = 0; k < tries && rate * (ramp + fade) > whole; ++k) {
@@ -519,7 +505,8 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
   if (damping_.size() > 0) torque += damping_.cwiseProduct(v_);
   if (friction_.size() > 0)
     torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
-  if (effort_max_.size() > 0) torque = torque.cwiseMin(effort_max_).cwiseMax(-effort_max_);
+  if (limits_.effort_max.size() > 0)
+    torque = torque.cwiseMin(limits_.effort_max).cwiseMax(-limits_.effort_max);
 }
 
 bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const VectorXd& last) const {

@@ -250,7 +250,7 @@ TEST_CASE("an arm that was pushed off its stop comes to rest, with torques of a 
   const double T = 0.001, torque_rate = GENERATE(1000.0, 300.0);
   const double push = GENERATE(0.0, 0.5, 2.0);
   CAPTURE(torque_rate, push);
-  Shield shield(scene, model, nullptr, T, {torque_rate, 0.0, 0.0});
+  Shield shield(scene, model, nullptr, T, {torque_rate, {}, {}});
   dynamics::Workspace ws(model);
   VectorXd q = scene.start_q, v = VectorXd::Constant(model.dof(), 0.2), a = v, tau = v, sent = v;
   const VectorXd zero = VectorXd::Zero(model.dof());
@@ -283,7 +283,7 @@ TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
   const scene::Environment environment = scene::make_environment(scene, model, 0.2);
   environment.prepare();
   const scene::SelfField self(model);
-  Shield shield(scene, model, &self, 0.001, {1000.0, 0.0, 0.0});
+  Shield shield(scene, model, &self, 0.001, {1000.0, {}, {}});
   VectorXd q = scene.start_q, v = VectorXd::Zero(model.dof()), a = v, tau = v, q1 = v, v1 = v;
   const VectorXd zero = v;
   shield.start({environment, 0, 0.0}, {q, v});

@@ -246,9 +246,10 @@ ModelFlags read_model(const Reader& in) {
 }
 
 // One number, or a list of them.
-std::vector<double> read_numbers(const Reader& in, const char* key) {
+std::vector<double> read_numbers(const Reader& in, const char* key,
+                                 std::vector<double> fallback = {}) {
   const Json* given = in.find(key);
-  if (given == nullptr) return {};
+  if (given == nullptr) return fallback;
   return given->is_number() ? std::vector{given->get<double>()} : given->get<std::vector<double>>();
 }
 
@@ -259,10 +260,13 @@ void read_servo(const Reader& in, Actuation& actuation) {
                               : "is not allowed, expected position actuation");
   if (!position) return;
   const Reader servo = in.child("servo");
-  actuation.servo = {read_numbers(servo, "kp"), read_numbers(servo, "kv"),
-                     servo.get<std::string>("feedforward", "dynamics") == "gravity"
-                         ? Feedforward::gravity
-                         : Feedforward::dynamics};
+  actuation.servo.kp = read_numbers(servo, "kp");
+  actuation.servo.kv = read_numbers(servo, "kv");
+  if (servo.get<std::string>("feedforward", "dynamics") == "gravity")
+    actuation.servo.feedforward = Feedforward::gravity;
+  for (auto [key, values] : {std::pair("acceleration_max", &actuation.servo.acceleration_max),
+                             std::pair("jerk_max", &actuation.servo.jerk_max)})
+    *values = read_numbers(servo, key, *values);
 }
 
 PlantType read_plant(const Reader& in, const Reader& plant, ActuationType actuation) {

@@ -136,7 +136,9 @@ Json actuation_json(const Actuation& actuation) {
   if (actuation.type == ActuationType::position)
     out["servo"] = {{"kp", one_or_list(actuation.servo.kp)},
                     {"kv", one_or_list(actuation.servo.kv)},
-                    {"feedforward", to_string(actuation.servo.feedforward)}};
+                    {"feedforward", to_string(actuation.servo.feedforward)},
+                    {"acceleration_max", one_or_list(actuation.servo.acceleration_max)},
+                    {"jerk_max", one_or_list(actuation.servo.jerk_max)}};
   if (actuation.deadline_s) out["deadline_s"] = *actuation.deadline_s;
   return out;
 }

@@ -195,16 +195,20 @@ TEST_CASE("position actuation has servos, and MuJoCo takes torques", "[scene][un
   CHECK_THROWS_WITH(read(),
                     "x.json: /actuation/servo: is missing, expected the gains kp and kv of "
                     "the position servos");
-  document["actuation"]["servo"] = {{"kp", 2000.0}, {"kv", {80.0, 40.0}}};
+  document["actuation"]["servo"] = {
+      {"kp", 2000.0}, {"kv", {80.0, 40.0}}, {"jerk_max", {7500.0, 3750.0}}};
   CHECK(read().plant == PlantType::mujoco);
   CHECK(read().actuation.type == ActuationType::position);
   CHECK(read().actuation.servo.kp == std::vector{2000.0});
   CHECK(read().actuation.servo.kv == std::vector{80.0, 40.0});
+  CHECK(read().actuation.servo.acceleration_max == std::vector{15.0});
+  CHECK(read().actuation.servo.jerk_max == std::vector{7500.0, 3750.0});
   const Json resolved = resolved_json(read());
   CHECK_NOTHROW(check_shipped_schema(resolved, "scene", "resolved"));
   CHECK(resolved["plant"]["type"] == "mujoco");
-  Json servo = document["actuation"]["servo"];
-  servo["feedforward"] = "dynamics";
+  Json servo{{"kp", 2000.0}, {"kv", {80.0, 40.0}}, {"feedforward", "dynamics"}};
+  servo["acceleration_max"] = 15.0;
+  servo["jerk_max"] = {7500.0, 3750.0};
   CHECK(resolved["actuation"]["servo"] == servo);
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
   document["actuation"]["torque_rate_max_Nm_s"] = 1000.0;

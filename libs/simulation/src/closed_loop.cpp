@@ -113,14 +113,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
                        const PlantFactory& plant_factory)
     : scene_(scene),
       model_(load_checked(scene)),
+      limits_(control::modelled_limits(scene, model_.robot())),
       q_shown_(VectorXd::Zero(model_.dof())),
       v_shown_(q_shown_) {
-  if (scene.model.joint_limits) {
-    q_lower_ = control::joint_limits(model_.robot(), &model::Joint::lower, -infinity);
-    q_upper_ = control::joint_limits(model_.robot(), &model::Joint::upper, infinity);
-  }
-  if (scene.model.velocity_limits)
-    v_max_ = control::joint_limits(model_.robot(), &model::Joint::velocity_max, infinity);
   make_plant(plant_factory);
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
@@ -134,6 +129,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   options.certify = false;      // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
+  options.acceleration_max = scene.actuation.servo.acceleration_max;
+  options.jerk_max = scene.actuation.servo.jerk_max;
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
   options.clock_s = control::steady_clock_s;
   options.late_answers_max = 0;  // no decision depends on the clock
@@ -273,10 +270,11 @@ void ClosedLoop::note_limits() {
   const auto raise = [](std::optional<double>& most, double excess) {
     most = std::max(most.value_or(0.0), excess);
   };
-  if (q_lower_.size() > 0)
+  if (limits_.q_lower.size() > 0)
     raise(result_.position_excess,
-          std::max((node.q - q_upper_).maxCoeff(), (q_lower_ - node.q).maxCoeff()));
-  if (v_max_.size() > 0) raise(result_.speed_excess, (node.v.cwiseAbs() - v_max_).maxCoeff());
+          std::max((node.q - limits_.q_upper).maxCoeff(), (limits_.q_lower - node.q).maxCoeff()));
+  if (limits_.velocity_max.size() > 0)
+    raise(result_.speed_excess, (node.v.cwiseAbs() - limits_.velocity_max).maxCoeff());
 }
 
 void ClosedLoop::certify() {

@@ -6,6 +6,7 @@
 #include "actuation.hpp"
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "recorder.hpp"
@@ -81,6 +82,7 @@ class ClosedLoop {
 
   const scene::Scene& scene_;
   model::Model model_;
+  control::ModelledLimits limits_;
   long steps_ = 0;
   std::unique_ptr<Plant> plant_;
   Json planner_params_;
@@ -92,8 +94,7 @@ class ClosedLoop {
   std::unique_ptr<control::WorldView> own_judge_;
   control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
   std::unique_ptr<Actuation> actuation_;
-  Eigen::VectorXd q_lower_, q_upper_, v_max_;  ///< of size zero: not modelled
-  Eigen::VectorXd q_shown_, v_shown_;          ///< to the controller
+  Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
   // State of the run.
   std::unique_ptr<Recorder> recorder_;

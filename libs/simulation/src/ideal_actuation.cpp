@@ -11,10 +11,7 @@ namespace {
 using Eigen::VectorXd;
 
 control::TorqueLimits torque_limits(const scene::Scene& scene, const model::Model& model) {
-  return {model,
-          scene.model.torque_limits
-              ? control::joint_limits(model.robot(), &model::Joint::effort_max, infinity)
-              : VectorXd(),
+  return {model, control::modelled_limits(scene, model.robot()).effort_max,
           scene.actuation.torque_rate_max_Nm_s};
 }
 

@@ -155,8 +155,7 @@ class ServoActuation final : public SampledActuation {
         delayed_(delay_ticks, point_) {
     torque_ = measured_ = acceleration_ = feedforward_ = VectorXd::Zero(model.dof());
     feed_forward();
-    if (scene.model.torque_limits)
-      effort_max_ = control::joint_limits(model.robot(), &model::Joint::effort_max, infinity);
+    effort_max_ = control::modelled_limits(scene, model.robot()).effort_max;
     check_stability(scene, model);
   }
 

@@ -146,7 +146,8 @@ TEST_CASE("a planner that fails leaves the arm at rest, also with masses that ar
       }
       CHECK(loop.v.lpNorm<Eigen::Infinity>() < 1e-4);
       CHECK(speed > 0.5);
-      const double braking = speed * speed / (2.0 * control::ControllerOptions{}.acceleration_max);
+      const double braking =
+          speed * speed / (2.0 * control::ControllerOptions{}.acceleration_max.front());
       CHECK((loop.state.q - failed_at).lpNorm<Eigen::Infinity>() < braking + 0.05);
       CHECK((loop.state.q - rested_at).lpNorm<Eigen::Infinity>() < 1e-3);
     }
@@ -171,7 +172,7 @@ TEST_CASE("positions come to rest within their bounds if the planner fails",
   }
   CHECK(loop.controller.answer().state == control::ControlState::stopping);
   CHECK(fastest > 0.2);
-  CHECK(acceleration <= options.acceleration_max * (1.0 + 1e-9));
+  CHECK(acceleration <= options.acceleration_max.front() * (1.0 + 1e-9));
   CHECK(v.lpNorm<Eigen::Infinity>() < 1e-6);
 }
 

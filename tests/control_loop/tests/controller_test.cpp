@@ -86,17 +86,26 @@ TEST_CASE("positions for the next period follow with bounded acceleration and je
   const scene::Scene scene = sampled("clutter.json");
   control::Controller::Options options;
   options.position = true;
-  options.acceleration_max = 10.0;
-  options.jerk_max = 2000.0;
+  const bool each = GENERATE(false, true);
+  VectorXd acceleration_max = VectorXd::Constant(7, 10.0), jerk_max = VectorXd::Constant(7, 2000.0);
+  if (each) {  // as arms with a jerk limit for each joint have them
+    acceleration_max << 15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0;
+    jerk_max = 500.0 * acceleration_max;
+  }
+  options.acceleration_max.assign(acceleration_max.begin(),
+                                  acceleration_max.begin() + (each ? 7 : 1));
+  options.jerk_max.assign(jerk_max.begin(), jerk_max.begin() + (each ? 7 : 1));
   Loop loop(scene, options);
   VectorXd q = scene.start_q, v = VectorXd::Zero(loop.arm.dof()), a = v;
-  double acceleration = 0.0, jerk = 0.0;
+  double acceleration = 0.0, jerk = 0.0;  // as shares of their bounds
   control::ControlState state = control::ControlState::running;
   for (int k = 0; k < 20000 && state == control::ControlState::running; ++k) {
     const control::Answer& answer = loop.controller.tick(0.001 * k, q, v);  // perfect servos
     const VectorXd next = (answer.v_next - v) / 0.001;
-    acceleration = std::max(acceleration, next.lpNorm<Eigen::Infinity>());
-    if (k > 0) jerk = std::max(jerk, (next - a).lpNorm<Eigen::Infinity>() / 0.001);
+    acceleration =
+        std::max(acceleration, next.cwiseQuotient(acceleration_max).cwiseAbs().maxCoeff());
+    if (k > 0)
+      jerk = std::max(jerk, (next - a).cwiseQuotient(0.001 * jerk_max).cwiseAbs().maxCoeff());
     CHECK(answer.q_next.isApprox(q + 0.001 * answer.v_next, 1e-12));
     a = next;
     q = answer.q_next;
@@ -104,8 +113,12 @@ TEST_CASE("positions for the next period follow with bounded acceleration and je
     state = answer.state;
   }
   CHECK(state == control::ControlState::reached);
-  CHECK(acceleration <= 10.0 * (1.0 + 1e-9));
-  CHECK(jerk <= 2000.0 * (1.0 + 1e-6));
+  CHECK(acceleration <= 1.0 + 1e-9);
+  CHECK(jerk <= 1.0 + 1e-6);
+  CHECK(acceleration > 0.3);
+  options.jerk_max = {1.0, 2.0};
+  CHECK_THROWS_WITH(Loop(scene, options),
+                    Catch::Contains("jerk_max: 2 values given, expected 1 or 7 positive numbers"));
 }
 
 TEST_CASE("a planner is shown the torque that was sent, its own or that of a stop",

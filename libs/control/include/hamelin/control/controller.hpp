@@ -67,8 +67,9 @@ struct ControllerOptions {
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
   bool torque = true;              ///< fill Answer::torque
   bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque
-  /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³].
-  double acceleration_max = 15.0, jerk_max = 5000.0;
+  /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³]:
+  /// one value, or one per joint.
+  std::vector<double> acceleration_max{15.0}, jerk_max{5000.0};
   /// The largest number of way-points of a goal's path, also of goals that are set later; none:
   /// that of the scene's goals, at least 256.
   std::optional<std::size_t> path_points_max;
@@ -212,7 +213,8 @@ class Controller {
   Options options_;
   double period_s_, deadline_s_;
   std::size_t path_points_max_;
-  model::Model nominal_;  ///< the planner's model of the arm
+  model::Model nominal_;                         ///< the planner's model of the arm
+  Eigen::VectorXd acceleration_max_, jerk_max_;  ///< of each joint, of positions
   World world_;
   WorldView view_;
   std::unique_ptr<Shield> shield_;

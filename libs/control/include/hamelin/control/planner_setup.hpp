@@ -14,6 +14,14 @@ namespace hamelin::control {
                                            std::optional<double> model::Joint::*limit,
                                            double unlimited);
 
+/// The limits of the joints that a scene models; of size zero: not modelled.
+struct ModelledLimits {
+  Eigen::VectorXd q_lower, q_upper;  ///< [rad or m]
+  Eigen::VectorXd velocity_max;      ///< [rad/s or m/s]
+  Eigen::VectorXd effort_max;        ///< [Nm or N]
+};
+[[nodiscard]] ModelledLimits modelled_limits(const scene::Scene& scene, const model::Robot& robot);
+
 /// By how much the limits that a planner is told lie inside those that hold, so that a shield that
 /// keeps these has nothing to refuse.
 struct LimitReserve {

@@ -83,8 +83,8 @@ class Shield {
     /// Largest rate of change of each torque [Nm/s or N/s]; zero: unbounded.
     double torque_rate = 0.0;
     /// For arms that are controlled by position: of each joint [rad/s² or m/s²] and [rad/s³ or
-    /// m/s³]; zero: unbounded.
-    double acceleration_max = 0.0, jerk_max = 0.0;
+    /// m/s³]; of size zero: unbounded.
+    Eigen::VectorXd acceleration_max = {}, jerk_max = {};
   };
   /// @param model the controller's model of the arm, kept by reference
   /// @param self null if self-collision is not modelled; kept by reference
@@ -189,8 +189,8 @@ class Shield {
   double period_s_, margin_m_;
   long dwell_;            ///< steps that a stop lasts at least, unless it ends before
   double feedback_rate_;  ///< ω [1/s]
-  // of size zero: not modelled
-  Eigen::VectorXd lower_, upper_, velocity_max_, effort_max_, damping_, friction_;
+  ModelledLimits limits_;
+  Eigen::VectorXd damping_, friction_;  ///< of size zero: not modelled
   double friction_speed_, torque_share_;
   /// Bounds of torques that the model does not explain: share of the model's own, and friction of
   /// each joint [Nm or N].

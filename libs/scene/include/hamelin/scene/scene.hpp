@@ -88,11 +88,13 @@ enum class Feedforward : std::int32_t { dynamics, gravity };
 
 [[nodiscard]] std::string_view to_string(Feedforward feedforward) noexcept;
 
-/// Position servos. Gains: one value for all joints, or one per joint.
+/// Position servos and the motion of their set points. One value for all joints, or one per joint.
 struct Servo {
   std::vector<double> kp;  ///< torque per position error [Nm/rad or N/m]
   std::vector<double> kv;  ///< torque per velocity error [Nms/rad or Ns/m]
   Feedforward feedforward = Feedforward::dynamics;
+  std::vector<double> acceleration_max{15.0};  ///< of set points [rad/s² or m/s²]
+  std::vector<double> jerk_max{5000.0};        ///< [rad/s³ or m/s³]
 };
 
 struct Actuation {
