@@ -37,7 +37,7 @@ constexpr double ramp_compliance = 0.1;
 // bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
 // What the shield keeps from speed limits, as a share, because velocities are not exact.
-constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.06;
+constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.08;
 // How long torques take to change for a stop, where their rate is bounded [s].
 constexpr double usual_ramp_s = 0.05;
 // Deviations at other postures than that of the start may be larger by this factor.
@@ -270,7 +270,7 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
   return true;
 }
 
-// An arm that is beyond a limit may come back. Within half of what is kept from a limit it may
+// An arm that is beyond a limit may come back. Within 0.3 of what is kept from a limit it may
 // move; beyond that it must come back by more than noise can pretend.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < limits_.q_lower.size(); ++j) {
@@ -280,7 +280,7 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
           {q[j] - (limits_.q_upper[j] - reserve), limits_.q_lower[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
-    const double allowed = now > 0.0 ? std::max(0.5 * reserve, now - 2.0 * noise_) : 0.0;
+    const double allowed = now > 0.0 ? std::max(0.3 * reserve, now - 2.0 * noise_) : 0.0;
     if (beyond(to) <= allowed && beyond(tried_.line_start()) <= allowed &&
         beyond(tried_.end()) <= allowed)
       continue;
