@@ -38,17 +38,13 @@ TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
 }
 
 // One positive number for all joints, or one per joint.
-VectorXd per_joint(const scene::Scene& scene, const std::vector<double>& values, const char* key,
-                   int dof) {
-  const auto usable = [](double x) { return std::isfinite(x) && x > 0.0; };
-  const auto n = static_cast<std::size_t>(dof);
-  if ((values.size() != 1 && values.size() != n) ||
-      !std::all_of(values.begin(), values.end(), usable))
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: {}: {} values given, expected 1 or {} positive numbers",
-                            scene.name, key, values.size(), n));
-  if (values.size() == 1) return VectorXd::Constant(dof, values.front());
-  return VectorXd::Map(values.data(), dof);
+VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>& values,
+                            const char* key, int dof) {
+  const std::string place = fmt::format("{}: {}", scene.name, key);
+  for (const double x : values)
+    if (!std::isfinite(x) || x <= 0.0)
+      throw Error(ErrorCode::invalid, fmt::format("{}: {}, expected positive numbers", place, x));
+  return one_or_per_joint(values, dof, place);
 }
 
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
@@ -82,9 +78,9 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       path_points_max_(std::max(longest_path(scene_.goals),
                                 options_.path_points_max.value_or(default_path_points))),
       nominal_(nominal_of(scene_, arm)),
-      acceleration_max_(
-          per_joint(scene_, options_.acceleration_max, "acceleration_max", nominal_.dof())),
-      jerk_max_(per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
+      acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
+                                           nominal_.dof())),
+      jerk_max_(positive_per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
       world_(scene_, nominal_,
              {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
               options_.prepare_maps}),

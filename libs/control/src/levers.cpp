@@ -52,7 +52,7 @@ void Levers::set() {
   }
 }
 
-bool Levers::extend_travel(const VectorXd& q, const VectorXd& stray) {
+void Levers::extend_travel(const VectorXd& q, const VectorXd& stray) {
   bool extended = false;
   for (Index j = 0; j < q.size(); ++j)
     if (slides(j) && std::abs(q[j]) + stray[j] > travel_[j]) {
@@ -60,7 +60,6 @@ bool Levers::extend_travel(const VectorXd& q, const VectorXd& stray) {
       extended = true;
     }
   if (extended) set();
-  return extended;
 }
 
 void Levers::curvature(const VectorXd& dq, VectorXd& c) const {

@@ -37,6 +37,14 @@ void add_payload(model::Robot& robot, const scene::Payload& payload) {
 
 }  // namespace
 
+VectorXd one_or_per_joint(const std::vector<double>& values, int dof, std::string_view place) {
+  if (values.size() == 1) return VectorXd::Constant(dof, values.front());
+  if (values.size() != static_cast<std::size_t>(dof))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: {} values given, expected 1 or {}", place, values.size(), dof));
+  return VectorXd::Map(values.data(), dof);
+}
+
 VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& given, const char* key,
                        const model::Robot& robot, double model::Joint::*member) {
   const int n = robot.dof();
@@ -46,11 +54,7 @@ VectorXd joint_numbers(const scene::Scene& scene, const scene::JointNumbers& giv
     return values.isZero(0.0) ? Eigen::VectorXd() : values;
   }
   if (given.values.empty()) return {};
-  if (given.values.size() == 1) return Eigen::VectorXd::Constant(n, given.values[0]);
-  if (given.values.size() != static_cast<std::size_t>(n))
-    throw Error(ErrorCode::invalid, fmt::format("{}: /model/{}: {} values given, expected 1 or {}",
-                                                scene.name, key, given.values.size(), n));
-  return Eigen::Map<const Eigen::VectorXd>(given.values.data(), n);
+  return one_or_per_joint(given.values, n, fmt::format("{}: /model/{}", scene.name, key));
 }
 
 model::Model load_model(const scene::Scene& scene) {

@@ -26,30 +26,15 @@ constexpr double dwell_s = 0.005;
 // A stop takes at least so many steps, or as many without torque limits: a torque that stops the
 // arm at once would not resolve the motion.
 constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
-// The deviation from a stop's motion grows with the square of the step from here on.
-constexpr double usual_step_s = 0.001;
-// By how much a joint strays per unexplained acceleration, in units of 1/ω²: the feedback of a stop
-// and the estimate of the disturbance together, docs/theory.md (14.16).
-constexpr double stop_compliance = 0.3;
-// The same while torques change as fast as they may, in units of the square of that time.
-constexpr double ramp_compliance = 0.1;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
 // bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
 // What the shield keeps from speed limits, as a share, because velocities are not exact.
 constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.08;
-// How long torques take to change for a stop, where their rate is bounded [s].
-constexpr double usual_ramp_s = 0.05;
-// Deviations at other postures than that of the start may be larger by this factor.
-constexpr double other_postures = 2.0;
-// An arm at rest is disturbed, too: it counts as a stop of this length [s].
-constexpr double hold_time_s = 0.01;
 // Steps in which a margin is sought that would do [m].
 constexpr double smallest_m = 1e-9;
 // The share of the torques' rate with which a stop is planned: the rest is for its feedback.
 constexpr double ramp_share = 0.5;
-// Noise is covered up to so many standard deviations.
-constexpr double noise_deviations = 4.0;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
@@ -106,9 +91,9 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
                               &model::Joint::friction)),
       friction_speed_(scene.model.friction_speed),
       torque_share_(scene.safety.torque_share),
-      mass_error_(scene.safety.mass_error),
       levers_(model, self),
       drive_(drive),
+      straying_(scene, model, levers_, period_s, feedback_rate_, drive.torque_rate),
       step_line_(model, levers_, self),
       ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
@@ -122,26 +107,11 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       arm_line_(model),
       arm_end_(model) {
   const Index n = model.dof();
-  const double coarse = std::max(1.0, period_s / usual_step_s);
-  const bool estimates = scene.actuation.estimates_velocity;
-  const double bandwidth = scene.actuation.estimator_bandwidth;
-  tracking_ = VectorXd::Constant(n, scene.safety.tracking_rad * coarse * coarse);
-  if (sampled_) speed_reserve_ = estimates ? estimated_speed_reserve : sampled_speed_reserve;
-  noise_ = noise_deviations * scene.safety.joint_noise_rad;
-  compliance_s2_ = stop_compliance / (feedback_rate_ * feedback_rate_) +
-                   (estimates ? 1.0 / (std::exp(1.0) * feedback_rate_ * bandwidth) : 0.0);
-  response_ = jacobian_ = dynamics::Matrix6Xd::Zero(6, n);
-  joint_stray_ = stop_joint_stray_ = VectorXd::Zero(n);
-  if (mass_error_ > 0.0 || scene.safety.friction_share > 0.0 || noise_ > 0.0)
-    shape_stray_ = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
-  mass_ = mass_inverse_ = Eigen::MatrixXd::Identity(n, n);
-  factors_.compute(mass_);  // allocates its memory
-  unmodelled_friction_ = VectorXd::Zero(n);
-  if (scene.safety.friction_share > 0.0)
-    unmodelled_friction_ =
-        scene.safety.friction_share * joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
-  for (auto* x : {&stray_, &tried_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_,
-                  &q_, &v_, &rate_, &hold_, &acceleration_})
+  if (sampled_)
+    speed_reserve_ =
+        scene.actuation.estimates_velocity ? estimated_speed_reserve : sampled_speed_reserve;
+  for (auto* x : {&stop_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_, &q_, &v_,
+                  &rate_, &hold_, &acceleration_})
     x->setZero(n);
 }
 
@@ -172,8 +142,7 @@ void Shield::start(const Surroundings& world, const Node& node) {
   dynamics::gravity_torque(model_, ws_, node.q, hold_);
   if (verify(world, {node, node.v, node, zero_, hold_, zero_})) {
     std::swap(stop_, tried_);
-    std::swap(stray_, tried_stray_);
-    stop_joint_stray_ = joint_stray_;
+    stop_stray_ = straying_.tracking() + straying_.errors();
     stop_time_ = 0.0;
     changed_ = false;
     largest_margin_ = stop_line_.largest_stray_m();
@@ -220,8 +189,7 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
     std::swap(stop_, tried_);
-    std::swap(stray_, tried_stray_);
-    stop_joint_stray_ = joint_stray_;
+    stop_stray_ = straying_.tracking() + straying_.errors();
     stop_time_ = 0.0;
     stopping_ = changed_ = false;
     run_ = 0;
@@ -274,13 +242,13 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 // move; beyond that it must come back by more than noise can pretend.
 bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < limits_.q_lower.size(); ++j) {
-    const double reserve = tried_stray_[j] + joint_stray_[j];
+    const double reserve = straying_.tracking()[j] + straying_.errors()[j];
     const auto beyond = [&](const VectorXd& q) {
       return std::max(
           {q[j] - (limits_.q_upper[j] - reserve), limits_.q_lower[j] + reserve - q[j], 0.0});
     };
     const double now = beyond(from);
-    const double allowed = now > 0.0 ? std::max(0.3 * reserve, now - 2.0 * noise_) : 0.0;
+    const double allowed = now > 0.0 ? std::max(0.3 * reserve, now - 2.0 * straying_.noise()) : 0.0;
     if (beyond(to) <= allowed && beyond(tried_.line_start()) <= allowed &&
         beyond(tried_.end()) <= allowed)
       continue;
@@ -294,7 +262,7 @@ bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineChec
                       const LineCheck::End& to, const VectorXd& stray) {
   const auto blocker =
       line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
-                 world.time_s, from, to, {stray, shape_stray_, margin_m_});
+                 world.time_s, from, to, {stray, straying_.shapes(), margin_m_});
   if (!blocker) return true;
   refusal_ = {cause_of(*blocker), *blocker, -1};
   return false;
@@ -319,7 +287,7 @@ bool Shield::verify(const Surroundings& world, const Step& step) {
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
   // stop_is_safe() has placed the arm at the step's end
   const LineCheck::End at_from = place(from.q, arm_from_), at_to{to.q, arm_to_.view()};
-  line_stray_ = tried_stray_ + 0.25 * period_s_ * (to.v - step.departure).cwiseAbs();
+  line_stray_ = straying_.tracking() + 0.25 * period_s_ * (to.v - step.departure).cwiseAbs();
   return is_clear(step_line_, world, at_from, at_to, line_stray_);
 }
 
@@ -327,8 +295,8 @@ bool Shield::stop_is_safe(const Surroundings& world, const Step& step) {
   if (!within_velocity(step.from.v, tried_.line_velocity())) return false;
   if (!within_joint_limits(step.from.q, step.to.q)) return false;
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
-  levers_.extend_travel(step.to.q, tried_stray_);
-  levers_.extend_travel(tried_.end(), tried_stray_);
+  levers_.extend_travel(step.to.q, straying_.tracking());
+  levers_.extend_travel(tried_.end(), straying_.tracking());
   return stop_is_clear(world, place(step.to.q, arm_to_));
 }
 
@@ -336,8 +304,8 @@ bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_t
   const auto [rate, ramp, fade] = tried_.braking();
   const LineCheck::End at_end = place(tried_.end(), arm_end_);
   // each step of the stop bends by as much as any other, docs/theory.md (12.2)
-  line_stray_ =
-      tried_stray_ + 0.25 * period_s_ * period_s_ * rate * tried_.line_velocity().cwiseAbs();
+  line_stray_ = straying_.tracking() +
+                0.25 * period_s_ * period_s_ * rate * tried_.line_velocity().cwiseAbs();
   if (ramp == 0.0) return is_clear(stop_line_, world, at_to, at_end, line_stray_);
   const LineCheck::End at_line = place(tried_.line_start(), arm_line_);
   if (!is_clear(stop_line_, world, at_line, at_end, line_stray_)) return false;
@@ -390,83 +358,14 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
     w_ = to.v + 0.5 * ramp * step.acceleration;
   }
   tried_.set(to.q, to.v, step.acceleration, {rate, ramp, fade});
-  bound_straying();
+  straying_.bound(tried_);
   return true;
 }
 
-// docs/theory.md (14.15)
-void Shield::bound_straying() {
-  tried_stray_ = tracking_ + 0.25 * period_s_ * period_s_ * tried_.braking().rate *
-                                 tried_.line_velocity().cwiseAbs();
-  shape_stray_.setZero();
-  joint_stray_.setZero();
-  if (mass_error_ > 0.0 || !unmodelled_friction_.isZero(0.0)) add_model_errors();
-  if (noise_ > 0.0) add_noise();
-}
-
-// docs/theory.md (14.17)
-void Shield::add_model_errors() {
-  const VectorXd& q = tried_.line_start();
-  const double time_s = tried_.duration_s() + hold_time_s;
-  const double ramp = drive_.torque_rate > 0.0 ? tried_.braking().ramp_s : 0.0;
-  const double compliance =
-      std::min(compliance_s2_ + ramp_compliance * ramp * ramp, 0.5 * time_s * time_s);
-  invert_mass(q);
-  rate_ = tried_.braking().rate * tried_.line_velocity();
-  q_.noalias() = mass_ * rate_;
-  dynamics::bias_torque(model_, ws_, q, tried_.line_velocity(), v_);
-  rate_ = mass_error_ * (q_.cwiseAbs() + v_.cwiseAbs()) + unmodelled_friction_;
-  bound_shapes(rate_, compliance);
-  for (Index j = 0; j < rate_.size(); ++j)
-    joint_stray_[j] = compliance * mass_inverse_.col(j).cwiseAbs().dot(rate_);
-}
-
-// Errors of different joints are independent: docs/theory.md (14.19).
-void Shield::add_noise() {
-  shape_stray_ += noise_ * levers_.shapes().rowwise().norm();
-  joint_stray_.array() += 2.0 * noise_;  // at both ends of a stop
-}
-
-void Shield::invert_mass(const VectorXd& q) {
-  dynamics::mass_matrix(model_, ws_, q, mass_);
-  factors_.compute(mass_);
-  mass_inverse_.setIdentity();
-  factors_.solveInPlace(mass_inverse_);
-}
-
 LimitReserve Shield::limit_reserve() {
-  LimitReserve reserve{VectorXd::Constant(model_.dof(), planner_reserve + noise_) + tracking_,
-                       sampled_ ? speed_reserve_ + planner_speed_reserve : 0.0};
-  if (mass_error_ == 0.0 && unmodelled_friction_.isZero(0.0)) return reserve;
-  invert_mass(start_q_);
-  dynamics::gravity_torque(model_, ws_, start_q_, q_);
-  rate_ = mass_error_ * q_.cwiseAbs() + unmodelled_friction_;
-  const double ramp = drive_.torque_rate > 0.0 ? usual_ramp_s : 0.0;
-  const double compliance = compliance_s2_ + ramp_compliance * ramp * ramp;
-  for (Index j = 0; j < rate_.size(); ++j)
-    reserve.position[j] += other_postures * compliance * mass_inverse_.col(j).cwiseAbs().dot(rate_);
-  return reserve;
-}
-
-// The response of a point to all torques together is far less than the sum of what each joint would
-// do alone: docs/theory.md (14.18).
-void Shield::bound_shapes(const VectorXd& torque, double compliance_s2) {
-  dynamics::forward_kinematics(model_, ws_, tried_.line_start());
-  int link = -1;
-  double turning = 0.0, moving = 0.0;
-  for (std::size_t i = 0; i < model_.shapes().size(); ++i) {
-    const auto& shape = model_.shapes()[i];
-    if (shape.link != link) {
-      link = shape.link;
-      dynamics::frame_jacobian(model_, ws_, link, dynamics::link_pose(model_, ws_, link).p(),
-                               jacobian_);
-      response_.noalias() = jacobian_ * mass_inverse_;
-      turning = response_.topRows<3>().colwise().norm().dot(torque);
-      moving = response_.bottomRows<3>().colwise().norm().dot(torque);
-    }
-    shape_stray_[static_cast<Index>(i)] =
-        compliance_s2 * (moving + turning * (shape.center.norm() + shape.half_axis.norm()));
-  }
+  VectorXd position = straying_.at_rest(start_q_);
+  position.array() += planner_reserve;
+  return {std::move(position), sampled_ ? speed_reserve_ + planner_speed_reserve : 0.0};
 }
 
 // Whether the bounds that the scene states hold can be seen by what a stop does.
@@ -476,7 +375,7 @@ void Shield::note_straying(const VectorXd& q) {
 
 void Shield::note_straying(Index joint, double strayed) {
   counts_.strayed = std::max(counts_.strayed, strayed);
-  const double bound = stray_[joint] + stop_joint_stray_[joint];
+  const double bound = stop_stray_[joint];
   if (!(strayed > counts_.strayed_share * bound)) return;
   counts_.strayed_share = strayed / bound;
   counts_.strayed_joint = static_cast<int>(joint);
@@ -512,7 +411,7 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
 bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const VectorXd& last) const {
   return drive_.torque_rate > 0.0 &&
          (torque - last).lpNorm<Eigen::Infinity>() > drive_.torque_rate / feedback_rate_ &&
-         ((node.q - reference_q_).cwiseAbs().array() > (stray_ + stop_joint_stray_).array()).any();
+         ((node.q - reference_q_).cwiseAbs().array() > stop_stray_.array()).any();
 }
 
 // Feedback that asks for more than the drives can follow makes the arm swing, docs/theory.md

@@ -10,6 +10,7 @@
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/allocations.hpp"
+#include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
 using control::BrakingRate;
@@ -22,21 +23,6 @@ namespace {
 
 scene::Scene shelf() {
   return scene::read_scene(HAMELIN_SOURCE_DIR "/data/scenes/shelf.json");
-}
-
-VectorXd random_q(const model::Model& model, Rng& rng) {
-  VectorXd q(model.dof());
-  for (int i = 0; i < model.dof(); ++i) {
-    const auto& joint = model.robot().links[static_cast<std::size_t>(i)].joint;
-    q[i] = rng.uniform(joint.lower.value_or(-3.0), joint.upper.value_or(3.0));
-  }
-  return q;
-}
-
-VectorXd random_vector(Eigen::Index n, double size, Rng& rng) {
-  VectorXd x(n);
-  for (auto& value : x) value = rng.uniform(-size, size);
-  return x;
 }
 
 }  // namespace
@@ -102,7 +88,8 @@ TEST_CASE("the rate of braking is near the largest that the torques allow", "[sh
   };
   int found = 0;
   for (int i = 0; i < 300; ++i) {
-    const VectorXd q = random_q(model, rng), w = random_vector(model.dof(), 1.5, rng);
+    const VectorXd q = test::random_within_limits(model, rng),
+                   w = test::random_joints(rng, model.dof(), 1.5);
     BrakingRate braking(model, allowed, VectorXd(), 1000.0);
     const auto rate = braking.find(q, w, BrakingRate::full_utilisation);
     if (!rate) continue;
@@ -112,7 +99,7 @@ TEST_CASE("the rate of braking is near the largest that the torques allow", "[sh
   }
   CHECK(found > 280);
   BrakingRate unlimited(model, VectorXd(), VectorXd(), 100.0);
-  CHECK(unlimited.find(random_q(model, rng), effort, 0.7) == 100.0);
+  CHECK(unlimited.find(test::random_within_limits(model, rng), effort, 0.7) == 100.0);
 }
 
 TEST_CASE("bounds from anchors are below the distances themselves", "[shield][slow]") {
@@ -133,11 +120,12 @@ TEST_CASE("bounds from anchors are below the distances themselves", "[shield][sl
   Rng rng(5);
   long lines = 0, clear = 0, bounds = 0;
   for (int start = 0; start < 20; ++start) {
-    VectorXd q = random_q(model, rng), v = random_vector(model.dof(), 1.5, rng);
+    VectorXd q = test::random_within_limits(model, rng),
+             v = test::random_joints(rng, model.dof(), 1.5);
     line.forget();
     for (int k = 0; k < 300; ++k) {
       q += 0.001 * v;
-      v += random_vector(model.dof(), 0.05, rng);
+      v += test::random_joints(rng, model.dof(), 0.05);
       const VectorXd end = q + 0.3 * v;
       place(q, arm_from);
       place(end, arm_to);

@@ -129,8 +129,12 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   options.certify = false;      // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
-  options.acceleration_max = scene.actuation.servo.acceleration_max;
-  options.jerk_max = scene.actuation.servo.jerk_max;
+  const auto bounds = [&](const std::vector<double>& values, const char* key) {
+    const VectorXd all = servo_values(scene, values, key, model_.dof());
+    return std::vector<double>(all.begin(), all.end());
+  };
+  options.acceleration_max = bounds(scene.actuation.servo.acceleration_max, "acceleration_max");
+  options.jerk_max = bounds(scene.actuation.servo.jerk_max, "jerk_max");
   options.period_s = static_cast<double>(steps_per_tick(scene)) * scene.step_s;
   options.clock_s = control::steady_clock_s;
   options.late_answers_max = 0;  // no decision depends on the clock

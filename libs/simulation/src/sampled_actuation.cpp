@@ -13,6 +13,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
@@ -143,8 +144,8 @@ class ServoActuation final : public SampledActuation {
   ServoActuation(const scene::Scene& scene, const model::Model& model, Plant& plant,
                  long period_steps, long delay_ticks)
       : SampledActuation(plant, period_steps),
-        kp_(servo_gains(scene, model, scene.actuation.servo.kp, "kp")),
-        kv_(servo_gains(scene, model, scene.actuation.servo.kv, "kv")),
+        kp_(servo_values(scene, scene.actuation.servo.kp, "kp", model.dof())),
+        kv_(servo_values(scene, scene.actuation.servo.kv, "kv", model.dof())),
         dynamic_(scene.actuation.servo.feedforward == scene::Feedforward::dynamics),
         period_s_(scene.actuation.control_period_s),
         nominal_(control::scaled_masses(model, scene.actuation.planner_mass_scale)),
@@ -169,19 +170,6 @@ class ServoActuation final : public SampledActuation {
   struct SetPoint {
     VectorXd q, v;
   };
-
-  static VectorXd servo_gains(const scene::Scene& scene, const model::Model& model,
-                              const std::vector<double>& given, const char* key) {
-    const auto n = static_cast<std::size_t>(model.dof());
-    if (given.size() != 1 && given.size() != n)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: /actuation/servo/{}: {} values given, expected 1 or {}",
-                              scene.name, key, given.size(), n));
-    VectorXd gains(model.dof());
-    for (std::size_t i = 0; i < n; ++i)
-      gains[static_cast<Eigen::Index>(i)] = given[given.size() == 1 ? 0 : i];
-    return gains;
-  }
 
   // docs/theory.md (8.15) at the start. The gains of the joint that contributes most are named.
   void check_stability(const scene::Scene& scene, const model::Model& model) {

@@ -1,5 +1,7 @@
 #include "scene_values.hpp"
 
+#include <fmt/format.h>
+
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
 
@@ -17,6 +19,12 @@ Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& ro
   if (share == 0.0) return friction;
   if (friction.size() == 0) friction = Eigen::VectorXd::Zero(robot.dof());
   return friction + share * control::joint_limits(robot, &model::Joint::effort_max, 0.0);
+}
+
+Eigen::VectorXd servo_values(const scene::Scene& scene, const std::vector<double>& values,
+                             const char* key, int dof) {
+  return control::one_or_per_joint(values, dof,
+                                   fmt::format("{}: /actuation/servo/{}", scene.name, key));
 }
 
 std::vector<log::Input> inputs_of(const scene::Scene& scene) {

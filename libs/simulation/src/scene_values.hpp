@@ -18,6 +18,12 @@ namespace hamelin::simulation {
 /// @throws Error invalid if there is neither one value nor one per joint
 [[nodiscard]] Eigen::VectorXd plant_friction(const scene::Scene& scene, const model::Robot& robot);
 
+/// The values of /actuation/servo/`key`, one per joint.
+/// @throws Error invalid if there is neither one value nor one per joint
+[[nodiscard]] Eigen::VectorXd servo_values(const scene::Scene& scene,
+                                           const std::vector<double>& values, const char* key,
+                                           int dof);
+
 /// The files of scene, robot and spheres.
 [[nodiscard]] std::vector<log::Input> inputs_of(const scene::Scene& scene);
 

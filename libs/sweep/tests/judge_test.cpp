@@ -22,6 +22,7 @@
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "hamelin/test/robots.hpp"
 #include "hamelin/test/scene_data.hpp"
 
 using namespace hamelin;
@@ -45,15 +46,6 @@ scene::Scene scene_of(const Json& more) {
   return scene::scene_from_json(document, source_dir, "scene");
 }
 
-VectorXd random_q(const model::Model& model, Rng& rng) {
-  VectorXd q(model.dof());
-  for (int i = 0; i < model.dof(); ++i) {
-    const auto& joint = model.robot().links[static_cast<std::size_t>(i)].joint;
-    q[i] = rng.uniform(joint.lower.value_or(-3.0), joint.upper.value_or(3.0));
-  }
-  return q;
-}
-
 /// Centres of the moving spheres, computed by the library that planners and runs use.
 std::vector<Vector3d> centers_of(const model::Model& model, const VectorXd& q) {
   dynamics::Workspace ws(model);
@@ -75,7 +67,7 @@ TEST_CASE("the judge places spheres where the dynamics place them, also on a rot
   Rng rng(3);
   std::vector<Vector3d> centers;
   for (int i = 0; i < 50; ++i) {
-    const VectorXd q = random_q(model, rng);
+    const VectorXd q = test::random_within_limits(model, rng);
     const auto expected = centers_of(model, q);
     arm.place(q, centers);
     for (std::size_t k = 0; k < centers.size(); ++k)
@@ -157,7 +149,7 @@ TEST_CASE(
     const auto scene = scene_of({{"obstacles", random_obstacles(8, seed)}});
     const model::Model model = control::load_model(scene);
     for (int i = 0; i < 12; ++i) {
-      const VectorXd q = random_q(model, rng);
+      const VectorXd q = test::random_within_limits(model, rng);
       const double time_s = rng.uniform(0.0, 3.0);
       const auto centers = centers_of(model, q);
       double nearest = std::numeric_limits<double>::infinity();
@@ -193,7 +185,7 @@ TEST_CASE("the judge agrees with FCL on contact with and distance from a map", "
   Rng rng(5);
   int contacts = 0, clear = 0;
   for (int i = 0; i < 40 && clear < 4; ++i) {
-    const VectorXd q = random_q(model, rng);
+    const VectorXd q = test::random_within_limits(model, rng);
     const auto found = judged(scene, 0.0, q);
     REQUIRE(found.has_value());
     CHECK(found->other == "map");
@@ -215,7 +207,8 @@ TEST_CASE("the judge's stored leaves do not change its distances along a motion"
   Rng rng(11);
   for (int motion = 0; motion < 3; ++motion) {
     Judge judge(scene);
-    const VectorXd from = random_q(model, rng), to = from + 0.15 * (random_q(model, rng) - from);
+    const VectorXd from = test::random_within_limits(model, rng),
+                   to = from + 0.15 * (test::random_within_limits(model, rng) - from);
     double nearest = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= 100; ++i) {
       const VectorXd q = from + 0.01 * i * (to - from);
@@ -291,7 +284,7 @@ TEST_CASE("the judge's self-collision pairs and their distances equal those of l
     Rng rng(23);
     int contacts = 0;
     for (int i = 0; i < 200; ++i) {
-      const VectorXd q = random_q(model, rng);
+      const VectorXd q = test::random_within_limits(model, rng);
       const auto centers = centers_of(model, q);
       double nearest = 10.0;
       for (std::size_t pair = 0; pair < field.pairs().size(); ++pair)
@@ -439,7 +432,7 @@ TEST_CASE("the judge's own code changes maps as runs do", "[sweep][unit]") {
     CHECK(map.advance(time_s) == (time_s > 0.0));
     Rng poses(31);
     for (int i = 0; i < 25; ++i) {
-      const VectorXd q = random_q(model, poses);
+      const VectorXd q = test::random_within_limits(model, poses);
       dynamics::forward_kinematics(model, ws, q);
       arm.place(model, ws);
       judged_arm.place(q, centers);

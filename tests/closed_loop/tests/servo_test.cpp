@@ -156,6 +156,9 @@ TEST_CASE("gains that do not fit the robot or are unstable are refused", "[simul
   scene["actuation"]["servo"]["kp"] = {1.0, 2.0};
   CHECK_THROWS_WITH(run_scene(folder, scene),
                     Catch::Contains("/actuation/servo/kp: 2 values given, expected 1 or 4"));
+  scene["actuation"]["servo"] = {{"kp", 1.0}, {"kv", 1.0}, {"jerk_max", {1.0, 2.0}}};
+  CHECK_THROWS_WITH(run_scene(folder, scene),
+                    Catch::Contains("/actuation/servo/jerk_max: 2 values given, expected 1 or 4"));
   scene["actuation"]["servo"] = {{"kp", 1.0}, {"kv", {1.0, 1.0, 1.0, 1e4}}};
   CHECK_THROWS_WITH(
       run_scene(folder, scene),

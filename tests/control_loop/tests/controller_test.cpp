@@ -118,7 +118,10 @@ TEST_CASE("positions for the next period follow with bounded acceleration and je
   CHECK(acceleration > 0.3);
   options.jerk_max = {1.0, 2.0};
   CHECK_THROWS_WITH(Loop(scene, options),
-                    Catch::Contains("jerk_max: 2 values given, expected 1 or 7 positive numbers"));
+                    Catch::Contains("jerk_max: 2 values given, expected 1 or 7"));
+  options.jerk_max = {0.0};
+  CHECK_THROWS_WITH(Loop(scene, options),
+                    Catch::Contains("jerk_max: 0, expected positive numbers"));
 }
 
 TEST_CASE("a planner is shown the torque that was sent, its own or that of a stop",

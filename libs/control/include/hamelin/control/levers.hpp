@@ -22,8 +22,7 @@ class Levers {
 
   /// Extends the travel of prismatic joints, on which the levers of the joints before them depend,
   /// if one of them may reach beyond it. @param stray how far each joint may be from q
-  /// @return whether levers have grown
-  bool extend_travel(const Eigen::VectorXd& q, const Eigen::VectorXd& stray);
+  void extend_travel(const Eigen::VectorXd& q, const Eigen::VectorXd& stray);
 
   /// The vector c whose product with the levers of a shape bounds the second derivative κ of its
   /// points along the line q + s dq, docs/theory.md (12.5).

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "hamelin/model/model.hpp"
@@ -16,6 +17,12 @@ namespace hamelin::control {
 
 /// The same arm with all masses and inertias scaled by one factor: what a planner believes.
 [[nodiscard]] model::Model scaled_masses(const model::Model& arm, double scale);
+
+/// One value for all joints, or one per joint, as one per joint.
+/// @param place of the values, which begins the message of an error
+/// @throws Error invalid if there is neither one value nor one per joint
+[[nodiscard]] Eigen::VectorXd one_or_per_joint(const std::vector<double>& values, int dof,
+                                               std::string_view place);
 
 /// One value per joint as a scene gives it under /model/`key`; of size zero: none.
 /// @param member where the robot file has it

@@ -1,5 +1,4 @@
 #pragma once
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
@@ -15,6 +14,7 @@
 #include "hamelin/control/line_check.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/stop_motion.hpp"
+#include "hamelin/control/straying.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -159,15 +159,6 @@ class Shield {
   /// Lets the stop begin again from where the arm is.
   void begin_again(const Node& node, const Eigen::VectorXd& disturbance,
                    const Eigen::VectorXd& last);
-  /// Adds what errors of the model cause.
-  void add_model_errors();
-  void add_noise();
-  /// Sets mass_ and mass_inverse_.
-  void invert_mass(const Eigen::VectorXd& q);
-  /// Sets shape_stray_. @param torque unexplained torques [Nm or N]
-  void bound_shapes(const Eigen::VectorXd& torque, double compliance_s2);
-  /// Sets tried_stray_.
-  void bound_straying();
   [[nodiscard]] bool stop_is_clear(const Surroundings& world, const LineCheck::End& at_to);
   [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
@@ -192,28 +183,17 @@ class Shield {
   ModelledLimits limits_;
   Eigen::VectorXd damping_, friction_;  ///< of size zero: not modelled
   double friction_speed_, torque_share_;
-  /// Bounds of torques that the model does not explain: share of the model's own, and friction of
-  /// each joint [Nm or N].
-  double mass_error_;
-  Eigen::VectorXd unmodelled_friction_;
   double speed_reserve_ = 0.0;  ///< share of the velocity limits
-  double noise_ = 0.0;          ///< of measured joint positions, a bound [rad or m]
-  double compliance_s2_ = 0.0;  ///< by how much a joint strays per unexplained acceleration
-  Eigen::MatrixXd mass_, mass_inverse_;
-  Eigen::LLT<Eigen::MatrixXd> factors_;
-  Eigen::VectorXd tracking_;  ///< bound of the deviation from a stop, but for what follows
   Levers levers_;
   Drive drive_;
+  Straying straying_;  ///< of tried_
   LineCheck step_line_, ramp_line_, stop_line_;
   BrakingRate braking_;
   dynamics::Workspace ws_;
   StopMotion stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
-  Eigen::VectorXd shape_stray_;              ///< by model errors, of tried_; of size zero: none [m]
-  dynamics::Matrix6Xd jacobian_, response_;  ///< response: acceleration of a link per torque
-  Eigen::VectorXd joint_stray_, stop_joint_stray_;  ///< by model errors, of tried_ and stop_
-  Eigen::VectorXd no_addition_;                     ///< of size zero
-  Eigen::VectorXd stray_, tried_stray_;             ///< bounds for stop_ and tried_ [rad or m]
+  Eigen::VectorXd stop_stray_;   ///< by how much joints may stray from stop_ [rad or m]
+  Eigen::VectorXd no_addition_;  ///< of size zero
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
   Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_, acceleration_;

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/model/model.hpp"
 #include "hamelin/model/robot.hpp"
 
 /// Random chains and joint vectors for tests, determined by a seed.
@@ -16,6 +17,16 @@ inline Eigen::VectorXd random_joints(Rng& rng, int n, double size = 1.0) {
   Eigen::VectorXd x(n);
   for (int i = 0; i < n; ++i) x[i] = rng.uniform(-size, size);
   return x;
+}
+
+/// Joint positions within the limits of a model, or within ±3 where it has none.
+inline Eigen::VectorXd random_within_limits(const model::Model& model, Rng& rng) {
+  Eigen::VectorXd q(model.dof());
+  for (int i = 0; i < model.dof(); ++i) {
+    const auto& joint = model.robot().links[static_cast<std::size_t>(i)].joint;
+    q[i] = rng.uniform(joint.lower.value_or(-3.0), joint.upper.value_or(3.0));
+  }
+  return q;
 }
 
 inline Eigen::Matrix3d random_inertia(Rng& rng) {

@@ -1,0 +1,68 @@
+#pragma once
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "hamelin/control/levers.hpp"
+#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/stop_motion.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/model/model.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::control {
+
+/// By how much an arm may stray from a stop, given the errors that a scene states:
+/// docs/theory.md (14.15)–(14.19). No allocation after construction.
+class Straying {
+ public:
+  /// @param model, levers kept by reference
+  /// @param period_s time between two steps
+  /// @param feedback_rate ω of a stop's feedback, docs/theory.md (14.13) [1/s]
+  /// @param torque_rate largest rate of change of each torque [Nm/s or N/s]; zero: unbounded
+  Straying(const scene::Scene& scene, const model::Model& model, const Levers& levers,
+           double period_s, double feedback_rate, double torque_rate);
+
+  /// Sets the bounds for a stop.
+  void bound(const StopMotion& stop);
+  /// What the motion itself causes, of each joint [rad or m].
+  [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return tracking_; }
+  /// What errors of the model and noise cause in addition, of each joint [rad or m].
+  [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return errors_; }
+  /// The same of each shape [m], far less than the joints' added up; of size zero: none.
+  [[nodiscard]] const Eigen::VectorXd& shapes() const noexcept { return shapes_; }
+  /// Bound of the noise of measured joint positions [rad or m].
+  [[nodiscard]] double noise() const noexcept { return noise_; }
+
+  /// By how much each joint may stray from rest at a configuration, as far as the motion itself
+  /// does not cause it [rad or m].
+  [[nodiscard]] Eigen::VectorXd at_rest(const Eigen::VectorXd& q);
+
+ private:
+  [[nodiscard]] bool has_model_errors() const {
+    return mass_error_ > 0.0 || !friction_.isZero(0.0);
+  }
+  void add_model_errors(const StopMotion& stop);
+  void add_noise();
+  /// Sets mass_ and mass_inverse_.
+  void invert_mass(const Eigen::VectorXd& q);
+  /// Sets shapes_ for the unexplained torque torque_.
+  void bound_shapes(const Eigen::VectorXd& q, double compliance_s2);
+
+  const model::Model& model_;
+  const Levers& levers_;
+  double period_s_;
+  bool limits_rate_;          ///< whether torques change at a bounded rate
+  double mass_error_;         ///< bound of unexplained torques as a share of the model's own
+  Eigen::VectorXd friction_;  ///< bound of unexplained friction of each joint [Nm or N]
+  double noise_;
+  double compliance_s2_;    ///< by how much a joint strays per unexplained acceleration
+  Eigen::VectorXd stated_;  ///< safety.tracking_rad
+  Eigen::VectorXd tracking_, errors_, shapes_;
+  Eigen::MatrixXd mass_, mass_inverse_;
+  Eigen::LLT<Eigen::MatrixXd> factors_;
+  Eigen::VectorXd torque_, rate_, bias_;
+  dynamics::Matrix6Xd jacobian_, response_;  ///< response: acceleration of a link per torque
+  dynamics::Workspace ws_;
+};
+
+}  // namespace hamelin::control
