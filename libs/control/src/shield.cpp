@@ -110,8 +110,8 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
   if (sampled_)
     speed_reserve_ =
         scene.actuation.estimates_velocity ? estimated_speed_reserve : sampled_speed_reserve;
-  for (auto* x : {&stop_stray_, &line_stray_, &zero_, &w_, &reference_q_, &reference_v_, &q_, &v_,
-                  &rate_, &hold_, &acceleration_})
+  for (auto* x : {&stop_stray_, &line_stray_, &integral_, &zero_, &w_, &reference_q_, &reference_v_,
+                  &q_, &v_, &rate_, &hold_, &acceleration_})
     x->setZero(n);
 }
 
@@ -395,8 +395,7 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
   const double middle = stop_time_ + 0.5 * period_s_, end = stop_time_ + period_s_;
   stop_.at(stop_time_, reference_q_, reference_v_);
   note_straying(node.q);
-  rate_ =
-      feedback_rate_ * (feedback_rate_ * (reference_q_ - node.q) + 2.0 * (reference_v_ - node.v));
+  feed_back(node);
   stop_.at(end, q_, v_);
   rate_ += (v_ - reference_v_) / period_s_ - disturbance;
   stop_.at(middle, q_, v_);
@@ -406,6 +405,19 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
     torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
   if (limits_.effort_max.size() > 0)
     torque = torque.cwiseMin(limits_.effort_max).cwiseMax(-limits_.effort_max);
+}
+
+// docs/theory.md (14.13): ideal actuation has no estimate of what the model does not explain, but
+// an integral.
+void Shield::feed_back(const Node& node) {
+  const double w = feedback_rate_;
+  if (sampled_) {
+    rate_ = w * (w * (reference_q_ - node.q) + 2.0 * (reference_v_ - node.v));
+    return;
+  }
+  if (stop_time_ == 0.0) integral_.setZero();
+  integral_ += w * period_s_ * (reference_q_ - node.q);
+  rate_ = w * (w * (3.0 * (reference_q_ - node.q) + integral_) + 3.0 * (reference_v_ - node.v));
 }
 
 bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const VectorXd& last) const {

@@ -95,7 +95,8 @@ constexpr double stop_again_s = 0.25;
 // An arm that is slower has come to rest [rad/s or m/s].
 constexpr double resting_speed = 2e-3;
 
-/// CPU time of a tick without writing its log line.
+/// CPU time of a tick: without the log, a judge of its own, a caller that watches, and a plant that
+/// is not hamelin's own.
 class TickTimer {
  public:
   void pause() { spent_ += thread_cpu_s() - since_; }
@@ -229,9 +230,14 @@ log::Result ClosedLoop::run(const Watch& watch) {
   start(watch);
   while (!done_) {
     TickTimer timer;
-    if (own_judge_) timer.pause();  // what only the judge does is no part of a tick
+    if (own_judge_) timer.pause();
     observe_node();
     if (own_judge_) timer.resume();
+    if (watch.at_node) {
+      timer.pause();
+      watch.at_node(plant_->node().time_s, plant_->node().q);
+      timer.resume();
+    }
     check_outcome();
     if (done_)
       book_last_node();
@@ -242,7 +248,6 @@ log::Result ClosedLoop::run(const Watch& watch) {
     write_tick();
     if (recorder_->logging()) timer.resume();
     if (done_) break;
-    // The time of a plant that is not hamelin's own is no part of a tick.
     if (scene_.plant != scene::PlantType::hamelin) timer.pause();
     step();
     if (scene_.plant != scene::PlantType::hamelin) timer.resume();
@@ -266,7 +271,6 @@ void ClosedLoop::observe_node() {
     certify();
   change_map();
   recorder_->observe(judge_->clearance_m(), certified_, plant_->node().v, scene_.step_s);
-  if (watch_->at_node) watch_->at_node(plant_->node().time_s, plant_->node().q);
 }
 
 void ClosedLoop::note_limits() {

@@ -152,6 +152,8 @@ class Shield {
   void note_straying(Eigen::Index joint, double strayed);
   /// The torque that keeps to the stop in the next period.
   void follow_stop(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
+  /// Sets rate_ to the acceleration that brings the arm back to the stop.
+  void feed_back(const Node& node);
   /// Whether the arm has strayed beyond its bounds, and the torque that would bring it back is
   /// farther from the last one than the drives can go in the time of the feedback.
   [[nodiscard]] bool has_lost_stop(const Node& node, const Eigen::VectorXd& torque,
@@ -193,6 +195,7 @@ class Shield {
   StopMotion stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
   Eigen::VectorXd stop_stray_;   ///< by how much joints may stray from stop_ [rad or m]
+  Eigen::VectorXd integral_;     ///< of the deviation from stop_, times ω [rad or m]
   Eigen::VectorXd no_addition_;  ///< of size zero
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
