@@ -60,7 +60,7 @@ double BrakingRate::evaluate(const VectorXd& q, const VectorXd& w, double rate) 
   return utilisation_;
 }
 
-// docs/theory.md (14.11)
+// docs/theory.md (14.12)
 std::pair<double, double> BrakingRate::allowed_rates(double rate) {
   a_.setZero();
   dynamics::inverse_dynamics(model_, ws_, q_, v_, a_, without_);

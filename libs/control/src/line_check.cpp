@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "hamelin/core/numbers.hpp"
 
@@ -18,40 +19,83 @@ namespace {
 constexpr double reserve_m = 0.1;
 // Bounds from anchors are reduced by this, far above what rounding can add [m].
 constexpr double rounding_m = 1e-12;
+// The share of the margin that must be left at the start of a line that does not lead away; the
+// other part is what the arm may have strayed. A line leads away if its distance grows by this
+// share of its length.
+constexpr double left_share = 0.5, away_share = 0.25;
+// The share of the margin by which lines that begin too near may begin nearer than earlier ones.
+constexpr double drift_share = 0.25;
 // In how many pieces a line is divided, one after the other, until it is proved.
 constexpr std::array<int, 3> sphere_pieces{1, 2, 8};
 constexpr std::array<int, 3> two_ended_pieces{1, 4, 16};
 
-/// Distances at the ends of the pieces of a line, one after the other: docs/theory.md (14.7). Where
-/// the line begins nearer than it needs to be, it must not come nearer at any end.
+/// What a line must keep of its distance, docs/theory.md (14.9).
+class Keep {
+ public:
+  /// @param need what is needed @param least what is needed in any case: need without the margin
+  Keep(double need, double least) : need_(need), least_(least) {}
+  /// If the line begins nearer than need be, nothing may be nearer still.
+  /// @param before lines of that kind before this one @return whether it may begin there
+  bool begin(double distance, LineCheck::Begun& before) {
+    if (distance >= need_) return true;
+    const double margin = need_ - least_;
+    if (distance >= before.need) before = {};
+    missing_ = before.distance - drift_share * margin - distance;
+    if (missing_ > 0.0) return false;
+    before = {std::max(before.distance, distance), std::max(before.need, need_)};
+    missing_ = need_ - distance;
+    from_ = distance;
+    leads_away_ = distance - least_ < left_share * margin;
+    need_ = std::max(least_, distance - rounding_m);
+    return true;
+  }
+  [[nodiscard]] double need() const noexcept { return need_; }
+  [[nodiscard]] bool leads_away() const noexcept { return leads_away_; }
+  /// What a line that leads away needs at its end. @param way from its start
+  [[nodiscard]] double at_end(double way) const noexcept { return from_ + away_share * way; }
+  /// By how much the line begins too near.
+  [[nodiscard]] double missing() const noexcept { return missing_; }
+
+ private:
+  double need_, least_, from_ = infinity, missing_ = 0.0;
+  bool leads_away_ = false;
+};
+
+/// Distances at the ends of the pieces of a line, one after the other: docs/theory.md (14.7).
 class TwoEnded {
  public:
-  /// @param least what is needed in any case @param way the longest way on a piece
-  TwoEnded(double need, double least, double way)
-      : need_(need), between_(need), least_(least), way_(way) {}
+  /// @param way the longest way on a piece
+  TwoEnded(const Keep& keep, double least, double way, int pieces, LineCheck::Begun& before)
+      : keep_(keep), before_(before), least_(least), way_(way), pieces_(pieces) {}
   /// @param chord of the piece that ends here @return whether it is clear so far
   bool goes_on(double distance, double chord) {
-    if (first_) {
-      if (distance <= need_) {
-        missing_ = need_ - distance;
-        need_ = distance - rounding_m;
-        between_ = std::max(least_, need_ - way_);
-      }
-      first_ = false;
-      last_ = distance;
-      return way_ > 0.0 ? need_ > least_ : missing_ == 0.0;
-    }
-    const double bound = 0.5 * (last_ + distance - chord);
-    last_ = distance;
-    missing_ = std::max({missing_, need_ - distance, between_ - bound});
-    return distance > need_ && bound > between_;
+    const double last = std::exchange(last_, distance);
+    if (ends_++ == 0) return begin(distance);
+    gone_ += chord;
+    const double bound = 0.5 * (last + distance - chord);
+    missing_ = std::max({missing_, keep_.need() - distance, between_ - bound});
+    if (distance <= keep_.need() || bound <= between_) return false;
+    if (ends_ <= pieces_ || !keep_.leads_away()) return true;
+    missing_ = std::max(missing_, keep_.at_end(gone_) - distance);
+    return distance >= keep_.at_end(gone_);
   }
   /// By how much the line falls short of what it needs.
   [[nodiscard]] double missing() const noexcept { return missing_; }
 
  private:
-  double need_, between_, least_, way_, last_ = 0.0, missing_ = 0.0;
-  bool first_ = true;
+  bool begin(double distance) {
+    between_ = keep_.need();
+    if (distance > between_) return true;
+    const bool may_begin = keep_.begin(distance, before_);
+    missing_ = keep_.missing();
+    between_ = std::max(least_, keep_.need() - way_);
+    return may_begin && way_ > 0.0 && keep_.need() > least_;
+  }
+
+  Keep keep_;
+  LineCheck::Begun& before_;
+  double between_ = 0.0, least_, way_, last_ = 0.0, gone_ = 0.0, missing_ = 0.0;
+  int ends_ = 0, pieces_;
 };
 
 }  // namespace
@@ -61,6 +105,8 @@ LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scen
       levers_(levers),
       self_(self),
       anchors_(model.shapes().size()),
+      begun_(model.shapes().size()),
+      pairs_begun_(static_cast<std::size_t>(levers.pairs().rows())),
       divisions_(pieces_max - 1,
                  Division{VectorXd::Zero(model.dof()), scene::PlacedShapes(model)}) {
   const Index n = model.dof(), shapes = static_cast<Index>(model.shapes().size()),
@@ -74,6 +120,7 @@ LineCheck::LineCheck(const model::Model& model, const Levers& levers, const scen
 
 void LineCheck::forget() {
   for (Anchor& anchor : anchors_) anchor = {};
+  for (Begun& begun : begun_) begun = {};
 }
 
 std::optional<LineCheck::Blocker> LineCheck::check(dynamics::Workspace& ws,
@@ -123,10 +170,9 @@ double LineCheck::need(std::size_t shape, int pieces) const {
          bend_[i] / (static_cast<double>(pieces) * pieces);
 }
 
-double LineCheck::need_from(std::size_t shape, int pieces, double distance_at_start) const {
-  const double tube = model_.shapes()[shape].radius +
-                      bend_[static_cast<Index>(shape)] / (static_cast<double>(pieces) * pieces);
-  return std::max(tube, std::min(need(shape, pieces), distance_at_start - rounding_m));
+double LineCheck::least(std::size_t shape, int pieces) const {
+  return model_.shapes()[shape].radius +
+         bend_[static_cast<Index>(shape)] / (static_cast<double>(pieces) * pieces);
 }
 
 double LineCheck::moved(std::size_t shape, const scene::Shapes& from,
@@ -145,7 +191,9 @@ double LineCheck::anchored_bound(std::size_t shape, const End& from, const End& 
 }
 
 bool LineCheck::shape_is_clear(std::size_t shape, Blocker& blocker) {
-  if (anchored_bound(shape, *from_, *to_) > need(shape, 1)) return true;
+  const double bound = anchored_bound(shape, *from_, *to_);
+  if (bound > begun_[shape].need) begun_[shape] = {};
+  if (bound > need(shape, 1)) return true;
   return from_->arm.is_capsule(shape) ? capsule_is_clear(shape, blocker)
                                       : sphere_is_clear(shape, blocker);
 }
@@ -173,9 +221,15 @@ scene::Shapes LineCheck::at(int i, int pieces) {
 // A sphere sweeps a tube around its chord: one query for a capsule without ends.
 bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
   Anchor& anchor = anchors_[shape];
+  const Vector3d &first = from_->arm.centers[shape], &last = to_->arm.centers[shape];
   double start = infinity;
   for (const int pieces : sphere_pieces) {
-    const double radius = need_from(shape, pieces, start);
+    Keep keep(need(shape, pieces), least(shape, pieces));
+    if (!keep.begin(start, begun_[shape])) {
+      blocker.missing_m = keep.missing();
+      return false;
+    }
+    const double radius = keep.need();
     const double limit = radius + (pieces == 1 ? reserve_m : 0.0);
     bool clear = true;
     for (int i = 0; i < pieces && clear; ++i) {
@@ -192,12 +246,16 @@ bool LineCheck::sphere_is_clear(std::size_t shape, Blocker& blocker) {
         anchor.distance = nearest.distance;
       }
     }
+    if (clear && keep.leads_away()) {
+      const double way = (last - first).norm();
+      const auto nearest = query(last, last, keep.at_end(way), anchor.hint);
+      const double missing = keep.at_end(way) - nearest.distance;
+      clear = missing <= 0.0;
+      if (!clear) blocker = {static_cast<int>(shape), nearest.obstacle, -1, missing};
+    }
     if (clear) return true;
     if (dq_.isZero(0.0)) break;
-    if (pieces == 1) {
-      const Vector3d& a = from_->arm.centers[shape];
-      start = query(a, a, radius, anchor.hint).distance;
-    }
+    if (pieces == 1) start = query(first, first, radius, anchor.hint).distance;
   }
   return false;
 }
@@ -209,7 +267,7 @@ bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
   const double way = levers_.shapes().row(static_cast<Index>(shape)).dot(way_);
   const double tube = model_.shapes()[shape].radius;
   for (const int pieces : two_ended_pieces) {
-    TwoEnded line(need(shape, pieces), tube, way / pieces);
+    TwoEnded line({need(shape, pieces), tube}, tube, way / pieces, pieces, begun_[shape]);
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       const scene::Shapes arm = at(i, pieces);
@@ -239,20 +297,22 @@ bool LineCheck::pair_is_clear(std::size_t pair, Blocker& blocker) {
   const auto k = static_cast<Index>(pair);
   const auto lever = levers_.pairs().row(k);
   const double stray = pair_stray_[k] + margin_;
-  const auto bound = [&] {
+  const auto proves = [&] {
     way_ = (from_->q - pair_q_.col(k)).cwiseAbs().cwiseMax((to_->q - pair_q_.col(k)).cwiseAbs());
-    return pair_distance_[k] - lever.dot(way_) - stray - rounding_m;
+    const double bound = pair_distance_[k] - lever.dot(way_) - rounding_m;
+    if (bound > pairs_begun_[pair].need) pairs_begun_[pair] = {};
+    return bound > stray;
   };
-  if (pair_distance_[k] > 0.0 && bound() > 0.0) return true;
+  if (pair_distance_[k] > 0.0 && proves()) return true;
   // Larger distances are not asked for, because few pairs are ever nearer.
   constexpr double far_m = 0.3;
   pair_q_.col(k) = from_->q + 0.5 * dq_;
   pair_distance_[k] = self_->distance(pair, at(1, 2), far_m);
-  if (bound() > 0.0) return true;
+  if (proves()) return true;
   way_ = dq_.cwiseAbs();
   const double way = lever.dot(way_);
   for (const int pieces : two_ended_pieces) {
-    TwoEnded line(stray, 0.0, way / pieces);
+    TwoEnded line({stray, 0.0}, 0.0, way / pieces, pieces, pairs_begun_[pair]);
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       clear = line.goes_on(self_->distance(pair, at(i, pieces), far_m), way / pieces);

@@ -60,7 +60,8 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     narrow(scene, reserve.position, limits.q_lower, limits.q_upper);
   data.q_lower = std::move(limits.q_lower);
   data.q_upper = std::move(limits.q_upper);
-  data.velocity_max = (1.0 - reserve.speed_share) * limits.velocity_max;
+  if (reserve.velocity.size() > 0) limits.velocity_max -= reserve.velocity;
+  data.velocity_max = std::move(limits.velocity_max);
   data.effort_max = std::move(limits.effort_max);
   if (scene.actuation.torque_rate_max_Nm_s)
     data.effort_rate_max = VectorXd::Constant(nominal.dof(), *scene.actuation.torque_rate_max_Nm_s);

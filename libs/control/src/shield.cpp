@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// ω of docs/theory.md (14.13) [1/s]; feedback that is faster than the steps would oscillate.
+// ω of docs/theory.md (14.14) [1/s]; feedback that is faster than the steps would oscillate.
 constexpr double feedback_rate = 50.0, feedback_per_step = 0.2;
 // A stop lasts at least this long, so that the planner's answer does not alternate with it [s].
 constexpr double dwell_s = 0.005;
@@ -29,8 +29,10 @@ constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
 // bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
 constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
-// What the shield keeps from speed limits, as a share, because velocities are not exact.
-constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.08;
+// What the shield keeps from speed limits, as a share, because velocities are not exact; and the
+// share that it leaves in any case.
+constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,
+                 least_speed_share = 0.5;
 // Steps in which a margin is sought that would do [m].
 constexpr double smallest_m = 1e-9;
 // The share of the torques' rate with which a stop is planned: the rest is for its feedback.
@@ -78,7 +80,6 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
     : model_(model),
       self_(self),
       scene_name_(scene.name),
-      start_q_(scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(model.dof())),
       sampled_(scene.actuation.type != scene::ActuationType::ideal),
       period_s_(period_s),
       margin_m_(scene.safety.margin_m),
@@ -107,9 +108,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       arm_line_(model),
       arm_end_(model) {
   const Index n = model.dof();
-  if (sampled_)
-    speed_reserve_ =
-        scene.actuation.estimates_velocity ? estimated_speed_reserve : sampled_speed_reserve;
+  set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
   for (auto* x : {&stop_stray_, &line_stray_, &integral_, &zero_, &w_, &reference_q_, &reference_v_,
                   &q_, &v_, &rate_, &hold_, &acceleration_})
     x->setZero(n);
@@ -229,7 +228,7 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
 
 bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
   for (Index j = 0; j < limits_.velocity_max.size(); ++j) {
-    if (std::abs(to[j]) <= limits_.velocity_max[j] * (1.0 - speed_reserve_ + velocity_rounding) ||
+    if (std::abs(to[j]) <= speed_max_[j] * (1.0 + velocity_rounding) ||
         std::abs(to[j]) <= std::abs(from[j]))
       continue;
     refusal_ = {StopCause::velocity_limit, {}, static_cast<int>(j)};
@@ -332,10 +331,10 @@ std::pair<double, double> Shield::transition_times(const Step& step, double rate
   return {ramp, fade};
 }
 
-// docs/theory.md (14.12): the rate of braking and the time to reach it depend on each other.
+// docs/theory.md (14.13): the rate of braking and the time to reach it depend on each other.
 bool Shield::find_stop(const Step& step, double least_utilisation) {
   constexpr int tries = 3;
-  constexpr double whole = 1.0;  // of docs/theory.md (14.12)
+  constexpr double whole = 1.0;  // of docs/theory.md (14.13)
   const Node& to = step.to;
   double ramp = 0.0, fade = 0.0, rate = 0.0;
   w_ = to.v;
@@ -362,10 +361,21 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
   return true;
 }
 
-LimitReserve Shield::limit_reserve() {
-  VectorXd position = straying_.at_rest(start_q_);
-  position.array() += planner_reserve;
-  return {std::move(position), sampled_ ? speed_reserve_ + planner_speed_reserve : 0.0};
+// Set points are exact, and so are the velocities of ideal actuation.
+void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
+  Straying::AtRest error = straying_.at_rest(q);
+  reserve_.position = std::move(error.position);
+  reserve_.position.array() += planner_reserve;
+  speed_max_ = limits_.velocity_max;
+  if (speed_max_.size() == 0) return;
+  reserve_.velocity = VectorXd::Zero(speed_max_.size());
+  if (!sampled_) return;
+  const bool estimates = scene.actuation.estimates_velocity;
+  speed_max_ *= 1.0 - (estimates ? estimated_speed_reserve : sampled_speed_reserve);
+  if (scene.actuation.type == scene::ActuationType::sampled) speed_max_ -= error.velocity;
+  speed_max_ = speed_max_.cwiseMax(least_speed_share * limits_.velocity_max);
+  reserve_.velocity =
+      limits_.velocity_max - speed_max_ + planner_speed_reserve * limits_.velocity_max;
 }
 
 // Whether the bounds that the scene states hold can be seen by what a stop does.
@@ -397,9 +407,11 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
   note_straying(node.q);
   feed_back(node);
   stop_.at(end, q_, v_);
-  rate_ += (v_ - reference_v_) / period_s_ - disturbance;
+  rate_ += (v_ - reference_v_) / period_s_;
+  if (!at_rest()) rate_ -= disturbance;
   stop_.at(middle, q_, v_);
   dynamics::inverse_dynamics(model_, ws_, q_, v_, rate_, torque);
+  if (at_rest()) resist(disturbance, torque);
   if (damping_.size() > 0) torque += damping_.cwiseProduct(v_);
   if (friction_.size() > 0)
     torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
@@ -407,7 +419,15 @@ void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd
     torque = torque.cwiseMin(limits_.effort_max).cwiseMax(-limits_.effort_max);
 }
 
-// docs/theory.md (14.13): ideal actuation has no estimate of what the model does not explain, but
+// docs/theory.md (14.15): friction holds an arm that rests, so what may be friction is left to it.
+// An integral against it would make the arm swing slowly.
+void Shield::resist(const VectorXd& disturbance, VectorXd& torque) {
+  const VectorXd& friction = straying_.friction();
+  dynamics::momentum(model_, ws_, q_, disturbance, rate_);
+  torque -= rate_ - rate_.cwiseMin(friction).cwiseMax(-friction);
+}
+
+// docs/theory.md (14.14): ideal actuation has no estimate of what the model does not explain, but
 // an integral.
 void Shield::feed_back(const Node& node) {
   const double w = feedback_rate_;
@@ -427,7 +447,7 @@ bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const Vecto
 }
 
 // Feedback that asks for more than the drives can follow makes the arm swing, docs/theory.md
-// (14.20). Where the stop ends now is as far from the verified one as the arm has strayed.
+// (14.23). Where the stop ends now is as far from the verified one as the arm has strayed.
 void Shield::begin_again(const Node& node, const VectorXd& disturbance, const VectorXd& last) {
   const Refusal refusal = refusal_;
   dynamics::forward_dynamics(model_, ws_, node.q, node.v, last, acceleration_);

@@ -13,7 +13,7 @@ namespace {
 // The deviation from a stop's motion grows with the square of the step from here on [s].
 constexpr double usual_step_s = 0.001;
 // By how much a joint strays per unexplained acceleration, in units of 1/ω²: the feedback of a stop
-// and the estimate of the disturbance together, docs/theory.md (14.16).
+// and the estimate of the disturbance together, docs/theory.md (14.18).
 constexpr double stop_compliance = 0.3;
 // The same while torques change as fast as they may, in units of the square of that time.
 constexpr double ramp_compliance = 0.1;
@@ -23,6 +23,10 @@ constexpr double usual_ramp_s = 0.05;
 constexpr double other_postures = 2.0;
 // An arm at rest is disturbed, too: it counts as a stop of this length [s].
 constexpr double hold_time_s = 0.01;
+// The error of a velocity per unexplained acceleration: as a share of the time until a torque acts,
+// of the estimator's time constant, and of the time in which torques change; docs/theory.md
+// (14.22).
+constexpr double late_share = 0.5, estimator_share = 0.05, ramp_share_of_speed = 0.4;
 // Noise is covered up to so many standard deviations.
 constexpr double noise_deviations = 4.0;
 
@@ -43,6 +47,9 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
   compliance_s2_ = stop_compliance / (feedback_rate * feedback_rate);
   if (scene.actuation.estimates_velocity)
     compliance_s2_ += 1.0 / (std::exp(1.0) * feedback_rate * scene.actuation.estimator_bandwidth);
+  velocity_error_s_ = late_share * (period_s + scene.actuation.delay_s);
+  if (scene.actuation.estimates_velocity)
+    velocity_error_s_ += estimator_share / scene.actuation.estimator_bandwidth;
   friction_ = VectorXd::Zero(n);
   if (scene.safety.friction_share > 0.0)
     friction_ =
@@ -55,7 +62,7 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
   factors_.compute(mass_);  // allocates its memory
 }
 
-// docs/theory.md (14.15)
+// docs/theory.md (14.17)
 void Straying::bound(const StopMotion& stop) {
   tracking_ = stated_ +
               0.25 * period_s_ * period_s_ * stop.braking().rate * stop.line_velocity().cwiseAbs();
@@ -65,7 +72,7 @@ void Straying::bound(const StopMotion& stop) {
   if (noise_ > 0.0) add_noise();
 }
 
-// docs/theory.md (14.17)
+// docs/theory.md (14.19)
 void Straying::add_model_errors(const StopMotion& stop) {
   const VectorXd& q = stop.line_start();
   const double time_s = stop.duration_s() + hold_time_s;
@@ -82,7 +89,7 @@ void Straying::add_model_errors(const StopMotion& stop) {
     errors_[j] = compliance * mass_inverse_.col(j).cwiseAbs().dot(torque_);
 }
 
-// Errors of different joints are independent: docs/theory.md (14.19).
+// Errors of different joints are independent: docs/theory.md (14.21).
 void Straying::add_noise() {
   shapes_ += noise_ * levers_.shapes().rowwise().norm();
   errors_.array() += 2.0 * noise_;  // at both ends of a stop
@@ -96,7 +103,7 @@ void Straying::invert_mass(const VectorXd& q) {
 }
 
 // The response of a point to all torques together is far less than the sum of what each joint would
-// do alone: docs/theory.md (14.18).
+// do alone: docs/theory.md (14.20).
 void Straying::bound_shapes(const VectorXd& q, double compliance_s2) {
   dynamics::forward_kinematics(model_, ws_, q);
   int link = -1;
@@ -116,16 +123,19 @@ void Straying::bound_shapes(const VectorXd& q, double compliance_s2) {
   }
 }
 
-VectorXd Straying::at_rest(const VectorXd& q) {
-  VectorXd bound = VectorXd::Constant(q.size(), noise_) + stated_;
+Straying::AtRest Straying::at_rest(const VectorXd& q) {
+  AtRest bound{VectorXd::Constant(q.size(), noise_) + stated_, VectorXd::Zero(q.size())};
   if (!has_model_errors()) return bound;
   invert_mass(q);
   dynamics::gravity_torque(model_, ws_, q, bias_);
   torque_ = mass_error_ * bias_.cwiseAbs() + friction_;
   const double ramp = limits_rate_ ? usual_ramp_s : 0.0;
   const double compliance = compliance_s2_ + ramp_compliance * ramp * ramp;
-  for (Index j = 0; j < torque_.size(); ++j)
-    bound[j] += other_postures * compliance * mass_inverse_.col(j).cwiseAbs().dot(torque_);
+  for (Index j = 0; j < torque_.size(); ++j) {
+    const double acceleration = mass_inverse_.col(j).cwiseAbs().dot(torque_);
+    bound.position[j] += other_postures * compliance * acceleration;
+    bound.velocity[j] = (velocity_error_s_ + ramp_share_of_speed * ramp) * acceleration;
+  }
   return bound;
 }
 

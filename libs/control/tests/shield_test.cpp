@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
@@ -192,6 +193,65 @@ TEST_CASE("an arm that is nearer than its margin may only move away", "[shield]"
   const double near = 0.3 - 0.17;  // 2 cm from it, less than the margin
   CHECK_FALSE(clear(near, near + 0.001));
   CHECK(clear(near, near - 0.1));
+
+  // Lines that lead away must not begin nearer and nearer.
+  const auto at = [](double distance) { return 0.3 - 2.0 * std::asin(0.5 * (distance + 0.15)); };
+  const auto leads_away_from = [&](double distance) {
+    return clear(at(distance), at(distance) - 1e-3);
+  };
+  line.forget();
+  CHECK(leads_away_from(0.04));
+  CHECK(leads_away_from(0.03));
+  CHECK_FALSE(leads_away_from(0.027));
+  CHECK(leads_away_from(0.03));
+  CHECK(leads_away_from(0.045));
+  CHECK_FALSE(leads_away_from(0.03));
+  CHECK(clear(at(0.08), at(0.07)));
+  CHECK(leads_away_from(0.049));
+  for (int i = 0; i < 2; ++i)
+    CHECK(leads_away_from(0.06));  // far enough away: what was before does not count any more
+  CHECK(leads_away_from(0.027));
+}
+
+TEST_CASE("friction does not make an arm swing that a stop holds", "[shield]") {
+  scene::Scene scene = shelf();
+  scene.model.torque_limits = true;
+  scene.actuation.type = scene::ActuationType::sampled;
+  scene.safety.friction_share = 0.05;
+  scene.safety.mass_error = 0.1;
+  const model::Model arm = control::load_model(scene);
+  const model::Model believed = control::scaled_masses(arm, 0.95);
+  const VectorXd friction =
+      0.05 * control::joint_limits(arm.robot(), &model::Joint::effort_max, 0.0);
+  constexpr double T = 0.001, friction_speed = 0.01;
+  constexpr int substeps = 100;  // friction is stiff
+  Shield shield(scene, believed, nullptr, T, {});
+  control::TorquePipeline pipeline(believed, 0, T);
+  dynamics::Workspace ws(arm), own(believed);
+  VectorXd q = scene.start_q, v = VectorXd::Constant(arm.dof(), 0.5), a = v, tau = v;
+  dynamics::gravity_torque(believed, own, q, tau);
+  pipeline.start_from(tau);
+  const scene::Environment environment;
+  shield.start({environment, 0, 0.0}, {q, v});
+  VectorXd lowest = q, highest = q;
+  for (int k = 0; k < 1500; ++k) {
+    pipeline.observe(own, q, v);
+    shield.refuse();
+    shield.stop_torque({q, v}, pipeline.disturbance(), pipeline.last(), tau);
+    pipeline.send(tau);
+    for (int i = 0; i < substeps; ++i) {
+      const VectorXd against = friction.cwiseProduct((v / friction_speed).array().tanh().matrix());
+      dynamics::forward_dynamics(arm, ws, q, v, tau - against, a);
+      v += T / substeps * a;
+      q += T / substeps * v;
+    }
+    if (k == 300) lowest = highest = q;
+    lowest = lowest.cwiseMin(q);
+    highest = highest.cwiseMax(q);
+  }
+  CHECK(shield.at_rest());
+  CHECK(shield.counts().strayed_share < 1.0);
+  CHECK((highest - lowest).maxCoeff() < 6e-4);
 }
 
 TEST_CASE("the shield refuses bounds that cannot hold, with the number that would do", "[shield]") {
@@ -232,6 +292,7 @@ TEST_CASE("an arm that was pushed off its stop comes to rest, with torques of a 
           "[shield]") {
   scene::Scene scene = shelf();
   scene.model.torque_limits = true;
+  scene.actuation.type = scene::ActuationType::sampled;
   scene.safety.tracking_rad = 1e-3;
   const model::Model model = control::load_model(scene);
   const scene::Environment environment;

@@ -471,7 +471,7 @@ std::size_t BoxField::nearest_distinct_of(const From& from, double limit, double
   const bool moves = vicinity != nullptr;
   Vicinity& near = moves ? *vicinity : scratch.once_;
   if (!moves || !near.covers(*this, from.a, from.b, limit))
-    near.gather(*this, from.a, from.b, limit + (moves ? Vicinity::skin_m : 0.0));
+    near.gather(*this, from.a, from.b, limit + (moves ? near.skin_m_ : 0.0));
   int count = 0;
   if (near.node_count_ >= 0) {
     std::array<float, Vicinity::nodes_max * width> bounds;

@@ -206,6 +206,18 @@ int Environment::reveal_visible(const Shapes& arm, double time_s,
   return -1;
 }
 
+// Shapes that move together would gather their boxes in the same call; different skins distribute
+// that work over many calls.
+Environment::Vicinity::Vicinity(std::size_t shapes) {
+  constexpr double least_m = 0.007, range_m = 0.006, golden = 0.6180339887498949;
+  double share = 0.0;
+  for (std::size_t i = 0; i < shapes; ++i) {
+    for (auto* field : {&map_, &unknown_}) field->emplace_back(least_m + range_m * share);
+    share += golden;
+    share -= std::floor(share);
+  }
+}
+
 std::size_t Environment::closest(const Shapes& arm, double influence, double time_s,
                                  Scratch& scratch, std::span<Contact> out, View view,
                                  std::span<const std::uint8_t> seen, Vicinity* vicinity) const {

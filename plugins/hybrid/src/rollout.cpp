@@ -9,7 +9,7 @@ namespace hamelin::hybrid {
 namespace {
 
 constexpr double step_s = 0.06;        // long steps are possible without dynamics
-constexpr double radius_m = 0.10;      // obstacles beyond this distance are ignored
+constexpr double radius_m = 0.07;      // obstacles beyond this distance are ignored
 constexpr double rate = 8.0;           // speed per distance from obstacles and joint limits [1/s]
 constexpr int passes = 12;             // of the filter
 constexpr int idle_steps = 6;          // more steps without progress end the rollout

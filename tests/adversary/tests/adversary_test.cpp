@@ -95,6 +95,23 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("estimated velocities keep their limits, also where friction and masses are not known",
+          "[adversary]") {
+  for (const char* name : {"clutter", "shelf"})
+    for (const std::uint64_t seed : {6U, 10U, 26U}) {
+      scene::Scene scene = sampled(under_attack(name, seed));
+      scene.safety.torque_share = 0.75;
+      scene.actuation.coulomb_friction_share = scene.safety.friction_share = 0.05;
+      scene.actuation.planner_mass_scale = 0.9;
+      scene.safety.mass_error = 0.1;
+      scene.actuation.estimates_velocity = true;
+      scene.actuation.joint_noise_rad = scene.safety.joint_noise_rad = 1e-4;
+      const log::Result result = simulation::run(scene, plugins, {});
+      check_safe(scene, result);
+      CHECK(result.speed_excess == 0.0);
+    }
+}
+
 TEST_CASE("a bound that does not hold is noticed by what stops do, and named", "[adversary]") {
   struct Case {
     const char* what;

@@ -8,7 +8,7 @@ namespace hamelin::control {
 
 /// Finds how fast an arm can stop on a straight joint line: the largest rate α at which the torques
 /// M(q)(−α w) + s² C(q, w) w + g(q) of the StopMotion stay within given limits until it rests:
-/// docs/theory.md (14.9)–(14.12). One object per thread. No allocation after construction.
+/// docs/theory.md (14.10)–(14.13). One object per thread. No allocation after construction.
 class BrakingRate {
  public:
   /// @param effort_max allowed torques [Nm or N]; of size zero: any

@@ -20,6 +20,13 @@ namespace hamelin::control {
 /// One object per thread and kind of line. No allocation after construction.
 class LineCheck {
  public:
+  /// The lines of a shape or pair that began nearer than need be, since the last time when it had
+  /// come far enough away.
+  struct Begun {
+    double distance = -1.0;  ///< the largest at the beginning of any of them
+    double need = 0.0;       ///< the largest that any of them needed
+  };
+
   /// @param levers of the model, kept by reference
   /// @param self null if self-collision is not modelled
   LineCheck(const model::Model& model, const Levers& levers, const scene::SelfField* self);
@@ -86,8 +93,8 @@ class LineCheck {
   bool capsule_is_clear(std::size_t shape, Blocker& blocker);
   /// Tube radius, margin and own radius of a shape on a piece of length 1/pieces.
   [[nodiscard]] double need(std::size_t shape, int pieces) const;
-  /// The same, or less if the line begins nearer: then it may lead away, but not nearer still.
-  [[nodiscard]] double need_from(std::size_t shape, int pieces, double distance_at_start) const;
+  /// The same without margin and straying, which even an arm that leads away must keep.
+  [[nodiscard]] double least(std::size_t shape, int pieces) const;
   bool pair_is_clear(std::size_t pair, Blocker& blocker);
   /// The shapes at i/pieces of the line.
   scene::Shapes at(int i, int pieces);
@@ -98,8 +105,9 @@ class LineCheck {
   const Levers& levers_;
   const scene::SelfField* self_;
   std::vector<Anchor> anchors_;
-  Eigen::MatrixXd pair_q_;         ///< dof × pairs: where their distances were found
-  Eigen::VectorXd pair_distance_;  ///< there; negative: none
+  std::vector<Begun> begun_, pairs_begun_;  ///< of shapes, and of pairs
+  Eigen::MatrixXd pair_q_;                  ///< dof × pairs: where their distances were found
+  Eigen::VectorXd pair_distance_;           ///< there; negative: none
   long queries_ = 0;
 
   // of the line that is checked

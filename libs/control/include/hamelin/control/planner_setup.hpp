@@ -26,7 +26,7 @@ struct ModelledLimits {
 /// keeps these has nothing to refuse.
 struct LimitReserve {
   Eigen::VectorXd position;  ///< of each joint [rad or m]; of size zero: none
-  double speed_share = 0.0;  ///< of the velocity limits
+  Eigen::VectorXd velocity;  ///< of each joint [rad/s or m/s]; of size zero: none
 };
 
 /// The data that a planner is given before its first tick: goals, limits and timing of a scene, the

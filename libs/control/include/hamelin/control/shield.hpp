@@ -93,7 +93,7 @@ class Shield {
          double period_s, const Drive& drive);
 
   /// By how much the planner's limits should lie inside those that this keeps.
-  [[nodiscard]] LimitReserve limit_reserve();
+  [[nodiscard]] const LimitReserve& limit_reserve() const noexcept { return reserve_; }
 
   /// Begins at a node, which must have a verified stop itself.
   /// @throws Error invalid if it has none, with the bound that would do
@@ -114,7 +114,7 @@ class Shield {
   [[nodiscard]] bool accept(const Surroundings& world, const Step& step);
   /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
   void refuse();
-  /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.13).
+  /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.14).
   /// @param disturbance acceleration that acts besides that of the torques [rad/s² or m/s²]
   /// @param last the torque of the period before, where torques change at a bounded rate
   void stop_torque(const Node& node, const Eigen::VectorXd& disturbance,
@@ -139,6 +139,8 @@ class Shield {
   [[nodiscard]] std::string describe(const scene::Environment& environment) const;
 
  private:
+  /// Sets what is kept from the limits. @param q where the arm starts
+  void set_reserve(const scene::Scene& scene, const Eigen::VectorXd& q);
   /// Why the arm cannot begin at a node, and what would do.
   [[nodiscard]] std::string defect_at_start(const Surroundings& world, const Node& node);
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
@@ -152,6 +154,8 @@ class Shield {
   void note_straying(Eigen::Index joint, double strayed);
   /// The torque that keeps to the stop in the next period.
   void follow_stop(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
+  /// Adds what resists a disturbance at rest.
+  void resist(const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
   /// Sets rate_ to the acceleration that brings the arm back to the stop.
   void feed_back(const Node& node);
   /// Whether the arm has strayed beyond its bounds, and the torque that would bring it back is
@@ -177,15 +181,15 @@ class Shield {
   const model::Model& model_;
   const scene::SelfField* self_;
   std::string scene_name_;
-  Eigen::VectorXd start_q_;  ///< of the scene
-  bool sampled_;             ///< whether actuation is not ideal
+  bool sampled_;  ///< whether actuation is not ideal
   double period_s_, margin_m_;
   long dwell_;            ///< steps that a stop lasts at least, unless it ends before
   double feedback_rate_;  ///< ω [1/s]
   ModelledLimits limits_;
   Eigen::VectorXd damping_, friction_;  ///< of size zero: not modelled
   double friction_speed_, torque_share_;
-  double speed_reserve_ = 0.0;  ///< share of the velocity limits
+  Eigen::VectorXd speed_max_;  ///< of size zero: not modelled
+  LimitReserve reserve_;
   Levers levers_;
   Drive drive_;
   Straying straying_;  ///< of tried_

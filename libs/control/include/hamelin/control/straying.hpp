@@ -12,12 +12,12 @@
 namespace hamelin::control {
 
 /// By how much an arm may stray from a stop, given the errors that a scene states:
-/// docs/theory.md (14.15)–(14.19). No allocation after construction.
+/// docs/theory.md (14.17)–(14.21). No allocation after construction.
 class Straying {
  public:
   /// @param model, levers kept by reference
   /// @param period_s time between two steps
-  /// @param feedback_rate ω of a stop's feedback, docs/theory.md (14.13) [1/s]
+  /// @param feedback_rate ω of a stop's feedback, docs/theory.md (14.14) [1/s]
   /// @param torque_rate largest rate of change of each torque [Nm/s or N/s]; zero: unbounded
   Straying(const scene::Scene& scene, const model::Model& model, const Levers& levers,
            double period_s, double feedback_rate, double torque_rate);
@@ -30,12 +30,17 @@ class Straying {
   [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return errors_; }
   /// The same of each shape [m], far less than the joints' added up; of size zero: none.
   [[nodiscard]] const Eigen::VectorXd& shapes() const noexcept { return shapes_; }
+  /// Bound of the friction that the model does not have, of each joint [Nm or N].
+  [[nodiscard]] const Eigen::VectorXd& friction() const noexcept { return friction_; }
   /// Bound of the noise of measured joint positions [rad or m].
   [[nodiscard]] double noise() const noexcept { return noise_; }
 
-  /// By how much each joint may stray from rest at a configuration, as far as the motion itself
-  /// does not cause it [rad or m].
-  [[nodiscard]] Eigen::VectorXd at_rest(const Eigen::VectorXd& q);
+  /// What is not known of an arm that rests, or moves at a constant speed.
+  struct AtRest {
+    Eigen::VectorXd position;  ///< by how much each joint may stray [rad or m]
+    Eigen::VectorXd velocity;  ///< by how much it may be faster than it seems [rad/s or m/s]
+  };
+  [[nodiscard]] AtRest at_rest(const Eigen::VectorXd& q);
 
  private:
   [[nodiscard]] bool has_model_errors() const {
@@ -55,8 +60,9 @@ class Straying {
   double mass_error_;         ///< bound of unexplained torques as a share of the model's own
   Eigen::VectorXd friction_;  ///< bound of unexplained friction of each joint [Nm or N]
   double noise_;
-  double compliance_s2_;    ///< by how much a joint strays per unexplained acceleration
-  Eigen::VectorXd stated_;  ///< safety.tracking_rad
+  double compliance_s2_;     ///< by how much a joint strays per unexplained acceleration
+  double velocity_error_s_;  ///< of a velocity per unexplained acceleration
+  Eigen::VectorXd stated_;   ///< safety.tracking_rad
   Eigen::VectorXd tracking_, errors_, shapes_;
   Eigen::MatrixXd mass_, mass_inverse_;
   Eigen::LLT<Eigen::MatrixXd> factors_;

@@ -8,7 +8,7 @@
 namespace hamelin::control {
 
 /// The torques that are on their way to an arm whose torques act late, and where the arm will be
-/// when they have acted: docs/theory.md (14.14). What the model does not explain (friction, wrong
+/// when they have acted: docs/theory.md (14.16). What the model does not explain (friction, wrong
 /// masses) is estimated as an acceleration from the difference between the velocity and its
 /// prediction, and is expected to go on. No allocation after construction.
 class TorquePipeline {

@@ -90,13 +90,14 @@ class BoxField {
   class Vicinity {
    public:
     /// Allocates all memory that it will use.
-    Vicinity() : nodes_(std::make_unique_for_overwrite<kernel::TreeNode[]>(nodes_max)) {}
+    /// @param skin_m how far the query may move before it gathers boxes again
+    explicit Vicinity(double skin_m = 0.01)
+        : skin_m_(skin_m), nodes_(std::make_unique_for_overwrite<kernel::TreeNode[]>(nodes_max)) {}
 
    private:
     friend class BoxField;
     friend class MapField;
     static constexpr std::size_t nodes_max = 64;
-    static constexpr double skin_m = 0.01;  ///< how far the query may move before it gathers again
     [[nodiscard]] bool covers(const BoxField& field, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, double limit) const noexcept;
     void set_empty(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
@@ -104,6 +105,7 @@ class BoxField {
     void gather(const BoxField& field, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 double reach) noexcept;
 
+    double skin_m_;
     std::uint64_t revision_ = 0;  ///< of the field; zero: of none
     Eigen::Vector3d a_ = Eigen::Vector3d::Zero(), b_ = Eigen::Vector3d::Zero();
     double reach_ =

@@ -82,7 +82,7 @@ class Environment {
   class Vicinity {
    public:
     /// Allocates all memory that queries with so many shapes will use.
-    explicit Vicinity(std::size_t shapes) : map_(shapes), unknown_(shapes) {}
+    explicit Vicinity(std::size_t shapes);
 
    private:
     friend class Environment;
