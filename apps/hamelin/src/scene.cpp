@@ -109,8 +109,11 @@ class ArmClearance {
 };
 
 // The map of a scene, as `scene info` describes it.
-Json map_json(const scene::Environment& environment, double reach_m) {
+Json map_json(const scene::Scene& scene, const scene::Environment& environment, double reach_m) {
   const auto& summary = environment.summary();
+  const scene::Shares shares = summary.within_reach
+                                   ? *summary.within_reach
+                                   : scene::shares_within_reach(*scene.map, scene.base, reach_m);
   Json map{{"file", summary.map_file},
            {"sha256", summary.map_sha256},
            {"resolution_m", summary.resolution_m},
@@ -120,9 +123,9 @@ Json map_json(const scene::Environment& environment, double reach_m) {
            {"unknown", scene::to_string(summary.unknown)},
            {"self_filter", nullptr}};
   map["within_reach"] = {{"reach_m", reach_m},
-                         {"occupied_share", summary.within_reach.occupied},
-                         {"free_share", summary.within_reach.free},
-                         {"unknown_share", summary.within_reach.unknown},
+                         {"occupied_share", shares.occupied},
+                         {"free_share", shares.free},
+                         {"unknown_share", shares.unknown},
                          {"occupied_leaves", summary.leaves_cropped},
                          {"boxes", summary.boxes},
                          {"unknown_boxes", summary.unknown_boxes},
@@ -160,7 +163,7 @@ Json scene_info(const std::filesystem::path& file) {
             {"self_clearance_at_start_m", nullptr},
             {"timing", {{"build_ms", build_ms}}},
             {"warnings", summary.warnings}};
-  if (summary.has_map) info["map"] = map_json(environment, model.reach());
+  if (summary.has_map) info["map"] = map_json(scene, environment, model.reach());
   if (model.shapes().empty()) return info;
   const auto check_size = [&](const Eigen::VectorXd& q, const std::string& place) {
     if (q.size() != model.dof())

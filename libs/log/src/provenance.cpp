@@ -102,8 +102,7 @@ std::string build_id() {
 Json provenance(const std::vector<Input>& inputs, const std::vector<std::string>& argv) {
   Json hashed = Json::array();
   for (const auto& [role, file] : inputs)
-    hashed.push_back(
-        {{"role", role}, {"path", file.string()}, {"sha256", sha256_hex(read_file(file))}});
+    hashed.push_back({{"role", role}, {"path", file.string()}, {"sha256", sha256_of_file(file)}});
   std::error_code ec;
   const BuildInfo& build = build_info();
   const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." +

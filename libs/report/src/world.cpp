@@ -280,7 +280,7 @@ std::string world_key(const simulation::Recorded& recorded) {
     if (!key.contains(file) || !key[file].is_string()) return;
     std::error_code ec;
     const std::filesystem::path path = key[file].get<std::string>();
-    if (std::filesystem::is_regular_file(path, ec)) key[file] = sha256_hex(read_file(path));
+    if (std::filesystem::is_regular_file(path, ec)) key[file] = sha256_of_file(path);
   };
   for (const char* file : {"/robot/file", "/robot/spheres", "/robot/srdf", "/map/file"})
     content(Json::json_pointer(file));

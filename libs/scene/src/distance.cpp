@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -511,12 +510,14 @@ NearTable::NearTable(const Ball& region, double edge) {
 }
 
 void NearTable::clear() {
-  std::fill(cells_.begin(), cells_.end(), std::uint64_t{0});
+  std::fill(cells_.begin(), cells_.end(), std::uint32_t{0});
 }
 
 // docs/theory.md (11.24)
 NearTable::Answer NearTable::query(const BoxField& field, const Eigen::Vector3d& p) const {
-  constexpr double margin = 1e-6;  // far above the rounding of points, cells and floats [m]
+  constexpr double margin = 1e-6;  // far above the rounding of points and cells [m]
+  constexpr double unit = 1e-4;    // of stored distances [m]
+  constexpr std::uint32_t most = 0xFFFF;
   constexpr float no_bound = -float_infinity;
   if (cells_.empty() || field.empty()) return {no_bound, -1};
   const Eigen::Vector3d at = (p - low_) * inverse_edge_;
@@ -527,17 +528,21 @@ NearTable::Answer NearTable::query(const BoxField& field, const Eigen::Vector3d&
   const Eigen::Vector3d middle =
       low_ + edge_ * Eigen::Vector3d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5,
                                      static_cast<double>(z) + 0.5);
-  const std::atomic_ref<std::uint64_t> cell(cells_[(x * count_ + y) * count_ + z]);
-  std::uint64_t known = cell.load(std::memory_order_relaxed);
+  const std::atomic_ref<std::uint32_t> cell(cells_[(x * count_ + y) * count_ + z]);
+  std::uint32_t known = cell.load(std::memory_order_relaxed);
   if (known == 0) {
     BoxHit hit;
     (void)field.nearest(middle, std::numeric_limits<double>::infinity(), hit);
-    known = (static_cast<std::uint64_t>(hit.box + 1) << 32U) |
-            std::bit_cast<std::uint32_t>(round_down(hit.distance - margin));
+    const double units = std::clamp((hit.distance - margin) / unit, 0.0, most - 1.0);
+    const auto box = static_cast<std::uint32_t>(hit.box) + 1;
+    known = (box <= most ? box << 16U : 0U) | (static_cast<std::uint32_t>(units) + 1U);
     cell.store(known, std::memory_order_relaxed);
   }
-  const auto bound = static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(known)));
-  return {round_down(bound - (p - middle).norm()), static_cast<std::int32_t>(known >> 32U) - 1};
+  const auto hint = static_cast<std::int32_t>(known >> 16U) - 1;
+  const std::uint32_t stored = (known & most) - 1U;
+  if (stored == 0) return {no_bound, hint};
+  const double bound = unit * static_cast<double>(stored) - margin;
+  return {round_down(bound - (p - middle).norm()), hint};
 }
 
 }  // namespace hamelin::scene

@@ -84,8 +84,8 @@ void filter_robot(const MapSpec& map, const RobotAtStart& robot,
 
 // Refuses or warns where unknown space matters and most of the reachable ball is unknown.
 void check_unknown_share(const MapSpec& map, MapSummary& summary) {
-  const Shares& shares = summary.within_reach;
-  if (map.unknown == UnknownPolicy::free || shares.unknown <= 0.5) return;
+  if (!summary.within_reach || summary.within_reach->unknown <= 0.5) return;
+  const Shares& shares = *summary.within_reach;
   const double percent = 100.0 * shares.unknown;
   if (shares.free > 0.0) {
     summary.warnings.push_back(
@@ -124,6 +124,11 @@ Shares shares_within(const MapData& map, const Ball& ball) {
   return {occupied / all, free / all, (all - in_tree + unknown) / all};
 }
 
+Shares shares_within_reach(const MapSpec& map, const geometry::SE3& base, double reach) {
+  return shares_within(read_map(map.file, {map.scale, map.occupancy_threshold}),
+                       {map.pose.inverse() * base.p(), reach});
+}
+
 MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reach, double influence,
                       const RobotAtStart& robot) {
   if (!(reach >= 0.0 && influence >= 0.0 && std::isfinite(reach) && std::isfinite(influence)))
@@ -148,7 +153,8 @@ MapRegion read_region(const MapSpec& map, const geometry::SE3& base, double reac
   summary.free_leaves = data.free_leaves;
   summary.unknown = map.unknown;
   summary.warnings = std::move(data.warnings);
-  summary.within_reach = shares_within(data, region.reachable);
+  if (map.unknown != UnknownPolicy::free)
+    summary.within_reach = shares_within(data, region.reachable);
   region.occupied = crop(data.occupied, data.resolution, region.ball);
   summary.leaves_cropped = region.occupied.size();
   if (!data.occupied.empty() && region.occupied.empty())

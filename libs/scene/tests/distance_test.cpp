@@ -399,7 +399,10 @@ TEST_CASE(
     BoxHit hit;
     REQUIRE(field.nearest(p, 10.0, hit));
     CHECK(static_cast<double>(answer.lower) <= hit.distance);
-    CHECK(static_cast<double>(answer.lower) >= hit.distance - 0.05 * std::sqrt(3.0) - 2e-6);
+    if (answer.lower == -std::numeric_limits<float>::infinity())  // the cell's centre is in a box
+      CHECK(hit.distance <= 0.025 * std::sqrt(3.0) + 1.02e-4);
+    else
+      CHECK(static_cast<double>(answer.lower) >= hit.distance - 0.05 * std::sqrt(3.0) - 1.02e-4);
     CHECK(static_cast<std::size_t>(answer.hint) < boxes.size());
   }
   CHECK(known > 1000);

@@ -61,7 +61,7 @@ TEST_CASE("inside the region a cropped map equals the map, to OctoMap and in dis
   const CropReport report = crop_map(options);
   CHECK(report.bytes * 2 < report.bytes_before);
   CHECK(report.bytes == std::filesystem::file_size(options.output));
-  CHECK(report.sha256 == sha256_hex(read_file(options.output)));
+  CHECK(report.sha256 == sha256_of_file(options.output));
   const octomap::OcTree whole(options.map.string()), part(options.output.string());
   CHECK(part.size() == report.nodes);
   CHECK(part.getResolution() == whole.getResolution());

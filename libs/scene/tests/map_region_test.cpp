@@ -126,7 +126,7 @@ TEST_CASE("shares within reach are those of the ball's voxels and add up to one"
     return p.z() < -0.2 ? 'o' : p.z() < 0.3 ? 'f' : 'u';
   });
   const auto region = read_region(painted.spec, {}, 0.8, 0.1);
-  const Shares& shares = region.summary.within_reach;
+  const Shares shares = shares_within_reach(painted.spec, {}, 0.8);
   // Caps of height h: π h² (3r − h)/3.
   const auto cap = [](double h) { return h * h * (3.0 * 0.8 - h) / (4.0 * 0.8 * 0.8 * 0.8); };
   CHECK(shares.occupied == Approx(cap(0.6)).epsilon(0.01));

@@ -38,7 +38,7 @@ Found find_input(const fs::path& named, const std::string& sha256, const fs::pat
        {named, cwd / named, log.parent_path() / named, log.parent_path() / named.filename()}) {
     std::error_code ec;
     if (!fs::is_regular_file(place, ec)) continue;
-    Found here{place, sha256_hex(read_file(place))};
+    Found here{place, sha256_of_file(place)};
     if (here.sha256 == sha256) return here;
     if (first.file.empty()) first = std::move(here);
   }
@@ -276,7 +276,7 @@ Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_di
   if (recorded.program == Recorded::Program::run && recorded.scene.planner) {
     const auto plugin = planning::find_plugin(recorded.scene.planner->name, plugin_directories);
     const std::string then = logged_hash(header, "plugin"),
-                      now = sha256_hex(read_file(plugin.file()));
+                      now = sha256_of_file(plugin.file());
     if (then != now)
       recorded.other_build.push_back(
           fmt::format("planner '{}': SHA-256 {}... in the log, {}... now", plugin.name(),

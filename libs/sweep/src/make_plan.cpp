@@ -195,7 +195,7 @@ class PlanBuilder {
     entry.scene.feasible = found.feasible;
     entry.scene.reason = found.reason;
     entry.scene.file = fs::proximate(file, directory_).generic_string();
-    entry.scene.sha256 = sha256_hex(read_file(file));
+    entry.scene.sha256 = sha256_of_file(file);
     entries_.push_back(std::move(entry));
   }
 
@@ -482,10 +482,10 @@ class PlanBuilder {
     }
     for (const auto& file : files)
       plan.inputs.push_back(
-          {file.generic_string(), sha256_hex(read_file(resolve_path(directory_, file)))});
+          {file.generic_string(), sha256_of_file(resolve_path(directory_, file))});
     for (const auto& name : planners)
-      plan.plugins.push_back({name, sha256_hex(read_file(planning::find_plugin_file(
-                                        name, options_.plugin_directories)))});
+      plan.plugins.push_back(
+          {name, sha256_of_file(planning::find_plugin_file(name, options_.plugin_directories))});
   }
 
   // Each planner has its own names for the gains.

@@ -154,7 +154,7 @@ scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
 void check_unchanged(const Plan& plan, const fs::path& directory,
                      const std::vector<fs::path>& plugin_directories) {
   const auto check = [&](const fs::path& file, const std::string& planned) {
-    if (const std::string now = sha256_hex(read_file(file)); now != planned)
+    if (const std::string now = sha256_of_file(file); now != planned)
       throw Error(ErrorCode::invalid, fmt::format("{}: has changed since the sweep was planned: "
                                                   "SHA-256 {}, expected {}; plan it again, in a "
                                                   "new directory if there are records",

@@ -171,11 +171,11 @@ TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will re
   for (const auto& plugin : plan.plugins) plugins[plugin.name] = plugin.sha256;
   std::map<std::string, std::string> expected;
   for (const char* name : {"arm7.urdf", "arm7.spheres.json", "clutter.bt", "shelf.bt"})
-    expected[std::string("../inputs/") + name] = sha256_hex(read_file(work / name));
+    expected[std::string("../inputs/") + name] = sha256_of_file(work / name);
   CHECK(inputs == expected);
   for (const char* name : {"apf", "hybrid"})
-    CHECK(plugins.at(name) == sha256_hex(read_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) /
-                                                   (std::string(name) + ".hamelin.so"))));
+    CHECK(plugins.at(name) == sha256_of_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) /
+                                                   (std::string(name) + ".hamelin.so")));
   CHECK(plugins.size() == 2);
   CHECK_NOTHROW(check_unchanged(plan, bench.dir("a"), plugin_directories));
   for (const char* name : {"arm7.spheres.json", "arm7.urdf", "clutter.bt", "shelf.bt"}) {

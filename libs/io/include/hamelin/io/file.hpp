@@ -22,5 +22,7 @@ void write_file_atomically(const std::filesystem::path& file, std::string_view c
 
 /// SHA-256 of the bytes, as 64 hexadecimal digits.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
+/// The same of a file's content. @throws Error io as read_file()
+[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace hamelin

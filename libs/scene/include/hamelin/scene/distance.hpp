@@ -191,16 +191,18 @@ class NearTable {
   void clear();
 
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return cells_.capacity() * sizeof(std::uint64_t);
+    return cells_.capacity() * sizeof(std::uint32_t);
   }
 
  private:
   Eigen::Vector3d low_ = Eigen::Vector3d::Zero();
   double edge_ = 0.0, inverse_edge_ = 0.0;
   std::size_t count_ = 0;  ///< along each axis
-  /// Lower 32 bits: a float, the distance at the cell's centre reduced by a margin for rounding.
-  /// Upper 32 bits: the index of the nearest box plus one. Zero if the cell was not queried yet.
-  mutable std::vector<std::uint64_t> cells_;
+  /// Lower 16 bits: the distance at the cell's centre, rounded down to a number of units, plus one;
+  /// zero units, also inside a box, give no bound.
+  /// Upper 16 bits: the index of the nearest box plus one, or zero if that is too large. Zero if
+  /// the cell was not queried yet.
+  mutable std::vector<std::uint32_t> cells_;
 };
 
 }  // namespace hamelin::scene

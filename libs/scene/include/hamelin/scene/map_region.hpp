@@ -48,6 +48,11 @@ struct Shares {
 /// @param ball in the map's frame [m]; zero shares if its radius is zero
 [[nodiscard]] Shares shares_within(const MapData& map, const Ball& ball);
 
+/// The same of the map of a scene, for the ball that an arm can reach.
+/// @param base of the arm @param reach [m] @throws Error as read_map()
+[[nodiscard]] Shares shares_within_reach(const MapSpec& map, const geometry::SE3& base,
+                                         double reach);
+
 /// The robot's shapes at the start of a run, in the world.
 struct RobotAtStart {
   Shapes arm;   ///< of the links
@@ -63,7 +68,8 @@ struct MapSummary {
   std::size_t leaves = 0;          ///< occupied leaves in the file
   std::size_t leaves_cropped = 0;  ///< of these within reach + influence
   std::size_t free_leaves = 0;     ///< in the file
-  Shares within_reach;             ///< of the file's map, before any removal
+  /// Of the file's map, before any removal; none where unknown space is free.
+  std::optional<Shares> within_reach;
   UnknownPolicy unknown = UnknownPolicy::free;
   std::optional<double> self_filter_padding_m;
   std::size_t self_filter_voxels = 0;          ///< occupied voxels that the self-filter removed
