@@ -50,6 +50,7 @@ class Keep {
     return true;
   }
   [[nodiscard]] double need() const noexcept { return need_; }
+  [[nodiscard]] double least() const noexcept { return least_; }
   [[nodiscard]] bool leads_away() const noexcept { return leads_away_; }
   /// What a line that leads away needs at its end. @param way from its start
   [[nodiscard]] double at_end(double way) const noexcept { return from_ + away_share * way; }
@@ -65,8 +66,8 @@ class Keep {
 class TwoEnded {
  public:
   /// @param way the longest way on a piece
-  TwoEnded(const Keep& keep, double least, double way, int pieces, LineCheck::Begun& before)
-      : keep_(keep), before_(before), least_(least), way_(way), pieces_(pieces) {}
+  TwoEnded(const Keep& keep, double way, int pieces, LineCheck::Begun& before)
+      : keep_(keep), before_(before), way_(way), pieces_(pieces) {}
   /// @param chord of the piece that ends here @return whether it is clear so far
   bool goes_on(double distance, double chord) {
     const double last = std::exchange(last_, distance);
@@ -88,13 +89,13 @@ class TwoEnded {
     if (distance > between_) return true;
     const bool may_begin = keep_.begin(distance, before_);
     missing_ = keep_.missing();
-    between_ = std::max(least_, keep_.need() - way_);
-    return may_begin && way_ > 0.0 && keep_.need() > least_;
+    between_ = std::max(keep_.least(), keep_.need() - way_);
+    return may_begin && way_ > 0.0 && keep_.need() > keep_.least();
   }
 
   Keep keep_;
   LineCheck::Begun& before_;
-  double between_ = 0.0, least_, way_, last_ = 0.0, gone_ = 0.0, missing_ = 0.0;
+  double between_ = 0.0, way_, last_ = 0.0, gone_ = 0.0, missing_ = 0.0;
   int ends_ = 0, pieces_;
 };
 
@@ -267,7 +268,7 @@ bool LineCheck::capsule_is_clear(std::size_t shape, Blocker& blocker) {
   const double way = levers_.shapes().row(static_cast<Index>(shape)).dot(way_);
   const double tube = model_.shapes()[shape].radius;
   for (const int pieces : two_ended_pieces) {
-    TwoEnded line({need(shape, pieces), tube}, tube, way / pieces, pieces, begun_[shape]);
+    TwoEnded line({need(shape, pieces), tube}, way / pieces, pieces, begun_[shape]);
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       const scene::Shapes arm = at(i, pieces);
@@ -312,7 +313,7 @@ bool LineCheck::pair_is_clear(std::size_t pair, Blocker& blocker) {
   way_ = dq_.cwiseAbs();
   const double way = lever.dot(way_);
   for (const int pieces : two_ended_pieces) {
-    TwoEnded line({stray, 0.0}, 0.0, way / pieces, pieces, pairs_begun_[pair]);
+    TwoEnded line({stray, 0.0}, way / pieces, pieces, pairs_begun_[pair]);
     bool clear = true;
     for (int i = 0; i <= pieces && clear; ++i) {
       clear = line.goes_on(self_->distance(pair, at(i, pieces), far_m), way / pieces);

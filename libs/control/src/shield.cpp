@@ -135,18 +135,10 @@ void Shield::notice(const Surroundings& world) {
 
 void Shield::start(const Surroundings& world, const Node& node) {
   counts_ = {};
-  stopping_ = false;
-  run_ = 0;
+  largest_margin_ = 0.0;
   notice(world);
   dynamics::gravity_torque(model_, ws_, node.q, hold_);
-  if (verify(world, {node, node.v, node, zero_, hold_, zero_})) {
-    std::swap(stop_, tried_);
-    stop_stray_ = straying_.tracking() + straying_.errors();
-    stop_time_ = 0.0;
-    changed_ = false;
-    largest_margin_ = stop_line_.largest_stray_m();
-    return;
-  }
+  if (verify(world, {node, node.v, node, zero_, hold_, zero_})) return take_tried();
   throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
 }
 
@@ -181,18 +173,22 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
       what, stop_line_.largest_stray_m(), refusal_.blocker.missing_m);
 }
 
+void Shield::take_tried() {
+  std::swap(stop_, tried_);
+  stop_stray_ = straying_.tracking() + straying_.errors();
+  stop_time_ = 0.0;
+  stopping_ = changed_ = false;
+  run_ = 0;
+  largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
+}
+
 bool Shield::accept(const Surroundings& world, const Step& step) {
   const Node& to = step.to;
   ++counts_.steps;
   notice(world);
   const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
-    std::swap(stop_, tried_);
-    stop_stray_ = straying_.tracking() + straying_.errors();
-    stop_time_ = 0.0;
-    stopping_ = changed_ = false;
-    run_ = 0;
-    largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
+    take_tried();
     return true;
   }
   if (!to.q.allFinite() || !to.v.allFinite()) refusal_ = {};

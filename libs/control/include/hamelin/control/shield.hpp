@@ -144,6 +144,8 @@ class Shield {
   /// Why the arm cannot begin at a node, and what would do.
   [[nodiscard]] std::string defect_at_start(const Surroundings& world, const Node& node);
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);
+  /// The stop that was verified is now the one that goes on if the next step is refused.
+  void take_tried();
   /// Sets tried_ to a stop after the step. @return whether there is one
   [[nodiscard]] bool find_stop(const Step& step, double least_utilisation);
   /// Whether the stop after the step keeps the joint limits and stays clear.
