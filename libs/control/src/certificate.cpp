@@ -30,6 +30,7 @@ Certificate::Certificate(const model::Model& model, double limit, const scene::S
       levers_(model, self),
       arm_(model) {
   appearing_.reserve(obstacles_max);
+  movers_.reserve(obstacles_max);
   const Index n = model.dof();
   for (auto* x : {&q_, &dq_, &stray_, &curvature_, &rest_, &q_middle_, &rate_}) x->setZero(n);
 }
@@ -40,21 +41,15 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   environment_ = &environment;
   q_ = from.q;
   dq_ = to.q - from.q;
-  time_s_ = from.time_s;
-  h_ = to.time_s - from.time_s;
+  moment_ = from.moment;
+  ahead_ = to.moment.now_s == from.moment.now_s;
+  h_ = to.moment.now_s + to.moment.ahead_s - from.moment.now_s - from.moment.ahead_s;
   stray_ = 0.25 * h_ * (to.v - from.v).cwiseAbs();  // docs/theory.md (12.2)
   levers_.extend_travel(from.q, stray_);
   levers_.extend_travel(to.q, stray_);
   levers_.curvature(dq_, curvature_);
   rest_ = 0.125 * curvature_ + stray_;
-  obstacle_travel_ = 0.0;
-  appearing_.clear();
-  for (std::size_t k = 0; k < environment_->obstacles().size(); ++k) {
-    const auto& obstacle = environment_->obstacles()[k];
-    if (!scene::exists(obstacle, to.time_s)) continue;
-    obstacle_travel_ = std::max(obstacle_travel_, h_ * scene::max_speed(obstacle));
-    if (!scene::exists(obstacle, from.time_s)) appearing_.push_back(k);
-  }
+  find_movers(from, to);
   contact_ = false;
   pieces_ = 0;
 
@@ -68,12 +63,9 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   for (std::size_t s = 0; s < from.clearance.size(); ++s) {
     const Subject subject{s, false};
     const double d = appearing_.empty() ? from.clearance[s]
-                                        : clearance_of_appearing(from.arm.single(s), from.time_s,
+                                        : clearance_of_appearing(from.arm.single(s), from.moment,
                                                                  from.clearance[s]);
-    const double rest = lever(subject).dot(rest_);
-    const double bound =
-        0.5 * (d + to.clearance[s] - chord(from.arm, to.arm, s) - obstacle_travel_) - rest;
-    include(subject, bound, d, to.clearance[s]);  // docs/theory.md (12.7)
+    include(subject, bound_on_step(from, to, s, d, to.clearance[s]), d, to.clearance[s]);
   }
   for (std::size_t k = 0; k < from.pairs.size(); ++k) {
     const Subject subject{k, true};
@@ -88,6 +80,49 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   return verdict;
 }
 
+void Certificate::find_movers(const Node& from, const Node& to) {
+  appearing_.clear();
+  movers_.clear();
+  for (std::size_t k = 0; k < environment_->obstacles().size(); ++k) {
+    const auto& obstacle = environment_->obstacles()[k];
+    if (!scene::exists(obstacle, to.moment.now_s)) continue;
+    if (!scene::exists(obstacle, from.moment.now_s)) appearing_.push_back(k);
+    if (!environment_->moves(k)) continue;
+    const scene::Placed at_from = scene::placed_at(obstacle, from.moment),
+                        at_to = scene::placed_at(obstacle, to.moment);
+    const double ball = scene::bounding_radius(obstacle),
+                 speed =
+                     ahead_ ? scene::max_speed(obstacle, from.moment) : scene::max_speed(obstacle);
+    movers_.push_back({h_ * speed, at_from.pose.p(), at_to.pose.p(), ball + at_from.nearer_m,
+                       ball + at_to.nearer_m});
+  }
+}
+
+double Certificate::bound_on_step(const Node& from, const Node& to, std::size_t shape, double d,
+                                  double d_next) {
+  const double moved = chord(from.arm, to.arm, shape),
+               rest = levers_.shapes().row(static_cast<Index>(shape)).dot(rest_);
+  const double standing = 0.5 * (d + d_next - moved) - rest;
+  const double own =
+      from.arm.radii[shape] + (from.arm.is_capsule(shape) ? from.arm.half_axes[shape].norm() : 0.0);
+  double bound = standing;
+  travel_ = 0.0;
+  for (const Mover& mover : movers_) {
+    const double apart = (from.arm.centers[shape] - mover.from).norm() - mover.ball_from - own,
+                 apart_next = (to.arm.centers[shape] - mover.to).norm() - mover.ball_to - own;
+    const double by_balls =
+        0.5 * (std::max(d, apart) + std::max(d_next, apart_next) - moved - mover.travel) - rest;
+    bound = std::min(bound, by_balls);
+    if (by_balls <= 0.0) travel_ = std::max(travel_, mover.travel);
+  }
+  return bound;
+}
+
+scene::Moment Certificate::moment_at(double s) const {
+  if (ahead_) return {moment_.now_s, moment_.ahead_s + s * h_};
+  return {moment_.now_s + s * h_, moment_.ahead_s};
+}
+
 double Certificate::longest_path(const VectorXd& dq) const {
   double longest = 0.0;
   for (Index s = 0; s < levers_.shapes().rows(); ++s)
@@ -95,10 +130,10 @@ double Certificate::longest_path(const VectorXd& dq) const {
   return longest;
 }
 
-double Certificate::clearance_of_appearing(const scene::Shapes& shape, double time_s,
+double Certificate::clearance_of_appearing(const scene::Shapes& shape, const scene::Moment& moment,
                                            double clearance) const {
   for (const std::size_t k : appearing_)
-    clearance = std::min(clearance, environment_->clearance_to(k, shape, time_s, clearance));
+    clearance = std::min(clearance, environment_->clearance_to(k, shape, moment, clearance));
   return clearance;
 }
 
@@ -130,11 +165,11 @@ double Certificate::speed(const dynamics::Workspace& ws, Subject subject) const 
 
 double Certificate::clearance_at(Subject subject, double s) {
   const scene::Shapes shape = subject.is_pair ? arm_.view() : arm_.view().single(subject.index);
-  const double time_s = time_s_ + s * h_;
+  const scene::Moment moment = moment_at(s);
   const double clearance = subject.is_pair ? self_->distance(subject.index, shape, self_limit_)
-                                           : environment_->clearance(shape, time_s, limit_);
+                                           : environment_->clearance(shape, moment, limit_);
   contact_ = contact_ || clearance <= 0.0;
-  return subject.is_pair ? clearance : clearance_of_appearing(shape, time_s, clearance);
+  return subject.is_pair ? clearance : clearance_of_appearing(shape, moment, clearance);
 }
 
 // docs/theory.md (12.9), (12.10)
@@ -143,7 +178,7 @@ double Certificate::prove(dynamics::Workspace& ws, Subject subject, const Piece&
   const double middle = piece.at + 0.5 * piece.width;
   q_middle_ = q_ + middle * dq_;
   rate_ = dq_;
-  double obstacle_travel = obstacle_travel_;
+  double obstacle_travel = travel_;
   if (subject.is_pair) {
     const auto& pair = self_->pairs()[subject.index];
     const int inner = std::min(self_->parts()[static_cast<std::size_t>(pair.part_a)].body,

@@ -25,11 +25,11 @@ class Handle final : public planning::QueryServices {
   void clearance(const double* q, std::size_t count, double time_ahead_s, double at_least_m,
                  double* out) override {
     for (std::size_t i = 0; i < count; ++i)
-      out[i] = query_.clearance(q + i * query_.dof(), time_s_ + time_ahead_s, at_least_m);
+      out[i] = query_.clearance(q + i * query_.dof(), {time_s_, time_ahead_s}, at_least_m);
   }
   std::size_t contacts(const double* q, double time_ahead_s, double influence_m,
                        planning::ArrayOut<hamelin_contact> out) override {
-    return query_.contacts(q, time_s_ + time_ahead_s, influence_m, out);
+    return query_.contacts(q, {time_s_, time_ahead_s}, influence_m, out);
   }
   std::size_t self_contacts(const double* q, double influence_m,
                             planning::ArrayOut<hamelin_self_contact> out) override {
@@ -37,14 +37,14 @@ class Handle final : public planning::QueryServices {
   }
   bool motion_clear(const double* q0, const double* q1, double t0_s, double t1_s,
                     double& margin_m) override {
-    return query_.motion_clear(q0, q1, time_s_ + t0_s, time_s_ + t1_s, margin_m);
+    return query_.motion_clear(q0, q1, time_s_, t0_s, t1_s, margin_m);
   }
   void distance(const double* points_world_m, std::size_t count, double time_ahead_s,
                 double limit_m, double* distance_m, double* gradient) override {
     Eigen::Vector3d direction;
     for (std::size_t i = 0; i < count; ++i) {
       distance_m[i] = query_.distance(Eigen::Vector3d::Map(points_world_m + 3 * i),
-                                      time_s_ + time_ahead_s, limit_m, direction);
+                                      {time_s_, time_ahead_s}, limit_m, direction);
       if (gradient != nullptr) Eigen::Vector3d::Map(gradient + 3 * i) = direction;
     }
   }
@@ -55,7 +55,7 @@ class Handle final : public planning::QueryServices {
   std::size_t obstacles(double time_ahead_s,
                         planning::ArrayOut<hamelin_obstacle_state> out) override {
     return list_obstacles(query_.snapshot().environment, query_.snapshot().obstacle_ids,
-                          time_s_ + time_ahead_s, out);
+                          {time_s_, time_ahead_s}, out);
   }
 
  private:
@@ -122,10 +122,21 @@ void PlannerHost::log(std::int32_t level, std::string_view line) {
 
 std::size_t PlannerHost::closest_points(std::span<const double> q, double influence_m,
                                         planning::ArrayOut<hamelin_contact> out) {
+  return closest_ahead(q, 0.0, HAMELIN_STANDING + HAMELIN_MOVING, influence_m, out);
+}
+
+std::size_t PlannerHost::closest_ahead(std::span<const double> q, double time_ahead_s,
+                                       std::int32_t kinds, double influence_m,
+                                       planning::ArrayOut<hamelin_contact> out) {
+  constexpr std::int32_t both = HAMELIN_STANDING + HAMELIN_MOVING;
+  if ((kinds & both) == 0) return 0;
+  const auto among = (kinds & both) == both          ? scene::Among::all
+                     : (kinds & HAMELIN_MOVING) != 0 ? scene::Among::moving
+                                                     : scene::Among::standing;
   query_q_ = Eigen::Map<const Eigen::VectorXd>(q.data(), query_q_.size());
   const auto contacts =
       std::span(query_contacts_).first(std::min(query_contacts_.size(), out.size()));
-  const std::size_t found = view_.closest(query_q_, influence_m, contacts);
+  const std::size_t found = view_.closest(query_q_, influence_m, contacts, time_ahead_s, among);
   for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i)
     out.set(i, to_c(contacts[i], view_.obstacle_id(contacts[i].obstacle)));
   return found;
@@ -142,7 +153,7 @@ std::size_t PlannerHost::closest_self(std::span<const double> q, double influenc
 }
 
 std::size_t PlannerHost::obstacles(planning::ArrayOut<hamelin_obstacle_state> out) {
-  return list_obstacles(view_.environment(), view_.obstacle_ids(), time_s_, out);
+  return list_obstacles(view_.environment(), view_.obstacle_ids(), time_s_.load(), out);
 }
 
 std::unique_ptr<planning::QueryServices> PlannerHost::open_query() {

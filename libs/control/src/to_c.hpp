@@ -13,10 +13,11 @@ namespace hamelin::control {
 [[nodiscard]] hamelin_contact to_c(const scene::Contact& contact, std::int32_t obstacle_id);
 [[nodiscard]] hamelin_self_contact to_c(const scene::SelfContact& contact);
 
-/// Writes the obstacles of an environment that exist at a time, and where they are then.
+/// Writes the obstacles of an environment that exist now, and where they are at a moment.
 /// @param ids of its obstacles; empty: their indices
 /// @return how many there are, even if out is smaller
 std::size_t list_obstacles(const scene::Environment& environment, std::span<const std::int32_t> ids,
-                           double time_s, const planning::ArrayOut<hamelin_obstacle_state>& out);
+                           const scene::Moment& moment,
+                           const planning::ArrayOut<hamelin_obstacle_state>& out);
 
 }  // namespace hamelin::control

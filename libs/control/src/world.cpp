@@ -131,7 +131,7 @@ std::uint64_t World::move_obstacle(std::string_view name, const geometry::SE3& p
   const std::size_t found = require(name);
   auto obstacles = latest_->environment.obstacles();
   obstacles[found].pose = pose;
-  obstacles[found].motion = scene::LinearMotion{velocity_m_s, time_s};
+  obstacles[found].motion = scene::ObservedMotion{time_s, velocity_m_s};
   if (!velocity_m_s.allFinite() || !std::isfinite(time_s))
     throw Error(ErrorCode::invalid,
                 fmt::format("obstacle '{}': its velocity or its time is not finite, expected "

@@ -59,11 +59,11 @@ scene::Shapes WorldQuery::place(const double* q) {
   return arm_.view();
 }
 
-double WorldQuery::clearance(const double* q, double time_s, double at_least_m) {
+double WorldQuery::clearance(const double* q, const scene::Moment& moment, double at_least_m) {
   const scene::Shapes arm = place(q);
   double smallest = influence_;
   for (std::size_t s = 0; s < arm.size() && smallest >= at_least_m; ++s)
-    smallest = snapshot_->environment.clearance(arm.single(s), time_s, smallest);
+    smallest = snapshot_->environment.clearance(arm.single(s), moment, smallest);
   if (self_ == nullptr) return smallest;
   for (std::size_t pair = 0; pair < self_->pairs().size() && smallest >= at_least_m; ++pair) {
     const double limit = std::min(smallest, self_influence_);
@@ -73,11 +73,11 @@ double WorldQuery::clearance(const double* q, double time_s, double at_least_m) 
   return smallest;
 }
 
-std::size_t WorldQuery::contacts(const double* q, double time_s, double influence_m,
+std::size_t WorldQuery::contacts(const double* q, const scene::Moment& moment, double influence_m,
                                  const planning::ArrayOut<hamelin_contact>& out) {
   const auto into = std::span(contacts_).first(std::min(contacts_.size(), out.size()));
   const std::size_t found = snapshot_->environment.closest(
-      place(q), std::min(influence_m, influence_), time_s, scratch_, into);
+      place(q), std::min(influence_m, influence_), moment, scratch_, into);
   for (std::size_t i = 0; i < std::min(found, into.size()); ++i) {
     const int obstacle = into[i].obstacle;
     out.set(i, to_c(into[i], obstacle < 0
@@ -102,7 +102,7 @@ bool WorldQuery::measure(Node& node) {
   const scene::Shapes arm = node.arm.view();
   bool clear = true;
   for (std::size_t s = 0; s < arm.size() && clear; ++s) {
-    node.clearance[s] = snapshot_->environment.clearance(arm.single(s), node.time_s, influence_);
+    node.clearance[s] = snapshot_->environment.clearance(arm.single(s), node.moment, influence_);
     clear = node.clearance[s] > 0.0;
   }
   for (std::size_t pair = 0; pair < node.pairs.size() && clear; ++pair) {
@@ -116,21 +116,21 @@ Certificate::Node WorldQuery::end_of(const Node& node) const {
   // The motion keeps to the line: with equal velocities at both ends nothing deviates from it.
   return {node.q,
           rest_,
-          node.time_s,
+          node.moment,
           node.arm.view(),
           snapshot_->environment.has_obstacles() ? std::span<const double>(node.clearance)
                                                  : std::span<const double>(),
           node.pairs};
 }
 
-bool WorldQuery::motion_clear(const double* q0, const double* q1, double t0_s, double t1_s,
-                              double& margin_m) {
+bool WorldQuery::motion_clear(const double* q0, const double* q1, double now_s, double t0_s,
+                              double t1_s, double& margin_m) {
   from_.q = Eigen::Map<const VectorXd>(q0, q_.size());
   q_ = Eigen::Map<const VectorXd>(q1, q_.size());
   dq_ = q_ - from_.q;
-  from_.time_s = t0_s;
+  from_.moment = {now_s, t0_s};
   to_.q = q_;
-  to_.time_s = t1_s;
+  to_.moment = {now_s, t1_s};
   if (!measure(to_) || !measure(from_)) return false;  // most motions that fail end in contact
   const double piece_m = std::max(piece_min_m, piece_share * influence_);
   const double pieces =
@@ -139,7 +139,7 @@ bool WorldQuery::motion_clear(const double* q0, const double* q1, double t0_s, d
   for (double i = 1.0; i <= pieces; ++i) {
     const double left = 1.0 - i / pieces;
     to_.q = q_ - left * dq_;
-    to_.time_s = t1_s - left * (t1_s - t0_s);
+    to_.moment.ahead_s = t1_s - left * (t1_s - t0_s);
     if (!measure(to_)) return false;
     const auto verdict =
         certificate_.check(ws_, snapshot_->environment, end_of(from_), end_of(to_));
@@ -150,12 +150,12 @@ bool WorldQuery::motion_clear(const double* q0, const double* q1, double t0_s, d
   return true;
 }
 
-double WorldQuery::distance(const Vector3d& point, double time_s, double limit_m,
+double WorldQuery::distance(const Vector3d& point, const scene::Moment& moment, double limit_m,
                             Vector3d& gradient) {
   const std::array<double, 1> radius{0.0};
   scene::Contact nearest;
   gradient.setZero();
-  if (snapshot_->environment.closest({{&point, 1}, radius}, limit_m, time_s, scratch_,
+  if (snapshot_->environment.closest({{&point, 1}, radius}, limit_m, moment, scratch_,
                                      {&nearest, 1}) == 0)
     return limit_m;
   gradient = nearest.direction;

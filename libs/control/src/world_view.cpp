@@ -85,7 +85,7 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
   other_contacts_.resize(contacts_.size());
   clearance_.assign(model.shapes().size(), influence_);
   clearance_before_ = clearance_;
-  q_ = q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
+  q_ = query_q_ = q_before_ = v_before_ = Eigen::VectorXd::Zero(model.dof());
 }
 
 bool WorldView::take_newest() {
@@ -185,16 +185,20 @@ Certificate::Verdict WorldView::certify(const Eigen::VectorXd& q, const Eigen::V
 }
 
 scene::Shapes WorldView::place(const Eigen::VectorXd& q) {
+  if (query_placed_ && query_q_ == q) return query_arm_.view();
+  query_placed_ = true;
+  query_q_ = q;
   dynamics::forward_kinematics(model_, query_poses_, q);
   query_arm_.place(model_, query_poses_);
   return query_arm_.view();
 }
 
 std::size_t WorldView::closest(const Eigen::VectorXd& q, double influence_m,
-                               std::span<scene::Contact> out) {
+                               std::span<scene::Contact> out, double ahead_s, scene::Among among) {
   if (!has_obstacles()) return 0;
-  return environment_->closest(place(q), std::min(influence_m, influence_), time_s_, *scratch_, out,
-                               scene::View::planner, seen_);
+  if (among != scene::Among::moving) influence_m = std::min(influence_m, influence_);
+  return environment_->closest(place(q), influence_m, {time_s_, ahead_s}, *scratch_, out,
+                               scene::View::planner, seen_, nullptr, among);
 }
 
 std::size_t WorldView::closest_self(const Eigen::VectorXd& q, double influence_m,
@@ -210,9 +214,7 @@ bool WorldView::deepest_at_start(const scene::Shapes& shapes, scene::Contact& de
   bool found = false;
   for (const auto& contact : std::span(other_contacts_).first(count)) {
     // a moving obstacle may be elsewhere when the arm arrives
-    if (contact.obstacle >= 0 &&
-        scene::max_speed(environment_->obstacles()[static_cast<std::size_t>(contact.obstacle)]) >
-            0.0)
+    if (contact.obstacle >= 0 && environment_->moves(static_cast<std::size_t>(contact.obstacle)))
       continue;
     if (!found || contact.distance < deepest.distance) deepest = contact;
     found = true;

@@ -142,7 +142,7 @@ TEST_CASE("a motion that is proved clear has no contact anywhere, and most clear
       sampled = std::min(sampled, rig.reference(from + s * (to - from), t0 + s * (t1 - t0)));
     }
     double margin = 0.0;
-    const bool is_clear = rig.query.motion_clear(from.data(), to.data(), t0, t1, margin);
+    const bool is_clear = rig.query.motion_clear(from.data(), to.data(), 0.0, t0, t1, margin);
     if (is_clear) {
       CHECK(margin > 0.0);
       CHECK(sampled >= margin);
@@ -174,10 +174,10 @@ TEST_CASE("whether a motion is clear depends on its times where obstacles move",
   VectorXd near = q;
   near[0] += 0.05;
   double margin = 0.0;
-  CHECK(query.motion_clear(q.data(), near.data(), 0.0, 0.5, margin));
-  CHECK_FALSE(query.motion_clear(q.data(), near.data(), 0.0, 3.0, margin));
-  CHECK_FALSE(query.motion_clear(q.data(), near.data(), 1.9, 2.1, margin));
-  CHECK(query.motion_clear(q.data(), near.data(), 4.0, 4.5, margin));
+  CHECK(query.motion_clear(q.data(), near.data(), 0.0, 0.0, 0.5, margin));
+  CHECK_FALSE(query.motion_clear(q.data(), near.data(), 0.0, 0.0, 3.0, margin));
+  CHECK_FALSE(query.motion_clear(q.data(), near.data(), 0.0, 1.9, 2.1, margin));
+  CHECK(query.motion_clear(q.data(), near.data(), 0.0, 4.0, 4.5, margin));
 }
 
 TEST_CASE("distances of points have their gradients, and boxes cover exactly what is occupied",
@@ -240,7 +240,7 @@ TEST_CASE(
   const long allocations = test::allocations_in([&] {
     (void)rig.query.clearance(to.data(), 0.0, 0.0);
     (void)rig.query.contacts(to.data(), 0.0, 0.1, std::span<hamelin_contact>(contacts));
-    (void)rig.query.motion_clear(q.data(), to.data(), 0.0, 1.0, margin);
+    (void)rig.query.motion_clear(q.data(), to.data(), 0.0, 0.0, 1.0, margin);
     (void)rig.query.distance({0.3, 0.3, 0.3}, 0.0, 0.1, gradient);
   });
   if (test::counts_allocations()) CHECK(allocations == 0);

@@ -54,8 +54,8 @@ TEST_CASE("obstacles of a world are added, replaced, moved and removed, and keep
   CHECK(ids() == std::vector<std::int32_t>{0, 1});
   CHECK(obstacles()[0].radius_m == 0.2);
   world.move_obstacle("b", {Eigen::Matrix3d::Identity(), {2.0, 1.0, 0.0}}, {0.1, 0.0, 0.0}, 3.0);
-  CHECK(scene::position_at(obstacles()[1], 3.0).isApprox(Vector3d(2.0, 1.0, 0.0)));
-  CHECK(scene::position_at(obstacles()[1], 5.0).isApprox(Vector3d(2.2, 1.0, 0.0)));
+  CHECK(scene::motion_at(obstacles()[1], 3.0).pose.p().isApprox(Vector3d(2.0, 1.0, 0.0)));
+  CHECK(scene::motion_at(obstacles()[1], 5.0).pose.p().isApprox(Vector3d(2.2, 1.0, 0.0)));
   world.remove_obstacle("a");
   CHECK(ids() == std::vector<std::int32_t>{1});
   world.set_obstacle(ball("a", {1.0, 0.0, 0.0}));

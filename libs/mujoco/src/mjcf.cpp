@@ -84,9 +84,11 @@ class Writer {
   // Moving obstacles are bodies of their own, which the plant places at each node.
   void add_obstacle(int index) {
     const scene::Obstacle& o = environment_.obstacles()[static_cast<std::size_t>(index)];
+    if (o.shape == scene::Shape::frame) return;
+    const geometry::SE3 pose = scene::motion_at(o, 0.0).pose;
     add("<body name='{}' mocap='{}' pos='{}' quat='{}'><geom name='{}' ", obstacle_body_name(index),
-        o.motion ? "true" : "false", text(o.pose.p()), rotation(o.pose.R()),
-        name_of(Kind::obstacle, index));
+        environment_.moves(static_cast<std::size_t>(index)) ? "true" : "false", text(pose.p()),
+        rotation(pose.R()), name_of(Kind::obstacle, index));
     switch (o.shape) {
       case scene::Shape::sphere:
         add("type='sphere' size='{}'", o.radius_m);
@@ -96,6 +98,11 @@ class Writer {
         break;
       case scene::Shape::cylinder:
         add("type='cylinder' size='{} {}'", o.radius_m, 0.5 * o.length_m);
+        break;
+      case scene::Shape::capsule:
+        add("type='capsule' size='{} {}'", o.radius_m, 0.5 * o.length_m);
+        break;
+      case scene::Shape::frame:
         break;
     }
     add("/></body>\n");

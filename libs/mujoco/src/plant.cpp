@@ -129,7 +129,8 @@ class MujocoPlant final : public simulation::Plant {
       const int index = static_cast<int>(k);
       const int geom = mj_name2id(model_.get(), mjOBJ_GEOM, name_of(Kind::obstacle, index).c_str()),
                 body = mj_name2id(model_.get(), mjOBJ_BODY, obstacle_body_name(index).c_str());
-      if (obstacle.motion || obstacle.appears_s > 0.0)
+      if (obstacle.shape != scene::Shape::frame &&
+          (environment_.moves(k) || obstacle.appears_s > 0.0))
         obstacles_.push_back({&obstacle, geom, model_->body_mocapid[body]});
     }
   }
@@ -146,8 +147,9 @@ class MujocoPlant final : public simulation::Plant {
     for (const ChangingObstacle& o : obstacles_) {
       model_->geom_conaffinity[o.geom] = scene::exists(*o.obstacle, node_.time_s) ? 1 : 0;
       if (o.mocap < 0) continue;
-      const Eigen::Vector3d at = scene::position_at(*o.obstacle, node_.time_s);
-      mju_copy3(vector_of(data_->mocap_pos, o.mocap), at.data());
+      const geometry::SE3 at = scene::motion_at(*o.obstacle, node_.time_s).pose;
+      mju_copy3(vector_of(data_->mocap_pos, o.mocap), at.p().data());
+      mju_copy4(data_->mocap_quat + 4 * o.mocap, geometry::quaternion_wxyz(at.R()).data());
     }
     mj_step1(model_.get(), data_.get());
     if (environment_.map_field().empty()) return;

@@ -387,6 +387,7 @@ struct LoadedPlanner::Instance {
     host.close_query = [](hamelin_query* query) noexcept { delete query; };
     host.query_refresh = &Instance::query_refresh;
     add_query_functions(host);
+    host.closest_ahead = &Instance::closest_ahead;
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -425,6 +426,17 @@ struct LoadedPlanner::Instance {
     self.guarded([&] {
       count =
           self.services->closest_points({q, self.setup.dof}, influence_m, {out, capacity, stride});
+    });
+    return count;
+  }
+  static std::size_t closest_ahead(void* context, const double* q, double time_ahead_s,
+                                   std::int32_t kinds, double influence_m, hamelin_contact* out,
+                                   std::size_t capacity, std::size_t stride) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::size_t count = 0;
+    self.guarded([&] {
+      count = self.services->closest_ahead({q, self.setup.dof}, time_ahead_s, kinds, influence_m,
+                                           {out, capacity, stride});
     });
     return count;
   }

@@ -64,11 +64,8 @@ void write_nearest(const std::vector<Contact>& found, std::vector<std::size_t>& 
 
 Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles,
                          const geometry::SE3& base, double reach, double influence,
-                         const RobotAtStart& robot)
-    : obstacles_(std::move(obstacles)) {
-  for (const Obstacle& obstacle : obstacles_)
-    check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
-  summary_.obstacles = obstacles_.size();
+                         const RobotAtStart& robot) {
+  take(std::move(obstacles));
   if (!map) return;
   const MapRegion region = read_region(*map, base, reach, influence, robot);
   static_cast<MapSummary&>(summary_) = region.summary;
@@ -84,6 +81,17 @@ Environment::Environment(const std::optional<MapSpec>& map, std::vector<Obstacle
   read_changes(map->changes);
 }
 
+void Environment::take(std::vector<Obstacle> obstacles) {
+  attach(obstacles, "obstacles");
+  moves_.clear();
+  for (const Obstacle& obstacle : obstacles) {
+    check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
+    moves_.push_back(scene::moves(obstacle) ? 1 : 0);
+  }
+  obstacles_ = std::move(obstacles);
+  summary_.obstacles = obstacles_.size();
+}
+
 void Environment::read_changes(std::span<const MapChangeSpec> changes) {
   for (const MapChangeSpec& change : changes)
     changes_.push_back(read_change(change, *map_spec_, summary_.resolution_m, map_ball_));
@@ -91,11 +99,8 @@ void Environment::read_changes(std::span<const MapChangeSpec> changes) {
 
 Environment Environment::with_obstacles(std::vector<Obstacle> obstacles,
                                         std::span<const MapChangeSpec> changes) const {
-  for (const Obstacle& obstacle : obstacles)
-    check(obstacle, fmt::format("obstacle '{}'", obstacle.name));
   Environment copy = *this;
-  copy.obstacles_ = std::move(obstacles);
-  copy.summary_.obstacles = copy.obstacles_.size();
+  copy.take(std::move(obstacles));
   copy.read_changes(changes);
   return copy;
 }
@@ -167,26 +172,27 @@ bool Environment::has_obstacles() const noexcept {
          (!unknown_->empty() && summary_.unknown == UnknownPolicy::block);
 }
 
-double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, double time_s,
+double Environment::clearance_to(const Obstacle& obstacle, const Shapes& arm, const Placed& at,
                                  double limit) {
-  const Eigen::Vector3d at = position_at(obstacle, time_s);
-  const double ball = bounding_radius(obstacle);
+  if (obstacle.shape == Shape::frame) return limit;
+  const double ball = bounding_radius(obstacle) + at.nearer_m;
   double smallest = limit;
   for (std::size_t i = 0; i < arm.size(); ++i) {
     const bool capsule = arm.is_capsule(i);
     const double near = smallest + arm.radii[i] + ball + (capsule ? arm.half_axes[i].norm() : 0.0);
-    if (near <= 0.0 || (arm.centers[i] - at).squaredNorm() >= near * near) continue;
-    const double distance = capsule ? closest_on(obstacle, at, arm.from(i), arm.to(i)).distance
-                                    : closest_on(obstacle, at, arm.centers[i]).distance;
-    smallest = std::min(smallest, distance - arm.radii[i]);
+    if (near <= 0.0 || (arm.centers[i] - at.pose.p()).squaredNorm() >= near * near) continue;
+    const double distance = capsule ? closest_on(obstacle, at.pose, arm.from(i), arm.to(i)).distance
+                                    : closest_on(obstacle, at.pose, arm.centers[i]).distance;
+    smallest = std::min(smallest, distance - at.nearer_m - arm.radii[i]);
   }
   return smallest;
 }
 
 bool Environment::in_view(std::size_t obstacle, double time_s, View view,
-                          std::span<const std::uint8_t> seen) const {
+                          std::span<const std::uint8_t> seen, Among among) const {
   const Obstacle& o = obstacles_[obstacle];
-  if (!exists(o, time_s)) return false;
+  if (!exists(o, time_s) || o.shape == Shape::frame) return false;
+  if (among != Among::all && moves(obstacle) != (among == Among::moving)) return false;
   const bool known = !o.judge_only && (o.known || (obstacle < seen.size() && seen[obstacle] != 0));
   return view == View::judge || known == (view == View::planner);
 }
@@ -198,8 +204,8 @@ int Environment::reveal_visible(const Shapes& arm, double time_s,
     if (o.known || o.judge_only || !o.visible_within_m || seen[k] != 0 || !exists(o, time_s))
       continue;
     // any limit above visible_within_m is enough
-    if (!visible(o, time_s, clearance_to(o, arm, time_s, 2.0 * *o.visible_within_m + 1.0)))
-      continue;
+    const double limit = 2.0 * *o.visible_within_m + 1.0;
+    if (!visible(o, time_s, clearance_to(k, arm, time_s, limit))) continue;
     seen[k] = 1;
     return static_cast<int>(k);
   }
@@ -218,11 +224,12 @@ Environment::Vicinity::Vicinity(std::size_t shapes) {
   }
 }
 
-std::size_t Environment::closest(const Shapes& arm, double influence, double time_s,
+std::size_t Environment::closest(const Shapes& arm, double influence, const Moment& moment,
                                  Scratch& scratch, std::span<Contact> out, View view,
-                                 std::span<const std::uint8_t> seen, Vicinity* vicinity) const {
+                                 std::span<const std::uint8_t> seen, Vicinity* vicinity,
+                                 Among among) const {
   scratch.found_.clear();
-  if (view != View::hidden) {
+  if (view != View::hidden && among != Among::moving) {
     add_map_contacts(*map_, Contact::map, arm, influence, scratch.map_,
                      vicinity != nullptr ? &vicinity->map_ : nullptr, scratch.found_);
     if (summary_.unknown == UnknownPolicy::block)
@@ -230,8 +237,8 @@ std::size_t Environment::closest(const Shapes& arm, double influence, double tim
                        vicinity != nullptr ? &vicinity->unknown_ : nullptr, scratch.found_);
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (in_view(k, time_s, view, seen))
-      add_obstacle_contacts(k, arm, influence, time_s, scratch.found_);
+    if (in_view(k, moment.now_s, view, seen, among))
+      add_obstacle_contacts(k, arm, influence, placed_at(obstacles_[k], moment), scratch.found_);
   write_nearest(scratch.found_, scratch.order_, out);
   return scratch.found_.size();
 }
@@ -263,43 +270,43 @@ void Environment::add_map_contacts(const MapField& field, int id, const Shapes& 
 }
 
 void Environment::add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence,
-                                        double time_s, std::vector<Contact>& found) const {
+                                        const Placed& at, std::vector<Contact>& found) const {
   const Obstacle& obstacle = obstacles_[k];
-  const Eigen::Vector3d at = position_at(obstacle, time_s),
-                        velocity = velocity_at(obstacle, time_s);
-  const double ball = bounding_radius(obstacle);
+  const double ball = bounding_radius(obstacle) + at.nearer_m;
   for (std::size_t shape = 0; shape < arm.size(); ++shape) {
     const bool capsule = arm.is_capsule(shape);
     const double limit = influence + arm.radii[shape];
     const double near = limit + ball + (capsule ? arm.half_axes[shape].norm() : 0.0);
-    if ((arm.centers[shape] - at).squaredNorm() > near * near) continue;
+    if ((arm.centers[shape] - at.pose.p()).squaredNorm() > near * near) continue;
     const auto add = [&](const SurfacePoint& hit, const Eigen::Vector3d& from) {
-      if (hit.distance <= limit)
-        found.push_back(contact_of(arm, shape, static_cast<int>(k), from, hit.distance, hit.point,
-                                   hit.direction, velocity));
+      const double distance = hit.distance - at.nearer_m;
+      if (distance <= limit)
+        found.push_back(contact_of(arm, shape, static_cast<int>(k), from, distance,
+                                   hit.point + at.nearer_m * hit.direction, hit.direction,
+                                   at.velocity_at(hit.point)));
     };
     if (!capsule) {
-      add(closest_on(obstacle, at, arm.centers[shape]), arm.centers[shape]);
+      add(closest_on(obstacle, at.pose, arm.centers[shape]), arm.centers[shape]);
       continue;
     }
     // a capsule that lies along an obstacle is near it at both of its ends
     const Eigen::Vector3d from = arm.from(shape), to = arm.to(shape);
-    const AxisPoint nearest = closest_on(obstacle, at, from, to);
+    const AxisPoint nearest = closest_on(obstacle, at.pose, from, to);
     add(nearest, nearest.axis_point);
     const double apart = distinct_share * 2.0 * arm.half_axes[shape].norm();
     for (const Eigen::Vector3d& end : {from, to})
       if ((end - nearest.axis_point).squaredNorm() > apart * apart)
-        add(closest_on(obstacle, at, end), end);
+        add(closest_on(obstacle, at.pose, end), end);
   }
 }
 
-double Environment::clearance(const Shapes& arm, double time_s, double limit, View view,
-                              std::span<const std::uint8_t> seen) const {
+double Environment::clearance(const Shapes& arm, const Moment& moment, double limit, View view,
+                              std::span<const std::uint8_t> seen, Among among) const {
   double smallest = limit;
   BoxHit hit;
   SegmentHit axis_hit;
   const auto consider = [&](const MapField& field) {
-    if (field.empty() || view == View::hidden) return;
+    if (field.empty() || view == View::hidden || among == Among::moving) return;
     std::int32_t hint = -1;
     for (std::size_t i = 0; i < arm.size(); ++i) {
       // In contact, smallest + radius may be negative, but a deeper contact may follow: the limit
@@ -320,8 +327,8 @@ double Environment::clearance(const Shapes& arm, double time_s, double limit, Vi
   consider(*map_);
   if (summary_.unknown == UnknownPolicy::block) consider(*unknown_);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    if (in_view(k, time_s, view, seen))
-      smallest = clearance_to(obstacles_[k], arm, time_s, smallest);
+    if (in_view(k, moment.now_s, view, seen, among))
+      smallest = clearance_to(k, arm, moment, smallest);
   return smallest;
 }
 
@@ -342,10 +349,10 @@ Environment::Standing Environment::nearest_standing(const Eigen::Vector3d& a,
   const double half = 0.5 * (b - a).norm();
   for (std::size_t k = 0; k < obstacles_.size(); ++k) {
     const Obstacle& obstacle = obstacles_[k];
-    if (max_speed(obstacle) > 0.0 || !in_view(k, time_s, view, seen)) continue;
-    const Eigen::Vector3d& at = obstacle.pose.p();
+    if (!in_view(k, time_s, view, seen, Among::standing)) continue;
+    const geometry::SE3 at = motion_at(obstacle, time_s).pose;
     const double near = nearest.distance + bounding_radius(obstacle) + half;
-    if ((0.5 * (a + b) - at).squaredNorm() >= near * near) continue;
+    if ((0.5 * (a + b) - at.p()).squaredNorm() >= near * near) continue;
     const double distance =
         half > 0.0 ? closest_on(obstacle, at, a, b).distance : closest_on(obstacle, at, a).distance;
     if (distance < nearest.distance) nearest = {distance, static_cast<int>(k)};

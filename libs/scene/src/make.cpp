@@ -34,6 +34,10 @@ double half_extent(const Obstacle& o, const Eigen::Vector3d& direction) {
       return 0.5 * o.size_m.dot(local.cwiseAbs());
     case Shape::cylinder:
       return 0.5 * o.length_m * std::abs(local.z()) + o.radius_m * std::hypot(local.x(), local.y());
+    case Shape::capsule:
+      return 0.5 * o.length_m * std::abs(local.z()) + o.radius_m;
+    case Shape::frame:
+      break;
   }
   return 0.0;
 }
@@ -74,7 +78,7 @@ bool contains(const Obstacle& o, const Box& box) {
     const Eigen::Vector3d p((corner & 1U) != 0 ? box.hi.x() : box.lo.x(),
                             (corner & 2U) != 0 ? box.hi.y() : box.lo.y(),
                             (corner & 4U) != 0 ? box.hi.z() : box.lo.z());
-    if (closest_on(o, o.pose.p(), p).distance > 0.0) return false;
+    if (closest_on(o, o.pose, p).distance > 0.0) return false;
   }
   return true;
 }
@@ -145,7 +149,7 @@ std::vector<Obstacle> make_clutter(const Clutter& clutter) {
     o.pose = {random_rotation(rng), center};
     const bool clear =
         std::all_of(clutter.keep_out.begin(), clutter.keep_out.end(), [&](const Ball& ball) {
-          return closest_on(o, center, ball.center).distance >= ball.radius;
+          return closest_on(o, o.pose, ball.center).distance >= ball.radius;
         });
     if (clear) made.push_back(o);
   }
@@ -155,13 +159,13 @@ std::vector<Obstacle> make_clutter(const Clutter& clutter) {
 bool touches(const Obstacle& primitive, const Box& cube) {
   const Eigen::Vector3d center = primitive.pose.p(), middle = 0.5 * (cube.lo + cube.hi),
                         half = 0.5 * (cube.hi - cube.lo);
-  if (closest_on(primitive, center, middle).distance > half.norm()) return false;
+  if (closest_on(primitive, primitive.pose, middle).distance > half.norm()) return false;
   // Alternating projections onto the two convex bodies converge to a nearest pair. If the bodies
   // are apart, the direction of the pair becomes the normal of a separating plane,
   // docs/theory.md (11.33). As long as no plane is found, they may touch.
   Eigen::Vector3d on_cube = middle;
   for (int round = 0; round < 100; ++round) {
-    const SurfacePoint hit = closest_on(primitive, center, on_cube);
+    const SurfacePoint hit = closest_on(primitive, primitive.pose, on_cube);
     if (hit.distance <= 0.0) return true;
     const Eigen::Vector3d& n = hit.direction;
     const double gap = n.dot(middle - center) - half.dot(n.cwiseAbs()) - half_extent(primitive, n);
@@ -214,10 +218,9 @@ MakeReport make_map(const MakeMapOptions& options) {
       const Obstacle& o = primitives[i];
       if (!overlaps(ranges[i], cell)) continue;
       if (cell.size == 1) {
-        const bool marked =
-            options.mark == Mark::touch
-                ? touches(o, cube)
-                : closest_on(o, o.pose.p(), 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
+        const bool marked = options.mark == Mark::touch
+                                ? touches(o, cube)
+                                : closest_on(o, o.pose, 0.5 * (cube.lo + cube.hi)).distance <= 0.0;
         if (marked) return BtNode::occupied;
       } else if (touches(o, {cube.lo.array() - margin, cube.hi.array() + margin})) {
         if (contains(ranges[i], cell) && contains(o, cube)) return BtNode::occupied;

@@ -5,10 +5,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <functional>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/distance.hpp"
+#include "hamelin/scene/self_collision.hpp"
 
 namespace hamelin::scene {
 
@@ -39,6 +40,19 @@ SurfacePoint on_cylinder(double radius, double length, const Eigen::Vector3d& p)
   }
   if (side > end) return {side, radius * radial + p.z() * Eigen::Vector3d::UnitZ(), radial};
   return {end, rho * radial + half * axial, axial};
+}
+
+// A sphere around the nearest point of the axis; on the axis, the exit direction is perpendicular.
+SurfacePoint on_capsule(double radius, double length, const Eigen::Vector3d& p) {
+  const double half = 0.5 * length;
+  const Eigen::Vector3d core(0.0, 0.0, std::clamp(p.z(), -half, half));
+  SurfacePoint hit = on_sphere(radius, p - core);
+  if (p == core) {
+    hit.direction = Eigen::Vector3d::UnitX();
+    hit.point = radius * hit.direction;
+  }
+  hit.point += core;
+  return hit;
 }
 
 // Minimises the signed distance of a convex body along an axis: docs/theory.md (11.28), (11.29).
@@ -92,6 +106,24 @@ AxisPoint on_sphere(double radius, const Eigen::Vector3d& a, const Eigen::Vector
   return {hit, p};
 }
 
+// The nearest points of two axes, docs/theory.md (11.35).
+AxisPoint on_capsule(double radius, double length, const Eigen::Vector3d& a,
+                     const Eigen::Vector3d& b) {
+  const Eigen::Vector3d half_a = 0.5 * (b - a), middle = 0.5 * (a + b),
+                        half_b = 0.5 * length * Eigen::Vector3d::UnitZ();
+  const AxisPair pair = nearest_on_axes(middle, half_a, Eigen::Vector3d::Zero(), half_b);
+  const Eigen::Vector3d at = middle + pair.on_a * half_a, core = pair.on_b * half_b;
+  SurfacePoint hit = on_sphere(radius, at - core);
+  if (at == core) {  // the axes cross
+    const Eigen::Vector3d normal = half_a.cross(half_b);
+    const double size = normal.norm();
+    hit.direction = size > 0.0 ? Eigen::Vector3d(normal / size) : Eigen::Vector3d::UnitX();
+    hit.point = radius * hit.direction;
+  }
+  hit.point += core;
+  return {hit, at};
+}
+
 }  // namespace
 
 std::string_view to_string(Shape shape) noexcept {
@@ -102,37 +134,96 @@ std::string_view to_string(Shape shape) noexcept {
       return "box";
     case Shape::cylinder:
       return "cylinder";
+    case Shape::capsule:
+      return "capsule";
+    case Shape::frame:
+      return "frame";
   }
   return "unknown";
 }
 
-// docs/theory.md (11.30), (11.31)
-Eigen::Vector3d position_at(const Obstacle& obstacle, double time_s) {
-  if (!obstacle.motion) return obstacle.pose.p();
-  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion))
-    return obstacle.pose.p() +
-           std::sin(2.0 * std::numbers::pi * time_s / sine->period_s) * sine->amplitude_m;
-  const auto& line = std::get<LinearMotion>(*obstacle.motion);
-  return obstacle.pose.p() +
-         std::clamp(time_s - line.start_s, 0.0, line.duration_s) * line.velocity_m_s;
-}
-
-Eigen::Vector3d velocity_at(const Obstacle& obstacle, double time_s) {
-  if (!obstacle.motion) return Eigen::Vector3d::Zero();
-  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion)) {
-    const double omega = 2.0 * std::numbers::pi / sine->period_s;
-    return omega * std::cos(omega * time_s) * sine->amplitude_m;
+std::string_view to_string(Prediction prediction) noexcept {
+  switch (prediction) {
+    case Prediction::path:
+      return "path";
+    case Prediction::constant_acceleration:
+      return "constant-acceleration";
+    case Prediction::constant_velocity:
+      return "constant-velocity";
+    case Prediction::speed_bound:
+      return "speed-bound";
   }
-  const auto& line = std::get<LinearMotion>(*obstacle.motion);
-  const bool moves = time_s >= line.start_s && time_s - line.start_s < line.duration_s;
-  return moves ? line.velocity_m_s : Eigen::Vector3d::Zero();
+  return "unknown";
 }
 
+void attach(std::span<Obstacle> obstacles, const std::string& where) {
+  std::vector<std::shared_ptr<Frame>> frames(obstacles.size());
+  // Each frame after that of its parent; `depth` ends circles.
+  const std::function<std::shared_ptr<Frame>(std::size_t, std::size_t)> frame_of =
+      [&](std::size_t i, std::size_t depth) {
+        Obstacle& o = obstacles[i];
+        const auto fail = [&](const std::string& what) {
+          throw Error(ErrorCode::invalid, fmt::format("{}: obstacle '{}' is attached to '{}', {}",
+                                                      where, o.name, o.attached_to, what));
+        };
+        if (frames[i]) return frames[i];
+        if (depth > obstacles.size()) fail("which is attached to it in turn, expected no circle");
+        o.parent.reset();
+        if (!o.attached_to.empty()) {
+          const auto parent =
+              std::find_if(obstacles.begin(), obstacles.end(),
+                           [&](const Obstacle& other) { return other.name == o.attached_to; });
+          if (parent == obstacles.end()) fail("but there is none of this name");
+          o.parent = frame_of(static_cast<std::size_t>(parent - obstacles.begin()), depth + 1);
+        }
+        frames[i] = std::make_shared<Frame>(static_cast<const Frame&>(o));
+        return frames[i];
+      };
+  for (std::size_t i = 0; i < obstacles.size(); ++i) (void)frame_of(i, 0);
+}
+
+Placed placed_at(const Obstacle& obstacle, const Moment& moment) {
+  if (moment.ahead_s <= 0.0) return {motion_at(obstacle, moment.now_s)};
+  const double ahead = moment.ahead_s;
+  switch (obstacle.prediction) {
+    case Prediction::path:
+      return {motion_at(obstacle, moment.now_s + ahead)};
+    case Prediction::constant_acceleration:
+      return {extrapolated(motion_at(obstacle, moment.now_s), ahead, true)};
+    case Prediction::constant_velocity:
+      return {extrapolated(motion_at(obstacle, moment.now_s), ahead, false)};
+    case Prediction::speed_bound:
+      return {motion_at(obstacle, moment.now_s), ahead * obstacle.speed_max_m_s};
+  }
+  return {};
+}
+
+// docs/theory.md (11.44)
 double max_speed(const Obstacle& obstacle) {
-  if (!obstacle.motion) return 0.0;
-  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion))
-    return 2.0 * std::numbers::pi * sine->amplitude_m.norm() / sine->period_s;
-  return std::get<LinearMotion>(*obstacle.motion).velocity_m_s.norm();
+  const MotionBounds bounds = motion_bounds(obstacle);
+  return bounds.speed + (bounds.rate > 0.0 ? bounds.rate * bounding_radius(obstacle) : 0.0);
+}
+
+double max_speed(const Obstacle& obstacle, const Moment& moment) {
+  switch (obstacle.prediction) {
+    case Prediction::path:
+      break;
+    case Prediction::speed_bound:
+      return obstacle.speed_max_m_s;
+    case Prediction::constant_acceleration:
+    case Prediction::constant_velocity: {
+      const bool accelerates = obstacle.prediction == Prediction::constant_acceleration;
+      const MotionState now = motion_at(obstacle, moment.now_s);
+      return now.velocity.norm() +
+             (accelerates ? acceleration_lasts_s * now.acceleration.norm() : 0.0) +
+             now.angular_velocity.norm() * bounding_radius(obstacle);
+    }
+  }
+  return max_speed(obstacle);
+}
+
+bool moves(const Obstacle& obstacle) {
+  return max_speed(obstacle) > 0.0;
 }
 
 double bounding_radius(const Obstacle& obstacle) {
@@ -143,14 +234,18 @@ double bounding_radius(const Obstacle& obstacle) {
       return 0.5 * obstacle.size_m.norm();
     case Shape::cylinder:
       return std::hypot(obstacle.radius_m, 0.5 * obstacle.length_m);
+    case Shape::capsule:
+      return obstacle.radius_m + 0.5 * obstacle.length_m;
+    case Shape::frame:
+      break;
   }
   return 0.0;
 }
 
-SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
+SurfacePoint closest_on(const Obstacle& obstacle, const geometry::SE3& pose,
                         const Eigen::Vector3d& p) {
-  const Eigen::Matrix3d& R = obstacle.pose.R();
-  const Eigen::Vector3d local = R.transpose() * (p - center);
+  const Eigen::Matrix3d& R = pose.R();
+  const Eigen::Vector3d local = R.transpose() * (p - pose.p());
   SurfacePoint hit;
   switch (obstacle.shape) {
     case Shape::sphere:
@@ -162,14 +257,19 @@ SurfacePoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
     case Shape::cylinder:
       hit = on_cylinder(obstacle.radius_m, obstacle.length_m, local);
       break;
+    case Shape::capsule:
+      hit = on_capsule(obstacle.radius_m, obstacle.length_m, local);
+      break;
+    case Shape::frame:
+      break;
   }
-  return {hit.distance, R * hit.point + center, R * hit.direction};
+  return {hit.distance, R * hit.point + pose.p(), R * hit.direction};
 }
 
-AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
-                     const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  const Eigen::Matrix3d& R = obstacle.pose.R();
-  const Eigen::Vector3d from = R.transpose() * (a - center), to = R.transpose() * (b - center);
+AxisPoint closest_on(const Obstacle& obstacle, const geometry::SE3& pose, const Eigen::Vector3d& a,
+                     const Eigen::Vector3d& b) {
+  const Eigen::Matrix3d& R = pose.R();
+  const Eigen::Vector3d from = R.transpose() * (a - pose.p()), to = R.transpose() * (b - pose.p());
   AxisPoint hit;
   switch (obstacle.shape) {
     case Shape::sphere:
@@ -188,8 +288,14 @@ AxisPoint closest_on(const Obstacle& obstacle, const Eigen::Vector3d& center,
           },
           obstacle.radius_m + obstacle.length_m, from, to);
       break;
+    case Shape::capsule:
+      hit = on_capsule(obstacle.radius_m, obstacle.length_m, from, to);
+      break;
+    case Shape::frame:
+      break;
   }
-  return {{hit.distance, R * hit.point + center, R * hit.direction}, R * hit.axis_point + center};
+  return {{hit.distance, R * hit.point + pose.p(), R * hit.direction},
+          R * hit.axis_point + pose.p()};
 }
 
 bool visible(const Obstacle& obstacle, double time_s, double clearance_m) {
@@ -204,21 +310,20 @@ void check(const Obstacle& obstacle, const std::string& where) {
                   fmt::format("{}: {} of the {} is {}, expected a number above 0", where, key,
                               to_string(obstacle.shape), value));
   };
-  if (obstacle.shape != Shape::box) positive("radius_m", obstacle.radius_m);
-  if (obstacle.shape == Shape::cylinder) positive("length_m", obstacle.length_m);
-  if (obstacle.shape == Shape::box)
+  const Shape shape = obstacle.shape;
+  if (shape == Shape::box)
     for (int axis = 0; axis < 3; ++axis) positive("size_m", obstacle.size_m[axis]);
-  if (!obstacle.motion) return;
-  if (const auto* sine = std::get_if<SineMotion>(&*obstacle.motion);
-      sine != nullptr && !(sine->period_s > 0.0))
+  else if (shape != Shape::frame)
+    positive("radius_m", obstacle.radius_m);
+  if (shape == Shape::cylinder || shape == Shape::capsule) positive("length_m", obstacle.length_m);
+  if (obstacle.motion) check(*obstacle.motion, where);
+  if (obstacle.prediction != Prediction::speed_bound) return;
+  positive("speed_max of the prediction", obstacle.speed_max_m_s);
+  if (const double fastest = max_speed(obstacle); fastest > obstacle.speed_max_m_s * (1.0 + 1e-9))
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: period_s of the motion is {}, expected a number above 0", where,
-                            sine->period_s));
-  if (const auto* line = std::get_if<LinearMotion>(&*obstacle.motion);
-      line != nullptr && !(line->duration_s > 0.0))
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: duration_s of the motion is {}, expected a number above 0", where,
-                            line->duration_s));
+                fmt::format("{}: its motion reaches {:.3g} m/s, expected at most {:.3g} m/s, the "
+                            "speed_max of its prediction",
+                            where, fastest, obstacle.speed_max_m_s));
 }
 
 }  // namespace hamelin::scene

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Geometry>
 
-#include "hamelin/scene/obstacles.hpp"
+#include "hamelin/scene/motion.hpp"
 
 namespace hamelin::scene {
 

@@ -212,10 +212,32 @@ std::string_view to_string(PlantType type) noexcept {
   return "unknown";
 }
 
-Json motion_json(const std::variant<SineMotion, LinearMotion>& motion) {
+namespace {
+
+Json waypoints_json(const WaypointPath& path) {
+  Json out{{"type", "waypoints"},
+           {"repeat", path.options().repeat},
+           {"gap_max_s", or_null(path.options().gap_max_s)}};
+  if (!path.file().empty()) {
+    out["file"] = path.file().string();
+    return out;
+  }
+  out["waypoints"] = Json::array();
+  for (const Waypoint& w : path.waypoints())
+    out["waypoints"].push_back({{"time_s", w.time_s},
+                                {"position_m", array(w.position_m)},
+                                {"quaternion_wxyz", w.quaternion_wxyz}});
+  return out;
+}
+
+}  // namespace
+
+Json motion_json(const Motion& motion) {
   if (const auto* sine = std::get_if<SineMotion>(&motion))
     return {
         {"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
+  if (const auto* waypoints = std::get_if<WaypointMotion>(&motion))
+    return waypoints_json(*waypoints->path);
   const auto& line = std::get<LinearMotion>(motion);
   return {{"type", "linear"},
           {"velocity_m_s", array(line.velocity_m_s)},

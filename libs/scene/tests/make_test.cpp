@@ -94,7 +94,7 @@ TEST_CASE("touch is exact for turned boxes and cylinders", "[scene][property]") 
       for (int y = 0; y <= n; ++y)
         for (int z = 0; z <= n; ++z) {
           const Vector3d p = cube.lo + (cube.hi - cube.lo).cwiseProduct(Vector3d(x, y, z)) / n;
-          sampled = std::min(sampled, closest_on(o, o.pose.p(), p).distance);
+          sampled = std::min(sampled, closest_on(o, o.pose, p).distance);
         }
     const double slack = 0.5 * std::sqrt(3.0) * 0.1 / n;
     if (sampled <= 0.0) {
@@ -141,7 +141,7 @@ TEST_CASE("a made map has the voxels that a test of each single voxel marks", "[
         const Vector3d middle = 0.5 * (cube.lo + cube.hi);
         const bool marked = std::any_of(made.begin(), made.end(), [&](const Obstacle& o) {
           return options.mark == Mark::touch ? touches(o, cube)
-                                             : closest_on(o, o.pose.p(), middle).distance <= 0.0;
+                                             : closest_on(o, o.pose, middle).distance <= 0.0;
         });
         const bool inside = (middle.array() >= options.free_bounds->lo.array()).all() &&
                             (middle.array() <= options.free_bounds->hi.array()).all();
@@ -201,7 +201,7 @@ TEST_CASE("clutter avoids keep-out balls and the same seed gives the same bytes"
   options.clutter = clutter;
   const auto made = make_clutter(clutter);
   CHECK(made.size() == 30);
-  for (const Obstacle& o : made) CHECK(closest_on(o, o.pose.p(), {0.0, 0.0, 0.3}).distance >= 0.35);
+  for (const Obstacle& o : made) CHECK(closest_on(o, o.pose, {0.0, 0.0, 0.3}).distance >= 0.35);
   const std::string first = make_map(options).sha256;
   CHECK(make_map(options).sha256 == first);
   options.clutter->seed = 8;

@@ -55,6 +55,21 @@ std::vector<Vector3d> surface(const Obstacle& o, double step) {
         local.emplace_back(o.radius_m * Vector3d(std::sin(a) * std::cos(b),
                                                  std::sin(a) * std::sin(b), std::cos(a)));
       }
+  } else if (o.shape == Shape::capsule) {
+    const int n = static_cast<int>(turn * o.radius_m / step),
+              m = static_cast<int>(o.length_m / step);
+    for (int j = 0; j < n; ++j) {
+      const Vector3d radial(std::cos(turn * j / n), std::sin(turn * j / n), 0.0);
+      for (int i = 0; i <= m; ++i)
+        local.emplace_back(o.radius_m * radial +
+                           o.length_m * (static_cast<double>(i) / m - 0.5) * Vector3d::UnitZ());
+      for (int i = 0; i <= n; ++i) {
+        const double a = std::numbers::pi * i / n;
+        local.emplace_back(o.radius_m * (std::sin(a) * radial + std::cos(a) * Vector3d::UnitZ()) +
+                           (a < 0.5 * std::numbers::pi ? 0.5 : -0.5) * o.length_m *
+                               Vector3d::UnitZ());
+      }
+    }
   } else {
     const int n = static_cast<int>(turn * o.radius_m / step),
               m = static_cast<int>(o.length_m / step), r = static_cast<int>(o.radius_m / step);
@@ -81,6 +96,12 @@ bool contains(const Obstacle& o, const Vector3d& world) {
       return (p.cwiseAbs().array() < 0.5 * o.size_m.array()).all();
     case Shape::cylinder:
       return std::hypot(p.x(), p.y()) < o.radius_m && std::abs(p.z()) < 0.5 * o.length_m;
+    case Shape::capsule: {
+      const double beyond = std::max(std::abs(p.z()) - 0.5 * o.length_m, 0.0);
+      return std::hypot(p.x(), p.y(), beyond) < o.radius_m;
+    }
+    case Shape::frame:
+      break;
   }
   return false;
 }
@@ -88,7 +109,7 @@ bool contains(const Obstacle& o, const Vector3d& world) {
 }  // namespace
 
 TEST_CASE("closest points of primitives agree with their sampled surfaces", "[scene][property]") {
-  const auto shape = GENERATE(Shape::sphere, Shape::box, Shape::cylinder);
+  const auto shape = GENERATE(Shape::sphere, Shape::box, Shape::cylinder, Shape::capsule);
   CAPTURE(to_string(shape));
   Rng rng(17);
   const Obstacle o = example(shape, rng);
@@ -97,7 +118,7 @@ TEST_CASE("closest points of primitives agree with their sampled surfaces", "[sc
   int inside = 0;
   for (int i = 0; i < 300; ++i) {
     const Vector3d p = o.pose.p() + rng.uniform(0.0, 0.4) * test::random_direction(rng);
-    const SurfacePoint hit = closest_on(o, o.pose.p(), p);
+    const SurfacePoint hit = closest_on(o, o.pose, p);
     double sampled = std::numeric_limits<double>::infinity();
     for (const Vector3d& s : samples) sampled = std::min(sampled, (s - p).norm());
     CAPTURE(i);
@@ -108,13 +129,13 @@ TEST_CASE("closest points of primitives agree with their sampled surfaces", "[sc
     CHECK(std::abs(hit.distance) >= sampled - step);
     CHECK((p - hit.point - hit.distance * hit.direction).norm() < 1e-12);
     CHECK(hit.direction.norm() == Approx(1.0).epsilon(1e-12));
-    CHECK(std::abs(closest_on(o, o.pose.p(), hit.point).distance) < 1e-12);
+    CHECK(std::abs(closest_on(o, o.pose, hit.point).distance) < 1e-12);
   }
   CHECK(inside > 10);
 }
 
 TEST_CASE("the direction is the gradient of the distance", "[scene][property]") {
-  const auto shape = GENERATE(Shape::sphere, Shape::box, Shape::cylinder);
+  const auto shape = GENERATE(Shape::sphere, Shape::box, Shape::cylinder, Shape::capsule);
   CAPTURE(to_string(shape));
   Rng rng(23);
   const Obstacle o = example(shape, rng);
@@ -122,12 +143,12 @@ TEST_CASE("the direction is the gradient of the distance", "[scene][property]") 
   int checked = 0;
   for (int i = 0; i < 100; ++i) {
     const Vector3d p = o.pose.p() + rng.uniform(0.0, 0.4) * test::random_direction(rng);
-    const SurfacePoint hit = closest_on(o, o.pose.p(), p);
+    const SurfacePoint hit = closest_on(o, o.pose, p);
     Vector3d gradient;
     for (int axis = 0; axis < 3; ++axis) {
       const Vector3d d = h * Vector3d::Unit(axis);
       gradient[axis] =
-          (closest_on(o, o.pose.p(), p + d).distance - closest_on(o, o.pose.p(), p - d).distance) /
+          (closest_on(o, o.pose, p + d).distance - closest_on(o, o.pose, p - d).distance) /
           (2.0 * h);
     }
     if (gradient.norm() < 1.0 - 1e-6) continue;  // at a ridge of the depth
@@ -141,11 +162,11 @@ TEST_CASE("centres and axes have a defined direction", "[scene][unit]") {
   Obstacle o;
   o.radius_m = 0.1;
   o.length_m = 1.0;
-  CHECK(closest_on(o, o.pose.p(), Vector3d::Zero()).distance == -0.1);
-  CHECK(closest_on(o, o.pose.p(), Vector3d::Zero()).direction == Vector3d::UnitZ());
+  CHECK(closest_on(o, o.pose, Vector3d::Zero()).distance == -0.1);
+  CHECK(closest_on(o, o.pose, Vector3d::Zero()).direction == Vector3d::UnitZ());
   o.shape = Shape::cylinder;
-  CHECK(closest_on(o, o.pose.p(), Vector3d::Zero()).distance == -0.1);
-  CHECK(closest_on(o, o.pose.p(), Vector3d::Zero()).direction == Vector3d::UnitX());
+  CHECK(closest_on(o, o.pose, Vector3d::Zero()).distance == -0.1);
+  CHECK(closest_on(o, o.pose, Vector3d::Zero()).direction == Vector3d::UnitX());
 }
 
 TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative",
@@ -153,15 +174,16 @@ TEST_CASE("a moving obstacle follows its sine and its velocity is the derivative
   Obstacle o;
   o.radius_m = 0.06;
   o.pose = {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.5}};
-  CHECK(position_at(o, 3.0) == o.pose.p());
-  CHECK(velocity_at(o, 3.0) == Vector3d::Zero());
+  CHECK(motion_at(o, 3.0).pose.p() == o.pose.p());
+  CHECK(motion_at(o, 3.0).velocity == Vector3d::Zero());
   o.motion = SineMotion{{0.25, 0.0, -0.1}, 6.0};
-  CHECK((position_at(o, 1.5) - Vector3d(0.75, 0.0, 0.4)).norm() < 1e-15);
-  CHECK((position_at(o, 6.0) - o.pose.p()).norm() < 1e-15);
+  CHECK((motion_at(o, 1.5).pose.p() - Vector3d(0.75, 0.0, 0.4)).norm() < 1e-15);
+  CHECK((motion_at(o, 6.0).pose.p() - o.pose.p()).norm() < 1e-15);
   for (const double t : {0.0, 0.7, 2.0, 5.9}) {
     const double h = 1e-5;
-    const Vector3d numeric = (position_at(o, t + h) - position_at(o, t - h)) / (2.0 * h);
-    CHECK((velocity_at(o, t) - numeric).norm() < 1e-9);
+    const Vector3d numeric =
+        (motion_at(o, t + h).pose.p() - motion_at(o, t - h).pose.p()) / (2.0 * h);
+    CHECK((motion_at(o, t).velocity - numeric).norm() < 1e-9);
   }
 }
 
@@ -170,15 +192,15 @@ TEST_CASE("an obstacle on a line moves in its time span, at its speed", "[scene]
   o.radius_m = 0.06;
   o.pose = {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.5}};
   o.motion = LinearMotion{{0.2, -0.1, 0.0}, 1.0, 2.0};
-  CHECK(position_at(o, 0.5) == o.pose.p());
-  CHECK(velocity_at(o, 0.5) == Vector3d::Zero());
-  CHECK((position_at(o, 2.0) - Vector3d(0.7, -0.1, 0.5)).norm() < 1e-15);
-  CHECK(velocity_at(o, 2.0) == Vector3d(0.2, -0.1, 0.0));
-  CHECK((position_at(o, 9.0) - Vector3d(0.9, -0.2, 0.5)).norm() < 1e-15);
-  CHECK(velocity_at(o, 9.0) == Vector3d::Zero());
+  CHECK(motion_at(o, 0.5).pose.p() == o.pose.p());
+  CHECK(motion_at(o, 0.5).velocity == Vector3d::Zero());
+  CHECK((motion_at(o, 2.0).pose.p() - Vector3d(0.7, -0.1, 0.5)).norm() < 1e-15);
+  CHECK(motion_at(o, 2.0).velocity == Vector3d(0.2, -0.1, 0.0));
+  CHECK((motion_at(o, 9.0).pose.p() - Vector3d(0.9, -0.2, 0.5)).norm() < 1e-15);
+  CHECK(motion_at(o, 9.0).velocity == Vector3d::Zero());
   CHECK(max_speed(o) == Approx(std::sqrt(0.05)));
   o.motion = LinearMotion{{0.0, 0.0, 1.0}};
-  CHECK((position_at(o, 100.0) - Vector3d(0.5, 0.0, 100.5)).norm() < 1e-12);
+  CHECK((motion_at(o, 100.0).pose.p() - Vector3d(0.5, 0.0, 100.5)).norm() < 1e-12);
   o.motion = LinearMotion{{0.0, 0.0, 1.0}, 0.0, 0.0};
   CHECK_THROWS_WITH(check(o, "here"), Catch::Matchers::Contains("duration_s"));
 }

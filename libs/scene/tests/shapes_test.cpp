@@ -65,10 +65,11 @@ model::Robot two_links() {
 TEST_CASE("an obstacle's distance from a segment is the least distance of its points",
           "[scene][unit]") {
   Rng rng(3);
-  for (const Shape shape : {Shape::sphere, Shape::box, Shape::cylinder})
+  for (const Shape shape : {Shape::sphere, Shape::box, Shape::cylinder, Shape::capsule})
     for (int i = 0; i < 2000; ++i) {
       const Obstacle o = random_obstacle(rng, shape);
       const Vector3d center = o.pose.p() + test::random_vector(rng, 0.2);
+      const geometry::SE3 pose(o.pose.R(), center);
       const Vector3d a = center + test::random_vector(rng, 0.7);
       // some short, some along an axis of the obstacle, some through its centre
       Vector3d b = a + std::pow(10.0, rng.uniform(-9.0, 0.0)) * test::random_direction(rng);
@@ -77,13 +78,13 @@ TEST_CASE("an obstacle's distance from a segment is the least distance of its po
       if (i % 4 == 2) b = 2.0 * center - a;
       CAPTURE(to_string(shape), i);
       const double expected =
-          least([&](double t) { return closest_on(o, center, a + t * (b - a)).distance; });
-      const AxisPoint hit = closest_on(o, center, a, b);
+          least([&](double t) { return closest_on(o, pose, a + t * (b - a)).distance; });
+      const AxisPoint hit = closest_on(o, pose, a, b);
       // sections stop where rounding hides the slope, so the result may be slightly less
       REQUIRE(hit.distance <= expected + 1e-12);
       REQUIRE(hit.distance >= expected - 1e-9);
       // the axis point has that distance and lies on the segment
-      CHECK(std::abs(closest_on(o, center, hit.axis_point).distance - hit.distance) < 1e-12);
+      CHECK(std::abs(closest_on(o, pose, hit.axis_point).distance - hit.distance) < 1e-12);
       const double t =
           (b - a).norm() > 0.0 ? (hit.axis_point - a).dot(b - a) / (b - a).squaredNorm() : 0.0;
       CHECK((t > -1e-6 && t < 1.0 + 1e-6));
@@ -192,7 +193,7 @@ TEST_CASE("a capsule is as near to obstacles as the nearest sphere along it", "[
     for (int k = 0; k <= parts; ++k) {
       const Vector3d p = center[0] + (2.0 * k / parts - 1.0) * half[0];
       for (const Obstacle& o : obstacles)
-        nearest = std::min(nearest, closest_on(o, o.pose.p(), p).distance - radius[0]);
+        nearest = std::min(nearest, closest_on(o, o.pose, p).distance - radius[0]);
     }
     const double clearance = environment.clearance(capsule, 0.0, infinity);
     REQUIRE(clearance <= nearest + 1e-12);

@@ -45,13 +45,20 @@ double distance_from_block(const Vector& excess) {
   return excess.cwiseMax(0.0).norm() + std::min(excess.maxCoeff(), 0.0);
 }
 
-Vector3d center_at(const scene::Obstacle& obstacle, double time_s) {
-  Vector3d rest = obstacle.pose.p();
-  if (!obstacle.motion) return rest;
-  if (const auto* sine = std::get_if<scene::SineMotion>(&*obstacle.motion))
-    return rest + sine->amplitude_m * std::sin(2.0 * std::numbers::pi * time_s / sine->period_s);
-  const auto& line = std::get<scene::LinearMotion>(*obstacle.motion);
-  return rest + line.velocity_m_s * std::min(std::max(time_s - line.start_s, 0.0), line.duration_s);
+// The pose in the world. Written apart from that of the library, but for way-points.
+geometry::SE3 pose_at(const scene::Frame& frame, double time_s) {
+  geometry::SE3 own = frame.pose;
+  if (frame.motion) {
+    if (const auto* sine = std::get_if<scene::SineMotion>(&*frame.motion))
+      own = {own.R(), own.p() + sine->amplitude_m *
+                                    std::sin(2.0 * std::numbers::pi * time_s / sine->period_s)};
+    else if (const auto* line = std::get_if<scene::LinearMotion>(&*frame.motion))
+      own = {own.R(), own.p() + line->velocity_m_s * std::min(std::max(time_s - line->start_s, 0.0),
+                                                              line->duration_s)};
+    else
+      own = scene::motion_at({frame.pose, frame.motion, nullptr}, time_s).pose;
+  }
+  return frame.parent ? pose_at(*frame.parent, time_s) * own : own;
 }
 
 double radius_around_center(const scene::Obstacle& obstacle) {
@@ -62,8 +69,12 @@ double radius_around_center(const scene::Obstacle& obstacle) {
       return 0.5 * obstacle.size_m.norm();
     case scene::Shape::cylinder:
       return std::hypot(obstacle.radius_m, 0.5 * obstacle.length_m);
+    case scene::Shape::capsule:
+      return obstacle.radius_m + 0.5 * obstacle.length_m;
+    case scene::Shape::frame:
+      break;
   }
-  return infinity;
+  return -infinity;
 }
 
 }  // namespace
@@ -142,8 +153,9 @@ void JudgedArm::place(const Eigen::VectorXd& q, std::vector<Vector3d>& centers) 
                  balls_[k].center;
 }
 
-double distance_from(const scene::Obstacle& obstacle, double time_s, const Vector3d& p) {
-  const Vector3d local = obstacle.pose.R().transpose() * (p - center_at(obstacle, time_s));
+double distance_from(const scene::Obstacle& obstacle, const geometry::SE3& pose,
+                     const Vector3d& p) {
+  const Vector3d local = pose.R().transpose() * (p - pose.p());
   switch (obstacle.shape) {
     case scene::Shape::sphere:
       return local.norm() - obstacle.radius_m;
@@ -152,6 +164,13 @@ double distance_from(const scene::Obstacle& obstacle, double time_s, const Vecto
     case scene::Shape::cylinder:
       return distance_from_block(Eigen::Vector2d(local.head<2>().norm() - obstacle.radius_m,
                                                  std::abs(local.z()) - 0.5 * obstacle.length_m));
+    case scene::Shape::capsule:
+      return Vector3d(local.x(), local.y(),
+                      std::max(std::abs(local.z()) - 0.5 * obstacle.length_m, 0.0))
+                 .norm() -
+             obstacle.radius_m;
+    case scene::Shape::frame:
+      break;
   }
   return infinity;
 }
@@ -176,6 +195,7 @@ Judge::Judge(const scene::Scene& scene)
       min_clearance_(infinity),
       min_self_clearance_(infinity) {
   for (const auto& obstacle : obstacles_) bounding_radii_.push_back(radius_around_center(obstacle));
+  poses_.resize(obstacles_.size());
   const bool exact =
       std::any_of(obstacles_.begin(), obstacles_.end(), [](const auto& o) { return o.judge_only; });
   if (scene.map && (!exact || !scene.map->changes.empty())) map_ = JudgedMap(scene, arm_);
@@ -210,15 +230,16 @@ void Judge::check(double time_s, const Eigen::VectorXd& q) {
     min_clearance_ = clearance;
     verdict_.obstacles = {clearance, time_s, balls[ball].name, other};
   };
+  for (std::size_t i = 0; i < obstacles_.size(); ++i) poses_[i] = pose_at(obstacles_[i], time_s);
   for (std::size_t k = 0; k < balls.size(); ++k) {
     if (balls[k].link < 0) continue;  // the base does not move
     for (std::size_t i = 0; i < obstacles_.size(); ++i) {
       const auto& obstacle = obstacles_[i];
       if (time_s < obstacle.appears_s) continue;
       const double lower_bound =
-          (centers_[k] - center_at(obstacle, time_s)).norm() - bounding_radii_[i] - balls[k].radius;
+          (centers_[k] - poses_[i].p()).norm() - bounding_radii_[i] - balls[k].radius;
       if (lower_bound < min_clearance_)
-        update(distance_from(obstacle, time_s, centers_[k]) - balls[k].radius, k, obstacle.name);
+        update(distance_from(obstacle, poses_[i], centers_[k]) - balls[k].radius, k, obstacle.name);
     }
     if (!map_.leaves().empty()) update(map_distance(k, min_clearance_) - balls[k].radius, k, "map");
   }
@@ -271,7 +292,7 @@ Nearest nearest_at(const scene::Scene& scene, const JudgedArm& arm, const Judged
     add(map.distance(centers[k]) - balls[k].radius, balls[k].name + " in the map");
     for (const auto& obstacle : scene.obstacles)
       if (!obstacle.judge_only && obstacle.appears_s <= 0.0)
-        add(distance_from(obstacle, 0.0, centers[k]) - balls[k].radius,
+        add(distance_from(obstacle, pose_at(obstacle, 0.0), centers[k]) - balls[k].radius,
             fmt::format("{} in '{}'", balls[k].name, obstacle.name));
   }
   for (const auto& [a, b] : arm.self_pairs())

@@ -155,8 +155,9 @@ TEST_CASE(
       double nearest = std::numeric_limits<double>::infinity();
       for (const auto& o : scene.obstacles) {
         const Geometry shape = shape_of(o);
-        nearest = std::min(nearest, fcl_distance(centers, model, *shape,
-                                                 at(scene::position_at(o, time_s), o.pose.R())));
+        nearest =
+            std::min(nearest, fcl_distance(centers, model, *shape,
+                                           at(scene::motion_at(o, time_s).pose.p(), o.pose.R())));
       }
       const auto found = judged(scene, time_s, q);
       REQUIRE(found.has_value());

@@ -15,8 +15,8 @@ namespace hamelin::control {
 /// Proves that the motion between two nodes stays clear: chapter 12 of docs/theory.md. The motion
 /// is assumed to follow the joint-space line q + s Δq, from which joint j deviates by at most σ_j,
 /// docs/theory.md (12.1), (12.2). Let the axis of a shape move by the chord Δc during the step h,
-/// with clearances d and d⁺ at the nodes, and let u be the largest speed of an obstacle. Then, by
-/// docs/theory.md (12.7), every clearance on the step is at least
+/// with distances d and d⁺ at the nodes from an obstacle whose speed is at most u. Then, by
+/// docs/theory.md (12.7), its distance on the step is at least
 ///
 ///     (d + d⁺ − |Δc| − u h)/2 − κ/8 − Σ_j l_j σ_j.
 ///
@@ -50,12 +50,13 @@ class Certificate {
   struct Node {
     const Eigen::VectorXd& q;
     const Eigen::VectorXd& v;  ///< velocity with which the motion leaves or reaches the node
-    double time_s;
+    scene::Moment moment;
     scene::Shapes arm;                  ///< all shapes at q
     std::span<const double> clearance;  ///< of all shapes to obstacles; empty if there are none
     std::span<const double> pairs;      ///< of all SelfField::pairs(); empty if not modelled
   };
   /// @param ws scratch of the same model; its poses change
+  /// @param from, to are moments at different times now, or both are ahead of the same time
   /// @param environment the obstacles during the step
   [[nodiscard]] Verdict check(dynamics::Workspace& ws, const scene::Environment& environment,
                               const Node& from, const Node& to);
@@ -74,6 +75,20 @@ class Certificate {
     double from, to;   ///< clearances at its ends
   };
 
+  /// An obstacle that moves, during the step.
+  struct Mover {
+    double travel;              ///< no point of it moves farther [m]
+    Eigen::Vector3d from, to;   ///< its centre at the nodes
+    double ball_from, ball_to;  ///< it is within these distances of its centre [m]
+  };
+
+  /// Lists what moves during the step, and what appears in it.
+  void find_movers(const Node& from, const Node& to);
+  /// Lower bound of a shape's clearance on the step, docs/theory.md (12.7), (12.7a). Sets travel_.
+  /// @param d, d_next clearances at the nodes
+  [[nodiscard]] double bound_on_step(const Node& from, const Node& to, std::size_t shape, double d,
+                                     double d_next);
+  [[nodiscard]] scene::Moment moment_at(double s) const;
   /// Lower bound of the subject's clearance on the piece.
   double prove(dynamics::Workspace& ws, Subject subject, const Piece& piece);
   /// Largest |dc/ds| of any point of the subject's axes at the posture of ws [m].
@@ -82,8 +97,8 @@ class Certificate {
   [[nodiscard]] double clearance_at(Subject subject, double s);
   /// The given clearance, or less if an obstacle that appears in this step is nearer, as if it
   /// existed all the time.
-  [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape, double time_s,
-                                              double clearance) const;
+  [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape,
+                                              const scene::Moment& moment, double clearance) const;
   [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const {
     return (subject.is_pair ? levers_.pairs() : levers_.shapes())
         .row(static_cast<Eigen::Index>(subject.index));
@@ -100,8 +115,11 @@ class Certificate {
   Eigen::VectorXd q_, dq_, stray_;  ///< stray: σ
   Eigen::VectorXd curvature_;       ///< κ is the scalar product of this and the levers
   Eigen::VectorXd rest_;            ///< curvature / 8 + stray
-  double time_s_ = 0.0, h_ = 0.0;
-  double obstacle_travel_ = 0.0;        ///< u h: no obstacle moves farther [m]
+  scene::Moment moment_{0.0};
+  double h_ = 0.0;
+  bool ahead_ = false;         ///< whether the step lies ahead of now
+  std::vector<Mover> movers_;  ///< that exist at the end
+  double travel_ = 0.0;  ///< of those that may touch the shape that is examined: none moves farther
   std::vector<std::size_t> appearing_;  ///< obstacles that exist at the end but not at the start
   bool contact_ = false;                ///< whether contact was found between the nodes
   int pieces_ = 0;

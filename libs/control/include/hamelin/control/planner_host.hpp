@@ -71,6 +71,8 @@ class PlannerHost final : private planning::HostServices {
   void log(std::int32_t level, std::string_view line) override;
   std::size_t closest_points(std::span<const double> q, double influence_m,
                              planning::ArrayOut<hamelin_contact> out) override;
+  std::size_t closest_ahead(std::span<const double> q, double time_ahead_s, std::int32_t kinds,
+                            double influence_m, planning::ArrayOut<hamelin_contact> out) override;
   std::size_t closest_self(std::span<const double> q, double influence_m,
                            planning::ArrayOut<hamelin_self_contact> out) override;
   std::size_t obstacles(planning::ArrayOut<hamelin_obstacle_state> out) override;

@@ -32,20 +32,21 @@ class WorldQuery {
 
   /// The smallest distance of the arm from obstacles, and from itself where that is modelled; at
   /// most the world's influence [m]. Ends at the first distance below `at_least_m`.
-  [[nodiscard]] double clearance(const double* q, double time_s, double at_least_m);
+  [[nodiscard]] double clearance(const double* q, const scene::Moment& moment, double at_least_m);
   /// @return how many contacts there are, even if out is smaller; then the nearest are written
-  std::size_t contacts(const double* q, double time_s, double influence_m,
+  std::size_t contacts(const double* q, const scene::Moment& moment, double influence_m,
                        const planning::ArrayOut<hamelin_contact>& out);
   std::size_t self_contacts(const double* q, double influence_m,
                             const planning::ArrayOut<hamelin_self_contact>& out);
-  /// Whether the straight joint motion from q0 at t0 to q1 at t1 is proved clear, see Certificate.
+  /// Whether the straight joint motion from q0 at now + t0 to q1 at now + t1 is proved clear, see
+  /// Certificate.
   /// @param margin_m a lower bound of all distances if it is
-  [[nodiscard]] bool motion_clear(const double* q0, const double* q1, double t0_s, double t1_s,
-                                  double& margin_m);
+  [[nodiscard]] bool motion_clear(const double* q0, const double* q1, double now_s, double t0_s,
+                                  double t1_s, double& margin_m);
   /// Distance of a point of the world from the nearest obstacle, at most `limit_m`.
   /// @param gradient of the distance; zero at the limit
-  [[nodiscard]] double distance(const Eigen::Vector3d& point, double time_s, double limit_m,
-                                Eigen::Vector3d& gradient);
+  [[nodiscard]] double distance(const Eigen::Vector3d& point, const scene::Moment& moment,
+                                double limit_m, Eigen::Vector3d& gradient);
   /// The boxes of the map, and of unknown space that blocks, that meet a region of the world.
   std::size_t boxes(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                     const planning::ArrayOut<hamelin_box>& out);
@@ -55,12 +56,12 @@ class WorldQuery {
   struct Node {
     explicit Node(const model::Model& model) : arm(model) {}
     Eigen::VectorXd q;
-    double time_s = 0.0;
+    scene::Moment moment{0.0};
     scene::PlacedShapes arm;
     std::vector<double> clearance, pairs;
   };
   [[nodiscard]] scene::Shapes place(const double* q);
-  /// Measures all clearances at node.q and node.time_s. @return whether there is no contact
+  /// Measures all clearances at node.q and node.moment. @return whether there is no contact
   [[nodiscard]] bool measure(Node& node);
   [[nodiscard]] Certificate::Node end_of(const Node& node) const;
 

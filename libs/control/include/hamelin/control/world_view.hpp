@@ -65,9 +65,12 @@ class WorldView {
   [[nodiscard]] std::span<const scene::SelfContact> self_contacts() const noexcept {
     return {self_contacts_.data(), self_contact_count_};
   }
-  /// Contacts at another configuration, with the obstacles at their positions of the last look().
+  /// Contacts at another configuration, with the obstacles where they were at the last look(), or
+  /// so long after it by what is known of their future. Only those that move are found beyond
+  /// influence_m().
   /// @return how many there are; the nearest out.size() of them are written
-  std::size_t closest(const Eigen::VectorXd& q, double influence_m, std::span<scene::Contact> out);
+  std::size_t closest(const Eigen::VectorXd& q, double influence_m, std::span<scene::Contact> out,
+                      double ahead_s = 0.0, scene::Among among = scene::Among::all);
   std::size_t closest_self(const Eigen::VectorXd& q, double influence_m,
                            std::span<scene::SelfContact> out);
   /// The deepest contact of `shapes` at time 0 with obstacles that never move, seen or not.
@@ -176,6 +179,8 @@ class WorldView {
   scene::Environment::Vicinity vicinity_;  ///< of the arm at the last look()
 
   // for queries at other configurations
+  Eigen::VectorXd query_q_;  ///< of the arm below, if it is placed
+  bool query_placed_ = false;
   dynamics::Workspace query_poses_;
   scene::PlacedShapes query_arm_;
 };

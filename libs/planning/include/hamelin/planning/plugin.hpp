@@ -297,6 +297,18 @@ class Host {
     return raw_->closest_points(raw_->context, q.data(), influence_m, out.data(), out.size(),
                                 sizeof(hamelin_contact));
   }
+  /// Finds the contacts at any q with obstacles of some kinds, where they will be by what is known
+  /// of their future.
+  /// @param kinds HAMELIN_STANDING, HAMELIN_MOVING or their sum. Hosts that are older than this
+  /// function count all obstacles as standing
+  [[nodiscard]] std::size_t closest_ahead(std::span<const double> q, double time_ahead_s,
+                                          std::int32_t kinds, double influence_m,
+                                          std::span<hamelin_contact> out) const {
+    if (!HAMELIN_HAS_FIELD(raw_, hamelin_host, closest_ahead))
+      return (kinds & HAMELIN_STANDING) != 0 ? closest_points(q, influence_m, out) : 0;
+    return raw_->closest_ahead(raw_->context, q.data(), time_ahead_s, kinds, influence_m,
+                               out.data(), out.size(), sizeof(hamelin_contact));
+  }
   /// Finds the self contacts at any q, in the same way.
   [[nodiscard]] std::size_t closest_self(std::span<const double> q, double influence_m,
                                          std::span<hamelin_self_contact> out) const {

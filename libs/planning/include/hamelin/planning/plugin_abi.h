@@ -81,18 +81,39 @@ typedef struct hamelin_self_contact {
   double direction_world[3];                     /* unit, from b towards a */
 } hamelin_self_contact;
 
-enum { HAMELIN_OBSTACLE_SPHERE = 0, HAMELIN_OBSTACLE_BOX = 1, HAMELIN_OBSTACLE_CYLINDER = 2 };
+enum {
+  HAMELIN_OBSTACLE_SPHERE = 0,
+  HAMELIN_OBSTACLE_BOX = 1,
+  HAMELIN_OBSTACLE_CYLINDER = 2,
+  HAMELIN_OBSTACLE_CAPSULE = 3
+};
+
+/* What is known of an obstacle's future: its path; that it keeps its acceleration, or its velocity,
+ * as far as anybody knows; or a bound of its speed only. */
+enum {
+  HAMELIN_PREDICTION_PATH = 0,
+  HAMELIN_PREDICTION_ACCELERATION = 1,
+  HAMELIN_PREDICTION_VELOCITY = 2,
+  HAMELIN_PREDICTION_SPEED_BOUND = 3
+};
 
 /* An obstacle at some time. */
 typedef struct hamelin_obstacle_state {
   int32_t id;                                     /* as in hamelin_contact.obstacle */
-  int32_t shape;                                  /* HAMELIN_OBSTACLE_SPHERE, _BOX, _CYLINDER */
+  int32_t shape;                                  /* HAMELIN_OBSTACLE_SPHERE, ... */
   const char* name;                               /* unique among the obstacles */
-  double radius_m;                                /* sphere, cylinder */
-  double length_m;                                /* cylinder, along its z axis */
+  double radius_m;                                /* sphere, cylinder, capsule */
+  double length_m;                                /* along z; of a capsule, without its caps */
   double size_m[3];                               /* box: full edges */
   double position_world_m[3], quaternion_wxyz[4]; /* of its centre and axes */
-  double velocity_world_m_s[3];
+  double velocity_world_m_s[3];                   /* of its centre */
+  /* Appended in version 4. */
+  double acceleration_world_m_s2[3]; /* of its centre */
+  double angular_velocity_world_rad_s[3];
+  int32_t moves;        /* 1: it moves, or may move later */
+  int32_t prediction;   /* HAMELIN_PREDICTION_PATH, ... */
+  double speed_max_m_s; /* of any point of it, where the prediction is a bound; else 0 */
+  double nearer_m;      /* by how much it may have come nearer than this pose by that time */
 } hamelin_obstacle_state;
 
 /* A box of occupied space. Boxes of a map are disjoint. */
@@ -224,6 +245,9 @@ typedef struct hamelin_command {
 
 enum { HAMELIN_LOG_INFO = 0, HAMELIN_LOG_WARNING = 1 };
 
+/* Kinds of obstacles, to be added up: those that never move, with the map; those that may. */
+enum { HAMELIN_STANDING = 1, HAMELIN_MOVING = 2 };
+
 /* A handle for questions about the world at any configuration, from any thread. One thread at a
  * time may use a handle; several handles work in parallel. A handle sees the snapshot of the world
  * and counts from the time of the last tick, both of the last query_refresh: so a series of answers
@@ -270,10 +294,10 @@ typedef struct hamelin_host {
    * not call it in a tick that must not wait. */
   int32_t (*query_refresh)(hamelin_query* query, uint64_t* world, double* time_s);
   /* Writes the clearance of `count` configurations, one after the other in q: the smallest distance
-   * of any shape from obstacles (at their positions time_ahead_s after the time of the handle) and,
-   * if the scene models it, of the arm from itself. Distances above hamelin_setup.influence_m count
-   * as this. Once it is below `at_least`, a configuration is not examined further, and what is
-   * written is an upper bound below `at_least`. */
+   * of any shape from obstacles (where they will be time_ahead_s after the time of the handle, by
+   * what is known of their future) and, if the scene models it, of the arm from itself. Distances
+   * above hamelin_setup.influence_m count as this. Once it is below `at_least`, a configuration is
+   * not examined further, and what is written is an upper bound below `at_least`. */
   void (*query_clearance)(hamelin_query* query, const double* q, size_t count, double time_ahead_s,
                           double at_least_m, double* out);
   size_t (*query_contacts)(hamelin_query* query, const double* q, double time_ahead_s,
@@ -301,6 +325,17 @@ typedef struct hamelin_host {
   /* Lists the obstacles as they will be. Names stay valid until the next refresh. */
   size_t (*query_obstacles)(hamelin_query* query, double time_ahead_s, hamelin_obstacle_state* out,
                             size_t capacity, size_t stride);
+
+  /* Appended in version 4. */
+
+  /* [tick] Finds contacts at any q like closest_points, with obstacles of some kinds only
+   * (HAMELIN_STANDING, HAMELIN_MOVING or their sum), where they will be time_ahead_s from now by
+   * what is known of their future. Distances from an obstacle of which only the speed is bounded
+   * are less by what it may have moved. Moving obstacles are found at any distance up to
+   * influence_m, the others up to hamelin_setup.influence_m. Several calls in a row with equal q
+   * cost less. */
+  size_t (*closest_ahead)(void* context, const double* q, double time_ahead_s, int32_t kinds,
+                          double influence_m, hamelin_contact* out, size_t capacity, size_t stride);
 } hamelin_host;
 
 /* hamelin_plugin.properties: what a planner does not promise. */

@@ -87,6 +87,13 @@ class HostServices {
   /// out.size() of them and returns their number.
   virtual std::size_t closest_points(std::span<const double> q, double influence_m,
                                      ArrayOut<hamelin_contact> out) = 0;
+  /// The same with obstacles of some kinds (HAMELIN_STANDING, HAMELIN_MOVING or their sum) where
+  /// they will be. In the default all stand still.
+  virtual std::size_t closest_ahead(std::span<const double> q, double /*time_ahead_s*/,
+                                    std::int32_t kinds, double influence_m,
+                                    ArrayOut<hamelin_contact> out) {
+    return (kinds & HAMELIN_STANDING) != 0 ? closest_points(q, influence_m, out) : 0;
+  }
   /// The same for pairs of parts of the arm itself. The default finds none.
   virtual std::size_t closest_self(std::span<const double> /*q*/, double /*influence_m*/,
                                    ArrayOut<hamelin_self_contact> /*out*/) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -39,6 +40,10 @@ struct Contact {
 /// that a planner is not shown. judge: everything that exists.
 enum class View : std::int32_t { planner, hidden, judge };
 
+/// Which obstacles a query includes of those in view: all, those that never move (with the map), or
+/// those that may move.
+enum class Among : std::int32_t { all, standing, moving };
+
 /// Everything that the arm can hit, cropped to the space that it can reach. Queries are const and
 /// may run on several threads at once, each with a Scratch of its own. advance() changes the map:
 /// no query may run at the same time.
@@ -59,7 +64,8 @@ class Environment {
   /// @param reach upper bound of the distance of any point of the arm from the base [m]
   /// @param influence the largest distance that queries will use [m]
   /// @param robot see read_region()
-  /// @throws Error io, parse or invalid for the map or an obstacle
+  /// @throws Error io, parse or invalid for the map or an obstacle, also if one is attached to
+  ///         another that there is not
   Environment(const std::optional<MapSpec>& map, std::vector<Obstacle> obstacles,
               const geometry::SE3& base, double reach, double influence,
               const RobotAtStart& robot = {});
@@ -105,9 +111,10 @@ class Environment {
   /// @param seen one flag per obstacle, see reveal_visible(); empty: none was seen
   /// @param vicinity that of the arm, or null
   /// @return how many there are, even if out is smaller. No allocation.
-  std::size_t closest(const Shapes& arm, double influence, double time_s, Scratch& scratch,
+  std::size_t closest(const Shapes& arm, double influence, const Moment& moment, Scratch& scratch,
                       std::span<Contact> out, View view = View::planner,
-                      std::span<const std::uint8_t> seen = {}, Vicinity* vicinity = nullptr) const;
+                      std::span<const std::uint8_t> seen = {}, Vicinity* vicinity = nullptr,
+                      Among among = Among::all) const;
 
   /// Marks an obstacle that is not known but visible from the arm's configuration: it exists, and
   /// the clearance to it is at most its visible_within_m. Marks are permanent: an obstacle that was
@@ -117,11 +124,11 @@ class Environment {
   ///        allocation.
   int reveal_visible(const Shapes& arm, double time_s, std::span<std::uint8_t> seen) const;
 
-  /// Smallest distance between the surface of any shape and any obstacle [m], or `limit` if all
-  /// obstacles are farther. Zero or below is contact. No allocation.
-  [[nodiscard]] double clearance(const Shapes& arm, double time_s, double limit,
-                                 View view = View::judge,
-                                 std::span<const std::uint8_t> seen = {}) const;
+  /// Smallest distance between the surface of any shape and any obstacle of those `among` [m], or
+  /// `limit` if all obstacles are farther. Zero or below is contact. No allocation.
+  [[nodiscard]] double clearance(const Shapes& arm, const Moment& moment, double limit,
+                                 View view = View::judge, std::span<const std::uint8_t> seen = {},
+                                 Among among = Among::all) const;
 
   /// The nearest of all that stands still: the map, unknown space that blocks, and the obstacles
   /// without motion.
@@ -142,9 +149,9 @@ class Environment {
 
   /// Distance of the arm from one obstacle [m], whether it exists at that time or not, or `limit`
   /// if that is less. No allocation.
-  [[nodiscard]] double clearance_to(std::size_t obstacle, const Shapes& arm, double time_s,
+  [[nodiscard]] double clearance_to(std::size_t obstacle, const Shapes& arm, const Moment& moment,
                                     double limit) const {
-    return clearance_to(obstacles_[obstacle], arm, time_s, limit);
+    return clearance_to(obstacles_[obstacle], arm, placed_at(obstacles_[obstacle], moment), limit);
   }
 
   /// Describes a contact of the arm: "sphere 2 of link 'hand' is 4.2 mm inside the map".
@@ -170,6 +177,12 @@ class Environment {
   /// allocate nor wait.
   void prepare() const;
 
+  /// Whether an obstacle may ever move.
+  [[nodiscard]] bool moves(std::size_t obstacle) const noexcept { return moves_[obstacle] != 0; }
+  /// Whether any obstacle may ever move.
+  [[nodiscard]] bool has_movers() const noexcept {
+    return std::find(moves_.begin(), moves_.end(), std::uint8_t{1}) != moves_.end();
+  }
   /// Whether there is any obstacle, now or later.
   [[nodiscard]] bool has_obstacles() const noexcept;
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const noexcept { return obstacles_; }
@@ -182,15 +195,15 @@ class Environment {
 
  private:
   [[nodiscard]] bool in_view(std::size_t obstacle, double time_s, View view,
-                             std::span<const std::uint8_t> seen) const;
+                             std::span<const std::uint8_t> seen, Among among) const;
   /// Adds the points of a field, or of obstacle k, that are within `influence` of the arm.
   void add_map_contacts(const MapField& field, int id, const Shapes& arm, double influence,
                         MapField::Scratch& scratch, std::vector<BoxField::Vicinity>* vicinity,
                         std::vector<Contact>& found) const;
-  void add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence, double time_s,
+  void add_obstacle_contacts(std::size_t k, const Shapes& arm, double influence, const Placed& at,
                              std::vector<Contact>& found) const;
   [[nodiscard]] static double clearance_to(const Obstacle& obstacle, const Shapes& arm,
-                                           double time_s, double limit);
+                                           const Placed& at, double limit);
 
   void read_changes(std::span<const MapChangeSpec> changes);
   /// Applies one change to fields that no other environment shares.
@@ -203,7 +216,11 @@ class Environment {
   Ball map_ball_;                    ///< what was kept of the map, in its frame
   std::vector<MapChange> changes_;
   std::size_t next_change_ = 0;
+  /// Checks the obstacles, and takes them.
+  void take(std::vector<Obstacle> obstacles);
+
   std::vector<Obstacle> obstacles_;
+  std::vector<std::uint8_t> moves_;  ///< per obstacle: whether it may ever move
   Summary summary_;
 };
 

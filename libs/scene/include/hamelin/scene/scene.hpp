@@ -197,7 +197,7 @@ void set_pointer(Json& document, std::string_view assignment);
 /// One obstacle in the format of a scene. @throws Error invalid, "where: …"
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
-[[nodiscard]] Json motion_json(const std::variant<SineMotion, LinearMotion>& motion);
+[[nodiscard]] Json motion_json(const Motion& motion);
 
 /// The region of a scene's map around its robot in its start configuration, see read_region().
 /// @throws Error io, parse or invalid, also if start/q does not fit the model; usage if there is no

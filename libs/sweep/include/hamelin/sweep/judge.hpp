@@ -171,6 +171,7 @@ class Judge {
 
   JudgedArm arm_;
   std::vector<scene::Obstacle> obstacles_;
+  std::vector<geometry::SE3> poses_;    ///< of each obstacle, at the configuration that is checked
   std::vector<double> bounding_radii_;  ///< of each obstacle: radius of a ball around it
   JudgedMap map_;
   std::vector<NearbyLeaves> nearby_;  ///< of each ball
