@@ -1,6 +1,7 @@
 #include "hamelin/control/planner_host.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "hamelin/control/world_query.hpp"
@@ -9,6 +10,14 @@
 namespace hamelin::control {
 
 namespace {
+
+// The obstacles of some kinds; none if there are no such kinds.
+std::optional<scene::Among> among_of(std::int32_t kinds) {
+  const bool standing = (kinds & HAMELIN_STANDING) != 0, moving = (kinds & HAMELIN_MOVING) != 0;
+  if (!standing && !moving) return std::nullopt;
+  if (standing && moving) return scene::Among::all;
+  return moving ? scene::Among::moving : scene::Among::standing;
+}
 
 /// A planner's query handle.
 class Handle final : public planning::QueryServices {
@@ -55,7 +64,7 @@ class Handle final : public planning::QueryServices {
   std::size_t obstacles(double time_ahead_s,
                         planning::ArrayOut<hamelin_obstacle_state> out) override {
     return list_obstacles(query_.snapshot().environment, query_.snapshot().obstacle_ids,
-                          {time_s_, time_ahead_s}, out);
+                          {time_s_, time_ahead_s}, scene::Among::all, out);
   }
 
  private:
@@ -113,6 +122,8 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
   tick.world = world_number_;
   tick.speed_scale = view_.speed_scale();
   tick.torque = torque != nullptr ? torque->data() : nullptr;
+  tick.moving_count = list_obstacles(view_.environment(), view_.obstacle_ids(), time_s,
+                                     scene::Among::moving, {nullptr, 0, 0});
   return planner_.tick(tick, command_);
 }
 
@@ -128,15 +139,12 @@ std::size_t PlannerHost::closest_points(std::span<const double> q, double influe
 std::size_t PlannerHost::closest_ahead(std::span<const double> q, double time_ahead_s,
                                        std::int32_t kinds, double influence_m,
                                        planning::ArrayOut<hamelin_contact> out) {
-  constexpr std::int32_t both = HAMELIN_STANDING + HAMELIN_MOVING;
-  if ((kinds & both) == 0) return 0;
-  const auto among = (kinds & both) == both          ? scene::Among::all
-                     : (kinds & HAMELIN_MOVING) != 0 ? scene::Among::moving
-                                                     : scene::Among::standing;
+  const auto among = among_of(kinds);
+  if (!among) return 0;
   query_q_ = Eigen::Map<const Eigen::VectorXd>(q.data(), query_q_.size());
   const auto contacts =
       std::span(query_contacts_).first(std::min(query_contacts_.size(), out.size()));
-  const std::size_t found = view_.closest(query_q_, influence_m, contacts, time_ahead_s, among);
+  const std::size_t found = view_.closest(query_q_, influence_m, contacts, time_ahead_s, *among);
   for (std::size_t i = 0; i < std::min(found, contacts.size()); ++i)
     out.set(i, to_c(contacts[i], view_.obstacle_id(contacts[i].obstacle)));
   return found;
@@ -153,7 +161,16 @@ std::size_t PlannerHost::closest_self(std::span<const double> q, double influenc
 }
 
 std::size_t PlannerHost::obstacles(planning::ArrayOut<hamelin_obstacle_state> out) {
-  return list_obstacles(view_.environment(), view_.obstacle_ids(), time_s_.load(), out);
+  return list_obstacles(view_.environment(), view_.obstacle_ids(), time_s_.load(),
+                        scene::Among::all, out);
+}
+
+std::size_t PlannerHost::obstacles_ahead(double time_ahead_s, std::int32_t kinds,
+                                         planning::ArrayOut<hamelin_obstacle_state> out) {
+  const auto among = among_of(kinds);
+  if (!among) return 0;
+  return list_obstacles(view_.environment(), view_.obstacle_ids(), {time_s_.load(), time_ahead_s},
+                        *among, out);
 }
 
 std::unique_ptr<planning::QueryServices> PlannerHost::open_query() {

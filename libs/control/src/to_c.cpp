@@ -88,12 +88,14 @@ hamelin_self_contact to_c(const scene::SelfContact& contact) {
 }
 
 std::size_t list_obstacles(const scene::Environment& environment, std::span<const std::int32_t> ids,
-                           const scene::Moment& moment,
+                           const scene::Moment& moment, scene::Among among,
                            const planning::ArrayOut<hamelin_obstacle_state>& out) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < environment.obstacles().size(); ++i) {
     const scene::Obstacle& obstacle = environment.obstacles()[i];
     if (!scene::exists(obstacle, moment.now_s) || obstacle.shape == scene::Shape::frame) continue;
+    if (among != scene::Among::all && environment.moves(i) != (among == scene::Among::moving))
+      continue;
     const auto id = ids.empty() ? static_cast<std::int32_t>(i) : ids[i];
     if (count < out.size())
       out.set(count, to_c(obstacle, id, environment.moves(i), scene::placed_at(obstacle, moment)));

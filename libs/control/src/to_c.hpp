@@ -17,7 +17,7 @@ namespace hamelin::control {
 /// @param ids of its obstacles; empty: their indices
 /// @return how many there are, even if out is smaller
 std::size_t list_obstacles(const scene::Environment& environment, std::span<const std::int32_t> ids,
-                           const scene::Moment& moment,
+                           const scene::Moment& moment, scene::Among among,
                            const planning::ArrayOut<hamelin_obstacle_state>& out);
 
 }  // namespace hamelin::control

@@ -388,6 +388,7 @@ struct LoadedPlanner::Instance {
     host.query_refresh = &Instance::query_refresh;
     add_query_functions(host);
     host.closest_ahead = &Instance::closest_ahead;
+    host.obstacles_ahead = &Instance::obstacles_ahead;
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -448,6 +449,16 @@ struct LoadedPlanner::Instance {
     self.guarded([&] {
       count =
           self.services->closest_self({q, self.setup.dof}, influence_m, {out, capacity, stride});
+    });
+    return count;
+  }
+  static std::size_t obstacles_ahead(void* context, double time_ahead_s, std::int32_t kinds,
+                                     hamelin_obstacle_state* out, std::size_t capacity,
+                                     std::size_t stride) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    std::size_t count = 0;
+    self.guarded([&] {
+      count = self.services->obstacles_ahead(time_ahead_s, kinds, {out, capacity, stride});
     });
     return count;
   }

@@ -53,19 +53,23 @@ void SafetyFilter::begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W) {
   M_ = &M;
   W_ = &W;
   count_ = 0;
+  has_soft_rows_ = false;
   has_momentum_box_ = false;
   constexpr double unbounded = std::numeric_limits<double>::infinity();
   box_.lower.setConstant(-unbounded);
   box_.upper.setConstant(unbounded);
 }
 
-bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor) {
+bool SafetyFilter::add_row(const Eigen::VectorXd& a, double b, double floor, double softness) {
   if (count_ == static_cast<int>(rows_.size())) return false;
   a_.col(count_) = a;
   Wa_.col(count_).noalias() = *W_ * a;
   const double size = a.dot(Wa_.col(count_));
   // No joint can change the distance of such a point, so its row is left out.
-  if (size > 1e-12) rows_[static_cast<std::size_t>(count_++)] = {b, floor, 1.0 / size, 0.0};
+  if (size <= 1e-12) return true;
+  rows_[static_cast<std::size_t>(count_++)] = {b, floor, 1.0 / ((1.0 + softness) * size), 0.0,
+                                               softness * size};
+  has_soft_rows_ = has_soft_rows_ || softness > 0.0;
   return true;
 }
 
@@ -117,37 +121,58 @@ SafetyFilter::Report SafetyFilter::project(Eigen::VectorXd& x, int max_passes) {
   Report report;
   Mx_.noalias() = *M_ * x;
   report.energy_before_J = 0.5 * x.dot(Mx_);
-  for (auto* lambda :
-       {&box_.lambda_low, &box_.lambda_high, &momentum_box_.lambda_low, &momentum_box_.lambda_high})
-    lambda->setZero();
-  for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
-
-  for (report.passes = 1; report.passes <= max_passes; ++report.passes) {
-    double moved = pass_rows(x);
-    moved = std::max(moved, pass_box(x));
-    if (has_momentum_box_) moved = std::max(moved, pass_momentum_box(x));
-    if (moved < settled * settled) break;
+  report.passes = run_passes(x, max_passes, Rows::all);
+  if (has_soft_rows_ && floor_is_broken(x)) {
+    report.recovery_J = recovery();
+    report.passes += run_passes(x, 2 * max_passes, Rows::hard);
   }
-  report.passes = std::min(report.passes, max_passes);
-
   for (int i = 0; i < count_; ++i) {
     const auto& row = rows_[static_cast<std::size_t>(i)];
     const double along = a_.col(i).dot(x);
-    if (row.floor <= 0.0 && along < row.floor)
+    if (row.rho == 0.0 && row.floor <= 0.0 && along < row.floor)
       report.scale = std::min(report.scale, row.floor / along);
   }
-  report.recovery_J = recovery();
+  report.recovery_J += recovery();
   if (report.scale < 1.0) x *= report.scale;
   Mx_.noalias() = *M_ * x;
   report.energy_after_J = 0.5 * x.dot(Mx_);
   return report;
 }
 
-double SafetyFilter::pass_rows(Eigen::VectorXd& x) {
+void SafetyFilter::clear_multipliers() {
+  for (auto* lambda :
+       {&box_.lambda_low, &box_.lambda_high, &momentum_box_.lambda_low, &momentum_box_.lambda_high})
+    lambda->setZero();
+  for (int i = 0; i < count_; ++i) rows_[static_cast<std::size_t>(i)].lambda = 0.0;
+}
+
+int SafetyFilter::run_passes(Eigen::VectorXd& x, int max_passes, Rows which) {
+  clear_multipliers();
+  for (int pass = 1; pass <= max_passes; ++pass) {
+    double moved = pass_rows(x, which);
+    moved = std::max(moved, pass_box(x));
+    if (has_momentum_box_) moved = std::max(moved, pass_momentum_box(x));
+    if (moved < settled * settled) return pass;
+  }
+  return max_passes;
+}
+
+bool SafetyFilter::floor_is_broken(const Eigen::VectorXd& x) const {
+  constexpr double slack = 1e-9;
+  for (int i = 0; i < count_; ++i) {
+    const auto& row = rows_[static_cast<std::size_t>(i)];
+    if (row.rho == 0.0 && row.floor <= 0.0 && a_.col(i).dot(x) < row.floor - slack) return true;
+  }
+  return false;
+}
+
+double SafetyFilter::pass_rows(Eigen::VectorXd& x, Rows which) {
   double moved = 0.0;
   for (int i = 0; i < count_; ++i) {
     auto& row = rows_[static_cast<std::size_t>(i)];
-    const double change = relax(row.lambda, row.b - a_.col(i).dot(x), row.weight);
+    if (which == Rows::hard && row.rho > 0.0) continue;
+    const double change =
+        relax(row.lambda, row.b - a_.col(i).dot(x) - row.rho * row.lambda, row.weight);
     if (change == 0.0) continue;
     x.noalias() += change * Wa_.col(i);
     moved = std::max(moved, change * change / row.weight);

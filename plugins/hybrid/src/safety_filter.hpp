@@ -22,8 +22,10 @@ class SafetyFilter {
   void begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W);
   /// Adds the row a·x ≥ b. If a·x is below `floor` ≤ 0 after the passes, x is scaled towards zero
   /// until a·x equals `floor`: docs/theory.md (10.18). A positive floor is ignored.
+  /// A row with softness κ > 0 gives way: its violation ρλ, with ρ = κ aᵀW a, is paid for by half
+  /// of its work, docs/theory.md (10.32), and it has no floor.
   /// @return false if there are max_rows rows already
-  bool add_row(const Eigen::VectorXd& a, double b, double floor);
+  bool add_row(const Eigen::VectorXd& a, double b, double floor, double softness = 0.0);
   /// Sets the bounds lower ≤ x ≤ upper.
   void set_box(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
   /// Sets the bounds lower ≤ M x ≤ upper.
@@ -50,7 +52,9 @@ class SafetyFilter {
     double recovery_J = 0.0;                             ///< Σ λ_i b_i over rows with b_i > 0
     double scale = 1.0;                                  ///< factor applied to x for the floors
   };
-  /// Projects x in place. @param max_passes at least 1
+  /// Projects x in place. If a hard row is below its floor after the passes, and there are soft
+  /// rows, the result is projected again onto hard rows and boxes alone: docs/theory.md (10.33).
+  /// @param max_passes at least 1
   Report project(Eigen::VectorXd& x, int max_passes);
 
   /// Multipliers after project(): of row i, of joint k's bounds, of joint k's momentum bounds. A
@@ -64,15 +68,30 @@ class SafetyFilter {
   [[nodiscard]] double momentum_multiplier(int k) const {
     return momentum_box_.lambda_low[k] + momentum_box_.lambda_high[k];
   }
+  /// Whether a soft row holds x back.
+  [[nodiscard]] bool soft_row_acts() const {
+    for (int i = 0; i < count_; ++i) {
+      const auto& row = rows_[static_cast<std::size_t>(i)];
+      if (row.rho > 0.0 && row.lambda > 0.0) return true;
+    }
+    return false;
+  }
   [[nodiscard]] int row_count() const noexcept { return count_; }
 
  private:
   struct Row {
     double b = 0.0, floor = 0.0, weight = 0.0, lambda = 0.0;
+    double rho = 0.0;  ///< of a soft row; zero: hard
   };
+  enum class Rows { all, hard };
+  void clear_multipliers();
+  /// @return the number of passes
+  int run_passes(Eigen::VectorXd& x, int max_passes, Rows which);
+  /// Whether a hard row is below its floor.
+  [[nodiscard]] bool floor_is_broken(const Eigen::VectorXd& x) const;
   /// One pass over rows, box or momentum box.
   /// @return the largest squared move of x in the metric [J]
-  double pass_rows(Eigen::VectorXd& x);
+  double pass_rows(Eigen::VectorXd& x, Rows which);
   double pass_box(Eigen::VectorXd& x);
   double pass_momentum_box(Eigen::VectorXd& x);
   /// Σ λ_i b_i over all rows and bounds with b_i > 0.
@@ -83,6 +102,7 @@ class SafetyFilter {
   Eigen::MatrixXd a_, Wa_;  ///< one column per row a_i
   std::vector<Row> rows_;
   int count_ = 0;
+  bool has_soft_rows_ = false;
   bool has_momentum_box_ = false;
   Box box_, momentum_box_;
   Eigen::VectorXd Mx_, step_, Mfrom_;

@@ -18,9 +18,13 @@ class Surroundings {
 
   /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
   /// `self_radius` [m].
-  void query(const Eigen::VectorXd& q, double radius, double self_radius) {
+  /// @param kinds of obstacles: HAMELIN_STANDING, HAMELIN_MOVING or their sum
+  void query(const Eigen::VectorXd& q, double radius, double self_radius,
+             std::int32_t kinds = HAMELIN_STANDING + HAMELIN_MOVING) {
+    static const bool ts = getenv("TREESTAND") != nullptr;
+    if (ts) kinds = HAMELIN_STANDING;
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
-    count_ = std::min(host_.closest_points(at, radius, contacts_), contacts_.size());
+    count_ = std::min(host_.closest_ahead(at, 0.0, kinds, radius, contacts_), contacts_.size());
     self_count_ = 0;
     if (self_collision_)
       self_count_ =
@@ -36,7 +40,8 @@ class Surroundings {
   /// other than `self_margin` at q [m].
   [[nodiscard]] bool is_clear(const Eigen::VectorXd& q, double margin, double self_margin) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
-    if (host_.closest_points(at, margin, {}) > 0) return false;
+    static const bool ts = getenv("TREESTAND") != nullptr;
+    if (host_.closest_ahead(at, 0.0, ts ? HAMELIN_STANDING : 3, margin, {}) > 0) return false;
     return !self_collision_ || host_.closest_self(at, self_margin, {}) == 0;
   }
 

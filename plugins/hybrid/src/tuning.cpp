@@ -55,7 +55,9 @@ Tuning::Tuning(const planning::Setup& setup, const Json& params)
       joint_damping(params["joint_damping"]),
       stall_time_s(params["stall_time_s"]),
       filter_passes(params["filter_passes"]),
-      search_steps(params["search_steps"]) {}
+      search_steps(params["search_steps"]),
+      look_budget(params["look_budget"]),
+      look_steps(params["look_steps"]) {}
 
 void check_fixed_params(const Json& params, const Json& initial) {
   for (const char* key : fixed)

@@ -14,7 +14,7 @@ struct Tuning {
   MarginParams margins;
   double velocity_gain, follow_gain, drive_acceleration, acceleration_max, brake_acceleration,
       approach_rate, joint_damping, stall_time_s;
-  int filter_passes, search_steps;
+  int filter_passes, search_steps, look_budget, look_steps;
 };
 
 /// @throws Error invalid if `params` differ from `initial` in one that cannot change

@@ -76,6 +76,8 @@ class PlannerHost final : private planning::HostServices {
   std::size_t closest_self(std::span<const double> q, double influence_m,
                            planning::ArrayOut<hamelin_self_contact> out) override;
   std::size_t obstacles(planning::ArrayOut<hamelin_obstacle_state> out) override;
+  std::size_t obstacles_ahead(double time_ahead_s, std::int32_t kinds,
+                              planning::ArrayOut<hamelin_obstacle_state> out) override;
   std::unique_ptr<planning::QueryServices> open_query() override;
 
   const model::Model& nominal_;

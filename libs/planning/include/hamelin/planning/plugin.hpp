@@ -208,6 +208,10 @@ class Tick {
       return std::nullopt;
     return ConstVectorMap(raw_->torque, dof_);
   }
+  /// The number of obstacles that move, or may move later, however far they are.
+  [[nodiscard]] std::size_t moving_count() const {
+    return HAMELIN_HAS_FIELD(raw_, hamelin_tick, moving_count) ? raw_->moving_count : 0;
+  }
   [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
 
  private:
@@ -319,6 +323,16 @@ class Host {
   /// @return their number, even if out is smaller
   [[nodiscard]] std::size_t obstacles(std::span<hamelin_obstacle_state> out) const {
     return raw_->obstacles(raw_->context, out.data(), out.size(), sizeof(hamelin_obstacle_state));
+  }
+  /// Lists obstacles of some kinds where they will be by what is known of their future.
+  /// @param kinds HAMELIN_STANDING, HAMELIN_MOVING or their sum; hosts that are older than this
+  /// function have no moving ones
+  [[nodiscard]] std::size_t obstacles_ahead(double time_ahead_s, std::int32_t kinds,
+                                            std::span<hamelin_obstacle_state> out) const {
+    if (!HAMELIN_HAS_FIELD(raw_, hamelin_host, obstacles_ahead))
+      return (kinds & HAMELIN_STANDING) != 0 ? obstacles(out) : 0;
+    return raw_->obstacles_ahead(raw_->context, time_ahead_s, kinds, out.data(), out.size(),
+                                 sizeof(hamelin_obstacle_state));
   }
   /// Declares a series of numbers for log and report, for Command::set_series(). For the planner's
   /// constructor.

@@ -203,6 +203,8 @@ typedef struct hamelin_tick {
   /* The joint torques sent to the arm last [Nm or N], within all limits and not the planner's where
    * a shield stopped the arm: dof numbers; null under ideal actuation. */
   const double* torque;
+  /* Appended in version 4. */
+  size_t moving_count; /* obstacles that move, or may move later, however far they are */
 } hamelin_tick;
 
 /* DETECTS_STALLS: running, and the planner detects its stalls itself: the scene's stall rule is
@@ -336,6 +338,10 @@ typedef struct hamelin_host {
    * cost less. */
   size_t (*closest_ahead)(void* context, const double* q, double time_ahead_s, int32_t kinds,
                           double influence_m, hamelin_contact* out, size_t capacity, size_t stride);
+  /* [tick] Lists obstacles of some kinds where they will be time_ahead_s from now, like
+   * obstacles(). For one tick, the order is always the same. */
+  size_t (*obstacles_ahead)(void* context, double time_ahead_s, int32_t kinds,
+                            hamelin_obstacle_state* out, size_t capacity, size_t stride);
 } hamelin_host;
 
 /* hamelin_plugin.properties: what a planner does not promise. */

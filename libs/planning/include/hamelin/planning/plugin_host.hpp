@@ -101,6 +101,11 @@ class HostServices {
   }
   /// Lists the obstacles that the planner is shown. The default has none.
   virtual std::size_t obstacles(ArrayOut<hamelin_obstacle_state> /*out*/) { return 0; }
+  /// Lists obstacles of some kinds where they will be. The default has none that move.
+  virtual std::size_t obstacles_ahead(double /*time_ahead_s*/, std::int32_t kinds,
+                                      ArrayOut<hamelin_obstacle_state> out) {
+    return (kinds & HAMELIN_STANDING) != 0 ? obstacles(out) : 0;
+  }
   /// Makes a query; may be called by any thread. The default world is empty space.
   virtual std::unique_ptr<QueryServices> open_query();
 };
