@@ -48,8 +48,9 @@ struct Obstacle : Frame {
 };
 
 /// Sets the parents of all obstacles by their `attached_to`.
-/// @throws Error invalid, "where: obstacle 'NAME': …", if there is none of this name, or obstacles
-///        are attached to each other in a circle
+/// @throws Error invalid, "where/index: obstacle 'NAME' …", if there is none of this name or more
+///        than one, or obstacles are attached to each other in a circle or in a chain of more than
+///        32
 void attach(std::span<Obstacle> obstacles, const std::string& where);
 
 /// A time as a controller sees it: now, or so long ahead of now, where obstacles are predicted.
