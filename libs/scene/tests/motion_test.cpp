@@ -124,7 +124,7 @@ TEST_CASE("velocity, acceleration and rate of a path are differences of its pose
                       [&](const auto& w) { return std::abs(w.time_s - t) < 2 * h; });
       if (at_knot) continue;
       const auto before = path->at(t - h), now = path->at(t), after = path->at(t + h);
-      CHECK((now.velocity - (after.position - before.position) / (2 * h)).norm() < 1e-7);
+      CHECK((now.velocity - (after.position - before.position) / (2 * h)).norm() < 1e-6);
       CHECK((now.acceleration - (after.velocity - before.velocity) / (2 * h)).norm() < 1e-6);
       const Vector3d rate =
           geometry::SO3(after.rotation * before.rotation.transpose()).log() / (2 * h);

@@ -132,6 +132,8 @@ struct MotionState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< of its origin [m/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();      ///< of its origin [m/s²]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
+  /// Of frames that turn in frames that turn [rad/s²].
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();
 
   /// Velocity of the point that moves with the frame and is at p now.
   [[nodiscard]] Eigen::Vector3d velocity_at(const Eigen::Vector3d& p) const {
