@@ -33,7 +33,7 @@ MotionState own_state(const Frame& frame, const LinearMotion& line, double time_
       moves ? line.velocity_m_s : Vector3d::Zero()};
 }
 
-// docs/theory.md (11.42)
+// docs/theory.md (11.40)
 MotionState composed(const MotionState& parent, const MotionState& own) {
   const Eigen::Matrix3d& R = parent.pose.R();
   const Vector3d arm = R * own.pose.p(), v = R * own.velocity, turn = R * own.angular_velocity,
@@ -90,6 +90,7 @@ MotionState motion_at(const Frame& frame, double time_s) {
   return frame.parent ? composed(motion_at(*frame.parent, time_s), own) : own;
 }
 
+// docs/theory.md (11.44)
 MotionBounds motion_bounds(const Frame& frame) {
   MotionBounds own{0.0, 0.0, frame.pose.p().norm()};
   if (frame.motion)

@@ -218,6 +218,7 @@ double max_speed(const Obstacle& obstacle) {
   return bounds.speed + (bounds.rate > 0.0 ? bounds.rate * bounding_radius(obstacle) : 0.0);
 }
 
+// docs/theory.md (11.45)
 double max_speed(const Obstacle& obstacle, const Moment& moment) {
   switch (obstacle.prediction) {
     case Prediction::path:
