@@ -159,6 +159,11 @@ std::string_view to_string(Prediction prediction) noexcept {
   return "unknown";
 }
 
+std::filesystem::path waypoint_file(const Obstacle& obstacle) {
+  const auto* motion = obstacle.motion ? std::get_if<WaypointMotion>(&*obstacle.motion) : nullptr;
+  return motion != nullptr ? motion->path->file() : std::filesystem::path();
+}
+
 void attach(std::span<Obstacle> obstacles, const std::string& where) {
   // What is examined at a time, motion_at() among it, recurses so often.
   constexpr std::size_t depth_max = 32;

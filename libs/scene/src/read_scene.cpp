@@ -487,10 +487,7 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   if (scene.robot.spheres) files.push_back(*scene.robot.spheres);
   if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
   for (const Obstacle& obstacle : scene.obstacles)
-    if (const auto* motion =
-            obstacle.motion ? std::get_if<WaypointMotion>(&*obstacle.motion) : nullptr;
-        motion != nullptr && !motion->path->file().empty())
-      files.push_back(motion->path->file());
+    if (const auto file = waypoint_file(obstacle); !file.empty()) files.push_back(file);
   if (!scene.map) return files;
   files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -46,6 +47,9 @@ struct Obstacle : Frame {
   double appears_s = 0.0;                  ///< before this time it does not exist
   bool judge_only = false;                 ///< for collision checks only, not for the planner
 };
+
+/// The file that its way-points were read from; empty: none.
+[[nodiscard]] std::filesystem::path waypoint_file(const Obstacle& obstacle);
 
 /// Sets the parents of all obstacles by their `attached_to`.
 /// @throws Error invalid, "where/index: obstacle 'NAME' …", if there is none of this name or more
