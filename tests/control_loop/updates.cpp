@@ -37,7 +37,7 @@ void pause(Rng& rng, double longest_s) {
 scene::Obstacle random_obstacle(Rng& rng, std::string name) {
   scene::Obstacle obstacle;
   obstacle.name = std::move(name);
-  obstacle.shape = static_cast<scene::Shape>(rng.below(3));
+  obstacle.shape = static_cast<scene::Shape>(rng.below(4));
   obstacle.radius_m = rng.uniform(0.03, 0.1);
   obstacle.length_m = rng.uniform(0.05, 0.4);
   obstacle.size_m = {rng.uniform(0.05, 0.3), rng.uniform(0.05, 0.3), rng.uniform(0.05, 0.3)};

@@ -12,7 +12,7 @@
 
 namespace hamelin::test {
 
-/// A sphere, box or cylinder that the arm of data/ can reach, or nearly so.
+/// A sphere, box, cylinder or capsule that the arm of data/ can reach, or nearly so.
 [[nodiscard]] scene::Obstacle random_obstacle(Rng& rng, std::string name);
 /// A configuration within the limits of the joints.
 [[nodiscard]] Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot);

@@ -5,7 +5,7 @@ set -euo pipefail
 hamelin=$(realpath "$1")
 out=$2
 source=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
-mkdir -p "$out"/{maps,scene,robot,spheres,urdf,srdf,log,primitives}
+mkdir -p "$out"/{maps,scene,robot,spheres,urdf,srdf,log,primitives,waypoints}
 out=$(realpath "$out")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -18,6 +18,9 @@ cp "$source"/data/robots/*.spheres.json "$out/spheres"
 for robot in "$source"/data/robots/*.json; do
   [[ $robot == *.spheres.json ]] || cp "$robot" "$out/robot"
 done
+
+printf 'time_s,x_m,y_m,z_m\n0,0,0,0\n0.5,0.2,0,0\n1,0.5,0.1,0\n' >"$out/waypoints/walk.csv"
+printf '[{"time_s": 0, "position_m": [0, 0, 0]}, {"time_s": 1, "position_m": [1, 0, 0]}]' >"$out/waypoints/list.json"
 
 cat >"$out/srdf/two_links.srdf" <<'XML'
 <?xml version="1.0"?>

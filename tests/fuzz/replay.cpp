@@ -27,10 +27,15 @@ namespace fs = std::filesystem;
 using hamelin::fuzz::require;
 
 const std::map<std::string, void (*)(std::string_view)> targets{
-    {"maps", hamelin::fuzz::maps},   {"scene", hamelin::fuzz::scene},
-    {"robot", hamelin::fuzz::robot}, {"spheres", hamelin::fuzz::spheres},
-    {"urdf", hamelin::fuzz::urdf},   {"srdf", hamelin::fuzz::srdf},
-    {"log", hamelin::fuzz::log},     {"primitives", hamelin::fuzz::primitives}};
+    {"maps", hamelin::fuzz::maps},
+    {"scene", hamelin::fuzz::scene},
+    {"robot", hamelin::fuzz::robot},
+    {"spheres", hamelin::fuzz::spheres},
+    {"urdf", hamelin::fuzz::urdf},
+    {"srdf", hamelin::fuzz::srdf},
+    {"log", hamelin::fuzz::log},
+    {"primitives", hamelin::fuzz::primitives},
+    {"waypoints", hamelin::fuzz::waypoints}};
 
 // Sanitizers slow the program down and need shadow memory.
 #ifdef HAMELIN_SANITIZED

@@ -19,6 +19,7 @@ void urdf(std::string_view bytes);
 void srdf(std::string_view bytes);
 void log(std::string_view bytes);
 void primitives(std::string_view bytes);
+void waypoints(std::string_view bytes);
 
 /// Aborts unless `holds`, and prints the condition.
 void require(bool holds, const std::string& condition);

@@ -258,6 +258,21 @@ const RACK_FACE = (p) => {
   return { point, distance: Math.hypot(...point.map((c, i) => c - p[i])) };
 };
 
+/** A capsule that swings and turns, given by samples of its pose, with a period of 2 s. */
+function swinging(pack) {
+  const t = Array.from({ length: 401 }, (_, k) => k / 40);
+  const s = t.map((time) => Math.sin(Math.PI * time));
+  return {
+    name: 'swinging', shape: 'capsule', radius_m: 0.05, length_m: 0.2, position_m: [0.4, -0.5, 0.9], quaternion_wxyz: [1, 0, 0, 0], motion: null,
+    poses: {
+      t: pack.add(t, 'f64'),
+      position_m: pack.add(s.flatMap((y) => [0.4, -0.5 + 0.2 * y, 0.9]), 'i32', { scale: 1e-5 }),
+      quaternion_wxyz: pack.add(s.flatMap((y) => [Math.cos(y / 2), Math.sin(y / 2), 0, 0]), 'i32', { scale: 1e-5 }),
+    },
+    appears_s: 0, judge_only: false,
+  };
+}
+
 /**
  * The container of one to four runs of the six-joint arm, of one planar run, or of "everything":
  * two runs that together have something for each control of the page.
@@ -298,7 +313,7 @@ export function container(kind) {
     map: rack(pack, everything ? 8000 : 20000),
     obstacles: [
       { name: 'drifter', shape: 'sphere', radius_m: 0.07, position_m: [0.35, 0.45, 0.95], quaternion_wxyz: [1, 0, 0, 0], motion: { amplitude_m: [0, 0.3, 0], period_s: 4 }, appears_s: 0, judge_only: false },
-      ...(everything ? [{ name: 'late', shape: 'cylinder', radius_m: 0.1, length_m: 0.3, position_m: [-0.4, -0.4, 0.8], quaternion_wxyz: [1, 0, 0, 0], motion: null, appears_s: 3, judge_only: true }] : []),
+      ...(everything ? [{ name: 'late', shape: 'cylinder', radius_m: 0.1, length_m: 0.3, position_m: [-0.4, -0.4, 0.8], quaternion_wxyz: [1, 0, 0, 0], motion: null, appears_s: 3, judge_only: true }, swinging(pack)] : []),
     ],
     reach_m: 1.2,
   };

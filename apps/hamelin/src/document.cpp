@@ -25,6 +25,8 @@ std::string_view to_string(Kind kind) noexcept {
       return "primitives";
     case Kind::spheres:
       return "file of collision spheres";
+    case Kind::waypoints:
+      return "file of way-points";
     case Kind::log:
       return "log";
     case Kind::sweep:
@@ -56,12 +58,14 @@ Kind recognise(const std::filesystem::path& file) {
   if (extension == ".jsonl" && holds_records(file)) return Kind::records;
   if (extension == ".jsonl" || extension == ".zst") return Kind::log;
   if (extension == ".urdf") return Kind::urdf;
+  if (extension == ".csv") return Kind::waypoints;
   const std::string text = read_file(file);
   if (text.starts_with("# Octomap")) return Kind::map;
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos)
     throw Error(ErrorCode::parse, fmt::format("{}: is empty", file.string()));
   if (text[first] == '<') return Kind::urdf;
+  if (text[first] == '[') return Kind::waypoints;
   if (text[first] != '{')
     throw Error(ErrorCode::parse,
                 fmt::format("{}: is not a map, XML or a JSON object", file.string()));
@@ -81,6 +85,7 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.accuracy/1") return Kind::accuracy;
   if (schema.is_null() && document.contains("links") && document["links"].is_object())
     return Kind::spheres;
+  if (schema.is_null() && document.contains("waypoints")) return Kind::waypoints;
   throw Error(
       ErrorCode::invalid,
       fmt::format(

@@ -15,6 +15,7 @@ enum class Kind {
   result,
   primitives,
   spheres,
+  waypoints,
   log,
   sweep,
   records,

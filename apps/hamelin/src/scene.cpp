@@ -374,8 +374,9 @@ void add_scene_make(CLI::App& scene) {
   make_command->add_option("problem", options->problem, "MotionBenchMaker problem")
       ->type_name("PROBLEM.json");
   make_command
-      ->add_option("--primitives", options->primitives,
-                   "file of spheres, boxes and cylinders (see `hamelin schema print primitives`)")
+      ->add_option(
+          "--primitives", options->primitives,
+          "file of spheres, boxes, cylinders and capsules (see `hamelin schema print primitives`)")
       ->type_name("FILE.json");
   make_command->add_option("--clutter", options->clutter, "number of random primitives")
       ->type_name("N")

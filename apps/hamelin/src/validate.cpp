@@ -91,6 +91,11 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
           scene::make_options_from_json(read_json(file), file.string()).primitives.size());
     case Kind::spheres:
       return fmt::format("collision spheres, {}", description::check_spheres(file));
+    case Kind::waypoints: {
+      const auto path = scene::read_waypoint_path(file, {});
+      return fmt::format("way-points, {}, up to {:.3g} m/s and {:.3g} rad/s",
+                         path.waypoints().size(), path.speed_max(), path.rate_max());
+    }
     case Kind::sweep: {
       const auto plan = sweep::read_plan_file(file);
       return fmt::format("sweep plan, {} runs of {} scenes", plan.runs.size(), plan.scenes.size());
@@ -138,13 +143,14 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command = add_command(app, "validate",
-                              "Check robots, collision spheres, scenes, maps, logs, results and "
-                              "sweeps against their formats. The kind of "
-                              "each file is recognised by its content",
-                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
-                              "hamelin validate arm.urdf --tip tool0\n"
-                              "hamelin validate run.jsonl --json");
+  auto* command =
+      add_command(app, "validate",
+                  "Check robots, collision spheres, scenes, maps, way-points, logs, results "
+                  "and sweeps against their formats. The kind of "
+                  "each file is recognised by its content",
+                  "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
+                  "hamelin validate arm.urdf --tip tool0\n"
+                  "hamelin validate run.jsonl --json");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "files to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "tip link (default for a URDF: its only leaf)")

@@ -186,13 +186,13 @@ std::int32_t hamelin_controller_set_obstacle(hamelin_controller* controller,
       throw Error(ErrorCode::usage, "obstacle: is null or its struct_size is too small");
     scene::Obstacle obstacle;
     obstacle.name = required(given->name, "obstacle: name");
-    if (given->shape < HAMELIN_SPHERE || given->shape > HAMELIN_CYLINDER)
+    if (given->shape < HAMELIN_SPHERE || given->shape > HAMELIN_CAPSULE)
       throw Error(ErrorCode::invalid, "obstacle '" + obstacle.name +
-                                          "': its shape is unknown, expected a sphere, box or "
-                                          "cylinder");
-    obstacle.shape = given->shape == HAMELIN_SPHERE ? scene::Shape::sphere
-                     : given->shape == HAMELIN_BOX  ? scene::Shape::box
-                                                    : scene::Shape::cylinder;
+                                          "': its shape is unknown, expected a sphere, box, "
+                                          "cylinder or capsule");
+    constexpr std::array shapes{scene::Shape::sphere, scene::Shape::box, scene::Shape::cylinder,
+                                scene::Shape::capsule};
+    obstacle.shape = shapes.at(static_cast<std::size_t>(given->shape));
     obstacle.radius_m = given->radius_m;
     obstacle.length_m = given->length_m;
     obstacle.size_m = Eigen::Map<const Eigen::Vector3d>(given->size_m);

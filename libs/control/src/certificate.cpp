@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/core/numbers.hpp"
+
 namespace hamelin::control {
 
 using Eigen::Index;
@@ -56,7 +58,7 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   Verdict verdict;
   verdict.margin_m = from.clearance.empty() ? self_limit_ : limit_;
   const auto include = [&](Subject subject, double bound, double d, double d_next) {
-    if (bound <= 0.0) bound = prove(ws, subject, {0.0, 1.0, d, d_next});
+    if (bound <= 0.0) bound = std::min(far_, prove(ws, subject, {0.0, 1.0, d, d_next}));
     verdict.margin_m = std::min(verdict.margin_m, bound);
     if (!(bound > 0.0)) verdict.certified = false;
   };
@@ -67,6 +69,7 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
                                                                  from.clearance[s]);
     include(subject, bound_on_step(from, to, s, d, to.clearance[s]), d, to.clearance[s]);
   }
+  far_ = infinity;
   for (std::size_t k = 0; k < from.pairs.size(); ++k) {
     const Subject subject{k, true};
     const bool touched = contact_;
@@ -98,6 +101,7 @@ void Certificate::find_movers(const Node& from, const Node& to) {
   }
 }
 
+// docs/theory.md (12.7), (12.13)
 double Certificate::bound_on_step(const Node& from, const Node& to, std::size_t shape, double d,
                                   double d_next) {
   const double moved = chord(from.arm, to.arm, shape),
@@ -107,13 +111,17 @@ double Certificate::bound_on_step(const Node& from, const Node& to, std::size_t 
       from.arm.radii[shape] + (from.arm.is_capsule(shape) ? from.arm.half_axes[shape].norm() : 0.0);
   double bound = standing;
   travel_ = 0.0;
+  far_ = infinity;
   for (const Mover& mover : movers_) {
     const double apart = (from.arm.centers[shape] - mover.from).norm() - mover.ball_from - own,
                  apart_next = (to.arm.centers[shape] - mover.to).norm() - mover.ball_to - own;
     const double by_balls =
         0.5 * (std::max(d, apart) + std::max(d_next, apart_next) - moved - mover.travel) - rest;
     bound = std::min(bound, by_balls);
-    if (by_balls <= 0.0) travel_ = std::max(travel_, mover.travel);
+    if (by_balls <= 0.0)
+      travel_ = std::max(travel_, mover.travel);
+    else
+      far_ = std::min(far_, by_balls);
   }
   return bound;
 }

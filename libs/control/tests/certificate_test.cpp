@@ -17,12 +17,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// A chain of one capsule of 1 m along y that turns about z, and one obstacle.
+/// A chain of one capsule of 1 m along y that turns about z, and obstacles.
 struct Rig {
-  explicit Rig(scene::Obstacle obstacle)
+  explicit Rig(scene::Obstacle obstacle) : Rig(std::vector{std::move(obstacle)}) {}
+  explicit Rig(std::vector<scene::Obstacle> obstacles)
       : model(model::make_chain({1, "z", 1.0, 1.0, 0.05})),
-        environment(std::nullopt, {std::move(obstacle)}, geometry::SE3{}, model.reach(), limit),
-        certificate(model, limit, nullptr, 0.0, 1),
+        environment(std::nullopt, obstacles, geometry::SE3{}, model.reach(), limit),
+        certificate(model, limit, nullptr, 0.0, obstacles.size()),
         ws(model),
         arm(model),
         next(model) {}
@@ -138,6 +139,27 @@ TEST_CASE("an obstacle counts with its speed, and from the start of the step in 
   scene::Obstacle far = ball({0.0, -1.0, 0.0}, 0.1);
   far.appears_s = 0.007;
   CHECK(Rig(far).turn(0.5, 1.4, 0.0, 0.01).certified);
+}
+
+TEST_CASE("a fast obstacle that is far away does not weaken the bound, a near one does",
+          "[control][unit]") {
+  const scene::Obstacle standing = ball({0.2, 1.0, 0.0}, 0.1);
+  const auto alone = Rig(standing).turn(0.0, 0.001, 0.0, 0.001);
+  REQUIRE(alone.certified);
+  const auto with = [&](const Vector3d& at) {
+    scene::Obstacle fast = ball(at, 0.1);
+    fast.motion = scene::LinearMotion{{0.0, 0.0, 200.0}};  // 0.2 m in the step
+    return Rig(std::vector{standing, fast}).turn(0.0, 0.001, 0.0, 0.001);
+  };
+  const auto far = with({-4.0, 0.0, 0.0});
+  CHECK(far.certified);
+  CHECK(far.margin_m == alone.margin_m);
+  // 0.1 m from the arm: proved on pieces of the step, whose bounds count its speed
+  const auto near = with({-0.25, 0.5, 0.0});
+  CHECK(near.certified);
+  CHECK(near.margin_m < 0.7 * alone.margin_m);
+  const auto touching = with({0.0, 0.5, -0.25});
+  CHECK_FALSE(touching.certified);
 }
 
 TEST_CASE("the travel of a prismatic joint without limits is bounded by its motion",

@@ -1,11 +1,14 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include "fixture.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/geometry/so3.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
@@ -25,6 +28,31 @@ scene::Obstacle ball(const Vector3d& at, double radius) {
   obstacle.radius_m = radius;
   obstacle.pose = {Eigen::Matrix3d::Identity(), at};
   return obstacle;
+}
+
+// A box that moves and turns along way-points, or a capsule that is attached to a frame that does.
+std::vector<scene::Obstacle> turning_bar(bool attached) {
+  const std::vector<scene::Waypoint> points{
+      {0.0, {2.0, 0.5, 0.0}},
+      {0.3, {2.1, 0.25, 0.01}, {std::cos(0.4), 0.0, 0.0, std::sin(0.4)}},
+      {0.6, {2.0, -0.1, 0.0}, {std::cos(0.7), 0.6 * std::sin(0.7), 0.0, 0.8 * std::sin(0.7)}}};
+  scene::Obstacle bar = ball(Vector3d::Zero(), 0.05);
+  bar.shape = attached ? scene::Shape::capsule : scene::Shape::box;
+  bar.size_m = {0.3, 0.1, 0.12};
+  bar.length_m = 0.2;
+  const scene::WaypointMotion motion{
+      std::make_shared<scene::WaypointPath>(points, scene::WaypointPath::Options(), "points")};
+  if (!attached) {
+    bar.motion = motion;
+    return {bar};
+  }
+  bar.attached_to = "frame";
+  bar.pose = {geometry::SO3::exp({0.0, 1.2, 0.3}).R(), {0.05, 0.02, 0.01}};
+  scene::Obstacle frame;
+  frame.name = "frame";
+  frame.shape = scene::Shape::frame;
+  frame.motion = motion;
+  return {bar, frame};
 }
 
 // The largest relative deviation of the acceleration of one step from hamelin's forward dynamics,
@@ -116,7 +144,8 @@ TEST_CASE("dry friction holds a torque below it, and joint limits are kept if th
 
 TEST_CASE("each link's contact with each kind of obstacle is counted at its true depth",
           "[mujoco]") {
-  const auto shape = GENERATE(scene::Shape::sphere, scene::Shape::box, scene::Shape::cylinder);
+  const auto shape = GENERATE(scene::Shape::sphere, scene::Shape::box, scene::Shape::cylinder,
+                              scene::Shape::capsule);
   const bool capsules = GENERATE(false, true);
   model::Robot robot = test::random_robot(11, 4);
   for (auto& link : robot.links) {
@@ -141,7 +170,7 @@ TEST_CASE("each link's contact with each kind of obstacle is counted at its true
     scene::Obstacle obstacle = ball({end.x(), end.y(), top + 0.1 - depth}, 0.1);
     obstacle.shape = shape;
     obstacle.size_m = Vector3d(0.02, 0.02, 0.2);
-    obstacle.length_m = 0.2;
+    obstacle.length_m = shape == scene::Shape::capsule ? 0.18 : 0.2;
     if (shape != scene::Shape::sphere) obstacle.radius_m = 0.01;
     rig.scene.obstacles = {obstacle};
     simulation::Plant& plant = rig.rest_at(q);
@@ -165,7 +194,7 @@ TEST_CASE("moving and appearing obstacles are where the scene puts them at each 
   Rig rig(model::Model(test::planar4(), geometry::SE3{}, Vector3d::Zero()));
   const VectorXd q = VectorXd::Zero(4);
   scene::Obstacle obstacle = ball({2.0, 0.5, 0.0}, 0.1);
-  const int kind = GENERATE(0, 1, 2);
+  const int kind = GENERATE(0, 1, 2, 3, 4);
   if (kind == 0) obstacle.motion = scene::LinearMotion{{0.0, -1.0, 0.0}, 0.1};
   if (kind == 1) obstacle.motion = scene::SineMotion{{0.3, -0.5, 0.0}, 3.0};
   if (kind == 2) {
@@ -173,6 +202,7 @@ TEST_CASE("moving and appearing obstacles are where the scene puts them at each 
     obstacle.appears_s = 0.25;
   }
   rig.scene.obstacles = {obstacle};
+  if (kind >= 3) rig.scene.obstacles = turning_bar(kind == 4);
   simulation::Plant& plant = rig.rest_at(q);
   const auto environment = scene::make_environment(rig.scene, rig.model, 1.0);
   dynamics::Workspace ws(rig.model);

@@ -202,17 +202,49 @@ Json map_json(const scene::Scene& scene, const model::Model& model, double influ
 
 // ---- obstacles and goals
 
-Json obstacle_json(const scene::Obstacle& obstacle) {
+// Poses of an obstacle are sampled so often, or as many times [s].
+constexpr double sample_s = 0.02;
+constexpr std::size_t samples_max = 3000;
+
+// Whether the page has no formula for where the obstacle is.
+bool is_sampled(const scene::Obstacle& obstacle) {
+  if (!scene::moves(obstacle)) return false;
+  return obstacle.parent ||
+         (obstacle.motion && !std::holds_alternative<scene::SineMotion>(*obstacle.motion) &&
+          !std::holds_alternative<scene::LinearMotion>(*obstacle.motion));
+}
+
+Json sampled_poses(const scene::Obstacle& obstacle, double duration_s, Container& container) {
+  const auto parts = static_cast<std::size_t>(
+      std::clamp(std::ceil(duration_s / sample_s), 1.0, static_cast<double>(samples_max)));
+  std::vector<double> t, position, quaternion;
+  for (std::size_t k = 0; k <= parts; ++k) {
+    t.push_back(duration_s * static_cast<double>(k) / static_cast<double>(parts));
+    const geometry::SE3 pose = scene::motion_at(obstacle, t.back()).pose;
+    const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(pose.R());
+    position.insert(position.end(), pose.p().begin(), pose.p().end());
+    quaternion.insert(quaternion.end(), wxyz.begin(), wxyz.end());
+  }
+  return {{"t", container.exact(t)},
+          {"position_m", container.stepped(position, 1e-5)},
+          {"quaternion_wxyz", container.stepped(quaternion, 1e-5)}};
+}
+
+Json obstacle_json(const scene::Obstacle& obstacle, double duration_s, Container& container) {
   Json json{{"name", obstacle.name}, {"shape", scene::to_string(obstacle.shape)}};
   if (obstacle.shape == scene::Shape::box) {
     json["size_m"] = array(obstacle.size_m);
   } else {
     json["radius_m"] = obstacle.radius_m;
   }
-  if (obstacle.shape == scene::Shape::cylinder) json["length_m"] = obstacle.length_m;
-  json.update(pose_json(obstacle.pose));
+  if (obstacle.shape == scene::Shape::cylinder || obstacle.shape == scene::Shape::capsule)
+    json["length_m"] = obstacle.length_m;
+  const bool sampled = is_sampled(obstacle);
+  const bool in_world = !obstacle.parent && !sampled;
+  json.update(pose_json(in_world ? obstacle.pose : scene::motion_at(obstacle, 0.0).pose));
   json["motion"] = nullptr;
-  if (obstacle.motion) json["motion"] = scene::motion_json(*obstacle.motion);
+  if (in_world && obstacle.motion) json["motion"] = scene::motion_json(*obstacle.motion);
+  json["poses"] = sampled ? sampled_poses(obstacle, duration_s, container) : Json(nullptr);
   json["appears_s"] = obstacle.appears_s;
   json["judge_only"] = obstacle.judge_only;
   return json;
@@ -284,6 +316,11 @@ std::string world_key(const simulation::Recorded& recorded) {
   };
   for (const char* file : {"/robot/file", "/robot/spheres", "/robot/srdf", "/map/file"})
     content(Json::json_pointer(file));
+  for (std::size_t i = 0; i < key["obstacles"].size(); ++i)
+    content(Json::json_pointer(fmt::format("/obstacles/{}/motion/file", i)));
+  const auto& obstacles = recorded.scene.obstacles;
+  if (std::any_of(obstacles.begin(), obstacles.end(), is_sampled))
+    key["duration_s"] = config["duration_s"];
   return key.dump();
 }
 
@@ -307,7 +344,9 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
         scene.map->file.string(), scene.map->changes.front().time_s));
   Json goals = Json::array(), obstacles = Json::array();
   for (const auto& goal : scene.goals) goals.push_back(goal_json(goal));
-  for (const auto& obstacle : scene.obstacles) obstacles.push_back(obstacle_json(obstacle));
+  for (const auto& obstacle : scene.obstacles)
+    if (obstacle.shape != scene::Shape::frame)
+      obstacles.push_back(obstacle_json(obstacle, scene.duration_s, container));
   world->json = {
       {"robot", robot_json(world->model)},
       {"goals", std::move(goals)},

@@ -1,7 +1,9 @@
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <memory>
 
 #include "decode.hpp"
 #include "hamelin/control/preparation.hpp"
@@ -430,4 +432,59 @@ TEST_CASE("the stops are those of the ticks", "[report]") {
       CHECK((vector_of(stops[i][key]) - vector_of(exact)).lpNorm<Eigen::Infinity>() <= 0.51e-6);
     }
   }
+}
+
+TEST_CASE("obstacles on way-points and in moving frames have the poses that the scene gives them",
+          "[report]") {
+  const auto folder = test::scratch("movers");
+  scene::Scene scene = test::shelf(0.3);
+  const auto add = [&](const char* name, scene::Shape shape) -> scene::Obstacle& {
+    scene::Obstacle& o = scene.obstacles.emplace_back();
+    o.name = name;
+    o.shape = shape;
+    o.radius_m = 0.05;
+    o.length_m = 0.2;
+    o.pose = {Eigen::Matrix3d::Identity(), {5.0, 0.0, 0.0}};
+    return o;
+  };
+  const std::vector<scene::Waypoint> points{
+      {0.0, {0.0, 0.0, 0.0}},
+      {0.1, {0.2, 0.0, 0.1}, {std::cos(0.4), 0.0, 0.0, std::sin(0.4)}},
+      {0.3, {0.1, 0.3, 0.0}, {std::cos(0.7), std::sin(0.7), 0.0, 0.0}}};
+  const scene::WaypointMotion motion{
+      std::make_shared<scene::WaypointPath>(points, scene::WaypointPath::Options(), "points")};
+  scene.obstacles.clear();
+  add("frame", scene::Shape::frame).motion = motion;
+  add("attached", scene::Shape::capsule).attached_to = "frame";
+  add("alone", scene::Shape::sphere).motion = motion;
+  add("swinging", scene::Shape::sphere).motion = scene::SineMotion{{0.0, 0.1, 0.0}, 1.0};
+  scene::attach(scene.obstacles, "scene");
+  (void)test::log_run(scene, folder / "run.jsonl");
+  scene.duration_s = 0.2;
+  (void)test::log_run(scene, folder / "shorter.jsonl");
+  const Decoded page(report::make_data({folder / "run.jsonl", folder / "shorter.jsonl"}).bytes);
+  REQUIRE(page.head["worlds"].size() == 2);  // samples end with the scene
+  const Json& drawn = page.head["worlds"][0]["obstacles"];
+  REQUIRE(drawn.size() == 3);  // without the frame
+  for (std::size_t i = 0; i < 2; ++i) {
+    const scene::Obstacle& o = scene.obstacles[i + 1];
+    CHECK(drawn[i]["name"] == o.name);
+    CHECK(drawn[i]["shape"] == scene::to_string(o.shape));
+    CHECK(drawn[i]["motion"].is_null());
+    const Json& poses = drawn[i]["poses"];
+    const auto t = page(poses["t"]), p = page(poses["position_m"]),
+               q = page(poses["quaternion_wxyz"]);
+    REQUIRE(t.size() == 16);
+    CHECK(t.back() == Approx(0.3));
+    REQUIRE(q.size() == 4 * t.size());
+    for (std::size_t k = 0; k < t.size(); ++k) {
+      const geometry::SE3 pose = scene::motion_at(o, t[k]).pose;
+      CHECK((triple(p, k) - pose.p()).norm() < 1e-5);
+      const Eigen::Quaterniond turn(q[4 * k], q[4 * k + 1], q[4 * k + 2], q[4 * k + 3]);
+      CHECK((turn.normalized().toRotationMatrix() - pose.R()).norm() < 1e-4);
+    }
+  }
+  CHECK(drawn[0]["length_m"] == 0.2);
+  CHECK(drawn[2]["poses"].is_null());
+  CHECK(drawn[2]["motion"]["type"] == "sine");
 }

@@ -33,13 +33,15 @@ MotionState own_state(const Frame& frame, const LinearMotion& line, double time_
       moves ? line.velocity_m_s : Vector3d::Zero()};
 }
 
+// docs/theory.md (11.40)
 MotionState composed(const MotionState& parent, const MotionState& own) {
   const Eigen::Matrix3d& R = parent.pose.R();
-  const Vector3d arm = R * own.pose.p(), v = R * own.velocity, &omega = parent.angular_velocity;
+  const Vector3d arm = R * own.pose.p(), v = R * own.velocity, turn = R * own.angular_velocity,
+                 &omega = parent.angular_velocity, &alpha = parent.angular_acceleration;
   return {parent.pose * own.pose, parent.velocity + omega.cross(arm) + v,
-          parent.acceleration + omega.cross(omega.cross(arm)) + 2.0 * omega.cross(v) +
-              R * own.acceleration,
-          omega + R * own.angular_velocity};
+          parent.acceleration + alpha.cross(arm) + omega.cross(omega.cross(arm)) +
+              2.0 * omega.cross(v) + R * own.acceleration,
+          omega + turn, alpha + omega.cross(turn) + R * own.angular_acceleration};
 }
 
 MotionState own_state(const Frame& frame, const WaypointMotion& waypoints, double time_s) {
@@ -88,6 +90,7 @@ MotionState motion_at(const Frame& frame, double time_s) {
   return frame.parent ? composed(motion_at(*frame.parent, time_s), own) : own;
 }
 
+// docs/theory.md (11.44)
 MotionBounds motion_bounds(const Frame& frame) {
   MotionBounds own{0.0, 0.0, frame.pose.p().norm()};
   if (frame.motion)
@@ -101,6 +104,7 @@ MotionBounds motion_bounds(const Frame& frame) {
 MotionState extrapolated(const MotionState& state, double ahead_s, bool accelerates) {
   const double tau = std::max(0.0, ahead_s);
   MotionState out = state;
+  out.angular_acceleration.setZero();
   Vector3d moved = tau * state.velocity;
   if (accelerates) {
     const double lasts = std::min(tau, acceleration_lasts_s);

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <unordered_map>
+#include <vector>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/distance.hpp"
@@ -156,25 +159,41 @@ std::string_view to_string(Prediction prediction) noexcept {
   return "unknown";
 }
 
+std::filesystem::path waypoint_file(const Obstacle& obstacle) {
+  const auto* motion = obstacle.motion ? std::get_if<WaypointMotion>(&*obstacle.motion) : nullptr;
+  return motion != nullptr ? motion->path->file() : std::filesystem::path();
+}
+
 void attach(std::span<Obstacle> obstacles, const std::string& where) {
+  // What is examined at a time, motion_at() among it, recurses so often.
+  constexpr std::size_t depth_max = 32;
+  std::unordered_multimap<std::string_view, std::size_t> by_name;
+  for (std::size_t i = 0; i < obstacles.size(); ++i) by_name.emplace(obstacles[i].name, i);
   std::vector<std::shared_ptr<Frame>> frames(obstacles.size());
-  // Each frame after that of its parent; `depth` ends circles.
+  std::vector<std::size_t> chain(obstacles.size(), 0);  // length of the chain from the world
+  // Each frame after that of its parent.
   const std::function<std::shared_ptr<Frame>(std::size_t, std::size_t)> frame_of =
       [&](std::size_t i, std::size_t depth) {
         Obstacle& o = obstacles[i];
-        const auto fail = [&](const std::string& what) {
-          throw Error(ErrorCode::invalid, fmt::format("{}: obstacle '{}' is attached to '{}', {}",
-                                                      where, o.name, o.attached_to, what));
+        const auto fail = [&](const char* what) {
+          throw Error(ErrorCode::invalid,
+                      fmt::format("{}/{}: obstacle '{}' is attached to '{}', {}", where, i, o.name,
+                                  o.attached_to, what));
+        };
+        const auto check_length = [&](std::size_t length) {
+          if (length > depth_max)
+            fail("in a circle or in a chain of more than 32, expected a shorter chain");
         };
         if (frames[i]) return frames[i];
-        if (depth > obstacles.size()) fail("which is attached to it in turn, expected no circle");
+        check_length(depth);
         o.parent.reset();
         if (!o.attached_to.empty()) {
-          const auto parent =
-              std::find_if(obstacles.begin(), obstacles.end(),
-                           [&](const Obstacle& other) { return other.name == o.attached_to; });
-          if (parent == obstacles.end()) fail("but there is none of this name");
-          o.parent = frame_of(static_cast<std::size_t>(parent - obstacles.begin()), depth + 1);
+          const std::size_t count = by_name.count(o.attached_to);
+          if (count == 0) fail("expected the name of an obstacle");
+          if (count > 1) fail("expected a name that only one obstacle has");
+          const std::size_t parent = by_name.find(o.attached_to)->second;
+          o.parent = frame_of(parent, depth + 1);
+          check_length(chain[i] = chain[parent] + 1);
         }
         frames[i] = std::make_shared<Frame>(static_cast<const Frame&>(o));
         return frames[i];
@@ -204,6 +223,7 @@ double max_speed(const Obstacle& obstacle) {
   return bounds.speed + (bounds.rate > 0.0 ? bounds.rate * bounding_radius(obstacle) : 0.0);
 }
 
+// docs/theory.md (11.45)
 double max_speed(const Obstacle& obstacle, const Moment& moment) {
   switch (obstacle.prediction) {
     case Prediction::path:

@@ -2,12 +2,15 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <memory>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "rotation.hpp"
+#include "waypoint_file.hpp"
 
 namespace hamelin::scene {
 
@@ -110,41 +113,105 @@ class Reader {
   std::string place_;
 };
 
-Obstacle read_obstacle(const Reader& in) {
+Shape shape_of(const std::string& type) {
+  for (const Shape shape : {Shape::box, Shape::cylinder, Shape::capsule, Shape::frame})
+    if (type == to_string(shape)) return shape;
+  return Shape::sphere;
+}
+
+WaypointMotion read_waypoint_motion(const Reader& in, const std::filesystem::path& folder) {
+  WaypointPath::Options options;
+  options.repeat = in.get("repeat", false);
+  options.gap_max_s = in.maybe<double>("gap_max_s");
+  const auto file = in.maybe<std::string>("file");
+  const Json* list = in.find("waypoints");
+  if (file && list != nullptr)
+    in.fail("file", "is given in addition to waypoints, expected one of the two");
+  if (list != nullptr)
+    return {std::make_shared<WaypointPath>(waypoints_from_json(*list, in.place_of("waypoints")),
+                                           options, in.place_of("waypoints"))};
+  if (!file) in.fail("waypoints", "is missing, expected waypoints or a file");
+  try {
+    return {
+        std::make_shared<WaypointPath>(read_waypoint_path(resolve_path(folder, *file), options))};
+  } catch (const Error& e) {
+    throw Error(e.code(), fmt::format("{}: {}", in.place_of("file"), e.what()));
+  }
+}
+
+Motion read_motion(const Reader& in, const std::filesystem::path& folder) {
+  const auto type = in.get<std::string>("type", "");
+  const auto take = [&](std::string_view kind, const std::string& name,
+                        std::initializer_list<const char*> keys) {
+    for (const char* key : keys)
+      if (type != kind) in.refuse(key, name);
+  };
+  const std::string name = type == "linear"      ? "linear motion"
+                           : type == "waypoints" ? "motion by way-points"
+                                                 : type;
+  take("sine", name, {"amplitude_m", "period_s"});
+  take("linear", name, {"velocity_m_s", "start_s", "duration_s"});
+  take("waypoints", name, {"waypoints", "file", "repeat", "gap_max_s"});
+  if (type == "waypoints") return read_waypoint_motion(in, folder);
+  if (type == "sine") {
+    in.require("amplitude_m", "sine");
+    in.require("period_s", "sine");
+    return SineMotion{in.vector("amplitude_m", Eigen::Vector3d::Zero()), in.get("period_s", 0.0)};
+  }
+  in.require("velocity_m_s", name);
+  return LinearMotion{in.vector("velocity_m_s", Eigen::Vector3d::Zero()), in.get("start_s", 0.0),
+                      in.get("duration_s", std::numeric_limits<double>::infinity())};
+}
+
+void read_prediction(const Reader& in, Obstacle& o) {
+  const Json* given = in.find("prediction");
+  if (given == nullptr) return;
+  if (given->is_object()) {
+    o.prediction = Prediction::speed_bound;
+    o.speed_max_m_s = given->at("speed_max").get<double>();
+    return;
+  }
+  for (const Prediction kind : {Prediction::path, Prediction::constant_velocity})
+    if (*given == to_string(kind)) o.prediction = kind;
+}
+
+Obstacle read_obstacle(const Reader& in, const std::filesystem::path& folder) {
   Obstacle o;
   o.name = in.get<std::string>("name", "");
   const auto type = in.get<std::string>("type", "");
-  o.shape = type == "sphere" ? Shape::sphere : type == "box" ? Shape::box : Shape::cylinder;
-  const bool box = o.shape == Shape::box, cylinder = o.shape == Shape::cylinder;
+  o.shape = shape_of(type);
+  const bool box = o.shape == Shape::box, frame = o.shape == Shape::frame,
+             has_length = o.shape == Shape::cylinder || o.shape == Shape::capsule;
   box ? in.require("size_m", type) : in.refuse("size_m", type);
-  box ? in.refuse("radius_m", type) : in.require("radius_m", type);
-  cylinder ? in.require("length_m", type) : in.refuse("length_m", type);
+  box || frame ? in.refuse("radius_m", type) : in.require("radius_m", type);
+  has_length ? in.require("length_m", type) : in.refuse("length_m", type);
   o.radius_m = in.get("radius_m", 0.0);
   o.length_m = in.get("length_m", 0.0);
   o.size_m = in.vector("size_m", Eigen::Vector3d::Zero());
+  o.attached_to = in.get<std::string>("attached_to", "");
+  if (in.find("motion") != nullptr) o.motion = read_motion(in.child("motion"), folder);
+  const bool has_place = frame || !o.attached_to.empty() ||
+                         (o.motion && std::holds_alternative<WaypointMotion>(*o.motion));
+  if (!has_place) in.require("position_m", type);
   o.pose = in.pose();
   o.quaternion_wxyz = in.quaternion();
-  if (in.find("motion") != nullptr) {
-    const Reader motion = in.child("motion");
-    if (motion.get<std::string>("type", "") == "sine") {
-      motion.require("amplitude_m", "sine");
-      motion.require("period_s", "sine");
-      for (const char* key : {"velocity_m_s", "start_s", "duration_s"}) motion.refuse(key, "sine");
-      o.motion = SineMotion{motion.vector("amplitude_m", Eigen::Vector3d::Zero()),
-                            motion.get("period_s", 0.0)};
-    } else {
-      motion.require("velocity_m_s", "linear motion");
-      for (const char* key : {"amplitude_m", "period_s"}) motion.refuse(key, "linear motion");
-      o.motion = LinearMotion{motion.vector("velocity_m_s", Eigen::Vector3d::Zero()),
-                              motion.get("start_s", 0.0),
-                              motion.get("duration_s", std::numeric_limits<double>::infinity())};
-    }
-  }
+  read_prediction(in, o);
   o.known = in.get("known", true);
   o.visible_within_m = in.maybe<double>("visible_within_m");
   o.appears_s = in.get("appears_s", 0.0);
   o.judge_only = in.get("judge_only", false);
   return o;
+}
+
+// Obstacles may be attached to later ones, so that speeds are known after all were read.
+std::vector<Obstacle> read_obstacles(const Reader& in, const std::filesystem::path& folder) {
+  std::vector<Obstacle> out;
+  in.each("obstacles",
+          [&](const Reader& obstacle) { out.push_back(read_obstacle(obstacle, folder)); });
+  const std::string place = in.place_of("obstacles");
+  attach(out, place);
+  for (std::size_t i = 0; i < out.size(); ++i) check(out[i], fmt::format("{}/{}", place, i));
+  return out;
 }
 
 // @param not_before the time of the previous change [s]
@@ -368,7 +435,12 @@ MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
 }  // namespace
 
 Obstacle obstacle_from_json(const Json& document, const std::string& where) {
-  return read_obstacle({document, where});
+  Obstacle obstacle = read_obstacle({document, where}, {});
+  if (!obstacle.attached_to.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}/attached_to: is '{}', expected none for an obstacle that is alone",
+                            where, obstacle.attached_to));
+  return obstacle;
 }
 
 Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
@@ -385,8 +457,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.start_q = in.child("start").joints("q");
   scene.start_v = in.child("start").joints("v");
   in.each("goals", [&](const Reader& goal) { scene.goals.push_back(read_goal(goal)); });
-  in.each("obstacles",
-          [&](const Reader& obstacle) { scene.obstacles.push_back(read_obstacle(obstacle)); });
+  scene.obstacles = read_obstacles(in, base_dir);
   if (in.find("map") != nullptr) scene.map = read_map_spec(in.child("map"), base_dir);
   scene.model = read_model(in.child("model"));
   if (in.find("planner") != nullptr) {
@@ -415,6 +486,8 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   std::vector<std::filesystem::path> files{scene.robot.file};
   if (scene.robot.spheres) files.push_back(*scene.robot.spheres);
   if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
+  for (const Obstacle& obstacle : scene.obstacles)
+    if (const auto file = waypoint_file(obstacle); !file.empty()) files.push_back(file);
   if (!scene.map) return files;
   files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)

@@ -21,6 +21,8 @@ namespace {
 constexpr double gap_factor = 10.0;
 // Two poses that differ by no more are equal, in metres and radians.
 constexpr double same_pose = 1e-9;
+// With these bounds, speeds and accelerations are far from overflow.
+constexpr double number_max = 1e9, interval_min_s = 1e-6;
 // Bounds of a cubic's speed are found on so many halvings of each curve.
 constexpr int speed_halvings = 5;
 
@@ -58,21 +60,25 @@ WaypointPath::WaypointPath(std::vector<Waypoint> waypoints, const Options& optio
 
 void WaypointPath::check(const std::string& where) const {
   const auto fail = [&](std::size_t i, const std::string& what) {
-    throw Error(ErrorCode::invalid, fmt::format("{}/{}: {}", where, i, what));
+    const int line = waypoints_[i].line;
+    throw Error(ErrorCode::invalid, line > 0 ? fmt::format("{}: line {}: {}", where, line, what)
+                                             : fmt::format("{}/{}: {}", where, i, what));
   };
   if (waypoints_.size() < 2)
     throw Error(ErrorCode::invalid,
-                fmt::format("{}: {} way-points, expected two or more", where, waypoints_.size()));
+                fmt::format("{}{} way-points, expected two or more",
+                            where.ends_with(": ") ? where : where + ": ", waypoints_.size()));
   for (std::size_t i = 0; i < waypoints_.size(); ++i) {
     const Waypoint& w = waypoints_[i];
     const Eigen::Map<const Eigen::Vector4d> wxyz(w.quaternion_wxyz.data());
-    if (!std::isfinite(w.time_s) || !w.position_m.allFinite() || !wxyz.allFinite())
-      fail(i, "a number is not finite, expected finite numbers");
+    const auto in_range = [](const auto& x) { return (x.array().abs() <= number_max).all(); };
+    if (!(std::abs(w.time_s) <= number_max) || !in_range(w.position_m) || !in_range(wxyz))
+      fail(i, "a number is not finite or too large, expected at most 1e9");
     if (!(std::abs(wxyz.norm() - 1.0) <= 1e-3))
       fail(i, fmt::format("the norm of its quaternion is {:.6g}, expected 1", wxyz.norm()));
-    if (i > 0 && !(w.time_s > waypoints_[i - 1].time_s))
-      fail(i, fmt::format("time_s is {} after {}, expected times that increase", w.time_s,
-                          waypoints_[i - 1].time_s));
+    if (i > 0 && !(w.time_s - waypoints_[i - 1].time_s >= interval_min_s))
+      fail(i, fmt::format("time_s is {} after {}, expected times that increase by 1e-6 or more",
+                          w.time_s, waypoints_[i - 1].time_s));
   }
   const auto same = [&](std::size_t i, std::size_t k) {
     return (waypoints_[i].position_m - waypoints_[k].position_m).norm() <= same_pose &&

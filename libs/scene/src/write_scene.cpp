@@ -249,14 +249,17 @@ Json to_json(const Obstacle& o) {
   Json out{{"name", o.name}, {"type", to_string(o.shape)}};
   if (o.shape == Shape::box) {
     out["size_m"] = array(o.size_m);
-  } else {
+  } else if (o.shape != Shape::frame) {
     out["radius_m"] = o.radius_m;
   }
-  if (o.shape == Shape::cylinder) out["length_m"] = o.length_m;
+  if (o.shape == Shape::cylinder || o.shape == Shape::capsule) out["length_m"] = o.length_m;
+  out["attached_to"] = o.attached_to.empty() ? Json(nullptr) : Json(o.attached_to);
   out["position_m"] = array(o.pose.p());
   out["quaternion_wxyz"] = quaternion_json(o.pose.R(), o.quaternion_wxyz);
   out["motion"] = nullptr;
   if (o.motion) out["motion"] = motion_json(*o.motion);
+  out["prediction"] = o.prediction == Prediction::speed_bound ? Json{{"speed_max", o.speed_max_m_s}}
+                                                              : Json(to_string(o.prediction));
   out["known"] = o.known;
   out["visible_within_m"] = or_null(o.visible_within_m);
   out["appears_s"] = o.appears_s;

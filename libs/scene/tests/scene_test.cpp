@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -495,5 +497,152 @@ TEST_CASE("dry friction and rotor inertia are read, and read back", "[scene][uni
     document["model"] = {{key, bad}};
     CHECK_THROWS_WITH(scene_from_json(document, ".", "x.json"),
                       Catch::Matchers::Contains("/model/" + key));
+  }
+}
+
+namespace {
+
+// Each new kind of obstacle, motion and prediction.
+Json movers_document() {
+  Json document = small_document();
+  document["obstacles"] = Json::parse(R"([
+    {"name": "hand", "type": "sphere", "radius_m": 0.05, "attached_to": "person",
+     "position_m": [0.2, 0, 1], "quaternion_wxyz": [0.8, 0, 0.6, 0],
+     "motion": {"type": "sine", "amplitude_m": [0, 0, 0.1], "period_s": 2}, "prediction": {"speed_max": 4}},
+    {"name": "person", "type": "frame", "prediction": "path",
+     "motion": {"type": "waypoints", "repeat": true, "gap_max_s": 5,
+                "waypoints": [{"time_s": 0, "position_m": [0, 0, 0]},
+                              {"time_s": 1, "position_m": [0.5, 0, 0], "quaternion_wxyz": [0.6, 0, 0, 0.8]},
+                              {"time_s": 3, "position_m": [0, 0, 0]}]}},
+    {"name": "arm", "type": "capsule", "radius_m": 0.04, "length_m": 0.3, "attached_to": "person"},
+    {"name": "cart", "type": "box", "size_m": [0.4, 0.3, 0.2], "prediction": "constant-velocity",
+     "motion": {"type": "waypoints", "file": "paths/cart.csv"}},
+    {"name": "post", "type": "cylinder", "radius_m": 0.04, "length_m": 0.3, "position_m": [1, 0, 0],
+     "prediction": "constant-acceleration", "attached_to": null}
+  ])");
+  return document;
+}
+
+constexpr const char* cart_csv =
+    "time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,0,0,1,0,0,0\n0.7,1,0.1,0,0.96,0,0,0.28\n1.3,1,0.3,0.1,1,0,"
+    "0,0\n";
+
+}  // namespace
+
+TEST_CASE("moving frames, capsules and way-points are read, and read back", "[scene][unit]") {
+  const test::TemporaryFolder folder;
+  const auto csv = folder.put("paths/cart.csv", cart_csv);
+  const Scene scene = scene_from_json(movers_document(), folder.path(), "x.json");
+  REQUIRE(scene.obstacles.size() == 5);
+  const Obstacle &hand = scene.obstacles[0], &person = scene.obstacles[1],
+                 &arm = scene.obstacles[2], &cart = scene.obstacles[3], &post = scene.obstacles[4];
+  CHECK(hand.attached_to == "person");
+  CHECK(hand.prediction == Prediction::speed_bound);
+  CHECK(hand.speed_max_m_s == 4.0);
+  CHECK(person.shape == Shape::frame);
+  CHECK(person.prediction == Prediction::path);
+  const WaypointPath& walk = *std::get<WaypointMotion>(*person.motion).path;
+  CHECK(walk.options().repeat);
+  CHECK(walk.options().gap_max_s == 5.0);
+  CHECK(walk.waypoints()[1].quaternion_wxyz == Quaternion{0.6, 0.0, 0.0, 0.8});
+  CHECK(arm.shape == Shape::capsule);
+  CHECK(arm.length_m == 0.3);
+  CHECK(arm.prediction == Prediction::constant_acceleration);
+  CHECK(cart.prediction == Prediction::constant_velocity);
+  CHECK(std::get<WaypointMotion>(*cart.motion).path->file() == csv);
+  CHECK(post.attached_to.empty());
+  // the hand moves with the person
+  REQUIRE(hand.parent);
+  const geometry::SE3 at = motion_at(person, 1.0).pose;
+  CHECK((motion_at(hand, 1.0).pose.p() - at * Vector3d(0.2, 0.0, 1.0)).norm() < 1e-12);
+  const auto files = input_files(scene);
+  CHECK(std::count(files.begin(), files.end(), csv) == 1);
+
+  const Json resolved = resolved_json(scene);
+  CHECK(resolved["obstacles"][1]["motion"]["waypoints"].size() == 3);
+  CHECK_FALSE(resolved["obstacles"][3]["motion"].contains("waypoints"));
+  CHECK(resolved["obstacles"][0]["prediction"] == Json{{"speed_max", 4.0}});
+  CHECK(resolved["obstacles"][4]["prediction"] == "constant-acceleration");
+  CHECK_FALSE(resolved["obstacles"][1].contains("radius_m"));
+  const Scene again = scene_from_json(resolved, "", "y.json");
+  CHECK(resolved_json(again) == resolved);
+  for (std::size_t i = 0; i < 5; ++i)
+    for (const double t : {0.0, 0.9, 2.2}) {
+      const MotionState a = motion_at(scene.obstacles[i], t), b = motion_at(again.obstacles[i], t);
+      CHECK(a.pose.p() == b.pose.p());
+      CHECK(a.pose.R() == b.pose.R());
+      CHECK(a.velocity == b.velocity);
+    }
+}
+
+TEST_CASE("moving frames, capsules and way-points that are wrong are refused with file and place",
+          "[scene][unit]") {
+  const test::TemporaryFolder folder;
+  folder.put("paths/cart.csv", cart_csv);
+  folder.put("bad.csv", "time_s,x_m,y_m,z_m\n0,0,0,0\n1,a,0,0\n");
+  const auto message = [&](const char* pointer, const Json& value) -> std::string {
+    Json document = movers_document();
+    const Json::json_pointer at(std::string("/obstacles/") + pointer);
+    if (value.is_discarded())
+      document[at.parent_pointer()].erase(at.back());
+    else
+      document[at] = value;
+    try {
+      (void)scene_from_json(document, folder.path(), "x.json");
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  const Json removed(Json::value_t::discarded);
+  const std::string bad = (folder.path() / "bad.csv").string();
+  const std::vector<std::tuple<const char*, Json, std::string>> cases{
+      {"2/length_m", removed, "x.json: /obstacles/2/length_m: is missing, expected for a capsule"},
+      {"2/size_m", Json{1, 1, 1}, "x.json: /obstacles/2/size_m: is not allowed for a capsule"},
+      {"1/radius_m", 1.0, "x.json: /obstacles/1/radius_m: is not allowed for a frame"},
+      {"1/length_m", 1.0, "x.json: /obstacles/1/length_m: is not allowed for a frame"},
+      {"4/position_m", removed,
+       "x.json: /obstacles/4/position_m: is missing, expected for a cylinder"},
+      {"4/type", "cone", "x.json: /obstacles/4/type: "},
+      {"2/attached_to", "nobody",
+       "x.json: /obstacles/2: obstacle 'arm' is attached to 'nobody', expected the name of an "
+       "obstacle"},
+      {"2/attached_to", 3, "x.json: /obstacles/2/attached_to: "},
+      {"1/attached_to", "person",
+       "x.json: /obstacles/1: obstacle 'person' is attached to 'person'"},
+      {"0/prediction", "oracle", "x.json: /obstacles/0/prediction: "},
+      {"0/prediction", Json::object(), "x.json: /obstacles/0/prediction: "},
+      {"0/prediction", Json{{"speed_max", 0}}, "x.json: /obstacles/0/prediction/speed_max: "},
+      {"0/prediction", Json{{"speed_max", 2.0}},
+       "x.json: /obstacles/0: its motion reaches 3.23 m/s, expected at most 2 m/s"},
+      {"0/motion/repeat", true, "x.json: /obstacles/0/motion/repeat: is not allowed for a sine"},
+      {"0/motion/file", "a.csv", "x.json: /obstacles/0/motion/file: is not allowed for a sine"},
+      {"1/motion/period_s", 1.0,
+       "x.json: /obstacles/1/motion/period_s: is not allowed for a motion by way-points"},
+      {"1/motion/waypoints", removed,
+       "x.json: /obstacles/1/motion/waypoints: is missing, expected waypoints or a file"},
+      {"1/motion/file", "paths/cart.csv",
+       "x.json: /obstacles/1/motion/file: is given in addition to waypoints, expected one"},
+      {"1/motion/gap_max_s", 0.5, "x.json: /obstacles/1/motion/waypoints/1: 1 s after"},
+      {"1/motion/waypoints/2/position_m", Json{1, 0, 0},
+       "x.json: /obstacles/1/motion/waypoints/2: its pose is not that of the first"},
+      {"1/motion/waypoints/2/time_s", 1.0,
+       "x.json: /obstacles/1/motion/waypoints/2: time_s is 1 after 1"},
+      {"1/motion/waypoints/0/speed", 1.0, "x.json: /obstacles/1/motion/waypoints/0"},
+      {"1/motion/waypoints", Json::array(),
+       "x.json: /obstacles/1/motion/waypoints: 0 way-points, expected two or more"},
+      {"3/motion/repeat", true,
+       "x.json: /obstacles/3/motion/file: " + (folder.path() / "paths/cart.csv").string() +
+           ": line 4: its pose is not that of the first way-point"},
+      {"3/motion/file", "none.csv", "x.json: /obstacles/3/motion/file: "},
+      {"3/motion/file", "bad.csv",
+       "x.json: /obstacles/3/motion/file: " + bad + ": line 3: x_m is 'a', expected a finite"},
+  };
+  CHECK(message("4/known", true) == "accepted");
+  for (const auto& [pointer, value, expected] : cases) {
+    const std::string found = message(pointer, value);
+    CAPTURE(pointer, found, expected);
+    CHECK(found.rfind(expected, 0) == 0);
+    CHECK(found.find('\n') == std::string::npos);
   }
 }

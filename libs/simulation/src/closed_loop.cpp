@@ -41,6 +41,9 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
       if (const auto& file = scene.map->changes[i].file)
         inputs.push_back({fmt::format("map_change_{}", i), *file});
   }
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
+    if (const auto file = scene::waypoint_file(scene.obstacles[i]); !file.empty())
+      inputs.push_back({fmt::format("waypoints_{}", i), file});
   inputs.push_back({"plugin", plugin.file()});
   return inputs;
 }

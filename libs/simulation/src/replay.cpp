@@ -87,6 +87,10 @@ std::vector<std::pair<std::string, std::string>> file_pointers(const Json& confi
   const Json::json_pointer changes("/map/changes");
   for (std::size_t i = 0; config.contains(changes) && i < config[changes].size(); ++i)
     places.emplace_back(fmt::format("map_change_{}", i), fmt::format("/map/changes/{}/file", i));
+  const Json::json_pointer obstacles("/obstacles");
+  for (std::size_t i = 0; config.contains(obstacles) && i < config[obstacles].size(); ++i)
+    places.emplace_back(fmt::format("waypoints_{}", i),
+                        fmt::format("/obstacles/{}/motion/file", i));
   return places;
 }
 
@@ -275,8 +279,7 @@ Recorded read_header(const fs::path& log, const std::vector<fs::path>& plugin_di
   Recorded recorded = read_header(header, log);
   if (recorded.program == Recorded::Program::run && recorded.scene.planner) {
     const auto plugin = planning::find_plugin(recorded.scene.planner->name, plugin_directories);
-    const std::string then = logged_hash(header, "plugin"),
-                      now = sha256_of_file(plugin.file());
+    const std::string then = logged_hash(header, "plugin"), now = sha256_of_file(plugin.file());
     if (then != now)
       recorded.other_build.push_back(
           fmt::format("planner '{}': SHA-256 {}... in the log, {}... now", plugin.name(),

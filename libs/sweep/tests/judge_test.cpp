@@ -19,6 +19,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/geometry/so3.hpp"
 #include "hamelin/scene/make.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
@@ -80,7 +81,22 @@ namespace {
 
 using Geometry = std::shared_ptr<fcl::CollisionGeometryd>;
 
-/// Primitives of all shapes around the arm, rotated at random, some of them moving.
+/// Poses around the origin, turning by up to 1.4 rad from one to the next.
+Json random_waypoints(Rng& rng) {
+  Json list = Json::array();
+  for (int i = 0; i <= 4; ++i) {
+    const Vector3d p(rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3)),
+        turn(rng.uniform(-0.8, 0.8), rng.uniform(-0.8, 0.8), rng.uniform(-0.8, 0.8));
+    const Eigen::Vector4d q = geometry::quaternion_wxyz(geometry::SO3::exp(turn).R());
+    list.push_back({{"time_s", 0.75 * i},
+                    {"position_m", {p.x(), p.y(), p.z()}},
+                    {"quaternion_wxyz", {q[0], q[1], q[2], q[3]}}});
+  }
+  return {{"type", "waypoints"}, {"waypoints", list}};
+}
+
+/// Primitives of all shapes around the arm, rotated at random. Some oscillate, some turn along
+/// way-points, and some are attached to a frame that turns.
 Json random_obstacles(std::size_t count, std::uint64_t seed) {
   scene::Clutter clutter;
   clutter.count = count;
@@ -88,15 +104,27 @@ Json random_obstacles(std::size_t count, std::uint64_t seed) {
   clutter.size_max_m = 0.3;
   clutter.bounds = {{-0.9, -0.9, -0.1}, {0.9, 0.9, 1.2}};
   clutter.seed = seed;
+  Rng rng(seed);
   Json all = Json::array();
   for (auto obstacle : scene::make_clutter(clutter)) {
     obstacle.judge_only = true;
-    if (all.size() % 3 == 0) obstacle.motion = scene::SineMotion{{0.2, -0.1, 0.05}, 2.0};
+    if (obstacle.shape == scene::Shape::cylinder && rng.below(2) == 0)
+      obstacle.shape = scene::Shape::capsule;
+    if (all.size() % 4 == 0) obstacle.motion = scene::SineMotion{{0.2, -0.1, 0.05}, 2.0};
+    if (all.size() % 4 == 1) obstacle.attached_to = "carrier";
     Json json = scene::to_json(obstacle);
+    if (all.size() % 4 == 2) json["motion"] = random_waypoints(rng);
     for (auto it = json.begin(); it != json.end();)
       it = it->is_null() ? json.erase(it) : std::next(it);
     all.push_back(json);
   }
+  all.push_back({{"name", "platform"},
+                 {"type", "frame"},
+                 {"motion", {{"type", "linear"}, {"velocity_m_s", {0.05, -0.02, 0.03}}}}});
+  all.push_back({{"name", "carrier"},
+                 {"type", "frame"},
+                 {"attached_to", "platform"},
+                 {"motion", random_waypoints(rng)}});
   return all;
 }
 
@@ -116,6 +144,8 @@ fcl::Transform3d at(const Vector3d& p, const Eigen::Matrix3d& R = Eigen::Matrix3
 Geometry shape_of(const scene::Obstacle& o) {
   if (o.shape == scene::Shape::sphere) return std::make_shared<fcl::Sphered>(o.radius_m);
   if (o.shape == scene::Shape::box) return std::make_shared<fcl::Boxd>(o.size_m);
+  if (o.shape == scene::Shape::capsule)
+    return std::make_shared<fcl::Capsuled>(o.radius_m, o.length_m);
   return std::make_shared<fcl::Cylinderd>(o.radius_m, o.length_m);
 }
 
@@ -144,7 +174,7 @@ TEST_CASE(
     "the judge agrees with FCL on contact and distance of random primitives, also of moving ones",
     "[sweep][unit]") {
   Rng rng(17);
-  int contacts = 0, clear = 0;
+  int contacts = 0, clear = 0, capsules = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto scene = scene_of({{"obstacles", random_obstacles(8, seed)}});
     const model::Model model = control::load_model(scene);
@@ -154,10 +184,11 @@ TEST_CASE(
       const auto centers = centers_of(model, q);
       double nearest = std::numeric_limits<double>::infinity();
       for (const auto& o : scene.obstacles) {
+        if (o.shape == scene::Shape::frame) continue;
+        capsules += o.shape == scene::Shape::capsule ? 1 : 0;
         const Geometry shape = shape_of(o);
-        nearest =
-            std::min(nearest, fcl_distance(centers, model, *shape,
-                                           at(scene::motion_at(o, time_s).pose.p(), o.pose.R())));
+        const geometry::SE3 pose = scene::motion_at(o, time_s).pose;
+        nearest = std::min(nearest, fcl_distance(centers, model, *shape, at(pose.p(), pose.R())));
       }
       const auto found = judged(scene, time_s, q);
       REQUIRE(found.has_value());
@@ -175,6 +206,7 @@ TEST_CASE(
   }
   CHECK(contacts > 10);
   CHECK(clear > 10);
+  CHECK(capsules > 50);
 }
 
 TEST_CASE("the judge agrees with FCL on contact with and distance from a map", "[sweep][unit]") {

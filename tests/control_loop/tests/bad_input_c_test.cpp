@@ -135,6 +135,18 @@ std::vector<BadCall> bad_obstacles() {
          ball.position_m[2] = nan;
          return hamelin_controller_set_obstacle(c, &ball, number, error, size);
        }},
+      {"obstacle 'ball': its shape is unknown, expected a sphere, box, cylinder or capsule",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.shape = HAMELIN_CAPSULE + 1;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
+      {"obstacle 'ball': length_m of the capsule is 0, expected a number above 0",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.shape = HAMELIN_CAPSULE;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
       {"quaternion_wxyz: the norm is",
        [](auto* c, auto* number, char* error, std::size_t size) {
          hamelin_obstacle ball = c_ball();

@@ -184,6 +184,36 @@ TEST_CASE("replay finds the inputs of a moved log, and names an input that has c
   CHECK_THAT(missing.err, Contains("robot.json: is missing"));
 }
 
+TEST_CASE("files of way-points are inputs of a run: found when moved, named when changed",
+          "[end_to_end][replay]") {
+  Sandbox sandbox;
+  const std::filesystem::path data = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
+  Json scene = read_json(data / "scenes/paper_52_apf.json");
+  scene["robot"]["file"] = (data / "robots/planar4.json").string();
+  scene["duration_s"] = 0.02;
+  scene["obstacles"] = {{{"name", "walker"},
+                         {"type", "sphere"},
+                         {"radius_m", 0.1},
+                         {"motion", {{"type", "waypoints"}, {"file", "walk.csv"}}}}};
+  sandbox.put("in/scene.json", scene.dump());
+  sandbox.put("in/walk.csv", "time_s,x_m,y_m,z_m\n0,2,2,2\n1,2,2,3\n");
+  const auto valid = sandbox.run({"validate", "in/scene.json", "in/walk.csv"});
+  CHECK(valid.exit_code == 0);
+  CHECK_THAT(valid.out, Contains("walk.csv: ok (way-points, 2, up to 1.5 m/s and 0 rad/s)"));
+  REQUIRE(sandbox.run({"run", "in/scene.json", "--log", "in/run.jsonl"}).exit_code == 1);
+  std::filesystem::rename(sandbox.path("in"), sandbox.path("moved"));
+  CHECK(test::run_json(sandbox, {"replay", "moved/run.jsonl", "--verify"})["to_the_bit"] == true);
+  sandbox.put("moved/walk.csv", sandbox.text("moved/walk.csv") + "2,2,2,4\n");
+  const auto changed = sandbox.run({"replay", "moved/run.jsonl", "--verify"});
+  CHECK(changed.exit_code == 2);
+  CHECK_THAT(changed.err, Contains("walk.csv: has changed since the log was written"));
+  sandbox.put("moved/walk.csv", "time_s,x_m,y_m,z_m\n0,2,2,2\n1,2,2\n");
+  const auto refused = sandbox.run({"validate", "moved/scene.json"});
+  CHECK(refused.exit_code == 2);
+  CHECK_THAT(refused.err, Contains("scene.json: /obstacles/0/motion/file: ") &&
+                              Contains("walk.csv: line 3: 3 cells, expected 4"));
+}
+
 TEST_CASE("a log of another build is compared within a tolerance, with a note",
           "[end_to_end][replay]") {
   Sandbox sandbox;

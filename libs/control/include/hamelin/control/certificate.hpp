@@ -84,7 +84,8 @@ class Certificate {
 
   /// Lists what moves during the step, and what appears in it.
   void find_movers(const Node& from, const Node& to);
-  /// Lower bound of a shape's clearance on the step, docs/theory.md (12.7), (12.7a). Sets travel_.
+  /// Lower bound of a shape's clearance on the step, docs/theory.md (12.7), (12.13). Sets travel_
+  /// and far_.
   /// @param d, d_next clearances at the nodes
   [[nodiscard]] double bound_on_step(const Node& from, const Node& to, std::size_t shape, double d,
                                      double d_next);
@@ -120,6 +121,7 @@ class Certificate {
   bool ahead_ = false;         ///< whether the step lies ahead of now
   std::vector<Mover> movers_;  ///< that exist at the end
   double travel_ = 0.0;  ///< of those that may touch the shape that is examined: none moves farther
+  double far_ = 0.0;     ///< bound of that shape's distance from the other movers [m]
   std::vector<std::size_t> appearing_;  ///< obstacles that exist at the end but not at the start
   bool contact_ = false;                ///< whether contact was found between the nodes
   int pieces_ = 0;

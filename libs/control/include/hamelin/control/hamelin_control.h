@@ -63,14 +63,14 @@ typedef struct hamelin_answer {
   uint64_t overruns;             /* in so many ticks it took longer than its deadline */
 } hamelin_answer;
 
-enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2 };
+enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2, HAMELIN_CAPSULE = 3 };
 
 typedef struct hamelin_obstacle {
   uint32_t struct_size;
   const char* name; /* an obstacle of the same name is replaced */
   int32_t shape;
-  double radius_m;  /* sphere, cylinder */
-  double length_m;  /* cylinder, along its z axis */
+  double radius_m;  /* sphere, cylinder, capsule */
+  double length_m;  /* cylinder, capsule without its caps; along the z axis */
   double size_m[3]; /* box: full edges */
   double position_m[3], quaternion_wxyz[4];
 } hamelin_obstacle;

@@ -38,6 +38,7 @@ struct Waypoint {
   double time_s = 0.0;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};
+  int line = 0;  ///< of the text file that it was read from, for messages; 0: none
 };
 
 /// A path through poses at given times, docs/theory.md (11.41), (11.42): positions on cubic curves
@@ -52,9 +53,10 @@ class WaypointPath {
     std::optional<double> gap_max_s;
   };
   /// @param file that the way-points were read from; empty: none
-  /// @throws Error invalid, "where/index: …", for fewer than two way-points, times that do not
-  ///         increase, gaps, numbers that are not finite, quaternions that are not of unit length,
-  ///         and an end that is not the start if it repeats
+  /// @throws Error invalid, "where/index: …" or "where: line N: …", for fewer than two way-points,
+  ///         times that do not increase, gaps, numbers that are not finite or above 1e9,
+  ///         quaternions that are not of unit length, and an end that is not the start if it
+  ///         repeats
   WaypointPath(std::vector<Waypoint> waypoints, const Options& options, const std::string& where,
                std::filesystem::path file = {});
 
@@ -94,9 +96,14 @@ struct WaypointMotion {
 
 /// Reads way-points from CSV with the header time_s,x_m,y_m,z_m and, if it turns, qw,qx,qy,qz, or
 /// from JSON: a list of objects with time_s, position_m and quaternion_wxyz, or an object with such
-/// a list as "waypoints".
-/// @throws Error io, parse or invalid, "file:line: …" or "file: /json/pointer: …"
+/// a list as "waypoints". CSV may have blank lines, and comments that begin with #.
+/// @throws Error io, parse or invalid, "file: line N: …" or "file: /json/pointer: …"
 [[nodiscard]] std::vector<Waypoint> read_waypoints(const std::filesystem::path& file);
+
+/// Reads way-points and makes their path. Messages name the line or the place in the file.
+/// @throws Error as read_waypoints() and WaypointPath do
+[[nodiscard]] WaypointPath read_waypoint_path(const std::filesystem::path& file,
+                                              const WaypointPath::Options& options);
 
 /// How an obstacle moves that was observed at a time, where it had its pose: docs/theory.md
 /// (11.43).
@@ -125,6 +132,8 @@ struct MotionState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< of its origin [m/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();      ///< of its origin [m/s²]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
+  /// Of frames that turn in frames that turn [rad/s²].
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();
 
   /// Velocity of the point that moves with the frame and is at p now.
   [[nodiscard]] Eigen::Vector3d velocity_at(const Eigen::Vector3d& p) const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -47,9 +48,13 @@ struct Obstacle : Frame {
   bool judge_only = false;                 ///< for collision checks only, not for the planner
 };
 
+/// The file that its way-points were read from; empty: none.
+[[nodiscard]] std::filesystem::path waypoint_file(const Obstacle& obstacle);
+
 /// Sets the parents of all obstacles by their `attached_to`.
-/// @throws Error invalid, "where: obstacle 'NAME': …", if there is none of this name, or obstacles
-///        are attached to each other in a circle
+/// @throws Error invalid, "where/index: obstacle 'NAME' …", if there is none of this name or more
+///        than one, or obstacles are attached to each other in a circle or in a chain of more than
+///        32
 void attach(std::span<Obstacle> obstacles, const std::string& where);
 
 /// A time as a controller sees it: now, or so long ahead of now, where obstacles are predicted.

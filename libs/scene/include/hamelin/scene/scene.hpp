@@ -173,7 +173,7 @@ struct Scene {
 };
 
 /// The files that a run of the scene reads, without the scene file itself: robot, spheres, SRDF,
-/// map and its changes.
+/// way-points of obstacles, map and its changes.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const Scene& scene);
 
 /// Reads a scene file; paths in it are relative to its folder, see resolve_path().
@@ -197,6 +197,7 @@ void set_pointer(Json& document, std::string_view assignment);
 /// One obstacle in the format of a scene. @throws Error invalid, "where: …"
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
+/// Not for ObservedMotion, which scene files do not have.
 [[nodiscard]] Json motion_json(const Motion& motion);
 
 /// The region of a scene's map around its robot in its start configuration, see read_region().
