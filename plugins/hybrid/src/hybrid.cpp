@@ -10,14 +10,13 @@
 #include <utility>
 
 #include "approach_speed.hpp"
+#include "evader.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
 #include "law.hpp"
-#include "look_ahead.hpp"
 #include "margins.hpp"
 #include "memory.hpp"
-#include "movers.hpp"
 #include "observer.hpp"
 #include "obstacles.hpp"
 #include "params_schema.hpp"
@@ -48,12 +47,9 @@ constexpr double steering_fade = 0.5;  // distance from the target below which s
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
 constexpr double path_beyond = 1.0, path_regained = 2.0;
-// Time between the starts of two looks ahead, and time for which an evasion is kept while it is
-// clear [s].
-constexpr double look_period_s = 0.02, evasion_kept_s = 0.2;
+constexpr int hurried_steps = 6;  // factor of the steps of a search where something moves
 // The longest time for which an evasion keeps a stall from counting [s].
 constexpr double longest_wait_s = 6.0;
-constexpr Eigen::Index trail_points = 512;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
 constexpr double via_reached = 0.1, escape_end_reached = 0.08;
 
@@ -95,13 +91,7 @@ class Hybrid final : public planning::Planner {
         margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
-        movers_(host, model_),
-        arm_(model_),
-        trail_(setup.dof(), trail_points),
-        evasion_(setup.dof()),
-        look_(setup_, model_, law_, margins_, surroundings_, host),
-        look_ticks_(std::max<std::uint64_t>(
-            1, static_cast<std::uint64_t>(std::lround(look_period_s / setup.control_period_s())))),
+        evader_(host, setup_, model_, law_, margins_, surroundings_),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
@@ -129,7 +119,7 @@ class Hybrid final : public planning::Planner {
     }
     const int n = setup.dof();
     for (auto* x : {&q_, &v_, &w_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_,
-                    &steering_, &row_})
+                    &steering_})
       *x = VectorXd::Zero(n);
     torque_ = VectorXd::Zero(n);
     // Scenes in which nothing moves need no series.
@@ -162,10 +152,9 @@ class Hybrid final : public planning::Planner {
     joint_damping_ = tuning.joint_damping;
     stall_.set_stall_time(tuning.stall_time_s);
     passes_ = tuning.filter_passes;
-    look_budget_ = tuning.look_budget;
-    look_steps_ = tuning.look_steps;
-    look_.set_params({velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_});
-    search_steps_ = tuning.search_steps;
+    evader_.set_params(
+        {velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_},
+        tuning.look_budget, tuning.look_steps);
   }
 
   // A new start has a new goal_number, so set_goal() forgets what belongs to the goal.
@@ -174,9 +163,8 @@ class Hybrid final : public planning::Planner {
     if (search_) search_->reset();
     if (observer_) observer_->reset();
     held_back_ = false;
-    trail_.clear();
-    look_.reset();
-    go_own_way();
+    evader_.reset();
+    evades_since_s_ = 0.0;
   }
 
   static double influence_m(const Json& params) { return params["contact_radius_m"]; }
@@ -190,11 +178,11 @@ class Hybrid final : public planning::Planner {
     prepare(tick);
 
     const Target target = choose_target();
-    mind_movers(tick);
+    evader_.update(tick, arm(), course());
     margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, goal));
     double closing_speed = 0.0;
-    if (evasion_.act != Act::own) {
-      evasion_velocity(evasion_, trail_, q_, trail_age_, u_);
+    if (evader_.evades()) {
+      evader_.velocity(q_, u_);
     } else if (mode_ == Mode::search) {
       u_.setZero();
     } else {
@@ -212,7 +200,7 @@ class Hybrid final : public planning::Planner {
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
            drive = drive_acceleration_;
-    if (evasion_.act != Act::own) gain = evasion_gain, drive = evasion_acceleration;
+    if (evader_.evades()) gain = evasion_gain, drive = evasion_acceleration;
     x_ = w_ + horizon_s_ * (gain * (u_ - w_)).cwiseMin(drive).cwiseMax(-drive);
     project(command);
     if (observer_)
@@ -221,9 +209,10 @@ class Hybrid final : public planning::Planner {
       answer_by_velocity(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     check_stall(tick.time_s(), target, closing_speed, command);
-    if (movers_.count() == 0) return;
-    command.set_series(evasion_series_, static_cast<double>(evasion_.act));
-    if (looks_) command.set_series(clearance_series_, clearance_ahead_);
+    if (!evader_.active()) return;
+    command.set_series(evasion_series_, static_cast<double>(evader_.act()));
+    if (const auto clearance = evader_.clearance_ahead())
+      command.set_series(clearance_series_, *clearance);
   }
 
  private:
@@ -247,7 +236,6 @@ class Hybrid final : public planning::Planner {
     const auto path = setup_.path(goal);
     for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
-    best_left_ = 1e9;
     enter(Mode::goal, tick.time_s());
   }
 
@@ -292,12 +280,6 @@ class Hybrid final : public planning::Planner {
     return {goal_, &via_, path_position_ < path_.length()};
   }
 
-  void go_own_way() {
-    evasion_.act = Act::own;
-    evasion_.rows = evasion_.clear = true;
-    looks_ = false;
-  }
-
   // The way that the arm follows if nothing moves into it.
   [[nodiscard]] Course course() {
     if (mode_ == Mode::search) return {goal_, nullptr, nullptr, 0.0, 0.0, true};
@@ -308,63 +290,7 @@ class Hybrid final : public planning::Planner {
     return {goal_, nullptr, &path_, path_position_, path_ahead};
   }
 
-  // Takes the result of the last look ahead, and starts the next: docs/theory.md (10.35).
-  void mind_movers(const planning::Tick& tick) {
-    movers_.update(tick.moving_count());
-    if (movers_.count() == 0) {
-      if (evasion_.act != Act::own || looks_) go_own_way();
-      return;
-    }
-    arm_.place(model_, ws_);
-    if (evasion_.act == Act::back)
-      trail_.forget(std::exchange(trail_age_, 0));
-    else
-      trail_.add(q_);
-    const Course course = this->course();
-    if (looks_ && !(course == course_)) looks_ = false;  // it looked along another way
-    if (tick.k() % look_ticks_ == 0) {
-      static const double reloc = getenv("RELOC") ? atof(getenv("RELOC")) : 0.0;
-      if (reloc > 0.0 && looks_) {
-        if (mode_ == Mode::escape_path)
-          escape_position_ =
-              search_->path().nearest(std::max(0.0, escape_position_ - reloc), reloc, q_, scratch_);
-        if (mode_ == Mode::goal && !path_.empty())
-          path_position_ =
-              path_.nearest(std::max(0.0, path_position_ - reloc), reloc, q_, scratch_);
-      }
-      if (looks_) take_look(tick.time_s());
-      course_ = course;
-      looks_ = look_.is_near(arm_.view(), tick.moving_count());
-      {
-        static const double pat = getenv("PAT") ? atof(getenv("PAT")) : 3.0,
-                            imp = getenv("IMP") ? atof(getenv("IMP")) : 3.0;
-        const double left = remaining(choose_target());
-        if (left < best_left_ - 0.05) best_left_ = left, best_since_ = tick.time_s();
-        const double t = std::fmod(tick.time_s() - best_since_, pat + imp);
-        look_.patient_ = t < pat;
-      }
-      if (looks_) {
-        const bool keep = evasion_.clear && tick.time_s() - evasion_since_s_ < evasion_kept_s;
-        look_.begin(q_, v_, M_, M_inv_, course, trail_, evasion_, keep,
-                    static_cast<double>(look_ticks_) * setup_.control_period_s(), look_budget_);
-      } else {
-        go_own_way();
-      }
-    }
-    // At least so many that the budget is used up in time.
-    const int ticks = static_cast<int>(look_ticks_);
-    if (looks_) look_.advance(std::max(look_steps_, (look_budget_ + ticks - 1) / ticks));
-  }
-
-  void take_look(double time_s) {
-    const Evasion& found = look_.result();
-    if (found.act != evasion_.act || found.aside != evasion_.aside) {
-      evasion_since_s_ = time_s;
-      trail_age_ = 0;
-    }
-    evasion_ = found;
-    clearance_ahead_ = look_.clearance();
-  }
+  [[nodiscard]] Evader::Arm arm() const { return {ws_, q_, v_, M_, M_inv_}; }
 
   // The length that remains: the distance from the target, and the path behind it.
   [[nodiscard]] double remaining(const Target& target) {
@@ -472,10 +398,9 @@ class Hybrid final : public planning::Planner {
 
   void add_rows() {
     const double dt = horizon_s_;
-    const bool rows = evasion_.rows || !evasion_.clear;
     for (const auto& point : obstacles_.points()) {
-      const bool moves = movers_.count() > 0 && movers_.contains(point.obstacle);
-      if (moves && !rows) continue;
+      const bool moves = evader_.moves(point.obstacle);
+      if (moves && !evader_.has_rows()) continue;
       const double x = point.distance - point.margin;
       // docs/theory.md (10.11)
       double bound = point.obstacle_speed - approach_speed(x, brake_, rate_);
@@ -495,30 +420,7 @@ class Hybrid final : public planning::Planner {
           point.obstacle_speed - rate_ * std::max(1e-9, point.distance - 0.5 * point.margin);
       (void)filter_.add_row(point.row, bound, floor, moves ? MoverRows::softness : 0.0);
     }
-    if (movers_.count() > 0 && rows) add_mover_rows();
-  }
-
-  // docs/theory.md (10.34)
-  void add_mover_rows() {
-    const scene::Shapes arm = arm_.view();
-    movers_.predict(0.0, places_[0]);
-    for (const double ahead : MoverRows::times_s) {
-      movers_.predict(ahead, places_[1]);
-      movers_.each_near(
-          arm, places_[1], MoverRows::margin_m + MoverRows::speed_m_s * ahead,
-          [&](const MoverPoint& point) {
-            if (movers_.has_passed(point, places_[0][static_cast<std::size_t>(point.mover)]))
-              return;
-            const double radius = arm.radii[static_cast<std::size_t>(point.shape)];
-            dynamics::point_jacobian_transpose(model_, ws_, point.link,
-                                               point.axis_point - radius * point.direction,
-                                               point.direction, row_);
-            double bound = (MoverRows::margin_m - point.distance) / ahead;
-            if (const double present = row_.dot(w_); present < bound)
-              bound = std::min(bound, present + filter_.braking_room(row_, w_));
-            (void)filter_.add_row(row_, bound, 0.0, MoverRows::softness);
-          });
-    }
+    if (evader_.active() && evader_.has_rows()) evader_.add_rows(arm(), w_, filter_);
   }
 
   // The velocity bound at a joint limit at the signed distance `offset` in the direction `side`
@@ -537,8 +439,7 @@ class Hybrid final : public planning::Planner {
                    planning::Command& command) {
     if (uses_memory_ || search_) command.disable_stall_rule();
     if (mode_ == Mode::search) return continue_search(now);
-    static const bool softwait = getenv("SOFTWAIT") != nullptr;
-    if (evasion_.act == Act::own && !(softwait && filter_.soft_row_acts())) {
+    if (!evader_.evades()) {
       evades_since_s_ = now;
     } else if (now - evades_since_s_ < longest_wait_s) {
       return stall_.restart(now);
@@ -593,7 +494,8 @@ class Hybrid final : public planning::Planner {
 
   // The arm stands still while the search continues.
   void continue_search(double now) {
-    if (!search_->advance(search_steps_)) return;
+    // What moves does not wait for the search.
+    if (!search_->advance(evader_.active() ? hurried_steps * search_steps_ : search_steps_)) return;
     if (search_->path().empty()) return enter(Mode::goal, now);
     escape_position_ = 0.0;
     enter(Mode::escape_path, now);
@@ -641,21 +543,9 @@ class Hybrid final : public planning::Planner {
   Margins margins_;
   JointBox box_;
   SafetyFilter filter_;
-  Movers movers_;
-  scene::PlacedShapes arm_;
-  std::array<Movers::Places, 2> places_;
-  Trail trail_;
-  Evasion evasion_;  ///< in force
-  LookAhead look_;
-  double best_left_ = 1e9, best_since_ = 0.0;
-  double clearance_ahead_ = 0.0;  ///< on the way of the last look [m]
+  Evader evader_;
+  double evades_since_s_ = 0.0;
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
-  Course course_;       ///< along which it looks
-  bool looks_ = false;  ///< whether a look is under way
-  std::uint64_t look_ticks_;
-  int look_budget_ = 1, look_steps_ = 1;
-  Eigen::Index trail_age_ = 0;
-  double evasion_since_s_ = 0.0, evades_since_s_ = 0.0;
   StallDetector stall_;
   EscapeMemory memory_;
   std::unique_ptr<Rollout> rollout_;
@@ -669,8 +559,7 @@ class Hybrid final : public planning::Planner {
   std::optional<TorqueRamp> ramp_;    ///< only where the rate of the torque is limited
   bool uses_memory_ = false;
   JointPath path_;
-  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_,
-      row_;
+  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
 namespace hamelin::hybrid {
 
@@ -11,15 +10,16 @@ namespace {
 
 constexpr double near_m = 0.25;        // movers farther than this within the horizon are ignored
 constexpr double look_clear_m = 0.01;  // least distance of a way that is clear
-static const double dash_clear_m = getenv("DASH") ? atof(getenv("DASH")) : 0.02;
-constexpr double better_m = 0.003;    // a way that is not clear replaces one that is worse
-constexpr double hopeless_m = -0.06;  // a way that comes so much nearer than look_clear_m ends
+constexpr double dash_clear_m = 0.02;  // the same for the own way without rows of the movers
+constexpr double arrival_share = 0.8;  // of the goal's tolerances, for arrival
+constexpr double better_m = 0.003;     // a way that is not clear replaces one that is worse
+constexpr double hopeless_m = -0.06;   // a way that comes so much nearer than look_clear_m ends
 constexpr double standing_radius_m = 0.08;  // obstacles that stand beyond this distance are ignored
 constexpr double self_radius_m = 0.03;
 constexpr double look_joint_limit_rate = 6.0;  // speed per distance from a joint limit [1/s]
 constexpr double rate_share = 0.6;             // of a distance that may be lost in a step
 constexpr int look_passes = 12;
-constexpr int random_ways = 12;
+constexpr int first_random = 8, random_ways = 12;    // numbers of candidates
 constexpr double far_aside = 1.5, near_aside = 0.9;  // distance of a random way's end [rad or m]
 constexpr Eigen::Index looked_trail_points = 64;     // more than fit into the horizon
 constexpr double far_m = 1.0;                        // distances beyond this are not measured
@@ -97,44 +97,26 @@ bool LookAhead::next_candidate() {
     return true;
   };
   const bool evades = in_force_.act != Act::own;
-  static const std::string push = getenv("PUSH") ? getenv("PUSH") : "koOfSbBs",
-                           wait = getenv("WAITS") ? getenv("WAITS") : "kosbOfSB";
-  const std::string& order = patient_ ? wait : push;
+  const auto take_in_force = [&] {
+    candidate_ = in_force_;
+    start_candidate();
+    return true;
+  };
   for (;;) {
-    const auto candidate = static_cast<std::size_t>(next_++);
-    if (candidate >= order.size() + random_ways) return false;
-    if (candidate >= order.size()) {
+    const int candidate = next_++;
+    if (candidate >= first_random + random_ways) return false;
+    if (candidate >= first_random) {
       draw_aside();
       return take(Act::aside, candidate % 3 == 1);
     }
-    switch (order[candidate]) {
-      case 'k':
-        if (!keep_ || !evades) break;
-        candidate_ = in_force_;
-        start_candidate();
-        return true;
-      case 'f':
-        if (keep_ || !evades) break;
-        candidate_ = in_force_;
-        start_candidate();
-        return true;
-      case 'o':
-        return take(Act::own, false);
-      case 'O':
-        return take(Act::own, true);
-      case 's':
-        return take(Act::stop, false);
-      case 'S':
-        return take(Act::stop, true);
-      case 'b':
-        if (trail_.size() == 0) break;
-        return take(Act::back, false);
-      case 'B':
-        if (trail_.size() == 0) break;
-        return take(Act::back, true);
-      default:
-        break;
-    }
+    if (candidate == 0 && keep_ && evades) return take_in_force();
+    if (candidate == 1) return take(Act::own, false);
+    if (candidate == 2) return take(Act::own, true);
+    if (candidate == 3 && !keep_ && evades) return take_in_force();
+    if (candidate == 4) return take(Act::stop, true);
+    if (candidate == 5 && trail_.size() > 0) return take(Act::back, false);
+    if (candidate == 6 && trail_.size() > 0) return take(Act::back, true);
+    if (candidate == 7) return take(Act::stop, false);
   }
 }
 
@@ -185,15 +167,10 @@ void LookAhead::step() {
   const scene::Shapes arm = arm_.view();
   clearance_ = movers_.clearance(arm, places_[static_cast<std::size_t>(step_)], clearance_);
   const double enough = std::max(best_clearance_, look_clear_m + hopeless_m);
-  static const int own_steps = getenv("OWNH") ? atoi(getenv("OWNH")) : 20;
-  const int last = candidate_.act == Act::own && !candidate_.rows ? own_steps : steps;
-  const bool arrived = candidate_.act == Act::own &&
-                       v_.lpNorm<Eigen::Infinity>() < 0.8 * course_.goal->speed_max &&
-                       law_.within(model_, ws_, q_, *course_.goal, 0.8);
-  if (arrived || step_ == last || (clearance_ < look_clear_m && clearance_ < enough))
+  if (step_ == steps || has_arrived() || (clearance_ < look_clear_m && clearance_ < enough))
     return finish_candidate();
 
-  surroundings_.query(q_, standing_radius_m, self_radius_m, HAMELIN_STANDING);
+  surroundings_.query(q_, standing_radius_m, self_radius_m);
   obstacles_.update(model_, ws_, surroundings_.contacts(), surroundings_.self_contacts());
   margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, *course_.goal));
   double gain = evasion_gain, acceleration = evasion_acceleration;
@@ -208,6 +185,13 @@ void LookAhead::step() {
   (void)filter_.project(v_, look_passes);
   q_ += step_s * v_;
   ++step_;
+}
+
+// The arm need not stay at a goal that it reaches.
+bool LookAhead::has_arrived() const {
+  return candidate_.act == Act::own &&
+         v_.lpNorm<Eigen::Infinity>() < arrival_share * course_.goal->speed_max &&
+         law_.within(model_, ws_, q_, *course_.goal, arrival_share);
 }
 
 void LookAhead::set_velocity(double& gain, double& acceleration) {

@@ -69,7 +69,7 @@ class LookAhead {
   [[nodiscard]] long units() const noexcept { return units_; }
 
  private:
-  static constexpr int steps = 20, row_steps = 6, places = 3 * steps + row_steps + 1;
+  static constexpr int steps = 20, row_steps = 6, places = steps + row_steps + 1;
 
   [[nodiscard]] bool next_candidate();
   void start_candidate();
@@ -80,6 +80,7 @@ class LookAhead {
   void add_mover_rows(const scene::Shapes& arm);
   void set_box();
   void draw_aside();
+  [[nodiscard]] bool has_arrived() const;
 
   const planning::Setup& setup_;
   const model::Model& model_;
@@ -103,10 +104,6 @@ class LookAhead {
   Course course_;
   Evasion in_force_, best_, candidate_;
 
- public:
-  bool patient_ = false;
-
- private:
   bool keep_ = false, done_ = true;
   int budget_ = 0, next_ = 0;
   double best_clearance_ = 0.0;

@@ -68,14 +68,6 @@ class SafetyFilter {
   [[nodiscard]] double momentum_multiplier(int k) const {
     return momentum_box_.lambda_low[k] + momentum_box_.lambda_high[k];
   }
-  /// Whether a soft row holds x back.
-  [[nodiscard]] bool soft_row_acts() const {
-    for (int i = 0; i < count_; ++i) {
-      const auto& row = rows_[static_cast<std::size_t>(i)];
-      if (row.rho > 0.0 && row.lambda > 0.0) return true;
-    }
-    return false;
-  }
   [[nodiscard]] int row_count() const noexcept { return count_; }
 
  private:

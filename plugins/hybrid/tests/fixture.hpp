@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <utility>
@@ -158,7 +159,7 @@ class Scene {
 
   hamelin_host host() {
     hamelin_host out{};
-    out.struct_size = sizeof out;
+    out.struct_size = offsetof(hamelin_host, closest_ahead);  // a host in which nothing moves
     out.context = this;
     out.log = &log;
     out.closest_points = &closest_points;
