@@ -44,9 +44,7 @@ class Evader {
   [[nodiscard]] bool has_rows() const noexcept { return evasion_.rows || !evasion_.clear; }
   /// The least distance from what moves that the last look found, on the way that the arm takes
   /// [m]; none before the first look, and if nothing is near.
-  [[nodiscard]] std::optional<double> clearance_ahead() const noexcept {
-    return clearance_ahead_;
-  }
+  [[nodiscard]] std::optional<double> clearance_ahead() const noexcept { return clearance_ahead_; }
   /// Sets u to the velocity of the evasion; only where the arm evades.
   void velocity(const Eigen::VectorXd& q, Eigen::VectorXd& u) {
     evasion_velocity(evasion_, trail_, q, trail_age_, u);

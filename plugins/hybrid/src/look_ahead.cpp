@@ -21,8 +21,9 @@ constexpr double rate_share = 0.6;             // of a distance that may be lost
 constexpr int look_passes = 12;
 constexpr int first_random = 8, random_ways = 12;    // numbers of candidates
 constexpr double far_aside = 1.5, near_aside = 0.9;  // distance of a random way's end [rad or m]
-constexpr Eigen::Index looked_trail_points = 64;     // more than fit into the horizon
-constexpr double far_m = 1.0;                        // distances beyond this are not measured
+constexpr double variation = 0.4;  // of the end of the best random way, per joint [rad or m]
+constexpr Eigen::Index looked_trail_points = 64;  // more than fit into the horizon
+constexpr double far_m = 1.0;                     // distances beyond this are not measured
 
 }  // namespace
 
@@ -123,8 +124,14 @@ bool LookAhead::next_candidate() {
 void LookAhead::draw_aside() {
   Eigen::VectorXd& aside = candidate_.aside;
   for (Eigen::Index k = 0; k < aside.size(); ++k) aside[k] = rng_.uniform(-1.0, 1.0);
-  aside *= (next_ % 2 == 0 ? near_aside : far_aside) / std::max(0.2, aside.norm());
-  aside += start_q_;
+  // Half of them are variations of the best so far.
+  if (next_ % 2 == 0 && best_.act == Act::aside) {
+    aside *= variation;
+    aside += best_.aside;
+  } else {
+    aside *= (next_ % 2 == 0 ? near_aside : far_aside) / std::max(0.2, aside.norm());
+    aside += start_q_;
+  }
   if (const auto limit = setup_.q_lower()) aside = aside.cwiseMax(*limit);
   if (const auto limit = setup_.q_upper()) aside = aside.cwiseMin(*limit);
 }
