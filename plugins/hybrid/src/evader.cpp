@@ -16,7 +16,7 @@ constexpr Eigen::Index trail_points = 512;
 }  // namespace
 
 Evader::Evader(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
-               Law& law, const Margins& margins, Surroundings& surroundings)
+               Law& law, const Margins& margins)
     : model_(model),
       period_s_(setup.control_period_s()),
       look_ticks_(std::max<std::uint64_t>(
@@ -25,7 +25,7 @@ Evader::Evader(const planning::Host& host, const planning::Setup& setup, const m
       arm_(model),
       trail_(setup.dof(), trail_points),
       evasion_(setup.dof()),
-      look_(setup, model, law, margins, surroundings, host),
+      look_(setup, model, law, margins, host),
       row_(Eigen::VectorXd::Zero(setup.dof())) {}
 
 void Evader::set_params(const LookAheadParams& params, int budget, int steps) noexcept {

@@ -91,7 +91,7 @@ class Hybrid final : public planning::Planner {
         margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
-        evader_(host, setup_, model_, law_, margins_, surroundings_),
+        evader_(host, setup_, model_, law_, margins_),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
@@ -475,6 +475,8 @@ class Hybrid final : public planning::Planner {
     const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
     host_.info({line.data(), static_cast<std::size_t>(size)});
     if (search_) {
+      // What moves may leave the way free, or stay in it: searches assume the one and the other.
+      surroundings_.count_movers(escapes_ % 2 == 0);
       search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_position_);
       return enter(Mode::search, now);
     }

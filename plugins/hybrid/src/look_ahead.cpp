@@ -28,12 +28,12 @@ constexpr double far_m = 1.0;                     // distances beyond this are n
 }  // namespace
 
 LookAhead::LookAhead(const planning::Setup& setup, const model::Model& model, Law& law,
-                     const Margins& margins, Surroundings& surroundings, const planning::Host& host)
+                     const Margins& margins, const planning::Host& host)
     : setup_(setup),
       model_(model),
       law_(law),
       margins_(margins),
-      surroundings_(surroundings),
+      surroundings_(host, setup),
       movers_(host, model),
       trail_(setup.dof(), looked_trail_points),
       ws_(model),

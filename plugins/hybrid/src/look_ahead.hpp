@@ -46,7 +46,7 @@ class LookAhead {
 
   /// All must outlive this, but for the host.
   LookAhead(const planning::Setup& setup, const model::Model& model, Law& law,
-            const Margins& margins, Surroundings& surroundings, const planning::Host& host);
+            const Margins& margins, const planning::Host& host);
   void set_params(const LookAheadParams& params) noexcept { params_ = params; }
   void reset();
 
@@ -86,7 +86,7 @@ class LookAhead {
   const model::Model& model_;
   Law& law_;
   const Margins& margins_;
-  Surroundings& surroundings_;
+  Surroundings surroundings_;
   Movers movers_;  ///< of the look
   Trail trail_;    ///< of the look
   LookAheadParams params_{};

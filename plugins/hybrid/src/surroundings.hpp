@@ -6,8 +6,8 @@
 
 namespace hamelin::hybrid {
 
-/// Contacts at configurations other than the arm's present one with what stands still, queried from
-/// the host: what moves will be elsewhere when the arm arrives. Only the constructor allocates.
+/// Contacts at configurations other than the arm's present one, queried from the host: with what
+/// stands still, and on demand with what moves, where it is now. Only the constructor allocates.
 class Surroundings {
  public:
   Surroundings(const planning::Host& host, const planning::Setup& setup)
@@ -16,12 +16,15 @@ class Surroundings {
         contacts_(setup.shapes().size() * 4 + 16),
         self_contacts_(self_collision_ ? setup.shapes().size() * 4 + 16 : 0) {}
 
-  /// Finds the contacts at q up to `radius` from what stands still and the self contacts up to
+  /// Whether what moves counts as if it stood still. At first it does not count.
+  void count_movers(bool count) noexcept {
+    kinds_ = count ? HAMELIN_STANDING + HAMELIN_MOVING : HAMELIN_STANDING;
+  }
+  /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
   /// `self_radius` [m].
   void query(const Eigen::VectorXd& q, double radius, double self_radius) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
-    count_ = std::min(host_.closest_ahead(at, 0.0, HAMELIN_STANDING, radius, contacts_),
-                      contacts_.size());
+    count_ = std::min(host_.closest_ahead(at, 0.0, kinds_, radius, contacts_), contacts_.size());
     self_count_ = 0;
     if (self_collision_)
       self_count_ =
@@ -33,17 +36,18 @@ class Surroundings {
   [[nodiscard]] std::span<const hamelin_self_contact> self_contacts() const {
     return {self_contacts_.data(), self_count_};
   }
-  /// Whether all that stands still is farther than `margin` and all parts of the arm farther from
+  /// Whether all obstacles are farther than `margin` and all parts of the arm farther from
   /// each other than `self_margin` at q [m].
   [[nodiscard]] bool is_clear(const Eigen::VectorXd& q, double margin, double self_margin) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
-    if (host_.closest_ahead(at, 0.0, HAMELIN_STANDING, margin, {}) > 0) return false;
+    if (host_.closest_ahead(at, 0.0, kinds_, margin, {}) > 0) return false;
     return !self_collision_ || host_.closest_self(at, self_margin, {}) == 0;
   }
 
  private:
   planning::Host host_;
   bool self_collision_;
+  std::int32_t kinds_ = HAMELIN_STANDING;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
   std::size_t count_ = 0, self_count_ = 0;
