@@ -5,6 +5,7 @@
 #include "evasion.hpp"
 #include "look_ahead.hpp"
 #include "movers.hpp"
+#include "sweep.hpp"
 
 namespace hamelin::hybrid {
 
@@ -45,6 +46,8 @@ class Evader {
   /// The least distance from what moves that the last look found, on the way that the arm takes
   /// [m]; none before the first look, and if nothing is near.
   [[nodiscard]] std::optional<double> clearance_ahead() const noexcept { return clearance_ahead_; }
+  /// Where moving obstacles were.
+  [[nodiscard]] Sweep& sweep() noexcept { return sweep_; }
   /// Sets u to the velocity of the evasion; only where the arm evades.
   void velocity(const Eigen::VectorXd& q, Eigen::VectorXd& u) {
     evasion_velocity(evasion_, trail_, q, trail_age_, u);
@@ -63,6 +66,7 @@ class Evader {
   Movers movers_;
   scene::PlacedShapes arm_;
   std::array<Movers::Places, 2> places_;
+  Sweep sweep_;
   Trail trail_;
   Evasion evasion_;  ///< in force
   LookAhead look_;

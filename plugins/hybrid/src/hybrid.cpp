@@ -87,7 +87,7 @@ class Hybrid final : public planning::Planner {
         initial_params_(params),
         law_(setup, model_, Tuning(setup, params).law),
         obstacles_(setup, params["contact_radius_m"]),
-        surroundings_(host, setup),
+        surroundings_(host, setup, model_),
         margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
@@ -223,6 +223,8 @@ class Hybrid final : public planning::Planner {
   void enter(Mode mode, double time_s) {
     mode_ = mode;
     stall_.restart(time_s);
+    least_left_ = std::numeric_limits<double>::infinity();
+    progress_s_ = time_s;
   }
 
   void set_goal(const planning::Tick& tick) {
@@ -441,11 +443,12 @@ class Hybrid final : public planning::Planner {
     if (mode_ == Mode::search) return continue_search(now);
     if (!evader_.evades()) {
       evades_since_s_ = now;
-    } else if (now - evades_since_s_ < longest_wait_s) {
+    } else if (now - evades_since_s_ < longest_wait_s && !makes_no_progress(now, target)) {
       return stall_.restart(now);
     }
     const bool stalled =
-        stall_.stalled(now, remaining(target), v_.norm(), closing_speed, held_back_);
+        stall_.stalled(now, remaining(target), v_.norm(), closing_speed, held_back_) ||
+        makes_no_progress(now, target);
     if (mode_ == Mode::via) {
       const bool arrived = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
       if (!arrived && !stalled && now < via_until_s_) return;
@@ -468,6 +471,18 @@ class Hybrid final : public planning::Planner {
     if (stalled) start_escape(now, target, command);
   }
 
+  // Where something moves, the arm may be driven to and fro, which the rule of stalls takes for
+  // motion: then only new bests of the remaining length count.
+  [[nodiscard]] bool makes_no_progress(double now, const Target& target) {
+    constexpr double patience_s = 3.0, progress = 0.05;
+    const double left = remaining(target);
+    if (left < least_left_ - progress || !evader_.active()) {
+      least_left_ = left;
+      progress_s_ = now;
+    }
+    return now - progress_s_ > patience_s;
+  }
+
   void start_escape(double now, const Target& target, planning::Command& command) {
     if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
@@ -475,8 +490,9 @@ class Hybrid final : public planning::Planner {
     const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
     host_.info({line.data(), static_cast<std::size_t>(size)});
     if (search_) {
-      // What moves may leave the way free, or stay in it: searches assume the one and the other.
-      surroundings_.count_movers(escapes_ % 2 == 0);
+      // What moves may leave the way free, or come back to where it was: most searches assume the
+      // one, each third the other.
+      surroundings_.count(evader_.active() && escapes_ % 3 == 0 ? &evader_.sweep() : nullptr);
       search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_position_);
       return enter(Mode::search, now);
     }
@@ -547,6 +563,7 @@ class Hybrid final : public planning::Planner {
   SafetyFilter filter_;
   Evader evader_;
   double evades_since_s_ = 0.0;
+  double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
   StallDetector stall_;
   EscapeMemory memory_;

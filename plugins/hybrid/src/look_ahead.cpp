@@ -33,7 +33,7 @@ LookAhead::LookAhead(const planning::Setup& setup, const model::Model& model, La
       model_(model),
       law_(law),
       margins_(margins),
-      surroundings_(host, setup),
+      surroundings_(host, setup, model),
       movers_(host, model),
       trail_(setup.dof(), looked_trail_points),
       ws_(model),

@@ -20,11 +20,21 @@ scene::Shape shape_of(std::int32_t shape) {
   }
 }
 
-MoverPlace place_of(const hamelin_obstacle_state& state) {
+// Where only the speed is bounded, nothing would ever be clear of all places that the obstacle can
+// reach in a second. It is then expected to keep its velocity, and may be nearer by what it can
+// move in a reaction time.
+constexpr double reaction_s = 0.1;
+
+MoverPlace place_of(const hamelin_obstacle_state& state, double ahead_s) {
   const auto& q = state.quaternion_wxyz;
-  return {{Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix(),
-           planning::vec3(state.position_world_m)},
-          state.nearer_m};
+  MoverPlace place{{Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix(),
+                    planning::vec3(state.position_world_m)},
+                   state.nearer_m};
+  if (state.prediction != HAMELIN_PREDICTION_SPEED_BOUND) return place;
+  place.pose = {place.pose.R(),
+                place.pose.p() + ahead_s * planning::vec3(state.velocity_world_m_s)};
+  place.nearer = std::min(ahead_s, reaction_s) * state.speed_max_m_s;
+  return place;
 }
 
 }  // namespace
@@ -63,7 +73,7 @@ bool Movers::contains(int obstacle) const noexcept {
 void Movers::predict(double ahead_s, Places& places) {
   const std::size_t listed =
       std::min(host_.obstacles_ahead(ahead_s, HAMELIN_MOVING, states_), count_);
-  for (std::size_t m = 0; m < listed; ++m) places[m] = place_of(states_[m]);
+  for (std::size_t m = 0; m < listed; ++m) places[m] = place_of(states_[m], ahead_s);
 }
 
 bool Movers::nearest(const scene::Shapes& arm, const Span& link, std::size_t mover,
@@ -84,8 +94,8 @@ bool Movers::nearest(const scene::Shapes& arm, const Span& link, std::size_t mov
     if (hit.distance > within) continue;
     least = hit.distance - arm.radii[i] - place.nearer;
     found = true;
-    point = {link.link, static_cast<int>(i), static_cast<int>(mover),
-             least,     hit.axis_point,      hit.direction};
+    point = {link.link,      static_cast<int>(i), static_cast<int>(mover), ids_[mover], least,
+             hit.axis_point, hit.direction};
   }
   return found;
 }

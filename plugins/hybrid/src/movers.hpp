@@ -19,6 +19,7 @@ struct MoverPlace {
 /// The point of a link that is nearest to a moving obstacle.
 struct MoverPoint {
   int link = 0, shape = 0, mover = 0;
+  int obstacle = 0;            ///< the id of the mover
   double distance = 0.0;       ///< from the shape's surface [m]
   Eigen::Vector3d axis_point;  ///< on the axis of the shape, world
   Eigen::Vector3d direction;   ///< unit, from the obstacle to the shape, world

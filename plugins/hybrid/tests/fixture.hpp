@@ -87,7 +87,7 @@ class Scene {
         raw_setup_(data_.view()),
         raw_host_(host()),
         setup(raw_setup_),
-        surroundings(planning::Host(raw_host_), setup),
+        surroundings(planning::Host(raw_host_), setup, model),
         margins(setup, margin_params),
         box(setup, Eigen::VectorXd::Ones(model.dof())),
         rollout(setup, model, law_params, margins, surroundings),
