@@ -135,3 +135,73 @@ TEST_CASE("arrays are read and written by their stride", "[planning][unit]") {
   narrow.set(1, box);
   CHECK(shorter == std::vector<std::int32_t>{1, 9, 3});
 }
+
+TEST_CASE("in hosts without a future of obstacles, all obstacles stand", "[planning][plugin]") {
+  struct OldHost {
+    static std::size_t closest_points(void*, const double*, double influence_m,
+                                      hamelin_contact* out, std::size_t capacity, std::size_t) {
+      if (capacity > 0) out[0].distance_m = influence_m;
+      return 1;
+    }
+    static std::size_t obstacles(void*, hamelin_obstacle_state* out, std::size_t capacity,
+                                 std::size_t) {
+      if (capacity > 0) out[0].id = 7;
+      return 1;
+    }
+    static std::size_t closest_ahead(void*, const double*, double, std::int32_t, double,
+                                     hamelin_contact*, std::size_t, std::size_t) {
+      return 100;
+    }
+    static std::size_t obstacles_ahead(void*, double, std::int32_t, hamelin_obstacle_state*,
+                                       std::size_t, std::size_t) {
+      return 200;
+    }
+  };
+  hamelin_host raw{};
+  raw.closest_points = &OldHost::closest_points;
+  raw.obstacles = &OldHost::obstacles;
+  // Must not be called: an old host ends before these fields.
+  raw.closest_ahead = &OldHost::closest_ahead;
+  raw.obstacles_ahead = &OldHost::obstacles_ahead;
+  const Host host(raw);
+  const std::vector<double> q(3, 0.0);
+  std::vector<hamelin_contact> contacts(2);
+  std::vector<hamelin_obstacle_state> states(2);
+
+  raw.struct_size = offsetof(hamelin_host, closest_ahead);
+  for (const std::int32_t kinds : {+HAMELIN_STANDING, HAMELIN_STANDING + HAMELIN_MOVING}) {
+    CHECK(host.closest_ahead(q, 0.5, kinds, 0.3, contacts) == 1);
+    CHECK(contacts[0].distance_m == 0.3);
+    CHECK(host.obstacles_ahead(0.5, kinds, states) == 1);
+    CHECK(states[0].id == 7);
+  }
+  for (const std::int32_t kinds : {0, +HAMELIN_MOVING}) {
+    CHECK(host.closest_ahead(q, 0.5, kinds, 0.3, contacts) == 0);
+    CHECK(host.obstacles_ahead(0.5, kinds, states) == 0);
+  }
+  // A host that has only the first of both functions.
+  raw.struct_size = offsetof(hamelin_host, obstacles_ahead);
+  CHECK(host.closest_ahead(q, 0.5, HAMELIN_MOVING, 0.3, contacts) == 100);
+  CHECK(host.obstacles_ahead(0.5, HAMELIN_MOVING, states) == 0);
+  raw.struct_size = sizeof raw;
+  CHECK(host.obstacles_ahead(0.5, HAMELIN_MOVING, states) == 200);
+
+  hamelin_tick tick{};
+  tick.moving_count = 5;
+  tick.struct_size = offsetof(hamelin_tick, moving_count);
+  CHECK(Tick(tick, 3).moving_count() == 0);
+  tick.struct_size = sizeof tick;
+  CHECK(Tick(tick, 3).moving_count() == 5);
+}
+
+TEST_CASE("in services that do not move obstacles, none moves", "[planning][plugin]") {
+  NearHost services;
+  std::vector<hamelin_contact> contacts(2);
+  std::vector<hamelin_obstacle_state> states(2);
+  const std::vector<double> q(3, 0.0);
+  HostServices& host = services;
+  CHECK(host.closest_ahead(q, 0.5, HAMELIN_STANDING, 0.3, std::span(contacts)) == 2);
+  CHECK(contacts[0].distance_m == 4.0);
+  CHECK(host.closest_ahead(q, 0.5, HAMELIN_MOVING, 0.3, std::span(contacts)) == 0);
+  CHECK(host.obstacles_ahead(0.5, HAMELIN_STANDING + HAMELIN_MOVING, std::span(states)) == 0);
+}

@@ -152,6 +152,7 @@ class Hybrid final : public planning::Planner {
     joint_damping_ = tuning.joint_damping;
     stall_.set_stall_time(tuning.stall_time_s);
     passes_ = tuning.filter_passes;
+    search_steps_ = tuning.search_steps;
     evader_.set_params(
         {velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_},
         tuning.look_budget, tuning.look_steps);

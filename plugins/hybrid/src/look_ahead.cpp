@@ -174,7 +174,10 @@ void LookAhead::step() {
   const scene::Shapes arm = arm_.view();
   clearance_ = movers_.clearance(arm, places_[static_cast<std::size_t>(step_)], clearance_);
   const double enough = std::max(best_clearance_, look_clear_m + hopeless_m);
-  if (step_ == steps || has_arrived() || (clearance_ < look_clear_m && clearance_ < enough))
+  const bool arrived = has_arrived();
+  if (step_ == 0) starts_at_goal_ = arrived;
+  if (step_ == steps || (arrived && !starts_at_goal_) ||
+      (clearance_ < look_clear_m && clearance_ < enough))
     return finish_candidate();
 
   surroundings_.query(q_, standing_radius_m, self_radius_m);
@@ -194,7 +197,8 @@ void LookAhead::step() {
   ++step_;
 }
 
-// The arm need not stay at a goal that it reaches.
+// The arm need not stay at a goal that it reaches. If it is there already, nobody has told it to
+// leave, so the way goes on.
 bool LookAhead::has_arrived() const {
   return candidate_.act == Act::own &&
          v_.lpNorm<Eigen::Infinity>() < arrival_share * course_.goal->speed_max &&

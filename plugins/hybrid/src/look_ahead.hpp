@@ -114,6 +114,7 @@ class LookAhead {
   double position_ = 0.0, clearance_ = 0.0;
   Eigen::Index age_ = 0;
   int step_ = 0;
+  bool starts_at_goal_ = false;
 };
 
 }  // namespace hamelin::hybrid

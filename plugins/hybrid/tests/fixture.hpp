@@ -9,11 +9,13 @@
 #include "../src/roots.hpp"
 #include "../src/tree.hpp"
 #include "../src/vias.hpp"
+#include "hamelin/geometry/se3.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/obstacles.hpp"
 #include "hamelin/test/arm_loop.hpp"
 
-/// An arm among balls, queried through the C interface as a planner queries its host, with
-/// distances in closed form.
+/// An arm among balls and moving obstacles, queried through the C interface as a planner queries
+/// its host, with distances from the balls in closed form.
 namespace hamelin::test {
 
 /// Four links of 0.25 m along x that turn about z, with five spheres each.
@@ -42,7 +44,8 @@ inline model::Robot short_planar4() {
 
 /// The parameters of a Scene.
 struct Task {
-  std::vector<Ball> balls{};
+  std::vector<Ball> balls{};  ///< stand still
+  std::vector<scene::Obstacle> movers{};
   hamelin_goal goal{};
   Eigen::VectorXd q_goal{};
   Eigen::MatrixXd path{};
@@ -81,6 +84,7 @@ class Scene {
   explicit Scene(const Task& task)
       : model(task.robot, geometry::SE3{}, Eigen::Vector3d::Zero()),
         balls_(task.balls),
+        movers_(task.movers),
         ws_(model),
         q_(Eigen::VectorXd::Zero(model.dof())),
         data_(fill(task, model)),
@@ -136,6 +140,28 @@ class Scene {
   /// The number of queries to the host.
   [[nodiscard]] long queries() const { return queries_; }
 
+  /// The host, for the parts that query it themselves. Valid as long as the scene.
+  [[nodiscard]] planning::Host planner_host() const { return planning::Host(raw_host_); }
+  /// The time from which moving obstacles are predicted [s].
+  void set_time(double time_s) { time_s_ = time_s; }
+  /// The ids of moving obstacles: balls have the smaller ones.
+  [[nodiscard]] std::int32_t mover_id(std::size_t mover) const {
+    return static_cast<std::int32_t>(balls_.size() + mover);
+  }
+  /// The smallest distance to a moving obstacle at q, where they are predicted to be, by brute
+  /// force over all shapes, which are spheres.
+  double mover_clearance(const Eigen::VectorXd& q, double ahead_s) {
+    dynamics::forward_kinematics(model, ws_, q);
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& mover : movers_) {
+      const auto at = scene::placed_at(mover, {time_s_, ahead_s});
+      for (std::size_t s = 0; s < data_.shapes.size(); ++s)
+        least = std::min(least, scene::closest_on(mover, at.pose, placed(s)).distance -
+                                    data_.shapes[s].radius_m - at.nearer_m);
+    }
+    return least;
+  }
+
   const model::Model model;
 
  private:
@@ -159,11 +185,14 @@ class Scene {
 
   hamelin_host host() {
     hamelin_host out{};
-    out.struct_size = offsetof(hamelin_host, closest_ahead);  // a host in which nothing moves
+    // Without moving obstacles it is a host of the time before there were any.
+    out.struct_size = movers_.empty() ? offsetof(hamelin_host, closest_ahead) : sizeof out;
     out.context = this;
     out.log = &log;
     out.closest_points = &closest_points;
     out.closest_self = &closest_self;
+    out.closest_ahead = &closest_ahead;
+    out.obstacles_ahead = &obstacles_ahead;
     return out;
   }
   static void log(void*, std::int32_t, const char*, std::size_t) {}
@@ -197,6 +226,37 @@ class Scene {
     }
     return count;
   }
+  // Queries of what moves go through obstacles_ahead().
+  static std::size_t closest_ahead(void* context, const double* q, double, std::int32_t kinds,
+                                   double influence, hamelin_contact* out, std::size_t capacity,
+                                   std::size_t stride) {
+    if (kinds != HAMELIN_STANDING) return 0;
+    return closest_points(context, q, influence, out, capacity, stride);
+  }
+  static std::size_t obstacles_ahead(void* context, double ahead_s, std::int32_t kinds,
+                                     hamelin_obstacle_state* out, std::size_t capacity,
+                                     std::size_t) {
+    const auto& self = *static_cast<Scene*>(context);
+    if (kinds != HAMELIN_MOVING) return 0;
+    for (std::size_t m = 0; m < std::min(capacity, self.movers_.size()); ++m) {
+      const scene::Obstacle& mover = self.movers_[m];
+      const auto at = scene::placed_at(mover, {self.time_s_, ahead_s});
+      hamelin_obstacle_state state{};
+      state.id = self.mover_id(m);
+      state.shape = static_cast<std::int32_t>(mover.shape);
+      state.name = mover.name.c_str();
+      state.radius_m = mover.radius_m;
+      state.length_m = mover.length_m;
+      std::copy_n(mover.size_m.data(), 3, state.size_m);
+      std::copy_n(at.pose.p().data(), 3, state.position_world_m);
+      const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(at.pose.R());
+      std::copy_n(wxyz.data(), 4, state.quaternion_wxyz);
+      state.moves = 1;
+      state.nearer_m = at.nearer_m;
+      out[m] = state;
+    }
+    return self.movers_.size();
+  }
   // Finds the nearest pair of spheres for each two links that share no joint.
   static std::size_t closest_self(void* context, const double* q, double influence,
                                   hamelin_self_contact* out, std::size_t capacity, std::size_t) {
@@ -229,6 +289,8 @@ class Scene {
   }
 
   std::vector<Ball> balls_;
+  std::vector<scene::Obstacle> movers_;
+  double time_s_ = 0.0;
   dynamics::Workspace ws_;
   Eigen::VectorXd q_;
   planning::SetupData data_;
@@ -244,6 +306,17 @@ class Scene {
   hybrid::Rollout rollout;
   hybrid::Roots roots;
 };
+
+/// A ball that is at a place at time 0 and keeps its velocity.
+inline scene::Obstacle moving_ball(const Eigen::Vector3d& at, double radius,
+                                   const Eigen::Vector3d& velocity) {
+  scene::Obstacle ball;
+  ball.radius_m = radius;
+  ball.pose = {Eigen::Matrix3d::Identity(), at};
+  ball.motion =
+      scene::ObservedMotion{0.0, velocity, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  return ball;
+}
 
 /// A ball in front of the arm, which must fold to get from one side to the other.
 inline const std::vector<Ball> ball_between{{{0.75, 0.0, 0.0}, 0.1}};

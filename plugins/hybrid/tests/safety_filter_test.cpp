@@ -145,6 +145,211 @@ TEST_CASE("floors hold after a single pass", "[hybrid][property]") {
   }
 }
 
+// ---- soft rows
+
+namespace {
+
+/// Hard and soft rows, with floors of the hard ones.
+struct Rows {
+  MatrixXd hard, soft;
+  VectorXd b_hard, b_soft, floors, softness;
+  void add_to(SafetyFilter& filter, bool with_floors = true) const {
+    for (Eigen::Index i = 0; i < hard.cols(); ++i)
+      (void)filter.add_row(hard.col(i), b_hard[i], with_floors ? floors[i] : 1.0);
+    for (Eigen::Index i = 0; i < soft.cols(); ++i)
+      (void)filter.add_row(soft.col(i), b_soft[i], 0.0, softness[i]);
+  }
+};
+
+Rows random_rows(Rng& rng, int n, int hard, int soft) {
+  Rows rows{MatrixXd(n, hard), MatrixXd(n, soft), VectorXd(hard),
+            VectorXd(soft),    VectorXd(hard),    VectorXd(soft)};
+  for (int i = 0; i < hard; ++i) {
+    rows.hard.col(i) = random_numbers(rng, n);
+    rows.b_hard[i] = -rng.uniform(0.0, 0.3);
+    rows.floors[i] = rows.b_hard[i] - rng.uniform(0.01, 0.2);
+  }
+  for (int i = 0; i < soft; ++i) {
+    rows.soft.col(i) = random_numbers(rng, n);
+    rows.b_soft[i] = rng.uniform(-0.3, 1.0);
+    rows.softness[i] = rng.uniform(0.05, 1.0);
+  }
+  return rows;
+}
+
+// The minimiser of ½|x − ũ|²_M + Σ ξ²/(2ρ) with a·x ≥ b − ξ, as that of a problem with hard rows
+// only in (x, ξ), whose metric is M and 1/ρ.
+VectorXd nearest_with_soft_rows(const MatrixXd& M, const VectorXd& target, const Rows& rows) {
+  const auto n = target.size(), hard = rows.hard.cols(), soft = rows.soft.cols();
+  MatrixXd metric = MatrixXd::Zero(n + soft, n + soft), all(n + soft, hard + soft);
+  metric.topLeftCorner(n, n) = M;
+  all.setZero();
+  all.topLeftCorner(n, hard) = rows.hard;
+  all.topRightCorner(n, soft) = rows.soft;
+  for (Eigen::Index i = 0; i < soft; ++i) {
+    const VectorXd a = rows.soft.col(i);
+    metric(n + i, n + i) = 1.0 / (rows.softness[i] * a.dot(M.ldlt().solve(a)));
+    all(n + i, hard + i) = 1.0;
+  }
+  VectorXd from = VectorXd::Zero(n + soft), b(hard + soft);
+  from.head(n) = target;
+  b << rows.b_hard, rows.b_soft;
+  return nearest_by_active_sets(metric, from, all, b).head(n);
+}
+
+}  // namespace
+
+TEST_CASE("soft rows give way at the price of half the work of their violation",
+          "[hybrid][property]") {
+  int gave_way = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    CAPTURE(seed);
+    Rng rng(seed);
+    const int n = 4;
+    const MatrixXd M = random_mass(rng, n), W = M.inverse();
+    const Rows rows = random_rows(rng, n, 3, 3);
+    SafetyFilter filter(n, 16);
+    filter.begin(M, W);
+    rows.add_to(filter);
+    const VectorXd target = random_numbers(rng, n, 2.0);
+    VectorXd x = target;
+    (void)filter.project(x, 20000);
+    const VectorXd expected = nearest_with_soft_rows(M, target, rows);
+    REQUIRE(expected.size() == n);
+    REQUIRE((x - expected).norm() < 1e-4 * (1.0 + expected.norm()));
+    // The violation of a soft row is ρλ.
+    for (int i = 0; i < 3; ++i) {
+      const VectorXd a = rows.soft.col(i);
+      const double lambda = filter.row_multiplier(3 + i);
+      if (lambda < 0.01) continue;
+      ++gave_way;
+      REQUIRE(a.dot(x) ==
+              Approx(rows.b_soft[i] - rows.softness[i] * a.dot(W * a) * lambda).margin(1e-3));
+    }
+  }
+  CHECK(gave_way > 50);
+}
+
+TEST_CASE("soft rows add no more energy than is booked as recovery, after any number of passes",
+          "[hybrid][property]") {
+  const int passes = GENERATE(1, 2, 5, 12);
+  int projected_twice = 0;
+  for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
+    CAPTURE(seed, passes);
+    Rng rng(seed);
+    const int n = 1 + static_cast<int>(rng.below(7)), hard = static_cast<int>(rng.below(8)),
+              soft = 1 + static_cast<int>(rng.below(8));
+    const MatrixXd M = random_mass(rng, n), W = M.inverse();
+    const Rows rows = random_rows(rng, n, hard, soft);
+    SafetyFilter filter(n, 32);
+    filter.begin(M, W);
+    rows.add_to(filter);
+    const VectorXd one = VectorXd::Constant(n, rng.uniform(0.2, 2.0));
+    filter.set_box(-one, one);
+    if (seed % 2 == 0) filter.set_momentum_box(-one, one);
+    VectorXd x = random_numbers(rng, n, 2.0);
+    const auto report = filter.project(x, passes);
+    projected_twice += report.passes > passes ? 1 : 0;
+    double paid = 0.0;  // ½ Σ ρ λ² of the last projection
+    for (int i = 0; i < soft; ++i) {
+      const VectorXd a = rows.soft.col(i);
+      const double lambda = filter.row_multiplier(hard + i);
+      paid += 0.5 * rows.softness[i] * a.dot(W * a) * lambda * lambda;
+    }
+    const double work = report.energy_after_J - report.energy_before_J - report.recovery_J;
+    REQUIRE(report.recovery_J >= 0.0);
+    REQUIRE(work <= -paid + 1e-12 * (1.0 + report.energy_before_J + report.recovery_J));
+    REQUIRE(report.energy_after_J == Approx(0.5 * x.dot(M * x)).margin(1e-15));
+  }
+  CHECK(projected_twice > 100);
+}
+
+TEST_CASE("where soft rows break floors of hard ones, a second projection has none of them",
+          "[hybrid][property]") {
+  // Soft rows push the arm into walls with a larger demand than the passes can resolve.
+  constexpr int n = 7, hard = 6, soft = 6, passes = 3;
+  int twice = 0;
+  for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
+    CAPTURE(seed);
+    Rng rng(seed);
+    const MatrixXd M = random_mass(rng, n), W = M.inverse();
+    Rows rows = random_rows(rng, n, hard, soft);
+    for (int i = 0; i < soft; ++i) {
+      rows.soft.col(i) = random_numbers(rng, n, 0.2) - rows.hard.col(i);
+      rows.b_soft[i] = rng.uniform(0.5, 3.0);
+    }
+    const VectorXd one = VectorXd::Constant(n, 3.0);
+    SafetyFilter filter(n, 32), first(n, 32), second(n, 32);
+    for (auto* each : {&filter, &first, &second}) {
+      each->begin(M, W);
+      each->set_box(-one, one);
+    }
+    rows.add_to(filter);
+    rows.add_to(first, false);
+    for (int i = 0; i < hard; ++i)
+      (void)second.add_row(rows.hard.col(i), rows.b_hard[i], rows.floors[i]);
+
+    VectorXd x = random_numbers(rng, n, 2.0), expected = x;
+    const auto report = filter.project(x, passes);
+    REQUIRE((rows.hard.transpose() * x - rows.floors).minCoeff() > -1e-9);
+    const double work = report.energy_after_J - report.energy_before_J - report.recovery_J;
+    REQUIRE(work <= 1e-12 * (1.0 + report.energy_before_J + report.recovery_J));
+
+    // The same by two filters, without floors in the first.
+    auto recovery = first.project(expected, passes).recovery_J;
+    double scale = 1.0;
+    const bool broken = (rows.hard.transpose() * expected - rows.floors).minCoeff() < -1e-9;
+    if (broken) {
+      ++twice;
+      const auto again = second.project(expected, 2 * passes);
+      recovery += again.recovery_J;
+      scale = again.scale;
+    }
+    REQUIRE((x - expected).norm() < 1e-12 * (1.0 + expected.norm()));
+    REQUIRE(report.recovery_J == Approx(recovery));
+    REQUIRE(report.scale == scale);
+  }
+  CHECK(twice > 500);
+}
+
+TEST_CASE("a wall that soft rows push against is kept without scaling the rest of the velocity",
+          "[hybrid][property]") {
+  // The second projection onto a single wall is exact.
+  int twice = 0;
+  for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
+    CAPTURE(seed);
+    Rng rng(seed);
+    constexpr int n = 7, soft = 5;
+    const int passes = 1 + static_cast<int>(rng.below(3));
+    const MatrixXd M = random_mass(rng, n), W = M.inverse();
+    Rows rows = random_rows(rng, n, 1, soft);
+    for (int i = 0; i < soft; ++i) {
+      rows.soft.col(i) = random_numbers(rng, n, 0.2) - rows.hard.col(0);
+      rows.b_soft[i] = rng.uniform(0.5, 3.0);
+    }
+    SafetyFilter filter(n, 16);
+    filter.begin(M, W);
+    rows.add_to(filter);
+    VectorXd x = random_numbers(rng, n, 2.0);
+    const auto report = filter.project(x, passes);
+    twice += report.passes > passes ? 1 : 0;
+    REQUIRE(report.scale == 1.0);
+    REQUIRE(rows.hard.col(0).dot(x) > rows.floors[0] - 1e-9);
+    const double work = report.energy_after_J - report.energy_before_J - report.recovery_J;
+    REQUIRE(work <= 1e-12 * (1.0 + report.energy_before_J + report.recovery_J));
+  }
+  CHECK(twice > 1000);
+
+  const MatrixXd M = MatrixXd::Identity(3, 3);
+  SafetyFilter filter(3, 8);
+  filter.begin(M, M);
+  REQUIRE(filter.add_row(Eigen::Vector3d(1.0, 0.0, 0.0), -0.01, -0.02));
+  REQUIRE(filter.add_row(Eigen::Vector3d(-1.0, 0.0, 0.0), 3.0, 0.0, 0.2));
+  VectorXd x = Eigen::Vector3d(0.0, 0.0, 0.7);
+  (void)filter.project(x, 2);
+  CHECK(x.isApprox(Eigen::Vector3d(-0.01, 0.0, 0.7)));
+}
+
 // ---- braking room
 
 namespace {
