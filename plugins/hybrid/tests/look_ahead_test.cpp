@@ -28,8 +28,7 @@ struct Looks {
   explicit Looks(const test::Task& task, VectorXd at = VectorXd::Zero(4))
       : scene(task),
         law(scene.setup, scene.model, test::law_params),
-        look(scene.setup, scene.model, law, scene.margins, scene.surroundings,
-             scene.planner_host()),
+        look(scene.setup, scene.model, law, scene.margins, scene.planner_host()),
         trail(4, 64),
         own(4),
         q(std::move(at)),
