@@ -64,6 +64,13 @@ TEST_CASE("a trail forgets its newest points, also across the end of its ring", 
   REQUIRE(trail.size() == 4);
   CHECK(trail.point(0) == at(1.0));
   CHECK(trail.point(1)[0] == Approx(0.30));
+
+  trail = straight(12, 8);
+  trail.forget(7);
+  REQUIRE(trail.size() == 1);
+  trail.add(at(1.0));
+  CHECK(trail.point(0) == at(1.0));
+  CHECK(trail.point(1)[0] == Approx(0.20));
 }
 
 TEST_CASE("a copy of a trail has its newest points, and goes on as a trail", "[hybrid]") {

@@ -220,6 +220,7 @@ TEST_CASE("an evasion in force is tried first while it is kept, else after the o
   in_force.act = Act::aside;
   in_force.rows = false;
   in_force.aside = Vector4d(-0.9, 0.0, 0.0, 0.0);
+  looks.v = Vector4d(-0.3, 0.2, -0.1, 0.4);
   REQUIRE(looks.simulated(in_force) >= 0.01);
   looks.begin(in_force, true);
   check_equal(looks.run(), in_force);
