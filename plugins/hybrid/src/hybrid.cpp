@@ -47,7 +47,7 @@ constexpr double steering_fade = 0.5;  // distance from the target below which s
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
 constexpr double path_beyond = 1.0, path_regained = 2.0;
-constexpr int hurried_steps = 6;  // factor of the steps of a search where something moves
+constexpr int hurried_steps = 2;  // factor of the steps of a search where something moves
 // The longest time for which an evasion keeps a stall from counting [s].
 constexpr double longest_wait_s = 6.0;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
