@@ -285,12 +285,22 @@ class Hybrid final : public planning::Planner {
 
   // The way that the arm follows if nothing moves into it.
   [[nodiscard]] Course course() {
-    if (mode_ == Mode::search) return {goal_, nullptr, nullptr, 0.0, 0.0, true};
-    if (mode_ == Mode::via) return {goal_, &memory_.via()};
-    if (mode_ == Mode::escape_path)
-      return {goal_, nullptr, &search_->path(), escape_position_, escape_ahead};
-    if (path_.empty()) return {goal_};
-    return {goal_, nullptr, &path_, path_position_, path_ahead};
+    Course course{goal_};
+    course.goal_number = goal_number_;
+    if (mode_ == Mode::search) {
+      course.waits = true;
+    } else if (mode_ == Mode::via) {
+      course.via = &memory_.via();
+    } else if (mode_ == Mode::escape_path) {
+      course.path = &search_->path();
+      course.position = escape_position_;
+      course.ahead = escape_ahead;
+    } else if (!path_.empty()) {
+      course.path = &path_;
+      course.position = path_position_;
+      course.ahead = path_ahead;
+    }
+    return course;
   }
 
   [[nodiscard]] Evader::Arm arm() const { return {ws_, q_, v_, M_, M_inv_}; }

@@ -20,9 +20,12 @@ struct Course {
   double position = 0.0;                 ///< arc length on the path
   double ahead = 0.0;                    ///< distance of the carrot on the path
   bool waits = false;
+  std::uint64_t goal_number = 0;  ///< as hamelin_tick.goal_number
 
+  /// Whether it leads the same way, from wherever.
   [[nodiscard]] bool operator==(const Course& other) const {
-    return goal == other.goal && via == other.via && path == other.path && waits == other.waits;
+    return goal_number == other.goal_number && via == other.via && path == other.path &&
+           waits == other.waits;
   }
 };
 
