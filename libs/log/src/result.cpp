@@ -74,6 +74,20 @@ Json shield(const Result::Shield& s) {
           {"work_J", s.work_J}};
 }
 
+Json contact_json(const Result::MoverContact& contact) {
+  Json errors = Json::array();
+  for (const auto& error : contact.prediction_errors)
+    errors.push_back({{"ahead_s", error.ahead_s}, {"error_m", error.error_m}});
+  return {{"obstacle", contact.obstacle},
+          {"link", contact.link},
+          {"time_s", contact.time_s},
+          {"arm_speed_m_s", contact.arm_speed_m_s},
+          {"obstacle_speed_m_s", contact.obstacle_speed_m_s},
+          {"closing_speed_m_s", contact.closing_speed_m_s},
+          {"prediction", contact.prediction},
+          {"prediction_errors", std::move(errors)}};
+}
+
 }  // namespace
 
 std::string_view to_string(Outcome outcome) noexcept {
@@ -161,6 +175,7 @@ Json to_json(const Result& r) {
   if (r.position_excess) document["position_excess"] = *r.position_excess;
   if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);
+  if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},
                          {"version", r.plant->version},

@@ -337,7 +337,10 @@ void ClosedLoop::check_outcome() {
                   fmt::format("step {}: the state is no longer finite", node.k));
   count_contacts();
   const bool contact = touching_ || contacts_.count > 0;
-  if (contact && node.k > 0) return finish(log::Outcome::collision, describe_contact());
+  if (contact && node.k > 0) {
+    result_.mover_contact = mover_contact();
+    return finish(log::Outcome::collision, describe_contact());
+  }
   if (contact) return refuse();
   if (done_) return;
   const bool tick = actuation_->asks_planner(node.k);
@@ -382,6 +385,38 @@ void ClosedLoop::count_contacts() {
   ++result_.plant->contacts;
   result_.plant->deepest_m =
       std::min(result_.plant->deepest_m.value_or(contacts_.deepest_m), contacts_.deepest_m);
+}
+
+std::optional<log::Result::MoverContact> ClosedLoop::mover_contact() const {
+  const scene::Contact* const touch = judge_->nearest();
+  // Between two nodes, contact is found where both of them are still apart.
+  constexpr double at_node_m = 1e-3;
+  if (touch == nullptr || touch->distance > at_node_m || touch->obstacle < 0) return std::nullopt;
+  const auto index = static_cast<std::size_t>(touch->obstacle);
+  const scene::Environment& environment = judge_->environment();
+  const scene::Obstacle& obstacle = environment.obstacles()[index];
+  if (!environment.moves(index) && obstacle.appears_s <= 0.0) return std::nullopt;
+  const int link = model_.shapes()[static_cast<std::size_t>(touch->sphere)].link;
+  const dynamics::Workspace& poses = judge_->poses();
+  const double now = plant_->node().time_s;
+  const Eigen::Vector3d arm =
+      dynamics::point_velocity(model_, poses, link, touch->arm_point, plant_->node().v);
+  log::Result::MoverContact out;
+  out.obstacle = obstacle.name;
+  out.link = model_.robot().links[static_cast<std::size_t>(link)].name;
+  out.prediction = scene::to_string(obstacle.prediction);
+  out.time_s = now;
+  out.arm_speed_m_s = arm.norm();
+  out.obstacle_speed_m_s = touch->obstacle_velocity.norm();
+  out.closing_speed_m_s = touch->direction.dot(touch->obstacle_velocity - arm);
+  const Eigen::Vector3d at = scene::motion_at(obstacle, now).pose.p();
+  for (const double ahead : {0.1, 0.3, 1.0}) {
+    if (ahead > now || !scene::exists(obstacle, now - ahead)) continue;
+    const scene::Placed predicted = scene::placed_at(obstacle, {now - ahead, ahead});
+    out.prediction_errors.push_back(
+        {ahead, std::max(0.0, (predicted.pose.p() - at).norm() - predicted.nearer_m)});
+  }
+  return out;
 }
 
 std::string ClosedLoop::describe_contact() const {

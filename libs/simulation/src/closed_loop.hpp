@@ -57,6 +57,9 @@ class ClosedLoop {
   void count_contacts();
   /// Describes the contact at this node, and who counted it if the plant counts, too.
   [[nodiscard]] std::string describe_contact() const;
+  /// Describes the contact with an obstacle that moves or appears; none if it is with something
+  /// else.
+  [[nodiscard]] std::optional<log::Result::MoverContact> mover_contact() const;
   /// Ends a run whose start is in contact.
   void refuse();
   /// Lets the controller look at the arm, as it measures it, and at its goals.

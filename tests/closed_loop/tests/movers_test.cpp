@@ -139,7 +139,16 @@ TEST_CASE("hybrid reaches its goals among obstacles that move, without contact",
     Json hidden = obstacles;
     for (auto& obstacle : hidden)
       if (obstacle["type"] != "frame") obstacle["judge_only"] = true;
-    CHECK(logged_run(scene_with(hidden)).result.outcome == Outcome::collision);
+    const MoversRun blind = logged_run(scene_with(hidden));
+    CHECK(blind.result.outcome == Outcome::collision);
+    REQUIRE(blind.result.mover_contact);
+    const auto& contact = *blind.result.mover_contact;
+    CHECK(contact.time_s == blind.result.time_s);
+    CHECK(contact.closing_speed_m_s > 0.0);
+    CHECK(contact.closing_speed_m_s <= contact.arm_speed_m_s + contact.obstacle_speed_m_s + 1e-12);
+    CHECK(contact.prediction == (name == "turning box" ? "path" : "constant-acceleration"));
+    REQUIRE(!contact.prediction_errors.empty());
+    for (const auto& error : contact.prediction_errors) CHECK(error.error_m >= 0.0);
   }
 }
 

@@ -104,6 +104,21 @@ struct Result {
     std::optional<double> deepest_m;        ///< of the plant's contacts, negative inside
   };
   std::optional<Plant> plant;
+  /// The contact with an obstacle that moves or appears at which the run ended, whether the arm
+  /// moved or stood.
+  struct MoverContact {
+    std::string obstacle, link, prediction;
+    double time_s = 0.0;
+    double arm_speed_m_s = 0.0, obstacle_speed_m_s = 0.0;  ///< of the points that touch
+    double closing_speed_m_s = 0.0;                        ///< along the direction between them
+    /// By how much the obstacle's place at the contact differed from the prediction made
+    /// `ahead_s` before [m]. Empty where the obstacle did not exist then.
+    struct Error {
+      double ahead_s, error_m;
+    };
+    std::vector<Error> prediction_errors;
+  };
+  std::optional<MoverContact> mover_contact;
   std::uint64_t seed = 0;
   std::vector<std::string> warnings;
   // The rest depends on clock and machine.
