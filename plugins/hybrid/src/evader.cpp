@@ -99,10 +99,7 @@ void Evader::add_rows(const Arm& arm, const Eigen::VectorXd& w, SafetyFilter& fi
         shapes, places_[1], MoverRows::margin_m + MoverRows::speed_m_s * ahead,
         [&](const MoverPoint& point) {
           if (movers_.has_passed(point, places_[0][static_cast<std::size_t>(point.mover)])) return;
-          const double radius = shapes.radii[static_cast<std::size_t>(point.shape)];
-          dynamics::point_jacobian_transpose(model_, arm.ws, point.link,
-                                             point.axis_point - radius * point.direction,
-                                             point.direction, row_);
+          row_of(point, model_, arm.ws, shapes, row_);
           double bound = (MoverRows::margin_m - point.distance) / ahead;
           if (const double present = row_.dot(w); present < bound)
             bound = std::min(bound, present + filter.braking_room(row_, w));

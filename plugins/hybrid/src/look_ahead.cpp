@@ -246,10 +246,7 @@ void LookAhead::add_mover_rows(const scene::Shapes& arm) {
     movers_.each_near(arm, then, MoverRows::margin_m + 1.5 * ahead, [&](const MoverPoint& point) {
       const auto m = static_cast<std::size_t>(point.mover);
       if (movers_.has_passed(point, now[m])) return;
-      const double radius = arm.radii[static_cast<std::size_t>(point.shape)];
-      dynamics::point_jacobian_transpose(model_, ws_, point.link,
-                                         point.axis_point - radius * point.direction,
-                                         point.direction, row_);
+      row_of(point, model_, ws_, arm, row_);
       (void)filter_.add_row(row_, (MoverRows::margin_m - point.distance) / ahead, 0.0,
                             MoverRows::softness);
     });

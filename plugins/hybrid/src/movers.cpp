@@ -39,6 +39,13 @@ MoverPlace place_of(const hamelin_obstacle_state& state, double ahead_s) {
 
 }  // namespace
 
+void row_of(const MoverPoint& point, const model::Model& model, const dynamics::Workspace& ws,
+            const scene::Shapes& arm, Eigen::VectorXd& row) {
+  const double radius = arm.radii[static_cast<std::size_t>(point.shape)];
+  dynamics::point_jacobian_transpose(
+      model, ws, point.link, point.axis_point - radius * point.direction, point.direction, row);
+}
+
 Movers::Movers(const planning::Host& host, const model::Model& model)
     : host_(host), states_(max_count) {
   const auto& shapes = model.shapes();

@@ -25,6 +25,11 @@ struct MoverPoint {
   Eigen::Vector3d direction;   ///< unit, from the obstacle to the shape, world
 };
 
+/// Sets row to a = Jᵀ n of the arm's point: the rate at which the arm moves it away from the mover.
+/// ws contains the forward kinematics of `arm`.
+void row_of(const MoverPoint& point, const model::Model& model, const dynamics::Workspace& ws,
+            const scene::Shapes& arm, Eigen::VectorXd& row);
+
 /// The obstacles that move, as the host predicts them. Only the constructor allocates.
 class Movers {
  public:

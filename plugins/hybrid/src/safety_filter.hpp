@@ -22,8 +22,8 @@ class SafetyFilter {
   void begin(const Eigen::MatrixXd& M, const Eigen::MatrixXd& W);
   /// Adds the row a·x ≥ b. If a·x is below `floor` ≤ 0 after the passes, x is scaled towards zero
   /// until a·x equals `floor`: docs/theory.md (10.18). A positive floor is ignored.
-  /// A row with softness κ > 0 gives way: its violation ρλ, with ρ = κ aᵀW a, is paid for by half
-  /// of its work, docs/theory.md (10.32), and it has no floor.
+  /// A row with softness κ > 0 may be violated, by ρ λ with its multiplier λ and ρ = κ aᵀW a:
+  /// docs/theory.md (10.32). It has no floor.
   /// @return false if there are max_rows rows already
   bool add_row(const Eigen::VectorXd& a, double b, double floor, double softness = 0.0);
   /// Sets the bounds lower ≤ x ≤ upper.
