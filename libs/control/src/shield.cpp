@@ -37,11 +37,25 @@ constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,
 constexpr double smallest_m = 1e-9;
 // The share of the torques' rate with which a stop is planned: the rest is for its feedback.
 constexpr double ramp_share = 0.5;
+// The share of the speed limits that the move of an evasion uses.
+constexpr double move_speed_share = 0.8;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
 double smallest_rest_time(const scene::Scene& scene, double period_s) {
   return period_s * (scene.model.torque_limits ? stop_steps : unlimited_stop_steps);
+}
+
+MoveTime::Limits move_limits(const scene::Scene& scene, const ModelledLimits& limits,
+                             const Shield::Drive& drive, double period_s) {
+  MoveTime::Limits out{scene.safety.torque_share * limits.effort_max,
+                       limits.velocity_max,
+                       drive.acceleration_max,
+                       drive.jerk_max,
+                       ramp_share * drive.torque_rate,
+                       unlimited_stop_steps * period_s};
+  if (out.velocity_max.size() > 0) out.velocity_max *= move_speed_share;
+  return out;
 }
 
 StopCause cause_of(const LineCheck::Blocker& blocker) {
@@ -106,12 +120,25 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       arm_from_(model),
       arm_to_(model),
       arm_line_(model),
-      arm_end_(model) {
+      arm_end_(model),
+      lead_s_(sampled_ ? scene.actuation.delay_s : 0.0),
+      move_time_(model, move_limits(scene, limits_, drive, period_s)),
+      move_line_(model, levers_, self),
+      other_line_(model, levers_, self),
+      stop_check_(model, levers_),
+      move_check_(model, levers_),
+      other_check_(model, levers_),
+      force_check_(model, levers_),
+      bounded_check_(model, levers_) {
   const Index n = model.dof();
   set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
   for (auto* x : {&stop_stray_, &line_stray_, &integral_, &zero_, &w_, &reference_q_, &reference_v_,
                   &q_, &v_, &rate_, &hold_, &acceleration_})
     x->setZero(n);
+  aside_ = zero_;
+  asides_.emplace(model, limits_, reserve_.position, scene.seed);
+  predicted_.reserve(MoverCheck::movers_max);
+  bounded_.reserve(MoverCheck::movers_max);
 }
 
 LineCheck::End Shield::place(const VectorXd& q, scene::PlacedShapes& arm) {
@@ -131,6 +158,11 @@ void Shield::notice(const Surroundings& world) {
   step_line_.forget();
   ramp_line_.forget();
   stop_line_.forget();
+  move_line_.forget();
+  other_line_.forget();
+  for (MoverCheck* check :
+       {&stop_check_, &move_check_, &other_check_, &force_check_, &bounded_check_})
+    check->forget();
 }
 
 void Shield::start(const Surroundings& world, const Node& node) {
@@ -186,13 +218,20 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   const Node& to = step.to;
   ++counts_.steps;
   notice(world);
+  const bool movers = list_movers(world, step.from);
   const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
-  if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step)) {
+  if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step) &&
+      (!movers || allow_for_movers(world, step))) {
     take_tried();
+    if (movers) note_proof();
     return true;
   }
   if (!to.q.allFinite() || !to.v.allFinite()) refusal_ = {};
   if (changed_) check_overtaken(world, step.from);
+  if (movers) {
+    go_on_among_movers(world);
+    note_proof();
+  }
   count_refusal();
   return false;
 }
@@ -209,6 +248,7 @@ void Shield::count_refusal() {
   if (!stopping_) {
     ++counts_.stops;
     ++counts_.causes[static_cast<std::size_t>(refusal_.cause)];
+    if (stop_.moves()) ++counts_.evasions;
   }
   stopping_ = true;
   counts_.longest = std::max(counts_.longest, ++run_);
@@ -216,10 +256,15 @@ void Shield::count_refusal() {
 
 void Shield::check_overtaken(const Surroundings& world, const Node& node) {
   changed_ = false;
+  const auto blocked = [&](const LineCheck::End& from, const LineCheck::End& to) {
+    return stop_line_
+        .check(ws_, &world.environment, world.time_s, from, to, {zero_, no_addition_, 0.0})
+        .has_value();
+  };
   const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.end(), arm_end_);
-  if (stop_line_.check(ws_, &world.environment, world.time_s, from, end,
-                       {zero_, no_addition_, 0.0}))
-    ++counts_.overtaken;
+  const bool goes_on = stop_.moves() && stop_time_ < stop_.stop_s();
+  const LineCheck::End turn = goes_on ? place(stop_.stop().end(), arm_line_) : from;
+  if ((goes_on && blocked(from, turn)) || blocked(turn, end)) ++counts_.overtaken;
 }
 
 bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
@@ -244,7 +289,7 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
     };
     const double now = beyond(from);
     const double allowed = now > 0.0 ? std::max(0.3 * reserve, now - 2.0 * straying_.noise()) : 0.0;
-    if (beyond(to) <= allowed && beyond(tried_.line_start()) <= allowed &&
+    if (beyond(to) <= allowed && beyond(tried_.stop().line_start()) <= allowed &&
         beyond(tried_.end()) <= allowed)
       continue;
     refusal_ = {StopCause::joint_limit, {}, static_cast<int>(j)};
@@ -270,10 +315,10 @@ bool Shield::verify(const Surroundings& world, const Step& step) {
   if (!find_stop(step, BrakingRate::usual_utilisation)) return false;
   if (!stop_is_safe(world, step)) {
     // the shortest stop may be safe where a longer one is not
-    const double rate = tried_.braking().rate;
+    const double rate = tried_.stop().braking().rate;
     const Refusal refusal = refusal_;
     const bool shorter = find_stop(step, BrakingRate::full_utilisation) &&
-                         tried_.braking().rate > 1.01 * rate && stop_is_safe(world, step);
+                         tried_.stop().braking().rate > 1.01 * rate && stop_is_safe(world, step);
     if (!shorter) {
       refusal_ = refusal;
       return false;
@@ -287,7 +332,7 @@ bool Shield::verify(const Surroundings& world, const Step& step) {
 }
 
 bool Shield::stop_is_safe(const Surroundings& world, const Step& step) {
-  if (!within_velocity(step.from.v, tried_.line_velocity())) return false;
+  if (!within_velocity(step.from.v, tried_.stop().line_velocity())) return false;
   if (!within_joint_limits(step.from.q, step.to.q)) return false;
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
   levers_.extend_travel(step.to.q, straying_.tracking());
@@ -296,17 +341,17 @@ bool Shield::stop_is_safe(const Surroundings& world, const Step& step) {
 }
 
 bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_to) {
-  const auto [rate, ramp, fade] = tried_.braking();
+  const auto [rate, ramp, fade] = tried_.stop().braking();
   const LineCheck::End at_end = place(tried_.end(), arm_end_);
   // each step of the stop bends by as much as any other, docs/theory.md (12.2)
   line_stray_ = straying_.tracking() +
-                0.25 * period_s_ * period_s_ * rate * tried_.line_velocity().cwiseAbs();
+                0.25 * period_s_ * period_s_ * rate * tried_.stop().line_velocity().cwiseAbs();
   if (ramp == 0.0) return is_clear(stop_line_, world, at_to, at_end, line_stray_);
-  const LineCheck::End at_line = place(tried_.line_start(), arm_line_);
+  const LineCheck::End at_line = place(tried_.stop().line_start(), arm_line_);
   if (!is_clear(stop_line_, world, at_line, at_end, line_stray_)) return false;
-  line_stray_ +=
-      0.125 * ramp * ramp *
-      tried_.acceleration().cwiseAbs().cwiseMax(rate * tried_.line_velocity().cwiseAbs());
+  line_stray_ += 0.125 * ramp * ramp *
+                 tried_.stop().acceleration().cwiseAbs().cwiseMax(
+                     rate * tried_.stop().line_velocity().cwiseAbs());
   return is_clear(ramp_line_, world, at_to, at_line, line_stray_);
 }
 
@@ -352,8 +397,8 @@ bool Shield::find_stop(const Step& step, double least_utilisation) {
     if (rate * (ramp + fade) > 1.9 * whole) rate = 1.9 * whole / (ramp + fade);
     w_ = to.v + 0.5 * ramp * step.acceleration;
   }
-  tried_.set(to.q, to.v, step.acceleration, {rate, ramp, fade});
-  straying_.bound(tried_);
+  tried_.set_stop(to.q, to.v, step.acceleration, {rate, ramp, fade});
+  straying_.bound(tried_.stop());
   return true;
 }
 

@@ -56,35 +56,53 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
         scene.safety.friction_share * joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
   if (has_model_errors() || noise_ > 0.0)
     shapes_ = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
-  tracking_ = errors_ = torque_ = rate_ = bias_ = VectorXd::Zero(n);
+  tracking_ = errors_ = torque_ = bias_ = velocity_ = acceleration_ = VectorXd::Zero(n);
+  before_tracking_ = before_errors_ = tracking_;
+  before_shapes_ = shapes_;
   response_ = jacobian_ = dynamics::Matrix6Xd::Zero(6, n);
   mass_ = mass_inverse_ = Eigen::MatrixXd::Identity(n, n);
   factors_.compute(mass_);  // allocates its memory
 }
 
-// docs/theory.md (14.17)
 void Straying::bound(const StopMotion& stop) {
-  tracking_ = stated_ +
-              0.25 * period_s_ * period_s_ * stop.braking().rate * stop.line_velocity().cwiseAbs();
+  acceleration_ = stop.braking().rate * stop.line_velocity();
+  bound({stop.line_start(), stop.line_velocity(), acceleration_, stop.duration_s(),
+         stop.braking().ramp_s});
+}
+
+void Straying::include_move(const FailSafe& motion) {
+  before_tracking_ = tracking_;
+  before_errors_ = errors_;
+  before_shapes_ = shapes_;
+  const double time_s = motion.move_s();
+  velocity_ = FailSafe::peak_velocity / time_s * motion.way();
+  acceleration_ = FailSafe::peak_acceleration / (time_s * time_s) * motion.way();
+  bound({motion.stop().end(), velocity_, acceleration_, time_s, 0.0});
+  tracking_ = tracking_.cwiseMax(before_tracking_);
+  errors_ = errors_.cwiseMax(before_errors_);
+  shapes_ = shapes_.cwiseMax(before_shapes_);
+}
+
+// docs/theory.md (14.17)
+void Straying::bound(const Effort& effort) {
+  tracking_ = stated_ + 0.25 * period_s_ * period_s_ * effort.acceleration.cwiseAbs();
   errors_.setZero();
   shapes_.setZero();
-  if (has_model_errors()) add_model_errors(stop);
+  if (has_model_errors()) add_model_errors(effort);
   if (noise_ > 0.0) add_noise();
 }
 
 // docs/theory.md (14.19)
-void Straying::add_model_errors(const StopMotion& stop) {
-  const VectorXd& q = stop.line_start();
-  const double time_s = stop.duration_s() + hold_time_s;
-  const double ramp = limits_rate_ ? stop.braking().ramp_s : 0.0;
+void Straying::add_model_errors(const Effort& effort) {
+  const double time_s = effort.duration_s + hold_time_s;
+  const double ramp = limits_rate_ ? effort.ramp_s : 0.0;
   const double compliance =
       std::min(compliance_s2_ + ramp_compliance * ramp * ramp, 0.5 * time_s * time_s);
-  invert_mass(q);
-  rate_ = stop.braking().rate * stop.line_velocity();
-  torque_.noalias() = mass_ * rate_;
-  dynamics::bias_torque(model_, ws_, q, stop.line_velocity(), bias_);
+  invert_mass(effort.q);
+  torque_.noalias() = mass_ * effort.acceleration;
+  dynamics::bias_torque(model_, ws_, effort.q, effort.velocity, bias_);
   torque_ = mass_error_ * (torque_.cwiseAbs() + bias_.cwiseAbs()) + friction_;
-  bound_shapes(q, compliance);
+  bound_shapes(effort.q, compliance);
   for (Index j = 0; j < torque_.size(); ++j)
     errors_[j] = compliance * mass_inverse_.col(j).cwiseAbs().dot(torque_);
 }

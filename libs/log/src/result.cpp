@@ -61,17 +61,22 @@ Json timing(const Result& r) {
 Json shield(const Result::Shield& s) {
   Json causes = Json::object();
   for (const auto& [cause, count] : s.causes) causes[cause] = count;
-  return {{"margin_m", s.margin_m},
-          {"steps", s.steps},
-          {"refused", s.refused},
-          {"refused_at_rest", s.refused_at_rest},
-          {"stops", s.stops},
-          {"longest_stop_steps", s.longest_stop_steps},
-          {"causes", std::move(causes)},
-          {"strayed_rad", s.strayed_rad},
-          {"strayed_share", s.strayed_share},
-          {"overtaken", s.overtaken},
-          {"work_J", s.work_J}};
+  Json out{{"margin_m", s.margin_m},
+           {"steps", s.steps},
+           {"refused", s.refused},
+           {"refused_at_rest", s.refused_at_rest},
+           {"stops", s.stops},
+           {"longest_stop_steps", s.longest_stop_steps},
+           {"causes", std::move(causes)},
+           {"strayed_rad", s.strayed_rad},
+           {"strayed_share", s.strayed_share},
+           {"overtaken", s.overtaken},
+           {"work_J", s.work_J}};
+  if (!s.movers) return out;
+  out["evasions"] = s.evasions;
+  out["movers"] = *s.movers;
+  for (const auto& [proof, count] : s.mover_steps) out["mover_steps"][proof] = count;
+  return out;
 }
 
 Json contact_json(const Result::MoverContact& contact) {

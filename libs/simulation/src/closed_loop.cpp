@@ -81,6 +81,12 @@ log::Result::Shield shield_figures(const control::Shield& shield, double work_J)
   out.strayed_share = counts.strayed_share;
   out.overtaken = counts.overtaken;
   out.work_J = work_J;
+  out.evasions = counts.evasions;
+  for (std::size_t i = 0; i < counts.proofs.size(); ++i) {
+    if (counts.proofs[i] == 0) continue;
+    out.movers = to_string(static_cast<control::MoverProof>(i));
+    out.mover_steps.emplace_back(*out.movers, counts.proofs[i]);
+  }
   return out;
 }
 

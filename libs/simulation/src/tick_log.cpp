@@ -58,9 +58,11 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   if (answer != nullptr)
     for (const double value : answer->series())
       fields["series"].push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
-  if (shield_ != nullptr && acts && shield_->stopping())
+  if (shield_ != nullptr && acts && shield_->stopping()) {
     fields["stop"] = {{"cause", to_string(shield_->refusal().cause)},
                       {"q_end", to_json(shield_->stop().end())}};
+    if (shield_->stop().moves()) fields["stop"]["evades"] = true;
+  }
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_.has_self()) fields["self_clearance_m"] = world_.self_clearance_m();
   if (world_.has_obstacles()) {

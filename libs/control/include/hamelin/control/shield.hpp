@@ -8,12 +8,16 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "hamelin/control/asides.hpp"
 #include "hamelin/control/braking_rate.hpp"
+#include "hamelin/control/fail_safe.hpp"
 #include "hamelin/control/levers.hpp"
 #include "hamelin/control/line_check.hpp"
+#include "hamelin/control/move_time.hpp"
+#include "hamelin/control/mover_check.hpp"
 #include "hamelin/control/planner_setup.hpp"
-#include "hamelin/control/stop_motion.hpp"
 #include "hamelin/control/straying.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
@@ -38,13 +42,22 @@ enum class StopCause : std::int32_t {
 inline constexpr std::size_t stop_causes = 8;
 [[nodiscard]] std::string_view to_string(StopCause cause) noexcept;
 
+/// What is proved of the obstacles that move, if the arm falls back on its fail-safe motion.
+/// clear: it stays clear of them for MoverCheck::horizon_s, as they are predicted. at_rest: of
+/// those of which only the speed is bounded, none touches the arm before it rests, or while it
+/// comes nearer to them. none: neither.
+enum class MoverProof : std::int32_t { clear, at_rest, none };
+inline constexpr std::size_t mover_proofs = 3;
+[[nodiscard]] std::string_view to_string(MoverProof proof) noexcept;
+
 /// Lets a step of the arm pass only if a verified way to stop exists after it: chapter 14 of
 /// docs/theory.md. Verified means that the arm stays clear of all that stands still and of itself,
 /// within its joint limits and within a share of its torque limits, until it rests, by margins that
 /// cover the errors that the scene states. If a step is refused, the last verified stop goes on
-/// instead; it ends with the first step that is accepted. Obstacles that move are not considered,
-/// because a stop is no safe answer to them. One object per thread; no allocation after
-/// construction.
+/// instead; it ends with the first step that is accepted. Where a moving obstacle would hit the
+/// arm, the stop is part of an evasion, see FailSafe. A step without one is refused only while the
+/// fail-safe motion in force stays clear itself: an arm that will be hit wherever it goes is left
+/// to its planner. One object per thread; no allocation after construction.
 class Shield {
  public:
   /// A configuration and a velocity.
@@ -76,6 +89,9 @@ class Shield {
     int strayed_joint = -1;      ///< whose share that is
     /// Stops that went on although the world had changed so that they are not clear any more.
     long overtaken = 0;
+    /// Steps with moving obstacles in reach, by what is proved after them.
+    std::array<long, mover_proofs> proofs{};
+    long evasions = 0;  ///< of the stops, those that were followed by a move when they began
   };
 
   /// What bounds the changes of the arm's motion.
@@ -131,8 +147,10 @@ class Shield {
   [[nodiscard]] bool stop_began() const noexcept { return stopping_ && run_ == 1; }
   [[nodiscard]] const Refusal& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
-  /// The motion by which the arm stops if the next step is refused.
-  [[nodiscard]] const StopMotion& stop() const noexcept { return stop_; }
+  /// The motion that goes on if the next step is refused.
+  [[nodiscard]] const FailSafe& stop() const noexcept { return stop_; }
+  /// What is proved of moving obstacles after the last step; none given if there are none in reach.
+  [[nodiscard]] std::optional<MoverProof> mover_proof() const noexcept { return proof_; }
   /// The largest margin of any shape that any stop required [m].
   [[nodiscard]] double largest_margin_m() const { return largest_margin_ + margin_m_; }
   /// Describes what was in the way: "link 'hand' would come too near the map".
@@ -168,6 +186,38 @@ class Shield {
   void begin_again(const Node& node, const Eigen::VectorXd& disturbance,
                    const Eigen::VectorXd& last);
   [[nodiscard]] bool stop_is_clear(const Surroundings& world, const LineCheck::End& at_to);
+  // Of obstacles that move, in shield_movers.cpp.
+  /// Lists those that could touch the arm within the horizon. @return whether there are any
+  [[nodiscard]] bool list_movers(const Surroundings& world, const Node& node);
+  /// Whether the step may be made; sets proof_, and what tried_ does after the stop.
+  [[nodiscard]] bool allow_for_movers(const Surroundings& world, const Step& step);
+  /// What is known of a motion among moving obstacles.
+  struct Foresight {
+    MoverProof proof;
+    double clear_s;  ///< so long it stays clear of those that are predicted
+    double least_m;  ///< lower bound of its distance from them
+  };
+  /// Of the motion in force; sets proof_.
+  Foresight prove_stop_in_force(const Surroundings& world);
+  void note_proof();
+  /// Sets refusal_ to the obstacle that comes nearest.
+  void blame(const Surroundings& world);
+  /// @param lead_s time from now to that from which on the motion is examined
+  [[nodiscard]] Foresight prove(MoverCheck& check, const Surroundings& world,
+                                const FailSafe& motion, double from_s, double lead_s);
+  [[nodiscard]] Foresight find_fail_safe(const Surroundings& world, const Step& step);
+  /// Adds a move to tried_, one of those that come into question, if it is clear.
+  /// @param stopped the check of the stop alone @param from_s where the arm is on it
+  /// @param ahead velocity of the arm
+  [[nodiscard]] Foresight find_evasion(const Surroundings& world, MoverCheck& stopped,
+                                       double from_s, const Eigen::VectorXd& ahead);
+  /// Sets proof_ while a step is refused. An arm that will be hit where it stops evades.
+  void go_on_among_movers(const Surroundings& world);
+  [[nodiscard]] Foresight try_move(LineCheck& line, MoverCheck& check, const Surroundings& world,
+                                   double from_s, const Eigen::VectorXd& target);
+  [[nodiscard]] bool keeps_limits(const Eigen::VectorXd& q) const;
+  [[nodiscard]] bool line_is_clear(LineCheck& line, const Surroundings& world,
+                                   const LineCheck::End& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,
@@ -198,7 +248,7 @@ class Shield {
   LineCheck step_line_, ramp_line_, stop_line_;
   BrakingRate braking_;
   dynamics::Workspace ws_;
-  StopMotion stop_, tried_;
+  FailSafe stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
   Eigen::VectorXd stop_stray_;   ///< by how much joints may stray from stop_ [rad or m]
   Eigen::VectorXd integral_;     ///< of the deviation from stop_, times ω [rad or m]
@@ -215,6 +265,19 @@ class Shield {
   long run_ = 0;
   Refusal refusal_;
   Counts counts_;
+
+  // of obstacles that move
+  double lead_s_;  ///< time from a measurement to the step that is tried
+  MoveTime move_time_;
+  LineCheck move_line_, other_line_;
+  MoverCheck stop_check_, move_check_, other_check_, force_check_;
+  MoverCheck bounded_check_;  ///< of obstacles with bounded speed
+  std::optional<Asides> asides_;
+  std::vector<int> predicted_, bounded_;  ///< in reach, indices of obstacles
+  bool all_listed_ = true;
+  Eigen::VectorXd aside_;  ///< where the evasion that was found last leads
+  bool has_aside_ = false;
+  std::optional<MoverProof> proof_;
 };
 
 }  // namespace hamelin::control

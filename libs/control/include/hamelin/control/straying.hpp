@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "hamelin/control/fail_safe.hpp"
 #include "hamelin/control/levers.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/stop_motion.hpp"
@@ -24,6 +25,8 @@ class Straying {
 
   /// Sets the bounds for a stop.
   void bound(const StopMotion& stop);
+  /// Raises them, where need be, to those of the move of a FailSafe after its stop.
+  void include_move(const FailSafe& motion);
   /// What the motion itself causes, of each joint [rad or m].
   [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return tracking_; }
   /// What errors of the model and noise cause in addition, of each joint [rad or m].
@@ -46,7 +49,13 @@ class Straying {
   [[nodiscard]] bool has_model_errors() const {
     return mass_error_ > 0.0 || !friction_.isZero(0.0);
   }
-  void add_model_errors(const StopMotion& stop);
+  /// A motion whose errors are bounded: where, how fast and for how long the arm moves.
+  struct Effort {
+    const Eigen::VectorXd &q, &velocity, &acceleration;
+    double duration_s, ramp_s;
+  };
+  void bound(const Effort& effort);
+  void add_model_errors(const Effort& effort);
   void add_noise();
   /// Sets mass_ and mass_inverse_.
   void invert_mass(const Eigen::VectorXd& q);
@@ -64,9 +73,10 @@ class Straying {
   double velocity_error_s_;  ///< of a velocity per unexplained acceleration
   Eigen::VectorXd stated_;   ///< safety.tracking_rad
   Eigen::VectorXd tracking_, errors_, shapes_;
+  Eigen::VectorXd before_tracking_, before_errors_, before_shapes_, velocity_, acceleration_;
   Eigen::MatrixXd mass_, mass_inverse_;
   Eigen::LLT<Eigen::MatrixXd> factors_;
-  Eigen::VectorXd torque_, rate_, bias_;
+  Eigen::VectorXd torque_, bias_;
   dynamics::Matrix6Xd jacobian_, response_;  ///< response: acceleration of a link per torque
   dynamics::Workspace ws_;
 };

@@ -94,7 +94,12 @@ struct Result {
     double strayed_rad = 0.0;    ///< largest deviation of a joint from a stop's motion [rad or m]
     double strayed_share = 0.0;  ///< the same as a share of the bound; above 1 it was exceeded
     long overtaken = 0;          ///< stops that are not clear any more since the world changed
-    double work_J = 0.0;         ///< of the torques of stops
+    long evasions = 0;           ///< stops that lead out of a moving obstacle's way
+    /// Number of steps with moving obstacles in reach by what was proved after them, and the
+    /// weakest of all; empty if there were none.
+    std::vector<std::pair<std::string, long>> mover_steps;
+    std::optional<std::string> movers;
+    double work_J = 0.0;  ///< of the torques of stops
   };
   std::optional<Shield> shield;
   /// A plant other than hamelin's own, with the contacts that it and the judge counted.
