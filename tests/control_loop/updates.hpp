@@ -17,8 +17,9 @@ namespace hamelin::test {
 /// A configuration within the limits of the joints.
 [[nodiscard]] Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot);
 
-/// Two threads that change the world, the goals and the parameters of a controller at random, until
-/// it is destroyed. Some of the changes are bad and must be refused.
+/// Three threads that change the world, the goals and the parameters of a controller at random and
+/// stream poses of two obstacles, until it is destroyed. Some of the changes are bad and must be
+/// refused.
 class Updates {
  public:
   /// What the threads tell about the changes that they made; called by these threads.
@@ -28,7 +29,7 @@ class Updates {
     std::function<void(const Json& params)> before_params;  ///< before the call that sets them
   };
   struct Counts {
-    std::atomic<long> obstacles{0}, maps{0}, goals{0}, params{0}, refused{0};
+    std::atomic<long> obstacles{0}, observations{0}, maps{0}, goals{0}, params{0}, refused{0};
     /// Changes that were refused although they are good, or made although they are bad.
     std::atomic<long> wrong{0};
   };
@@ -50,6 +51,8 @@ class Updates {
 
  private:
   void change_obstacles(std::uint64_t seed);
+  void observe_obstacles(std::uint64_t seed);
+  void observe_wrongly(Rng& rng, const std::string& name, double last_s);
   void change_rest(std::uint64_t seed);
   void set_goals(Rng& rng);
   void set_params(Rng& rng);
@@ -68,7 +71,7 @@ class Updates {
   Record record_;
   Counts counts_;
   std::atomic<bool> stop_{false};
-  std::thread obstacles_, rest_;
+  std::thread obstacles_, observations_, rest_;
 };
 
 }  // namespace hamelin::test
