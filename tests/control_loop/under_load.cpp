@@ -349,7 +349,7 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
   Checker checker(scene, controller.world().influence_m(), reporting);
   std::atomic<double> now_s{0.0};
   Follower follower(samples, history, checker);
-  test::Updates updates(controller, scene, now_s, param, seed, recorder(history, param.name));
+  test::Updates updates(controller, scene, now_s, param, seed, recorder(history, param.name), 2);
   const Totals totals = run(controller, scene, ticks, now_s, samples);
   updates.stop();
   const std::size_t unrecorded = follower.finish();

@@ -16,8 +16,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr std::size_t names = 12;    // of obstacles
-constexpr std::size_t streamed = 2;  // further obstacles, whose poses are streamed
+constexpr std::size_t names = 12;  // of obstacles that are not streamed
 constexpr double streamed_speed_max_m_s = 0.5;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -69,14 +68,16 @@ Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot) {
 }
 
 Updates::Updates(control::Controller& controller, const scene::Scene& scene,
-                 const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record)
+                 const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record,
+                 std::size_t streams)
     : controller_(controller),
       scene_(scene),
       robot_(control::load_model(scene).robot()),
       now_s_(now_s),
       param_(std::move(param)),
-      record_(std::move(record)) {
-  for (std::size_t i = 0; i < streamed; ++i) {
+      record_(std::move(record)),
+      streams_(streams) {
+  for (std::size_t i = 0; i < streams_; ++i) {
     Rng rng(seed + i);
     scene::Obstacle obstacle = random_obstacle(rng, streamed_name(i));
     obstacle.pose = streamed_pose(i, 0.0);
@@ -85,7 +86,7 @@ Updates::Updates(control::Controller& controller, const scene::Scene& scene,
     change_world(true, counts_.obstacles, [&] { controller_.world().set_obstacle(obstacle); });
   }
   obstacles_ = std::thread([this, seed] { change_obstacles(2 * seed); });
-  observations_ = std::thread([this, seed] { observe_obstacles(seed); });
+  if (streams_ > 0) observations_ = std::thread([this, seed] { observe_obstacles(seed); });
   rest_ = std::thread([this, seed] { change_rest(2 * seed + 1); });
 }
 
@@ -124,7 +125,7 @@ void Updates::change_obstacles(std::uint64_t seed) {
     const bool there = present.contains(name);
     const std::uint64_t choice = rng.below(16);
     if (choice < 8) {
-      const bool room = there || present.size() + streamed < world.obstacles_max();
+      const bool room = there || present.size() + streams_ < world.obstacles_max();
       change_world(room, counts_.obstacles,
                    [&] { world.set_obstacle(random_obstacle(rng, name)); });
       if (room) present.insert(name);
@@ -147,10 +148,9 @@ void Updates::change_obstacles(std::uint64_t seed) {
 
 void Updates::observe_obstacles(std::uint64_t seed) {
   Rng rng(seed);
-  std::array<double, streamed> last_s;
-  last_s.fill(-1.0);
+  std::vector<double> last_s(streams_, -1.0);
   while (!stop_) {
-    const std::size_t i = rng.below(streamed);
+    const std::size_t i = rng.below(streams_);
     if (rng.below(4) == 0 && last_s[i] >= 0.0) {
       observe_wrongly(rng, streamed_name(i), last_s[i]);
     } else if (const double time_s = now_s_ - 0.02; time_s > last_s[i]) {  // it arrives late

@@ -17,9 +17,9 @@ namespace hamelin::test {
 /// A configuration within the limits of the joints.
 [[nodiscard]] Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot);
 
-/// Three threads that change the world, the goals and the parameters of a controller at random and
-/// stream poses of two obstacles, until it is destroyed. Some of the changes are bad and must be
-/// refused.
+/// Two threads that change the world, the goals and the parameters of a controller at random, and a
+/// third one that streams poses of obstacles, until it is destroyed. Some of the changes are bad
+/// and must be refused.
 class Updates {
  public:
   /// What the threads tell about the changes that they made; called by these threads.
@@ -40,8 +40,10 @@ class Updates {
     double low, high;
   };
   /// @param now_s time of the controller's last tick, for obstacles that move
+  /// @param streams how many further obstacles are streamed; 0: there is no third thread
   Updates(control::Controller& controller, const scene::Scene& scene,
-          const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record = {});
+          const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record = {},
+          std::size_t streams = 0);
   Updates(const Updates&) = delete;
   Updates& operator=(const Updates&) = delete;
   ~Updates() { stop(); }
@@ -69,6 +71,7 @@ class Updates {
   const std::atomic<double>& now_s_;
   Param param_;
   Record record_;
+  std::size_t streams_;
   Counts counts_;
   std::atomic<bool> stop_{false};
   std::thread obstacles_, observations_, rest_;
