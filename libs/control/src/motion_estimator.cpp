@@ -24,10 +24,10 @@ Matrix3d transition(double T) {
   return (Matrix3d() << 1.0, T, 0.5 * T * T, 0.0, 1.0, T, 0.0, 0.0, 1.0).finished();
 }
 
-Matrix3d process_noise(double T) {
-  const double T2 = T * T, T3 = T2 * T, T4 = T3 * T, T5 = T4 * T;
-  return (Matrix3d() << T5 / 20.0, T4 / 8.0, T3 / 6.0, T4 / 8.0, T3 / 3.0, T2 / 2.0, T3 / 6.0,
-          T2 / 2.0, T)
+Matrix3d process_noise(double t) {
+  const double t2 = t * t, t3 = t2 * t, t4 = t3 * t, t5 = t4 * t;
+  return (Matrix3d() << t5 / 20.0, t4 / 8.0, t3 / 6.0, t4 / 8.0, t3 / 3.0, t2 / 2.0, t3 / 6.0,
+          t2 / 2.0, t)
       .finished();
 }
 
@@ -57,7 +57,7 @@ JerkFilter::JerkFilter(double noise, double jerk)
 Vector3d JerkFilter::advance(double elapsed_s) {
   const Matrix3d F = transition(elapsed_s);
   const Matrix3d P = F * covariance_ * F.transpose() + density_ * process_noise(elapsed_s);
-  const Vector3d gains = P.col(0) / (P(0, 0) + variance_);
+  Vector3d gains = P.col(0) / (P(0, 0) + variance_);
   // Symmetric up to rounding, which must not build up over a long stream.
   const Matrix3d left = P - gains * P.row(0);
   covariance_ = 0.5 * (left + left.transpose());
