@@ -1,4 +1,5 @@
-// Ticks a controller while two other threads change its world, goals and parameters at random.
+// Ticks a controller while three other threads change its world, goals and parameters at random and
+// stream poses of obstacles.
 // Counts what the ticks allocate and lock, and computes a sample of the answers again with other
 // calls, from the snapshot and the goals that the answer names.
 //
@@ -31,6 +32,7 @@ using SnapshotPointer = std::shared_ptr<const control::WorldSnapshot>;
 constexpr long samples_per_run = 5000;
 constexpr std::size_t checked_min = 1000;
 constexpr std::uint64_t snapshots_min = 100, goals_min = 20;
+constexpr long observations_min = 100;
 constexpr std::size_t series_count = 5;  // of the planner `reporting`
 
 /// What the controller answered in one tick.
@@ -315,7 +317,7 @@ int judge(const Totals& totals, const Checker& checker, const test::Updates::Cou
     if (!history.params.contains(gain)) return fail("the planner used a gain that nobody set");
   if (totals.snapshots < snapshots_min || totals.goals < goals_min ||
       checker.checked() < checked_min || checker.distinguished() == 0 || checker.advanced() == 0 ||
-      counts.params < 2 || counts.refused == 0)
+      counts.params < 2 || counts.observations < observations_min || counts.refused == 0)
     return fail("too few updates were made for a verdict");
   return 0;
 }
@@ -347,7 +349,7 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
   Checker checker(scene, controller.world().influence_m(), reporting);
   std::atomic<double> now_s{0.0};
   Follower follower(samples, history, checker);
-  test::Updates updates(controller, scene, now_s, param, seed, recorder(history, param.name));
+  test::Updates updates(controller, scene, now_s, param, seed, recorder(history, param.name), 2);
   const Totals totals = run(controller, scene, ticks, now_s, samples);
   updates.stop();
   const std::size_t unrecorded = follower.finish();
@@ -355,9 +357,12 @@ int under_load(long ticks, std::uint64_t seed, const std::string& planner) {
   const auto& counts = updates.counts();
   fmt::print("{} ticks saw {} snapshots and {} lists of goals\n", totals.ticks, totals.snapshots,
              totals.goals);
-  fmt::print("updates: {} of obstacles, {} of the map, {} of goals, {} of parameters; {} refused\n",
-             counts.obstacles.load(), counts.maps.load(), counts.goals.load(), counts.params.load(),
-             counts.refused.load());
+  fmt::print(
+      "updates: {} of obstacles, {} poses of streams, {} of the map, {} of goals, {} of "
+      "parameters; "
+      "{} refused\n",
+      counts.obstacles.load(), counts.observations.load(), counts.maps.load(), counts.goals.load(),
+      counts.params.load(), counts.refused.load());
   fmt::print(
       "{} answers computed again, of which {} would differ with the next recorded snapshot; "
       "{} left out\n",

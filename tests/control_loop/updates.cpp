@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <utility>
@@ -15,7 +16,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr std::size_t names = 12;  // of obstacles
+constexpr std::size_t names = 12;  // of obstacles that are not streamed
+constexpr double streamed_speed_max_m_s = 0.5;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // A place that the arm can reach, or nearly so.
@@ -26,6 +28,17 @@ Vector3d random_place(Rng& rng) {
 geometry::SE3 random_pose(Rng& rng) {
   Eigen::Vector4d wxyz(rng.normal(), rng.normal(), rng.normal(), rng.normal());
   return {geometry::rotation_from_wxyz(wxyz.normalized()), random_place(rng)};
+}
+
+std::string streamed_name(std::size_t i) {
+  return "hand " + std::to_string(i);
+}
+
+// Where a streamed obstacle is, slower than its bound.
+geometry::SE3 streamed_pose(std::size_t i, double time_s) {
+  const double phase = static_cast<double>(i) + time_s;
+  return {Eigen::Matrix3d::Identity(),
+          {0.5 + 0.1 * std::sin(3.0 * phase), 0.4 * std::cos(phase), 0.6}};
 }
 
 void pause(Rng& rng, double longest_s) {
@@ -55,19 +68,32 @@ Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot) {
 }
 
 Updates::Updates(control::Controller& controller, const scene::Scene& scene,
-                 const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record)
+                 const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record,
+                 std::size_t streams)
     : controller_(controller),
       scene_(scene),
       robot_(control::load_model(scene).robot()),
       now_s_(now_s),
       param_(std::move(param)),
       record_(std::move(record)),
-      obstacles_([this, seed] { change_obstacles(2 * seed); }),
-      rest_([this, seed] { change_rest(2 * seed + 1); }) {}
+      streams_(streams) {
+  for (std::size_t i = 0; i < streams_; ++i) {
+    Rng rng(seed + i);
+    scene::Obstacle obstacle = random_obstacle(rng, streamed_name(i));
+    obstacle.pose = streamed_pose(i, 0.0);
+    obstacle.speed_max_m_s = streamed_speed_max_m_s;
+    if (i == 1) obstacle.prediction = scene::Prediction::speed_bound;
+    change_world(true, counts_.obstacles, [&] { controller_.world().set_obstacle(obstacle); });
+  }
+  obstacles_ = std::thread([this, seed] { change_obstacles(2 * seed); });
+  if (streams_ > 0) observations_ = std::thread([this, seed] { observe_obstacles(seed); });
+  rest_ = std::thread([this, seed] { change_rest(2 * seed + 1); });
+}
 
 void Updates::stop() {
   stop_ = true;
   if (obstacles_.joinable()) obstacles_.join();
+  if (observations_.joinable()) observations_.join();
   if (rest_.joinable()) rest_.join();
 }
 
@@ -99,7 +125,7 @@ void Updates::change_obstacles(std::uint64_t seed) {
     const bool there = present.contains(name);
     const std::uint64_t choice = rng.below(16);
     if (choice < 8) {
-      const bool room = there || present.size() < world.obstacles_max();
+      const bool room = there || present.size() + streams_ < world.obstacles_max();
       change_world(room, counts_.obstacles,
                    [&] { world.set_obstacle(random_obstacle(rng, name)); });
       if (room) present.insert(name);
@@ -118,6 +144,37 @@ void Updates::change_obstacles(std::uint64_t seed) {
     }
     pause(rng, 1e-4);
   }
+}
+
+void Updates::observe_obstacles(std::uint64_t seed) {
+  Rng rng(seed);
+  std::vector<double> last_s(streams_, -1.0);
+  while (!stop_) {
+    const std::size_t i = rng.below(streams_);
+    if (rng.below(4) == 0 && last_s[i] >= 0.0) {
+      observe_wrongly(rng, streamed_name(i), last_s[i]);
+    } else if (const double time_s = now_s_ - 0.02; time_s > last_s[i]) {  // it arrives late
+      control::Observation seen{time_s, streamed_pose(i, time_s)};
+      if (i == 0 && rng.below(2) == 0) seen.velocity_m_s = Vector3d(0.0, 0.1, 0.0);
+      change_world(true, counts_.observations,
+                   [&] { controller_.world().observe_obstacle(streamed_name(i), seen); });
+      last_s[i] = time_s;
+    }
+    pause(rng, 1e-4);
+  }
+}
+
+// Times that repeat or fall, a pose that is not finite, a jump, or an unknown name.
+void Updates::observe_wrongly(Rng& rng, const std::string& name, double last_s) {
+  control::Observation seen{last_s + 1e-3, {Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.6}}};
+  const std::uint64_t choice = rng.below(5);
+  if (choice == 0) seen.time_s = last_s;
+  if (choice == 1) seen.time_s = last_s - rng.uniform();
+  if (choice == 2) seen.pose = {Eigen::Matrix3d::Identity(), {0.0, nan, 0.0}};
+  if (choice == 3) seen.pose = {Eigen::Matrix3d::Identity(), {5.0, 0.0, 0.0}};
+  change_world(false, counts_.observations, [&] {
+    controller_.world().observe_obstacle(choice == 4 ? "nobody's hand" : name, seen);
+  });
 }
 
 void Updates::change_rest(std::uint64_t seed) {

@@ -17,8 +17,9 @@ namespace hamelin::test {
 /// A configuration within the limits of the joints.
 [[nodiscard]] Eigen::VectorXd random_joints(Rng& rng, const model::Robot& robot);
 
-/// Two threads that change the world, the goals and the parameters of a controller at random, until
-/// it is destroyed. Some of the changes are bad and must be refused.
+/// Two threads that change the world, the goals and the parameters of a controller at random, and a
+/// third one that streams poses of obstacles, until it is destroyed. Some of the changes are bad
+/// and must be refused.
 class Updates {
  public:
   /// What the threads tell about the changes that they made; called by these threads.
@@ -28,7 +29,7 @@ class Updates {
     std::function<void(const Json& params)> before_params;  ///< before the call that sets them
   };
   struct Counts {
-    std::atomic<long> obstacles{0}, maps{0}, goals{0}, params{0}, refused{0};
+    std::atomic<long> obstacles{0}, observations{0}, maps{0}, goals{0}, params{0}, refused{0};
     /// Changes that were refused although they are good, or made although they are bad.
     std::atomic<long> wrong{0};
   };
@@ -39,8 +40,10 @@ class Updates {
     double low, high;
   };
   /// @param now_s time of the controller's last tick, for obstacles that move
+  /// @param streams how many further obstacles are streamed; 0: there is no third thread
   Updates(control::Controller& controller, const scene::Scene& scene,
-          const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record = {});
+          const std::atomic<double>& now_s, Param param, std::uint64_t seed, Record record = {},
+          std::size_t streams = 0);
   Updates(const Updates&) = delete;
   Updates& operator=(const Updates&) = delete;
   ~Updates() { stop(); }
@@ -50,6 +53,8 @@ class Updates {
 
  private:
   void change_obstacles(std::uint64_t seed);
+  void observe_obstacles(std::uint64_t seed);
+  void observe_wrongly(Rng& rng, const std::string& name, double last_s);
   void change_rest(std::uint64_t seed);
   void set_goals(Rng& rng);
   void set_params(Rng& rng);
@@ -66,9 +71,10 @@ class Updates {
   const std::atomic<double>& now_s_;
   Param param_;
   Record record_;
+  std::size_t streams_;
   Counts counts_;
   std::atomic<bool> stop_{false};
-  std::thread obstacles_, rest_;
+  std::thread obstacles_, observations_, rest_;
 };
 
 }  // namespace hamelin::test

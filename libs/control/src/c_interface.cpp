@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <string>
 
 #include "hamelin/control/controller.hpp"
@@ -61,9 +63,59 @@ const T* required(const T* pointer, const char* what) {
   return pointer;
 }
 
+// A struct of a caller that may be built against an earlier header, whose struct was shorter, with
+// zeros for what it lacks. `size` is that of the first header.
+template <class T>
+T complete(const T* given, std::size_t size, const char* what) {
+  if (given == nullptr || given->struct_size < size)
+    throw Error(ErrorCode::usage, fmt::format("{}: is null or its struct_size is too small", what));
+  T full{};
+  std::memcpy(&full, given, std::min<std::size_t>(given->struct_size, sizeof full));
+  return full;
+}
+
+std::optional<Eigen::Vector3d> optional_vector(const double* numbers) {
+  if (numbers == nullptr) return std::nullopt;
+  return Eigen::Map<const Eigen::Vector3d>(numbers);
+}
+
+control::ObservationOptions observations_of(const hamelin_controller_options& given) {
+  control::ObservationOptions out;
+  if (given.observation_noise_m != 0.0) out.noise_m = given.observation_noise_m;
+  if (given.observation_jerk_m_s3 != 0.0) out.jerk_m_s3 = given.observation_jerk_m_s3;
+  if (given.observation_timeout_s != 0.0) out.timeout_s = given.observation_timeout_s;
+  return out;
+}
+
 geometry::SE3 pose_of(const double* position, const double* wxyz) {
   return {geometry::rotation_from_wxyz(Eigen::Map<const Eigen::Vector4d>(wxyz)),
           Eigen::Map<const Eigen::Vector3d>(position)};
+}
+
+scene::Obstacle obstacle_of(const hamelin_obstacle& given) {
+  scene::Obstacle out;
+  out.name = required(given.name, "obstacle: name");
+  const auto choose = [&](const auto& values, std::int32_t index, const char* what) {
+    if (index < 0 || static_cast<std::size_t>(index) >= values.size())
+      throw Error(ErrorCode::invalid, fmt::format("obstacle '{}': its {}", out.name, what));
+    return values[static_cast<std::size_t>(index)];
+  };
+  constexpr std::array shapes{scene::Shape::sphere, scene::Shape::box, scene::Shape::cylinder,
+                              scene::Shape::capsule};
+  constexpr std::array predictions{scene::Prediction::constant_acceleration,
+                                   scene::Prediction::constant_velocity,
+                                   scene::Prediction::speed_bound};
+  out.shape =
+      choose(shapes, given.shape, "shape is unknown, expected a sphere, box, cylinder or capsule");
+  out.radius_m = given.radius_m;
+  out.length_m = given.length_m;
+  out.size_m = Eigen::Map<const Eigen::Vector3d>(given.size_m);
+  out.pose = pose_of(given.position_m, given.quaternion_wxyz);
+  out.prediction = choose(predictions, given.prediction,
+                          "prediction is unknown, expected a constant acceleration, a constant "
+                          "velocity or a speed bound");
+  out.speed_max_m_s = given.speed_max_m_s;
+  return out;
 }
 
 }  // namespace
@@ -74,28 +126,29 @@ hamelin_controller* hamelin_controller_create(const hamelin_controller_options* 
                                               char* error, std::size_t error_size) {
   hamelin_controller* made = nullptr;
   (void)guarded(error, error_size, [&] {
-    if (options == nullptr || options->struct_size < sizeof(hamelin_controller_options))
-      throw Error(ErrorCode::usage, "options: is null or its struct_size is too small");
+    const hamelin_controller_options given =
+        complete(options, offsetof(hamelin_controller_options, observation_noise_m), "options");
     control::Controller::Options chosen;
-    if (options->obstacles_max > 0) chosen.obstacles_max = options->obstacles_max;
-    chosen.position = options->position != 0;
-    if (options->late_answers_max < 0)
+    chosen.observations = observations_of(given);
+    if (given.obstacles_max > 0) chosen.obstacles_max = given.obstacles_max;
+    chosen.position = given.position != 0;
+    if (given.late_answers_max < 0)
       throw Error(ErrorCode::usage, fmt::format("late_answers_max: is {}, expected 0 or more",
-                                                options->late_answers_max));
-    if (options->late_answers_max > 0) chosen.clock_s = control::steady_clock_s;
-    chosen.late_answers_max = options->late_answers_max;
-    if (options->acceleration_max > 0.0) chosen.acceleration_max = {options->acceleration_max};
-    if (options->jerk_max > 0.0) chosen.jerk_max = {options->jerk_max};
-    if (options->log != nullptr)
-      chosen.log = [log = options->log, context = options->log_context](std::int32_t level,
-                                                                        std::string_view line) {
+                                                given.late_answers_max));
+    if (given.late_answers_max > 0) chosen.clock_s = control::steady_clock_s;
+    chosen.late_answers_max = given.late_answers_max;
+    if (given.acceleration_max > 0.0) chosen.acceleration_max = {given.acceleration_max};
+    if (given.jerk_max > 0.0) chosen.jerk_max = {given.jerk_max};
+    if (given.log != nullptr)
+      chosen.log = [log = given.log, context = given.log_context](std::int32_t level,
+                                                                  std::string_view line) {
         log(context, level, line.data(), line.size());
       };
     std::vector<std::filesystem::path> plugins;
-    for (std::size_t i = 0; i < options->plugin_directory_count; ++i)
-      plugins.emplace_back(required(options->plugin_directories[i], "plugin_directories"));
-    made = std::make_unique<hamelin_controller>(required(options->scene_file, "scene_file"),
-                                                plugins, std::move(chosen))
+    for (std::size_t i = 0; i < given.plugin_directory_count; ++i)
+      plugins.emplace_back(required(given.plugin_directories[i], "plugin_directories"));
+    made = std::make_unique<hamelin_controller>(required(given.scene_file, "scene_file"), plugins,
+                                                std::move(chosen))
                .release();
   });
   return made;
@@ -182,22 +235,8 @@ std::int32_t hamelin_controller_set_obstacle(hamelin_controller* controller,
                                              const hamelin_obstacle* given, std::uint64_t* snapshot,
                                              char* error, std::size_t error_size) {
   return update(snapshot, error, error_size, [&] {
-    if (given == nullptr || given->struct_size < sizeof(hamelin_obstacle))
-      throw Error(ErrorCode::usage, "obstacle: is null or its struct_size is too small");
-    scene::Obstacle obstacle;
-    obstacle.name = required(given->name, "obstacle: name");
-    if (given->shape < HAMELIN_SPHERE || given->shape > HAMELIN_CAPSULE)
-      throw Error(ErrorCode::invalid, "obstacle '" + obstacle.name +
-                                          "': its shape is unknown, expected a sphere, box, "
-                                          "cylinder or capsule");
-    constexpr std::array shapes{scene::Shape::sphere, scene::Shape::box, scene::Shape::cylinder,
-                                scene::Shape::capsule};
-    obstacle.shape = shapes.at(static_cast<std::size_t>(given->shape));
-    obstacle.radius_m = given->radius_m;
-    obstacle.length_m = given->length_m;
-    obstacle.size_m = Eigen::Map<const Eigen::Vector3d>(given->size_m);
-    obstacle.pose = pose_of(given->position_m, given->quaternion_wxyz);
-    return controller->controller.world().set_obstacle(std::move(obstacle));
+    return controller->controller.world().set_obstacle(
+        obstacle_of(complete(given, offsetof(hamelin_obstacle, prediction), "obstacle")));
   });
 }
 
@@ -214,6 +253,30 @@ std::int32_t hamelin_controller_move_obstacle(hamelin_controller* controller, co
                 required(quaternion_wxyz, "obstacle: quaternion_wxyz")),
         Eigen::Map<const Eigen::Vector3d>(required(velocity_m_s, "obstacle: velocity_m_s")),
         time_s);
+  });
+}
+
+std::int32_t hamelin_controller_observe_obstacle(hamelin_controller* controller, const char* name,
+                                                 const hamelin_observation* observation,
+                                                 std::uint64_t* snapshot, char* error,
+                                                 std::size_t error_size) {
+  return update(snapshot, error, error_size, [&] {
+    const hamelin_observation given =
+        complete(observation, sizeof(hamelin_observation), "observation");
+    return controller->controller.world().observe_obstacle(
+        required(name, "obstacle: name"),
+        {given.time_s, pose_of(given.position_m, given.quaternion_wxyz),
+         optional_vector(given.velocity_m_s), optional_vector(given.acceleration_m_s2),
+         optional_vector(given.angular_velocity_rad_s)});
+  });
+}
+
+std::int32_t hamelin_controller_last_observed(hamelin_controller* controller, const char* name,
+                                              double* time_s, char* error, std::size_t error_size) {
+  return guarded(error, error_size, [&] {
+    const auto last =
+        controller->controller.world().last_observed(required(name, "obstacle: name"));
+    if (time_s != nullptr) *time_s = last.value_or(-std::numeric_limits<double>::infinity());
   });
 }
 

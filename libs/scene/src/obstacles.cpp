@@ -337,7 +337,10 @@ void check(const Obstacle& obstacle, const std::string& where) {
     positive("radius_m", obstacle.radius_m);
   if (shape == Shape::cylinder || shape == Shape::capsule) positive("length_m", obstacle.length_m);
   if (obstacle.motion) check(*obstacle.motion, where);
-  if (obstacle.prediction != Prediction::speed_bound) return;
+  if (obstacle.prediction != Prediction::speed_bound) {
+    if (obstacle.speed_max_m_s != 0.0) positive("speed_max", obstacle.speed_max_m_s);
+    return;
+  }
   positive("speed_max of the prediction", obstacle.speed_max_m_s);
   if (const double fastest = max_speed(obstacle); fastest > obstacle.speed_max_m_s * (1.0 + 1e-9))
     throw Error(ErrorCode::invalid,

@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "hamelin/core/error.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "rotation.hpp"
 
@@ -238,6 +239,11 @@ Json motion_json(const Motion& motion) {
         {"type", "sine"}, {"amplitude_m", array(sine->amplitude_m)}, {"period_s", sine->period_s}};
   if (const auto* waypoints = std::get_if<WaypointMotion>(&motion))
     return waypoints_json(*waypoints->path);
+  if (std::holds_alternative<ObservedMotion>(motion))
+    throw Error(
+        ErrorCode::invalid,
+        "motion: was observed in a running loop, expected one that a scene can state: sine, "
+        "linear or waypoints");
   const auto& line = std::get<LinearMotion>(motion);
   return {{"type", "linear"},
           {"velocity_m_s", array(line.velocity_m_s)},

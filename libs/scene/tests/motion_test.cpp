@@ -356,6 +356,10 @@ TEST_CASE("an observed motion goes on from where the obstacle was seen", "[scene
   CHECK((motion_at(o, 4.0).pose.R() - geometry::SO3::exp({0.0, 0.0, 1.0}).R()).norm() < 1e-14);
   CHECK(max_speed(o) == Approx(0.1 + 0.4 + 0.5 * 0.1));
   CHECK(moves(o));
+  // Scenes state how obstacles move, not how they were seen to move.
+  CHECK_THROWS_WITH(to_json(o),
+                    "motion: was observed in a running loop, expected one that a scene can state: "
+                    "sine, linear or waypoints");
 }
 
 TEST_CASE("obstacles are attached by name, in any order, and circles are refused",

@@ -1,6 +1,7 @@
 // The same as bad_input_test.cpp, through the interface in C.
 #include <array>
 #include <catch2/catch.hpp>
+#include <cstddef>
 #include <functional>
 #include <limits>
 #include <string>
@@ -26,7 +27,8 @@ struct CLogLine {
 /// A controller in C, and an arm that it moves.
 struct CLoop {
   CLoop(const std::filesystem::path& folder, const std::string& planner, const Json& params,
-        std::int32_t late_answers_max = 0) {
+        std::int32_t late_answers_max = 0,
+        std::uint32_t options_size = sizeof(hamelin_controller_options)) {
     Json document =
         parse_json(read_file(test::data_folder / "scenes/clutter.json"), "clutter.json");
     document["robot"]["file"] = (test::data_folder / "robots/arm7.urdf").string();
@@ -42,7 +44,9 @@ struct CLoop {
     const std::array<const char*, 2> plugins{HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR};
     const std::string name = file.string();
     hamelin_controller_options options{};
-    options.struct_size = sizeof options;
+    options.struct_size = options_size;
+    options.observation_noise_m = -1.0;
+    if (options_size == sizeof options) options.observation_noise_m = 0.001;
     options.scene_file = name.c_str();
     options.plugin_directories = plugins.data();
     options.plugin_directory_count = plugins.size();
@@ -98,6 +102,16 @@ hamelin_obstacle c_ball() {
   std::copy_n(std::array{0.6, 0.3, 0.9}.begin(), 3, ball.position_m);
   std::copy(upright.begin(), upright.end(), ball.quaternion_wxyz);
   return ball;
+}
+
+hamelin_observation c_observation(double time_s) {
+  hamelin_observation seen{};
+  seen.struct_size = sizeof seen;
+  seen.time_s = time_s;
+  const hamelin_obstacle ball = c_ball();
+  std::copy_n(ball.position_m, 3, seen.position_m);
+  std::copy(upright.begin(), upright.end(), seen.quaternion_wxyz);
+  return seen;
 }
 
 struct BadCall {
@@ -156,8 +170,49 @@ std::vector<BadCall> bad_obstacles() {
   };
 }
 
+std::vector<BadCall> bad_observations() {
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  static constexpr std::array<double, 3> nowhere{nan, 0.0, 0.0};
+  const auto observe = [](const char* name, const hamelin_observation& seen) {
+    return [name, seen](auto* c, auto* number, char* error, std::size_t size) {
+      return hamelin_controller_observe_obstacle(c, name, &seen, number, error, size);
+    };
+  };
+  hamelin_observation short_one = c_observation(3.0), unknown_velocity = c_observation(3.0),
+                      no_rotation = c_observation(3.0);
+  short_one.struct_size = 8;
+  unknown_velocity.velocity_m_s = nowhere.data();
+  no_rotation.quaternion_wxyz[0] = 0.5;
+  return {
+      {"observation: is null or its struct_size is too small", observe("ball", short_one)},
+      {"obstacle: name: is null", observe(nullptr, c_observation(3.0))},
+      {"obstacle 'crate': there is none of this name", observe("crate", c_observation(3.0))},
+      {"obstacle 'ball': its time, velocity", observe("ball", c_observation(nan))},
+      {"obstacle 'ball': its time, velocity", observe("ball", unknown_velocity)},
+      {"quaternion_wxyz: the norm is", observe("ball", no_rotation)},
+      {"obstacle 'crate': there is none of this name",
+       [](auto* c, auto*, char* error, std::size_t size) {
+         double time_s = 0.0;
+         return hamelin_controller_last_observed(c, "crate", &time_s, error, size);
+       }},
+      {"obstacle 'ball': its prediction is unknown",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.prediction = HAMELIN_SPEED_BOUND + 1;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
+      {"obstacle 'ball': speed_max of the prediction of the sphere is 0, expected a number above 0",
+       [](auto* c, auto* number, char* error, std::size_t size) {
+         hamelin_obstacle ball = c_ball();
+         ball.prediction = HAMELIN_SPEED_BOUND;
+         return hamelin_controller_set_obstacle(c, &ball, number, error, size);
+       }},
+  };
+}
+
 std::vector<BadCall> bad_calls(const std::string& bad_map) {
   std::vector<BadCall> calls = bad_obstacles();
+  for (auto& call : bad_observations()) calls.push_back(std::move(call));
   calls.push_back({bad_map, [bad_map](auto* c, auto* number, char* error, std::size_t size) {
                      return hamelin_controller_set_map(c, bad_map.c_str(), number, error, size);
                    }});
@@ -215,6 +270,60 @@ TEST_CASE("in C, bad updates return one line and do not change the motion",
     disturbed.step();
     undisturbed.step();
   }
+}
+
+TEST_CASE("in C, obstacles have predictions, and poses of them are streamed",
+          "[control][tracking]") {
+  const test::TemporaryFolder folder;
+  CLoop loop(folder.path(), "reporting", Json::object());
+  hamelin_obstacle ball = c_ball();
+  ball.prediction = HAMELIN_CONSTANT_VELOCITY;
+  ball.speed_max_m_s = 0.5;
+  const auto checked = [&](std::int32_t result) {
+    INFO(loop.error.data());
+    REQUIRE(result == 0);
+  };
+  char* const error = loop.error.data();
+  const std::size_t size = loop.error.size();
+  checked(hamelin_controller_set_obstacle(loop.controller, &ball, nullptr, error, size));
+  double last_s = 0.0;
+  checked(hamelin_controller_last_observed(loop.controller, "ball", &last_s, error, size));
+  CHECK(last_s == -std::numeric_limits<double>::infinity());
+
+  hamelin_observation seen{};
+  std::uint64_t snapshot = 0;
+  for (int k = 0; k < 60; ++k) {
+    seen = c_observation(0.02 * k);
+    seen.position_m[1] += 0.4 * seen.time_s;
+    checked(hamelin_controller_observe_obstacle(loop.controller, "ball", &seen, &snapshot, error,
+                                                size));
+  }
+  CHECK(snapshot == 61);
+  checked(hamelin_controller_last_observed(loop.controller, "ball", &last_s, error, size));
+  CHECK(last_s == seen.time_s);
+  seen.time_s += 0.02;
+  seen.position_m[1] += 0.1;
+  CHECK(hamelin_controller_observe_obstacle(loop.controller, "ball", &seen, nullptr, error, size) !=
+        0);
+  CHECK_THAT(error, Contains("obstacle 'ball': moved 0.1 m in 0.02 s, expected at most 0.0185 m"));
+  const std::array<double, 3> velocity{0.0, 0.0, 0.3};
+  seen.position_m[1] -= 0.1;
+  seen.velocity_m_s = velocity.data();
+  checked(
+      hamelin_controller_observe_obstacle(loop.controller, "ball", &seen, nullptr, error, size));
+}
+
+TEST_CASE("in C, structs of callers that were built against earlier headers are accepted",
+          "[control][tracking]") {
+  const test::TemporaryFolder folder;
+  CLoop loop(folder.path(), "reporting", Json::object(), 0,
+             offsetof(hamelin_controller_options, observation_noise_m));
+  hamelin_obstacle ball = c_ball();
+  ball.struct_size = offsetof(hamelin_obstacle, prediction);
+  ball.prediction = 99;  // beyond its end
+  CHECK(hamelin_controller_set_obstacle(loop.controller, &ball, nullptr, nullptr, 0) == 0);
+  ball.struct_size -= 8;
+  CHECK(hamelin_controller_set_obstacle(loop.controller, &ball, nullptr, nullptr, 0) != 0);
 }
 
 TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",

@@ -60,8 +60,9 @@ struct Answer {
 
 /// What a Controller is made with.
 struct ControllerOptions {
-  std::size_t obstacles_max = 64;  ///< see World::Options
-  bool prepare_maps = true;        ///< see World::Options
+  std::size_t obstacles_max = 64;     ///< see World::Options
+  bool prepare_maps = true;           ///< see World::Options
+  ObservationOptions observations{};  ///< see World::Options
   /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
   bool certify = true;
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene

@@ -35,6 +35,10 @@ typedef struct hamelin_controller_options {
   /* The planner has failed after so many answers in a row beyond its deadline. 0: no clock is read,
    * and hamelin_answer has neither planner_s nor overruns. */
   int32_t late_answers_max;
+  /* Of the poses that hamelin_controller_observe_obstacle is given: standard deviation of positions
+   * per axis; root mean square of the obstacles' jerk at frequencies up to 1 Hz, per axis; the gap
+   * after which the estimate of the motion starts again. 0: 0.002 m, 2 m/s^3, 0.5 s. */
+  double observation_noise_m, observation_jerk_m_s3, observation_timeout_s;
 } hamelin_controller_options;
 
 enum {
@@ -65,6 +69,11 @@ typedef struct hamelin_answer {
 
 enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2, HAMELIN_CAPSULE = 3 };
 
+/* What is known of an obstacle's future besides its present pose and motion: it goes on with the
+ * present velocity and acceleration, or with the present velocity; or nothing but that no point of
+ * it is faster than speed_max_m_s. */
+enum { HAMELIN_CONSTANT_ACCELERATION = 0, HAMELIN_CONSTANT_VELOCITY = 1, HAMELIN_SPEED_BOUND = 2 };
+
 typedef struct hamelin_obstacle {
   uint32_t struct_size;
   const char* name; /* an obstacle of the same name is replaced */
@@ -73,7 +82,18 @@ typedef struct hamelin_obstacle {
   double length_m;  /* cylinder, capsule without its caps; along the z axis */
   double size_m[3]; /* box: full edges */
   double position_m[3], quaternion_wxyz[4];
+  int32_t prediction;   /* one of the enumeration above */
+  double speed_max_m_s; /* of any point of it; 0: not stated. Observed poses may not jump faster */
 } hamelin_obstacle;
+
+/* A measured pose of an obstacle. Pointers to three numbers may be null: then the velocity, the
+ * acceleration or the angular velocity [rad/s] is estimated from the poses. */
+typedef struct hamelin_observation {
+  uint32_t struct_size;
+  double time_s; /* of the measurement, on the clock of hamelin_controller_tick */
+  double position_m[3], quaternion_wxyz[4];
+  const double *velocity_m_s, *acceleration_m_s2, *angular_velocity_rad_s;
+} hamelin_observation;
 
 /* Returns null on failure. */
 hamelin_controller* hamelin_controller_create(const hamelin_controller_options* options,
@@ -114,6 +134,15 @@ int32_t hamelin_controller_move_obstacle(hamelin_controller* controller, const c
                                          const double quaternion_wxyz[4],
                                          const double velocity_m_s[3], double time_s,
                                          uint64_t* snapshot, char* error, size_t error_size);
+/* Takes a pose of a stream, from where the obstacle moves on with what is given or estimated; see
+ * World::observe_obstacle. Times must increase. */
+int32_t hamelin_controller_observe_obstacle(hamelin_controller* controller, const char* name,
+                                            const hamelin_observation* observation,
+                                            uint64_t* snapshot, char* error, size_t error_size);
+/* *time_s receives the time of the last observation or move of the obstacle, or minus infinity. A
+ * stream that ends does not stop the obstacle. */
+int32_t hamelin_controller_last_observed(hamelin_controller* controller, const char* name,
+                                         double* time_s, char* error, size_t error_size);
 int32_t hamelin_controller_remove_obstacle(hamelin_controller* controller, const char* name,
                                            uint64_t* snapshot, char* error, size_t error_size);
 /* Replaces the map by an OctoMap file (.bt, .ot) whose frame is the world; null removes it. */

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "hamelin/control/motion_estimator.hpp"
 #include "hamelin/control/newest.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
@@ -38,12 +40,14 @@ class World {
     /// Compute with each update what a query inside the map would compute first, so that no tick
     /// ever allocates or waits.
     bool prepare = true;
+    ObservationOptions observations{};  ///< of the poses that observe_obstacle() is given
   };
 
   /// The surroundings of a scene: its map with unknown space and self-filter, and its obstacles,
   /// except those that are judge_only or not known. The id of an obstacle of the scene is its index
   /// there, also if it is added later.
-  /// @throws Error io, parse or invalid, also for more obstacles than obstacles_max
+  /// @throws Error io, parse or invalid, also for more obstacles than obstacles_max;
+  ///        invalid for options that check() refuses
   World(const scene::Scene& scene, const model::Model& model, const Options& options);
 
   /// Adds an obstacle, or replaces the one of the same name, which keeps its id.
@@ -56,6 +60,22 @@ class World {
   /// @throws Error invalid if there is no such obstacle, or for numbers that are not finite
   std::uint64_t move_obstacle(std::string_view name, const geometry::SE3& pose,
                               const Eigen::Vector3d& velocity_m_s, double time_s);
+  /// Takes a pose of a stream: at its time the obstacle is at the pose, from where it goes on with
+  /// the velocities and the acceleration that are given or, if they are not, estimated from the
+  /// poses of the stream, docs/theory.md (11.46)–(11.49). A stream begins, at rest, with the first
+  /// pose after set_obstacle(), move_obstacle() or a gap longer than the time-out. An obstacle's
+  /// speed_max_m_s bounds the estimated velocities of its points, and with
+  /// scene::Prediction::speed_bound no acceleration is used.
+  /// @throws Error invalid if there is no such obstacle, for numbers that are not finite, a time
+  ///         that is not later than last_observed(), a pose that the obstacle cannot have reached
+  ///         since the last one of its stream at its speed_max_m_s, docs/theory.md (11.50), and an
+  ///         obstacle whose path is known
+  std::uint64_t observe_obstacle(std::string_view name, const Observation& observation);
+  /// The time for which observe_obstacle() or move_obstacle() last told where the obstacle is; none
+  /// if they have not since it was set. A stream that ends does not stop the obstacle: compare this
+  /// with the time of the tick.
+  /// @throws Error invalid if there is no such obstacle
+  [[nodiscard]] std::optional<double> last_observed(std::string_view name) const;
   /// @throws Error invalid if there is no such obstacle
   std::uint64_t remove_obstacle(std::string_view name);
   /// Replaces the map; none: removes it. Obstacles stay. Changes that the map lists with a time are
@@ -87,9 +107,9 @@ class World {
 
  private:
   std::uint64_t publish(scene::Environment environment, std::vector<std::int32_t> ids);
-  /// Index of an obstacle in the latest snapshot; the number of obstacles if there is none.
-  [[nodiscard]] std::size_t find(std::string_view name) const;
-  [[nodiscard]] std::size_t require(std::string_view name) const;
+  /// The stream of an obstacle after an observation that continues or begins it.
+  [[nodiscard]] MotionEstimator followed(const scene::Obstacle& obstacle, std::int32_t id,
+                                         const Observation& observation) const;
   [[nodiscard]] scene::Environment make_environment(const std::optional<scene::MapSpec>& map,
                                                     const Eigen::VectorXd& q) const;
 
@@ -100,6 +120,7 @@ class World {
   std::mutex mutex_;                 ///< among writers; the control loop never takes it
   mutable std::mutex latest_mutex_;  ///< of `latest_`, which only writers change
   std::int32_t next_id_ = 0;
+  std::map<std::int32_t, MotionEstimator> streams_;  ///< of observed poses, by the obstacle's id
   /// Obstacles of the scene that are not known at first, with their indices in the scene.
   std::vector<std::pair<std::string, std::int32_t>> reserved_;
   std::shared_ptr<const WorldSnapshot> latest_;

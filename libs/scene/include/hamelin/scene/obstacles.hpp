@@ -41,7 +41,9 @@ struct Obstacle : Frame {
   Quaternion quaternion_wxyz{1.0, 0.0, 0.0, 0.0};    ///< see Quaternion
   std::string attached_to;  ///< name of an obstacle, see attach(); empty: none
   Prediction prediction = Prediction::constant_acceleration;
-  double speed_max_m_s = 0.0;              ///< of any point of it, with Prediction::speed_bound
+  /// Of any point of it, needed with Prediction::speed_bound. With others it only bounds streams of
+  /// observed poses; 0: not stated.
+  double speed_max_m_s = 0.0;
   bool known = true;                       ///< whether the planner is shown it from the start
   std::optional<double> visible_within_m;  ///< if not known: seen from this clearance; none: never
   double appears_s = 0.0;                  ///< before this time it does not exist

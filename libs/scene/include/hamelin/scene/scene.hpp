@@ -196,8 +196,9 @@ void set_pointer(Json& document, std::string_view assignment);
 
 /// One obstacle in the format of a scene. @throws Error invalid, "where: …"
 [[nodiscard]] Obstacle obstacle_from_json(const Json& document, const std::string& where);
+/// @throws Error invalid for an ObservedMotion, which scenes do not have
 [[nodiscard]] Json to_json(const Obstacle& obstacle);
-/// Not for ObservedMotion, which scene files do not have.
+/// @throws Error invalid for an ObservedMotion
 [[nodiscard]] Json motion_json(const Motion& motion);
 
 /// The region of a scene's map around its robot in its start configuration, see read_region().
