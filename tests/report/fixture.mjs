@@ -229,6 +229,9 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
     const row = robot.joints.map((_, i) => path(from, i));
     return { t: from, until: from + length, cause, q: row, q_end: row.map((x) => x + 0.1) };
   });
+  // What the arm does about moving obstacles; nothing in the planar run.
+  const acts = robot.planar_normal ? [] : [[0.2, 'aside', 0.8], [0.4, 'stop', 0.12], [0.42, 'back', 0.5]].map(([share, act, length]) => (
+    { t: share * duration, until: share * duration + length, act }));
   const result = {
     schema: 'hamelin.result/1', version: '0.1.0', scene: 'rack.json', planner, integrator: 'hamel-variational', outcome, cause: outcome === 'reached' ? null : 'the tip stood still 0.31 m from the goal',
     time_s: duration, steps: Math.round(duration * 1000), energy_initial_J: 41.2, energy_final_J: 38.9, energy_error_max_J: 1.3e-13,
@@ -249,7 +252,7 @@ function makeRun(pack, { name, world, worldIndex, planner, duration, outcome, be
       contacts: { count: pack.add(counts, 'u8'), points: pack.add(points, 'i16', { scale: 2e-4, offset: 0 }) },
       forces,
     },
-    events, stops, plots,
+    events, stops, acts, plots,
   };
 }
 
@@ -258,8 +261,21 @@ const RACK_FACE = (p) => {
   return { point, distance: Math.hypot(...point.map((c, i) => c - p[i])) };
 };
 
+/** Where `swinging` is at a time, which is also what is predicted of it. */
+export const swingingAt = (t) => [0.4, -0.5 + 0.2 * Math.sin(Math.PI * t), 0.9];
+
 /** A capsule that swings and turns, given by samples of its pose, with a period of 2 s. */
 function swinging(pack) {
+  const ahead = [0.2, 0.6, 1];
+  const now = Array.from({ length: 201 }, (_, k) => k / 20);
+  const predicted = {
+    type: 'path', ahead_s: ahead, nearer_m: [0, 0, 0], t: pack.add(now, 'f64'),
+    position_m: pack.add(now.flatMap((time) => ahead.flatMap((later) => swingingAt(time + later))), 'i16', { scale: 1e-4, offset: 0 }),
+    quaternion_wxyz: pack.add(now.flatMap((time) => ahead.flatMap((later) => {
+      const y = Math.sin(Math.PI * (time + later));
+      return [Math.cos(y / 2), Math.sin(y / 2), 0, 0];
+    })), 'i16', { scale: 1e-4, offset: 0 }),
+  };
   const t = Array.from({ length: 401 }, (_, k) => k / 40);
   const s = t.map((time) => Math.sin(Math.PI * time));
   return {
@@ -269,7 +285,16 @@ function swinging(pack) {
       position_m: pack.add(s.flatMap((y) => [0.4, -0.5 + 0.2 * y, 0.9]), 'i32', { scale: 1e-5 }),
       quaternion_wxyz: pack.add(s.flatMap((y) => [Math.cos(y / 2), Math.sin(y / 2), 0, 0]), 'i32', { scale: 1e-5 }),
     },
-    appears_s: 0, judge_only: false,
+    predicted, appears_s: 0, judge_only: false,
+  };
+}
+
+/** The prediction of a ball of which only the speed is bounded, by 0.5 m/s. */
+function bounded(pack, at) {
+  const now = Array.from({ length: 201 }, (_, k) => k / 20);
+  return {
+    type: 'speed-bound', ahead_s: [0.1, 0.2], nearer_m: [0.05, 0.1], t: pack.add(now, 'f64'),
+    position_m: pack.add(now.flatMap((time) => [at(time), at(time)].flat()), 'i16', { scale: 1e-4, offset: 0 }), quaternion_wxyz: null,
   };
 }
 
@@ -312,7 +337,7 @@ export function container(kind) {
     ],
     map: rack(pack, everything ? 8000 : 20000),
     obstacles: [
-      { name: 'drifter', shape: 'sphere', radius_m: 0.07, position_m: [0.35, 0.45, 0.95], quaternion_wxyz: [1, 0, 0, 0], motion: { amplitude_m: [0, 0.3, 0], period_s: 4 }, appears_s: 0, judge_only: false },
+      { name: 'drifter', shape: 'sphere', radius_m: 0.07, position_m: [0.35, 0.45, 0.95], quaternion_wxyz: [1, 0, 0, 0], motion: { amplitude_m: [0, 0.3, 0], period_s: 4 }, predicted: bounded(pack, (t) => [0.35, 0.45 + 0.3 * Math.sin((Math.PI * t) / 2), 0.95]), appears_s: 0, judge_only: false },
       ...(everything ? [{ name: 'late', shape: 'cylinder', radius_m: 0.1, length_m: 0.3, position_m: [-0.4, -0.4, 0.8], quaternion_wxyz: [1, 0, 0, 0], motion: null, appears_s: 3, judge_only: true }, swinging(pack)] : []),
     ],
     reach_m: 1.2,

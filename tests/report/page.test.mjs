@@ -13,7 +13,7 @@ import path from 'node:path';
 import { after, before, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { launch, violations } from './browser.mjs';
-import { writePages } from './fixture.mjs';
+import { swingingAt, writePages } from './fixture.mjs';
 import { becomesEqual, changes, compare, drawingBecomes, keepDrawing, screenshot, settle, watchDrawing } from './picture.mjs';
 import { cellsWithin, jointsAt, readData, tipOf } from './report_data.mjs';
 
@@ -150,7 +150,12 @@ async function panelsAndTablesAreComplete(page, { json, has }) {
   }
   const timed = json.runs.flatMap((run) => run.events.filter((event) => event.t !== null));
   assert.equal(await page.locator('.event-ticks button').count(), timed.length);
-  assert.equal(await page.locator('.stop-spans button').count(), json.runs.reduce((sum, run) => sum + (run.stops?.length ?? 0), 0));
+  const spans = (of) => json.runs.reduce((sum, run) => sum + (run[of]?.length ?? 0), 0);
+  assert.equal(await page.locator('.stop-spans button').count(), spans('stops'));
+  assert.equal(await page.locator('.act-spans button').count(), spans('acts'));
+  const used = new Set(json.runs.flatMap((run) => run.acts.map((span) => span.act)));
+  assert.equal(await page.locator('.band-legend .key[data-act]').count(), used.size);
+  assert.equal(await page.locator('.band-legend .shield').count(), spans('stops') > 0 ? 1 : 0);
 }
 
 for (const file of [...given, everything, planar].filter(Boolean)) {
@@ -274,7 +279,7 @@ const flip = (page, label) => changes(page, label, () => box(page, label).unchec
 
 async function partsAreSwitched(page, { json, unpack, middle }) {
   await setTime(page, middle);
-  for (const label of ['arm', 'grid', 'tip trail', 'goals', 'obstacles', 'collision spheres']) await flip(page, label);
+  for (const label of ['arm', 'grid', 'tip trail', 'goals', 'obstacles', 'paths', 'predicted', 'collision spheres']) await flip(page, label);
   const run = json.runs.find(({ frames }) => unpack(frames.contacts.count).some((count) => count > 0));
   await setTime(page, unpack(run.frames.t)[unpack(run.frames.contacts.count).findIndex((count) => count > 0)]);
   await flip(page, 'closest points');
@@ -334,7 +339,8 @@ async function mapIsCut(page, { middle }) {
 }
 
 async function obstaclesMoveAndAppear(page, { json, worldOf, duration }) {
-  const others = ['arm', 'tip trail', 'goals', 'collision spheres', 'closest points', 'arrows', 'map'];
+  // What is predicted differs where obstacles are at the same place and move to the other side.
+  const others = ['arm', 'tip trail', 'goals', 'collision spheres', 'closest points', 'arrows', 'map', 'predicted'];
   for (const label of others) await box(page, label).uncheck();
   const { obstacles } = worldOf(json.runs[0]);
   const { period_s: period } = obstacles.find((o) => o.motion).motion;
@@ -349,6 +355,26 @@ async function obstaclesMoveAndAppear(page, { json, worldOf, duration }) {
   await setTime(page, later);
   assert.ok(await drawingBecomes(page, start, false), `${late.name} does not appear`);
   for (const label of others) await box(page, label).check();
+}
+
+async function movesAreForeseen(page, { json, worldOf }) {
+  const { obstacles } = worldOf(json.runs[0]);
+  const movers = obstacles.filter((o) => o.motion || o.poses);
+  assert.deepEqual((await counts(page)).paths, json.runs.map(() => movers.length));
+  const names = obstacles.filter((o) => o.predicted).map((o) => o.name);
+  assert.deepEqual(names, ['drifter', 'swinging']);
+  // Also between samples, which are 0.05 s apart.
+  for (const t of [0, 0.42, 1.333, 3]) {
+    await setTime(page, t);
+    const [ball, capsule] = await page.evaluate(() => window.hamelin.predicted(0));
+    assert.equal(capsule.length, 3);
+    [0.2, 0.6, 1].forEach((ahead, i) => swingingAt(t + ahead).forEach((c, axis) => {
+      assert.ok(near(capsule[i].position[axis], c, 2e-3), `${ahead} s after ${t} s: ${capsule[i].position}`);
+    }));
+    // A ball whose speed is bounded stays and grows.
+    assert.deepEqual(ball.map(({ scale }) => Math.round(1000 * scale)), [120, 170]);
+    ball.forEach(({ position }) => assert.ok(near(position[1], 0.45 + 0.3 * Math.sin((Math.PI * t) / 2), 2e-3)));
+  }
 }
 
 async function viewsTurnTheCamera(page) {
@@ -507,6 +533,33 @@ async function stopsAreShown(page, { json }) {
   assert.ok(before.every((shown) => !shown), 'a stop is shown at the start');
 }
 
+async function actsAreShown(page, { json }) {
+  const acts = json.runs.flatMap((run) => run.acts);
+  const spans = page.locator('.act-spans button');
+  const words = { stop: 'stops', back: 'goes back', aside: 'goes aside' };
+  const paints = await spans.evaluateAll((all) => all.map((span) => getComputedStyle(span).backgroundColor));
+  const legend = await page.locator('.band-legend .key[data-act]').evaluateAll((all) => all.map((key) => [key.dataset.act, key.textContent, getComputedStyle(key.firstChild).backgroundColor]));
+  assert.equal(new Set(legend.map(([, , paint]) => paint)).size, 3);
+  const track = await page.locator('.act-spans').boundingBox();
+  const duration = await page.evaluate(() => window.hamelin.duration);
+  for (const [i, { t, until, act }] of acts.entries()) {
+    assert.ok(legend.some(([name, text, paint]) => name === act && text === words[act] && paint === paints[i]), `${act}: ${paints[i]} is not in the legend`);
+    const area = await spans.nth(i).boundingBox();
+    assert.ok(near(area.x - track.x, (t / duration) * track.width, 1) && near(area.width, ((until - t) / duration) * track.width, 1), `${act}: from ${area.x}, ${area.width} wide`);
+    await spans.nth(i).hover();
+    assert.ok((await page.locator('.event-tip').textContent()).includes(`evades for ${(until - t).toFixed(3)} s: ${words[act]}`));
+    await spans.nth(i).click();
+    assert.ok(near(await time(page), t, 1e-9));
+  }
+  // The panel of the first run names its act, between the beginning and the end of the act.
+  const shown = page.locator('.panel').first().locator('dd').last();
+  const [{ t, until, act }] = json.runs[0].acts;
+  for (const [at, word] of [[t - 0.01, 'none'], [t + 0.01, words[act]], [until + 0.01, 'none']]) {
+    await setTime(page, at);
+    assert.equal(await shown.textContent(), word);
+  }
+}
+
 async function fitsWindows(page) {
   for (const width of [800, 1280, 1920]) {
     await page.setViewportSize({ width, height: 700 });
@@ -539,6 +592,7 @@ const CONTROLS = [
   ['the map, its opacity, and the cells near the arm', mapIsSwitched],
   ['the map is cut', mapIsCut],
   ['obstacles move and appear at their times', obstaclesMoveAndAppear],
+  ['moving obstacles have paths and predictions', movesAreForeseen],
   ['views, dragging and the wheel turn the camera', viewsTurnTheCamera],
   ['a click in a plot sets the time, and its values are the run\'s', plotsSetTheTime],
   ['plots zoom together', plotsZoom],
@@ -546,6 +600,7 @@ const CONTROLS = [
   ['light and dark', coloursSwitch],
   ['events, configuration, provenance', eventsSetTheTime],
   ['stops of the shield', stopsAreShown],
+  ['evasions', actsAreShown],
   ['it fits windows of 800 to 1920 pixels', fitsWindows],
 ];
 
@@ -554,7 +609,7 @@ if (template) {
 
   test('everything: every control has its effect', async (t) => {
     assert.deepEqual(Object.entries(data.has).filter(([, there]) => !there), [], 'the page has something for each control');
-    const { page, observed } = await open(everything);
+    const { page, observed } = await open(everything, { viewport: { width: 1200, height: 800 } });
     await watchDrawing(page);
     for (const [name, check] of CONTROLS) {
       await t.test(name, async () => {

@@ -40,6 +40,7 @@ function contents(json, unpack, worldOf) {
     forces: json.runs.some((run) => run.frames.forces.some((force) => unpack(force.f).some((f) => Math.abs(f) > 0))),
     goals: json.runs.some((run) => worldOf(run).goals.length),
     moving: json.runs.some((run) => worldOf(run).obstacles?.some((o) => o.motion || o.poses)),
+    predicted: json.runs.some((run) => worldOf(run).obstacles?.some((o) => o.predicted)),
     late: json.runs.some((run) => worldOf(run).obstacles?.some((o) => o.appears_s > 0)),
     events: json.runs.some((run) => run.events.some((event) => event.t !== null)),
     several: json.runs.length > 1,

@@ -29,6 +29,8 @@ for planner in apf gyro hybrid; do
   run data/scenes/shelf.json "$planner" "shelf-$planner.jsonl.zst" --set /duration_s=5 --every 4
   run "data/scenes/paper_52_$planner.json" "$planner" "paper_52-$planner.jsonl"
 done
+run data/scenes/shelf_person.json hybrid person.jsonl.zst --every 4
+"$program" report "$work/person.jsonl.zst" -o "$work/person.html"
 "$program" report "$work"/shelf-{apf,gyro,hybrid}.jsonl.zst -o "$work/shelf.html"
 "$program" report "$work"/paper_52-{apf,gyro,hybrid}.jsonl -o "$work/paper_52.html"
 "$program" sweep plan data/scenes/paper_52_gyro.json data/scenes/paper_52_apf.json -o "$work/tries"
@@ -39,6 +41,6 @@ done
 
 export NODE_MODULES=$modules HAMELIN_TEMPLATES=$templates
 HAMELIN_SWEEP_PAGE="$work/tries.html" HAMELIN_ACCURACY_PAGE="$work/accuracy.html" node --test "$here/documents.test.mjs"
-# Real runs. page.test.mjs adds made-up runs with what no scene in data/ has: obstacles that move or
-# appear later, a prismatic joint.
-HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"
+# Real runs. page.test.mjs adds made-up runs with what no scene in data/ has: obstacles that appear
+# later, a prismatic joint.
+HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html:$work/person.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"

@@ -22,7 +22,7 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 // Limits of the joint values, events and joints' lines in a page, for chains and logs of any
 // length.
 constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24,
-                      stops_max = 500, stop_values_max = 20000;
+                      stops_max = 500, stop_values_max = 20000, acts_max = 2000;
 
 // Columns of a tick's row after q, v and tau of the joints.
 enum Column : std::size_t {
@@ -115,6 +115,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       sample_(frames_of(options, world.model.dof())),
       stops_(std::clamp<std::size_t>(
           stop_values_max / static_cast<std::size_t>(2 * world.model.dof()), 1, stops_max)),
+      acts_(acts_max),
       config_(header["config"]),
       provenance_(header["provenance"]) {
   const auto& links = world.model.robot().links;
@@ -189,6 +190,7 @@ void Run::add_series_plots(const Json& header, std::size_t column) {
     const Json& series = header["series"][i];
     const auto name = series.at("name").get<std::string>(),
                series_unit = series.at("unit").get<std::string>();
+    if (name == "evasion" && series_unit.empty()) evasion_ = i;
     auto plot = std::find_if(plots_.begin() + static_cast<std::ptrdiff_t>(first), plots_.end(),
                              [&](const Plot& other) { return other.unit == series_unit; });
     if (plot == plots_.end()) {
@@ -285,6 +287,7 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
     const VectorXd series =
         numbers(line, "series", static_cast<int>(series_count_), "series", reader);
     if (series.size() > 0) std::copy_n(series.data(), series_count_, row + columns);
+    if (evasion_) acts_.add(t, row[columns + *evasion_]);
   }
   if (!extrema.empty()) {
     if (!std::isnan(row[clearance])) row[clearance] = number(extrema, "clearance_m", reader);
@@ -345,6 +348,8 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
     notes_.push_back(fmt::format("{} more events are in the log", events_left_out_));
   if (stops_.left_out() > 0)
     notes_.push_back(fmt::format("{} more stops are in the log", stops_.left_out()));
+  if (acts_.left_out() > 0)
+    notes_.push_back(fmt::format("{} more evasions are in the log", acts_.left_out()));
   notes_.insert(notes_.end(), world_.notes.begin(), world_.notes.end());
   if (recorded_.scene.map && world_.json["map"].is_null())
     notes_.push_back("without the map of the run there are no clearances and closest points");
@@ -377,6 +382,7 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["frames"] = columns.json(container, recorded_.scene.step_s);
   run["events"] = std::move(events_);
   run["stops"] = stops_.json();
+  run["acts"] = acts_.json();
   run["plots"] = plots_json(container);
   return run;
 }

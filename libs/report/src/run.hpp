@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "acts.hpp"
 #include "bins.hpp"
 #include "container.hpp"
 #include "frames.hpp"
@@ -56,6 +58,8 @@ class Run {
   Bins bins_;
   EvenSample<Frame> sample_;
   Stops stops_;
+  Acts acts_;
+  std::optional<std::size_t> evasion_;  ///< number of the series that tells the acts
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;
   double last_k_ = -1.0, time_s_ = 0.0, first_balance_ = 0.0;

@@ -5,10 +5,12 @@
 #include <Eigen/LU>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <iterator>
 #include <limits>
 #include <set>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -214,13 +216,21 @@ bool is_sampled(const scene::Obstacle& obstacle) {
           !std::holds_alternative<scene::LinearMotion>(*obstacle.motion));
 }
 
-Json sampled_poses(const scene::Obstacle& obstacle, double duration_s, Container& container) {
+// Evenly spaced times, at most `parts_max` and one.
+std::vector<double> sample_times(double duration_s, double every_s, std::size_t parts_max) {
   const auto parts = static_cast<std::size_t>(
-      std::clamp(std::ceil(duration_s / sample_s), 1.0, static_cast<double>(samples_max)));
-  std::vector<double> t, position, quaternion;
-  for (std::size_t k = 0; k <= parts; ++k) {
+      std::clamp(std::ceil(duration_s / every_s), 1.0, static_cast<double>(parts_max)));
+  std::vector<double> t;
+  for (std::size_t k = 0; k <= parts; ++k)
     t.push_back(duration_s * static_cast<double>(k) / static_cast<double>(parts));
-    const geometry::SE3 pose = scene::motion_at(obstacle, t.back()).pose;
+  return t;
+}
+
+Json sampled_poses(const scene::Obstacle& obstacle, double duration_s, Container& container) {
+  const std::vector<double> t = sample_times(duration_s, sample_s, samples_max);
+  std::vector<double> position, quaternion;
+  for (const double time_s : t) {
+    const geometry::SE3 pose = scene::motion_at(obstacle, time_s).pose;
     const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(pose.R());
     position.insert(position.end(), pose.p().begin(), pose.p().end());
     quaternion.insert(quaternion.end(), wxyz.begin(), wxyz.end());
@@ -228,6 +238,46 @@ Json sampled_poses(const scene::Obstacle& obstacle, double duration_s, Container
   return {{"t", container.exact(t)},
           {"position_m", container.stepped(position, 1e-5)},
           {"quaternion_wxyz", container.stepped(quaternion, 1e-5)}};
+}
+
+// So far ahead the page shows where a mover is predicted to be [s]. One of which only the speed is
+// bounded may soon be everywhere.
+constexpr std::array<double, 5> ahead_s{0.2, 0.4, 0.6, 0.8, 1.0};
+constexpr std::array<double, 2> bounded_ahead_s{0.1, 0.2};
+
+// Predictions are sampled so often, or as many times: there are several for each time [s].
+constexpr double prediction_sample_s = 0.05;
+constexpr std::size_t predictions_max = 1000;
+
+// Where a planner that is shown the mover is told that it will be; null for others.
+Json predicted_json(const scene::Obstacle& obstacle, double duration_s, Container& container) {
+  const bool shown = !obstacle.judge_only && (obstacle.known || obstacle.visible_within_m);
+  if (!shown || !scene::moves(obstacle)) return nullptr;
+  const std::span<const double> ahead = obstacle.prediction == scene::Prediction::speed_bound
+                                            ? std::span<const double>(bounded_ahead_s)
+                                            : std::span<const double>(ahead_s);
+  std::vector<double> t = sample_times(duration_s, prediction_sample_s, predictions_max), position,
+                      quaternion;
+  Json nearer = Json::array();
+  bool turns = false;
+  const Matrix3d first = scene::motion_at(obstacle, 0.0).pose.R();
+  for (const double now : t)
+    for (const double later : ahead) {
+      const scene::Placed placed = scene::placed_at(obstacle, {now, later});
+      const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(placed.pose.R());
+      position.insert(position.end(), placed.pose.p().begin(), placed.pose.p().end());
+      quaternion.insert(quaternion.end(), wxyz.begin(), wxyz.end());
+      turns = turns || (placed.pose.R() - first).norm() > 1e-6;
+      if (now == t.front()) nearer.push_back(placed.nearer_m);
+    }
+  constexpr double position_step = 2e-4, quaternion_step = 1e-4;
+  return {
+      {"type", scene::to_string(obstacle.prediction)},
+      {"ahead_s", ahead},
+      {"nearer_m", std::move(nearer)},
+      {"t", container.exact(t)},
+      {"position_m", container.centred(position, position_step)},
+      {"quaternion_wxyz", turns ? container.centred(quaternion, quaternion_step) : Json(nullptr)}};
 }
 
 Json obstacle_json(const scene::Obstacle& obstacle, double duration_s, Container& container) {
@@ -245,6 +295,7 @@ Json obstacle_json(const scene::Obstacle& obstacle, double duration_s, Container
   json["motion"] = nullptr;
   if (in_world && obstacle.motion) json["motion"] = scene::motion_json(*obstacle.motion);
   json["poses"] = sampled ? sampled_poses(obstacle, duration_s, container) : Json(nullptr);
+  json["predicted"] = predicted_json(obstacle, duration_s, container);
   json["appears_s"] = obstacle.appears_s;
   json["judge_only"] = obstacle.judge_only;
   return json;
@@ -319,7 +370,7 @@ std::string world_key(const simulation::Recorded& recorded) {
   for (std::size_t i = 0; i < key["obstacles"].size(); ++i)
     content(Json::json_pointer(fmt::format("/obstacles/{}/motion/file", i)));
   const auto& obstacles = recorded.scene.obstacles;
-  if (std::any_of(obstacles.begin(), obstacles.end(), is_sampled))
+  if (std::any_of(obstacles.begin(), obstacles.end(), scene::moves))
     key["duration_s"] = config["duration_s"];
   return key.dump();
 }

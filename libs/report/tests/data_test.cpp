@@ -488,3 +488,103 @@ TEST_CASE("obstacles on way-points and in moving frames have the poses that the 
   CHECK(drawn[2]["poses"].is_null());
   CHECK(drawn[2]["motion"]["type"] == "sine");
 }
+
+TEST_CASE("movers are predicted to be where the scene's predictions put them", "[report]") {
+  const auto folder = test::scratch("predicted");
+  scene::Scene scene = test::shelf(0.3);
+  scene.obstacles.clear();
+  const auto add = [&](const char* name, scene::Prediction prediction) -> scene::Obstacle& {
+    scene::Obstacle& o = scene.obstacles.emplace_back();
+    o.name = name;
+    o.shape = scene::Shape::capsule;
+    o.radius_m = 0.05;
+    o.length_m = 0.2;
+    o.pose = {Eigen::Matrix3d::Identity(), {5.0, 0.0, 0.0}};
+    o.motion = scene::SineMotion{{0.0, 0.1, 0.0}, 1.0};
+    o.prediction = prediction;
+    return o;
+  };
+  const std::vector<scene::Waypoint> points{
+      {0.0, {0.0, 0.0, 0.0}},
+      {0.5, {0.2, 0.0, 0.1}, {std::cos(0.4), 0.0, 0.0, std::sin(0.4)}},
+      {1.3, {0.1, 0.3, 0.0}, {std::cos(0.7), std::sin(0.7), 0.0, 0.0}}};
+  using scene::Prediction;
+  add("turning", Prediction::path).motion = scene::WaypointMotion{
+      std::make_shared<scene::WaypointPath>(points, scene::WaypointPath::Options(), "points")};
+  add("accelerated", Prediction::constant_acceleration);
+  add("straight", Prediction::constant_velocity);
+  add("bounded", Prediction::speed_bound).speed_max_m_s = 1.5;
+  add("late", Prediction::path).known = false;
+  scene.obstacles.back().visible_within_m = 0.1;
+  add("resting", Prediction::path).motion.reset();
+  add("never seen", Prediction::path).known = false;
+  add("of the judge", Prediction::path).judge_only = true;
+  (void)test::log_run(scene, folder / "run.jsonl");
+  const Decoded page(report::make_data({folder / "run.jsonl"}).bytes);
+  const Json& drawn = page.head["worlds"][0]["obstacles"];
+  REQUIRE(drawn.size() == 8);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const scene::Obstacle& o = scene.obstacles[i];
+    CAPTURE(o.name);
+    const Json& predicted = drawn[i]["predicted"];
+    REQUIRE(predicted.is_object());
+    CHECK(predicted["type"] == scene::to_string(o.prediction));
+    const Json& ahead = predicted["ahead_s"];
+    const auto t = page(predicted["t"]), p = page(predicted["position_m"]);
+    CHECK(t.front() == 0.0);
+    CHECK(t.back() == Approx(0.3));
+    REQUIRE(p.size() == 3 * t.size() * ahead.size());
+    REQUIRE(predicted["nearer_m"].size() == ahead.size());
+    // Only what turns has rotations.
+    REQUIRE(predicted["quaternion_wxyz"].is_null() == (i != 0));
+    const auto q = i == 0 ? page(predicted["quaternion_wxyz"]) : std::vector<double>();
+    for (std::size_t k = 0; k < t.size(); ++k)
+      for (std::size_t a = 0; a < ahead.size(); ++a) {
+        const scene::Placed placed = scene::placed_at(o, {t[k], ahead[a].get<double>()});
+        const std::size_t at = ahead.size() * k + a;
+        REQUIRE((triple(p, at) - placed.pose.p()).norm() < 4e-4);
+        CHECK(predicted["nearer_m"][a] == placed.nearer_m);
+        if (q.empty()) continue;
+        const Eigen::Quaterniond turn(q[4 * at], q[4 * at + 1], q[4 * at + 2], q[4 * at + 3]);
+        REQUIRE((turn.normalized().toRotationMatrix() - placed.pose.R()).norm() < 1e-3);
+      }
+  }
+  // Nothing else is predicted for a planner.
+  for (std::size_t i = 5; i < drawn.size(); ++i) CHECK(drawn[i]["predicted"].is_null());
+}
+
+TEST_CASE("the acts are those of the planner's series", "[report]") {
+  const auto folder = test::scratch("acts");
+  (void)test::log_run(test::shelf(0.1), folder / "plain.jsonl");
+  // The number of the series at the first ticks; ticks without channels have no series.
+  const std::vector<Json> numbers{0.0, 3.0, 3.0, 1.0, 2.0, 2.0, 0.0, 0.0, nullptr, 3.0, 4.0, 1.0};
+  const auto with_series = [&](const char* name) {
+    std::string text;
+    std::size_t ticks = 0;
+    for (Json line : log::read_log(folder / "plain.jsonl").lines) {
+      if (line["type"] == "header") line["series"] = Json::array({{{"name", name}, {"unit", ""}}});
+      if (line["type"] == "tick" && line.contains("channels"))
+        line["series"] = {ticks < numbers.size() ? numbers[ticks++] : Json(0.0)};
+      text += line.dump() + "\n";
+    }
+    write_file_atomically(folder / "acts.jsonl", text);
+    return report::make_data({folder / "acts.jsonl"});
+  };
+  const auto ticks = test::ticks_of(folder / "plain.jsonl");
+  const Decoded page(with_series("evasion").bytes);
+  const Json& acts = page.head["runs"][0]["acts"];
+  REQUIRE(acts.size() == 5);
+  const auto check = [&](std::size_t i, const char* act, std::size_t from, std::size_t until) {
+    CHECK(acts[i]["act"] == act);
+    CHECK(acts[i]["t"] == ticks.at(from)["time_s"]);
+    CHECK(acts[i]["until"] == ticks.at(until)["time_s"]);
+  };
+  check(0, "aside", 1, 3);
+  check(1, "stop", 3, 4);
+  check(2, "back", 4, 6);
+  check(3, "aside", 9, 10);
+  check(4, "stop", 11, 12);
+
+  const Decoded other(with_series("fear").bytes);
+  CHECK(other.head["runs"][0]["acts"].empty());
+}

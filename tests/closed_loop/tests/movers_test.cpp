@@ -152,6 +152,46 @@ TEST_CASE("hybrid reaches its goals among obstacles that move, without contact",
   }
 }
 
+TEST_CASE("the arm in the shelf evades a person who reaches in", "[hybrid][closed_loop][movers]") {
+  const scene::Scene scene = scene::read_scene(robots.parent_path() / "scenes/shelf_person.json");
+  const TemporaryFolder folder;
+  log::RunLog log(folder.path() / "run.jsonl");
+  simulation::Watch watch;
+  watch.log = &log;
+  const log::Result result = simulation::run(scene, test::plugin_directories, watch);
+  CHECK(result.outcome == Outcome::reached);
+  REQUIRE(result.min_clearance_m);
+  CHECK(*result.min_clearance_m > 0.005);
+  std::map<double, int> acts;  // milliseconds of each act
+  for (const auto& line : log::read_log(log.file()).lines)
+    if (line["type"] == "tick" && line.contains("series")) ++acts[line["series"][0].get<double>()];
+  for (const double act : {1.0, 2.0, 3.0}) CHECK(acts[act] > 50);
+
+  // The tip of the hand is 0.08 m from its centre, and is as fast as that of a person at work.
+  const auto hand = std::find_if(scene.obstacles.begin(), scene.obstacles.end(),
+                                 [](const auto& o) { return o.name == "hand"; });
+  REQUIRE(hand != scene.obstacles.end());
+  const auto tip = [&](double t) -> Eigen::Vector3d {
+    return scene::motion_at(*hand, t).pose * Eigen::Vector3d(0.0, 0.0, 0.08);
+  };
+  double fastest = 0.0, deepest = 0.0;
+  for (double t = 0.0; t < 12.0; t += 0.01) {
+    fastest = std::max(fastest, (tip(t + 0.01) - tip(t)).norm() / 0.01);
+    deepest = std::max(deepest, tip(t).x());
+  }
+  CHECK(fastest > 0.6);
+  CHECK(fastest < 0.8);
+  CHECK(deepest > 0.7);  // the shelf begins at 0.6 m
+
+  // An arm that does not know of the person is hit.
+  scene::Scene hidden = scene;
+  for (auto& obstacle : hidden.obstacles) obstacle.known = false;
+  const log::Result blind = simulation::run(hidden, test::plugin_directories, {});
+  CHECK(blind.outcome == Outcome::collision);
+  REQUIRE(blind.mover_contact);
+  CHECK(blind.mover_contact->obstacle == "hand");
+}
+
 TEST_CASE("runs among moving obstacles repeat, however the looks ahead are split",
           "[hybrid][closed_loop][movers]") {
   for (const auto& [name, obstacles] : all_movers()) {

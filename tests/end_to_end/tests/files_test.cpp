@@ -8,10 +8,10 @@ using namespace hamelin;
 using test::Sandbox;
 namespace fs = std::filesystem;
 
-TEST_CASE("every robot, map and scene of data/ validates", "[end_to_end]") {
+TEST_CASE("every robot, map, file of way-points and scene of data/ validates", "[end_to_end]") {
   Sandbox sandbox;
   std::vector<std::string> command = {"validate"};
-  for (const char* folder : {"robots", "maps", "scenes"})
+  for (const char* folder : {"robots", "maps", "paths", "scenes"})
     for (const auto& entry : fs::directory_iterator(fs::path(HAMELIN_SOURCE_DIR) / "data" / folder))
       if (entry.is_regular_file())
         command.push_back((fs::path("data") / folder / entry.path().filename()).string());

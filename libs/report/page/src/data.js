@@ -86,6 +86,7 @@ function prepare(report) {
     }
     run.events ??= [];
     run.stops ??= [];
+    run.acts ??= [];
     run.plots ??= [];
     run.notes ??= [];
   }

@@ -7,7 +7,7 @@ import { Board } from './plots.js';
 import { Replay } from './replay.js';
 import { Settings } from './settings.js';
 import { badge, comparison, notes, runLabel, sections } from './summary.js';
-import { Timeline } from './timeline.js';
+import { ACT_LABELS, Timeline } from './timeline.js';
 import { View } from './view.js';
 
 /** The text over a panel: the run, and its values at the current time. */
@@ -19,11 +19,13 @@ class Panel {
       .map(([label, ids]) => [label, ids.map(plot).filter(Boolean)]).filter(([, found]) => found.length);
     this.values = this.figures.map(() => h('output', {}));
     this.goal = h('output', {});
+    this.acts = run.acts;
+    this.act = h('output', {});
     this.ended = h('span', { class: 'over', hidden: true }, 'run has ended');
     this.element = h('div', { class: 'panel' },
       h('div', { class: 'hud' },
         h('div', { class: 'hud-name' }, !alone && runLabel(run, i), !alone && badge(run.outcome), this.ended),
-        h('dl', {}, this.figures.map(([label], j) => [h('dt', {}, label), h('dd', {}, this.values[j])]), goals > 0 && [h('dt', {}, 'goal'), h('dd', {}, this.goal)])));
+        h('dl', {}, this.figures.map(([label], j) => [h('dt', {}, label), h('dd', {}, this.values[j])]), goals > 0 && [h('dt', {}, 'goal'), h('dd', {}, this.goal)], this.acts.length > 0 && [h('dt', {}, 'evasion'), h('dd', {}, this.act)])));
     this.element.firstChild.hidden = alone && goals === 0 && this.figures.length === 0;
   }
 
@@ -39,6 +41,7 @@ class Panel {
     });
     const index = replay.goalIndex;
     this.goal.textContent = index >= this.goals ? `all ${this.goals} reached` : `${index + 1} of ${this.goals}`;
+    this.act.textContent = ACT_LABELS[this.acts.find((span) => t >= span.t && t < span.until)?.act] ?? 'none';
     this.ended.hidden = t <= replay.end + 1e-9;
   }
 }
@@ -152,12 +155,15 @@ async function start() {
     time: () => now,
     /** Position of the tip of a run's arm in the world [m]. */
     pose: (i) => [...replays[i].tip],
+    /** Where the moving obstacles of a run are predicted to be, with the first scale of each copy. */
+    predicted: (i) => view.scenes[i].predictions.items.map(({ meshes }) => meshes.map((mesh) => ({ position: mesh.position.toArray(), scale: mesh.scale.x }))),
     counts: () => ({
       runs: runs.length,
       frames: runs.map((run) => run.frames.t.length),
       plots: board.all.reduce((sum, group) => sum + group.cells.length, 0),
       voxels: view ? view.scenes.map((scene) => scene.voxels?.total ?? 0) : null,
       voxelsShown: view ? view.voxelsShown : null,
+      paths: view ? view.scenes.map((scene) => scene.paths.count) : null,
       stopsShown: view ? view.scenes.map((scene) => scene.stop.stop !== null) : null,
       drawn: view?.drawn ?? 0,
     }),

@@ -1,20 +1,17 @@
 // Objects drawn around the arm: collision spheres, lines between closest points, force arrows,
-// trail, goals, obstacles, floor.
+// trail, goals, floor.
 import {
-  BufferAttribute, BufferGeometry, CapsuleGeometry, Color, GridHelper, Group, InstancedMesh, Line, LineBasicMaterial, Matrix4, Mesh,
-  MeshBasicMaterial, MeshLambertMaterial, Quaternion, TorusGeometry, Vector3,
+  BufferAttribute, BufferGeometry, Color, GridHelper, Group, InstancedMesh, Line, LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial,
+  MeshLambertMaterial, Quaternion, TorusGeometry, Vector3,
 } from 'three';
 import { Arm } from './arm.js';
 import { clearanceColor } from './colors.js';
-import { indexAt } from './data.js';
 import { Chain } from './kinematics.js';
-import { BALL, CONE, CUBE, DRUM, fixMatrix, matrixBetween, ROD, translucent } from './shapes.js';
+import { BALL, CONE, fixMatrix, matrixBetween, ROD, translucent } from './shapes.js';
 
 const matrix = new Matrix4();
 const color = new Color();
 const rgb = [0, 0, 0];
-const nextTurn = new Quaternion();
-const Z_FROM_Y = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2);
 
 /** Balls that are drawn by one call. */
 class Balls {
@@ -277,71 +274,6 @@ export class Goals {
       if (ghost) ghost.group.visible = now;
     });
   }
-}
-
-/** Primitive obstacles; some of them move or appear later. */
-export class Obstacles {
-  constructor(obstacles, planarNormal) {
-    this.group = new Group();
-    this.moving = 0;
-    this.items = obstacles.map((o) => {
-      const material = new MeshLambertMaterial(o.judge_only || planarNormal ? { transparent: true, opacity: o.judge_only ? 0.35 : 0.9 } : {});
-      const geometry = o.shape === 'sphere' ? BALL : o.shape === 'cylinder' ? DRUM : o.shape === 'capsule' ? new CapsuleGeometry(o.radius_m, o.length_m, 12, 28) : CUBE;
-      const mesh = new Mesh(geometry, material);
-      const [w, x, y, z] = o.quaternion_wxyz ?? [1, 0, 0, 0];
-      mesh.quaternion.set(x, y, z, w).normalize();
-      // The axis of the unit cylinder and of a capsule is y, that of the obstacle is its own z.
-      const axial = o.shape === 'cylinder' || o.shape === 'capsule';
-      if (axial) mesh.quaternion.multiply(Z_FROM_Y);
-      if (o.shape === 'sphere') mesh.scale.setScalar(o.radius_m);
-      else if (o.shape === 'box') mesh.scale.fromArray(o.size_m);
-      else if (o.shape === 'cylinder') mesh.scale.set(o.radius_m, o.length_m, o.radius_m);
-      if (o.motion || o.poses) ++this.moving;
-      this.group.add(mesh);
-      return { o, mesh, material, axial };
-    });
-  }
-
-  paint(colors) {
-    for (const { o, material } of this.items) material.color.set(o.judge_only ? colors.judge : colors.obstacle);
-  }
-
-  update(t) {
-    for (const { o, mesh, axial } of this.items) {
-      mesh.visible = t >= (o.appears_s ?? 0);
-      if (o.poses) {
-        placeSampled(mesh, o.poses, t);
-        if (axial) mesh.quaternion.multiply(Z_FROM_Y);
-        continue;
-      }
-      const moved = displacement(o.motion, t);
-      mesh.position.set(...o.position_m.map((c, i) => c + moved[i]));
-    }
-  }
-}
-
-/** Sets the pose at time t, between two samples or at the first or the last one. */
-function placeSampled(mesh, { t: times, position_m: p, quaternion_wxyz: q }, t) {
-  const last = times.length - 1;
-  const k = indexAt(times, t);
-  const next = Math.min(k + 1, last);
-  const a = next > k ? Math.min(1, Math.max(0, (t - times[k]) / (times[next] - times[k]))) : 0;
-  const at = (i) => p[3 * k + i] + a * (p[3 * next + i] - p[3 * k + i]);
-  mesh.position.set(at(0), at(1), at(2));
-  mesh.quaternion.set(q[4 * k + 1], q[4 * k + 2], q[4 * k + 3], q[4 * k]).normalize();
-  nextTurn.set(q[4 * next + 1], q[4 * next + 2], q[4 * next + 3], q[4 * next]).normalize();
-  mesh.quaternion.slerp(nextTurn, a);
-}
-
-/** Displacement of an obstacle's motion at time t [m]. */
-function displacement(motion, t) {
-  if (!motion) return [0, 0, 0];
-  if (motion.type === 'linear') {
-    const s = Math.min(Math.max(t - motion.start_s, 0), motion.duration_s ?? Infinity);
-    return motion.velocity_m_s.map((v) => s * v);
-  }
-  const s = Math.sin((2 * Math.PI * t) / motion.period_s);
-  return motion.amplitude_m.map((a) => s * a);
 }
 
 /** A grid under the arm, or in the plane of a planar one. */

@@ -48,6 +48,8 @@ export class Settings {
       stops: runs.some((run) => run.stops.length),
       goals: used.some((world) => world.goals.length),
       obstacles: used.some((world) => world.obstacles?.length),
+      paths: used.some((world) => world.obstacles?.some((o) => o.motion || o.poses)),
+      predicted: used.some((world) => world.obstacles?.some((o) => o.predicted)),
     };
     this.view = view;
     this.changed = changed;
@@ -57,7 +59,7 @@ export class Settings {
     this.near = null;
     this.clip = null;
     this.forceScale = 1;
-    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, stops: true, goals: true, obstacles: true, floor: true };
+    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, stops: true, goals: true, obstacles: true, paths: true, predicted: true, floor: true };
     this.channels = {};
 
     const planar = Boolean(view.planar);
@@ -65,12 +67,18 @@ export class Settings {
       ...(planar ? [['plane', 'Plane', 'View along the normal of the plane']] : []),
       ['3d', '3D', 'Perspective view'], ...(planar ? [] : [['top', 'Top', 'View from above']]), ['front', 'Front', 'View along y'], ['side', 'Side', 'View along x'],
     ], view.name, (name) => view.setView(name));
-    const toggle = (key, label) => has[key] !== false && checkbox(label, true, (on) => { this.show[key] = on; changed(); });
+    const toggle = (key, label, title = '') => {
+      if (has[key] === false) return false;
+      const element = checkbox(label, true, (on) => { this.show[key] = on; changed(); });
+      element.title = title;
+      return element;
+    };
     this.element = h('div', { class: 'settings' },
       h('fieldset', {}, h('legend', {}, 'View'), this.views),
       h('fieldset', { class: 'shows' }, h('legend', {}, 'Show'),
         toggle('map', 'map'), toggle('arm', 'arm'), toggle('spheres', 'collision spheres'), toggle('lines', 'closest points'),
-        toggle('trail', 'tip trail'), toggle('stops', 'stops'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('floor', 'grid')),
+        toggle('trail', 'tip trail'), toggle('stops', 'stops'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('paths', 'paths', 'Paths of moving obstacles'),
+        toggle('predicted', 'predicted', 'Where moving obstacles are predicted to be, up to 1 s ahead'), toggle('floor', 'grid')),
       has.map && this.mapControls(),
       has.forces && this.forceControls(runs),
     );

@@ -1,7 +1,11 @@
-// The bar at the bottom of the page: play, step, time, speed, the events as ticks, and the stops.
-import { runColor } from './colors.js';
+// The bar at the bottom of the page: play, step, time, speed, the events as ticks, and a band with
+// evasions and stops.
+import { runColor, theme } from './colors.js';
 import { h, icon } from './dom.js';
 import { milliseconds, seconds } from './format.js';
+
+/** What an arm does about moving obstacles, for tooltips and legend. */
+export const ACT_LABELS = { stop: 'stops', back: 'goes back', aside: 'goes aside' };
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
@@ -27,11 +31,12 @@ export class Timeline {
     this.rate = h('select', { 'aria-label': 'Speed', title: 'Speed', onchange: () => { this.speed = Number(this.rate.value); } }, SPEEDS.map((s) => h('option', { value: s, selected: s === 1 }, `${s}×`)));
     this.tip = h('div', { class: 'event-tip', hidden: true });
     this.ticks = h('div', { class: 'event-ticks', style: `--rows:${runs.length}` });
+    this.acts = h('div', { class: 'act-spans', style: `--rows:${runs.length}` });
     this.stops = h('div', { class: 'stop-spans', style: `--rows:${runs.length}` });
     this.element = h('section', { class: 'timeline', 'aria-label': 'Time' },
       h('div', { class: 'buttons' }, button('start', 'Go to the start (Home)', () => this.jump(0)), button('back', 'Previous frame (left arrow)', () => this.step(-1)), this.play, button('forward', 'Next frame (right arrow)', () => this.step(1))),
       this.readout,
-      h('div', { class: 'track' }, this.ticks, this.stops, this.range, this.tip),
+      h('div', { class: 'track' }, this.ticks, this.acts, this.stops, this.range, this.tip, this.legend()),
       h('label', { class: 'speed' }, h('span', {}, 'Speed'), this.rate),
     );
     this.addTicks();
@@ -45,12 +50,26 @@ export class Timeline {
         if (event.t === null || event.t === undefined) continue;
         this.addMark(this.ticks, row, event.t, `${seconds(event.t)} · ${named}${event.text}`);
       }
+      for (const { t, until, act } of run.acts) {
+        const mark = this.addMark(this.acts, row, t, `${seconds(t)} · ${named}evades for ${seconds(until - t)}: ${ACT_LABELS[act]}`);
+        mark.style.setProperty('--share', this.share(until - t));
+        mark.dataset.act = act;
+      }
       for (const { t, until, cause } of run.stops) {
         const mark = this.addMark(this.stops, row, t, `${seconds(t)} · ${named}stop of ${milliseconds(until - t)}: ${cause.replaceAll('_', ' ')}`);
         mark.style.setProperty('--share', this.share(until - t));
       }
     });
     this.paint();
+  }
+
+  /** The colours in the band, or null if it is empty. */
+  legend() {
+    this.keys = Object.entries(ACT_LABELS).filter(([act]) => this.runs.some((run) => run.acts.some((span) => span.act === act)))
+      .map(([act, label]) => h('span', { class: 'key', 'data-act': act }, h('i', {}), label));
+    if (this.keys.length) this.keys.unshift(h('span', {}, 'evades:'));
+    if (this.runs.some((run) => run.stops.length)) this.keys.push(h('span', { class: 'key' }, h('i', { class: 'shield' }), 'stop of the shield'));
+    return this.keys.length > 0 && h('div', { class: 'band-legend' }, this.keys);
   }
 
   share(t) {
@@ -75,6 +94,8 @@ export class Timeline {
 
   paint() {
     for (const tick of this.ticks.children) tick.style.background = runColor(Number(tick.dataset.run));
+    for (const span of this.acts.children) span.style.background = theme().acts[span.dataset.act];
+    for (const key of this.keys) if (key.dataset.act) key.firstChild.style.background = theme().acts[key.dataset.act];
   }
 
   /** Sets the time; playing continues from there. */
