@@ -154,6 +154,16 @@ std::optional<LineCheck::Blocker> LineCheck::check(dynamics::Workspace& ws,
   return std::nullopt;
 }
 
+double LineCheck::largest_pair_stray(const Stray& stray) const {
+  double most = 0.0;
+  for (Index k = 0; k < levers_.pairs().rows(); ++k)
+    most = std::max(most, levers_.pairs().row(k).dot(stray.joints) +
+                              (stray.shapes_m.size() > 0
+                                   ? pair_addition(static_cast<std::size_t>(k), stray.shapes_m)
+                                   : 0.0));
+  return most + stray.margin_m;
+}
+
 double LineCheck::pair_addition(std::size_t pair, const VectorXd& shapes_m) const {
   const auto largest = [&](int part) {
     double most = 0.0;

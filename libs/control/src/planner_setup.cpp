@@ -73,6 +73,8 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
   data.self_collision = scene.model.self_collision;
   data.influence_m = world.influence_m();
   data.map_resolution_m = world.environment().summary().resolution_m;
+  data.shield_margin_m = reserve.obstacles_m;
+  data.shield_self_margin_m = reserve.self_m;
   data.seed = scene.seed;
   return data;
 }

@@ -407,6 +407,14 @@ void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
   Straying::AtRest error = straying_.at_rest(q);
   reserve_.position = std::move(error.position);
   reserve_.position.array() += planner_reserve;
+  straying_.bound_at_rest(q);
+  const VectorXd& tracking = straying_.tracking();
+  for (Index s = 0; s < levers_.shapes().rows(); ++s)
+    reserve_.obstacles_m = std::max(
+        reserve_.obstacles_m, margin_m_ + levers_.shapes().row(s).dot(tracking) +
+                                  (straying_.shapes().size() > 0 ? straying_.shapes()[s] : 0.0));
+  if (self_ != nullptr)
+    reserve_.self_m = stop_line_.largest_pair_stray({tracking, straying_.shapes(), margin_m_});
   speed_max_ = limits_.velocity_max;
   if (speed_max_.size() == 0) return;
   reserve_.velocity = VectorXd::Zero(speed_max_.size());

@@ -27,6 +27,8 @@ constexpr double hold_time_s = 0.01;
 // of the estimator's time constant, and of the time in which torques change; docs/theory.md
 // (14.22).
 constexpr double late_share = 0.5, estimator_share = 0.05, ramp_share_of_speed = 0.4;
+// Longer than any disturbance acts before feedback answers it [s].
+constexpr double long_s = 1.0;
 // Noise is covered up to so many standard deviations.
 constexpr double noise_deviations = 4.0;
 
@@ -68,6 +70,11 @@ void Straying::bound(const StopMotion& stop) {
   acceleration_ = stop.braking().rate * stop.line_velocity();
   bound({stop.line_start(), stop.line_velocity(), acceleration_, stop.duration_s(),
          stop.braking().ramp_s});
+}
+
+void Straying::bound_at_rest(const VectorXd& q) {
+  velocity_.setZero();
+  bound({q, velocity_, velocity_, long_s, usual_ramp_s});
 }
 
 void Straying::include_move(const FailSafe& motion) {

@@ -156,6 +156,8 @@ hamelin_setup SetupData::view() {
   raw.self_collision = self_collision ? 1 : 0;
   raw.influence_m = influence_m;
   raw.map_resolution_m = map_resolution_m;
+  raw.shield_margin_m = shield_margin_m;
+  raw.shield_self_margin_m = shield_self_margin_m;
   raw.seed = seed;
   raw.instruction_set = name_of(default_isa()).data();  // views a literal, so it is nul-terminated
   return raw;

@@ -8,7 +8,8 @@ namespace hamelin::hybrid {
 
 namespace {
 
-constexpr double voxel_at_goal = 0.4;  // share of a voxel that is kept near a tip goal
+constexpr double beyond_shield_m = 0.002;  // what is kept of the distance between parts besides
+constexpr double voxel_at_goal = 0.4;      // share of a voxel that is kept near a tip goal
 
 // These determine the crop of the map, the kind of search, or the size of memory.
 constexpr std::array fixed{"contact_radius_m", "escape", "search_budget", "max_escapes",
@@ -36,7 +37,9 @@ MarginParams margin_params(const planning::Setup& setup, const Json& params) {
   margins.goal_m = std::min(std::max(params["goal_margin_m"].get<double>(), voxel_at_goal * voxel),
                             margins.full_m);
   margins.slack_m = std::min(params["goal_margin_m"].get<double>(), margins.full_m);
-  margins.self_m = params["self_margin_m"];
+  // Inside the margin of a shield, the arm could not leave its place.
+  margins.self_m = std::max(params["self_margin_m"].get<double>(),
+                            setup.shield_self_margin_m() + beyond_shield_m);
   return margins;
 }
 

@@ -55,6 +55,9 @@ class LineCheck {
   [[nodiscard]] std::optional<Blocker> check(dynamics::Workspace& ws,
                                              const scene::Environment* obstacles, double time_s,
                                              const End& from, const End& to, const Stray& stray);
+  /// By how much two parts of the arm may come nearer to each other than they seem, the most of all
+  /// pairs, with the margin [m].
+  [[nodiscard]] double largest_pair_stray(const Stray& stray) const;
   /// Forgets all anchors, because obstacles have changed.
   void forget();
 

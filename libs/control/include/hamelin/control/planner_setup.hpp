@@ -27,6 +27,8 @@ struct ModelledLimits {
 struct LimitReserve {
   Eigen::VectorXd position;  ///< of each joint [rad or m]; of size zero: none
   Eigen::VectorXd velocity;  ///< of each joint [rad/s or m/s]; of size zero: none
+  /// What is kept from obstacles, and between parts of the arm, while it moves slowly [m].
+  double obstacles_m = 0.0, self_m = 0.0;
 };
 
 /// The data that a planner is given before its first tick: goals, limits and timing of a scene, the

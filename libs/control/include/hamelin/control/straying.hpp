@@ -25,6 +25,8 @@ class Straying {
 
   /// Sets the bounds for a stop.
   void bound(const StopMotion& stop);
+  /// Sets the bounds for an arm that rests at q.
+  void bound_at_rest(const Eigen::VectorXd& q);
   /// Raises them, where need be, to those of the move of a FailSafe after its stop.
   void include_move(const FailSafe& motion);
   /// What the motion itself causes, of each joint [rad or m].

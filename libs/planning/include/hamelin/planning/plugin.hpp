@@ -161,6 +161,15 @@ class Setup {
   [[nodiscard]] double influence_m() const { return raw_->influence_m; }
   /// The edge of the map's smallest box [m]; zero without a map.
   [[nodiscard]] double map_resolution_m() const { return raw_->map_resolution_m; }
+  /// A shield keeps so much from obstacles, and between parts of the arm, and more where the arm
+  /// moves fast [m]; zero without a shield.
+  [[nodiscard]] double shield_margin_m() const {
+    return HAMELIN_HAS_FIELD(raw_, hamelin_setup, shield_margin_m) ? raw_->shield_margin_m : 0.0;
+  }
+  [[nodiscard]] double shield_self_margin_m() const {
+    return HAMELIN_HAS_FIELD(raw_, hamelin_setup, shield_self_margin_m) ? raw_->shield_self_margin_m
+                                                                        : 0.0;
+  }
   [[nodiscard]] std::uint64_t seed() const { return raw_->seed; }
   [[nodiscard]] const hamelin_setup& raw() const { return *raw_; }
 

@@ -180,6 +180,9 @@ typedef struct hamelin_setup {
   /* The instruction set of the host's kernels: "x86-64", "v3", "v4" or "generic". A plugin that
    * links hamelin's libraries has its own copy of them and should use the same set. */
   const char* instruction_set;
+  /* A shield refuses steps that come nearer than this to obstacles, or bring parts of the arm
+   * nearer to each other [m]. It keeps more where the arm moves fast. Zero without a shield. */
+  double shield_margin_m, shield_self_margin_m;
 } hamelin_setup;
 
 /* The input of one tick. A payload that is attached while the arm moves is to be announced here by

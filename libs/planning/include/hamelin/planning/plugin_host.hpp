@@ -140,6 +140,7 @@ struct SetupData {
   double delay_s = 0.0;
   double influence_m = 0.0;
   double map_resolution_m = 0.0;
+  double shield_margin_m = 0.0, shield_self_margin_m = 0.0;
   std::uint64_t seed = 0;
 
   /// Adds a goal.
