@@ -88,6 +88,8 @@ std::string verdict_text(const Explanation& explanation) {
     case Avoidability::unavoidable:
       break;
   }
+  if (explanation.search.starts == 0)
+    return coloured("unavoidable", Colour::fair) + ": no time to move";
   return coloured("unavoidable", Colour::fair) +
          fmt::format(": none of {} motions that were tried", explanation.search.motions);
 }
@@ -150,7 +152,7 @@ void add_explain(CLI::App& app, int& exit_code) {
       "(not with what was known of the obstacle), or unavoidable (by none of the motions that were "
       "tried). The exit code is 0 also if there is no such contact",
       "hamelin explain run.jsonl\n"
-      "hamelin explain run.jsonl.zst --motions 2000 --json");
+      "hamelin explain run.jsonl.zst --motions 10000 --json");
   const auto options = std::make_shared<ExplainCommand>();
   command->add_option("log", options->file, "log file, plain or zstd")
       ->required()

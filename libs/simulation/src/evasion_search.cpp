@@ -118,7 +118,9 @@ std::vector<std::size_t> EvasionSearch::starts() const {
   for (std::size_t i = run_.points.size() - 1; i-- > 0;) {
     const Point& point = run_.points[i];
     if (point.time_s < from - same_time_s) break;
-    if (point.time_s > next + same_time_s || !point.q.allFinite() || !point.v.allFinite()) continue;
+    const bool earliest = i == 0 || run_.points[i - 1].time_s < from - same_time_s;
+    if (point.time_s > next + same_time_s && !earliest) continue;
+    if (!point.q.allFinite() || !point.v.allFinite()) continue;
     found.push_back(i);
     next = point.time_s - ExplainOptions::grid_s;
   }

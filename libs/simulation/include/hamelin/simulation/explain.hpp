@@ -48,7 +48,7 @@ enum class Avoidability : std::int32_t { avoidable, avoidable_in_hindsight, unav
 
 struct ExplainOptions {
   std::uint64_t seed = 1;                 ///< of random motions
-  int motions = 400;                      ///< tried from each start
+  int motions = 2000;                     ///< tried from each start
   static constexpr double back_s = 2.0;   ///< the earliest start before the contact
   static constexpr double grid_s = 0.01;  ///< least time between two starts
   static constexpr double after_s = 0.5;  ///< for so long after the contact it must stay clear
