@@ -73,7 +73,7 @@ void EvasionSearch::find_threat() {
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: obstacle '{}' is not near the arm at {} s, expected the contact "
                             "of the result",
-                            run_.scene.name, run_.obstacle, contact_s_));
+                            run_.log.string(), run_.obstacle, contact_s_));
   obstacle_ = static_cast<std::size_t>(touch->obstacle);
   threat_ = {touch->obstacle, touch->sphere, 0.0, last.q, touch->arm_point, touch->direction};
 }

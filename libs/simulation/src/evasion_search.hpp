@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ class EvasionSearch {
  public:
   /// The run; the last point is at the contact.
   struct Run {
+    std::filesystem::path log;  ///< for messages
     const scene::Scene& scene;
     const model::Model& model;
     const std::vector<log::Trajectory::Point>& points;

@@ -191,7 +191,8 @@ Explanation explain(const std::filesystem::path& log, const ExplainOptions& opti
   explanation.planner_acts = last_of(logged.planner_acts, contact_s - last_acts_s);
   explanation.notes = notes_of(recorded.scene, points);
   EvasionSearch search(
-      {recorded.scene, model, points, explanation.contact["obstacle"].get<std::string>()}, options);
+      {log, recorded.scene, model, points, explanation.contact["obstacle"].get<std::string>()},
+      options);
   search.run(explanation);
   return explanation;
 }

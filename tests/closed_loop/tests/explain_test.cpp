@@ -296,6 +296,13 @@ TEST_CASE("damaged logs, and logs whose robot has changed, are refused", "[expla
   const auto tick = text.rfind('\n', result - 2) + 1;
   refused(text.substr(0, tick) + text.substr(result), "expected one at the contact");
 
+  // the result names another obstacle
+  altered = text;
+  const auto contact = altered.find("\"obstacle\":\"ball\"", result);
+  REQUIRE(contact != std::string::npos);
+  altered.replace(contact, 17, "\"obstacle\":\"bell\"");
+  refused(altered, "damaged.jsonl: obstacle 'bell' is not near the arm");
+
   // an unfinished log has no result
   const auto cut = folder.path() / "cut.jsonl";
   std::ofstream(cut, std::ios::binary) << text.substr(0, result);
