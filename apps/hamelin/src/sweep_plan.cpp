@@ -18,6 +18,7 @@ struct PlanFlags {
   std::string mark = "touch", sizes = "0.05,0.2", bounds = "-0.8,-0.8,0,0.8,0.8,1.2";
   std::vector<std::string> keep_out;
   std::optional<double> sphere_m, visible_m;
+  std::string swing, prediction = "constant-acceleration";
   std::size_t primitives = 30;
   std::uint64_t clutter_seed = 1;
   std::vector<std::filesystem::path> plugin_path;
@@ -29,6 +30,24 @@ scene::GoalType goal_from(const std::string& name) {
   for (const auto type : {scene::GoalType::joint, scene::GoalType::position})
     if (name == scene::to_string(type)) return type;
   return scene::GoalType::pose;
+}
+
+scene::Prediction prediction_from(const std::string& name) {
+  for (const auto prediction : {scene::Prediction::path, scene::Prediction::constant_velocity,
+                                scene::Prediction::speed_bound})
+    if (name == scene::to_string(prediction)) return prediction;
+  return scene::Prediction::constant_acceleration;
+}
+
+void set_swing(const PlanFlags& flags, sweep::SphereOnPath& sphere) {
+  const auto numbers = number_list("--swing", flags.swing, 2);
+  for (const double x : numbers)
+    if (!(x > 0.0))
+      throw Error(ErrorCode::usage,
+                  fmt::format("--swing {}: {}, expected two numbers above 0", flags.swing, x));
+  sphere.swing_m = numbers[0];
+  sphere.swing_period_s = numbers[1];
+  sphere.prediction = prediction_from(flags.prediction);
 }
 
 int sweep_plan(const PlanFlags& flags) {
@@ -59,6 +78,7 @@ int sweep_plan(const PlanFlags& flags) {
     sphere.radius_m = *flags.sphere_m;
     sphere.visible_within_m = flags.visible_m;
     sphere.seed = flags.clutter_seed;
+    if (!flags.swing.empty()) set_swing(flags, sphere);
   }
   options.plugin_directories = plugin_path(flags.plugin_path);
   const sweep::Plan plan = sweep::make_plan(flags.output, options);
@@ -179,6 +199,16 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       ->type_name("D")
       ->check(CLI::PositiveNumber)
       ->needs(sphere);
+  auto* swing = command->add_option(
+      "--swing", flags->swing,
+      "let that sphere swing across the path, by A [m] to both sides with the period T [s]");
+  swing->type_name("A,T")->needs(sphere);
+  restrict_values(
+      command->add_option("--prediction", flags->prediction,
+                          "what planners know of its future (default constant-acceleration)"),
+      {"path", "constant-acceleration", "constant-velocity", "speed-bound"})
+      ->type_name("KIND")
+      ->needs(swing);
   command->add_option("--robot", plan.problem.robot, "robot file of the problems")
       ->type_name("FILE");
   command->add_option("--spheres", plan.problem.spheres, "collision spheres of the robot")

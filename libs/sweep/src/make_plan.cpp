@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "directory_lock.hpp"
@@ -282,12 +283,27 @@ class PlanBuilder {
       sphere["known"] = false;
       sphere["visible_within_m"] = *sphere_options.visible_within_m;
     }
-    document["obstacles"].push_back(std::move(sphere));
     labels["goal"] = "path";
     labels["sphere"] = sphere_options.visible_within_m
                            ? fmt::format("seen at {} m", *sphere_options.visible_within_m)
                            : "known";
+    if (sphere_options.swing_m > 0.0) let_swing(sphere, found.swing, labels);
+    document["obstacles"].push_back(std::move(sphere));
     add_scene(labels.at("problem") + "-path", document, labels);
+  }
+
+  void let_swing(Json& sphere, const Eigen::Vector3d& swing, Labels& labels) const {
+    const SphereOnPath& options = *options_.sphere_on_path;
+    sphere["motion"] = {{"type", "sine"},
+                        {"amplitude_m", {swing.x(), swing.y(), swing.z()}},
+                        {"period_s", options.swing_period_s}};
+    if (options.prediction == scene::Prediction::speed_bound)
+      sphere["prediction"]["speed_max"] =
+          1.02 * 2.0 * std::numbers::pi * swing.norm() / options.swing_period_s;
+    else
+      sphere["prediction"] = scene::to_string(options.prediction);
+    labels["sphere"] = fmt::format("swings in {} s", options.swing_period_s);
+    labels["prediction"] = scene::to_string(options.prediction);
   }
 
   // The document of the base scene, with file names relative to the directory of the scenes.

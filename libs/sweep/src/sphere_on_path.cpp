@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
 #include <optional>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
@@ -18,14 +20,17 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// The moving balls of the arm, in an order that depends on the seed and the name of the problem.
-std::vector<std::size_t> moving_balls(const JudgedArm& arm, std::uint64_t seed,
-                                      const std::string& name) {
+// Depends on the seed and the name of the problem.
+Rng random_of(std::uint64_t seed, const std::string& name) {
+  constexpr std::size_t digits = 15;  // hexadecimal digits that fit into 64 bits
+  return Rng(seed + std::stoull(sha256_hex(name).substr(0, digits), nullptr, 16));
+}
+
+// The moving balls of the arm, in random order.
+std::vector<std::size_t> moving_balls(const JudgedArm& arm, Rng& rng) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < arm.balls().size(); ++k)
     if (arm.balls()[k].link >= 0) order.push_back(k);
-  constexpr std::size_t digits = 15;  // hexadecimal digits that fit into 64 bits
-  Rng rng(seed + std::stoull(sha256_hex(name).substr(0, digits), nullptr, 16));
   for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[rng.below(k)]);
   return order;
 }
@@ -40,9 +45,15 @@ std::vector<std::size_t> order_from_middle(std::size_t count) {
   return order;
 }
 
-std::optional<Vector3d> sphere_position(const JudgedArm& arm, const std::vector<VectorXd>& path,
-                                        const std::vector<std::size_t>& order,
-                                        const SphereOnPath& options) {
+/// A place for the sphere.
+struct Candidate {
+  std::size_t node, ball;
+  Vector3d center;
+};
+
+std::optional<Candidate> sphere_position(const JudgedArm& arm, const std::vector<VectorXd>& path,
+                                         const std::vector<std::size_t>& order,
+                                         const SphereOnPath& options) {
   std::vector<Vector3d> at_start, at_goal, centers;
   arm.place(path.front(), at_start);
   arm.place(path.back(), at_goal);
@@ -56,9 +67,46 @@ std::optional<Vector3d> sphere_position(const JudgedArm& arm, const std::vector<
   for (const std::size_t i : order_from_middle(path.size())) {
     arm.place(path[i], centers);
     for (const std::size_t k : order)
-      if (clear(at_start, centers[k]) && clear(at_goal, centers[k])) return centers[k];
+      if (clear(at_start, centers[k]) && clear(at_goal, centers[k]))
+        return Candidate{i, k, centers[k]};
   }
   return std::nullopt;
+}
+
+// The unit direction in which the sphere swings: the first drawn that leaves enough room, else the
+// one that leaves most.
+Vector3d swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path,
+                         const Candidate& place, const SphereOnPath& options, Rng& rng) {
+  constexpr int draws = 60, last_rooted_link = 1, samples = 10;
+  constexpr double room_m = 0.06;
+  std::vector<Vector3d> before, after;
+  arm.place(path[place.node > 0 ? place.node - 1 : 0], before);
+  arm.place(path[std::min(place.node + 1, path.size() - 1)], after);
+  const Vector3d way = after[place.ball] - before[place.ball];
+  const auto room = [&](const Vector3d& direction) {
+    double least = infinity;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      if (arm.balls()[k].link > last_rooted_link) continue;
+      for (int i = -samples; i <= samples; ++i)
+        least = std::min(
+            least, (place.center + options.swing_m * i / samples * direction - before[k]).norm() -
+                       arm.balls()[k].radius - options.radius_m);
+    }
+    return least;
+  };
+  Vector3d best = way.unitOrthogonal();
+  double most = -infinity;
+  for (int draw = 0; draw < draws && most < room_m; ++draw) {
+    Vector3d direction(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    direction -= direction.dot(way) / std::max(way.squaredNorm(), 1e-12) * way;
+    if (direction.norm() < 0.1) continue;
+    direction.normalize();
+    if (const double left = room(direction); left > most) {
+      most = left;
+      best = direction;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -99,13 +147,16 @@ PathWithSphere place_sphere_on_path(const std::filesystem::path& scene_file,
   nodes.push_back(scene.goals.front().q);
   found.path = thin_path(nodes, options.spacing_rad);
   const JudgedArm arm(scene);
-  const auto order = moving_balls(arm, options.seed, scene_file.stem().string());
-  const auto center = sphere_position(arm, found.path, order, options);
-  if (!center)
+  Rng rng = random_of(options.seed, scene_file.stem().string());
+  const auto place = sphere_position(arm, found.path, moving_balls(arm, rng), options);
+  if (!place) {
     found.reason = fmt::format("no position on the path leaves start and goal a clearance of {} m",
                                options.clearance_m);
-  else
-    found.center = *center;
+  } else {
+    found.center = place->center;
+    if (options.swing_m > 0.0)
+      found.swing = options.swing_m * swing_direction(arm, found.path, *place, options, rng);
+  }
   found.path.erase(found.path.begin());  // the start is not a waypoint
   return found;
 }

@@ -12,6 +12,7 @@ namespace hamelin::sweep {
 struct PathWithSphere {
   std::vector<Eigen::VectorXd> path;  ///< waypoints after the start, the goal last [rad or m]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the sphere, world [m]
+  Eigen::Vector3d swing = Eigen::Vector3d::Zero();   ///< from there to its farthest place [m]
   std::string reason;  ///< why there is no sphere; empty if there is one
 };
 
@@ -24,7 +25,9 @@ struct PathWithSphere {
 /// Runs a scene with one joint goal by hybrid, thins its motion, and searches a position for a
 /// sphere on it. Candidates are the centres of the arm's moving balls, from the middle of the path
 /// outwards, with the balls in an order that depends on the seed and the name of the scene. The
-/// first candidate is taken that keeps the clearance of start and goal.
+/// first candidate is taken that keeps the clearance of start and goal. A sphere swings at right
+/// angles to the way of its ball, in a random direction in which it stays away from the base and
+/// the first two links, which could not evade it.
 /// @throws Error as simulation::run
 [[nodiscard]] PathWithSphere place_sphere_on_path(
     const std::filesystem::path& scene_file, const SphereOnPath& options,

@@ -174,8 +174,8 @@ TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will re
     expected[std::string("../inputs/") + name] = sha256_of_file(work / name);
   CHECK(inputs == expected);
   for (const char* name : {"apf", "hybrid"})
-    CHECK(plugins.at(name) == sha256_of_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) /
-                                                   (std::string(name) + ".hamelin.so")));
+    CHECK(plugins.at(name) ==
+          sha256_of_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) / (std::string(name) + ".hamelin.so")));
   CHECK(plugins.size() == 2);
   CHECK_NOTHROW(check_unchanged(plan, bench.dir("a"), plugin_directories));
   for (const char* name : {"arm7.spheres.json", "arm7.urdf", "clutter.bt", "shelf.bt"}) {
@@ -427,6 +427,54 @@ TEST_CASE("a sphere on a path touches the arm on its path, and is clear of start
     before = q;
   }
   CHECK(nearest < -0.06);
+}
+
+TEST_CASE("a sphere swings at right angles to the arm's way, and off its base", "[sweep]") {
+  Bench bench;
+  PlanOptions options = bench.problems();
+  options.on_note = [](const std::string&) {};
+  auto& swinging = options.sphere_on_path.emplace();
+  const scene::Scene still =
+      scene::read_scene(bench.dir("a") / make_plan(bench.dir("a"), options).scenes.at(0).file);
+  swinging.swing_m = 0.25;
+  swinging.swing_period_s = 3.0;
+  swinging.prediction = scene::Prediction::speed_bound;
+  const Plan plan = make_plan(bench.dir("b"), options);
+  CHECK(plan.runs.at(0).labels.at("sphere") == "swings in 3 s");
+  CHECK(plan.runs.at(0).labels.at("prediction") == "speed-bound");
+  const scene::Scene scene = scene::read_scene(bench.dir("b") / plan.scenes.at(0).file);
+  const scene::Obstacle& sphere = scene.obstacles.back();
+  CHECK(sphere.pose.p() == still.obstacles.back().pose.p());
+  const auto& sine = std::get<scene::SineMotion>(sphere.motion.value());
+  CHECK(sine.amplitude_m.norm() == Approx(0.25));
+  CHECK(sine.period_s == 3.0);
+  CHECK(scene::max_speed(sphere) <= sphere.speed_max_m_s);
+  CHECK(sphere.speed_max_m_s < 1.05 * scene::max_speed(sphere));
+  // The way of the nearest point of the arm, with the kinematics that runs use.
+  const model::Model model = control::load_model(scene);
+  dynamics::Workspace ws(model);
+  std::vector<Eigen::Vector3d> centers(model.shapes().size()), at(model.shapes().size());
+  const auto place = [&](const Eigen::VectorXd& q, std::vector<Eigen::Vector3d>& out) {
+    dynamics::forward_kinematics(model, ws, q);
+    dynamics::shape_centers(model, ws, out);
+  };
+  double nearest = 1e9, cosine = 1.0;
+  const Eigen::MatrixXd& path = scene.goals.at(0).path;
+  for (Eigen::Index k = 1; k + 1 < path.cols(); ++k) {
+    place(path.col(k), at);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const double distance = (at[i] - sphere.pose.p()).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      place(path.col(k - 1), centers);
+      const Eigen::Vector3d before = centers[i];
+      place(path.col(k + 1), centers);
+      const Eigen::Vector3d way = centers[i] - before;
+      cosine = std::abs(way.dot(sine.amplitude_m)) / (way.norm() * sine.amplitude_m.norm());
+    }
+  }
+  CHECK(nearest < 1e-6);
+  CHECK(cosine < 1e-6);
 }
 
 TEST_CASE("invalid options of a plan are refused in one line", "[sweep][unit]") {

@@ -302,7 +302,7 @@ TEST_CASE("bash completes commands, options, values, planners and files", "[comm
   CHECK(completions({"integrate", "--start", "="}) == Strings{"consistent", "published"});
   CHECK(completions({"schema", "print", "sc"}) == Strings{"scene"});
   CHECK(completions({"completion", ""}) == Strings{"bash"});
-  CHECK(completions({"run", "data/scenes/sh"}) == Strings{"data/scenes/shelf.json"});
+  CHECK(completions({"run", "data/scenes/cl"}) == Strings{"data/scenes/clutter.json"});
   CHECK(completions({"scene", "info", "data/maps/shelf"}) ==
         Strings{"data/maps/shelf.bt", "data/maps/shelf.primitives.json"});
   CHECK(completions({"run", "--plugin-path", "data/ma"}) == Strings{"data/maps"});

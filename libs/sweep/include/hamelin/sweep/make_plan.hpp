@@ -28,9 +28,14 @@ struct GainScenes {
 };
 
 /// A sphere on the path of a problem's arm: the goal becomes a path in joint space, and the sphere
-/// blocks it.
+/// blocks it, or swings across it.
 struct SphereOnPath {
   double radius_m = 0.06;
+  /// The sphere swings by so much to both sides, at right angles to the way of the part of the arm
+  /// that passes there [m]; zero: it stands still.
+  double swing_m = 0.0;
+  double swing_period_s = 6.0;
+  scene::Prediction prediction = scene::Prediction::constant_acceleration;  ///< if it swings
   /// The planner sees the sphere once the arm is this near [m]; none: it knows the sphere from the
   /// start.
   std::optional<double> visible_within_m;
