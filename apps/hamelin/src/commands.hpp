@@ -9,6 +9,7 @@ void add_run(CLI::App& app, int& exit_code);
 void add_integrate(CLI::App& app, int& exit_code);
 void add_accuracy(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
+void add_explain(CLI::App& app, int& exit_code);
 void add_export(CLI::App& app, int& exit_code);
 void add_report(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);

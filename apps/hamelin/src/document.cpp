@@ -21,6 +21,8 @@ std::string_view to_string(Kind kind) noexcept {
       return "scene";
     case Kind::result:
       return "result";
+    case Kind::explanation:
+      return "explanation";
     case Kind::primitives:
       return "primitives";
     case Kind::spheres:
@@ -79,6 +81,7 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.robot/1") return Kind::robot;
   if (schema == "hamelin.scene/1") return Kind::scene;
   if (schema == "hamelin.result/1") return Kind::result;
+  if (schema == "hamelin.explanation/1") return Kind::explanation;
   if (schema == "hamelin.primitives/1") return Kind::primitives;
   if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema == "hamelin.summary/1") return Kind::summary;
@@ -90,7 +93,8 @@ Kind recognise(const std::filesystem::path& file) {
       ErrorCode::invalid,
       fmt::format(
           "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
-          "hamelin.primitives/1, hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
+          "hamelin.explanation/1, hamelin.primitives/1, hamelin.sweep/1, hamelin.summary/1 or "
+          "hamelin.accuracy/1",
           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

@@ -13,6 +13,7 @@ enum class Kind {
   robot,
   scene,
   result,
+  explanation,
   primitives,
   spheres,
   waypoints,

@@ -85,6 +85,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::result:
       check_shipped_schema(read_json(file), "result", file.string());
       return "result";
+    case Kind::explanation:
+      check_shipped_schema(read_json(file), "explanation", file.string());
+      return "explanation";
     case Kind::primitives:
       return fmt::format(
           "primitives, {} obstacles",
@@ -145,8 +148,8 @@ int validate(const ValidateOptions& options) {
 void add_validate(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "validate",
-                  "Check robots, collision spheres, scenes, maps, way-points, logs, results "
-                  "and sweeps against their formats. The kind of "
+                  "Check robots, collision spheres, scenes, maps, way-points, logs, results, "
+                  "explanations and sweeps against their formats. The kind of "
                   "each file is recognised by its content",
                   "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
                   "hamelin validate arm.urdf --tip tool0\n"
