@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """variants.py PLAN OUT KIND: other moving obstacles instead of the swinging sphere of a plan.
 
-PLAN is a folder that `hamelin sweep plan … --sphere-on-path R --swing A,T` made; OUT is made anew.
+PLAN is a folder that `hamelin sweep plan … --sphere-on-path R --swing A,T` made; OUT, which must
+lie beside it, is made anew.
 KIND is one of
   pair    two spheres that swing in antiphase, 0.3 m apart
   box     a bar of 0.4 m that turns once in T
@@ -63,8 +64,9 @@ def appear(ball, swing, period, rng, speed=0.0):
     out.pop("motion")
     out["position_m"] = added(ball["position_m"], swing)
     if speed > 0.0:
+        way = 2.0 * math.sqrt(sum(x * x for x in swing))  # farther on it could meet the base
         out["motion"] = {"type": "linear", "velocity_m_s": scaled(-speed, unit(swing)),
-                         "start_s": 0.4}
+                         "start_s": 0.4, "duration_s": way / speed}
     return [out]
 
 

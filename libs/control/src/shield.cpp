@@ -299,10 +299,10 @@ bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
 }
 
 bool Shield::is_clear(LineCheck& line, const Surroundings& world, const LineCheck::End& from,
-                      const LineCheck::End& to, const VectorXd& stray) {
+                      const LineCheck::End& to, const VectorXd& stray, double more_m) {
   const auto blocker =
       line.check(ws_, world.environment.has_obstacles() ? &world.environment : nullptr,
-                 world.time_s, from, to, {stray, straying_.shapes(), margin_m_});
+                 world.time_s, from, to, {stray, straying_.shapes(), margin_m_ + more_m});
   if (!blocker) return true;
   refusal_ = {cause_of(*blocker), *blocker, -1};
   return false;

@@ -18,6 +18,8 @@ constexpr double comfortable_m = 0.02;
 // A step is refused if the arm could be hit so soon after it: later places of an obstacle are
 // known too badly [s].
 constexpr double refused_within_s = 0.5;
+// A move keeps so much more than its margin, so that the arm can leave where it ends [m].
+constexpr double beyond_margin_m = 0.003;
 // While the stop is clear itself, an evasion is examined in one of so many steps.
 constexpr long evasion_steps = 8;
 
@@ -217,7 +219,7 @@ bool Shield::line_is_clear(LineCheck& line, const Surroundings& world, const Lin
                            const VectorXd& to) {
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
   levers_.extend_travel(to, straying_.tracking());
-  return is_clear(line, world, from, place(to, arm_line_), line_stray_);
+  return is_clear(line, world, from, place(to, arm_line_), line_stray_, beyond_margin_m);
 }
 
 }  // namespace hamelin::control

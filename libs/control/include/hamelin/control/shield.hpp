@@ -222,7 +222,7 @@ class Shield {
   [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,
                               const LineCheck::End& from, const LineCheck::End& to,
-                              const Eigen::VectorXd& stray);
+                              const Eigen::VectorXd& stray, double more_m = 0.0);
   /// Forgets what is known of obstacles if they are others than before.
   void notice(const Surroundings& world);
   /// Counts the stop in force if it is not clear any more.
