@@ -19,7 +19,7 @@ constexpr double comfortable_m = 0.02;
 // known too badly [s].
 constexpr double refused_within_s = 0.5;
 // A move keeps so much more than its margin, so that the arm can leave where it ends [m].
-constexpr double beyond_margin_m = 0.003;
+constexpr double beyond_margin_m = 0.001;
 // While the stop is clear itself, an evasion is examined in one of so many steps.
 constexpr long evasion_steps = 8;
 
