@@ -12,6 +12,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
+#include "hamelin/core/text.hpp"
 
 namespace hamelin::control {
 
@@ -32,11 +33,6 @@ double period_of(const scene::Scene& scene) {
                                                              : scene.actuation.control_period_s;
 }
 
-TorqueLimits limits_of(const scene::Scene& scene, const model::Model& model) {
-  return {model, modelled_limits(scene, model.robot()).effort_max,
-          scene.actuation.torque_rate_max_Nm_s};
-}
-
 // One positive number for all joints, or one per joint.
 VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>& values,
                             const char* key, int dof) {
@@ -45,6 +41,37 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
     if (!std::isfinite(x) || x <= 0.0)
       throw Error(ErrorCode::invalid, fmt::format("{}: {}, expected positive numbers", place, x));
   return one_or_per_joint(values, dof, place);
+}
+
+std::size_t delay_periods(const scene::Scene& scene, double period_s) {
+  return static_cast<std::size_t>(std::round(scene.actuation.delay_s / period_s));
+}
+
+World::Options world_options(const scene::Scene& scene, const model::Model& arm,
+                             const ControllerOptions& options, std::optional<double> influence_m) {
+  const scene::PayloadBounds bounds =
+      scene::payload_bounds(scene.events, arm, scene.name + ": /events");
+  World::Options out{influence_m.value_or(default_influence_m), options.obstacles_max,
+                     options.prepare_maps, options.observations};
+  out.payload_reach_m = options.payload_reach_m.value_or(bounds.reach_m);
+  out.payload_shapes = options.payload_shapes_max.value_or(bounds.shapes);
+  return out;
+}
+
+// Beyond these bounds the surroundings are not known, or memory would be missing.
+void check_size(const model::Model& loaded, const World& world) {
+  constexpr double rounding_m = 1e-9;
+  if (loaded.reach() > world.reach_m() + rounding_m)
+    throw Error(ErrorCode::invalid,
+                fmt::format("payload: the arm with it reaches {:.3g} m, expected at most {:.3g} m "
+                            "(payload_reach_m)",
+                            loaded.reach(), world.reach_m()));
+  if (loaded.shapes().size() > world.shapes_max())
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("payload: the arm with it has {} spheres and capsules, expected at most "
+                    "{} (payload_shapes_max)",
+                    loaded.shapes().size(), world.shapes_max()));
 }
 
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
@@ -77,46 +104,32 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
       path_points_max_(std::max(longest_path(scene_.goals),
                                 options_.path_points_max.value_or(default_path_points))),
+      plugin_(plugin),
       nominal_(nominal_of(scene_, arm)),
       acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
                                            nominal_.dof())),
       jerk_max_(positive_per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
       world_(scene_, nominal_,
-             {plugin.influence_m(params).value_or(default_influence_m), options_.obstacles_max,
-              options_.prepare_maps, options_.observations}),
-      view_(scene_, nominal_, world_),
-      shield_(make_shield()),
-      planner_(plugin, make_setup(), params, nominal_, world_, view_, options_.log),
+             world_options(scene_, nominal_, options_, plugin.influence_m(params))),
       params_(params),
+      arm_(std::make_unique<LoadedArm>(scene_, nominal_, params_, common())),
+      newest_goals_(scene_.goals),
+      newest_arm_(arm_.get()),
       new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
       new_params_(std::make_unique<NewParams>()),
+      new_load_(std::make_unique<NewLoad>()),
       goal_list_(&new_goals_.take()),
-      goals_(goal_list_->goals, scene_.stall, nominal_),
-      limits_(limits_of(scene_, nominal_)),
-      sum_(nominal_, view_.contacts_max()),
-      ws_(nominal_) {
+      goals_(goal_list_->goals, scene_.stall, arm_->model) {
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
-  const auto delay_ticks =
-      static_cast<std::size_t>(std::round(scene_.actuation.delay_s / period_s_));
-  if (shield_ && options_.torque && !options_.position)
-    pipeline_.emplace(nominal_, delay_ticks, period_s_);
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
-  issued_.assign(delay_ticks + 1, zero);
+  issued_.assign(delay_periods(scene_, period_s_) + 1, zero);
 }
 
-planning::SetupData Controller::make_setup() {
-  planning::SetupData setup = planner_setup(scene_, nominal_, view_, period_s_,
-                                            shield_ ? shield_->limit_reserve() : LimitReserve{});
-  setup.path_points_max = path_points_max_;
-  return setup;
-}
-
-std::unique_ptr<Shield> Controller::make_shield() {
-  if (scene_.safety.type != scene::SafetyType::shield) return nullptr;
+LoadedArm::Common Controller::common() noexcept {
   Shield::Drive drive;
   if (options_.position) {
     drive.acceleration_max = acceleration_max_;
@@ -124,7 +137,14 @@ std::unique_ptr<Shield> Controller::make_shield() {
   } else if (options_.torque) {
     drive.torque_rate = scene_.actuation.torque_rate_max_Nm_s.value_or(0.0);
   }
-  return std::make_unique<Shield>(scene_, nominal_, view_.self_field(), period_s_, drive);
+  return {plugin_,
+          world_,
+          options_.log,
+          period_s_,
+          path_points_max_,
+          std::move(drive),
+          options_.torque && !options_.position,
+          delay_periods(scene_, period_s_)};
 }
 
 double steady_clock_s() {
@@ -135,6 +155,7 @@ double steady_clock_s() {
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
   check_goals(goals, scene_, nominal_, path_points_max_);
   const std::lock_guard lock(goals_mutex_);
+  newest_goals_ = goals;
   new_goals_.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
   return goals_number_;
 }
@@ -143,20 +164,119 @@ void Controller::set_planner_params(const Json& changes) {
   if (!changes.is_object())
     throw Error(ErrorCode::invalid,
                 fmt::format("parameters of planner '{}': /: expected an object", plugin().name()));
-  const std::lock_guard lock(params_mutex_);
+  const std::lock_guard lock(load_mutex_);
   Json all = params_;
   all.update(changes);
   all = planning::check_params(plugin(), all);
   auto fresh = std::make_unique<NewParams>();
-  fresh->params.emplace(planner_.prepare_params(all));
+  fresh->params.emplace(newest_arm_->planner.prepare_params(all));
   fresh->number = ++params_number_;
   new_params_.publish(std::move(fresh));
   params_ = std::move(all);
 }
 
 Json Controller::planner_params() const {
-  const std::lock_guard lock(params_mutex_);
+  const std::lock_guard lock(load_mutex_);
   return params_;
+}
+
+std::uint64_t Controller::attach(const scene::Payload& payload, const VectorXd& q) {
+  const std::string where = fmt::format("payload '{}'", payload.name);
+  scene::check(payload, where);
+  const std::lock_guard lock(load_mutex_);
+  std::vector<scene::Payload> all = payloads();
+  for (const auto& other : all)
+    if (other.name == payload.name)
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: is attached already, expected another name", where));
+  all.push_back(payload);
+  return publish_load(std::move(all), q);
+}
+
+std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
+  const std::lock_guard lock(load_mutex_);
+  std::vector<scene::Payload> all = payloads();
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [&](const auto& payload) { return payload.name == name; });
+  if (found == all.end()) {
+    std::vector<std::string> names;
+    for (const auto& payload : all) names.push_back(payload.name);
+    throw Error(ErrorCode::invalid,
+                fmt::format("payload '{}': is not attached, expected one of the {} that are{}",
+                            name, names.size(), did_you_mean(name, names)));
+  }
+  all.erase(found);
+  return publish_load(std::move(all), q);
+}
+
+std::vector<std::string> Controller::attached() const {
+  const std::lock_guard lock(load_mutex_);
+  std::vector<std::string> names;
+  for (const auto& payload : payloads()) names.push_back(payload.name);
+  return names;
+}
+
+const std::vector<scene::Payload>& Controller::payloads() const {
+  return load_number_ > 0 && refused_load_.load() == load_number_ ? accepted_ : attached_;
+}
+
+std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const VectorXd& q) {
+  if (q.size() != nominal_.dof() || !q.allFinite())
+    throw Error(
+        ErrorCode::invalid,
+        fmt::format("q: {} values given, expected {} finite numbers (one per joint of '{}')",
+                    q.size(), nominal_.dof(), nominal_.robot().name));
+  scene::Scene scene = scene_;
+  scene.start_q = q;
+  scene.start_v.resize(0);
+  {
+    const std::lock_guard goals_lock(goals_mutex_);
+    scene.goals = newest_goals_;
+  }
+  model::Model model =
+      carrying(nominal_, all, scene_.model.self_collision, scene_.safety.margin_m, q);
+  check_size(model, world_);
+  auto fresh = std::make_unique<NewLoad>();
+  fresh->number = load_number_ + 1;
+  fresh->params_number = params_number_;
+  fresh->arm = std::make_unique<LoadedArm>(scene, std::move(model), params_, common());
+  if (used_load_.load() == load_number_) accepted_ = attached_;
+  attached_ = std::move(all);
+  newest_arm_ = fresh->arm.get();
+  new_load_.publish(std::move(fresh));
+  return ++load_number_;
+}
+
+std::string Controller::load_defect(LoadedArm& fresh) {
+  (void)fresh.view.take_newest();
+  fresh.view.look(q_, time_s_);
+  if (!fresh.shield) return fresh.view.touching() ? fresh.view.describe_contact() : std::string();
+  const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_};
+  const Shield::Node now =
+      options_.position ? Shield::Node{point_q_, point_v_} : Shield::Node{q_, v_};
+  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, now)) return {};
+  return fresh.shield->describe(world.environment);
+}
+
+// Takes over what the arm is doing, so that its torque goes on from the last one.
+void Controller::take_load() {
+  NewLoad& newest = new_load_.take();
+  if (newest.number == answer_.load || newest.number == answer_.refused_load) return;
+  LoadedArm& fresh = *newest.arm;
+  if (load_refusal_ = load_defect(fresh); !load_refusal_.empty()) {
+    answer_.refused_load = newest.number;
+    answer_.load_refusal = load_refusal_;
+    refused_load_.store(newest.number);
+    return;
+  }
+  fresh.limits.start_from(answer_.torque);
+  if (fresh.pipeline) fresh.pipeline->continue_from(*arm_->pipeline);
+  std::swap(arm_, newest.arm);
+  goals_.set_model(arm_->model);
+  used_params_ = std::max(used_params_, newest.params_number);
+  answer_.load = newest.number;
+  used_load_.store(newest.number);
+  if (goal_.goal != nullptr) ++goal_.number;
 }
 
 void Controller::take_goals() {
@@ -171,7 +291,7 @@ void Controller::take_params() {
   const NewParams& newest = new_params_.take();
   if (newest.number == used_params_) return;
   used_params_ = newest.number;
-  planner_.apply_params(*newest.params);
+  arm_->planner.apply_params(*newest.params);
 }
 
 void Controller::reset() {
@@ -196,24 +316,25 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   time_s_ = time_s;
   verdict_.reset();
   if (options_.certify && !first) {  // against the world in which the arm moved
-    view_.look(q_, time_s);
-    verdict_ = view_.certify(q_, v_);
-    if (view_.take_newest()) view_.look(q_, time_s);
+    arm_->view.look(q_, time_s);
+    verdict_ = arm_->view.certify(q_, v_);
+    if (arm_->view.take_newest()) arm_->view.look(q_, time_s);
   } else {
-    (void)view_.take_newest();
-    view_.look(q_, time_s);
+    (void)arm_->view.take_newest();
+    arm_->view.look(q_, time_s);
   }
-  answer_.snapshot = view_.snapshot();
+  take_load();
+  answer_.snapshot = arm_->view.snapshot();
   take_goals();
   answer_.goals_number = goal_list_->number;
   if (answer_.state == ControlState::stopping) return;
   answer_.state = ControlState::running;
   answer_.cause = {};
-  while (goals_.advance(view_.poses(), q_, v_)) continue;
+  while (goals_.advance(arm_->view.poses(), q_, v_)) continue;
   answer_.goal_index = goals_.index();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
-  else if (!planner_.detects_stalls() && goals_.stalled(view_.poses(), v_, period_s_))
+  else if (!arm_->planner.detects_stalls() && goals_.stalled(arm_->view.poses(), v_, period_s_))
     answer_.state = ControlState::stalled;
 }
 
@@ -233,7 +354,7 @@ void Controller::measure(const VectorXd& q, const VectorXd& v) {
     if (options_.position)
       rate_ = acting;
     else
-      dynamics::forward_dynamics(nominal_, ws_, q_, v_, acting, rate_);
+      dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting, rate_);
     estimator_->update(q, rate_);
   }
   q_ = estimator_->q();
@@ -254,23 +375,23 @@ void Controller::take_braking_state() {
 void Controller::start_outputs() {
   answer_.q_next = q_;
   answer_.v_next = v_;
-  if (shield_) {
+  if (arm_->shield) {
     point_q_ = q_;
     point_v_ = v_;
   }
   command_rate_.setZero();
   if (!forms_torque()) return;
-  dynamics::gravity_torque(nominal_, ws_, q_, answer_.torque);
-  limits_.start_from(answer_.torque);
-  if (pipeline_) pipeline_->start_from(answer_.torque);
+  dynamics::gravity_torque(arm_->model, arm_->ws, q_, answer_.torque);
+  arm_->limits.start_from(answer_.torque);
+  if (arm_->pipeline) arm_->pipeline->start_from(answer_.torque);
   if (!options_.position)
     for (auto& torque : issued_) torque = answer_.torque;
 }
 
 void Controller::decide() {
   if (k_ == 0) start_outputs();
-  if (shield_ && !shielded_) {
-    shield_->start(surroundings(), {q_, v_});
+  if (arm_->shield && !shielded_) {
+    arm_->shield->start(surroundings(), {q_, v_});
     shielded_ = true;
   }
   if (answer_.state != ControlState::stopping) {
@@ -278,30 +399,30 @@ void Controller::decide() {
       start_braking("the measured q or v is not finite, expected numbers");
     } else if (!ask_planner()) {
       start_braking(failure_);
-    } else if (planner_.gave_up()) {
+    } else if (arm_->planner.gave_up()) {
       answer_.state = ControlState::gave_up;
-      answer_.cause = planner_.command().raw().cause;
+      answer_.cause = arm_->planner.command().raw().cause;
     }
   }
-  answer_.channels = answer_.state == ControlState::stopping ? nullptr : &planner_.command();
-  answer_.series = planner_.command().series();
+  answer_.channels = answer_.state == ControlState::stopping ? nullptr : &arm_->planner.command();
+  answer_.series = arm_->planner.command().series();
   if (forms_torque()) form_torque();
   if (options_.position) form_position();
   answer_.stopping = false;
-  if (shield_ && options_.position)
+  if (arm_->shield && options_.position)
     shield_position();
-  else if (pipeline_)
+  else if (arm_->pipeline)
     shield_torque();
   if (estimator_)
     issued_[static_cast<std::size_t>(k_) % issued_.size()] =
         options_.position ? command_rate_ : answer_.torque;
-  if (options_.certify) view_.depart(q_, v_);
+  if (options_.certify) arm_->view.depart(q_, v_);
   ++k_;
 }
 
 bool Controller::ask_planner() {
   take_params();
-  if (reset_) planner_.reset(q_, v_);
+  if (reset_) arm_->planner.reset(q_, v_);
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
   const hamelin_goal* const goal = &goal_list_->for_planner[index];
   if (reset_ || (goal_.goal != nullptr && goal_.goal != goal)) ++goal_.number;
@@ -309,8 +430,8 @@ bool Controller::ask_planner() {
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
   const bool sends_torque = forms_torque() && !options_.position;
-  if (!planner_.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr)) {
-    failure_ = planner_.error();
+  if (!arm_->planner.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr)) {
+    failure_ = arm_->planner.error();
     return false;
   }
   return options_.clock_s == nullptr || in_time(options_.clock_s() - since_s);
@@ -357,43 +478,44 @@ void Controller::form_torque() {
   if (answer_.channels == nullptr)
     brake();
   else
-    sum_.sum(ws_, *answer_.channels, q_, v_, q_, period_s_, 1.0, answer_.torque);
-  answer_.saturated = limits_.limit(answer_.torque, period_s_);
+    arm_->sum.sum(arm_->ws, *answer_.channels, q_, v_, q_, period_s_, 1.0, answer_.torque);
+  answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
 }
 
 void Controller::shield_torque() {
-  pipeline_->observe(ws_, q_, v_);
-  pipeline_->predict(ws_, q_measured_, v_);
-  const Shield::Node from{pipeline_->q(), pipeline_->v()};
+  arm_->pipeline->observe(arm_->ws, q_, v_);
+  arm_->pipeline->predict(arm_->ws, q_measured_, v_);
+  const Shield::Node from{arm_->pipeline->q(), arm_->pipeline->v()};
   if (answer_.channels != nullptr) {
-    pipeline_->advance(ws_, answer_.torque);
-    const Shield::Node to{pipeline_->q_next(), pipeline_->v_next()};
-    answer_.stopping = !shield_->accept(
-        surroundings(),
-        {from, from.v, to, pipeline_->acceleration(), answer_.torque, pipeline_->disturbance()});
+    arm_->pipeline->advance(arm_->ws, answer_.torque);
+    const Shield::Node to{arm_->pipeline->q_next(), arm_->pipeline->v_next()};
+    answer_.stopping =
+        !arm_->shield->accept(surroundings(), {from, from.v, to, arm_->pipeline->acceleration(),
+                                               answer_.torque, arm_->pipeline->disturbance()});
   } else {
-    shield_->refuse();
+    arm_->shield->refuse();
     answer_.stopping = true;
   }
   if (answer_.stopping) {
-    shield_->stop_torque(from, pipeline_->disturbance(), pipeline_->last(), answer_.torque);
-    limits_.start_from(pipeline_->last());
-    answer_.saturated = limits_.limit(answer_.torque, period_s_);
+    arm_->shield->stop_torque(from, arm_->pipeline->disturbance(), arm_->pipeline->last(),
+                              answer_.torque);
+    arm_->limits.start_from(arm_->pipeline->last());
+    answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
   }
-  pipeline_->send(answer_.torque);
+  arm_->pipeline->send(answer_.torque);
 }
 
 void Controller::shield_position() {
   const Shield::Node from{point_q_, point_v_}, to{answer_.q_next, answer_.v_next};
   if (answer_.channels != nullptr) {
-    answer_.stopping = !shield_->accept(
+    answer_.stopping = !arm_->shield->accept(
         surroundings(), {from, from.v, to, command_rate_, answer_.torque, command_rate_});
   } else {
-    shield_->refuse();
+    arm_->shield->refuse();
     answer_.stopping = true;
   }
   if (answer_.stopping) {
-    shield_->stop_point(answer_.q_next, answer_.v_next);
+    arm_->shield->stop_point(answer_.q_next, answer_.v_next);
     command_rate_ = (answer_.v_next - point_v_) / period_s_;
   }
   point_q_ = answer_.q_next;
@@ -409,7 +531,7 @@ void Controller::brake() {
   brake_rate_ = (-brake_v_ / time_s).cwiseMin(a).cwiseMax(-a);
   rate_ = brake_rate_ + 2.0 / time_s * (brake_v_ - v_) + (brake_q_ - q_) / (time_s * time_s);
   rate_ = rate_.cwiseMin(a).cwiseMax(-a);
-  dynamics::inverse_dynamics(nominal_, ws_, q_, v_, rate_, answer_.torque);
+  dynamics::inverse_dynamics(arm_->model, arm_->ws, q_, v_, rate_, answer_.torque);
   brake_v_ += period_s_ * brake_rate_;
   brake_q_ += period_s_ * brake_v_;
 }
@@ -423,7 +545,7 @@ void Controller::form_position() {
   } else if (answer_.channels->raw().has_node_velocity != 0) {
     rate_ = (answer_.channels->node_velocity() - answer_.v_next) / T;
   } else {
-    dynamics::forward_dynamics(nominal_, ws_, q_, v_, answer_.torque, rate_);
+    dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, answer_.torque, rate_);
   }
   for (Eigen::Index i = 0; i < rate_.size(); ++i) {
     const double step = jerk_max_[i] * T;

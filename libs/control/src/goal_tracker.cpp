@@ -41,11 +41,11 @@ GoalError goal_error(const scene::Goal& goal, const model::Model& model,
 
 GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals,
                          const std::optional<scene::StallRule>& rule, const model::Model& model)
-    : goals_(&goals), rule_(rule), model_(model) {}
+    : goals_(&goals), rule_(rule), model_(&model) {}
 
 bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                           const Eigen::VectorXd& v) {
-  if (all_reached() || !goal_error(goal(), model_, ws, q, v).reached) return false;
+  if (all_reached() || !goal_error(goal(), *model_, ws, q, v).reached) return false;
   ++index_;
   rest_s_ = 0.0;
   return true;
@@ -55,8 +55,8 @@ bool GoalTracker::stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& 
   if (!rule_) return false;
   bool away = true;
   if (goal().type != scene::GoalType::joint)
-    away = (dynamics::tip_pose(model_, ws).p() - goal().pose.p()).norm() > rule_->distance_m;
-  rest_s_ = tip_speed(model_, ws, v) < rule_->speed_m_s && away ? rest_s_ + dt_s : 0.0;
+    away = (dynamics::tip_pose(*model_, ws).p() - goal().pose.p()).norm() > rule_->distance_m;
+  rest_s_ = tip_speed(*model_, ws, v) < rule_->speed_m_s && away ? rest_s_ + dt_s : 0.0;
   return rest_s_ >= rule_->hold_s;
 }
 

@@ -168,10 +168,23 @@ void Shield::notice(const Surroundings& world) {
 void Shield::start(const Surroundings& world, const Node& node) {
   counts_ = {};
   largest_margin_ = 0.0;
+  if (try_start(world, node)) return;
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
+}
+
+bool Shield::try_start(const Surroundings& world, const Node& node) {
   notice(world);
   dynamics::gravity_torque(model_, ws_, node.q, hold_);
-  if (verify(world, {node, node.v, node, zero_, hold_, zero_})) return take_tried();
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
+  if (!verify(world, {node, node.v, node, zero_, hold_, zero_})) return false;
+  take_tried();
+  return true;
+}
+
+bool Shield::start_in_place_of(const Shield& other, const Surroundings& world, const Node& node) {
+  if (!try_start(world, node)) return false;
+  counts_ = other.counts_;
+  largest_margin_ = std::max(largest_margin_, other.largest_margin_);
+  return true;
 }
 
 std::string Shield::defect_at_start(const Surroundings& world, const Node& node) {

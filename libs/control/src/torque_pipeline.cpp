@@ -63,6 +63,15 @@ void TorquePipeline::start_from(const VectorXd& torque) {
   sent_ = false;
 }
 
+// What moved the arm until now was not this model, so that its motion tells nothing of errors.
+void TorquePipeline::continue_from(const TorquePipeline& other) {
+  for (std::size_t i = 0; i < waiting_.size(); ++i) waiting_[i] = other.waiting_[i];
+  first_ = other.first_;
+  last_ = other.last_;
+  disturbance_ = other.disturbance_;
+  sent_ = false;
+}
+
 void TorquePipeline::send(const VectorXd& torque) {
   last_ = torque;
   sent_ = true;

@@ -120,7 +120,7 @@ World::World(const scene::Scene& scene, const model::Model& model, const Options
     : options_(options), scene_(scene), model_(model) {
   check(options_.observations);
   options_.obstacles_max = std::max(options_.obstacles_max, scene.obstacles.size());
-  contacts_max_ = scene::Environment::contacts_max(model.shapes().size(), options_.obstacles_max);
+  contacts_max_ = scene::Environment::contacts_max(shapes_max(), options_.obstacles_max);
   std::vector<scene::Obstacle> obstacles;
   std::vector<std::int32_t> ids;
   for (const auto& obstacle : scene.obstacles) {
@@ -143,7 +143,21 @@ scene::Environment World::make_environment(const std::optional<scene::MapSpec>& 
   scene.map = map;
   if (scene.map) scene.map->changes.clear();
   scene.start_q = q;
-  return scene::make_environment(scene, model_, options_.influence_m);
+  return scene::make_environment(scene, model_, options_.influence_m + options_.payload_reach_m);
+}
+
+std::size_t World::shapes_max() const noexcept {
+  return model_.shapes().size() + options_.payload_shapes;
+}
+
+double World::reach_m() const noexcept {
+  return model_.reach() + options_.payload_reach_m;
+}
+
+World::View World::view_of_latest() const {
+  std::shared_ptr<const WorldSnapshot> snapshot = latest();
+  scene::Environment::Scratch scratch(snapshot->environment, shapes_max());
+  return {std::move(snapshot), std::move(scratch)};
 }
 
 std::uint64_t World::publish(scene::Environment environment, std::vector<std::int32_t> ids) {
@@ -152,7 +166,7 @@ std::uint64_t World::publish(scene::Environment environment, std::vector<std::in
   auto snapshot = std::make_shared<const WorldSnapshot>(
       WorldSnapshot{number, std::move(environment), std::move(ids)});
   auto view = std::make_unique<View>(
-      View{snapshot, scene::Environment::Scratch(snapshot->environment, model_.shapes().size())});
+      View{snapshot, scene::Environment::Scratch(snapshot->environment, shapes_max())});
   {
     const std::lock_guard lock(latest_mutex_);
     latest_.swap(snapshot);

@@ -40,6 +40,16 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, const
                     model.shapes().size()),
                 nullptr, 0) {}
 
+std::unique_ptr<WorldView> WorldView::for_other_load(const scene::Scene& scene,
+                                                     const model::Model& model,
+                                                     const WorldView& other) {
+  scene::Environment same = *other.environment_;
+  std::unique_ptr<WorldView> view(new WorldView(
+      scene, model, other.influence_, Own(std::move(same), model.shapes().size()), nullptr, 0));
+  view->seen_ = other.seen_;
+  return view;
+}
+
 WorldView::WorldView(const scene::Scene& scene, const model::Model& model, World& world)
     : WorldView(scene, model, world.influence_m(), std::nullopt, &world, world.contacts_max()) {}
 
@@ -57,7 +67,8 @@ WorldView::WorldView(const scene::Scene& scene, const model::Model& model, doubl
       query_poses_(model),
       query_arm_(model) {
   if (world_ != nullptr) {
-    (void)take_newest();
+    first_view_ = world_->view_of_latest();
+    see(*first_view_);
   } else {
     environment_ = &own_->environment;
     scratch_ = &own_->scratch;
@@ -92,12 +103,22 @@ bool WorldView::take_newest() {
   if (world_ == nullptr) return false;
   World::View& newest = world_->take();
   if (environment_ == &newest.snapshot->environment) return false;
-  environment_ = &newest.snapshot->environment;
-  scratch_ = &newest.scratch;
-  ids_ = newest.snapshot->obstacle_ids;
-  snapshot_ = newest.snapshot->number;
-  current_ = false;
+  see(newest);
   return true;
+}
+
+void WorldView::see(World::View& view) {
+  environment_ = &view.snapshot->environment;
+  scratch_ = &view.scratch;
+  ids_ = view.snapshot->obstacle_ids;
+  snapshot_ = view.snapshot->number;
+  current_ = false;
+}
+
+void WorldView::change_map(const scene::MapChangeSpec& change) {
+  own_->environment = own_->environment.with_change(change);
+  own_->scratch = scene::Environment::Scratch(own_->environment, model_.shapes().size());
+  current_ = false;
 }
 
 void WorldView::look(const Eigen::VectorXd& q, double time_s) {

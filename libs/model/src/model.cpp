@@ -257,8 +257,11 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
 }
 
 std::string Model::describe(const Shape& shape) const {
-  return formatted("{} {} of link '{}'", shape.is_capsule ? "capsule" : "sphere",
-                   shape.index_in_link, robot_.links[static_cast<std::size_t>(shape.link)].name);
+  const Link& link = robot_.links[static_cast<std::size_t>(shape.link)];
+  const auto index = static_cast<std::size_t>(shape.index_in_link);
+  const std::string& part = shape.is_capsule ? link.segments[index].part : link.spheres[index].part;
+  return formatted("{} {} of {} '{}'", shape.is_capsule ? "capsule" : "sphere", index,
+                   part.empty() ? "link" : "part", part.empty() ? link.name : part);
 }
 
 }  // namespace hamelin::model

@@ -23,6 +23,13 @@ using Eigen::VectorXd;
 
 constexpr int map_boxes_at_first = 64;
 
+scene::Environment make_environment(const simulation::PlantSetup& setup) {
+  const scene::Scene& scene = setup.scene;
+  const double beyond_m =
+      scene::payload_bounds(scene.events, setup.model, scene.name + ": /events").reach_m;
+  return scene::make_environment(scene, setup.model, beyond_m);
+}
+
 class MujocoPlant final : public simulation::Plant {
  public:
   explicit MujocoPlant(const simulation::PlantSetup& setup)
@@ -35,7 +42,7 @@ class MujocoPlant final : public simulation::Plant {
                      0.0,
                      "reached a state that MuJoCo rejects",
                      true},
-        environment_(scene::make_environment(setup.scene, setup.model, 0.0)),
+        environment_(make_environment(setup)),
         ws_(setup.model) {
     if (setup.scene.model.self_collision) self_.emplace(setup.model);
     build(environment_.map_field().empty() ? 0 : map_boxes_at_first);
@@ -68,6 +75,19 @@ class MujocoPlant final : public simulation::Plant {
     mju_copy(node_.v.data(), data_->qvel, model_->nv);
     arrive(!environment_.advance(node_.time_s).empty());
     return report_.converged = accepted();
+  }
+
+  void take_load() override {
+    ws_ = dynamics::Workspace(setup_.model);
+    if (self_) self_.emplace(setup_.model);
+    build(map_boxes_);
+    put_state();
+    arrive(true);
+  }
+
+  void change_map(const scene::MapChangeSpec& change) override {
+    environment_ = environment_.with_change(change);
+    arrive(true);
   }
 
   [[nodiscard]] integration::Energy energy() override {

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <limits>
 #include <memory>
+#include <set>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
@@ -48,6 +49,7 @@ class Reader {
     for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
       read(Reader((*list)[i], fmt::format("{}/{}", place_of(key), i)));
   }
+  [[nodiscard]] const std::string& place() const noexcept { return place_; }
   [[nodiscard]] std::string place_of(const char* key) const {
     return fmt::format("{}/{}", place_, key);
   }
@@ -214,14 +216,9 @@ std::vector<Obstacle> read_obstacles(const Reader& in, const std::filesystem::pa
   return out;
 }
 
-// @param not_before the time of the previous change [s]
-MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder,
-                              double not_before) {
+MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& folder) {
   MapChangeSpec change;
   change.time_s = in.get("time_s", 0.0);
-  if (change.time_s < not_before)
-    in.fail("time_s", fmt::format("{} s is before the change at {} s, expected changes by time",
-                                  change.time_s, not_before));
   if (const auto file = in.maybe<std::string>("file")) change.file = resolve_path(folder, *file);
   const auto boxes = [&](const char* key, std::vector<Box>& out) {
     for (const auto& six : in.get<std::vector<std::vector<double>>>(key, {})) {
@@ -290,6 +287,26 @@ JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers 
   return numbers;
 }
 
+Payload read_payload(const Reader& in) {
+  Payload payload;
+  payload.name = in.get("name", payload.name);
+  payload.mass_kg = in.get("mass_kg", 0.0);
+  payload.position_m = in.vector("position_m", Eigen::Vector3d::Zero());
+  const auto i = in.get<std::vector<double>>("inertia_kg_m2", {0, 0, 0, 0, 0, 0});
+  payload.inertia_kg_m2 << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  in.each("spheres", [&](const Reader& sphere) {
+    payload.spheres.push_back({sphere.vector("center_m", zero), sphere.get("radius_m", 0.0)});
+  });
+  in.each("capsules", [&](const Reader& capsule) {
+    payload.capsules.push_back({capsule.vector("from_m", zero), capsule.vector("to_m", zero),
+                                capsule.get("radius_m", 0.0)});
+  });
+  payload.shapes_known = in.get("shapes_known", true);
+  check(payload, in.place());
+  return payload;
+}
+
 ModelFlags read_model(const Reader& in) {
   ModelFlags model;
   model.joint_damping = read_joint_numbers(in, "joint_damping", model.joint_damping);
@@ -300,15 +317,7 @@ ModelFlags read_model(const Reader& in) {
   model.velocity_limits = in.get("velocity_limits", false);
   model.torque_limits = in.get("torque_limits", false);
   model.self_collision = in.get("self_collision", false);
-  if (in.find("payload") != nullptr) {
-    const Reader body = in.child("payload");
-    Payload payload;
-    payload.mass_kg = body.get("mass_kg", 0.0);
-    payload.position_m = body.vector("position_m", Eigen::Vector3d::Zero());
-    const auto i = body.get<std::vector<double>>("inertia_kg_m2", {0, 0, 0, 0, 0, 0});
-    payload.inertia_kg_m2 << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
-    model.payload = payload;
-  }
+  if (in.find("payload") != nullptr) model.payload = read_payload(in.child("payload"));
   return model;
 }
 
@@ -426,10 +435,54 @@ MapSpec read_map_spec(const Reader& in, const std::filesystem::path& folder) {
     map.self_filter_padding_m =
         in.child("self_filter").get("padding_m", default_self_filter_padding_m);
   in.each("changes", [&](const Reader& change) {
-    map.changes.push_back(
-        read_map_change(change, folder, map.changes.empty() ? 0.0 : map.changes.back().time_s));
+    const double last_s = map.changes.empty() ? 0.0 : map.changes.back().time_s;
+    map.changes.push_back(read_map_change(change, folder));
+    if (const double time_s = map.changes.back().time_s; time_s < last_s)
+      change.fail("time_s", fmt::format("{} s is before the change at {} s, expected changes by "
+                                        "time",
+                                        time_s, last_s));
   });
   return map;
+}
+
+std::vector<Event> read_events(const Reader& in, const std::filesystem::path& folder,
+                               const Scene& scene) {
+  std::vector<Event> out;
+  std::set<std::string> attached;
+  if (scene.model.payload) attached.insert(scene.model.payload->name);
+  in.each("events", [&](const Reader& given) {
+    Event event;
+    event.time_s = given.maybe<double>("time_s");
+    event.goals_reached = given.maybe<std::size_t>("goals_reached");
+    if (event.time_s.has_value() == event.goals_reached.has_value())
+      given.fail("time_s", event.time_s ? "is given in addition to goals_reached, expected one of "
+                                          "the two"
+                                        : "is missing, expected time_s or goals_reached");
+    if (event.goals_reached && *event.goals_reached >= scene.goals.size())
+      given.fail("goals_reached",
+                 fmt::format("is {}, expected less than the number of goals, {}, because the run "
+                             "ends with the last one",
+                             *event.goals_reached, scene.goals.size()));
+    if (given.find("attach") != nullptr) event.attach = read_payload(given.child("attach"));
+    event.detach = given.maybe<std::string>("detach");
+    event.required = given.get("required", true);
+    if (given.find("map") != nullptr) event.map = read_map_change(given.child("map"), folder);
+    if (event.attach && event.detach)
+      given.fail("detach", "is given in addition to attach, expected one of the two");
+    if (!event.attach && !event.detach && !event.map)
+      given.fail("attach", "is missing, expected attach, detach or map");
+    if (event.map && !scene.map) given.fail("map", "there is no map, expected one in the scene");
+    if (event.attach && !attached.insert(event.attach->name).second)
+      given.fail("attach/name",
+                 fmt::format("'{}' is attached already, expected another name or a detach before",
+                             event.attach->name));
+    if (event.detach && attached.erase(*event.detach) == 0)
+      given.fail("detach",
+                 fmt::format("'{}' is not attached, expected what an earlier event attaches",
+                             *event.detach));
+    out.push_back(std::move(event));
+  });
+  return out;
 }
 
 }  // namespace
@@ -479,6 +532,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.actuation = read_actuation(in.child("actuation"), scene.step_s);
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
   scene.safety = read_safety(in.child("safety"), scene);
+  scene.events = read_events(in, base_dir, scene);
   return scene;
 }
 
@@ -492,6 +546,8 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)
     if (change.file) files.push_back(*change.file);
+  for (const Event& event : scene.events)
+    if (event.map && event.map->file) files.push_back(*event.map->file);
   return files;
 }
 

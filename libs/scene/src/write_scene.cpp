@@ -92,6 +92,38 @@ Json joint_numbers_json(const JointNumbers& numbers) {
   return numbers.values.empty() ? Json(0.0) : one_or_list(numbers.values);
 }
 
+Json payload_json(const Payload& payload) {
+  const Eigen::Matrix3d& I = payload.inertia_kg_m2;
+  Json out{{"name", payload.name},
+           {"mass_kg", payload.mass_kg},
+           {"position_m", array(payload.position_m)},
+           {"inertia_kg_m2", {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}},
+           {"spheres", Json::array()},
+           {"capsules", Json::array()},
+           {"shapes_known", payload.shapes_known}};
+  for (const model::Sphere& sphere : payload.spheres)
+    out["spheres"].push_back({{"center_m", array(sphere.center_m)}, {"radius_m", sphere.radius_m}});
+  for (const model::Segment& capsule : payload.capsules)
+    out["capsules"].push_back({{"from_m", array(capsule.from_m)},
+                               {"to_m", array(capsule.to_m)},
+                               {"radius_m", capsule.radius_m}});
+  return out;
+}
+
+Json event_json(const Event& event) {
+  Json out = Json::object();
+  if (event.time_s) out["time_s"] = *event.time_s;
+  if (event.goals_reached) out["goals_reached"] = *event.goals_reached;
+  if (event.attach) out["attach"] = payload_json(*event.attach);
+  if (event.detach) out["detach"] = *event.detach;
+  if (event.map) {
+    out["map"] = change_json(*event.map);
+    out["map"].erase("time_s");
+  }
+  out["required"] = event.required;
+  return out;
+}
+
 Json model_json(const ModelFlags& model) {
   Json out{{"joint_damping", joint_numbers_json(model.joint_damping)},
            {"friction", joint_numbers_json(model.friction)},
@@ -102,11 +134,7 @@ Json model_json(const ModelFlags& model) {
            {"torque_limits", model.torque_limits},
            {"self_collision", model.self_collision},
            {"payload", nullptr}};
-  if (!model.payload) return out;
-  const Eigen::Matrix3d& I = model.payload->inertia_kg_m2;
-  out["payload"] = {{"mass_kg", model.payload->mass_kg},
-                    {"position_m", array(model.payload->position_m)},
-                    {"inertia_kg_m2", {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}}};
+  if (model.payload) out["payload"] = payload_json(*model.payload);
   return out;
 }
 
@@ -288,6 +316,7 @@ Json resolved_json(const Scene& scene) {
   out["map"] = scene.map ? map_json(*scene.map) : Json(nullptr);
   out["obstacles"] = Json::array();
   for (const Obstacle& obstacle : scene.obstacles) out["obstacles"].push_back(to_json(obstacle));
+  for (const Event& event : scene.events) out["events"].push_back(event_json(event));
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};

@@ -22,6 +22,8 @@ class Actuation {
   virtual void reach_node() {}
   /// Reserves memory for answers with so many gyroscopic terms.
   virtual void reserve(std::size_t) {}
+  /// The arm carries something else: the model has changed, in place.
+  virtual void take_load() {}
   /// The state that the controller is shown at a tick.
   virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
   /// Whether the planner is called at node k.

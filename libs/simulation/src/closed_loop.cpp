@@ -41,6 +41,9 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
       if (const auto& file = scene.map->changes[i].file)
         inputs.push_back({fmt::format("map_change_{}", i), *file});
   }
+  for (std::size_t i = 0; i < scene.events.size(); ++i)
+    if (const auto& map = scene.events[i].map; map && map->file)
+      inputs.push_back({fmt::format("event_map_{}", i), *map->file});
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
     if (const auto file = scene::waypoint_file(scene.obstacles[i]); !file.empty())
       inputs.push_back({fmt::format("waypoints_{}", i), file});
@@ -54,7 +57,7 @@ bool controller_sees_all(const scene::Scene& scene) {
   const bool exact =
       scene.actuation.joint_noise_rad == 0.0 && scene.actuation.planner_mass_scale == 1.0 &&
       !scene.actuation.estimates_velocity && scene.actuation.type != scene::ActuationType::position;
-  return exact && !(scene.map && !scene.map->changes.empty()) &&
+  return exact && scene.events.empty() && !(scene.map && !scene.map->changes.empty()) &&
          std::all_of(scene.obstacles.begin(), scene.obstacles.end(),
                      [](const auto& o) { return o.known && !o.judge_only; });
 }
@@ -125,7 +128,8 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       model_(load_checked(scene)),
       limits_(control::modelled_limits(scene, model_.robot())),
       q_shown_(VectorXd::Zero(model_.dof())),
-      v_shown_(q_shown_) {
+      v_shown_(q_shown_),
+      bare_(model_) {
   make_plant(plant_factory);
   result_.warnings = model::warnings(model_.robot());
   const planning::Plugin plugin = control::find_planner(scene, plugin_directories);
@@ -223,12 +227,9 @@ void ClosedLoop::start(const Watch& watch) {
   const bool ideal = scene_.actuation.type == scene::ActuationType::ideal;
   audit_ =
       std::make_unique<EnergyAudit>(*recorder_, ideal && plant.integrator == "hamel-variational");
-  log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, controller_->goals(),
-                                   *actuation_, controller_->shield());
+  log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, *controller_, *actuation_);
   result_.provenance = log::provenance(inputs_, watch.argv);
-  if (recorder_->logging())
-    log_->header(scene_, controller_->plugin(), planner_params_, controller_->series(),
-                 result_.provenance, steps_);
+  if (recorder_->logging()) log_->header(scene_, planner_params_, result_.provenance, steps_);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = judge_->influence_m();
   min_self_clearance_ = judge_->self_influence_m();
@@ -351,6 +352,8 @@ void ClosedLoop::check_outcome() {
   if (done_) return;
   const bool tick = actuation_->asks_planner(node.k);
   if (tick) let_controller_observe();
+  if (tick && next_event_ < scene_.events.size()) advance_events();
+  if (done_) return;
   const control::ControlState now = controller_->answer().state;
   if (now == control::ControlState::reached && arrived())
     finish(log::Outcome::reached, "");

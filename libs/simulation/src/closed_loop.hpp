@@ -45,6 +45,18 @@ class ClosedLoop {
   /// Shows the controller obstacles that come into sight.
   void reveal_obstacles();
   void change_map();
+
+  // Of the scene's events, in load_events.cpp.
+  /// Begins events that are due, and completes one that the controller has carried out.
+  void advance_events();
+  [[nodiscard]] bool is_due(const scene::Event& event) const;
+  void begin(const scene::Event& event);
+  /// What the controller has accepted becomes true of the arm, the map and the judge.
+  void complete(const scene::Event& event);
+  /// The arm carries what `carried_` lists from this node on.
+  void take_load();
+  /// The controller has refused to carry what an event attaches.
+  void note_refused_load(const scene::Event& event);
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
   /// Whether the shield's stop has brought the arm to rest.
@@ -118,8 +130,11 @@ class ClosedLoop {
   bool halting_ = false;        ///< whether the run ends when the shield's stop does
   double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
   long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;
-  std::size_t next_map_change_ = 0, goals_reached_ = 0;
-  long observed_k_ = -1;  ///< the step at which the controller last looked
+  std::size_t next_map_change_ = 0, goals_reached_ = 0, next_event_ = 0;
+  model::Model bare_;                    ///< the arm without what events attach to it
+  std::vector<scene::Payload> carried_;  ///< attached by events
+  std::uint64_t expected_load_ = 0;      ///< of the event that has begun; 0: none has
+  long observed_k_ = -1;                 ///< the step at which the controller last looked
 };
 
 }  // namespace hamelin::simulation

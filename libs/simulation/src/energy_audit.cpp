@@ -35,6 +35,10 @@ void EnergyAudit::book_node_velocity(double work_J, const hamelin_command& answe
   book_filter(answer);
 }
 
+void EnergyAudit::book_load(double energy_J) noexcept {
+  ledger_.load += energy_J;
+}
+
 void EnergyAudit::book_filter(const hamelin_command& answer) noexcept {
   ledger_.filter += answer.filter_work_J;
   ledger_.recovery += answer.recovery_work_J;

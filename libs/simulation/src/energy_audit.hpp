@@ -27,6 +27,8 @@ class EnergyAudit {
   void note_potential() noexcept { has_potential_ = true; }
   /// Books the work of a node velocity, docs/theory.md (8.6), and how the planner splits it.
   void book_node_velocity(double work_J, const hamelin_command& answer) noexcept;
+  /// Books the energy that comes with what is attached, or goes with what is detached.
+  void book_load(double energy_J) noexcept;
   void book_filter(const hamelin_command& answer) noexcept;
   /// @param stopping whether a stop of the shield held the torque
   void book_step(const integration::StepReport& report, bool stopping) noexcept {

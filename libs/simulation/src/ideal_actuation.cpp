@@ -36,6 +36,12 @@ class IdealActuation final : public Actuation {
   void reserve(std::size_t gyroscopic_terms) override {
     arm_.channels.gyroscopic.reserve(gyroscopic_terms);
   }
+  // The planner of the arm with the other load begins anew, so nothing is left to be closed.
+  void take_load() override {
+    kicked_ = false;
+    gradient_.setZero();
+    gradient_before_.setZero();
+  }
   void observe(VectorXd& q, VectorXd& v) override {
     q = arm_.node().q;
     v = arm_.node().v;

@@ -159,6 +159,7 @@ Json energy_json(const Ledger& ledger) {
            {"dissipated_J", ledger.dissipated}, {"held_work_J", ledger.held},
            {"node_work_J", ledger.node}};
   if (ledger.stop != 0.0) out["stop_work_J"] = ledger.stop;
+  if (ledger.load != 0.0) out["load_energy_J"] = ledger.load;
   return out;
 }
 

@@ -25,6 +25,7 @@ struct Ledger {
   double stop = 0.0;                                      ///< of the shield's stops
   double node = 0.0;                    ///< of node velocities: law, filter and recovery together
   double filter = 0.0, recovery = 0.0;  ///< parts of `node`, by the planner's account
+  double load = 0.0;                    ///< that came with attached objects
 
   void book(const integration::StepReport& report, bool stopping) noexcept {
     gyroscopic += report.gyroscopic_work_J;
@@ -32,7 +33,7 @@ struct Ledger {
     dissipated += report.dissipated_J;
   }
   [[nodiscard]] double balance() const noexcept {
-    return kinetic + potential + control - (gyroscopic + held + stop - dissipated + node);
+    return kinetic + potential + control - (gyroscopic + held + stop - dissipated + node + load);
   }
 };
 

@@ -87,6 +87,9 @@ std::vector<std::pair<std::string, std::string>> file_pointers(const Json& confi
   const Json::json_pointer changes("/map/changes");
   for (std::size_t i = 0; config.contains(changes) && i < config[changes].size(); ++i)
     places.emplace_back(fmt::format("map_change_{}", i), fmt::format("/map/changes/{}/file", i));
+  const Json::json_pointer events("/events");
+  for (std::size_t i = 0; config.contains(events) && i < config[events].size(); ++i)
+    places.emplace_back(fmt::format("event_map_{}", i), fmt::format("/events/{}/map/file", i));
   const Json::json_pointer obstacles("/obstacles");
   for (std::size_t i = 0; config.contains(obstacles) && i < config[obstacles].size(); ++i)
     places.emplace_back(fmt::format("waypoints_{}", i),

@@ -148,7 +148,9 @@ class ServoActuation final : public SampledActuation {
         kv_(servo_values(scene, scene.actuation.servo.kv, "kv", model.dof())),
         dynamic_(scene.actuation.servo.feedforward == scene::Feedforward::dynamics),
         period_s_(scene.actuation.control_period_s),
-        nominal_(control::scaled_masses(model, scene.actuation.planner_mass_scale)),
+        arm_(model),
+        mass_scale_(scene.actuation.planner_mass_scale),
+        nominal_(control::scaled_masses(model, mass_scale_)),
         ws_(nominal_),
         encoders_(scene),
         point_{plant.node().q, plant.node().v},
@@ -160,6 +162,11 @@ class ServoActuation final : public SampledActuation {
     check_stability(scene, model);
   }
 
+  void take_load() override {
+    nominal_ = control::scaled_masses(arm_, mass_scale_);
+    ws_ = dynamics::Workspace(nominal_);
+    feed_forward();
+  }
   void observe(VectorXd& q, VectorXd& v) override {
     q = sent_.q;
     v = sent_.v;
@@ -222,6 +229,8 @@ class ServoActuation final : public SampledActuation {
   VectorXd kp_, kv_, effort_max_;
   bool dynamic_;  ///< whether the set point's motion is fed forward
   double period_s_;
+  const model::Model& arm_;
+  double mass_scale_;
   model::Model nominal_;  ///< the arm as its drives know it
   dynamics::Workspace ws_;
   Encoders encoders_;

@@ -13,6 +13,8 @@ SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm,
       ws(arm),
       integrator(integration::make_integrator(scene.integrator.name, arm, options)),
       own_damping(plant_damping(scene, arm.robot())),
+      scheme_(scene.integrator.name),
+      options_(options),
       description_{"hamelin",
                    "hamelin",
                    std::string(version()),
@@ -31,6 +33,17 @@ SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm,
 void SimulatedArm::start(const VectorXd& q, const VectorXd& v) {
   state = integrator->start(q, v);
   node_ = {0, 0.0, q, v};
+  update_velocity();
+}
+
+// Schemes of more than one step begin again, as they do at the start of a run.
+void SimulatedArm::take_load() {
+  ws = dynamics::Workspace(model);
+  integrator = integration::make_integrator(scheme_, model, options_);
+  const VectorXd v = node_.v;
+  state = integrator->start(node_.q, v);
+  state.k = node_.k;
+  state.time_s = node_.time_s;
   update_velocity();
 }
 

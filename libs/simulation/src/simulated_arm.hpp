@@ -19,6 +19,7 @@ class SimulatedArm final : public Plant {
   [[nodiscard]] const Description& description() const noexcept override { return description_; }
   void start(const Eigen::VectorXd& q, const Eigen::VectorXd& v) override;
   [[nodiscard]] bool step(const Eigen::VectorXd& torque, double step_s) override;
+  void take_load() override;
   [[nodiscard]] integration::Energy energy() override { return integrator->energy(state, node_.v); }
 
   /// Advances with the channels as they are. The node's velocity is updated by update_velocity().
@@ -39,6 +40,8 @@ class SimulatedArm final : public Plant {
  private:
   /// Makes the state the node.
   void reach(double step_s);
+  std::string scheme_;
+  integration::Parameters options_;
   Description description_;
 };
 

@@ -18,9 +18,9 @@ std::string obstacle_name(const scene::Environment& environment, int obstacle) {
 
 }  // namespace
 
-void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-                     const std::vector<planning::Series>& series, const Json& provenance,
+void TickLog::header(const scene::Scene& scene, const Json& params, const Json& provenance,
                      long steps) {
+  const planning::Plugin& plugin = controller_.plugin();
   Json config = resolved_config(scene);
   config["planner"]["params"] = params;
   Json fields{
@@ -33,7 +33,7 @@ void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, 
       {"plugin",
        {{"name", plugin.name()}, {"version", plugin.version()}, {"abi", plugin.abi_version()}}},
       {"provenance", provenance}};
-  for (const auto& one : series)
+  for (const auto& one : controller_.series())
     fields["series"].push_back({{"name", one.name}, {"unit", one.unit}});
   recorder_.header(std::move(fields), model_.robot(), steps);
 }
@@ -48,7 +48,7 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
               {"q", to_json(plant_.node().q)},
               {"v", to_json(plant_.node().v)},
               {"tau", to_json(torque_)},
-              {"goal_index", goals_.index()},
+              {"goal_index", controller_.goals().index()},
               {"clearance_m", nullptr},
               {"closest", nullptr},
               {"energy", energy_json(recorder_.last_node())},
@@ -58,18 +58,19 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   if (answer != nullptr)
     for (const double value : answer->series())
       fields["series"].push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
-  if (shield_ != nullptr && acts && shield_->stopping()) {
-    fields["stop"] = {{"cause", to_string(shield_->refusal().cause)},
-                      {"q_end", to_json(shield_->stop().end())}};
-    if (shield_->stop().moves()) fields["stop"]["evades"] = true;
+  const control::Shield* const shield = controller_.shield();
+  if (shield != nullptr && acts && shield->stopping()) {
+    fields["stop"] = {{"cause", to_string(shield->refusal().cause)},
+                      {"q_end", to_json(shield->stop().end())}};
+    if (shield->stop().moves()) fields["stop"]["evades"] = true;
   }
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
-  if (world_.has_self()) fields["self_clearance_m"] = world_.self_clearance_m();
-  if (world_.has_obstacles()) {
-    fields["clearance_m"] = world_.clearance_m();
-    if (const auto* nearest = world_.nearest())
+  if (world_->has_self()) fields["self_clearance_m"] = world_->self_clearance_m();
+  if (world_->has_obstacles()) {
+    fields["clearance_m"] = world_->clearance_m();
+    if (const auto* nearest = world_->nearest())
       fields["closest"] = {{"sphere", nearest->sphere},
-                           {"obstacle", obstacle_name(world_.environment(), nearest->obstacle)}};
+                           {"obstacle", obstacle_name(world_->environment(), nearest->obstacle)}};
   }
   recorder_.tick(plant_.node().k, std::move(fields));
 }

@@ -3,9 +3,7 @@
 #include <vector>
 
 #include "actuation.hpp"
-#include "hamelin/control/goal_tracker.hpp"
-#include "hamelin/control/planner_host.hpp"
-#include "hamelin/control/shield.hpp"
+#include "hamelin/control/controller.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "recorder.hpp"
 
@@ -16,21 +14,20 @@ class TickLog {
  public:
   /// @param world all obstacles, those that the planner does not know included
   TickLog(Recorder& recorder, const model::Model& model, const Plant& plant,
-          const control::WorldView& world, const control::GoalTracker& goals, Actuation& actuation,
-          const control::Shield* shield)
+          const control::WorldView& world, control::Controller& controller, Actuation& actuation)
       : recorder_(recorder),
         model_(model),
         plant_(plant),
-        world_(world),
-        goals_(goals),
-        actuation_(actuation),
-        shield_(shield) {
+        world_(&world),
+        controller_(controller),
+        actuation_(actuation) {
     torque_.setZero(model.dof());
   }
 
-  /// @param params the planner's, with defaults @param series that it declared
-  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-              const std::vector<planning::Series>& series, const Json& provenance, long steps);
+  /// @param params the planner's, with defaults
+  void header(const scene::Scene& scene, const Json& params, const Json& provenance, long steps);
+  /// The judge's view is another one from now on.
+  void set_world(const control::WorldView& world) noexcept { world_ = &world; }
   /// Writes the line of this node. @param answer the planner's, which acts from here on; null if
   /// there is none
   void tick(bool certified, const planning::CommandBuffers* answer);
@@ -39,11 +36,10 @@ class TickLog {
   Recorder& recorder_;
   const model::Model& model_;
   const Plant& plant_;
-  const control::WorldView& world_;
-  const control::GoalTracker& goals_;
+  const control::WorldView* world_;
+  control::Controller& controller_;
   Actuation& actuation_;
-  const control::Shield* shield_;  ///< null if the scene asks for none
-  Eigen::VectorXd torque_;         ///< of the last node with an answer
+  Eigen::VectorXd torque_;  ///< of the last node with an answer
 };
 
 }  // namespace hamelin::simulation

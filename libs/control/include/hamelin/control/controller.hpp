@@ -1,25 +1,23 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/loaded_arm.hpp"
 #include "hamelin/control/newest.hpp"
-#include "hamelin/control/planner_host.hpp"
-#include "hamelin/control/shield.hpp"
 #include "hamelin/control/state_estimator.hpp"
-#include "hamelin/control/torque_limits.hpp"
-#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/control/world.hpp"
-#include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
 
@@ -47,6 +45,10 @@ struct Answer {
   std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
   /// Number of the World's snapshot that the answer is for.
   std::uint64_t snapshot = 0;
+  /// Number of what the arm carries: 0 at first, else what attach() or detach() returned last of
+  /// those that took effect; and of the last one that was refused, with the reason, one line.
+  std::uint64_t load = 0, refused_load = 0;
+  std::string_view load_refusal;
   /// The planner's own figures, see Controller::series(); NaN where it set none.
   std::span<const double> series;
   /// Time that the planner took by Options::clock_s [s], and in how many ticks since the start it
@@ -80,6 +82,11 @@ struct ControllerOptions {
   /// The planner has failed after so many answers in a row beyond the deadline; 0: never. Single
   /// late answers are used. Without a clock none is late.
   int late_answers_max = 10;
+  /// How far payloads that are attached later extend beyond the tip [m], and how many shapes they
+  /// have together; none: as the scene's events say. What the arm can reach is known so much
+  /// farther.
+  std::optional<double> payload_reach_m;
+  std::optional<std::size_t> payload_shapes_max;
   /// Receives the planner's messages on the thread that calls the planner; empty: none.
   PlannerHost::LineSink log;
   /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
@@ -126,6 +133,23 @@ class Controller {
   std::uint64_t set_goals(std::vector<scene::Goal> goals);
   std::uint64_t set_goal(scene::Goal goal) { return set_goals({std::move(goal)}); }
 
+  /// Fixes a body to the tip, from the next tick on: its mass joins the model of the arm, its
+  /// shapes those of the arm, except that parts that it touches at q may go on to touch it. The
+  /// planner is made again for the arm as it is then, and forgets what it learnt on the way. The
+  /// tick refuses the payload if its shapes are in contact, or a shield finds no way to stop with
+  /// it: then the arm goes on without it, see Answer::load_refusal. Any thread; this takes
+  /// milliseconds.
+  /// @param q configuration in which it is attached; dof numbers
+  /// @return the number of what the arm carries then, see Answer::load
+  /// @throws Error invalid for a payload that check() refuses, of a name that is in use, or that
+  ///         exceeds Options::payload_reach_m or payload_shapes_max; nothing changes then
+  std::uint64_t attach(const scene::Payload& payload, const Eigen::VectorXd& q);
+  /// Takes it off again, from the next tick on. Any thread; this takes milliseconds.
+  /// @throws Error invalid if nothing of this name is attached
+  std::uint64_t detach(std::string_view name, const Eigen::VectorXd& q);
+  /// The names of what is attached, or will be at the next tick. Any thread.
+  [[nodiscard]] std::vector<std::string> attached() const;
+
   /// Changes parameters of the planner, from the next tick on. Any thread.
   /// @param changes an object with those that change; the others stay
   /// @throws Error invalid for values that the planner's schema or the planner refuses, also if it
@@ -150,6 +174,10 @@ class Controller {
   void decide();
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
+  /// Brings the arm to rest from the next answer on, as if the planner had failed. For the thread
+  /// of tick(). @param cause for Answer::cause; must outlive this
+  void stop(std::string_view cause) { start_braking(cause); }
+
   /// The proof for the motion between the last two ticks; empty after the first one and without
   /// Options::certify.
   [[nodiscard]] const std::optional<Certificate::Verdict>& verdict() const noexcept {
@@ -160,22 +188,25 @@ class Controller {
   void reset();
 
   /// The scene's shield; null if it asks for none.
-  [[nodiscard]] Shield* shield() noexcept { return shield_.get(); }
+  [[nodiscard]] Shield* shield() noexcept { return arm_->shield.get(); }
   /// What the shield keeps the arm from, at the last tick.
   [[nodiscard]] Shield::Surroundings surroundings() const noexcept {
-    return {view_.environment(), view_.snapshot(), time_s_};
+    return {arm_->view.environment(), arm_->view.snapshot(), time_s_};
   }
 
-  /// What it sees. A caller may look() at and certify() the motion between ticks with it.
-  [[nodiscard]] WorldView& view() noexcept { return view_; }
+  /// What it sees, until the load changes. A caller may look() at and certify() the motion between
+  /// ticks with it.
+  [[nodiscard]] WorldView& view() noexcept { return arm_->view; }
+  /// The controller's model of the arm with what it carries, until the load changes.
+  [[nodiscard]] const model::Model& model() const noexcept { return arm_->model; }
   /// The state that the last tick acted on: as measured, or as estimated.
   [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
   [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
   [[nodiscard]] const GoalTracker& goals() const noexcept { return goals_; }
-  [[nodiscard]] const planning::Plugin& plugin() const noexcept { return planner_.plugin(); }
+  [[nodiscard]] const planning::Plugin& plugin() const noexcept { return plugin_; }
   /// The numeric series that the planner declared, in the order of Answer::series.
   [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
-    return planner_.series();
+    return arm_->planner.series();
   }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
@@ -188,8 +219,21 @@ class Controller {
     std::uint64_t number = 0;
     std::optional<planning::PreparedParams> params;
   };
-  [[nodiscard]] std::unique_ptr<Shield> make_shield();
-  [[nodiscard]] planning::SetupData make_setup();
+  /// What the arm carries, on its way to the tick.
+  struct NewLoad {
+    std::uint64_t number = 0;
+    std::uint64_t params_number = 0;  ///< of the parameters that its planner was made with
+    std::unique_ptr<LoadedArm> arm;   ///< after it was taken: the one before
+  };
+  [[nodiscard]] LoadedArm::Common common() noexcept;
+  /// Publishes an arm with other payloads. The caller has locked load_mutex_.
+  std::uint64_t publish_load(std::vector<scene::Payload> payloads, const Eigen::VectorXd& q);
+  /// What is attached, or will be if the tick does not refuse it. The caller has locked
+  /// load_mutex_.
+  [[nodiscard]] const std::vector<scene::Payload>& payloads() const;
+  void take_load();
+  /// Why the arm cannot begin with the load; empty if it can.
+  [[nodiscard]] std::string load_defect(LoadedArm& fresh);
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
   void start_outputs();
@@ -214,30 +258,29 @@ class Controller {
   Options options_;
   double period_s_, deadline_s_;
   std::size_t path_points_max_;
-  model::Model nominal_;                         ///< the planner's model of the arm
+  planning::Plugin plugin_;
+  model::Model nominal_;  ///< the planner's model of the arm, without what is attached later
   Eigen::VectorXd acceleration_max_, jerk_max_;  ///< of each joint, of positions
   World world_;
-  WorldView view_;
-  std::unique_ptr<Shield> shield_;
-  bool shielded_ = false;  ///< whether the shield has started
-  PlannerHost planner_;
+  Json params_;                     ///< of the planner, as last set
+  std::unique_ptr<LoadedArm> arm_;  ///< that the tick uses
+  bool shielded_ = false;           ///< whether the shield has started
   // Each is among writers; the tick takes none.
-  std::mutex goals_mutex_;
-  mutable std::mutex params_mutex_;
-  std::uint64_t goals_number_ = 0, params_number_ = 0;  ///< of the newest, for writers
-  Json params_;
+  mutable std::mutex goals_mutex_, load_mutex_;
+  std::uint64_t goals_number_ = 0, params_number_ = 0, load_number_ = 0;  ///< of the newest
+  std::vector<scene::Goal> newest_goals_;
+  LoadedArm* newest_arm_;  ///< for writers: the last that was published, or the first
+  std::vector<scene::Payload> attached_, accepted_;  ///< with the newest load, and one in use
+  std::atomic<std::uint64_t> refused_load_{0}, used_load_{0};
   Newest<GoalList> new_goals_;
   Newest<NewParams> new_params_;
+  Newest<NewLoad> new_load_;
   const GoalList* goal_list_;  ///< that the tick uses
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
   GoalTracker goals_;
   std::optional<StateEstimator> estimator_;
   std::vector<Eigen::VectorXd> issued_;  ///< for the estimator: torques, or accelerations
-  TorqueLimits limits_;
-  ChannelSum sum_;
-  dynamics::Workspace ws_;
-  std::optional<TorquePipeline> pipeline_;  ///< with a shield, where torques are the output
   /// What the shield starts from: where friction is not known, an estimate lags behind.
   Eigen::VectorXd q_measured_;
   Eigen::VectorXd point_q_, point_v_;  ///< set point of the last tick
@@ -249,7 +292,8 @@ class Controller {
   std::string_view failure_;
   int late_answers_ = 0;             ///< in a row
   std::array<char, 192> late_line_;  ///< memory of failure_ where answers were late
-  bool reset_ = false;               ///< whether the planner is to be told of a new start
+  std::string load_refusal_;
+  bool reset_ = false;  ///< whether the planner is to be told of a new start
   double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
   Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest

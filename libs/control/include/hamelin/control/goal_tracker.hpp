@@ -39,6 +39,8 @@ class GoalTracker {
     goals_ = &goals;
     restart();
   }
+  /// The arm carries something else. `model` must outlive this, or stay until the next call.
+  void set_model(const model::Model& model) noexcept { model_ = &model; }
   /// Starts again with the first goal.
   void restart() noexcept {
     index_ = 0;
@@ -61,7 +63,7 @@ class GoalTracker {
  private:
   const std::vector<scene::Goal>* goals_;
   const std::optional<scene::StallRule>& rule_;
-  const model::Model& model_;
+  const model::Model* model_;
   std::size_t index_ = 0;
   double rest_s_ = 0.0;
 };

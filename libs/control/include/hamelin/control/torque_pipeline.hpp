@@ -33,6 +33,8 @@ class TorquePipeline {
 
   /// Forgets the past: this torque has acted and will act.
   void start_from(const Eigen::VectorXd& torque);
+  /// Goes on where that of the arm with another load was.
+  void continue_from(const TorquePipeline& other);
   /// Sends the torque of this tick.
   void send(const Eigen::VectorXd& torque);
   /// The torque that was sent last.

@@ -41,6 +41,9 @@ class World {
     /// ever allocates or waits.
     bool prepare = true;
     ObservationOptions observations{};  ///< of the poses that observe_obstacle() is given
+    /// How far beyond the arm's reach payloads extend [m], and how many shapes they have.
+    double payload_reach_m = 0.0;
+    std::size_t payload_shapes = 0;
   };
 
   /// The surroundings of a scene: its map with unknown space and self-filter, and its obstacles,
@@ -99,8 +102,14 @@ class World {
   /// The newest snapshot, valid until the next call. For the thread of the control loop: never
   /// waits, never allocates.
   [[nodiscard]] View& take() noexcept { return newest_->take(); }
+  /// The newest snapshot with working memory of its own. Any thread; this allocates.
+  [[nodiscard]] View view_of_latest() const;
 
   [[nodiscard]] double influence_m() const noexcept { return options_.influence_m; }
+  /// The largest number of shapes of an arm, payloads included.
+  [[nodiscard]] std::size_t shapes_max() const noexcept;
+  /// Map and obstacles are known as far as such an arm can reach [m].
+  [[nodiscard]] double reach_m() const noexcept;
   [[nodiscard]] std::size_t obstacles_max() const noexcept { return options_.obstacles_max; }
   /// The largest number of contacts that a query can find.
   [[nodiscard]] std::size_t contacts_max() const noexcept { return contacts_max_; }

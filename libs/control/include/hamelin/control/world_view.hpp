@@ -19,7 +19,8 @@ namespace hamelin::control {
 
 /// The surroundings of the arm at a configuration: near points of obstacles and of its own parts,
 /// the smallest clearances, and the proof that the motion between two configurations was clear of
-/// both. One object per thread. After construction, only advance_map() allocates.
+/// both. One object per thread. After construction, only advance_map()
+/// and change_map() allocate.
 class WorldView {
  public:
   /// All obstacles of a scene, those that a planner is not shown included.
@@ -35,6 +36,11 @@ class WorldView {
   /// @param scene says whether self-collision is modelled and unknown space is crossed slowly
   /// @param world must outlive this
   WorldView(const scene::Scene& scene, const model::Model& model, World& world);
+  /// The surroundings of another view as they are, for the arm with another load.
+  /// @param other not one of a World
+  [[nodiscard]] static std::unique_ptr<WorldView> for_other_load(const scene::Scene& scene,
+                                                                 const model::Model& model,
+                                                                 const WorldView& other);
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
@@ -50,6 +56,9 @@ class WorldView {
   /// see Certificate.
   /// @param q the configuration of the last look() @param v velocity with which it was reached
   [[nodiscard]] Certificate::Verdict certify(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// Changes the map at once; only without a World. Results of the last look() still belong to the
+  /// old map. @throws Error io, parse or invalid
+  void change_map(const scene::MapChangeSpec& change);
   /// Applies the changes of the map that are due. Results of the last look() still belong to the
   /// old map.
   /// @return one line that describes them; empty if none was due
@@ -135,6 +144,7 @@ class WorldView {
   };
   WorldView(const scene::Scene& scene, const model::Model& model, double influence_m,
             std::optional<Own> own, World* world, std::size_t contacts_max);
+  void see(World::View& view);
   void update_obstacle_contacts();
   void update_self_contacts();
   void reveal_visible();
@@ -142,8 +152,9 @@ class WorldView {
   void update_clearances(std::span<const scene::Contact> contacts);
 
   const model::Model& model_;
-  std::optional<Own> own_;  ///< without a World
-  World* world_;            ///< null without one
+  std::optional<Own> own_;                 ///< without a World
+  World* world_;                           ///< null without one
+  std::optional<World::View> first_view_;  ///< of the world, until the first take_newest()
   const scene::Environment* environment_ = nullptr;
   scene::Environment::Scratch* scratch_ = nullptr;
   std::span<const std::int32_t> ids_;

@@ -62,7 +62,8 @@ class Model {
   [[nodiscard]] const std::vector<Shape>& shapes() const noexcept { return shapes_; }
   /// Whether any shape is a capsule.
   [[nodiscard]] bool has_capsules() const noexcept { return has_capsules_; }
-  /// A shape's description for messages, for example "sphere 2 of link 'forearm'".
+  /// A shape's description for messages, for example "sphere 2 of link 'forearm'", or "sphere 2 of
+  /// part 'cup'" for what was lumped into a link. The index is that in the link.
   [[nodiscard]] std::string describe(const Shape& shape) const;
 
   /// An upper bound over all q of the distance from the base to any point of a shape or to the tip

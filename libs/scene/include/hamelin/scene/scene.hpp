@@ -13,6 +13,7 @@
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/obstacles.hpp"
+#include "hamelin/scene/payload.hpp"
 
 namespace hamelin::scene {
 
@@ -53,14 +54,6 @@ struct Goal {
 struct JointNumbers {
   bool from_robot = false;     ///< the values of the robot file
   std::vector<double> values;  ///< else one value for all joints, one per joint, or none: zero
-};
-
-/// A body fixed to the tip.
-struct Payload {
-  double mass_kg = 0.0;
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< centre of mass, tip frame
-  /// About the centre of mass, tip frame's axes.
-  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
 };
 
 /// Default speed below which dry friction becomes viscous [rad/s or m/s].
@@ -161,6 +154,7 @@ struct Scene {
   std::vector<Goal> goals;
   std::optional<MapSpec> map;
   std::vector<Obstacle> obstacles;
+  std::vector<Event> events;  ///< happen in this order
   ModelFlags model;
   Actuation actuation;
   PlantType plant = PlantType::hamelin;

@@ -1,0 +1,72 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "hamelin/control/planner_host.hpp"
+#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/shield.hpp"
+#include "hamelin/control/torque_limits.hpp"
+#include "hamelin/control/torque_pipeline.hpp"
+#include "hamelin/control/world.hpp"
+#include "hamelin/control/world_view.hpp"
+#include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/payload.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::control {
+
+/// The arm as a controller knows it with what it carries, and all that depends on its masses and
+/// shapes: its view of the world, its shield, its planner, and how channels become a torque. Where
+/// something is attached or detached, another object takes its place: made on any thread, and
+/// taken over by that of the tick.
+struct LoadedArm {
+  /// What is the same for all loads.
+  struct Common {
+    const planning::Plugin& plugin;
+    World& world;
+    PlannerHost::LineSink log;
+    double period_s;
+    std::size_t path_points_max;
+    Shield::Drive drive;
+    /// Whether torques are the output, so that a shield must predict where they lead.
+    bool sends_torque;
+    std::size_t delay_periods;
+  };
+
+  /// @param scene start and goals are those that the planner is to begin with
+  /// @param nominal the controller's model of the arm, with what it carries
+  /// @param params of the planner, checked and with defaults
+  /// @throws Error plugin or invalid if the planner refuses to start
+  LoadedArm(const scene::Scene& scene, model::Model nominal, const Json& params,
+            const Common& common);
+  LoadedArm(const LoadedArm&) = delete;
+  LoadedArm& operator=(const LoadedArm&) = delete;
+
+  const model::Model model;
+  WorldView view;
+  std::unique_ptr<Shield> shield;  ///< null if the scene asks for none
+  PlannerHost planner;
+  TorqueLimits limits;
+  ChannelSum sum;
+  dynamics::Workspace ws;
+  std::optional<TorquePipeline> pipeline;  ///< with a shield, where torques are the output
+
+ private:
+  [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene,
+                                               const Common& common) const;
+};
+
+/// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is
+/// attached may go on to touch it.
+/// @param bare the arm without them @param touching how near counts as touching [m]
+/// @param self_collision whether it is modelled
+/// @param q configuration in which the last of them is attached; dof numbers
+/// @throws Error invalid for a name that a link or part of the robot has already
+[[nodiscard]] model::Model carrying(const model::Model& bare,
+                                    std::span<const scene::Payload> payloads, bool self_collision,
+                                    double touching_m, const Eigen::VectorXd& q);
+
+}  // namespace hamelin::control

@@ -1,0 +1,59 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hamelin/model/model.hpp"
+#include "hamelin/model/robot.hpp"
+#include "hamelin/scene/map_change.hpp"
+
+namespace hamelin::scene {
+
+/// A body fixed to the tip. All coordinates are in the tip's frame.
+struct Payload {
+  std::string name = "payload";  ///< of the part of the arm that its shapes form
+  double mass_kg = 0.0;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< centre of mass
+  /// About the centre of mass, in the axes of the tip's frame.
+  Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
+  std::vector<model::Sphere> spheres;    ///< `part` is not used
+  std::vector<model::Segment> capsules;  ///< `part` is not used
+  /// Whether the controller is told of its shapes; a run's judge knows them in any case.
+  bool shapes_known = true;
+};
+
+/// Checks a payload: finite numbers, mass and radii in range, a possible inertia, a name.
+/// @param where prefix of the message
+/// @throws Error invalid
+void check(const Payload& payload, const std::string& where);
+
+/// A robot with bodies fixed to its tip: their masses and inertias join those of the link that
+/// carries the tip, by the parallel-axis theorem. The shapes of each form a part of that link.
+/// @throws Error invalid for a name that a link or part of the robot has already
+[[nodiscard]] model::Robot with_payloads(model::Robot robot, std::span<const Payload> payloads);
+
+/// What happens during a run, once, at a time or when goals were reached.
+struct Event {
+  std::optional<double> time_s;              ///< not before this time; or
+  std::optional<std::size_t> goals_reached;  ///< not before so many goals are reached
+  std::optional<Payload> attach;             ///< fixed to the tip from then on
+  std::optional<std::string> detach;         ///< name of what is not fixed to it any more
+  std::optional<MapChangeSpec> map;          ///< its time is not used
+  /// Whether a run ends if the controller refuses what is attached; else it goes on without it.
+  bool required = true;
+};
+
+/// What events add to an arm at most.
+struct PayloadBounds {
+  double reach_m = 0.0;    ///< to Model::reach()
+  std::size_t shapes = 0;  ///< at a time
+};
+/// @param arm without what the events attach @param where prefix of messages
+/// @throws Error invalid for a payload that does not fit the arm
+[[nodiscard]] PayloadBounds payload_bounds(std::span<const Event> events, const model::Model& arm,
+                                           const std::string& where);
+
+}  // namespace hamelin::scene

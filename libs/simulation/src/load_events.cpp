@@ -1,0 +1,106 @@
+// What a scene's events do to a run: objects that are attached and detached, with the map.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "closed_loop.hpp"
+#include "hamelin/control/loaded_arm.hpp"
+
+namespace hamelin::simulation {
+
+namespace {
+
+constexpr double time_rounding_s = 1e-9;
+
+}  // namespace
+
+bool ClosedLoop::is_due(const scene::Event& event) const {
+  return event.time_s ? *event.time_s <= plant_->node().time_s + time_rounding_s
+                      : controller_->goals().index() >= *event.goals_reached;
+}
+
+// An event takes two ticks: the controller is told in the first, and has accepted or refused in the
+// second.
+void ClosedLoop::advance_events() {
+  const std::vector<scene::Event>& events = scene_.events;
+  if (expected_load_ != 0) {
+    const bool refused = controller_->answer().refused_load == expected_load_;
+    expected_load_ = 0;
+    const scene::Event& event = events[next_event_++];
+    if (refused) note_refused_load(event);
+    complete(event);
+  }
+  while (!done_ && next_event_ < events.size() && is_due(events[next_event_])) {
+    begin(events[next_event_]);
+    if (expected_load_ != 0) return;
+    complete(events[next_event_++]);
+  }
+}
+
+void ClosedLoop::begin(const scene::Event& event) {
+  if (event.map) controller_->world().change_map(*event.map);
+  if (event.attach) {
+    scene::Payload told = *event.attach;
+    if (!told.shapes_known) {
+      told.spheres.clear();
+      told.capsules.clear();
+    }
+    expected_load_ = controller_->attach(told, q_shown_);
+  }
+  const bool carried =
+      event.detach && std::any_of(carried_.begin(), carried_.end(),
+                                  [&](const auto& one) { return one.name == *event.detach; });
+  if (carried) expected_load_ = controller_->detach(*event.detach, q_shown_);
+}
+
+void ClosedLoop::note_refused_load(const scene::Event& event) {
+  const std::string& name = event.attach ? event.attach->name : *event.detach;
+  std::string cause =
+      fmt::format("'{}' cannot be {}: {}", name, event.attach ? "attached" : "detached",
+                  controller_->answer().load_refusal);
+  report_event(true, cause);
+  if (event.required) {
+    controller_->stop("the load is refused");
+    return finish_at_rest(log::Outcome::refused, std::move(cause));
+  }
+  result_.warnings.push_back(std::move(cause));
+}
+
+void ClosedLoop::complete(const scene::Event& event) {
+  const std::size_t before = carried_.size();
+  if (event.map) {
+    own_judge_->change_map(*event.map);
+    plant_->change_map(*event.map);
+    report_event(false, "the map changes");
+  }
+  const bool accepted = controller_->attached().size() != before;
+  if (accepted && event.attach) {
+    carried_.push_back(*event.attach);
+    recorder_->event(plant_->node().time_s, fmt::format("'{}' is attached", event.attach->name));
+  } else if (accepted) {
+    std::erase_if(carried_, [&](const auto& one) { return one.name == *event.detach; });
+    recorder_->event(plant_->node().time_s, fmt::format("'{}' is detached", *event.detach));
+  }
+  if (accepted) take_load();
+  judge_->look(plant_->node().q, plant_->node().time_s);
+  min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
+  min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
+  touching_ = judge_->touching();
+  if (touching_ && !done_) finish(log::Outcome::collision, describe_contact());
+}
+
+void ClosedLoop::take_load() {
+  const integration::Energy before = plant_->energy();
+  // in place: plant and actuation refer to it
+  model_ = control::carrying(bare_, carried_, scene_.model.self_collision, scene_.safety.margin_m,
+                             plant_->node().q);
+  plant_->take_load();
+  actuation_->take_load();
+  const integration::Energy after = plant_->energy();
+  audit_->book_load(after.kinetic_J + after.potential_J - before.kinetic_J - before.potential_J);
+  own_judge_ = control::WorldView::for_other_load(scene_, model_, *own_judge_);
+  judge_ = own_judge_.get();
+  log_->set_world(*judge_);
+}
+
+}  // namespace hamelin::simulation
