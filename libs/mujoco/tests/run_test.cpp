@@ -111,3 +111,19 @@ TEST_CASE("a run in MuJoCo repeats to the bit", "[mujoco]") {
   CHECK(verdict.ticks == 501);
   CHECK_FALSE(verdict.first_difference);
 }
+
+TEST_CASE("a can is carried through the shelf in MuJoCo, which counts no contact", "[mujoco]") {
+  scene::Scene scene = scene::read_scene(test::data / "scenes" / "shelf_carry.json");
+  scene.plant = scene::PlantType::mujoco;
+  scene.actuation.type = scene::ActuationType::sampled;
+  const log::Result result = run(scene);
+  CAPTURE(result.cause);
+  CHECK(result.outcome == log::Outcome::reached);
+  CHECK(result.plant->contacts == 0);
+  CHECK(*result.min_clearance_m > 0.003);
+  // what the controller is not told of is touched, by MuJoCo's count, too
+  scene.events[0].attach->shapes_known = false;
+  const log::Result unknown = run(scene);
+  CHECK(unknown.outcome == log::Outcome::collision);
+  CHECK(unknown.plant->contacts + unknown.plant->judge_contacts > 0);
+}
