@@ -22,7 +22,7 @@ struct hamelin_controller {
 
   hamelin::control::Controller controller;
   Eigen::VectorXd q, v;
-  std::array<char, 256> cause{};  ///< of the last answer, nul-terminated
+  std::array<char, 256> cause{}, load_refusal{};  ///< of the last answer, nul-terminated
 };
 
 namespace {
@@ -118,6 +118,25 @@ scene::Obstacle obstacle_of(const hamelin_obstacle& given) {
   return out;
 }
 
+scene::Payload payload_of(const hamelin_payload& given) {
+  scene::Payload out;
+  out.name = required(given.name, "payload: name");
+  out.mass_kg = given.mass_kg;
+  out.position_m = Eigen::Map<const Eigen::Vector3d>(given.position_m);
+  const double* i = given.inertia_kg_m2;
+  out.inertia_kg_m2 << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  if (given.shape_count > 0) (void)required(given.shapes, "payload: shapes");
+  for (std::size_t k = 0; k < given.shape_count; ++k) {
+    const hamelin_payload_capsule& shape = given.shapes[k];
+    const Eigen::Vector3d from(shape.from_m), to(shape.to_m);
+    if (from == to)
+      out.spheres.push_back({from, shape.radius_m});
+    else
+      out.capsules.push_back({from, to, shape.radius_m});
+  }
+  return out;
+}
+
 }  // namespace
 
 extern "C" {
@@ -147,6 +166,8 @@ hamelin_controller* hamelin_controller_create(const hamelin_controller_options* 
     std::vector<std::filesystem::path> plugins;
     for (std::size_t i = 0; i < given.plugin_directory_count; ++i)
       plugins.emplace_back(required(given.plugin_directories[i], "plugin_directories"));
+    if (given.payload_reach_m != 0.0) chosen.payload_reach_m = given.payload_reach_m;
+    if (given.payload_shapes_max > 0) chosen.payload_shapes_max = given.payload_shapes_max;
     made = std::make_unique<hamelin_controller>(required(given.scene_file, "scene_file"), plugins,
                                                 std::move(chosen))
                .release();
@@ -190,6 +211,10 @@ void hamelin_controller_tick(hamelin_controller* controller, double time_s, cons
   full.goals = answer.goals_number;
   full.planner_s = answer.planner_s;
   full.overruns = answer.overruns;
+  full.load = answer.load;
+  full.refused_load = answer.refused_load;
+  write_line(answer.load_refusal, controller->load_refusal.data(), controller->load_refusal.size());
+  full.load_refusal = controller->load_refusal.data();
   // A caller that was built against an earlier header has a shorter struct.
   std::memcpy(out, &full, std::min<std::size_t>(out->struct_size, sizeof full));
 }
@@ -228,6 +253,27 @@ std::int32_t hamelin_controller_set_planner_params(hamelin_controller* controlle
     const std::string place = "params_json";
     controller->controller.set_planner_params(
         parse_json(required(params_json, "params_json"), place));
+  });
+}
+
+std::int32_t hamelin_controller_attach(hamelin_controller* controller,
+                                       const hamelin_payload* payload, const double* q,
+                                       std::uint64_t* load, char* error, std::size_t error_size) {
+  return update(load, error, error_size, [&] {
+    const hamelin_payload given = complete(payload, sizeof(hamelin_payload), "payload");
+    return controller->controller.attach(
+        payload_of(given),
+        Eigen::Map<const Eigen::VectorXd>(required(q, "q"), controller->q.size()));
+  });
+}
+
+std::int32_t hamelin_controller_detach(hamelin_controller* controller, const char* name,
+                                       const double* q, std::uint64_t* load, char* error,
+                                       std::size_t error_size) {
+  return update(load, error, error_size, [&] {
+    return controller->controller.detach(
+        required(name, "payload: name"),
+        Eigen::Map<const Eigen::VectorXd>(required(q, "q"), controller->q.size()));
   });
 }
 

@@ -59,13 +59,14 @@ World::Options world_options(const scene::Scene& scene, const model::Model& arm,
 }
 
 // Beyond these bounds the surroundings are not known, or memory would be missing.
-void check_size(const model::Model& loaded, const World& world) {
-  constexpr double rounding_m = 1e-9;
-  if (loaded.reach() > world.reach_m() + rounding_m)
-    throw Error(ErrorCode::invalid,
-                fmt::format("payload: the arm with it reaches {:.3g} m, expected at most {:.3g} m "
-                            "(payload_reach_m)",
-                            loaded.reach(), world.reach_m()));
+void check_size(std::span<const scene::Payload> payloads, const model::Model& loaded,
+                const World& world) {
+  for (const scene::Payload& payload : payloads)
+    if (const double reach = scene::reach_beyond_tip(payload); reach > world.payload_reach_m())
+      throw Error(ErrorCode::invalid,
+                  fmt::format("payload '{}': extends {:.3g} m beyond the tip, expected at most "
+                              "{:.3g} m (payload_reach_m)",
+                              payload.name, reach, world.payload_reach_m()));
   if (loaded.shapes().size() > world.shapes_max())
     throw Error(
         ErrorCode::invalid,
@@ -144,7 +145,8 @@ LoadedArm::Common Controller::common() noexcept {
           path_points_max_,
           std::move(drive),
           options_.torque && !options_.position,
-          delay_periods(scene_, period_s_)};
+          delay_periods(scene_, period_s_),
+          time_s_.load()};
 }
 
 double steady_clock_s() {
@@ -235,7 +237,7 @@ std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const Ve
   }
   model::Model model =
       carrying(nominal_, all, scene_.model.self_collision, scene_.safety.margin_m, q);
-  check_size(model, world_);
+  check_size(all, model, world_);
   auto fresh = std::make_unique<NewLoad>();
   fresh->number = load_number_ + 1;
   fresh->params_number = params_number_;
@@ -251,7 +253,7 @@ std::string Controller::load_defect(LoadedArm& fresh) {
   (void)fresh.view.take_newest();
   fresh.view.look(q_, time_s_);
   if (!fresh.shield) return fresh.view.touching() ? fresh.view.describe_contact() : std::string();
-  const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_};
+  const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
   const Shield::Node now =
       options_.position ? Shield::Node{point_q_, point_v_} : Shield::Node{q_, v_};
   if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, now)) return {};
@@ -455,10 +457,11 @@ bool Controller::in_time(double planner_s) {
 void Controller::log_first_overrun() {
   if (!options_.log || !options_.log_overrun) return;
   std::array<char, 256> line{};  // not a string, which would be allocated
-  const auto end = fmt::format_to_n(line.data(), line.size(),
-                                    "planner '{}' took {:.3g} s in the tick at {} s, expected at "
-                                    "most its deadline of {} s; later overruns are only counted",
-                                    plugin().name(), answer_.planner_s, time_s_, deadline_s_);
+  const auto end =
+      fmt::format_to_n(line.data(), line.size(),
+                       "planner '{}' took {:.3g} s in the tick at {} s, expected at "
+                       "most its deadline of {} s; later overruns are only counted",
+                       plugin().name(), answer_.planner_s, time_s_.load(), deadline_s_);
   options_.log(HAMELIN_LOG_WARNING,
                {line.data(), std::min(line.size(), static_cast<std::size_t>(end.size))});
 }

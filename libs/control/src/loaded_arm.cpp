@@ -80,7 +80,7 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
                                             common.drive)
                  : nullptr),
       planner(common.plugin, make_setup(scene, common), params, model, common.world, view,
-              common.log),
+              common.log, common.now_s),
       limits(model, modelled_limits(scene, model.robot()).effort_max,
              scene.actuation.torque_rate_max_Nm_s),
       sum(model, view.contacts_max()),
@@ -88,7 +88,8 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
   if (shield && common.sends_torque) pipeline.emplace(model, common.delay_periods, common.period_s);
 }
 
-planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const Common& common) const {
+planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const Common& common) {
+  if (common.now_s > 0.0) view.look(scene.start_q, common.now_s);  // the planner may ask at once
   planning::SetupData setup = planner_setup(scene, model, view, common.period_s,
                                             shield ? shield->limit_reserve() : LimitReserve{});
   setup.path_points_max = common.path_points_max;

@@ -77,7 +77,7 @@ class Handle final : public planning::QueryServices {
 
 PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData setup,
                          const Json& params, const model::Model& nominal, const World& world,
-                         WorldView& view, LineSink sink)
+                         WorldView& view, LineSink sink, double now_s)
     : nominal_(nominal),
       world_(world),
       view_(view),
@@ -87,6 +87,7 @@ PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData set
       query_self_contacts_(view.self_contacts_max()),
       contacts_(view.contacts_max()),
       self_contacts_(view.self_contacts_max()),
+      time_s_(now_s),
       world_number_(view.snapshot()),
       planner_(plugin.create(std::move(setup), *this, params)),
       command_(static_cast<std::size_t>(nominal.dof()), view.contacts_max(),

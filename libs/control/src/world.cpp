@@ -150,10 +150,6 @@ std::size_t World::shapes_max() const noexcept {
   return model_.shapes().size() + options_.payload_shapes;
 }
 
-double World::reach_m() const noexcept {
-  return model_.reach() + options_.payload_reach_m;
-}
-
 World::View World::view_of_latest() const {
   std::shared_ptr<const WorldSnapshot> snapshot = latest();
   scene::Environment::Scratch scratch(snapshot->environment, shapes_max());

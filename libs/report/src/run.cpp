@@ -116,6 +116,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       stops_(std::clamp<std::size_t>(
           stop_values_max / static_cast<std::size_t>(2 * world.model.dof()), 1, stops_max)),
       acts_(acts_max),
+      loads_(recorded.scene, world.model.robot().tip.pose),
       config_(header["config"]),
       provenance_(header["provenance"]) {
   const auto& links = world.model.robot().links;
@@ -209,14 +210,7 @@ void Run::add_line(Json line, const log::LogReader& reader) {
   if (type == "tick") {
     add_tick(line, reader);
   } else if (type == "event") {
-    const Json* text = find(line, "text");
-    if (text == nullptr || !text->is_string())
-      throw line_error(reader, "text: expected one line of text");
-    const double t = number(line, "time_s", reader);
-    if (events_.size() < events_max)
-      events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
-    else
-      ++events_left_out_;
+    add_event(line, reader);
   } else if (type == "result") {
     log::check_line(line, reader.where());
     line.erase("type");
@@ -224,6 +218,27 @@ void Run::add_line(Json line, const log::LogReader& reader) {
   } else {
     throw line_error(reader, fmt::format("type {}, expected tick, event or result", type.dump()));
   }
+}
+
+void Run::add_event(const Json& line, const log::LogReader& reader) {
+  const Json* text = find(line, "text");
+  if (text == nullptr || !text->is_string())
+    throw line_error(reader, "text: expected one line of text");
+  const double t = number(line, "time_s", reader);
+  for (const char* what : {"attached", "detached"}) {
+    const Json* name = find(line, what);
+    if (name == nullptr || std::isnan(t)) continue;
+    if (!name->is_string()) throw line_error(reader, fmt::format("{}: expected a name", what));
+    const VectorXd q = joint_vector(line, "q", world_.model.dof(), reader);
+    if (*what == 'a')
+      loads_.attach(name->get<std::string>(), t);
+    else
+      loads_.detach(name->get<std::string>(), t, q);
+  }
+  if (events_.size() < events_max)
+    events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
+  else
+    ++events_left_out_;
 }
 
 void Run::add_tick(const Json& line, const log::LogReader& reader) {
@@ -275,7 +290,8 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   const double balance =
       row[kinetic] + row[potential] + row[control] -
       (row[gyroscopic] + row[held] - row[dissipated] + row[node]) -
-      (energy.contains("stop_work_J") ? number(energy, "stop_work_J", reader) : 0.0);
+      (energy.contains("stop_work_J") ? number(energy, "stop_work_J", reader) : 0.0) -
+      (energy.contains("load_energy_J") ? number(energy, "load_energy_J", reader) : 0.0);
   if (ticks_ == 0) first_balance_ = balance;
   row[energy_error] = std::abs(balance - first_balance_);
   row[updates] = number(solver, "updates", reader);
@@ -383,6 +399,7 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["events"] = std::move(events_);
   run["stops"] = stops_.json();
   run["acts"] = acts_.json();
+  run["loads"] = loads_.take();
   run["plots"] = plots_json(container);
   return run;
 }

@@ -13,6 +13,7 @@
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/simulation/replay.hpp"
+#include "loads.hpp"
 #include "stops.hpp"
 #include "world.hpp"
 
@@ -44,6 +45,7 @@ class Run {
   /// A plot for each unit of the planner's own series.
   void add_series_plots(const Json& header, std::size_t column);
   void add_tick(const Json& line, const log::LogReader& reader);
+  void add_event(const Json& line, const log::LogReader& reader);
   void add_stop(const Json& line, const Frame& frame, const log::LogReader& reader);
   void set_goal_distance(const Frame& frame);
   [[nodiscard]] Json plots_json(Container& container) const;
@@ -59,6 +61,7 @@ class Run {
   EvenSample<Frame> sample_;
   Stops stops_;
   Acts acts_;
+  Loads loads_;
   std::optional<std::size_t> evasion_;  ///< number of the series that tells the acts
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;

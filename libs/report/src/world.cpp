@@ -17,6 +17,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "loads.hpp"
 
 namespace hamelin::report {
 
@@ -44,9 +45,6 @@ Json pose_json(const geometry::SE3& pose) {
 }
 
 // ---- robot
-
-// Largest spacing, in radii, and largest number of the balls that a capsule is drawn as.
-constexpr double ball_spacing_share = 0.4, balls_max = 60.0;
 
 Json robot_json(const model::Model& model) {
   const model::Robot& robot = model.robot();
@@ -82,10 +80,8 @@ Json robot_json(const model::Model& model) {
       continue;
     }
     const model::Segment& capsule = link.segments[index];
-    const Vector3d axis = capsule.to_m - capsule.from_m;
-    const double parts =
-        std::clamp(std::ceil(axis.norm() / (ball_spacing_share * shape.radius)), 1.0, balls_max);
-    for (double part = 0.0; part <= parts; part += 1.0) add(capsule.from_m + (part / parts) * axis);
+    for (const Vector3d& center : balls_along(capsule.from_m, capsule.to_m, shape.radius))
+      add(center);
   }
   for (const Vector3d& point : skeleton(robot)) points.push_back(array(point));
   Json normal = nullptr;

@@ -79,7 +79,11 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
           "[report]") {
   const auto folder = test::scratch("kinematics");
   scene::Scene scene = test::shelf(0.01);
-  scene.model.payload = scene::Payload{1.0, {0.01, 0.02, 0.05}, 0.01 * Eigen::Matrix3d::Identity()};
+  scene::Payload payload;
+  payload.mass_kg = 1.0;
+  payload.position_m = {0.01, 0.02, 0.05};
+  payload.inertia_kg_m2 = 0.01 * Eigen::Matrix3d::Identity();
+  scene.model.payload = payload;
   scene::Scene planar = scene::read_scene(test::checkout("data/scenes/paper_51.json"));
   planar.base = geometry::SE3(
       Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {1, 2, 3});

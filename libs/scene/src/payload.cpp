@@ -89,6 +89,16 @@ model::Robot with_payloads(model::Robot robot, std::span<const Payload> payloads
   return robot;
 }
 
+double reach_beyond_tip(const Payload& payload) {
+  double reach = 0.0;
+  for (const model::Sphere& sphere : payload.spheres)
+    reach = std::max(reach, sphere.center_m.norm() + sphere.radius_m);
+  for (const model::Segment& capsule : payload.capsules)
+    reach =
+        std::max(reach, std::max(capsule.from_m.norm(), capsule.to_m.norm()) + capsule.radius_m);
+  return reach;
+}
+
 PayloadBounds payload_bounds(std::span<const Event> events, const model::Model& arm,
                              const std::string& where) {
   PayloadBounds out;
@@ -101,7 +111,7 @@ PayloadBounds payload_bounds(std::span<const Event> events, const model::Model& 
     carried.push_back(*event.attach);
     try {
       const model::Model loaded(with_payloads(arm.robot(), carried), arm.base(), arm.gravity());
-      out.reach_m = std::max(out.reach_m, loaded.reach() - arm.reach());
+      out.reach_m = std::max(out.reach_m, reach_beyond_tip(*event.attach));
       out.shapes = std::max(out.shapes, loaded.shapes().size() - arm.shapes().size());
     } catch (const Error& e) {
       throw Error(e.code(), fmt::format("{}/{}/attach: {}", where, i, e.what()));

@@ -138,7 +138,7 @@ TEST_CASE("the bounds of events count what is carried at a time", "[scene][paylo
                              apart = scene::payload_bounds(one_by_one, arm, "events");
   CHECK(together.shapes == 5);
   CHECK(apart.shapes == 3);
-  CHECK(apart.reach_m > 0.9);
+  CHECK(apart.reach_m == Approx(1.1));
   CHECK(scene::payload_bounds({}, arm, "events").reach_m == 0.0);
   const std::vector<scene::Event> twice{first, first};
   CHECK_THAT(message_of([&] { (void)scene::payload_bounds(twice, arm, "events"); }),

@@ -55,6 +55,8 @@ class ClosedLoop {
   void complete(const scene::Event& event);
   /// The arm carries what `carried_` lists from this node on.
   void take_load();
+  /// Logs that something of this name is "attached" or "detached".
+  void record_load(const std::string& name, const char* what);
   /// The controller has refused to carry what an event attaches.
   void note_refused_load(const scene::Event& event);
   /// Ends the run at this node if an outcome applies.

@@ -76,10 +76,10 @@ void ClosedLoop::complete(const scene::Event& event) {
   const bool accepted = controller_->attached().size() != before;
   if (accepted && event.attach) {
     carried_.push_back(*event.attach);
-    recorder_->event(plant_->node().time_s, fmt::format("'{}' is attached", event.attach->name));
+    record_load(event.attach->name, "attached");
   } else if (accepted) {
     std::erase_if(carried_, [&](const auto& one) { return one.name == *event.detach; });
-    recorder_->event(plant_->node().time_s, fmt::format("'{}' is detached", *event.detach));
+    record_load(*event.detach, "detached");
   }
   if (accepted) take_load();
   judge_->look(plant_->node().q, plant_->node().time_s);
@@ -87,6 +87,11 @@ void ClosedLoop::complete(const scene::Event& event) {
   min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
   touching_ = judge_->touching();
   if (touching_ && !done_) finish(log::Outcome::collision, describe_contact());
+}
+
+void ClosedLoop::record_load(const std::string& name, const char* what) {
+  recorder_->event(plant_->node().time_s, fmt::format("'{}' is {}", name, what),
+                   {{what, name}, {"q", to_json(plant_->node().q)}});
 }
 
 void ClosedLoop::take_load() {

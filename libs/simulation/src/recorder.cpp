@@ -122,9 +122,12 @@ void Recorder::write_waiting_tick() {
   waiting_.reset();
 }
 
-void Recorder::event(double time_s, const std::string& text) {
+void Recorder::event(double time_s, const std::string& text, const Json& more) {
   write_waiting_tick();
-  if (watch_.log != nullptr) watch_.log->write("event", {{"time_s", time_s}, {"text", text}});
+  if (watch_.log == nullptr) return;
+  Json fields{{"time_s", time_s}, {"text", text}};
+  fields.update(more);
+  watch_.log->write("event", std::move(fields));
 }
 
 void Recorder::close(const Ledger& ledger) {

@@ -65,7 +65,8 @@ class Recorder {
   /// The line of a tick, once per node. It is written by tick_time() or close().
   void tick(long k, Json fields);
   void write_waiting_tick();
-  void event(double time_s, const std::string& text);
+  /// @param more fields of its line
+  void event(double time_s, const std::string& text, const Json& more = Json::object());
   [[nodiscard]] bool stopped(long k) const noexcept {
     return (watch_.stop != nullptr && watch_.stop->load()) || watch_.stop_at == k ||
            (watch_.log != nullptr && watch_.log->enough());

@@ -229,6 +229,33 @@ std::vector<BadCall> bad_calls(const std::string& bad_map) {
                      return hamelin_controller_set_planner_params(c, R"({"cruise_sped": 1})", error,
                                                                   size);
                    }});
+  const auto attach = [](auto* c, const hamelin_payload& payload, auto* number, char* error,
+                         std::size_t size) {
+    const std::vector<double> q(hamelin_controller_dof(c), 0.0);
+    return hamelin_controller_attach(c, &payload, q.data(), number, error, size);
+  };
+  calls.push_back({"payload: is null or its struct_size is too small",
+                   [=](auto* c, auto* number, char* error, std::size_t size) {
+                     return attach(c, hamelin_payload{}, number, error, size);
+                   }});
+  calls.push_back({"payload: name: is null", [=](auto* c, auto* number, char* error, auto size) {
+                     hamelin_payload payload{};
+                     payload.struct_size = sizeof payload;
+                     return attach(c, payload, number, error, size);
+                   }});
+  calls.push_back({"payload 'box': its mass is -1 kg",
+                   [=](auto* c, auto* number, char* error, std::size_t size) {
+                     hamelin_payload payload{};
+                     payload.struct_size = sizeof payload;
+                     payload.name = "box";
+                     payload.mass_kg = -1.0;
+                     return attach(c, payload, number, error, size);
+                   }});
+  calls.push_back(
+      {"payload 'box': is not attached", [](auto* c, auto* number, char* error, std::size_t size) {
+         const std::vector<double> q(hamelin_controller_dof(c), 0.0);
+         return hamelin_controller_detach(c, "box", q.data(), number, error, size);
+       }});
   calls.push_back({"params_json", [](auto* c, auto*, char* error, std::size_t size) {
                      return hamelin_controller_set_planner_params(c, "{", error, size);
                    }});
@@ -324,6 +351,39 @@ TEST_CASE("in C, structs of callers that were built against earlier headers are 
   CHECK(hamelin_controller_set_obstacle(loop.controller, &ball, nullptr, nullptr, 0) == 0);
   ball.struct_size -= 8;
   CHECK(hamelin_controller_set_obstacle(loop.controller, &ball, nullptr, nullptr, 0) != 0);
+}
+
+TEST_CASE("in C, a body is attached to the arm and detached again", "[control][load]") {
+  const test::TemporaryFolder folder;
+  CLoop loop(folder.path(), "hybrid", Json::object());
+  const hamelin_payload_capsule small{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.001};
+  hamelin_payload body{};
+  body.struct_size = sizeof body;
+  body.name = "body";
+  body.mass_kg = 0.1;
+  for (int i = 0; i < 3; ++i) body.inertia_kg_m2[i] = 1e-4;
+  char* const error = loop.error.data();
+  const std::size_t size = loop.error.size();
+  std::uint64_t load = 0;
+  loop.tick();
+  loop.step();
+  body.shapes = &small;
+  body.shape_count = 1;
+  CHECK(hamelin_controller_attach(loop.controller, &body, loop.state.q.data(), &load, error,
+                                  size) != 0);
+  CHECK_THAT(error, Contains("extends 0.001 m beyond the tip, expected at most 0 m"));
+  body.shape_count = 0;
+  REQUIRE(hamelin_controller_attach(loop.controller, &body, loop.state.q.data(), &load, error,
+                                    size) == 0);
+  loop.tick();
+  CHECK(loop.answer.load == load);
+  CHECK(loop.answer.refused_load == 0);
+  CHECK(std::string(loop.answer.load_refusal).empty());
+  loop.step();
+  REQUIRE(hamelin_controller_detach(loop.controller, "body", loop.state.q.data(), &load, error,
+                                    size) == 0);
+  loop.tick();
+  CHECK(loop.answer.load == load);
 }
 
 TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",

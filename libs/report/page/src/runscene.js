@@ -3,6 +3,7 @@ import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
 import { Arm } from './arm.js';
 import { runColor, theme } from './colors.js';
 import { Contacts, coordinateAxes, Floor, Forces, Goals, Spheres, Trail } from './markers.js';
+import { Loads } from './loads.js';
 import { Obstacles, Paths, Predictions } from './obstacles.js';
 import { StopLine } from './stops.js';
 import { Voxels } from './voxels.js';
@@ -24,6 +25,7 @@ export class RunScene {
     this.spheres = new Spheres(world.robot, frames, Math.min(...this.arm.radii) > Math.max(0, ...world.robot.spheres.map((s) => s.radius_m)));
     this.contacts = new Contacts(frames, reach);
     this.forces = new Forces(frames, reach);
+    this.loads = new Loads(replay.run, world.robot);
     this.trail = new Trail(replay.tips, reach);
     this.stop = new StopLine(replay.run, world.robot, reach);
     this.goals = new Goals(world);
@@ -33,7 +35,7 @@ export class RunScene {
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
     this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? coordinateAxes(0.07 * reach) : new Group();
     this.tipFrame.matrixAutoUpdate = false;
-    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.arm, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
+    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.arm, this.loads, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
     for (const part of this.parts) this.scene.add(part.group);
     this.scene.add(this.tipFrame);
     this.probes = this.probesOf(world.robot);
@@ -88,6 +90,7 @@ export class RunScene {
       this.voxels.setClip(settings.clip);
     }
     this.arm.group.visible = show.arm;
+    this.loads.group.visible = show.arm;
     this.spheres.group.visible = show.spheres;
     this.contacts.group.visible = show.lines;
     this.forces.group.visible = show.forces;
@@ -106,6 +109,7 @@ export class RunScene {
     const { replay, settings } = this;
     const { chain, k, a, tip } = replay;
     this.arm.update(chain);
+    this.loads.update(chain, t);
     this.spheres.update(chain, replay.nearest);
     this.contacts.update(replay.nearest);
     this.forces.update(tip, k, a, settings.metresPerNewton);

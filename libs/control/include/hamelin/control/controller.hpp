@@ -262,9 +262,10 @@ class Controller {
   model::Model nominal_;  ///< the planner's model of the arm, without what is attached later
   Eigen::VectorXd acceleration_max_, jerk_max_;  ///< of each joint, of positions
   World world_;
-  Json params_;                     ///< of the planner, as last set
-  std::unique_ptr<LoadedArm> arm_;  ///< that the tick uses
-  bool shielded_ = false;           ///< whether the shield has started
+  Json params_;                      ///< of the planner, as last set
+  std::atomic<double> time_s_{0.0};  ///< of the last tick
+  std::unique_ptr<LoadedArm> arm_;   ///< that the tick uses
+  bool shielded_ = false;            ///< whether the shield has started
   // Each is among writers; the tick takes none.
   mutable std::mutex goals_mutex_, load_mutex_;
   std::uint64_t goals_number_ = 0, params_number_ = 0, load_number_ = 0;  ///< of the newest
@@ -294,7 +295,6 @@ class Controller {
   std::array<char, 192> late_line_;  ///< memory of failure_ where answers were late
   std::string load_refusal_;
   bool reset_ = false;  ///< whether the planner is to be told of a new start
-  double time_s_ = 0.0;
   Eigen::VectorXd q_, v_, rate_, command_rate_;
   Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest
 };

@@ -39,6 +39,10 @@ typedef struct hamelin_controller_options {
    * per axis; root mean square of the obstacles' jerk at frequencies up to 1 Hz, per axis; the gap
    * after which the estimate of the motion starts again. 0: 0.002 m, 2 m/s^3, 0.5 s. */
   double observation_noise_m, observation_jerk_m_s3, observation_timeout_s;
+  /* How far payloads that are attached later extend beyond the arm's reach, and how many shapes
+   * they have together. 0: as the scene's events say. */
+  double payload_reach_m;
+  size_t payload_shapes_max;
 } hamelin_controller_options;
 
 enum {
@@ -65,6 +69,9 @@ typedef struct hamelin_answer {
   uint64_t goals;                /* number of the list of goals: 0 for the scene's */
   double planner_s;              /* wall time that the planner took */
   uint64_t overruns;             /* in so many ticks it took longer than its deadline */
+  uint64_t load;                 /* number of what the arm carries: 0 at first */
+  uint64_t refused_load;         /* number of the last load that was refused; 0: none was */
+  const char* load_refusal;      /* why; empty if none was */
 } hamelin_answer;
 
 enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2, HAMELIN_CAPSULE = 3 };
@@ -85,6 +92,22 @@ typedef struct hamelin_obstacle {
   int32_t prediction;   /* one of the enumeration above */
   double speed_max_m_s; /* of any point of it; 0: not stated. Observed poses may not jump faster */
 } hamelin_obstacle;
+
+/* A body that is fixed to the tip. All coordinates are in the tip's frame. */
+typedef struct hamelin_payload_capsule {
+  double from_m[3], to_m[3]; /* a sphere if both are equal */
+  double radius_m;
+} hamelin_payload_capsule;
+
+typedef struct hamelin_payload {
+  uint32_t struct_size;
+  const char* name;
+  double mass_kg;
+  double position_m[3];    /* centre of mass */
+  double inertia_kg_m2[6]; /* xx, yy, zz, xy, xz, yz about the centre of mass */
+  const hamelin_payload_capsule* shapes;
+  size_t shape_count;
+} hamelin_payload;
 
 /* A measured pose of an obstacle. Pointers to three numbers may be null: then the velocity, the
  * acceleration or the angular velocity [rad/s] is estimated from the poses. */
@@ -122,6 +145,15 @@ int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const d
 int32_t hamelin_controller_set_planner_params(hamelin_controller* controller,
                                               const char* params_json, char* error,
                                               size_t error_size);
+
+/* Fixes a body to the tip, or takes it off again, from the next tick on; by any thread. q: the
+ * configuration in which this happens; parts of the arm that the body touches there may go on to
+ * touch it. *load, unless null, receives what hamelin_answer.load will be, unless the tick refuses
+ * the body, because it is in contact or the arm could not stop with it. This takes milliseconds. */
+int32_t hamelin_controller_attach(hamelin_controller* controller, const hamelin_payload* payload,
+                                  const double* q, uint64_t* load, char* error, size_t error_size);
+int32_t hamelin_controller_detach(hamelin_controller* controller, const char* name, const double* q,
+                                  uint64_t* load, char* error, size_t error_size);
 
 /* Changes of the world. *snapshot, unless null, receives the number of the first snapshot that
  * contains the change. */

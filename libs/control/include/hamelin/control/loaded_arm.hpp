@@ -34,6 +34,7 @@ struct LoadedArm {
     /// Whether torques are the output, so that a shield must predict where they lead.
     bool sends_torque;
     std::size_t delay_periods;
+    double now_s;  ///< time of the last tick; 0 before the first
   };
 
   /// @param scene start and goals are those that the planner is to begin with
@@ -55,8 +56,7 @@ struct LoadedArm {
   std::optional<TorquePipeline> pipeline;  ///< with a shield, where torques are the output
 
  private:
-  [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene,
-                                               const Common& common) const;
+  [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene, const Common& common);
 };
 
 /// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is

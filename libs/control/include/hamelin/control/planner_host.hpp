@@ -31,9 +31,11 @@ class PlannerHost final : private planning::HostServices {
   /// @param setup nominal arm of the planner, goals and limits
   /// @param nominal the planner's model of the arm; must outlive this, as `world` and `view`
   /// @param view the surroundings that it is shown, a view of `world`
+  /// @param now_s time of the last tick
   /// @throws Error plugin with the planner's own message if it refuses to start
   PlannerHost(const planning::Plugin& plugin, planning::SetupData setup, const Json& params,
-              const model::Model& nominal, const World& world, WorldView& view, LineSink sink);
+              const model::Model& nominal, const World& world, WorldView& view, LineSink sink,
+              double now_s);
 
   /// Calls the planner with the contacts of the world's last look().
   /// @param k, time_s index and time of the tick
@@ -89,7 +91,7 @@ class PlannerHost final : private planning::HostServices {
   std::vector<scene::SelfContact> query_self_contacts_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
-  std::atomic<double> time_s_{0.0};  ///< of the last tick
+  std::atomic<double> time_s_;       ///< of the last tick
   std::uint64_t world_number_ = 0;   ///< that the planner knows
   planning::LoadedPlanner planner_;  ///< its constructor uses the members before it
   planning::CommandBuffers command_;

@@ -41,7 +41,7 @@ class World {
     /// ever allocates or waits.
     bool prepare = true;
     ObservationOptions observations{};  ///< of the poses that observe_obstacle() is given
-    /// How far beyond the arm's reach payloads extend [m], and how many shapes they have.
+    /// How far beyond the tip payloads extend [m], and how many shapes they have.
     double payload_reach_m = 0.0;
     std::size_t payload_shapes = 0;
   };
@@ -108,8 +108,8 @@ class World {
   [[nodiscard]] double influence_m() const noexcept { return options_.influence_m; }
   /// The largest number of shapes of an arm, payloads included.
   [[nodiscard]] std::size_t shapes_max() const noexcept;
-  /// Map and obstacles are known as far as such an arm can reach [m].
-  [[nodiscard]] double reach_m() const noexcept;
+  /// How far beyond the tip the surroundings are known [m].
+  [[nodiscard]] double payload_reach_m() const noexcept { return options_.payload_reach_m; }
   [[nodiscard]] std::size_t obstacles_max() const noexcept { return options_.obstacles_max; }
   /// The largest number of contacts that a query can find.
   [[nodiscard]] std::size_t contacts_max() const noexcept { return contacts_max_; }

@@ -14,11 +14,11 @@ namespace hamelin::scene {
 
 /// A body fixed to the tip. All coordinates are in the tip's frame.
 struct Payload {
-  std::string name = "payload";  ///< of the part of the arm that its shapes form
   double mass_kg = 0.0;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< centre of mass
   /// About the centre of mass, in the axes of the tip's frame.
   Eigen::Matrix3d inertia_kg_m2 = Eigen::Matrix3d::Zero();
+  std::string name = "payload";          ///< of the part of the arm that its shapes form
   std::vector<model::Sphere> spheres;    ///< `part` is not used
   std::vector<model::Segment> capsules;  ///< `part` is not used
   /// Whether the controller is told of its shapes; a run's judge knows them in any case.
@@ -29,6 +29,9 @@ struct Payload {
 /// @param where prefix of the message
 /// @throws Error invalid
 void check(const Payload& payload, const std::string& where);
+
+/// Upper bound of the distance from the tip to any point of a payload's shapes [m].
+[[nodiscard]] double reach_beyond_tip(const Payload& payload);
 
 /// A robot with bodies fixed to its tip: their masses and inertias join those of the link that
 /// carries the tip, by the parallel-axis theorem. The shapes of each form a part of that link.
@@ -48,7 +51,7 @@ struct Event {
 
 /// What events add to an arm at most.
 struct PayloadBounds {
-  double reach_m = 0.0;    ///< to Model::reach()
+  double reach_m = 0.0;    ///< beyond the tip
   std::size_t shapes = 0;  ///< at a time
 };
 /// @param arm without what the events attach @param where prefix of messages
