@@ -23,6 +23,7 @@ constexpr const char* schema = R"({
     "recovery_work_J": {"type": "number", "default": 0},
     "books_at_tick": {"type": "integer", "minimum": 0, "default": 0},
     "series": {"type": "boolean", "default": false},
+    "draw_every": {"type": "integer", "minimum": 0, "default": 0},
     "think_of": {"type": "array", "items": {"type": "number"}, "default": []},
     "influence_m": {"type": "number", "default": 0.3}
   }
@@ -44,6 +45,7 @@ class Probe : public Planner {
         filter_(params.at("filter_work_J").get<double>()),
         recovery_(params.at("recovery_work_J").get<double>()),
         books_at_(params.at("books_at_tick").get<std::uint64_t>()),
+        draw_every_(params.at("draw_every").get<std::uint64_t>()),
         contacts_(10000),
         self_(100) {
     if (params.at("series").get<bool>()) {
@@ -81,6 +83,11 @@ class Probe : public Planner {
       command.node_velocity() = ConstVectorMap(velocity_.data(), setup_.dof());
     command.set_series(time_series_, tick.time_s());
     if (tick.k() % 2 == 0) command.set_series(even_series_, 2.0);
+    if (draw_every_ > 0 && tick.k() % draw_every_ == 0) {
+      const auto k = static_cast<double>(tick.k());
+      host_.draw_path(std::vector<Eigen::Vector3d>{{k, 0.0, 0.12345}, {k, 1.0, 0.0}});
+      host_.draw_path(std::vector<Eigen::Vector3d>{{-k, 0.0, 0.0}});
+    }
     if (tick.k() == books_at_) command.set_accounts(filter_, recovery_);
   }
 
@@ -104,7 +111,7 @@ class Probe : public Planner {
   Setup setup_;
   std::vector<double> torque_, velocity_, think_of_;
   double torque_until_s_, filter_, recovery_;
-  std::uint64_t books_at_;
+  std::uint64_t books_at_, draw_every_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_;
   std::size_t thought_ = 0, shown_ = 0;

@@ -96,6 +96,7 @@ PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData set
 bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                        const PlannerGoal& goal, const Eigen::VectorXd* torque) {
   time_s_ = time_s;
+  draws_ = false;
   if (const std::uint64_t world = view_.snapshot(); world != world_number_) {
     world_number_ = world;
     planner_.world_changed(world);
@@ -172,6 +173,19 @@ std::size_t PlannerHost::obstacles_ahead(double time_ahead_s, std::int32_t kinds
   if (!among) return 0;
   return list_obstacles(view_.environment(), view_.obstacle_ids(), {time_s_.load(), time_ahead_s},
                         *among, out);
+}
+
+// Grows with the largest drawing; planners that draw nothing cost nothing.
+void PlannerHost::draw_path(std::span<const double> points_world_m) {
+  if (!draws_) {
+    drawing_.points.clear();
+    drawing_.ends.clear();
+    ++drawing_.number;
+    draws_ = true;
+  }
+  for (std::size_t i = 0; i + 2 < points_world_m.size(); i += 3)
+    drawing_.points.emplace_back(points_world_m.data() + i);
+  drawing_.ends.push_back(drawing_.points.size());
 }
 
 std::unique_ptr<planning::QueryServices> PlannerHost::open_query() {

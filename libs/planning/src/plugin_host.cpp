@@ -391,6 +391,7 @@ struct LoadedPlanner::Instance {
     add_query_functions(host);
     host.closest_ahead = &Instance::closest_ahead;
     host.obstacles_ahead = &Instance::obstacles_ahead;
+    host.draw_path = &Instance::draw_path;
     error[0] = '\0';
   }
   Instance(const Instance&) = delete;
@@ -470,6 +471,10 @@ struct LoadedPlanner::Instance {
     std::size_t count = 0;
     self.guarded([&] { count = self.services->obstacles({out, capacity, stride}); });
     return count;
+  }
+  static void draw_path(void* context, const double* points_world_m, std::size_t count) noexcept {
+    auto& self = *static_cast<Instance*>(context);
+    self.guarded([&] { self.services->draw_path({points_world_m, 3 * count}); });
   }
   static std::int32_t declare_series(void* context, const char* name, const char* unit) noexcept {
     auto& self = *static_cast<Instance*>(context);

@@ -186,6 +186,18 @@ TEST_CASE("in hosts without a future of obstacles, all obstacles stand", "[plann
   raw.struct_size = sizeof raw;
   CHECK(host.obstacles_ahead(0.5, HAMELIN_MOVING, states) == 200);
 
+  static int drawn = 0;
+  raw.draw_path = [](void*, const double* points, std::size_t count) {
+    drawn += static_cast<int>(count) + static_cast<int>(points[3]);
+  };
+  const std::vector<Eigen::Vector3d> line{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}};
+  raw.struct_size = offsetof(hamelin_host, draw_path);
+  host.draw_path(line);
+  CHECK(drawn == 0);
+  raw.struct_size = sizeof raw;
+  host.draw_path(line);
+  CHECK(drawn == 6);
+
   hamelin_tick tick{};
   tick.moving_count = 5;
   tick.struct_size = offsetof(hamelin_tick, moving_count);

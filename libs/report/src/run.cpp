@@ -22,7 +22,8 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 // Limits of the joint values, events and joints' lines in a page, for chains and logs of any
 // length.
 constexpr std::size_t joint_values_max = 200000, events_max = 2000, plotted_joints_max = 24,
-                      stops_max = 500, stop_values_max = 20000, acts_max = 2000;
+                      stops_max = 500, stop_values_max = 20000, acts_max = 2000,
+                      drawn_points_max = 400000;
 
 // Columns of a tick's row after q, v and tau of the joints.
 enum Column : std::size_t {
@@ -117,6 +118,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
           stop_values_max / static_cast<std::size_t>(2 * world.model.dof()), 1, stops_max)),
       acts_(acts_max),
       loads_(recorded.scene, world.model.robot().tip.pose),
+      drawings_(drawn_points_max),
       config_(header["config"]),
       provenance_(header["provenance"]) {
   const auto& links = world.model.robot().links;
@@ -265,6 +267,7 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
           joint_vector(object_member(line, "channels", reader), channel_names[i], dof, reader);
 
   add_stop(line, frame, reader);
+  add_drawing(line, reader);
 
   std::fill(row_.begin(), row_.end(), unknown);
   const auto joints = [&](std::size_t at, const VectorXd& x) {
@@ -323,6 +326,25 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   }
 }
 
+void Run::add_drawing(const Json& line, const log::LogReader& reader) {
+  const Json* paths = find(line, "paths");
+  if (paths == nullptr) return;
+  std::vector<std::vector<double>> lines;
+  const auto fail = [&] {
+    throw line_error(reader, "paths: expected lists of numbers, three per point");
+  };
+  if (!paths->is_array()) fail();
+  for (const Json& path : *paths) {
+    if (!path.is_array() || path.size() % 3 != 0) fail();
+    std::vector<double>& points = lines.emplace_back();
+    for (const Json& x : path) {
+      if (!x.is_number()) fail();
+      points.push_back(x.get<double>());
+    }
+  }
+  drawings_.add(time_s_, lines);
+}
+
 void Run::add_stop(const Json& line, const Frame& frame, const log::LogReader& reader) {
   if (find(line, "stop") == nullptr) return stops_.add(frame.time_s, nullptr, frame.q, frame.q);
   const Json& stop = object_member(line, "stop", reader);
@@ -364,6 +386,9 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
     notes_.push_back(fmt::format("{} more events are in the log", events_left_out_));
   if (stops_.left_out() > 0)
     notes_.push_back(fmt::format("{} more stops are in the log", stops_.left_out()));
+  if (drawings_.left_out() > 0)
+    notes_.push_back(
+        fmt::format("{} more drawings of the planner are in the log", drawings_.left_out()));
   if (acts_.left_out() > 0)
     notes_.push_back(fmt::format("{} more evasions are in the log", acts_.left_out()));
   notes_.insert(notes_.end(), world_.notes.begin(), world_.notes.end());
@@ -400,6 +425,7 @@ Json Run::finish(const log::LogReader& reader, Container& container, RunSummary&
   run["stops"] = stops_.json();
   run["acts"] = acts_.json();
   run["loads"] = loads_.take();
+  run["drawings"] = drawings_.json(container);
   run["plots"] = plots_json(container);
   return run;
 }

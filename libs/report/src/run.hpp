@@ -7,6 +7,7 @@
 #include "acts.hpp"
 #include "bins.hpp"
 #include "container.hpp"
+#include "drawings.hpp"
 #include "frames.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/io/json.hpp"
@@ -46,6 +47,7 @@ class Run {
   void add_series_plots(const Json& header, std::size_t column);
   void add_tick(const Json& line, const log::LogReader& reader);
   void add_event(const Json& line, const log::LogReader& reader);
+  void add_drawing(const Json& line, const log::LogReader& reader);
   void add_stop(const Json& line, const Frame& frame, const log::LogReader& reader);
   void set_goal_distance(const Frame& frame);
   [[nodiscard]] Json plots_json(Container& container) const;
@@ -62,6 +64,7 @@ class Run {
   Stops stops_;
   Acts acts_;
   Loads loads_;
+  Drawings drawings_;
   std::optional<std::size_t> evasion_;  ///< number of the series that tells the acts
   Json events_ = Json::array(), result_ = nullptr, config_, provenance_;
   std::size_t events_left_out_ = 0, ticks_ = 0, not_finite_ = 0;

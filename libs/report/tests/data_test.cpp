@@ -592,3 +592,62 @@ TEST_CASE("the acts are those of the planner's series", "[report]") {
   const Decoded other(with_series("fear").bytes);
   CHECK(other.head["runs"][0]["acts"].empty());
 }
+
+TEST_CASE("what the arm carries moves with the tip between its events", "[report]") {
+  const auto log = test::scratch("loads") / "run.jsonl";
+  scene::Scene scene = scene::read_scene(test::checkout("data/scenes/shelf_carry.json"));
+  // attached and detached on the way
+  scene.map.reset();
+  scene.events.resize(2);
+  for (auto& event : scene.events) event.map.reset();
+  scene.events[0].goals_reached.reset();
+  scene.events[0].time_s = 0.2;
+  scene.events[1] = {};
+  scene.events[1].time_s = 0.4;
+  scene.events[1].detach = "can";
+  scene.duration_s = 0.5;
+  (void)test::log_run(scene, log);
+  const Decoded page(report::make_data({log}).bytes);
+  const Json &loads = page.head["runs"][0]["loads"], &robot = page.head["worlds"][0]["robot"];
+  REQUIRE(loads.size() == 1);
+  CHECK(loads[0]["name"] == "can");
+  CHECK(loads[0]["t"] == Approx(0.201));
+  CHECK(loads[0]["until"] == Approx(0.401));
+  const Eigen::VectorXd q = vector_of(loads[0]["q_end"]);
+  const model::Model model = control::load_model(scene);
+  dynamics::Workspace ws(model);
+  dynamics::forward_kinematics(model, ws, q);
+  const geometry::SE3 tip = dynamics::tip_pose(model, ws),
+                      link = pose_of(robot["base"]) * poses(robot, q).back();
+  const auto& capsule = scene.events[0].attach->capsules[0];
+  const Json& balls = loads[0]["balls"];
+  REQUIRE(balls.size() > scene.events[0].attach->capsules.size());
+  CHECK(balls[0]["radius_m"] == capsule.radius_m);
+  CHECK((link * Vector3d(vector_of(balls[0]["center_m"])) - tip * capsule.from_m).norm() < 1e-12);
+}
+
+TEST_CASE("the lines that a planner has drawn are those of the log", "[report]") {
+  const auto folder = test::scratch("drawings");
+  const auto log = folder / "run.jsonl";
+  (void)test::log_run(test::shelf(0.05), log);
+  std::string text = read_file(log);
+  const std::string at = R"("k":10,)";
+  const std::size_t found = text.find(at);
+  REQUIRE(found != std::string::npos);
+  text.insert(found + at.size(), R"("paths":[[0,0,0,0.1,0.2,0.3],[1,1,1]],)");
+  write_file_atomically(folder / "drawn.jsonl", text);
+  const Decoded page(report::make_data({folder / "drawn.jsonl"}).bytes);
+  const Json& drawings = page.head["runs"][0]["drawings"];
+  CHECK(page(drawings["t"]) == std::vector<double>{0.01});
+  CHECK(page(drawings["lines"]) == std::vector<double>{2.0});
+  CHECK(page(drawings["points"]) == std::vector<double>{2.0, 1.0});
+  const auto points = page(drawings["position_m"]);
+  REQUIRE(points.size() == 9);
+  CHECK(std::abs(points[4] - 0.2) < 1e-4);
+  CHECK(std::abs(points[8] - 1.0) < 1e-4);
+  const Decoded without(report::make_data({log}).bytes);
+  CHECK(without.head["runs"][0]["drawings"].is_null());
+  text.replace(text.find("[1,1,1]"), 7, "[1,1]");
+  write_file_atomically(folder / "drawn.jsonl", text);
+  CHECK_THROWS_AS(report::make_data({folder / "drawn.jsonl"}), Error);
+}

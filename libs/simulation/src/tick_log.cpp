@@ -16,6 +16,20 @@ std::string obstacle_name(const scene::Environment& environment, int obstacle) {
   return environment.obstacles()[static_cast<std::size_t>(obstacle)].name;
 }
 
+// One list of numbers per line, in steps of 0.1 mm: a drawing needs no more.
+Json paths_json(const control::PlannerHost::Drawing& drawing) {
+  constexpr double steps_per_m = 1e4;
+  Json paths = Json::array();
+  std::size_t from = 0;
+  for (const std::size_t end : drawing.ends) {
+    Json& path = paths.emplace_back(Json::array());
+    for (; from < end; ++from)
+      for (const double x : drawing.points[from])
+        path.push_back(std::round(steps_per_m * x) / steps_per_m);
+  }
+  return paths;
+}
+
 }  // namespace
 
 void TickLog::header(const scene::Scene& scene, const Json& params, const Json& provenance,
@@ -58,6 +72,10 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   if (answer != nullptr)
     for (const double value : answer->series())
       fields["series"].push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
+  if (const auto& drawing = controller_.drawing(); drawing.number != drawn_) {
+    drawn_ = drawing.number;
+    fields["paths"] = paths_json(drawing);
+  }
   const control::Shield* const shield = controller_.shield();
   if (shield != nullptr && acts && shield->stopping()) {
     fields["stop"] = {{"cause", to_string(shield->refusal().cause)},

@@ -39,7 +39,8 @@ class TickLog {
   const control::WorldView* world_;
   control::Controller& controller_;
   Actuation& actuation_;
-  Eigen::VectorXd torque_;  ///< of the last node with an answer
+  std::uint64_t drawn_ = 0;  ///< number of the planner's drawing that was written last
+  Eigen::VectorXd torque_;   ///< of the last node with an answer
 };
 
 }  // namespace hamelin::simulation

@@ -173,3 +173,23 @@ TEST_CASE("series that a planner declares are in the header and in each tick",
   CHECK(late.late_ticks == 10);  // no planner answers within a nanosecond
   CHECK(late.outcome == result.outcome);
 }
+
+TEST_CASE("lines that a planner draws are in the next tick that is logged", "[simulation][log]") {
+  const TemporaryFolder folder;
+  Json scene = logged_scene({{"name", "probe"}, {"params", {{"draw_every", 4}}}});
+  scene["duration_s"] = 0.012;
+  std::vector<long> drawn;
+  for (const auto& tick : ticks_of(folder, scene, 1))
+    if (tick.contains("paths")) {
+      const long k = tick["k"].get<long>();
+      drawn.push_back(k);
+      log::check_line(tick, "line");
+      CHECK(tick["paths"] == Json({{k, 0.0, 0.1235, k, 1.0, 0.0}, {-k, 0.0, 0.0}}));
+    }
+  CHECK(drawn == std::vector<long>{0, 4, 8});
+  // of the drawings since the last line, the last one
+  drawn.clear();
+  for (const auto& tick : ticks_of(folder, scene, 9))
+    if (tick.contains("paths")) drawn.push_back(tick["paths"][0][0].get<long>());
+  CHECK(drawn == std::vector<long>{0, 8});
+}

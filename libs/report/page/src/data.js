@@ -87,6 +87,8 @@ function prepare(report) {
     run.events ??= [];
     run.stops ??= [];
     run.acts ??= [];
+    run.loads ??= [];
+    run.drawings ??= null;
     run.plots ??= [];
     run.notes ??= [];
   }

@@ -3,6 +3,7 @@ import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
 import { Arm } from './arm.js';
 import { runColor, theme } from './colors.js';
 import { Contacts, coordinateAxes, Floor, Forces, Goals, Spheres, Trail } from './markers.js';
+import { Drawings } from './drawings.js';
 import { Loads } from './loads.js';
 import { Obstacles, Paths, Predictions } from './obstacles.js';
 import { StopLine } from './stops.js';
@@ -25,6 +26,7 @@ export class RunScene {
     this.spheres = new Spheres(world.robot, frames, Math.min(...this.arm.radii) > Math.max(0, ...world.robot.spheres.map((s) => s.radius_m)));
     this.contacts = new Contacts(frames, reach);
     this.forces = new Forces(frames, reach);
+    this.drawings = new Drawings(replay.run);
     this.loads = new Loads(replay.run, world.robot);
     this.trail = new Trail(replay.tips, reach);
     this.stop = new StopLine(replay.run, world.robot, reach);
@@ -35,7 +37,7 @@ export class RunScene {
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
     this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? coordinateAxes(0.07 * reach) : new Group();
     this.tipFrame.matrixAutoUpdate = false;
-    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.arm, this.loads, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
+    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.arm, this.loads, this.drawings, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
     for (const part of this.parts) this.scene.add(part.group);
     this.scene.add(this.tipFrame);
     this.probes = this.probesOf(world.robot);
@@ -96,6 +98,7 @@ export class RunScene {
     this.forces.group.visible = show.forces;
     for (const arrow of this.forces.arrows) arrow.on = settings.channels[arrow.channel] ?? true;
     this.trail.group.visible = show.trail;
+    this.drawings.group.visible = show.drawings;
     this.stop.group.visible = show.stops;
     this.goals.group.visible = show.goals;
     this.tipFrame.visible = show.goals;
@@ -114,6 +117,7 @@ export class RunScene {
     this.contacts.update(replay.nearest);
     this.forces.update(tip, k, a, settings.metresPerNewton);
     this.trail.update(tip, k);
+    this.drawings.update(t);
     this.stop.update(t);
     this.goals.setCurrent(replay.goalIndex);
     this.obstacles.update(t);

@@ -45,6 +45,7 @@ export class Settings {
       spheres: used.some((world) => world.robot.spheres.length),
       lines: runs.some((run) => run.frames.contacts),
       forces: runs.some((run) => run.frames.forces.length),
+      drawings: runs.some((run) => run.drawings),
       stops: runs.some((run) => run.stops.length),
       goals: used.some((world) => world.goals.length),
       obstacles: used.some((world) => world.obstacles?.length),
@@ -59,7 +60,7 @@ export class Settings {
     this.near = null;
     this.clip = null;
     this.forceScale = 1;
-    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, stops: true, goals: true, obstacles: true, paths: true, predicted: true, floor: true };
+    this.show = { map: true, arm: true, spheres: true, lines: true, forces: true, trail: true, drawings: true, stops: true, goals: true, obstacles: true, paths: true, predicted: true, floor: true };
     this.channels = {};
 
     const planar = Boolean(view.planar);
@@ -77,7 +78,7 @@ export class Settings {
       h('fieldset', {}, h('legend', {}, 'View'), this.views),
       h('fieldset', { class: 'shows' }, h('legend', {}, 'Show'),
         toggle('map', 'map'), toggle('arm', 'arm'), toggle('spheres', 'collision spheres'), toggle('lines', 'closest points'),
-        toggle('trail', 'tip trail'), toggle('stops', 'stops'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('paths', 'paths', 'Paths of moving obstacles'),
+        toggle('trail', 'tip trail'), toggle('drawings', 'sampled paths', 'Lines that the planner has drawn'), toggle('stops', 'stops'), toggle('goals', 'goals'), toggle('obstacles', 'obstacles'), toggle('paths', 'paths', 'Paths of moving obstacles'),
         toggle('predicted', 'predicted', 'Where moving obstacles are predicted to be, up to 1 s ahead'), toggle('floor', 'grid')),
       has.map && this.mapControls(),
       has.forces && this.forceControls(runs),

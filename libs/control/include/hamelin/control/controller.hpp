@@ -208,6 +208,10 @@ class Controller {
   [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
     return arm_->planner.series();
   }
+  /// The lines that the planner drew last.
+  [[nodiscard]] const PlannerHost::Drawing& drawing() const noexcept {
+    return arm_->planner.drawing();
+  }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
   /// Time that the planner should not exceed in a tick [s], see Answer::overruns.

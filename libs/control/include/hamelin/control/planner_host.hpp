@@ -55,6 +55,13 @@ class PlannerHost final : private planning::HostServices {
   [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
     return planner_.series();
   }
+  /// The lines that it drew in the last tick in which it drew any: their points [m], line by line.
+  struct Drawing {
+    std::uint64_t number = 0;             ///< of the drawing; 0: none was made
+    std::vector<Eigen::Vector3d> points;  ///< in the world
+    std::vector<std::size_t> ends;        ///< of each line, in points
+  };
+  [[nodiscard]] const Drawing& drawing() const noexcept { return drawing_; }
   /// Its last answer.
   [[nodiscard]] const planning::CommandBuffers& command() const noexcept { return command_; }
   /// Why the last tick failed.
@@ -80,6 +87,7 @@ class PlannerHost final : private planning::HostServices {
   std::size_t obstacles(planning::ArrayOut<hamelin_obstacle_state> out) override;
   std::size_t obstacles_ahead(double time_ahead_s, std::int32_t kinds,
                               planning::ArrayOut<hamelin_obstacle_state> out) override;
+  void draw_path(std::span<const double> points_world_m) override;
   std::unique_ptr<planning::QueryServices> open_query() override;
 
   const model::Model& nominal_;
@@ -91,7 +99,9 @@ class PlannerHost final : private planning::HostServices {
   std::vector<scene::SelfContact> query_self_contacts_;
   std::vector<hamelin_contact> contacts_;
   std::vector<hamelin_self_contact> self_contacts_;
-  std::atomic<double> time_s_;       ///< of the last tick
+  std::atomic<double> time_s_;  ///< of the last tick
+  Drawing drawing_;
+  bool draws_ = false;               ///< whether it drew a line in this tick
   std::uint64_t world_number_ = 0;   ///< that the planner knows
   planning::LoadedPlanner planner_;  ///< its constructor uses the members before it
   planning::CommandBuffers command_;

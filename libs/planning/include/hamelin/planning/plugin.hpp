@@ -343,6 +343,15 @@ class Host {
     return raw_->obstacles_ahead(raw_->context, time_ahead_s, kinds, out.data(), out.size(),
                                  sizeof(hamelin_obstacle_state));
   }
+  /// Draws a line of points of the world [m], one after the other, for log and report. The lines of
+  /// a tick are drawn together, until a later tick draws others. Hosts that are older than this
+  /// function draw nothing. For the planner's tick.
+  void draw_path(std::span<const Eigen::Vector3d> points_world) const {
+    static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
+    if (HAMELIN_HAS_FIELD(raw_, hamelin_host, draw_path))
+      raw_->draw_path(raw_->context, reinterpret_cast<const double*>(points_world.data()),
+                      points_world.size());
+  }
   /// Declares a series of numbers for log and report, for Command::set_series(). For the planner's
   /// constructor.
   /// @param unit may be empty

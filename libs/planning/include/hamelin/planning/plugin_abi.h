@@ -345,6 +345,10 @@ typedef struct hamelin_host {
    * obstacles(). For one tick, the order is always the same. */
   size_t (*obstacles_ahead)(void* context, double time_ahead_s, int32_t kinds,
                             hamelin_obstacle_state* out, size_t capacity, size_t stride);
+  /* [tick, inside tick only] Draws a line of `count` points of the world (three numbers each) for
+   * log and report, such as the path of the tip that the planner considers. The lines of a tick
+   * are drawn together, until a later tick draws others. */
+  void (*draw_path)(void* context, const double* points_world_m, size_t count);
 } hamelin_host;
 
 /* hamelin_plugin.properties: what a planner does not promise. */

@@ -106,6 +106,8 @@ class HostServices {
                                       ArrayOut<hamelin_obstacle_state> out) {
     return (kinds & HAMELIN_STANDING) != 0 ? obstacles(out) : 0;
   }
+  /// Draws a line of points of the world, three numbers each [m]. The default draws nothing.
+  virtual void draw_path(std::span<const double> /*points_world_m*/) {}
   /// Makes a query; may be called by any thread. The default world is empty space.
   virtual std::unique_ptr<QueryServices> open_query();
 };
