@@ -21,7 +21,7 @@ struct Payload {
   std::string name = "payload";          ///< of the part of the arm that its shapes form
   std::vector<model::Sphere> spheres;    ///< `part` is not used
   std::vector<model::Segment> capsules;  ///< `part` is not used
-  /// Whether the controller is told of its shapes; a run's judge knows them in any case.
+  /// Whether the controller knows its shapes; a run's judge knows them in any case.
   bool shapes_known = true;
 };
 
