@@ -1,0 +1,54 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/plugin.hpp"
+#include "task.hpp"
+
+namespace hamelin::mppi {
+
+/// For each joint, an upper bound of how far it moves any point of the arm's shapes or its tip per
+/// radian, or 1 for a prismatic joint [m].
+[[nodiscard]] Eigen::VectorXd levers(const planning::Setup& setup,
+                                     const model::Model& model);
+
+/// Computes the costs of rollouts and checks motions. It belongs to one thread at a time; its query
+/// is refreshed on the thread of the tick. Only the constructor and refresh allocate.
+class Evaluator {
+ public:
+  Evaluator(const planning::Host& host, const planning::Setup& setup, const model::Model& model,
+            Eigen::Index point_count);
+
+  void refresh() { (void)query_.refresh(); }
+  [[nodiscard]] planning::Query& query() noexcept { return query_; }
+  /// Sets cost, clearance and collision of the first `lanes` rollouts: docs/theory.md (15.6).
+  void evaluate(const Task& task, Rollouts& rollouts, Eigen::Index lanes = lane_count);
+  /// Whether the motion of these control points is proved clear, docs/theory.md (15.14), and within
+  /// the torque limits.
+  [[nodiscard]] bool verify(const Task& task, const Eigen::MatrixXd& points);
+
+ private:
+  void place(const Rollouts& rollouts, double spacing_s);
+  void add_torques(const Task& task, Rollouts& rollouts);
+  void add_progress(const Task& task, Rollouts& rollouts, Eigen::Index lane);
+  void add_clearance(const Task& task, Rollouts& rollouts, Eigen::Index lane);
+  [[nodiscard]] double time_to_go(const Task& task, const Eigen::VectorXd& q);
+  [[nodiscard]] double clearance(const Eigen::VectorXd& q, double time_ahead_s, double at_least_m);
+  [[nodiscard]] bool within_torques();
+  void get_place(Eigen::Index half, Eigen::Index lane);
+
+  planning::Setup setup_;
+  const model::Model& model_;
+  dynamics::Workspace ws_;
+  dynamics::BatchWorkspace batch_;
+  planning::Query query_;
+  Eigen::VectorXd levers_;
+  Eigen::Index dof_, segments_;
+  dynamics::StatesXd q_, v_, a_, torque_;  ///< at the knots, lane by lane within a knot
+  Eigen::Array<double, lane_count, Eigen::Dynamic> halves_;  ///< places at all half knots
+  Eigen::Array<double, lane_count, Eigen::Dynamic> paths_;   ///< bound of each way between them [m]
+  Eigen::VectorXd at_, from_;
+  Rollouts single_;
+};
+
+}  // namespace hamelin::mppi

@@ -1,0 +1,63 @@
+#include "rollout_pool.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::mppi {
+
+RolloutPool::RolloutPool(const planning::Host& host, const planning::Setup& setup,
+                         const model::Model& model, Eigen::Index point_count, int samples,
+                         int threads, Task& task, Guide& guide)
+    : task_(task),
+      guide_(guide),
+      blocks_(static_cast<std::size_t>(samples) / lane_count, Rollouts(model.dof(), point_count)) {
+  for (int i = 0; i < std::max(1, threads); ++i) {
+    evaluators_.push_back(std::make_unique<Evaluator>(host, setup, model, point_count));
+    samplers_.emplace_back(model.dof(), point_count);
+  }
+  if (threads > 0)
+    workers_.emplace(threads, [this](int worker, int unit) { work(worker, unit); });
+}
+
+void RolloutPool::refresh() {
+  for (auto& evaluator : evaluators_) evaluator->refresh();
+}
+
+void RolloutPool::start(long guide_checks) {
+  guide_from_ = guide_.checks();
+  guide_to_ = guide_checks;
+  done_ = 0;
+  active_ = true;
+  if (workers_) workers_->start(static_cast<int>(blocks_.size()) + 1);
+}
+
+void RolloutPool::share(double of_whole) {
+  if (workers_ || !active_) return;
+  const auto blocks = static_cast<int>(blocks_.size());
+  const int target = std::min(blocks, static_cast<int>(std::ceil(of_whole * blocks)));
+  for (; done_ < target; ++done_) work(0, done_ + 1);
+  guide_.advance(evaluator().query(),
+                 guide_from_ + std::lround(of_whole * static_cast<double>(guide_to_ - guide_from_)));
+}
+
+void RolloutPool::finish() {
+  if (workers_)
+    workers_->wait();
+  else
+    share(1.0);
+  active_ = false;
+}
+
+// The guide, whose work cannot be divided among threads, comes first.
+void RolloutPool::work(int worker, int unit) {
+  const auto w = static_cast<std::size_t>(worker);
+  if (unit == 0) return guide_.advance(evaluators_[w]->query(), guide_to_);
+  auto& rollouts = blocks_[static_cast<std::size_t>(unit) - 1];
+  if (unit == 1)
+    samplers_[w].propose(task_, rollouts);
+  else
+    samplers_[w].sample(task_, unit - 1, rollouts);
+  evaluators_[w]->evaluate(task_, rollouts);
+}
+
+}  // namespace hamelin::mppi
