@@ -71,15 +71,16 @@ Evaluator::Evaluator(const planning::Host& host, const planning::Setup& setup,
     *x = dynamics::StatesXd::Zero(dof_, (segments_ + 1) * lane_count);
 }
 
-void Evaluator::evaluate(const Task& task, Rollouts& rollouts, Index lanes) {
+void Evaluator::begin(const Task& task, Rollouts& rollouts) {
   rollouts.cost.setZero();
   rollouts.clearance_m.setConstant(setup_.influence_m());
   place(rollouts, task.spacing_s);
   add_torques(task, rollouts);
-  for (Index lane = 0; lane < lanes; ++lane) {
-    add_progress(task, rollouts, lane);
-    add_clearance(task, rollouts, lane);
-  }
+}
+
+void Evaluator::evaluate(const Task& task, Rollouts& rollouts, Index lane) {
+  add_progress(task, rollouts, lane);
+  add_clearance(task, rollouts, lane);
 }
 
 // States at the knots and places between them, docs/theory.md (15.1).
@@ -163,15 +164,16 @@ double Evaluator::clearance(const Eigen::VectorXd& q, double time_ahead_s, doubl
 // docs/theory.md (15.8), (15.11). Where nothing moves, places that a larger clearance before them
 // covers are not queried.
 void Evaluator::add_clearance(const Task& task, Rollouts& rollouts, Index lane) {
-  const double range = task.cost.clearance_range_m, half_s = 0.5 * task.spacing_s;
+  const double half_s = 0.5 * task.spacing_s;
   const double horizon = static_cast<double>(2 * segments_);
   double known = task.start_clearance_m, travelled = 0.0;
   rollouts.collides[static_cast<std::size_t>(lane)] = false;
   for (Index h = 1; h <= 2 * segments_; ++h) {
     travelled += paths_(lane, h);
-    if (!task.moving && (paths_(lane, h) == 0.0 || travelled <= known - range)) continue;
+    if (!task.moving && (paths_(lane, h) == 0.0 || travelled <= known - task.margins.range())) continue;
     get_place(h, lane);
-    const double margin = task.margins.required(at_) + (task.moving ? mover_margin_m : 0.0);
+    const auto required = task.margins.required(at_);
+    const double margin = required.margin_m + (task.moving ? mover_margin_m : 0.0);
     const double time_s = task.spacing_s + static_cast<double>(h) * half_s;
     const double distance = clearance(at_, time_s, margin);
     rollouts.clearance_m[lane] = std::min(rollouts.clearance_m[lane], distance);
@@ -180,8 +182,9 @@ void Evaluator::add_clearance(const Task& task, Rollouts& rollouts, Index lane) 
       rollouts.cost[lane] += collision_s * (2.0 - static_cast<double>(h) / horizon);
       return;
     }
-    if (distance < range) {
-      const double lack = (range - distance) / std::max(1e-3, range - margin);
+    if (distance < required.range_m) {
+      const double lack =
+          (required.range_m - distance) / std::max(1e-3, required.range_m - margin);
       rollouts.cost[lane] += task.cost.clearance_s * lack * lack / horizon;
     }
     known = distance;
@@ -213,7 +216,7 @@ bool Evaluator::verify(const Task& task, const Eigen::MatrixXd& points) {
     if (!task.moving && paths_(0, h) == 0.0) continue;
     get_place(h, 0);
     const double time_s = task.spacing_s + static_cast<double>(h) * half_s;
-    const double margin = task.margins.required(at_);
+    const double margin = task.margins.required(at_).margin_m;
     const double distance = clearance(at_, time_s, margin);
     if (distance < margin) return false;
     // The balls of both clearances cover the way between, or else the certificate proves it, with

@@ -21,8 +21,10 @@ class Evaluator {
 
   void refresh() { (void)query_.refresh(); }
   [[nodiscard]] planning::Query& query() noexcept { return query_; }
-  /// Sets cost, clearance and collision of the first `lanes` rollouts: docs/theory.md (15.6).
-  void evaluate(const Task& task, Rollouts& rollouts, Eigen::Index lanes = lane_count);
+  /// Sets cost, clearance and collision of rollouts, docs/theory.md (15.6): begin() does what SIMD
+  /// lanes do together, evaluate() the rest of one lane of the same rollouts.
+  void begin(const Task& task, Rollouts& rollouts);
+  void evaluate(const Task& task, Rollouts& rollouts, Eigen::Index lane);
   /// Whether the motion of these control points is proved clear, docs/theory.md (15.14), and within
   /// the torque limits.
   [[nodiscard]] bool verify(const Task& task, const Eigen::MatrixXd& points);

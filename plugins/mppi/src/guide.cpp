@@ -13,7 +13,10 @@ constexpr int root_attempts = 60;
 constexpr double root_clearance_m = 0.003;  // at least, beyond what a shield keeps
 constexpr double extension = 0.5;           // length of a step of a tree [rad or m]
 constexpr double least_way_m = 0.02;        // ways of all points between two queries
-constexpr double guide_reserve_m = 0.004;   // kept beyond the margins of rollouts
+constexpr double guide_reserve_m = 0.002;   // kept beyond the margins of rollouts
+// Share of the draws around a root or the start, where ways are often narrow, and their spread [rad
+// or m].
+constexpr double near_share = 0.3, near_spread = 0.5;
 constexpr int cuts = 120;                   // attempts to shorten a path
 constexpr int iterations_per_check = 4;     // of inverse kinematics count as much as one query
 
@@ -131,11 +134,11 @@ bool Guide::motion_clear(planning::Query& query, const Eigen::VectorXd& from,
   const double way = levers_.dot((to - from).cwiseAbs());
   if (way == 0.0) return true;
   // The end first, because it is the likeliest to be in collision.
-  double margin = margins_.required(to);
+  double margin = margins_.required(to).margin_m;
   if (clearance(query, to, margin) < margin) return false;
   for (double t = std::min(least_way_m / way, 1.0); t < 1.0;) {
     at_ = from + t * (to - from);
-    margin = margins_.required(at_);
+    margin = margins_.required(at_).margin_m;
     const double distance = clearance(query, at_, margin);
     if (distance < margin) return false;
     t += std::max(least_way_m, distance - margin) / way;
@@ -164,10 +167,19 @@ bool Guide::connect(planning::Query& query, Tree& tree, const Eigen::VectorXd& t
   return true;
 }
 
+void Guide::draw_target() {
+  box_.draw(rng_, target_);
+  if (rng_.uniform() >= near_share) return;
+  const auto k = static_cast<int>(rng_.below(static_cast<std::uint64_t>(root_count_) + 1));
+  const Eigen::VectorXd& center = k < root_count_ ? root(k) : start_;
+  for (Eigen::Index i = 0; i < target_.size(); ++i)
+    target_[i] = std::clamp(center[i] + near_spread * rng_.normal(), box_.lower[i], box_.upper[i]);
+}
+
 void Guide::grow(planning::Query& query) {
   auto &tree = trees_[to_size(side_)], &other = trees_[to_size(1 - side_)];
   side_ = 1 - side_;
-  box_.draw(rng_, target_);
+  draw_target();
   if (!extend(query, tree, target_)) {
     if (tree.size == nodes_max) stop();
     return;

@@ -53,6 +53,7 @@ class Guide {
   void measure_start(planning::Query& query);
   void find_root(planning::Query& query);
   void add_root(planning::Query& query, const Eigen::VectorXd& q);
+  void draw_target();
   void grow(planning::Query& query);
   bool extend(planning::Query& query, Tree& tree, const Eigen::VectorXd& target);
   bool connect(planning::Query& query, Tree& tree, const Eigen::VectorXd& target);

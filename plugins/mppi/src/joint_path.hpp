@@ -12,7 +12,7 @@ namespace hamelin::mppi {
 class JointPath {
  public:
   JointPath(Eigen::Index dof, Eigen::Index capacity)
-      : points_(Eigen::MatrixXd::Zero(dof, capacity)), arc_(to_size(capacity)) {}
+      : points_(Eigen::MatrixXd::Zero(dof, capacity)), arc_(to_size(capacity)), turn_(to_size(capacity)) {}
 
   void clear() noexcept { size_ = 0; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
@@ -29,8 +29,11 @@ class JointPath {
     points_.col(size_) = q;
     arc_[to_size(size_)] =
         size_ == 0 ? 0.0 : arc(size_ - 1) + (points_.col(size_) - points_.col(size_ - 1)).norm();
-    ++size_;
+    turn_[to_size(size_)] = 0.0;
+    if (++size_ > 2) measure_turn(size_ - 2);
   }
+  /// How sharply the path turns at a point: the difference of the directions before and behind it.
+  [[nodiscard]] double turn(Eigen::Index i) const { return turn_[to_size(i)]; }
   /// The point at the arc length s.
   void at(double s, Eigen::Ref<Eigen::VectorXd> out) const {
     Eigen::Index i = 0;
@@ -77,8 +80,16 @@ class JointPath {
   static constexpr double lead = 0.35355339059327373;  // 1/√(κ² − 1)
   static std::size_t to_size(Eigen::Index n) { return static_cast<std::size_t>(n); }
 
+  void measure_turn(Eigen::Index i) {
+    const double before = arc(i) - arc(i - 1), behind = arc(i + 1) - arc(i);
+    if (before > 0.0 && behind > 0.0)
+      turn_[to_size(i)] = ((points_.col(i) - points_.col(i - 1)) / before -
+                           (points_.col(i + 1) - points_.col(i)) / behind)
+                              .norm();
+  }
+
   Eigen::MatrixXd points_;
-  std::vector<double> arc_;
+  std::vector<double> arc_, turn_;
   Eigen::Index size_ = 0;
 };
 

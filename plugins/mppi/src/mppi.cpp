@@ -128,7 +128,7 @@ class Mppi final : public planning::Planner {
     const double shield = std::max(setup.shield_margin_m(), setup.shield_self_margin_m());
     const double least = setup.sampled() ? least_sampled_m : least_m;
     return {setup.dof(), std::max(params["margin_m"].get<double>(), shield + beyond_shield_m),
-            std::max(least, shield), params["goal_margin_m"]};
+            std::max(least, shield), params["goal_margin_m"], params["clearance_range_m"]};
   }
 
   void check_horizon() const {
@@ -193,7 +193,9 @@ class Mppi final : public planning::Planner {
     if (searching_ && !guide_.searches()) take_path();
     measure_start();
     check_progress(tick.time_s());
-    pool_.start(guide_.checks() + tuning_.guide_queries);
+    // An arm that waits where nothing moves needs no rollouts.
+    rolls_ = !searching_ || task_.moving;
+    pool_.start(guide_.checks() + tuning_.guide_queries, rolls_);
   }
 
   static void shift(const MatrixXd& from, MatrixXd& to) {
@@ -337,6 +339,11 @@ class Mppi final : public planning::Planner {
   // docs/theory.md (15.12), (15.13)
   void finish_plan() {
     pool_.finish();
+    figures_[guide_queries] = static_cast<double>(guide_.checks());
+    if (!rolls_) {
+      plan_ = task_.best = task_.mean;
+      return;
+    }
     const Index count = pool_.sample_count();
     double collisions = 0.0;
     for (Index i = 0; i < count; ++i) {
@@ -351,7 +358,6 @@ class Mppi final : public planning::Planner {
                       });
     figures_[effective_samples] = weights_of_costs(weights_, tuning_.temperature_s);
     figures_[colliding] = collisions;
-    figures_[guide_queries] = static_cast<double>(guide_.checks());
     average();
     choose();
     pool_.get_points(order_.front(), task_.best);
@@ -376,7 +382,8 @@ class Mppi final : public planning::Planner {
   // keeps to the plan before, which ends at rest, or brakes if that costs less.
   void choose() {
     average_.set_lane(0, mean_);
-    pool_.evaluator().evaluate(task_, average_, 1);
+    pool_.evaluator().begin(task_, average_);
+    pool_.evaluator().evaluate(task_, average_, 0);
     figures_[mean_cost] = average_.cost[0];
     bool mean_tried = false;
     for (std::size_t i = 0; i < candidate_count; ++i) {
@@ -425,7 +432,8 @@ class Mppi final : public planning::Planner {
   Tracker tracker_;
   JointState planned_;
   Rollouts average_;
-  bool uses_guide_, started_ = false, searching_ = false, gives_up_ = false, known_goal_ = false;
+  bool uses_guide_, started_ = false, searching_ = false, gives_up_ = false, known_goal_ = false,
+       rolls_ = false;
   std::uint64_t goal_number_ = 0;
   int searches_ = 0;
   double left_ = 0.0, least_left_ = 0.0, progress_s_ = 0.0;  ///< length to go, and since when

@@ -23,7 +23,8 @@ class RolloutPool {
   void refresh();
   /// Starts the work on the task, which must not change until finish().
   /// @param guide_checks number of queries that the guide may have used in the end
-  void start(long guide_checks);
+  /// @param rollouts false: the guide only
+  void start(long guide_checks, bool rollouts);
   /// Without threads: does the work up to a share of the whole (0 to 1).
   void share(double of_whole);
   /// Returns when the work is done.
@@ -49,6 +50,7 @@ class RolloutPool {
   [[nodiscard]] Evaluator& evaluator() noexcept { return *evaluators_.front(); }
 
  private:
+  void begin(std::size_t worker, std::size_t block);
   void work(int worker, int unit);
   [[nodiscard]] const Rollouts& block(Eigen::Index sample) const {
     return blocks_[static_cast<std::size_t>(sample / lane_count)];
@@ -60,8 +62,8 @@ class RolloutPool {
   std::vector<Sampler> samplers_;
   std::vector<Rollouts> blocks_;
   long guide_from_ = 0, guide_to_ = 0;
-  int done_ = 0;
-  bool active_ = false;
+  Eigen::Index done_ = 0;  ///< rollouts evaluated by share()
+  bool active_ = false, rolls_ = false;
   std::optional<Workers> workers_;  ///< last, so that they end before what they use
 };
 

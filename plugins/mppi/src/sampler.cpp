@@ -16,12 +16,15 @@ using Scalar = Eigen::Array<double, 1, 1>;
 // The noise of samples 0, 1, 2, 3, 4, … as shares of Task::noise, again and again: wide samples
 // find other ways, narrow ones refine the mean.
 constexpr std::array noise_shares{1.0, 0.5, 0.25, 0.1};
+// Half of the random samples are centred on the mean, the others on a motion along the path with
+// random speed and distance of the carrot.
 struct Following {
   double speed_share;  // of the speed limits
   double ahead;        // distance of the carrot [rad or m]
 };
 constexpr std::array<Following, 5> followings{
-    {{1.0, 0.3}, {1.0, 0.12}, {0.6, 0.12}, {0.3, 0.06}, {0.12, 0.03}}};
+    {{1.0, 0.3}, {1.0, 0.1}, {0.6, 0.1}, {0.3, 0.05}, {0.12, 0.03}}};
+constexpr Following slowest{0.2, 0.02}, fastest{1.0, 0.4};
 constexpr double path_step = 0.02;  // of the search for the carrot [rad or m]
 
 // Numbers of different plans and samples are independent: the seed of a generator is a mix of all.
@@ -61,22 +64,28 @@ Sampler::Sampler(Index dof, Index point_count)
   basis_ /= 6.0;
 }
 
-void Sampler::sample(const Task& task, int block, Rollouts& out) {
+void Sampler::sample(const Task& task, std::size_t block, Rollouts& out) {
   const Index dof = task.mean.rows(), n = task.mean.cols();
-  const std::uint64_t stream = mix(mix(task.seed, task.plan), static_cast<std::uint64_t>(block));
+  const std::uint64_t stream = mix(mix(task.seed, task.plan), block);
   for (Index lane = 0; lane < lane_count; ++lane) {
     Rng rng(mix(stream, static_cast<std::uint64_t>(lane)));
     const double sigma =
         task.noise * noise_shares[static_cast<std::size_t>(lane) % noise_shares.size()];
     for (Index k = 0; k < noise_.cols(); ++k) noise_(lane, k) = sigma * rng.normal();
+    if (lane < lane_count / 2) {
+      out.set_lane(lane, task.mean);
+      continue;
+    }
+    const double ahead = slowest.ahead * std::pow(fastest.ahead / slowest.ahead, rng.uniform());
+    follow(task, rng.uniform(slowest.speed_share, fastest.speed_share), ahead);
+    out.set_lane(lane, points_);
   }
   for (Index j = 0; j < dof; ++j) {
-    for (Index i = 0; i < 3; ++i) out.point(j, i) = task.mean(j, i);
     for (Index i = 3; i + 2 < n; ++i) {
-      Lanes desired = Lanes::Constant(task.mean(j, i)) - out.point(j, i - 1);
+      const Lanes position = out.point(j, i - 1), previous = position - out.point(j, i - 2);
+      Lanes desired = out.point(j, i) - position;
       for (Index k = 0; k < coefficient_count; ++k)
         desired += basis_(i, k) * noise_.col(j * coefficient_count + k);
-      const Lanes position = out.point(j, i - 1), previous = position - out.point(j, i - 2);
       out.point(j, i) =
           position + task.limits.limit(j, desired, position, previous, steps_after(i, n));
     }
@@ -121,6 +130,7 @@ void Sampler::propose(const Task& task, Rollouts& out) {
   }
 }
 
+// docs/theory.md (15.5)
 void Sampler::follow(const Task& task, double speed_share, double ahead) {
   const auto& limits = task.limits;
   const Index dof = points_.rows(), n = points_.cols();
@@ -134,22 +144,35 @@ void Sampler::follow(const Task& task, double speed_share, double ahead) {
       task.path.at(s, carrot_);
     }
     step_ = carrot_ - position;
-    const double distance = step_.norm(), left = task.path.length() - s + distance;
-    double share = 1.0, brake = limits.change.maxCoeff();
+    const double distance = step_.norm();
+    double length = distance, brake = limits.change.maxCoeff();
     for (Index j = 0; j < dof; ++j) {
       if (step_[j] == 0.0) continue;
-      share = std::min(share, speed_share * limits.speed[j] / std::abs(step_[j]));
-      brake = std::min(brake, limits.change[j] * distance / std::abs(step_[j]));
+      const double per_length = std::abs(step_[j]) / distance;
+      length = std::min(length, speed_share * limits.speed[j] / per_length);
+      brake = std::min(brake, limits.change[j] / per_length);
     }
-    if (distance > 0.0)
-      share = std::min(share,
-                       0.5 * (std::sqrt(brake * brake + 8.0 * brake * left) - brake) / distance);
+    length = std::min(length, length_before_turns(task.path, s, distance, ahead, brake));
+    const double share = distance > 0.0 ? length / distance : 0.0;
     for (Index j = 0; j < dof; ++j)
       points_(j, i) =
           i + 2 < n ? position[j] + limited(limits, j, share * step_[j], position[j],
                                             position[j] - points_(j, i - 2), steps_after(i, n))
                     : position[j];
   }
+}
+
+double Sampler::length_before_turns(const JointPath& path, double s, double distance, double ahead,
+                                    double brake) {
+  const double left = path.length() - s + distance;
+  double length = 0.5 * (std::sqrt(brake * brake + 8.0 * brake * left) - brake);
+  for (Index k = 1; k + 1 < path.size(); ++k) {
+    const double before = path.arc(k) - s + distance;
+    if (before < 0.0 || path.turn(k) == 0.0) continue;
+    const double turning = brake * ahead / path.turn(k);
+    length = std::min(length, std::sqrt(turning + 2.0 * brake * std::max(0.0, before - ahead)));
+  }
+  return length;
 }
 
 }  // namespace hamelin::mppi

@@ -17,9 +17,9 @@ class Sampler {
   /// The mean, the best rollout of the plan before, braking, and motions that follow the path at
   /// several speeds: docs/theory.md (15.5).
   void propose(const Task& task, Rollouts& out);
-  /// Random rollouts around the mean, docs/theory.md (15.4). The numbers depend on seed, plan and
+  /// Random rollouts around the mean and along the path, docs/theory.md (15.4). The numbers depend on seed, plan and
   /// block only.
-  void sample(const Task& task, int block, Rollouts& out);
+  void sample(const Task& task, std::size_t block, Rollouts& out);
   /// The rollout from the first three control points that stays nearest to desired ones.
   static void approach(const StepLimits& limits, const Eigen::MatrixXd& desired,
                        Eigen::MatrixXd& points);
@@ -31,6 +31,9 @@ class Sampler {
   static constexpr Eigen::Index coefficient_count = 6;
 
  private:
+  /// The longest step from which the arm can still slow down for the turns and the end of the path.
+  [[nodiscard]] static double length_before_turns(const JointPath& path, double s, double distance,
+                                                  double ahead, double brake);
   void follow(const Task& task, double speed_share, double ahead);
 
   Eigen::Matrix<double, Eigen::Dynamic, coefficient_count> basis_;

@@ -19,10 +19,9 @@ struct Goal {
   double tolerance_m = 0.0, tolerance_rad = 0.0;
 };
 
-/// Weights and lengths of the cost, docs/theory.md (15.6), (15.9)–(15.11).
+/// Weights of the cost, docs/theory.md (15.6), (15.9)–(15.11).
 struct CostParams {
-  double smoothness_s, clearance_s;  ///< weights
-  double clearance_range_m;          ///< clearances beyond it cost nothing
+  double smoothness_s, clearance_s;
 };
 
 /// What the rollouts of one plan share. Workers only read it.

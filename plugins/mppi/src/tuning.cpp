@@ -15,8 +15,7 @@ constexpr std::array fixed_params{
 }  // namespace
 
 Tuning::Tuning(const Json& params)
-    : cost{params["smoothness_weight_s"], params["clearance_weight_s"],
-           params["clearance_range_m"]},
+    : cost{params["smoothness_weight_s"], params["clearance_weight_s"]},
       temperature_s(params["temperature_s"]),
       noise(params["noise_rad"]),
       cruise_speed(params["cruise_speed"]),
