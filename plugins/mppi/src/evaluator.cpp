@@ -19,6 +19,7 @@ constexpr Index progress_stride = 3;     // knots at which the time to go is eva
 constexpr double tip_speed = 0.6, tip_turn = 1.5;
 // Distance kept from moving obstacles, in addition to the margin [m].
 constexpr double mover_margin_m = 0.02;
+constexpr std::size_t splits = 3;  // how often a part is divided that is not proved clear
 
 // The largest travel of a joint from zero [m].
 double travel(const planning::Setup& setup, Index j) {
@@ -66,6 +67,7 @@ Evaluator::Evaluator(const planning::Host& host, const planning::Setup& setup,
       paths_(lane_count, 2 * segments_ + 1),
       at_(Eigen::VectorXd::Zero(dof_)),
       from_(at_),
+      middles_(splits, JointState(dof_)),
       single_(dof_, point_count) {
   for (auto* x : {&q_, &v_, &a_, &torque_})
     *x = dynamics::StatesXd::Zero(dof_, (segments_ + 1) * lane_count);
@@ -85,6 +87,7 @@ void Evaluator::evaluate(const Task& task, Rollouts& rollouts, Index lane) {
 
 // States at the knots and places between them, docs/theory.md (15.1).
 void Evaluator::place(const Rollouts& rollouts, double spacing_s) {
+  spacing_s_ = spacing_s;
   const Index halves = 2 * segments_ + 1;
   paths_.setZero();
   for (Index j = 0; j < dof_; ++j) {
@@ -203,11 +206,38 @@ bool Evaluator::within_torques() {
   return true;
 }
 
+// Whether a part of a segment is proved clear: its chord, with room for the difference between
+// spline and chord. If it is not, both halves may be.
+bool Evaluator::proved_clear(const Eigen::MatrixXd& points, Index segment, Part part,
+                             const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+                             std::size_t depth) {
+  const std::size_t n = static_cast<std::size_t>(dof_);
+  const double duration_s = (part.to - part.from) * spacing_s_;
+  double bend = 0.0, proved = 0.0;
+  for (Index j = 0; j < dof_; ++j)
+    bend += levers_[j] *
+            std::max(std::abs(a_(j, segment * lane_count)),
+                     std::abs(a_(j, (segment + 1) * lane_count))) *
+            duration_s * duration_s / 8.0;
+  const auto time_s = [&](double u) {
+    return (1.0 + static_cast<double>(segment) + u) * spacing_s_;
+  };
+  if (query_.motion_clear({from.data(), n}, {to.data(), n}, time_s(part.from), time_s(part.to),
+                          &proved) &&
+      proved >= bend)
+    return true;
+  if (depth == 0) return false;
+  JointState& middle = middles_[depth - 1];
+  const double u = 0.5 * (part.from + part.to);
+  mppi::evaluate(points, segment, u, spacing_s_, middle);
+  return proved_clear(points, segment, {part.from, u}, from, middle.q, depth - 1) &&
+         proved_clear(points, segment, {u, part.to}, middle.q, to, depth - 1);
+}
+
 bool Evaluator::verify(const Task& task, const Eigen::MatrixXd& points) {
   single_.set_lane(0, points);
   place(single_, task.spacing_s);
   if (!within_torques()) return false;
-  const std::size_t n = static_cast<std::size_t>(dof_);
   const double half_s = 0.5 * task.spacing_s;
   get_place(0, 0);
   from_ = at_;
@@ -219,20 +249,11 @@ bool Evaluator::verify(const Task& task, const Eigen::MatrixXd& points) {
     const double margin = task.margins.required(at_).margin_m;
     const double distance = clearance(at_, time_s, margin);
     if (distance < margin) return false;
-    // The balls of both clearances cover the way between, or else the certificate proves it, with
-    // room for the difference between the spline and its chord.
-    if (task.moving || before + distance <= paths_(0, h)) {
-      double bend = 0.0, proved = 0.0;
-      for (Index j = 0; j < dof_; ++j)
-        bend += levers_[j] *
-                std::max(std::abs(a_(j, (h - 1) / 2 * lane_count)),
-                         std::abs(a_(j, (h + 1) / 2 * lane_count))) *
-                half_s * half_s / 8.0;
-      if (!query_.motion_clear({from_.data(), n}, {at_.data(), n}, time_s - half_s, time_s,
-                               &proved) ||
-          proved < bend)
-        return false;
-    }
+    // The balls of both clearances cover the way between, or else a certificate proves it.
+    const double u = 0.5 * static_cast<double>((h - 1) % 2);
+    if ((task.moving || before + distance <= paths_(0, h)) &&
+        !proved_clear(points, (h - 1) / 2, {u, u + 0.5}, from_, at_, splits))
+      return false;
     before = distance;
     from_ = at_;
   }

@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
+#include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
+#include "spline.hpp"
 #include "task.hpp"
 
 namespace hamelin::mppi {
@@ -37,6 +39,12 @@ class Evaluator {
   [[nodiscard]] double time_to_go(const Task& task, const Eigen::VectorXd& q);
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double time_ahead_s, double at_least_m);
   [[nodiscard]] bool within_torques();
+  struct Part {
+    double from, to;  ///< of a segment, 0 to 1
+  };
+  [[nodiscard]] bool proved_clear(const Eigen::MatrixXd& points, Eigen::Index segment, Part part,
+                                  const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+                                  std::size_t depth);
   void get_place(Eigen::Index half, Eigen::Index lane);
 
   planning::Setup setup_;
@@ -49,7 +57,9 @@ class Evaluator {
   dynamics::StatesXd q_, v_, a_, torque_;  ///< at the knots, lane by lane within a knot
   Eigen::Array<double, lane_count, Eigen::Dynamic> halves_;  ///< places at all half knots
   Eigen::Array<double, lane_count, Eigen::Dynamic> paths_;   ///< bound of each way between them [m]
+  double spacing_s_ = 0.0;  ///< of what was placed last
   Eigen::VectorXd at_, from_;
+  std::vector<JointState> middles_;  ///< one per depth of proved_clear()
   Rollouts single_;
 };
 

@@ -10,6 +10,7 @@ namespace {
 constexpr int nodes_max = 3000;                // of each tree
 constexpr Eigen::Index path_points_max = 200;  // of the path before it is shortened
 constexpr int root_attempts = 60;
+constexpr double tolerance_share_of_roots = 0.9;  // within which roots of joint goals are drawn
 constexpr double root_clearance_m = 0.003;  // at least, beyond what a shield keeps
 constexpr double extension = 0.5;           // length of a step of a tree [rad or m]
 constexpr double least_way_m = 0.02;        // ways of all points between two queries
@@ -96,7 +97,7 @@ void Guide::measure_start(planning::Query& query) {
 
 void Guide::add_root(planning::Query& query, const Eigen::VectorXd& q) {
   const double distance = clearance(query, q, 0.0);
-  if (distance < (goal_.type == HAMELIN_GOAL_JOINT ? 0.0 : shield_m_ + root_clearance_m)) return;
+  if (distance < shield_m_ + (goal_.type == HAMELIN_GOAL_JOINT ? 0.0 : root_clearance_m)) return;
   auto& root = roots_[to_size(root_count_++)];
   root.q = q;
   root.clearance = distance;
@@ -104,16 +105,20 @@ void Guide::add_root(planning::Query& query, const Eigen::VectorXd& q) {
 }
 
 void Guide::find_root(planning::Query& query) {
-  bool done = true;
-  if (goal_.type == HAMELIN_GOAL_JOINT) {
-    add_root(query, goal_.q);
+  const bool joint_goal = goal_.type == HAMELIN_GOAL_JOINT;
+  if (joint_goal) {
+    x_ = goal_.q;
+    if (attempt_ > 0)  // the goal itself is not clear, but a place within its tolerance may be
+      for (Eigen::Index i = 0; i < x_.size(); ++i)
+        x_[i] += tolerance_share_of_roots * goal_.tolerance_rad * rng_.uniform(-1.0, 1.0);
+    add_root(query, x_);
   } else {
     if (kinematics_.solve(goal_, x_)) add_root(query, x_);
     checks_ += kinematics_.iterations() / iterations_per_check + 1;
     box_.draw(rng_, x_);
-    done = ++attempt_ == root_attempts || root_count_ == static_cast<int>(roots_.size());
   }
-  if (!done) return;
+  const int enough = joint_goal ? 1 : static_cast<int>(roots_.size());
+  if (++attempt_ < root_attempts && root_count_ < enough) return;
   if (root_count_ == 0) return stop();
   // The nearest root first: straight ways are tried in this order.
   std::sort(roots_.begin(), roots_.begin() + root_count_, [&](const Root& a, const Root& b) {
