@@ -1,5 +1,6 @@
 #include "guide.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +12,12 @@ constexpr int nodes_max = 3000;                // of each tree
 constexpr Eigen::Index path_points_max = 200;  // of the path before it is shortened
 constexpr int root_attempts = 60;
 constexpr double tolerance_share_of_roots = 0.9;  // within which roots of joint goals are drawn
-constexpr double root_clearance_m = 0.003;  // at least, beyond what a shield keeps
+// Least clearance of roots of a tip goal beyond what a shield keeps, in the first half of the
+// attempts and later [m].
+constexpr double root_clearance_m = 0.003, least_root_clearance_m = 0.001;
+// Share of a tip goal's tolerances within which other poses are drawn. Inverse kinematics takes the
+// rest.
+constexpr double tip_tolerance_share = 0.6;
 constexpr double extension = 0.5;           // length of a step of a tree [rad or m]
 constexpr double least_way_m = 0.02;        // ways of all points between two queries
 constexpr double guide_reserve_m = 0.002;   // kept beyond the margins of rollouts
@@ -38,7 +44,7 @@ Guide::Guide(const planning::Setup& setup, const model::Model& model, const Marg
       from_(start_),
       at_(start_),
       target_(start_) {
-  goal_.q = start_;
+  goal_.q = near_goal_.q = start_;
   for (auto& root : roots_) root.q = start_;
   for (auto& tree : trees_) {
     tree.q = Eigen::MatrixXd::Zero(setup.dof(), nodes_max);
@@ -59,7 +65,7 @@ int Guide::Tree::nearest(const Eigen::VectorXd& to) const {
 
 void Guide::begin(const Goal& goal, const Eigen::VectorXd& q, std::uint64_t seed,
                   std::uint64_t number) {
-  goal_ = goal;
+  goal_ = near_goal_ = goal;
   start_ = x_ = q;
   rng_ = Rng(seed + 0x632be59bd9b4e019ULL * (number + 1));
   checks_ = 0;
@@ -97,11 +103,27 @@ void Guide::measure_start(planning::Query& query) {
 
 void Guide::add_root(planning::Query& query, const Eigen::VectorXd& q) {
   const double distance = clearance(query, q, 0.0);
-  if (distance < shield_m_ + (goal_.type == HAMELIN_GOAL_JOINT ? 0.0 : root_clearance_m)) return;
+  double least = 0.0;
+  if (goal_.type != HAMELIN_GOAL_JOINT)
+    least = attempt_ < root_attempts / 2 ? root_clearance_m : least_root_clearance_m;
+  if (distance < shield_m_ + least) return;
   auto& root = roots_[to_size(root_count_++)];
   root.q = q;
   root.clearance = distance;
   margins_.add_goal(q, distance);
+}
+
+// Another pose within the tolerances of the goal, since the goal itself is often near an obstacle.
+void Guide::draw_near_goal() {
+  const auto draw = [&](double radius) -> Eigen::Vector3d {
+    Eigen::Vector3d out;
+    for (int i = 0; i < 3; ++i) out[i] = rng_.uniform(-1.0, 1.0);
+    return out * (radius / std::max(1.0, out.norm()));
+  };
+  near_goal_.position = goal_.position + draw(tip_tolerance_share * goal_.tolerance_m);
+  const Eigen::Vector3d turn = draw(tip_tolerance_share * goal_.tolerance_rad);
+  near_goal_.rotation =
+      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * goal_.rotation;
 }
 
 void Guide::find_root(planning::Query& query) {
@@ -113,7 +135,8 @@ void Guide::find_root(planning::Query& query) {
         x_[i] += tolerance_share_of_roots * goal_.tolerance_rad * rng_.uniform(-1.0, 1.0);
     add_root(query, x_);
   } else {
-    if (kinematics_.solve(goal_, x_)) add_root(query, x_);
+    if (attempt_ > 0) draw_near_goal();
+    if (kinematics_.solve(near_goal_, x_)) add_root(query, x_);
     checks_ += kinematics_.iterations() / iterations_per_check + 1;
     box_.draw(rng_, x_);
   }

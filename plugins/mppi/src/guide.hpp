@@ -53,6 +53,7 @@ class Guide {
   void measure_start(planning::Query& query);
   void find_root(planning::Query& query);
   void add_root(planning::Query& query, const Eigen::VectorXd& q);
+  void draw_near_goal();
   void draw_target();
   void grow(planning::Query& query);
   bool extend(planning::Query& query, Tree& tree, const Eigen::VectorXd& target);
@@ -72,7 +73,7 @@ class Guide {
   long budget_, checks_ = 0;
   Rng rng_{0};
   Phase phase_ = Phase::idle;
-  Goal goal_;
+  Goal goal_, near_goal_;  ///< and a pose within its tolerances
   std::array<Root, Margins::max_goals> roots_;
   int root_count_ = 0, attempt_ = 0, cut_ = 0;
   std::array<Tree, 2> trees_;  ///< from the start, and from the roots

@@ -165,7 +165,7 @@ void Sampler::follow(const Task& task, double speed_share, double ahead) {
 double Sampler::length_before_turns(const JointPath& path, double s, double distance, double ahead,
                                     double brake) {
   const double left = path.length() - s + distance;
-  double length = 0.5 * (std::sqrt(brake * brake + 8.0 * brake * left) - brake);
+  double length = braking_step<Scalar>(Scalar(left), brake)[0];
   for (Index k = 1; k + 1 < path.size(); ++k) {
     const double before = path.arc(k) - s + distance;
     if (before < 0.0 || path.turn(k) == 0.0) continue;

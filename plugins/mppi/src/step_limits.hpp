@@ -3,6 +3,15 @@
 
 namespace hamelin::mppi {
 
+/// The longest step from which steps that shorten by `change` each come to rest within the distance
+/// x: d + (d − b) + (d − 2b) + … = x, docs/theory.md (15.4). It is concave in x. For arrays.
+template <class Array>
+[[nodiscard]] Array braking_step(const Array& x, double change) {
+  const Array room = x.max(0.0);
+  const Array shorter = (0.5 * ((1.0 + 8.0 / change * room).sqrt() - 1.0)).floor();
+  return (room + 0.5 * change * shorter * (shorter + 1.0)) / (shorter + 1.0);
+}
+
 /// Limits of the differences of control points, which bound velocity and acceleration of the whole
 /// spline: docs/theory.md (15.3). Per joint.
 struct StepLimits {
@@ -19,11 +28,9 @@ struct StepLimits {
   [[nodiscard]] Array limit(Eigen::Index joint, const Array& desired, const Array& position,
                             const Array& previous, double steps_left) const {
     const double b = change[joint], c = std::min(speed[joint], b * (steps_left + 1.0));
-    const auto room = [&](const Array& x) -> Array {
-      return 0.5 * ((b * b + 8.0 * b * x.max(0.0)).sqrt() - b);
-    };
+    const Array above = upper[joint] - position, below = position - lower[joint];
     Array d = desired.min(c).max(-c);
-    d = d.min(room(upper[joint] - position)).max(-room(position - lower[joint]));
+    d = d.min(braking_step<Array>(above, b)).max(-braking_step<Array>(below, b));
     return d.min(previous + b).max(previous - b);
   }
 };
