@@ -11,10 +11,10 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double torque_share = 0.95;    // of the torque limits, for rollouts
+constexpr double torque_share = 0.95;     // of the torque limits, for rollouts
 constexpr double torque_weight_s = 20.0;  // of the mean square excess
-constexpr double collision_s = 50.0;     // cost of a collision at the horizon's end; twice at once
-constexpr Index progress_stride = 3;     // knots at which the time to go is evaluated
+constexpr double collision_s = 50.0;      // cost of a collision at the horizon's end; twice at once
+constexpr Index progress_stride = 3;      // knots at which the time to go is evaluated
 // Speeds that convert errors of the tip to times [m/s, rad/s].
 constexpr double tip_speed = 0.6, tip_turn = 1.5;
 // Distance kept from moving obstacles, in addition to the margin [m].
@@ -45,8 +45,8 @@ Eigen::VectorXd levers(const planning::Setup& setup, const model::Model& model) 
         reach = std::max(reach, std::max((shape.center - shape.half_axis).norm(),
                                          (shape.center + shape.half_axis).norm()) +
                                     shape.radius);
-    const bool prismatic = model.robot().links[static_cast<std::size_t>(j)].joint.type ==
-                           model::JointType::prismatic;
+    const bool prismatic =
+        model.robot().links[static_cast<std::size_t>(j)].joint.type == model::JointType::prismatic;
     lever[j] = prismatic ? 1.0 : reach;
     if (prismatic) reach += travel(setup, j);
   }
@@ -105,8 +105,8 @@ void Evaluator::place(const Rollouts& rollouts, double spacing_s) {
             (p0 + 23.0 * p1 + 23.0 * p2 + rollouts.point(j, i + 3)) / 48.0;
     }
     for (Index h = 1; h < halves; ++h)
-      paths_.col(h) += levers_[j] * (halves_.col(j * halves + h) - halves_.col(j * halves + h - 1))
-                                        .abs();
+      paths_.col(h) +=
+          levers_[j] * (halves_.col(j * halves + h) - halves_.col(j * halves + h - 1)).abs();
   }
 }
 
@@ -138,8 +138,7 @@ double Evaluator::time_to_go(const Task& task, const Eigen::VectorXd& q) {
   const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);
   const double error = (task.goal.position - tip.p()).norm() / tip_speed;
   if (task.goal.type != HAMELIN_GOAL_POSE) return error;
-  return error +
-         Eigen::AngleAxisd(task.goal.rotation * tip.R().transpose()).angle() / tip_turn;
+  return error + Eigen::AngleAxisd(task.goal.rotation * tip.R().transpose()).angle() / tip_turn;
 }
 
 // docs/theory.md (15.6)
@@ -160,8 +159,7 @@ void Evaluator::get_place(Index half, Index lane) {
 }
 
 double Evaluator::clearance(const Eigen::VectorXd& q, double time_ahead_s, double at_least_m) {
-  return query_.clearance({q.data(), static_cast<std::size_t>(q.size())}, time_ahead_s,
-                          at_least_m);
+  return query_.clearance({q.data(), static_cast<std::size_t>(q.size())}, time_ahead_s, at_least_m);
 }
 
 // docs/theory.md (15.8), (15.11). Where nothing moves, places that a larger clearance before them
@@ -171,14 +169,15 @@ void Evaluator::add_clearance(const Task& task, Rollouts& rollouts, Index lane) 
   const double horizon = static_cast<double>(2 * segments_);
   double known = task.start_clearance_m, travelled = 0.0;
   rollouts.collides[static_cast<std::size_t>(lane)] = false;
+  if (task.moving) return add_mover_clearance(task, rollouts, lane);
   for (Index h = 1; h <= 2 * segments_; ++h) {
     travelled += paths_(lane, h);
-    if (!task.moving && (paths_(lane, h) == 0.0 || travelled <= known - task.margins.range())) continue;
+    if (paths_(lane, h) == 0.0 || travelled <= known - task.margins.range()) continue;
     get_place(h, lane);
     const auto required = task.margins.required(at_);
-    const double margin = required.margin_m + (task.moving ? mover_margin_m : 0.0);
-    const double time_s = task.spacing_s + static_cast<double>(h) * half_s;
-    const double distance = clearance(at_, time_s, margin);
+    const double margin = required.margin_m;
+    const double distance =
+        clearance(at_, task.spacing_s + static_cast<double>(h) * half_s, margin);
     rollouts.clearance_m[lane] = std::min(rollouts.clearance_m[lane], distance);
     if (distance < margin) {
       rollouts.collides[static_cast<std::size_t>(lane)] = true;
@@ -186,12 +185,29 @@ void Evaluator::add_clearance(const Task& task, Rollouts& rollouts, Index lane) 
       return;
     }
     if (distance < required.range_m) {
-      const double lack =
-          (required.range_m - distance) / std::max(1e-3, required.range_m - margin);
+      const double lack = (required.range_m - distance) / std::max(1e-3, required.range_m - margin);
       rollouts.cost[lane] += task.cost.clearance_s * lack * lack / horizon;
     }
     known = distance;
     travelled = 0.0;
+  }
+}
+
+// Obstacles that move may leave no rollout its margins, so all lacks count, at all knots:
+// docs/theory.md (15.17).
+void Evaluator::add_mover_clearance(const Task& task, Rollouts& rollouts, Index lane) {
+  const double share = 1.0 / static_cast<double>(segments_);
+  for (Index i = 1; i <= segments_; ++i) {
+    get_place(2 * i, lane);
+    const auto required = task.margins.required(at_);
+    const double margin =
+        std::min(required.margin_m + mover_margin_m, std::max(required.margin_m, required.range_m));
+    const double time_s = static_cast<double>(i + 1) * task.spacing_s;
+    const double distance = clearance(at_, time_s, -mover_margin_m);
+    rollouts.clearance_m[lane] = std::min(rollouts.clearance_m[lane], distance);
+    if (distance < required.margin_m) rollouts.collides[static_cast<std::size_t>(lane)] = true;
+    const double lack = std::clamp((margin - distance) / margin, 0.0, 2.0);
+    rollouts.cost[lane] += share * 2.0 * collision_s * lack;
   }
 }
 

@@ -11,8 +11,7 @@ namespace hamelin::mppi {
 
 /// For each joint, an upper bound of how far it moves any point of the arm's shapes or its tip per
 /// radian, or 1 for a prismatic joint [m].
-[[nodiscard]] Eigen::VectorXd levers(const planning::Setup& setup,
-                                     const model::Model& model);
+[[nodiscard]] Eigen::VectorXd levers(const planning::Setup& setup, const model::Model& model);
 
 /// Computes the costs of rollouts and checks motions. It belongs to one thread at a time; its query
 /// is refreshed on the thread of the tick. Only the constructor and refresh allocate.
@@ -36,6 +35,7 @@ class Evaluator {
   void add_torques(const Task& task, Rollouts& rollouts);
   void add_progress(const Task& task, Rollouts& rollouts, Eigen::Index lane);
   void add_clearance(const Task& task, Rollouts& rollouts, Eigen::Index lane);
+  void add_mover_clearance(const Task& task, Rollouts& rollouts, Eigen::Index lane);
   [[nodiscard]] double time_to_go(const Task& task, const Eigen::VectorXd& q);
   [[nodiscard]] double clearance(const Eigen::VectorXd& q, double time_ahead_s, double at_least_m);
   [[nodiscard]] bool within_torques();
@@ -57,7 +57,7 @@ class Evaluator {
   dynamics::StatesXd q_, v_, a_, torque_;  ///< at the knots, lane by lane within a knot
   Eigen::Array<double, lane_count, Eigen::Dynamic> halves_;  ///< places at all half knots
   Eigen::Array<double, lane_count, Eigen::Dynamic> paths_;   ///< bound of each way between them [m]
-  double spacing_s_ = 0.0;  ///< of what was placed last
+  double spacing_s_ = 0.0;                                   ///< of what was placed last
   Eigen::VectorXd at_, from_;
   std::vector<JointState> middles_;  ///< one per depth of proved_clear()
   Rollouts single_;

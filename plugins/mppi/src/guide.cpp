@@ -12,20 +12,20 @@ constexpr int nodes_max = 3000;                // of each tree
 constexpr Eigen::Index path_points_max = 200;  // of the path before it is shortened
 constexpr int root_attempts = 60;
 constexpr double tolerance_share_of_roots = 0.9;  // within which roots of joint goals are drawn
-// Least clearance of roots of a tip goal beyond what a shield keeps, in the first half of the
-// attempts and later [m].
+// Clearance of roots of a tip goal beyond what a shield keeps [m].
 constexpr double root_clearance_m = 0.003, least_root_clearance_m = 0.001;
+constexpr double shield_share = 0.6;  // of the margin of a shield that roots keep at least
 // Share of a tip goal's tolerances within which other poses are drawn. Inverse kinematics takes the
 // rest.
 constexpr double tip_tolerance_share = 0.6;
-constexpr double extension = 0.5;           // length of a step of a tree [rad or m]
-constexpr double least_way_m = 0.02;        // ways of all points between two queries
-constexpr double guide_reserve_m = 0.002;   // kept beyond the margins of rollouts
+constexpr double extension = 0.5;          // length of a step of a tree [rad or m]
+constexpr double least_way_m = 0.02;       // ways of all points between two queries
+constexpr double guide_reserve_m = 0.002;  // kept beyond the margins of rollouts
 // Share of the draws around a root or the start, where ways are often narrow, and their spread [rad
 // or m].
 constexpr double near_share = 0.3, near_spread = 0.5;
-constexpr int cuts = 120;                   // attempts to shorten a path
-constexpr int iterations_per_check = 4;     // of inverse kinematics count as much as one query
+constexpr int cuts = 120;                // attempts to shorten a path
+constexpr int iterations_per_check = 4;  // of inverse kinematics count as much as one query
 
 }  // namespace
 
@@ -64,7 +64,8 @@ int Guide::Tree::nearest(const Eigen::VectorXd& to) const {
 }
 
 void Guide::begin(const Goal& goal, const Eigen::VectorXd& q, std::uint64_t seed,
-                  std::uint64_t number) {
+                  std::uint64_t number, double reserve_m) {
+  reserve_m_ = reserve_m;
   goal_ = near_goal_ = goal;
   start_ = x_ = q;
   rng_ = Rng(seed + 0x632be59bd9b4e019ULL * (number + 1));
@@ -101,12 +102,19 @@ void Guide::measure_start(planning::Query& query) {
   phase_ = Phase::roots;
 }
 
+// Most attempts look for places well outside the margin of a shield. The last quarter accepts those
+// that a shield, which keeps less where the arm moves slowly, may yet allow.
+double Guide::clearance_of_attempts(int quarter) const {
+  if (quarter < 2) return shield_m_ + root_clearance_m + reserve_m_;
+  return quarter == 2 ? shield_m_ + least_root_clearance_m
+                      : std::max(root_clearance_m, shield_share * shield_m_);
+}
+
 void Guide::add_root(planning::Query& query, const Eigen::VectorXd& q) {
   const double distance = clearance(query, q, 0.0);
   double least = 0.0;
-  if (goal_.type != HAMELIN_GOAL_JOINT)
-    least = attempt_ < root_attempts / 2 ? root_clearance_m : least_root_clearance_m;
-  if (distance < shield_m_ + least) return;
+  if (goal_.type != HAMELIN_GOAL_JOINT) least = clearance_of_attempts(4 * attempt_ / root_attempts);
+  if (distance < least) return;
   auto& root = roots_[to_size(root_count_++)];
   root.q = q;
   root.clearance = distance;

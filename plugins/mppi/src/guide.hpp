@@ -21,7 +21,9 @@ class Guide {
         const JointBox& box, const Eigen::VectorXd& levers, long budget);
 
   /// Starts a search from q. @param number distinguishes the random numbers of searches
-  void begin(const Goal& goal, const Eigen::VectorXd& q, std::uint64_t seed, std::uint64_t number);
+  /// @param reserve_m clearance at goals of the tip in addition, as far as it is found
+  void begin(const Goal& goal, const Eigen::VectorXd& q, std::uint64_t seed, std::uint64_t number,
+             double reserve_m);
   /// Continues until the search ends or has used this number of queries since begin().
   void advance(planning::Query& query, long checks);
   void stop() noexcept { phase_ = Phase::idle; }
@@ -52,6 +54,7 @@ class Guide {
 
   void measure_start(planning::Query& query);
   void find_root(planning::Query& query);
+  [[nodiscard]] double clearance_of_attempts(int quarter) const;
   void add_root(planning::Query& query, const Eigen::VectorXd& q);
   void draw_near_goal();
   void draw_target();
@@ -60,12 +63,11 @@ class Guide {
   bool connect(planning::Query& query, Tree& tree, const Eigen::VectorXd& target);
   void join(int in_start, int in_goal);
   void shorten(planning::Query& query);
-  [[nodiscard]] double clearance(planning::Query& query, const Eigen::VectorXd& q,
-                                 double at_least);
+  [[nodiscard]] double clearance(planning::Query& query, const Eigen::VectorXd& q, double at_least);
   [[nodiscard]] bool motion_clear(planning::Query& query, const Eigen::VectorXd& from,
                                   const Eigen::VectorXd& to);
 
-  double shield_m_;
+  double shield_m_, reserve_m_ = 0.0;
   InverseKinematics kinematics_;
   const JointBox& box_;
   Eigen::VectorXd levers_;

@@ -17,11 +17,12 @@ constexpr double tolerance_share = 1.0 / 3.0;
 
 }  // namespace
 
-JointBox::JointBox(const planning::Setup& setup) : lower(setup.dof()), upper(setup.dof()) {
+JointBox::JointBox(const planning::Setup& setup, double reserve)
+    : lower(setup.dof()), upper(setup.dof()) {
   const auto low = setup.q_lower(), high = setup.q_upper();
   for (int i = 0; i < setup.dof(); ++i) {
-    lower[i] = low && std::isfinite((*low)[i]) ? (*low)[i] : -std::numbers::pi;
-    upper[i] = high && std::isfinite((*high)[i]) ? (*high)[i] : std::numbers::pi;
+    lower[i] = low && std::isfinite((*low)[i]) ? (*low)[i] + reserve : -std::numbers::pi;
+    upper[i] = high && std::isfinite((*high)[i]) ? (*high)[i] - reserve : std::numbers::pi;
   }
 }
 

@@ -8,10 +8,11 @@
 
 namespace hamelin::mppi {
 
-/// The box in joint space from which random joint vectors are drawn: the joint limits, ±π where
-/// there are none.
+/// The box in joint space from which random joint vectors are drawn: the joint limits less a
+/// reserve, ±π where there are none.
 struct JointBox {
-  explicit JointBox(const planning::Setup& setup);
+  /// @param reserve kept from joint limits [rad or m]
+  JointBox(const planning::Setup& setup, double reserve);
   void draw(Rng& rng, Eigen::VectorXd& q) const;
   Eigen::VectorXd lower, upper;
 };

@@ -12,7 +12,9 @@ namespace hamelin::mppi {
 class JointPath {
  public:
   JointPath(Eigen::Index dof, Eigen::Index capacity)
-      : points_(Eigen::MatrixXd::Zero(dof, capacity)), arc_(to_size(capacity)), turn_(to_size(capacity)) {}
+      : points_(Eigen::MatrixXd::Zero(dof, capacity)),
+        arc_(to_size(capacity)),
+        turn_(to_size(capacity)) {}
 
   void clear() noexcept { size_ = 0; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
@@ -55,7 +57,7 @@ class JointPath {
   /// for each segment: docs/theory.md (15.7).
   template <class Vector>
   [[nodiscard]] Place cost_to_go(const Vector& q, double from, double to) const {
-    if (size_ == 1) return {(points_.col(0) - q).norm(), 0.0};
+    if (length() == 0.0) return {(points_.col(0) - q).norm(), 0.0};
     Place best{std::numeric_limits<double>::infinity(), from};
     for (Eigen::Index i = 0; i + 1 < size_; ++i) {
       if (arc(i + 1) < from && i + 2 < size_) continue;
@@ -64,8 +66,8 @@ class JointPath {
       if (segment <= 0.0) continue;
       const auto direction = (points_.col(i + 1) - points_.col(i)) / segment;
       const double along = direction.dot(q - points_.col(i));
-      const double off = std::sqrt(
-          std::max(0.0, (q - points_.col(i)).squaredNorm() - along * along));
+      const double off =
+          std::sqrt(std::max(0.0, (q - points_.col(i)).squaredNorm() - along * along));
       const double low = std::clamp(from - arc(i), 0.0, segment),
                    high = std::clamp(to - arc(i), low, segment);
       const double t = std::clamp(along + off * lead, low, high);
@@ -76,7 +78,7 @@ class JointPath {
   }
 
  private:
-  static constexpr double deviation_weight = 3.0;  // κ
+  static constexpr double deviation_weight = 3.0;      // κ
   static constexpr double lead = 0.35355339059327373;  // 1/√(κ² − 1)
   static std::size_t to_size(Eigen::Index n) { return static_cast<std::size_t>(n); }
 

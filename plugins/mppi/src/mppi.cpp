@@ -24,7 +24,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double velocity_share = 0.98;  // of the velocity limits
-constexpr double limit_reserve = 1e-3;   // kept from position limits [rad or m]
+// Kept from position limits by plans; motors let the arm stray [rad or m].
+constexpr double limit_reserve = 1e-3, limit_reserve_sampled = 0.02;
 // Least clearances, also at tight goals; motors that act late, with friction and noise, let the arm
 // come about a millimetre nearer [m].
 constexpr double least_m = 0.001, least_sampled_m = 0.003;
@@ -32,12 +33,17 @@ constexpr double beyond_shield_m = 0.002;
 // A joint that strays farther from its planned motion is not followed but planned for from where it
 // is [rad or m].
 constexpr double stray = 0.03;
-constexpr double reach = 2.0;         // stretch of the path that a rollout may join [rad or m]
-constexpr double noise_fade = 1.0;    // length to go below which the noise is less [rad or m]
-constexpr double least_noise = 0.15;  // share of the noise that remains where obstacles move
-constexpr double progress = 0.02;     // length that counts as progress [rad or m]
-constexpr double at_goal = 0.01;      // length to go at which nothing counts as a stall
-constexpr int posture_attempts = 20;     // of inverse kinematics without a guide
+constexpr double stray_of_stop = 0.003;  // the same if a shield has stopped the arm in this period
+constexpr double reach = 2.0;            // stretch of the path that a rollout may join [rad or m]
+constexpr double noise_fade = 1.0;       // length to go below which the noise is less [rad or m]
+constexpr double least_noise = 0.15;     // share of the noise that remains where obstacles move
+constexpr double progress = 0.02;        // length that counts as progress [rad or m]
+constexpr double renewed = 0.2;  // progress after which searches are counted from zero again
+// Clearance that goals of the tip keep in addition, for each search that led nowhere [m].
+constexpr double search_reserve_m = 0.002;
+constexpr double mover_patience_s = 3.0;  // least time until a stall where obstacles move
+constexpr double at_goal = 0.01;          // length to go at which nothing counts as a stall
+constexpr int posture_attempts = 20;      // of inverse kinematics without a guide
 constexpr std::size_t candidate_count = 4;
 
 class Mppi final : public planning::Planner {
@@ -55,7 +61,7 @@ class Mppi final : public planning::Planner {
             1L, std::lround(params["plan_period_s"].get<double>() / setup.control_period_s()))),
         spacing_s_(static_cast<double>(ticks_per_plan_) * setup.control_period_s()),
         point_count_(3 + std::max(6L, std::lround(params["horizon_s"].get<double>() / spacing_s_))),
-        box_(setup),
+        box_(setup, reserve(setup)),
         kinematics_(model_, box_),
         margins_(make_margins(setup, params)),
         task_(setup.dof(), point_count_,
@@ -75,11 +81,10 @@ class Mppi final : public planning::Planner {
     task_.seed = setup.seed();
     task_.goal.q = hold_;
     check_horizon();
-    series_ = {host.declare_series("plan_cost", "s"), host.declare_series("mean_cost", "s"),
-               host.declare_series("effective_samples", ""),
-               host.declare_series("plan_clearance", "m"),
-               host.declare_series("colliding_rollouts", ""),
-               host.declare_series("guide_queries", "")};
+    series_ = {
+        host.declare_series("plan_cost", "s"),         host.declare_series("mean_cost", "s"),
+        host.declare_series("effective_samples", ""),  host.declare_series("plan_clearance", "m"),
+        host.declare_series("colliding_rollouts", ""), host.declare_series("guide_queries", "")};
   }
   ~Mppi() override { pool_.finish(); }
 
@@ -103,9 +108,12 @@ class Mppi final : public planning::Planner {
 
   void tick(const planning::Tick& tick, planning::Command& command) override {
     if (started_) evaluate(plan_, 0, place_in_plan(), spacing_s_, planned_);
-    if (!started_ || (planned_.q - tick.q()).lpNorm<Eigen::Infinity>() > stray) {
+    if (const auto sent = tick.torque(); sent && started_) stopped_ |= *sent != torque_;
+    const bool period_ends = ticks_ == ticks_per_plan_;
+    if (!started_ || strays(tick.q(), stray) ||
+        (period_ends && stopped_ && strays(tick.q(), stray_of_stop))) {
       restart(tick);
-    } else if (ticks_ == ticks_per_plan_) {
+    } else if (period_ends) {
       finish_plan();
       begin_plan(tick);
     }
@@ -126,9 +134,12 @@ class Mppi final : public planning::Planner {
 
   static Margins make_margins(const planning::Setup& setup, const Json& params) {
     const double shield = std::max(setup.shield_margin_m(), setup.shield_self_margin_m());
-    const double least = setup.sampled() ? least_sampled_m : least_m;
     return {setup.dof(), std::max(params["margin_m"].get<double>(), shield + beyond_shield_m),
-            std::max(least, shield), params["goal_margin_m"], params["clearance_range_m"]};
+            setup.sampled() ? least_sampled_m : least_m, params["goal_margin_m"],
+            params["clearance_range_m"]};
+  }
+  static double reserve(const planning::Setup& setup) {
+    return setup.sampled() ? limit_reserve_sampled : limit_reserve;
   }
 
   void check_horizon() const {
@@ -139,6 +150,9 @@ class Mppi final : public planning::Planner {
                   "horizon_s - 3 plan_period_s >= cruise_speed/acceleration_max");
   }
 
+  [[nodiscard]] bool strays(const planning::ConstVectorMap& q, double limit) const {
+    return (planned_.q - q).lpNorm<Eigen::Infinity>() > limit;
+  }
   [[nodiscard]] double place_in_plan() const {
     return static_cast<double>(ticks_) / static_cast<double>(ticks_per_plan_);
   }
@@ -171,14 +185,18 @@ class Mppi final : public planning::Planner {
     limits.lower = VectorXd::Constant(n, -unlimited);
     limits.upper = -limits.lower;
     if (const auto lower = setup_.q_lower())
-      limits.lower = (lower->array() + limit_reserve).max(-unlimited);
+      limits.lower = (lower->array() + reserve(setup_)).max(-unlimited);
     if (const auto upper = setup_.q_upper())
-      limits.upper = (upper->array() - limit_reserve).min(unlimited);
+      limits.upper = (upper->array() - reserve(setup_)).min(unlimited);
+    if (!known_goal_ || task_.goal.type != HAMELIN_GOAL_JOINT) return;
+    limits.lower = limits.lower.cwiseMin(task_.goal.q);
+    limits.upper = limits.upper.cwiseMax(task_.goal.q);
   }
 
   // The plan that begins one period from now, from where the present one will be then.
   void begin_plan(const planning::Tick& tick) {
     ticks_ = 0;
+    stopped_ = false;
     pool_.refresh();
     set_limits(tick.speed_scale());
     task_.cost = tuning_.cost;
@@ -219,6 +237,8 @@ class Mppi final : public planning::Planner {
     known_goal_ = true;
     gives_up_ = false;
     searches_ = 0;
+    failed_ = false;
+    searched_left_ = std::numeric_limits<double>::infinity();
     task_.margins.clear_goals();
     task_.tip_cost = false;
     const auto way_points = setup_.path(from);
@@ -276,8 +296,10 @@ class Mppi final : public planning::Planner {
   // The arm waits where the present plan ends, and searches from there.
   void search() {
     hold_ = task_.mean.rightCols<1>();
-    guide_.begin(task_.goal, hold_, setup_.seed(), goal_number_ * 1000003ULL + task_.plan);
+    guide_.begin(task_.goal, hold_, setup_.seed(), goal_number_ * 1000003ULL + task_.plan,
+                 search_reserve_m * searches_);
     searching_ = true;
+    failed_ = false;
     ++searches_;
     task_.path.clear();
     task_.path.add(hold_);
@@ -286,13 +308,8 @@ class Mppi final : public planning::Planner {
 
   void take_path() {
     searching_ = false;
-    if (guide_.path().empty()) {
-      if (searches_ >= tuning_.max_searches) {
-        gives_up_ = true;
-        return;
-      }
-      return search();
-    }
+    failed_ = guide_.path().empty();
+    if (failed_) return;
     task_.path.clear();
     for (Index i = 0; i < guide_.path().size(); ++i) task_.path.add(guide_.path().point(i));
     task_.margins.clear_goals();
@@ -311,8 +328,7 @@ class Mppi final : public planning::Planner {
     evaluate(task_.mean, 0, 0.0, spacing_s_, planned_);
     task_.start_clearance_m = pool_.evaluator().query().clearance(span_of(planned_.q), spacing_s_);
     task_.margins.set_start(planned_.q, task_.start_clearance_m);
-    const auto place =
-        task_.path.cost_to_go(planned_.q, task_.path_from, task_.path_from + reach);
+    const auto place = task_.path.cost_to_go(planned_.q, task_.path_from, task_.path_from + reach);
     left_ = place.cost;
     task_.path_from = place.s;
     task_.path_to = place.s + reach;
@@ -321,17 +337,24 @@ class Mppi final : public planning::Planner {
     task_.noise = share * tuning_.noise;
   }
 
+  // After a stall or a failed search the guide searches again. What moves is given time to leave.
   void check_progress(double time_s) {
-    if (searching_ || left_ < at_goal || left_ < least_left_ - progress) {
+    const bool advances = left_ < at_goal || left_ < least_left_ - progress;
+    if (searching_ || (advances && !failed_)) {
       least_left_ = std::min(left_, least_left_);
       progress_s_ = time_s;
+      if (left_ < searched_left_ - renewed) searches_ = 0;
       return;
     }
-    if (!uses_guide_ || gives_up_ || time_s - progress_s_ < tuning_.stall_time_s) return;
+    double patience_s = failed_ ? 0.0 : tuning_.stall_time_s;
+    if (task_.moving) patience_s = std::max(tuning_.stall_time_s, mover_patience_s);
+    if (!uses_guide_ || gives_up_ || time_s - progress_s_ < patience_s) return;
     if (searches_ >= tuning_.max_searches) {
       gives_up_ = true;
       return;
     }
+    searched_left_ = failed_ ? searched_left_ : left_;
+    progress_s_ = time_s;
     search();
     measure_start();
   }
@@ -351,11 +374,10 @@ class Mppi final : public planning::Planner {
       order_[static_cast<std::size_t>(i)] = i;
       collisions += pool_.collides(i) ? 1.0 : 0.0;
     }
-    std::partial_sort(order_.begin(), order_.begin() + candidate_count, order_.end(),
-                      [&](Index a, Index b) {
-                        return pool_.cost(a) < pool_.cost(b) ||
-                               (pool_.cost(a) == pool_.cost(b) && a < b);
-                      });
+    std::partial_sort(
+        order_.begin(), order_.begin() + candidate_count, order_.end(), [&](Index a, Index b) {
+          return pool_.cost(a) < pool_.cost(b) || (pool_.cost(a) == pool_.cost(b) && a < b);
+        });
     figures_[effective_samples] = weights_of_costs(weights_, tuning_.temperature_s);
     figures_[colliding] = collisions;
     average();
@@ -379,7 +401,8 @@ class Mppi final : public planning::Planner {
   }
 
   // The mean, or a rollout that costs less, the first that is proved clear. Without any, the arm
-  // keeps to the plan before, which ends at rest, or brakes if that costs less.
+  // keeps to the plan before, which ends at rest, or brakes if that costs less. Where obstacles
+  // move the plan before may not be clear any more, and the arm takes what costs least.
   void choose() {
     average_.set_lane(0, mean_);
     pool_.evaluator().begin(task_, average_);
@@ -395,9 +418,10 @@ class Mppi final : public planning::Planner {
       pool_.get_points(sample, plan_);
       if (accept(plan_, pool_.cost(sample), pool_.clearance_m(sample))) return;
     }
-    const Index otherwise = pool_.cost(Sampler::proposal_brake) < pool_.cost(Sampler::proposal_mean)
-                                ? Sampler::proposal_brake
-                                : Sampler::proposal_mean;
+    Index otherwise = pool_.cost(Sampler::proposal_brake) < pool_.cost(Sampler::proposal_mean)
+                          ? Sampler::proposal_brake
+                          : Sampler::proposal_mean;
+    if (task_.moving) otherwise = order_.front();
     pool_.get_points(otherwise, plan_);
     set_figures(pool_.cost(otherwise), pool_.clearance_m(otherwise));
   }
@@ -432,12 +456,13 @@ class Mppi final : public planning::Planner {
   Tracker tracker_;
   JointState planned_;
   Rollouts average_;
-  bool uses_guide_, started_ = false, searching_ = false, gives_up_ = false, known_goal_ = false,
-       rolls_ = false;
+  bool uses_guide_, started_ = false, searching_ = false, failed_ = false, stopped_ = false,
+                    gives_up_ = false, known_goal_ = false, rolls_ = false;
   std::uint64_t goal_number_ = 0;
   int searches_ = 0;
-  double left_ = 0.0, least_left_ = 0.0, progress_s_ = 0.0;  ///< length to go, and since when
-  MatrixXd plan_, mean_;  ///< control points of the motion in execution, and of the average
+  double left_ = 0.0, least_left_ = 0.0, searched_left_ = 0.0,
+         progress_s_ = 0.0;  ///< lengths to go, and since when
+  MatrixXd plan_, mean_;     ///< control points of the motion in execution, and of the average
   VectorXd hold_, target_, torque_;
   std::vector<double> weights_;
   std::vector<Index> order_;

@@ -15,8 +15,7 @@ RolloutPool::RolloutPool(const planning::Host& host, const planning::Setup& setu
     evaluators_.push_back(std::make_unique<Evaluator>(host, setup, model, point_count));
     samplers_.emplace_back(model.dof(), point_count);
   }
-  if (threads > 0)
-    workers_.emplace(threads, [this](int worker, int unit) { work(worker, unit); });
+  if (threads > 0) workers_.emplace(threads, [this](int worker, int unit) { work(worker, unit); });
 }
 
 void RolloutPool::refresh() {
@@ -42,8 +41,9 @@ void RolloutPool::share(double of_whole) {
     if (done_ % lane_count == 0) begin(0, block);
     evaluator().evaluate(task_, blocks_[block], done_ % lane_count);
   }
-  guide_.advance(evaluator().query(),
-                 guide_from_ + std::lround(of_whole * static_cast<double>(guide_to_ - guide_from_)));
+  guide_.advance(
+      evaluator().query(),
+      guide_from_ + std::lround(of_whole * static_cast<double>(guide_to_ - guide_from_)));
 }
 
 void RolloutPool::finish() {

@@ -110,9 +110,9 @@ void Sampler::brake(const StepLimits& limits, Eigen::MatrixXd& points) {
   for (Index i = 3; i < n; ++i)
     for (Index j = 0; j < points.rows(); ++j) {
       const double position = points(j, i - 1), previous = position - points(j, i - 2);
-      points(j, i) = i + 2 < n ? position + limited(limits, j, 0.0, position, previous,
-                                                    steps_after(i, n))
-                               : position;
+      points(j, i) = i + 2 < n
+                         ? position + limited(limits, j, 0.0, position, previous, steps_after(i, n))
+                         : position;
     }
 }
 

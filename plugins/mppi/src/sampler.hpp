@@ -17,8 +17,8 @@ class Sampler {
   /// The mean, the best rollout of the plan before, braking, and motions that follow the path at
   /// several speeds: docs/theory.md (15.5).
   void propose(const Task& task, Rollouts& out);
-  /// Random rollouts around the mean and along the path, docs/theory.md (15.4). The numbers depend on seed, plan and
-  /// block only.
+  /// Random rollouts around the mean and along the path, docs/theory.md (15.4). The numbers depend
+  /// on seed, plan and block only.
   void sample(const Task& task, std::size_t block, Rollouts& out);
   /// The rollout from the first three control points that stays nearest to desired ones.
   static void approach(const StepLimits& limits, const Eigen::MatrixXd& desired,

@@ -22,8 +22,8 @@ void evaluate(const Points& points, Eigen::Index segment, double u, double spaci
   out.q = (w * w * w * p0 + (4.0 - 6.0 * u * u + 3.0 * u * u * u) * p1 +
            (4.0 - 6.0 * w * w + 3.0 * w * w * w) * p2 + u * u * u * p3) /
           6.0;
-  out.v = (w * w * (p1 - p0) + (1.0 + 2.0 * u * w) * (p2 - p1) + u * u * (p3 - p2)) /
-          (2.0 * spacing_s);
+  out.v =
+      (w * w * (p1 - p0) + (1.0 + 2.0 * u * w) * (p2 - p1) + u * u * (p3 - p2)) / (2.0 * spacing_s);
   out.a = (w * (p0 - 2.0 * p1 + p2) + u * (p1 - 2.0 * p2 + p3)) / (spacing_s * spacing_s);
 }
 

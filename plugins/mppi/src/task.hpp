@@ -35,9 +35,9 @@ struct Task {
 
   StepLimits limits;
   CostParams cost{};
-  double spacing_s = 0.0;      ///< of the control points, and the period of plans
-  double cruise_speed = 0.0;   ///< converts lengths in joint space to times [rad/s or m/s]
-  double noise = 0.0;          ///< standard deviation of the coefficients [rad or m]
+  double spacing_s = 0.0;     ///< of the control points, and the period of plans
+  double cruise_speed = 0.0;  ///< converts lengths in joint space to times [rad/s or m/s]
+  double noise = 0.0;         ///< standard deviation of the coefficients [rad or m]
   std::uint64_t seed = 0, plan = 0;
   Eigen::MatrixXd mean, best;  ///< control points: the mean, and the best rollout before
   Goal goal;

@@ -7,10 +7,10 @@ namespace hamelin::mppi {
 
 namespace {
 
-constexpr std::array fixed_params{
-    "samples",       "horizon_s",         "plan_period_s", "threads",      "margin_m",
-    "goal_margin_m", "clearance_range_m", "query_range_m", "guide",        "guide_budget",
-    "tracking_rate", "record_rollouts"};
+constexpr std::array fixed_params{"samples",           "horizon_s",     "plan_period_s",
+                                  "threads",           "margin_m",      "goal_margin_m",
+                                  "clearance_range_m", "query_range_m", "guide",
+                                  "guide_budget",      "tracking_rate", "record_rollouts"};
 
 }  // namespace
 

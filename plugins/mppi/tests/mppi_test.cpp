@@ -64,8 +64,8 @@ log::Result run(const Json& document) {
   };
   write("robot.json", description::robot_to_json(limited_planar4()));
   write("scene.json", document);
-  return simulation::run(scene::read_scene(folder.path() / "scene.json"),
-                         {HAMELIN_TEST_PLUGIN_DIR}, {});
+  return simulation::run(scene::read_scene(folder.path() / "scene.json"), {HAMELIN_TEST_PLUGIN_DIR},
+                         {});
 }
 
 const std::vector<double> left{-0.9, -0.3, 0.0, -2.0, 0.0, 1.7, 0.0},
@@ -95,8 +95,8 @@ TEST_CASE("mppi reaches goals of each type in free space", "[mppi]") {
               .outcome == Outcome::reached);
   }
   SECTION("a path") {
-    const auto result = run(planar_scene(
-        {{"type", "path"}, {"q", {{0.4, 0.0, 0.0, 0.0}, {0.4, 0.6, 0.0, 0.3}}}}));
+    const auto result =
+        run(planar_scene({{"type", "path"}, {"q", {{0.4, 0.0, 0.0, 0.0}, {0.4, 0.6, 0.0, 0.3}}}}));
     CHECK(result.outcome == Outcome::reached);
   }
 }
@@ -188,7 +188,8 @@ class Bench : public planning::HostServices {
     goal_.q = q_goal_.data();
     goal_.tolerance_rad = 0.05;
     setup.add_goal(goal_, q_goal_);
-    planner_.emplace(plugin.create(std::move(setup), *this, planning::check_params(plugin, params)));
+    planner_.emplace(
+        plugin.create(std::move(setup), *this, planning::check_params(plugin, params)));
   }
   void log(std::int32_t, std::string_view) override {}
   std::size_t closest_points(std::span<const double>, double,
@@ -210,7 +211,8 @@ class Bench : public planning::HostServices {
       input.v = v.data();
       input.goal = &goal_;
       input.speed_scale = 1.0;
-      if (!planner_->tick(input, buffers_)) throw std::runtime_error(std::string(planner_->error()));
+      if (!planner_->tick(input, buffers_))
+        throw std::runtime_error(std::string(planner_->error()));
       for (const double x : buffers_.held_torque()) out.push_back(x);
       dynamics::forward_dynamics(model_, ws, q, v, buffers_.held_torque(), a);
       v += 0.002 * a;
