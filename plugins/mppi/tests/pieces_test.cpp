@@ -8,9 +8,11 @@
 #include "../src/margins.hpp"
 #include "../src/sampler.hpp"
 #include "../src/spline.hpp"
+#include "../src/tip_path.hpp"
 #include "../src/weights.hpp"
 #include "../src/workers.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/test/arm_loop.hpp"
 
 using namespace hamelin;
 using namespace hamelin::mppi;
@@ -210,6 +212,29 @@ TEST_CASE("margins are less at tight goals and where the arm is", "[mppi]") {
   CHECK(margins.required(Vector2d(1.45, 0.0)).margin_m == Approx(0.0065));
   margins.clear_goals();
   CHECK(margins.required(goal).margin_m == Approx(0.01));
+}
+
+TEST_CASE("the path of the tip is that of the knots", "[mppi]") {
+  const model::Model model(test::planar4(), geometry::SE3{}, Eigen::Vector3d::Zero());
+  dynamics::Workspace ws(model);
+  // The first joint turns by 0.1 per control point, so the tip is on a circle of radius 4.
+  MatrixXd points = MatrixXd::Zero(4, 6);
+  for (Index i = 0; i < 6; ++i) points(0, i) = 0.1 * static_cast<double>(i);
+  std::vector<Eigen::Vector3d> tips(8);
+  REQUIRE(tip_path(model, ws, points, tips) == 4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double angle = 0.1 * static_cast<double>(i + 1);
+    CHECK((tips[i] - Eigen::Vector3d(4.0 * std::cos(angle), 4.0 * std::sin(angle), 0.0)).norm() <
+          1e-12);
+  }
+  CHECK(tip_path(model, ws, points, {tips.data(), 2}) == 2);
+}
+
+TEST_CASE("a path without length costs the distance from it", "[mppi]") {
+  JointPath path(2, 4);
+  path.add(Vector2d(1.0, 0.0));
+  path.add(Vector2d(1.0, 0.0));
+  CHECK(path.cost_to_go(Vector2d(1.0, 2.0), 0.0, 2.0).cost == Approx(2.0));
 }
 
 TEST_CASE("workers do each unit once and wait for all", "[mppi][threads]") {
