@@ -1,0 +1,88 @@
+#pragma once
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+namespace hamelin::mppi {
+
+/// The clearance that a configuration needs, and that from which on it costs nothing. Both are less
+/// near places where the arm must be although they have less clearance: where it is now (the first
+/// only), and goals. docs/theory.md (15.8)
+class Margins {
+ public:
+  static constexpr std::size_t max_goals = 6;
+
+  /// @param full_m away from tight places @param least_m at any place
+  /// @param slack_m by how much the clearance of a tight goal may be undercut
+  /// @param range_m clearance from which on a place away from tight goals costs nothing
+  Margins(Eigen::Index dof, double full_m, double least_m, double slack_m, double range_m)
+      : full_(full_m),
+        least_(std::min(least_m, full_m)),
+        slack_(slack_m),
+        range_(std::max(range_m, full_m)) {
+    start_.q = Eigen::VectorXd::Zero(dof);
+    for (auto& goal : goals_) goal.q = start_.q;
+  }
+
+  /// The same with a larger full margin.
+  [[nodiscard]] Margins with_reserve(double reserve_m) const {
+    Margins out = *this;
+    out.full_ += reserve_m;
+    return out;
+  }
+  void clear_goals() noexcept { goal_count_ = 0; }
+  template <class Vector>
+  void add_goal(const Vector& q, double clearance_m) {
+    if (goal_count_ == max_goals) return;
+    auto& goal = goals_[goal_count_++];
+    goal.q = q;
+    goal.margin = std::min(full_, std::max(least_, clearance_m - slack_));
+    goal.range = std::min(range_, clearance_m);
+  }
+  /// The place where a plan starts must not make it impossible, whatever its clearance.
+  template <class Vector>
+  void set_start(const Vector& q, double clearance_m) {
+    start_.q = q;
+    start_.margin = std::min(full_, std::max(0.0, clearance_m - start_slack_m));
+    start_.range = range_;
+  }
+
+  struct Required {
+    double margin_m, range_m;
+  };
+  template <class Vector>
+  [[nodiscard]] Required required(const Vector& q) const {
+    Required out{full_, range_};
+    lower(start_, q, out);
+    for (std::size_t i = 0; i < goal_count_; ++i) lower(goals_[i], q, out);
+    return out;
+  }
+  /// The largest range of any place.
+  [[nodiscard]] double range() const noexcept { return range_; }
+
+ private:
+  static constexpr double start_slack_m = 2e-4;
+  // Largest difference of a joint at which a tight place counts fully, and not at all [rad or m].
+  static constexpr double near = 0.1, far = 0.8;
+
+  struct Place {
+    Eigen::VectorXd q;
+    double margin = 1.0, range = 1.0;
+  };
+  template <class Vector>
+  void lower(const Place& place, const Vector& q, Required& out) const {
+    if (place.margin >= full_ && place.range >= range_) return;
+    const double distance = (q - place.q).template lpNorm<Eigen::Infinity>();
+    const double weight = std::clamp((distance - near) / (far - near), 0.0, 1.0);
+    out.margin_m = std::min(out.margin_m, place.margin + weight * (full_ - place.margin));
+    out.range_m = std::min(out.range_m, place.range + weight * (range_ - place.range));
+  }
+
+  double full_, least_, slack_, range_;
+  Place start_;
+  std::array<Place, max_goals> goals_;
+  std::size_t goal_count_ = 0;
+};
+
+}  // namespace hamelin::mppi

@@ -1,0 +1,478 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/plugin.hpp"
+#include "params_schema.hpp"
+#include "rollout_pool.hpp"
+#include "spline.hpp"
+#include "tracker.hpp"
+#include "tuning.hpp"
+#include "weights.hpp"
+
+namespace hamelin::mppi {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double velocity_share = 0.98;  // of the velocity limits
+// Kept from position limits by plans; motors let the arm stray [rad or m].
+constexpr double limit_reserve = 1e-3, limit_reserve_sampled = 0.02;
+// Least clearances, also at tight goals; motors that act late, with friction and noise, let the arm
+// come about a millimetre nearer [m].
+constexpr double least_m = 0.001, least_sampled_m = 0.003;
+constexpr double beyond_shield_m = 0.002;
+// A joint that strays farther from its planned motion is not followed but planned for from where it
+// is [rad or m].
+constexpr double stray = 0.03;
+constexpr double stray_of_stop = 0.003;  // the same if a shield has stopped the arm in this period
+constexpr double reach = 2.0;            // stretch of the path that a rollout may join [rad or m]
+constexpr double noise_fade = 1.0;       // length to go below which the noise is less [rad or m]
+constexpr double least_noise = 0.15;     // share of the noise that remains where obstacles move
+constexpr double progress = 0.02;        // length that counts as progress [rad or m]
+constexpr double renewed = 0.2;  // progress after which searches are counted from zero again
+// Clearance that goals of the tip keep in addition, for each search that led nowhere [m].
+constexpr double search_reserve_m = 0.002;
+constexpr double mover_patience_s = 3.0;  // least time until a stall where obstacles move
+constexpr double at_goal = 0.01;          // length to go at which nothing counts as a stall
+constexpr int posture_attempts = 20;      // of inverse kinematics without a guide
+constexpr std::size_t candidate_count = 4;
+
+class Mppi final : public planning::Planner {
+ public:
+  static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS;
+
+  Mppi(const planning::Host& host, const planning::Setup& setup, const Json& params)
+      : host_(host),
+        setup_(setup),
+        initial_params_(params),
+        tuning_(params),
+        model_(setup.model()),
+        ws_(model_),
+        ticks_per_plan_(std::max(
+            1L, std::lround(params["plan_period_s"].get<double>() / setup.control_period_s()))),
+        spacing_s_(static_cast<double>(ticks_per_plan_) * setup.control_period_s()),
+        point_count_(3 + std::max(6L, std::lround(params["horizon_s"].get<double>() / spacing_s_))),
+        box_(setup, reserve(setup)),
+        kinematics_(model_, box_),
+        margins_(make_margins(setup, params)),
+        task_(setup.dof(), point_count_,
+              std::max<Index>(256, static_cast<Index>(setup.path_points_max()) + 1), margins_),
+        guide_(setup, model_, margins_, box_, levers(setup, model_),
+               params["guide_budget"].get<long>()),
+        pool_(host, setup, model_, point_count_, params["samples"], params["threads"], task_,
+              guide_),
+        tracker_(setup.dof(), params["tracking_rate"], setup.control_period_s()),
+        planned_(setup.dof()),
+        average_(setup.dof(), point_count_),
+        uses_guide_(params["guide"] == "tree") {
+    plan_ = mean_ = MatrixXd::Zero(setup.dof(), point_count_);
+    hold_ = target_ = torque_ = VectorXd::Zero(setup.dof());
+    weights_.resize(static_cast<std::size_t>(pool_.sample_count()));
+    order_.resize(weights_.size());
+    task_.seed = setup.seed();
+    task_.goal.q = hold_;
+    check_horizon();
+    series_ = {
+        host.declare_series("plan_cost", "s"),         host.declare_series("mean_cost", "s"),
+        host.declare_series("effective_samples", ""),  host.declare_series("plan_clearance", "m"),
+        host.declare_series("colliding_rollouts", ""), host.declare_series("guide_queries", "")};
+  }
+  ~Mppi() override { pool_.finish(); }
+
+  static double influence_m(const Json& params) { return params["query_range_m"]; }
+
+  [[nodiscard]] Tuning prepare_params(const Json& params) const {
+    check_fixed_params(params, initial_params_);
+    return Tuning(params);
+  }
+  // Workers use the task, so the next plan takes it.
+  void apply_params(const Tuning& tuning) { tuning_ = tuning; }
+
+  void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
+    pool_.finish();
+    guide_.stop();
+    searching_ = started_ = false;
+    task_.plan = 0;
+    known_goal_ = false;
+    figures_ = {};
+  }
+
+  void tick(const planning::Tick& tick, planning::Command& command) override {
+    if (started_) evaluate(plan_, 0, place_in_plan(), spacing_s_, planned_);
+    if (const auto sent = tick.torque(); sent && started_) stopped_ |= *sent != torque_;
+    const bool period_ends = ticks_ == ticks_per_plan_;
+    if (!started_ || strays(tick.q(), stray) ||
+        (period_ends && stopped_ && strays(tick.q(), stray_of_stop))) {
+      restart(tick);
+    } else if (period_ends) {
+      finish_plan();
+      begin_plan(tick);
+    }
+    pool_.share(static_cast<double>(ticks_ + 1) / static_cast<double>(ticks_per_plan_));
+    evaluate(plan_, 0, place_in_plan(), spacing_s_, planned_);
+    tracker_.torque(model_, ws_, tick.q(), tick.v(), planned_, setup_.effort_max(), torque_);
+    command.held_torque() = torque_;
+    ++ticks_;
+    // The arm waits while the guide searches, and the planner gives up after too many searches.
+    if (uses_guide_) command.disable_stall_rule();
+    if (gives_up_)
+      command.give_up("no way: the guide found no path on which the arm made progress");
+    for (std::size_t i = 0; i < series_.size(); ++i) command.set_series(series_[i], figures_[i]);
+  }
+
+ private:
+  enum Figure { plan_cost, mean_cost, effective_samples, plan_clearance, colliding, guide_queries };
+
+  static Margins make_margins(const planning::Setup& setup, const Json& params) {
+    const double shield = std::max(setup.shield_margin_m(), setup.shield_self_margin_m());
+    return {setup.dof(), std::max(params["margin_m"].get<double>(), shield + beyond_shield_m),
+            setup.sampled() ? least_sampled_m : least_m, params["goal_margin_m"],
+            params["clearance_range_m"]};
+  }
+  static double reserve(const planning::Setup& setup) {
+    return setup.sampled() ? limit_reserve_sampled : limit_reserve;
+  }
+
+  void check_horizon() const {
+    const double rest_s = static_cast<double>(point_count_ - 6) * spacing_s_;
+    if (tuning_.cruise_speed > rest_s * tuning_.acceleration_max)
+      throw Error(ErrorCode::invalid,
+                  "params: /horizon_s: the arm cannot brake within the horizon, expected "
+                  "horizon_s - 3 plan_period_s >= cruise_speed/acceleration_max");
+  }
+
+  [[nodiscard]] bool strays(const planning::ConstVectorMap& q, double limit) const {
+    return (planned_.q - q).lpNorm<Eigen::Infinity>() > limit;
+  }
+  [[nodiscard]] double place_in_plan() const {
+    return static_cast<double>(ticks_) / static_cast<double>(ticks_per_plan_);
+  }
+
+  // Plans from the measured state: at the start, and where the arm was kept from its plan.
+  void restart(const planning::Tick& tick) {
+    pool_.finish();
+    set_limits(tick.speed_scale());
+    JointState& state = planned_;
+    state.q = tick.q();
+    state.v = tick.v();
+    state.a.setZero();
+    set_start(state, spacing_s_, plan_);
+    Sampler::brake(task_.limits, plan_);
+    task_.best = plan_;
+    tracker_.reset();
+    started_ = true;
+    begin_plan(tick);
+  }
+
+  void set_limits(double speed_scale) {
+    auto& limits = task_.limits;
+    const int n = setup_.dof();
+    limits.speed = VectorXd::Constant(n, tuning_.cruise_speed);
+    if (const auto velocity_max = setup_.velocity_max())
+      limits.speed = limits.speed.cwiseMin(velocity_share * *velocity_max);
+    limits.speed *= spacing_s_ * speed_scale;
+    limits.change = VectorXd::Constant(n, tuning_.acceleration_max * spacing_s_ * spacing_s_);
+    constexpr double unlimited = 1e9;
+    limits.lower = VectorXd::Constant(n, -unlimited);
+    limits.upper = -limits.lower;
+    if (const auto lower = setup_.q_lower())
+      limits.lower = (lower->array() + reserve(setup_)).max(-unlimited);
+    if (const auto upper = setup_.q_upper())
+      limits.upper = (upper->array() - reserve(setup_)).min(unlimited);
+    if (!known_goal_ || task_.goal.type != HAMELIN_GOAL_JOINT) return;
+    limits.lower = limits.lower.cwiseMin(task_.goal.q);
+    limits.upper = limits.upper.cwiseMax(task_.goal.q);
+  }
+
+  // The plan that begins one period from now, from where the present one will be then.
+  void begin_plan(const planning::Tick& tick) {
+    ticks_ = 0;
+    stopped_ = false;
+    pool_.refresh();
+    set_limits(tick.speed_scale());
+    task_.cost = tuning_.cost;
+    task_.spacing_s = spacing_s_;
+    task_.cruise_speed = tuning_.cruise_speed;
+    task_.moving = tick.moving_count() > 0;
+    ++task_.plan;
+    shift(plan_, task_.mean);
+    shift(MatrixXd(task_.best), task_.best);
+    task_.best.leftCols<3>() = task_.mean.leftCols<3>();
+    if (!known_goal_ || goal_number_ != tick.goal_number()) set_goal(tick);
+    if (searching_ && !guide_.searches()) take_path();
+    measure_start();
+    check_progress(tick.time_s());
+    // An arm that waits where nothing moves needs no rollouts.
+    rolls_ = !searching_ || task_.moving;
+    pool_.start(guide_.checks() + tuning_.guide_queries, rolls_);
+  }
+
+  static void shift(const MatrixXd& from, MatrixXd& to) {
+    const Index n = from.cols();
+    to.leftCols(n - 1) = from.rightCols(n - 1);
+    to.col(n - 1) = from.col(n - 1);
+  }
+
+  void set_goal(const planning::Tick& tick) {
+    const hamelin_goal& from = tick.goal();
+    Goal& goal = task_.goal;
+    goal.type = from.type;
+    if (from.type == HAMELIN_GOAL_JOINT) goal.q = planning::ConstVectorMap(from.q, setup_.dof());
+    goal.position = planning::vec3(from.position_world_m);
+    const auto& w = from.quaternion_wxyz;
+    if (from.type == HAMELIN_GOAL_POSE)
+      goal.rotation = Eigen::Quaterniond(w[0], w[1], w[2], w[3]).normalized().toRotationMatrix();
+    goal.tolerance_m = from.tolerance_m;
+    goal.tolerance_rad = from.tolerance_rad;
+    goal_number_ = tick.goal_number();
+    known_goal_ = true;
+    gives_up_ = false;
+    searches_ = 0;
+    failed_ = false;
+    searched_left_ = std::numeric_limits<double>::infinity();
+    task_.margins.clear_goals();
+    task_.tip_cost = false;
+    const auto way_points = setup_.path(from);
+    if (way_points.cols() > 1) return follow_way_points(way_points);
+    if (uses_guide_) return search();
+    head_straight();
+  }
+
+  template <class Points>
+  void follow_way_points(const Points& way_points) {
+    guide_.stop();
+    searching_ = false;
+    task_.path.clear();
+    task_.path.add(task_.mean.rightCols<1>());
+    for (Index i = 0; i < way_points.cols(); ++i) task_.path.add(way_points.col(i));
+    add_goal_margin(task_.goal.q);
+    begin_path();
+  }
+
+  // Without a guide: straight to the goal, or to the nearest posture with the tip at it.
+  void head_straight() {
+    target_ = task_.mean.rightCols<1>();
+    if (task_.goal.type == HAMELIN_GOAL_JOINT)
+      target_ = task_.goal.q;
+    else
+      find_posture();
+    task_.tip_cost = task_.goal.type != HAMELIN_GOAL_JOINT;
+    task_.path.clear();
+    task_.path.add(target_);
+    add_goal_margin(target_);
+    begin_path();
+  }
+
+  void find_posture() {
+    Rng rng(setup_.seed() + goal_number_);
+    double least = std::numeric_limits<double>::infinity();
+    VectorXd q = target_;
+    for (int i = 0; i < posture_attempts; ++i) {
+      if (kinematics_.solve(task_.goal, q)) {
+        const double distance = (q - task_.mean.rightCols<1>()).norm();
+        if (distance < least) least = distance, target_ = q;
+      }
+      box_.draw(rng, q);
+    }
+  }
+
+  void add_goal_margin(const VectorXd& q) {
+    task_.margins.add_goal(q, pool_.evaluator().query().clearance(span_of(q)));
+  }
+
+  [[nodiscard]] std::span<const double> span_of(const VectorXd& q) const {
+    return {q.data(), static_cast<std::size_t>(q.size())};
+  }
+
+  // The arm waits where the present plan ends, and searches from there.
+  void search() {
+    hold_ = task_.mean.rightCols<1>();
+    guide_.begin(task_.goal, hold_, setup_.seed(), goal_number_ * 1000003ULL + task_.plan,
+                 search_reserve_m * searches_);
+    searching_ = true;
+    failed_ = false;
+    ++searches_;
+    task_.path.clear();
+    task_.path.add(hold_);
+    begin_path();
+  }
+
+  void take_path() {
+    searching_ = false;
+    failed_ = guide_.path().empty();
+    if (failed_) return;
+    task_.path.clear();
+    for (Index i = 0; i < guide_.path().size(); ++i) task_.path.add(guide_.path().point(i));
+    task_.margins.clear_goals();
+    for (int i = 0; i < guide_.root_count(); ++i)
+      task_.margins.add_goal(guide_.root(i), guide_.root_clearance(i));
+    begin_path();
+  }
+
+  void begin_path() {
+    task_.path_from = 0.0;
+    least_left_ = std::numeric_limits<double>::infinity();
+  }
+
+  // Where the next plan starts, on the path and with what clearance.
+  void measure_start() {
+    evaluate(task_.mean, 0, 0.0, spacing_s_, planned_);
+    task_.start_clearance_m = pool_.evaluator().query().clearance(span_of(planned_.q), spacing_s_);
+    task_.margins.set_start(planned_.q, task_.start_clearance_m);
+    const auto place = task_.path.cost_to_go(planned_.q, task_.path_from, task_.path_from + reach);
+    left_ = place.cost;
+    task_.path_from = place.s;
+    task_.path_to = place.s + reach;
+    double share = std::min(1.0, left_ / noise_fade);
+    if (task_.moving) share = std::max(share, least_noise);
+    task_.noise = share * tuning_.noise;
+  }
+
+  // After a stall or a failed search the guide searches again. What moves is given time to leave.
+  void check_progress(double time_s) {
+    const bool advances = left_ < at_goal || left_ < least_left_ - progress;
+    if (searching_ || (advances && !failed_)) {
+      least_left_ = std::min(left_, least_left_);
+      progress_s_ = time_s;
+      if (left_ < searched_left_ - renewed) searches_ = 0;
+      return;
+    }
+    double patience_s = failed_ ? 0.0 : tuning_.stall_time_s;
+    if (task_.moving) patience_s = std::max(tuning_.stall_time_s, mover_patience_s);
+    if (!uses_guide_ || gives_up_ || time_s - progress_s_ < patience_s) return;
+    if (searches_ >= tuning_.max_searches) {
+      gives_up_ = true;
+      return;
+    }
+    searched_left_ = failed_ ? searched_left_ : left_;
+    progress_s_ = time_s;
+    search();
+    measure_start();
+  }
+
+  // docs/theory.md (15.12), (15.13)
+  void finish_plan() {
+    pool_.finish();
+    figures_[guide_queries] = static_cast<double>(guide_.checks());
+    if (!rolls_) {
+      plan_ = task_.best = task_.mean;
+      return;
+    }
+    const Index count = pool_.sample_count();
+    double collisions = 0.0;
+    for (Index i = 0; i < count; ++i) {
+      weights_[static_cast<std::size_t>(i)] = pool_.cost(i);
+      order_[static_cast<std::size_t>(i)] = i;
+      collisions += pool_.collides(i) ? 1.0 : 0.0;
+    }
+    std::partial_sort(
+        order_.begin(), order_.begin() + candidate_count, order_.end(), [&](Index a, Index b) {
+          return pool_.cost(a) < pool_.cost(b) || (pool_.cost(a) == pool_.cost(b) && a < b);
+        });
+    figures_[effective_samples] = weights_of_costs(weights_, tuning_.temperature_s);
+    figures_[colliding] = collisions;
+    average();
+    choose();
+    pool_.get_points(order_.front(), task_.best);
+  }
+
+  // The weighted mean of all rollouts keeps their limits, because these are convex.
+  void average() {
+    mean_.setZero();
+    Index sample = 0;
+    for (const auto& block : pool_.blocks())
+      for (Index lane = 0; lane < lane_count; ++lane, ++sample) {
+        const double w = weights_[static_cast<std::size_t>(sample)];
+        if (w < 1e-12) continue;
+        for (Index j = 0; j < mean_.rows(); ++j)
+          for (Index i = 0; i < point_count_; ++i) mean_(j, i) += w * block.point(j, i)[lane];
+      }
+    mean_.leftCols<3>() = task_.mean.leftCols<3>();
+    mean_.col(point_count_ - 2) = mean_.col(point_count_ - 1) = mean_.col(point_count_ - 3);
+  }
+
+  // The mean, or a rollout that costs less, the first that is proved clear. Without any, the arm
+  // keeps to the plan before, which ends at rest, or brakes if that costs less. Where obstacles
+  // move the plan before may not be clear any more, and the arm takes what costs least.
+  void choose() {
+    average_.set_lane(0, mean_);
+    pool_.evaluator().begin(task_, average_);
+    pool_.evaluator().evaluate(task_, average_, 0);
+    figures_[mean_cost] = average_.cost[0];
+    bool mean_tried = false;
+    for (std::size_t i = 0; i < candidate_count; ++i) {
+      const Index sample = order_[i];
+      if (!mean_tried && average_.cost[0] <= pool_.cost(sample)) {
+        mean_tried = true;
+        if (accept(mean_, average_.cost[0], average_.clearance_m[0])) return;
+      }
+      pool_.get_points(sample, plan_);
+      if (accept(plan_, pool_.cost(sample), pool_.clearance_m(sample))) return;
+    }
+    Index otherwise = pool_.cost(Sampler::proposal_brake) < pool_.cost(Sampler::proposal_mean)
+                          ? Sampler::proposal_brake
+                          : Sampler::proposal_mean;
+    if (task_.moving) otherwise = order_.front();
+    pool_.get_points(otherwise, plan_);
+    set_figures(pool_.cost(otherwise), pool_.clearance_m(otherwise));
+  }
+
+  bool accept(const MatrixXd& points, double cost, double clearance_m) {
+    if (!pool_.evaluator().verify(task_, points)) return false;
+    if (&points != &plan_) plan_ = points;
+    set_figures(cost, clearance_m);
+    return true;
+  }
+
+  void set_figures(double cost, double clearance_m) {
+    figures_[plan_cost] = cost;
+    figures_[plan_clearance] = clearance_m;
+  }
+
+  planning::Host host_;
+  planning::Setup setup_;
+  Json initial_params_;
+  Tuning tuning_;
+  model::Model model_;
+  dynamics::Workspace ws_;
+  long ticks_per_plan_, ticks_ = 0;
+  double spacing_s_;
+  Index point_count_;
+  JointBox box_;
+  InverseKinematics kinematics_;
+  Margins margins_;
+  Task task_;
+  Guide guide_;
+  RolloutPool pool_;
+  Tracker tracker_;
+  JointState planned_;
+  Rollouts average_;
+  bool uses_guide_, started_ = false, searching_ = false, failed_ = false, stopped_ = false,
+                    gives_up_ = false, known_goal_ = false, rolls_ = false;
+  std::uint64_t goal_number_ = 0;
+  int searches_ = 0;
+  double left_ = 0.0, least_left_ = 0.0, searched_left_ = 0.0,
+         progress_s_ = 0.0;  ///< lengths to go, and since when
+  MatrixXd plan_, mean_;     ///< control points of the motion in execution, and of the average
+  VectorXd hold_, target_, torque_;
+  std::vector<double> weights_;
+  std::vector<Index> order_;
+  std::array<std::int32_t, 6> series_{};
+  std::array<double, 6> figures_{};
+};
+
+}  // namespace
+}  // namespace hamelin::mppi
+
+HAMELIN_PLANNER_PLUGIN(hamelin::mppi::Mppi, "mppi", "0.1.0",
+                       "Sampling model-predictive control with rollouts that end at rest",
+                       params_schema);

@@ -1,0 +1,35 @@
+#include "tuning.hpp"
+
+#include <array>
+#include <string>
+
+namespace hamelin::mppi {
+
+namespace {
+
+constexpr std::array fixed_params{"samples",           "horizon_s",     "plan_period_s",
+                                  "threads",           "margin_m",      "goal_margin_m",
+                                  "clearance_range_m", "query_range_m", "guide",
+                                  "guide_budget",      "tracking_rate", "record_rollouts"};
+
+}  // namespace
+
+Tuning::Tuning(const Json& params)
+    : cost{params["smoothness_weight_s"], params["clearance_weight_s"]},
+      temperature_s(params["temperature_s"]),
+      noise(params["noise_rad"]),
+      cruise_speed(params["cruise_speed"]),
+      acceleration_max(params["acceleration_max"]),
+      stall_time_s(params["stall_time_s"]),
+      guide_queries(params["guide_queries"]),
+      max_searches(params["max_searches"]) {}
+
+void check_fixed_params(const Json& params, const Json& initial) {
+  for (const char* key : fixed_params)
+    if (params.at(key) != initial.at(key))
+      throw Error(ErrorCode::invalid, std::string("/") + key +
+                                          ": cannot be changed while it runs, expected " +
+                                          initial.at(key).dump());
+}
+
+}  // namespace hamelin::mppi
