@@ -12,6 +12,7 @@
 #include "params_schema.hpp"
 #include "rollout_pool.hpp"
 #include "spline.hpp"
+#include "tip_path.hpp"
 #include "tracker.hpp"
 #include "tuning.hpp"
 #include "weights.hpp"
@@ -73,7 +74,10 @@ class Mppi final : public planning::Planner {
         tracker_(setup.dof(), params["tracking_rate"], setup.control_period_s()),
         planned_(setup.dof()),
         average_(setup.dof(), point_count_),
-        uses_guide_(params["guide"] == "tree") {
+        uses_guide_(params["guide"] == "tree"),
+        recorded_rollouts_(params["record_rollouts"]),
+        drawn_(setup.dof(), point_count_),
+        tip_path_(static_cast<std::size_t>(point_count_)) {
     plan_ = mean_ = MatrixXd::Zero(setup.dof(), point_count_);
     hold_ = target_ = torque_ = VectorXd::Zero(setup.dof());
     weights_.resize(static_cast<std::size_t>(pool_.sample_count()));
@@ -374,15 +378,26 @@ class Mppi final : public planning::Planner {
       order_[static_cast<std::size_t>(i)] = i;
       collisions += pool_.collides(i) ? 1.0 : 0.0;
     }
-    std::partial_sort(
-        order_.begin(), order_.begin() + candidate_count, order_.end(), [&](Index a, Index b) {
-          return pool_.cost(a) < pool_.cost(b) || (pool_.cost(a) == pool_.cost(b) && a < b);
-        });
+    const auto ranked = static_cast<std::ptrdiff_t>(
+        std::min(order_.size(), std::max(candidate_count, recorded_rollouts_)));
+    std::partial_sort(order_.begin(), order_.begin() + ranked, order_.end(), [&](Index a, Index b) {
+      return pool_.cost(a) < pool_.cost(b) || (pool_.cost(a) == pool_.cost(b) && a < b);
+    });
+    draw_rollouts();
     figures_[effective_samples] = weights_of_costs(weights_, tuning_.temperature_s);
     figures_[colliding] = collisions;
     average();
     choose();
     pool_.get_points(order_.front(), task_.best);
+  }
+
+  // The paths of the tip in the best rollouts.
+  void draw_rollouts() {
+    for (std::size_t i = 0; i < std::min(recorded_rollouts_, order_.size()); ++i) {
+      pool_.get_points(order_[i], drawn_);
+      const Index count = tip_path(model_, ws_, drawn_, tip_path_);
+      host_.draw_path(std::span(tip_path_).first(static_cast<std::size_t>(count)));
+    }
   }
 
   // The weighted mean of all rollouts keeps their limits, because these are convex.
@@ -466,6 +481,9 @@ class Mppi final : public planning::Planner {
   VectorXd hold_, target_, torque_;
   std::vector<double> weights_;
   std::vector<Index> order_;
+  std::size_t recorded_rollouts_;
+  MatrixXd drawn_;
+  std::vector<Eigen::Vector3d> tip_path_;
   std::array<std::int32_t, 6> series_{};
   std::array<double, 6> figures_{};
 };
