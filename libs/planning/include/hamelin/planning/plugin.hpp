@@ -463,14 +463,12 @@ class Query {
 /// Base class of planners. A planner has a constructor (const Host&, const Setup&, const Json&
 /// params), which reports bad input by throwing Error; params are complete and checked against the
 /// plugin's schema. It may also have any of these, which are found by their names:
-///
-///     static double influence_m(const Json& params);  // distance up to which it needs contacts
-///     [m] static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES |
-///     HAMELIN_USES_THREADS; T prepare_params(const Json& params) const;  // any thread, while
-///     tick() runs; throws Error void apply_params(const T& params);          // before a tick;
-///     does not allocate or throw void reset(ConstVectorMap q, ConstVectorMap v);  // a new start;
-///     does not throw void world_changed(std::uint64_t world);         // before a tick; does not
-///     throw
+/// - `static double influence_m(const Json& params)`: distance up to which it needs contacts [m].
+/// - `static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS`.
+/// - `T prepare_params(const Json& params) const`: on any thread, while tick() runs; throws Error.
+/// - `void apply_params(const T& params)`: before a tick; does not allocate or throw.
+/// - `void reset(ConstVectorMap q, ConstVectorMap v)`: a new start; does not throw.
+/// - `void world_changed(std::uint64_t world)`: before a tick; does not throw.
 class Planner {
  public:
   Planner() = default;
