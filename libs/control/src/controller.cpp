@@ -86,15 +86,18 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
               options_.prepare_maps, options_.observations}),
       view_(scene_, nominal_, world_),
       shield_(make_shield()),
-      planner_(plugin, make_setup(), params, nominal_, world_, view_, options_.log),
+      planner_(plugin, make_setup(plugin), params, nominal_, world_, view_, options_.log),
       params_(params),
       new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
       new_params_(std::make_unique<NewParams>()),
       goal_list_(&new_goals_.take()),
+      receiver_(options_.targets),
+      new_target_(std::make_unique<StreamedTarget>()),
       goals_(goal_list_->goals, scene_.stall, nominal_),
       limits_(limits_of(scene_, nominal_)),
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
+  expect_target(scene_.goals);
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
@@ -108,7 +111,12 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   issued_.assign(delay_ticks + 1, zero);
 }
 
-planning::SetupData Controller::make_setup() {
+planning::SetupData Controller::make_setup(const planning::Plugin& plugin) {
+  if (follow_goal_of(scene_.goals) != nullptr && !plugin.follows_targets())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
+                            "expected one that does, such as hybrid",
+                            scene_.name, scene_.goals.size() - 1, plugin.name()));
   planning::SetupData setup = planner_setup(scene_, nominal_, view_, period_s_,
                                             shield_ ? shield_->limit_reserve() : LimitReserve{});
   setup.path_points_max = path_points_max_;
@@ -133,10 +141,34 @@ double steady_clock_s() {
 }
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
-  check_goals(goals, scene_, nominal_, path_points_max_);
+  check_goals(goals, scene_, nominal_, path_points_max_, plugin().follows_targets());
   const std::lock_guard lock(goals_mutex_);
+  expect_target(goals);
   new_goals_.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
   return goals_number_;
+}
+
+void Controller::expect_target(const std::vector<scene::Goal>& goals) {
+  const scene::Goal* const follow = follow_goal_of(goals);
+  receives_ = follow != nullptr && !follow->motion;
+  if (receives_) receiver_.start(follow->stream);
+}
+
+template <class Sample>
+void Controller::receive_target(const Sample& sample) {
+  const std::lock_guard lock(goals_mutex_);
+  if (!receives_)
+    throw Error(ErrorCode::invalid,
+                "target: no goal follows a streamed target, expected a follow goal");
+  new_target_.publish(std::make_unique<StreamedTarget>(receiver_.take(sample)));
+}
+
+void Controller::set_target(const TargetPose& pose) {
+  receive_target(pose);
+}
+
+void Controller::set_target(const TargetTwist& twist) {
+  receive_target(twist);
 }
 
 void Controller::set_planner_params(const Json& changes) {
@@ -165,6 +197,25 @@ void Controller::take_goals() {
   goal_list_ = &newest;
   goals_.set_goals(newest.goals);
   goal_ = {nullptr, goal_.number + 1, 0};
+  listed_ = nullptr;
+  target_.stop();
+}
+
+// A target starts where the tip is when its goal becomes the current one.
+void Controller::update_target() {
+  const scene::Goal* const goal = goals_.follows() ? &goals_.goal() : nullptr;
+  answer_.target = nullptr;
+  if (goal == nullptr) return;
+  const geometry::SE3 tip = dynamics::tip_pose(nominal_, view_.poses());
+  if (target_.goal() != goal) target_.start(*goal, tip);
+  answer_.target = &target_.update(time_s_, new_target_.take(), tip);
+}
+
+const hamelin_goal* Controller::goal_for_planner() {
+  if (answer_.target == nullptr) return listed_;
+  live_goal_ = *listed_;
+  control::set_target(*answer_.target, live_goal_);
+  return &live_goal_;
 }
 
 void Controller::take_params() {
@@ -179,6 +230,7 @@ void Controller::reset() {
   reset_ = true;
   late_answers_ = 0;
   goals_.restart();
+  target_.stop();
   verdict_.reset();
   answer_.state = ControlState::running;
   answer_.cause = {};
@@ -211,6 +263,7 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   answer_.cause = {};
   while (goals_.advance(view_.poses(), q_, v_)) continue;
   answer_.goal_index = goals_.index();
+  update_target();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
   else if (!planner_.detects_stalls() && goals_.stalled(view_.poses(), v_, period_s_))
@@ -303,9 +356,10 @@ bool Controller::ask_planner() {
   take_params();
   if (reset_) planner_.reset(q_, v_);
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
-  const hamelin_goal* const goal = &goal_list_->for_planner[index];
-  if (reset_ || (goal_.goal != nullptr && goal_.goal != goal)) ++goal_.number;
-  goal_ = {goal, goal_.number, index};
+  const hamelin_goal* const listed = &goal_list_->for_planner[index];
+  if (reset_ || (listed_ != nullptr && listed_ != listed)) ++goal_.number;
+  listed_ = listed;
+  goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
   const bool sends_torque = forms_torque() && !options_.position;

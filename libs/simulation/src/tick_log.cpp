@@ -16,6 +16,17 @@ std::string obstacle_name(const scene::Environment& environment, int obstacle) {
   return environment.obstacles()[static_cast<std::size_t>(obstacle)].name;
 }
 
+Json target_json(const control::TargetState& target, const TrackingAudit& tracking) {
+  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(target.pose.R());
+  Json out{{"position_m", to_json(target.pose.p())},
+           {"quaternion_wxyz", to_json(wxyz)},
+           {"error_m", tracking.error().metres.value_or(0.0)},
+           {"free", tracking.free()}};
+  if (tracking.error().radians) out["error_rad"] = *tracking.error().radians;
+  if (target.lost) out["lost"] = true;
+  return out;
+}
+
 }  // namespace
 
 void TickLog::header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
@@ -63,6 +74,8 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
                       {"q_end", to_json(shield_->stop().end())}};
     if (shield_->stop().moves()) fields["stop"]["evades"] = true;
   }
+  if (answer_ != nullptr && answer_->target != nullptr && !answer_->target->waiting)
+    fields["target"] = target_json(*answer_->target, *tracking_);
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_.has_self()) fields["self_clearance_m"] = world_.self_clearance_m();
   if (world_.has_obstacles()) {

@@ -3,11 +3,13 @@
 #include <vector>
 
 #include "actuation.hpp"
+#include "hamelin/control/controller.hpp"
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/planner_host.hpp"
 #include "hamelin/control/shield.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "recorder.hpp"
+#include "tracking_audit.hpp"
 
 namespace hamelin::simulation {
 
@@ -28,6 +30,12 @@ class TickLog {
     torque_.setZero(model.dof());
   }
 
+  /// Writes the target that is followed, too. Both must outlive this.
+  void add_target(const control::Answer& answer, const TrackingAudit& tracking) {
+    answer_ = &answer;
+    tracking_ = &tracking;
+  }
+
   /// @param params the planner's, with defaults @param series that it declared
   void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
               const std::vector<planning::Series>& series, const Json& provenance, long steps);
@@ -42,8 +50,10 @@ class TickLog {
   const control::WorldView& world_;
   const control::GoalTracker& goals_;
   Actuation& actuation_;
-  const control::Shield* shield_;  ///< null if the scene asks for none
-  Eigen::VectorXd torque_;         ///< of the last node with an answer
+  const control::Shield* shield_;            ///< null if the scene asks for none
+  const control::Answer* answer_ = nullptr;  ///< null if no goal follows a target
+  const TrackingAudit* tracking_ = nullptr;  ///< the same
+  Eigen::VectorXd torque_;                   ///< of the last node with an answer
 };
 
 }  // namespace hamelin::simulation

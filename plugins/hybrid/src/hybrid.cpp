@@ -10,6 +10,7 @@
 
 #include "approach_speed.hpp"
 #include "evader.hpp"
+#include "follower.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
@@ -51,6 +52,10 @@ constexpr int hurried_steps = 2;  // factor of the steps of a search where somet
 constexpr double longest_wait_s = 6.0;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
 constexpr double via_reached = 0.1, escape_end_reached = 0.08;
+// Searches for a way to a target that rests out of reach, before the arm only waits near it.
+constexpr int target_searches = 3;
+// For the rule of stalls (10.25): an arm that is kept from a target is given about a second more.
+constexpr double target_closing_speed = 0.03;
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -78,6 +83,8 @@ VectorXd lever_weights(const model::Model& model) {
 
 class Hybrid final : public planning::Planner {
  public:
+  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS;
+
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
         setup_(setup),
@@ -91,6 +98,7 @@ class Hybrid final : public planning::Planner {
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
         evader_(host, setup_, model_, law_, margins_),
+        follower_(setup, model_),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
@@ -141,6 +149,8 @@ class Hybrid final : public planning::Planner {
     if (rollout_) rollout_->set_params(tuning.search_law);
     if (roots_) roots_->set_params(tuning.search_law);
     margins_.set_params(tuning.margins);
+    follower_.set_params(tuning.follow);
+    target_velocity_gain_ = tuning.target_velocity_gain;
     measure_margins_ = true;
     velocity_gain_ = tuning.velocity_gain;
     follow_gain_ = tuning.follow_gain;
@@ -176,6 +186,7 @@ class Hybrid final : public planning::Planner {
     if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
     if (measure_margins_) measure_margins();
     prepare(tick);
+    if (follows()) watch_target(tick.time_s());
 
     const Target target = choose_target();
     evader_.update(tick, arm(), course());
@@ -185,6 +196,9 @@ class Hybrid final : public planning::Planner {
       evader_.velocity(q_, u_);
     } else if (mode_ == Mode::search) {
       u_.setZero();
+    } else if (follows() && mode_ == Mode::goal) {
+      follow(tick);
+      closing_speed = target_closing_speed;
     } else {
       closing_speed = law_.attract(model_, ws_, q_, target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
@@ -200,6 +214,7 @@ class Hybrid final : public planning::Planner {
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
            drive = drive_acceleration_;
+    if (follows() && mode_ == Mode::goal) gain = target_velocity_gain_;
     if (evader_.evades()) gain = evasion_gain, drive = evasion_acceleration;
     x_ = w_ + horizon_s_ * (gain * (u_ - w_)).cwiseMin(drive).cwiseMax(-drive);
     project(command);
@@ -239,6 +254,24 @@ class Hybrid final : public planning::Planner {
     for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
     enter(Mode::goal, tick.time_s());
+    if (!follows()) return;
+    anchor_.set(goal);
+    follower_.start(tick.q());
+  }
+
+  [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
+
+  // An escape ends where its target has left.
+  void watch_target(double now) {
+    if (!anchor_.left_by(*goal_)) return;
+    anchor_.set(*goal_);
+    enter(Mode::goal, now);
+  }
+
+  void follow(const planning::Tick& tick) {
+    follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, u_);
+    if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
+    law_.repel(obstacles_.points(), std::min(1.0, law_.distance(model_, ws_, q_, {goal_})), u_);
   }
 
   void measure_margins() {
@@ -451,6 +484,8 @@ class Hybrid final : public planning::Planner {
                    planning::Command& command) {
     if (uses_memory_ || search_) command.disable_stall_rule();
     if (mode_ == Mode::search) return continue_search(now);
+    const bool tracks = follows() && law_.within(model_, ws_, q_, *goal_, 1.0);
+    if (tracks && mode_ == Mode::goal) return stall_.restart(now);
     if (!evader_.evades()) {
       evades_since_s_ = now;
     } else if (now - evades_since_s_ < longest_wait_s && !makes_no_progress(now, target)) {
@@ -471,7 +506,7 @@ class Hybrid final : public planning::Planner {
       const bool arrived =
           (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < escape_end_reached;
       // The escape path of a tip goal ends at a solution of the goal, so it is followed to its end.
-      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
+      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT && !follows();
       if (arrived && (stalled || !stay)) {
         if (search_->arrives())
           path_position_ = std::max(path_position_, search_->rejoin_arc_length());
@@ -494,7 +529,12 @@ class Hybrid final : public planning::Planner {
   }
 
   void start_escape(double now, const Target& target, planning::Command& command) {
-    if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
+    const bool searches = uses_memory_ || search_;
+    if (follows()) {  // a target may come back, so the arm waits near it
+      if (!searches || anchor_.searches++ >= target_searches) return stall_.restart(now);
+    } else if (!searches || escapes_ >= max_escapes_) {
+      return command.give_up(cause());
+    }
     ++escapes_;
     std::array<char, 64> line{};
     const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
@@ -503,7 +543,8 @@ class Hybrid final : public planning::Planner {
       // What moves may leave the way free, or come back to where it was: most searches assume the
       // one, each third the other.
       surroundings_.count(evader_.active() && escapes_ % 3 == 0 ? &evader_.sweep() : nullptr);
-      search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_position_);
+      search_->begin(follows() ? anchor_.goal() : *goal_, q_, path_.empty() ? nullptr : &path_,
+                     path_position_);
       return enter(Mode::search, now);
     }
     // On a path the distance from a point behind the blocked stretch counts.
@@ -572,6 +613,8 @@ class Hybrid final : public planning::Planner {
   JointBox box_;
   SafetyFilter filter_;
   Evader evader_;
+  Follower follower_;
+  TargetAnchor anchor_;
   double evades_since_s_ = 0.0;
   double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
@@ -580,8 +623,9 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
-  double velocity_gain_ = 0.0, follow_gain_ = 0.0, drive_acceleration_ = 0.0,
-         acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
+  double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
+         drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0,
+         joint_damping_ = 0.0, contact_radius_;
   int passes_ = 1, max_escapes_, search_steps_ = 1;
   double horizon_s_;                  ///< time after which the velocity is to be x
   std::optional<Observer> observer_;  ///< only under sampled actuation

@@ -12,6 +12,7 @@
 
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/live_target.hpp"
 #include "hamelin/control/newest.hpp"
 #include "hamelin/control/planner_host.hpp"
 #include "hamelin/control/shield.hpp"
@@ -45,6 +46,8 @@ struct Answer {
   /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
   std::uint64_t goals_number = 0;
   std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
+  /// The target of the current goal, where that is a follow goal; else null.
+  const TargetState* target = nullptr;
   /// Number of the World's snapshot that the answer is for.
   std::uint64_t snapshot = 0;
   /// The planner's own figures, see Controller::series(); NaN where it set none.
@@ -65,6 +68,9 @@ struct ControllerOptions {
   ObservationOptions observations{};  ///< see World::Options
   /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
   bool certify = true;
+  /// What is known of the poses of targets, see set_target(). The timeout is not used: gap_max_s of
+  /// the goal applies.
+  ObservationOptions targets{0.0005, 0.002, 5.0, 20.0, 0.5};
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
   bool torque = true;              ///< fill Answer::torque
   bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque
@@ -125,6 +131,15 @@ class Controller {
   ///         Options::path_points_max, or no goal; nothing changes then
   std::uint64_t set_goals(std::vector<scene::Goal> goals);
   std::uint64_t set_goal(scene::Goal goal) { return set_goals({std::move(goal)}); }
+
+  /// Moves the target of the follow goal, from the next tick on: a pose, from where it goes on with
+  /// the velocities that are given or else estimated, or a twist, as of a joystick. Any thread; the
+  /// tick takes the newest without a lock. Times must increase. The bounds are those of the goal,
+  /// scene::TargetStream.
+  /// @throws Error invalid, "target: …", if no goal follows a streamed target, for numbers that are
+  ///         not finite, times that do not increase, and poses that jump; nothing changes then
+  void set_target(const TargetPose& pose);
+  void set_target(const TargetTwist& twist);
 
   /// Changes parameters of the planner, from the next tick on. Any thread.
   /// @param changes an object with those that change; the others stay
@@ -189,11 +204,18 @@ class Controller {
     std::optional<planning::PreparedParams> params;
   };
   [[nodiscard]] std::unique_ptr<Shield> make_shield();
-  [[nodiscard]] planning::SetupData make_setup();
+  [[nodiscard]] planning::SetupData make_setup(const planning::Plugin& plugin);
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
   void start_outputs();
   void take_goals();
+  /// Notes whether these goals follow a streamed target.
+  void expect_target(const std::vector<scene::Goal>& goals);
+  template <class Sample>
+  void receive_target(const Sample& sample);
+  void update_target();
+  /// The current goal as the planner sees it.
+  [[nodiscard]] const hamelin_goal* goal_for_planner();
   void take_params();
   /// Calls the planner. @return whether it has not failed; else failure_ says why
   [[nodiscard]] bool ask_planner();
@@ -229,6 +251,12 @@ class Controller {
   Newest<GoalList> new_goals_;
   Newest<NewParams> new_params_;
   const GoalList* goal_list_;  ///< that the tick uses
+  TargetReceiver receiver_;    ///< among writers, as goals_mutex_
+  bool receives_ = false;      ///< whether the newest goals follow a streamed target
+  Newest<StreamedTarget> new_target_;
+  LiveTarget target_;
+  const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
+  hamelin_goal live_goal_{};              ///< the current one if it is a follow goal
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
   GoalTracker goals_;

@@ -1,0 +1,127 @@
+#include "follower.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::hybrid {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+// The length ℓ [m] that makes a rotation by one radian comparable with a displacement.
+constexpr double turn_length = 0.25;
+// Singular values below the first are damped, with the second at zero [m/rad].
+constexpr double singular_below = 0.08, damping_at_zero = 0.05;
+// Eigenvalues of J Jᵀ below this belong to directions that are not part of the task.
+constexpr double not_a_direction = 1e-14;
+constexpr double comfort_gain = 0.5;  // towards the comfortable posture [1/s]
+constexpr double row_square = 0.05;   // least |a|² by which a repulsion is divided
+// A target that has gone so far has left its place.
+constexpr double left_m = 0.05, left_rad = 0.3;
+
+// A correction with the gain, at most `fastest`.
+Vector3d bounded(const Vector3d& error, double gain, double fastest) {
+  const double size = error.norm();
+  return size > 0.0 ? Vector3d(error * std::min(gain, fastest / size)) : Vector3d::Zero();
+}
+
+}  // namespace
+
+Follower::Follower(const planning::Setup& setup, const model::Model& model)
+    : model_(model),
+      comfortable_(VectorXd::Zero(model.dof())),
+      J_(6, model.dof()),
+      spare_(VectorXd::Zero(model.dof())) {
+  const auto lower = setup.q_lower(), upper = setup.q_upper();
+  limited_ = lower && upper && lower->allFinite() && upper->allFinite();
+  if (limited_) comfortable_ = 0.5 * (*lower + *upper);
+}
+
+void Follower::start(const VectorXd& q) noexcept {
+  if (!limited_) comfortable_ = q;
+}
+
+void Follower::velocity(const dynamics::Workspace& ws, const VectorXd& q, const hamelin_goal& goal,
+                        std::span<const NearPoint> points, double lag_s, VectorXd& u) {
+  desire(ws, goal, lag_s);
+  resolve(ws, goal, u);
+  move_in_null_space(q, points, u);
+  const double speed = u.norm();
+  if (speed > params_.joint_speed) u *= params_.joint_speed / speed;
+}
+
+// docs/theory.md (16.4)
+void Follower::desire(const dynamics::Workspace& ws, const hamelin_goal& goal, double lag_s) {
+  const TipError error = tip_error(model_, ws, goal);
+  using planning::vec3;
+  desired_.tail<3>() = vec3(goal.velocity_world_m_s) + lag_s * vec3(goal.acceleration_world_m_s2) +
+                       bounded(error.position, params_.gain, params_.tip_speed);
+  desired_.head<3>().setZero();
+  if (!rotates(goal)) return;
+  desired_.head<3>() = turn_length * (vec3(goal.angular_velocity_world_rad_s) +
+                                      lag_s * vec3(goal.angular_acceleration_world_rad_s2) +
+                                      bounded(error.rotation, params_.gain, params_.tip_turn));
+}
+
+// docs/theory.md (16.5)–(16.7)
+void Follower::resolve(const dynamics::Workspace& ws, const hamelin_goal& goal, VectorXd& u) {
+  dynamics::frame_jacobian(model_, ws, model_.robot().tip.link, dynamics::tip_pose(model_, ws).p(),
+                           J_);
+  if (rotates(goal))
+    J_.topRows<3>() *= turn_length;
+  else
+    J_.topRows<3>().setZero();
+  const Matrix6d G = J_ * J_.transpose();
+  modes_.compute(G);
+  smallest_ = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 6; ++i) {
+    const double square = std::max(0.0, modes_.eigenvalues()[i]), sigma = std::sqrt(square);
+    if (rotates(goal) || i >= 3) smallest_ = std::min(smallest_, sigma);
+    const double near = std::max(0.0, 1.0 - square / (singular_below * singular_below)),
+                 damping = damping_at_zero * near;
+    inverse_[i] = square > not_a_direction ? 1.0 / (square + damping * damping) : 0.0;
+  }
+  const Vector6d along = modes_.eigenvectors().transpose() * desired_;
+  const Vector6d force = modes_.eigenvectors() * inverse_.cwiseProduct(along);
+  u.noalias() = J_.transpose() * force;
+}
+
+// docs/theory.md (16.8), (16.9). In a damped direction part of the motion is left, by which the arm
+// leaves a singular posture.
+void Follower::move_in_null_space(const VectorXd& q, std::span<const NearPoint> points,
+                                  VectorXd& u) {
+  spare_ = comfort_gain * (comfortable_ - q);
+  for (const auto& point : points) {
+    const double h = std::max(point.distance - point.margin, 0.0);
+    if (h >= params_.repulsion_range) continue;
+    spare_ += (params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
+               std::max(row_square, point.row.squaredNorm())) *
+              point.row;
+  }
+  const Vector6d tip_motion = J_ * spare_;
+  const Vector6d along = modes_.eigenvectors().transpose() * tip_motion;
+  const Vector6d force = modes_.eigenvectors() * inverse_.cwiseProduct(along);
+  u += spare_;
+  u.noalias() -= J_.transpose() * force;
+}
+
+void TargetAnchor::set(const hamelin_goal& target) noexcept {
+  goal_ = target;
+  goal_.type = rotates(target) ? HAMELIN_GOAL_POSE : HAMELIN_GOAL_POSITION;
+  searches = 0;
+}
+
+bool TargetAnchor::left_by(const hamelin_goal& target) const noexcept {
+  const Vector3d moved =
+      planning::vec3(target.position_world_m) - planning::vec3(goal_.position_world_m);
+  if (moved.norm() > left_m) return true;
+  if (!rotates(target)) return false;
+  const Eigen::Map<const Eigen::Vector4d> now(target.quaternion_wxyz),
+      before(goal_.quaternion_wxyz);
+  return std::abs(now.dot(before)) < std::cos(0.5 * left_rad);
+}
+
+}  // namespace hamelin::hybrid

@@ -1,0 +1,77 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <span>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/plugin.hpp"
+#include "law.hpp"
+#include "obstacles.hpp"
+
+namespace hamelin::hybrid {
+
+struct FollowParams {
+  double gain;             ///< of the tip's error [1/s]
+  double tip_speed;        ///< largest correction of its position [m/s]
+  double tip_turn;         ///< and of its orientation [rad/s]
+  double joint_speed;      ///< largest |u| [rad/s or m/s]
+  double repulsion_range;  ///< of near points from their margins [m]
+  double repulsion_speed;  ///< at the margin [m/s]
+};
+
+/// The desired joint velocity towards a target that moves, docs/theory.md (16.4)–(16.9): its twist
+/// and a correction of the tip's error, resolved with a damping that acts in nearly singular
+/// directions only; and motion in the null space towards a comfortable posture and away from
+/// obstacles, by which an arm leaves singular postures.
+class Follower {
+ public:
+  Follower(const planning::Setup& setup, const model::Model& model);
+  void set_params(const FollowParams& params) noexcept { params_ = params; }
+  /// Starts to follow from a posture, which counts as comfortable where joints have no limits.
+  void start(const Eigen::VectorXd& q) noexcept;
+
+  /// Sets u to the joint velocity that is desired a time `lag_s` after this tick, which the arm's
+  /// velocity needs to follow it. ws must contain the forward kinematics at q.
+  void velocity(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const hamelin_goal& goal,
+                std::span<const NearPoint> points, double lag_s, Eigen::VectorXd& u);
+  /// The smallest singular value of the last tick's Jacobian, among those of the task.
+  [[nodiscard]] double smallest_singular_value() const noexcept { return smallest_; }
+
+ private:
+  void desire(const dynamics::Workspace& ws, const hamelin_goal& goal, double lag_s);
+  void resolve(const dynamics::Workspace& ws, const hamelin_goal& goal, Eigen::VectorXd& u);
+  void move_in_null_space(const Eigen::VectorXd& q, std::span<const NearPoint> points,
+                          Eigen::VectorXd& u);
+
+  using Vector6d = Eigen::Matrix<double, 6, 1>;
+  using Matrix6d = Eigen::Matrix<double, 6, 6>;
+  const model::Model& model_;
+  FollowParams params_{};
+  Eigen::VectorXd comfortable_;  ///< posture
+  bool limited_ = false;         ///< whether that is the middle of the limits
+  dynamics::Matrix6Xd J_;
+  Vector6d desired_;
+  Eigen::SelfAdjointEigenSolver<Matrix6d> modes_;  ///< of J Jᵀ
+  Vector6d inverse_;                               ///< damped, of its eigenvalues
+  double smallest_ = 0.0;
+  Eigen::VectorXd spare_;
+};
+
+/// Notices that the arm cannot follow a target that hardly moves, for which a search is worth
+/// while: docs/theory.md (16.10).
+class TargetAnchor {
+ public:
+  /// Takes the place of the target as a goal at rest.
+  void set(const hamelin_goal& target) noexcept;
+  /// Whether the target has left the place.
+  [[nodiscard]] bool left_by(const hamelin_goal& target) const noexcept;
+  /// The target as a goal at rest.
+  [[nodiscard]] const hamelin_goal& goal() const noexcept { return goal_; }
+
+  int searches = 0;  ///< for this place
+
+ private:
+  hamelin_goal goal_{};
+};
+
+}  // namespace hamelin::hybrid
