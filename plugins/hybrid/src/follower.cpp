@@ -18,6 +18,7 @@ constexpr double singular_below = 0.08, damping_at_zero = 0.05;
 // Eigenvalues of J Jᵀ below this belong to directions that are not part of the task.
 constexpr double not_a_direction = 1e-14;
 constexpr double comfort_gain = 0.5;  // towards the comfortable posture [1/s]
+constexpr int fixed_at_most = 3;      // joints that others replace at a limit
 constexpr double row_square = 0.05;   // least |a|² by which a repulsion is divided
 // A target that has gone so far has left its place.
 constexpr double left_m = 0.05, left_rad = 0.3;
@@ -34,7 +35,9 @@ Follower::Follower(const planning::Setup& setup, const model::Model& model)
     : model_(model),
       comfortable_(VectorXd::Zero(model.dof())),
       J_(6, model.dof()),
-      spare_(VectorXd::Zero(model.dof())) {
+      preferred_(VectorXd::Zero(model.dof())),
+      fixed_(preferred_),
+      is_fixed_(static_cast<std::size_t>(model.dof())) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   limited_ = lower && upper && lower->allFinite() && upper->allFinite();
   if (limited_) comfortable_ = 0.5 * (*lower + *upper);
@@ -45,12 +48,23 @@ void Follower::start(const VectorXd& q) noexcept {
 }
 
 void Follower::velocity(const dynamics::Workspace& ws, const VectorXd& q, const hamelin_goal& goal,
-                        std::span<const NearPoint> points, double lag_s, VectorXd& u) {
+                        std::span<const NearPoint> points, double lag_s, const VectorXd& lower,
+                        const VectorXd& upper, VectorXd& u) {
   desire(ws, goal, lag_s);
-  resolve(ws, goal, u);
-  move_in_null_space(q, points, u);
-  const double speed = u.norm();
-  if (speed > params_.joint_speed) u *= params_.joint_speed / speed;
+  place_jacobian(ws, goal);
+  prefer(q, points);
+  std::fill(is_fixed_.begin(), is_fixed_.end(), false);
+  fixed_.setZero();
+  // docs/theory.md (16.9), (16.10)
+  for (int i = 0; i <= fixed_at_most; ++i) {
+    decompose(rotates(goal));
+    resolve(desired_ - J_ * preferred_, u);
+    u += preferred_;
+    const double speed = u.norm();
+    if (speed > params_.joint_speed) u *= params_.joint_speed / speed;
+    if (!fix_worst(lower, upper, u)) break;
+  }
+  u += fixed_;
 }
 
 // docs/theory.md (16.4)
@@ -66,46 +80,65 @@ void Follower::desire(const dynamics::Workspace& ws, const hamelin_goal& goal, d
                                       bounded(error.rotation, params_.gain, params_.tip_turn));
 }
 
-// docs/theory.md (16.5)–(16.7)
-void Follower::resolve(const dynamics::Workspace& ws, const hamelin_goal& goal, VectorXd& u) {
+// docs/theory.md (16.5)
+void Follower::place_jacobian(const dynamics::Workspace& ws, const hamelin_goal& goal) {
   dynamics::frame_jacobian(model_, ws, model_.robot().tip.link, dynamics::tip_pose(model_, ws).p(),
                            J_);
   if (rotates(goal))
     J_.topRows<3>() *= turn_length;
   else
     J_.topRows<3>().setZero();
+}
+
+// docs/theory.md (16.6), (16.7)
+void Follower::decompose(bool rotates) {
   const Matrix6d G = J_ * J_.transpose();
   modes_.compute(G);
   smallest_ = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 6; ++i) {
-    const double square = std::max(0.0, modes_.eigenvalues()[i]), sigma = std::sqrt(square);
-    if (rotates(goal) || i >= 3) smallest_ = std::min(smallest_, sigma);
+    const double square = std::max(0.0, modes_.eigenvalues()[i]);
+    if (rotates || i >= 3) smallest_ = std::min(smallest_, std::sqrt(square));
     const double near = std::max(0.0, 1.0 - square / (singular_below * singular_below)),
                  damping = damping_at_zero * near;
     inverse_[i] = square > not_a_direction ? 1.0 / (square + damping * damping) : 0.0;
   }
-  const Vector6d along = modes_.eigenvectors().transpose() * desired_;
+}
+
+void Follower::resolve(const Vector6d& tip_motion, VectorXd& u) const {
+  const Vector6d along = modes_.eigenvectors().transpose() * tip_motion;
   const Vector6d force = modes_.eigenvectors() * inverse_.cwiseProduct(along);
   u.noalias() = J_.transpose() * force;
 }
 
-// docs/theory.md (16.8), (16.9). In a damped direction part of the motion is left, by which the arm
-// leaves a singular posture.
-void Follower::move_in_null_space(const VectorXd& q, std::span<const NearPoint> points,
-                                  VectorXd& u) {
-  spare_ = comfort_gain * (comfortable_ - q);
+// docs/theory.md (16.8)
+void Follower::prefer(const VectorXd& q, std::span<const NearPoint> points) {
+  preferred_ = comfort_gain * (comfortable_ - q);
   for (const auto& point : points) {
     const double h = std::max(point.distance - point.margin, 0.0);
     if (h >= params_.repulsion_range) continue;
-    spare_ += (params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
-               std::max(row_square, point.row.squaredNorm())) *
-              point.row;
+    preferred_ += (params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
+                   std::max(row_square, point.row.squaredNorm())) *
+                  point.row;
   }
-  const Vector6d tip_motion = J_ * spare_;
-  const Vector6d along = modes_.eigenvectors().transpose() * tip_motion;
-  const Vector6d force = modes_.eigenvectors() * inverse_.cwiseProduct(along);
-  u += spare_;
-  u.noalias() -= J_.transpose() * force;
+}
+
+// A fixed joint has no column in the Jacobian any more, so that the others do its part.
+bool Follower::fix_worst(const VectorXd& lower, const VectorXd& upper, const VectorXd& u) {
+  Eigen::Index worst = -1;
+  double most = 1e-9;
+  for (Eigen::Index k = 0; k < u.size(); ++k) {
+    const double beyond = std::max(lower[k] - u[k], u[k] - upper[k]);
+    if (is_fixed_[static_cast<std::size_t>(k)] || beyond <= most) continue;
+    most = beyond;
+    worst = k;
+  }
+  if (worst < 0) return false;
+  is_fixed_[static_cast<std::size_t>(worst)] = true;
+  fixed_[worst] = std::clamp(u[worst], lower[worst], upper[worst]);
+  desired_ -= fixed_[worst] * J_.col(worst);
+  J_.col(worst).setZero();
+  preferred_[worst] = 0.0;
+  return true;
 }
 
 void TargetAnchor::set(const hamelin_goal& target) noexcept {

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <span>
+#include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
@@ -19,10 +20,11 @@ struct FollowParams {
   double repulsion_speed;  ///< at the margin [m/s]
 };
 
-/// The desired joint velocity towards a target that moves, docs/theory.md (16.4)–(16.9): its twist
+/// The desired joint velocity towards a target that moves, docs/theory.md (16.4)–(16.10): its twist
 /// and a correction of the tip's error, resolved with a damping that acts in nearly singular
-/// directions only; and motion in the null space towards a comfortable posture and away from
-/// obstacles, by which an arm leaves singular postures.
+/// directions only; motion in the null space towards a comfortable posture and away from obstacles,
+/// by which an arm leaves singular postures; and other joints in place of those that are at a
+/// limit.
 class Follower {
  public:
   Follower(const planning::Setup& setup, const model::Model& model);
@@ -32,16 +34,24 @@ class Follower {
 
   /// Sets u to the joint velocity that is desired a time `lag_s` after this tick, which the arm's
   /// velocity needs to follow it. ws must contain the forward kinematics at q.
+  /// @param lower, upper bounds of u
   void velocity(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const hamelin_goal& goal,
-                std::span<const NearPoint> points, double lag_s, Eigen::VectorXd& u);
+                std::span<const NearPoint> points, double lag_s, const Eigen::VectorXd& lower,
+                const Eigen::VectorXd& upper, Eigen::VectorXd& u);
   /// The smallest singular value of the last tick's Jacobian, among those of the task.
   [[nodiscard]] double smallest_singular_value() const noexcept { return smallest_; }
 
  private:
   void desire(const dynamics::Workspace& ws, const hamelin_goal& goal, double lag_s);
-  void resolve(const dynamics::Workspace& ws, const hamelin_goal& goal, Eigen::VectorXd& u);
-  void move_in_null_space(const Eigen::VectorXd& q, std::span<const NearPoint> points,
-                          Eigen::VectorXd& u);
+  void place_jacobian(const dynamics::Workspace& ws, const hamelin_goal& goal);
+  /// Sets `inverse_` for the joints that are free.
+  void decompose(bool rotates);
+  /// The joint velocity of least norm that causes a motion of the tip, or nearly so.
+  void resolve(const Eigen::Matrix<double, 6, 1>& tip_motion, Eigen::VectorXd& u) const;
+  void prefer(const Eigen::VectorXd& q, std::span<const NearPoint> points);
+  /// Fixes the joint that is farthest beyond a bound there. @return false if there is none
+  [[nodiscard]] bool fix_worst(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                               const Eigen::VectorXd& u);
 
   using Vector6d = Eigen::Matrix<double, 6, 1>;
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -54,11 +64,13 @@ class Follower {
   Eigen::SelfAdjointEigenSolver<Matrix6d> modes_;  ///< of J Jᵀ
   Vector6d inverse_;                               ///< damped, of its eigenvalues
   double smallest_ = 0.0;
-  Eigen::VectorXd spare_;
+  Eigen::VectorXd preferred_;  ///< velocity in the null space
+  Eigen::VectorXd fixed_;      ///< velocities of the joints that are fixed, else zero
+  std::vector<bool> is_fixed_;
 };
 
 /// Notices that the arm cannot follow a target that hardly moves, for which a search is worth
-/// while: docs/theory.md (16.10).
+/// while: docs/theory.md (16.11).
 class TargetAnchor {
  public:
   /// Takes the place of the target as a goal at rest.

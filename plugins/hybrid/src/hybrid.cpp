@@ -7,6 +7,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "approach_speed.hpp"
 #include "evader.hpp"
@@ -269,7 +271,9 @@ class Hybrid final : public planning::Planner {
   }
 
   void follow(const planning::Tick& tick) {
-    follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, u_);
+    for (int k = 0; k < setup_.dof(); ++k) std::tie(lower_[k], upper_[k]) = joint_bounds(k);
+    follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, lower_,
+                       upper_, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
     law_.repel(obstacles_.points(), std::min(1.0, law_.distance(model_, ws_, q_, {goal_})), u_);
   }
@@ -410,12 +414,8 @@ class Hybrid final : public planning::Planner {
         excess = std::max(excess, std::abs(x_[k]) / (*velocity_max)[k]);
       x_ /= excess;
     }
-    const auto q_lower = setup_.q_lower(), q_upper = setup_.q_upper();
     for (int k = 0; k < setup_.dof(); ++k) {
-      double low = -std::numeric_limits<double>::infinity(), high = -low;
-      if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
-      if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
-      if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
+      const auto [low, high] = joint_bounds(k);
       // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
       // approached with the hardest braking.
       const double slowest = w_[k] - dt * acceleration_max_,
@@ -426,6 +426,17 @@ class Hybrid final : public planning::Planner {
         lower_[k] = upper_[k] = std::clamp(0.5 * (low + high), slowest, fastest);
     }
     filter_.set_box(lower_, upper_);
+  }
+
+  // The bounds of a joint's velocity by its limits, where these are modelled.
+  [[nodiscard]] std::pair<double, double> joint_bounds(int k) const {
+    const auto velocity_max = setup_.velocity_max(), q_lower = setup_.q_lower(),
+               q_upper = setup_.q_upper();
+    double low = -std::numeric_limits<double>::infinity(), high = -low;
+    if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
+    if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
+    if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
+    return {low, high};
   }
 
   // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at
