@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hamelin::hybrid {
 
@@ -19,7 +20,10 @@ constexpr double singular_below = 0.08, damping_at_zero = 0.05;
 constexpr double not_a_direction = 1e-14;
 constexpr double comfort_gain = 0.5;  // towards the comfortable posture [1/s]
 constexpr int fixed_at_most = 3;      // joints that others replace at a limit
-constexpr double row_square = 0.05;   // least |a|² by which a repulsion is divided
+// Desired motions below this are not compared with what took place [m/s]; time constant of the
+// comparison; and the least share of the pull that is left to an arm that is held back.
+constexpr double least_desired = 0.01, progress_time_s = 0.1, least_pull = 0.2;
+constexpr double row_square = 0.05;  // least |a|² by which a repulsion is divided
 // A target that has gone so far has left its place.
 constexpr double left_m = 0.05, left_rad = 0.3;
 
@@ -45,20 +49,35 @@ Follower::Follower(const planning::Setup& setup, const model::Model& model)
 
 void Follower::start(const VectorXd& q) noexcept {
   if (!limited_) comfortable_ = q;
+  restart();
+}
+
+// docs/theory.md (16.5)
+void Follower::observe(const dynamics::Workspace& ws, const VectorXd& v, double period_s) {
+  const double square = desired_.squaredNorm();
+  double share = 1.0;
+  if (square > least_desired * least_desired) {
+    place_jacobian(ws, rotates_);
+    const Vector6d motion = J_ * v;
+    share = std::clamp(motion.dot(desired_) / square, 0.0, 1.0);
+  }
+  progress_ += (1.0 - std::exp(-period_s / progress_time_s)) * (share - progress_);
 }
 
 void Follower::velocity(const dynamics::Workspace& ws, const VectorXd& q, const hamelin_goal& goal,
                         std::span<const NearPoint> points, double lag_s, const VectorXd& lower,
                         const VectorXd& upper, VectorXd& u) {
+  rotates_ = rotates(goal);
   desire(ws, goal, lag_s);
-  place_jacobian(ws, goal);
+  remaining_ = desired_;
+  place_jacobian(ws, rotates_);
   prefer(q, points);
   std::fill(is_fixed_.begin(), is_fixed_.end(), false);
   fixed_.setZero();
   // docs/theory.md (16.9), (16.10)
   for (int i = 0; i <= fixed_at_most; ++i) {
-    decompose(rotates(goal));
-    resolve(desired_ - J_ * preferred_, u);
+    decompose(rotates_);
+    resolve(remaining_ - J_ * preferred_, u);
     u += preferred_;
     const double speed = u.norm();
     if (speed > params_.joint_speed) u *= params_.joint_speed / speed;
@@ -71,8 +90,9 @@ void Follower::velocity(const dynamics::Workspace& ws, const VectorXd& q, const 
 void Follower::desire(const dynamics::Workspace& ws, const hamelin_goal& goal, double lag_s) {
   const TipError error = tip_error(model_, ws, goal);
   using planning::vec3;
-  desired_.tail<3>() = vec3(goal.velocity_world_m_s) + lag_s * vec3(goal.acceleration_world_m_s2) +
-                       bounded(error.position, params_.gain, params_.tip_speed);
+  desired_.tail<3>() =
+      vec3(goal.velocity_world_m_s) + lag_s * vec3(goal.acceleration_world_m_s2) +
+      bounded(error.position, params_.gain, params_.tip_speed * std::max(least_pull, progress_));
   desired_.head<3>().setZero();
   if (!rotates(goal)) return;
   desired_.head<3>() = turn_length * (vec3(goal.angular_velocity_world_rad_s) +
@@ -81,10 +101,10 @@ void Follower::desire(const dynamics::Workspace& ws, const hamelin_goal& goal, d
 }
 
 // docs/theory.md (16.5)
-void Follower::place_jacobian(const dynamics::Workspace& ws, const hamelin_goal& goal) {
+void Follower::place_jacobian(const dynamics::Workspace& ws, bool rotates) {
   dynamics::frame_jacobian(model_, ws, model_.robot().tip.link, dynamics::tip_pose(model_, ws).p(),
                            J_);
-  if (rotates(goal))
+  if (rotates)
     J_.topRows<3>() *= turn_length;
   else
     J_.topRows<3>().setZero();
@@ -135,7 +155,7 @@ bool Follower::fix_worst(const VectorXd& lower, const VectorXd& upper, const Vec
   if (worst < 0) return false;
   is_fixed_[static_cast<std::size_t>(worst)] = true;
   fixed_[worst] = std::clamp(u[worst], lower[worst], upper[worst]);
-  desired_ -= fixed_[worst] * J_.col(worst);
+  remaining_ -= fixed_[worst] * J_.col(worst);
   J_.col(worst).setZero();
   preferred_[worst] = 0.0;
   return true;

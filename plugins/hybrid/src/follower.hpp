@@ -31,6 +31,16 @@ class Follower {
   void set_params(const FollowParams& params) noexcept { params_ = params; }
   /// Starts to follow from a posture, which counts as comfortable where joints have no limits.
   void start(const Eigen::VectorXd& q) noexcept;
+  /// Forgets what held the arm back.
+  void restart() noexcept {
+    progress_ = 1.0;
+    desired_.setZero();
+  }
+  /// Compares the tip's velocity with what was desired last, docs/theory.md (16.5). To be called
+  /// before velocity(). ws must contain the forward kinematics at q.
+  void observe(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double period_s);
+  /// The share of the desired motion of the tip that took place lately, from 0 to 1.
+  [[nodiscard]] double progress() const noexcept { return progress_; }
 
   /// Sets u to the joint velocity that is desired a time `lag_s` after this tick, which the arm's
   /// velocity needs to follow it. ws must contain the forward kinematics at q.
@@ -42,8 +52,9 @@ class Follower {
   [[nodiscard]] double smallest_singular_value() const noexcept { return smallest_; }
 
  private:
+  /// Sets J_ to that of the tip, rotations scaled to lengths.
+  void place_jacobian(const dynamics::Workspace& ws, bool rotates);
   void desire(const dynamics::Workspace& ws, const hamelin_goal& goal, double lag_s);
-  void place_jacobian(const dynamics::Workspace& ws, const hamelin_goal& goal);
   /// Sets `inverse_` for the joints that are free.
   void decompose(bool rotates);
   /// The joint velocity of least norm that causes a motion of the tip, or nearly so.
@@ -60,7 +71,10 @@ class Follower {
   Eigen::VectorXd comfortable_;  ///< posture
   bool limited_ = false;         ///< whether that is the middle of the limits
   dynamics::Matrix6Xd J_;
-  Vector6d desired_;
+  Vector6d desired_ = Vector6d::Zero();  ///< velocity of the tip, rotations scaled to lengths
+  Vector6d remaining_;                   ///< of it, without what fixed joints do
+  bool rotates_ = true;
+  double progress_ = 1.0;
   Eigen::SelfAdjointEigenSolver<Matrix6d> modes_;  ///< of J Jᵀ
   Vector6d inverse_;                               ///< damped, of its eigenvalues
   double smallest_ = 0.0;

@@ -54,10 +54,11 @@ constexpr int hurried_steps = 2;  // factor of the steps of a search where somet
 constexpr double longest_wait_s = 6.0;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
 constexpr double via_reached = 0.1, escape_end_reached = 0.08;
-// Searches for a way to a target that rests out of reach, before the arm only waits near it.
+// An arm that is kept from its target, farther than so far [m and ½ rad], for so long and up to
+// this share of the desired motion, searches a way to it. To a target that rests it does so a few
+// times.
+constexpr double target_away = 0.06, target_blocked_s = 0.3, target_blocked_share = 0.3;
 constexpr int target_searches = 3;
-// For the rule of stalls (10.25): an arm that is kept from a target is given about a second more.
-constexpr double target_closing_speed = 0.03;
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -188,7 +189,6 @@ class Hybrid final : public planning::Planner {
     if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
     if (measure_margins_) measure_margins();
     prepare(tick);
-    if (follows()) watch_target(tick.time_s());
 
     const Target target = choose_target();
     evader_.update(tick, arm(), course());
@@ -200,7 +200,6 @@ class Hybrid final : public planning::Planner {
       u_.setZero();
     } else if (follows() && mode_ == Mode::goal) {
       follow(tick);
-      closing_speed = target_closing_speed;
     } else {
       closing_speed = law_.attract(model_, ws_, q_, target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
@@ -225,7 +224,10 @@ class Hybrid final : public planning::Planner {
     else
       answer_by_velocity(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
-    check_stall(tick.time_s(), target, closing_speed, command);
+    if (follows())
+      check_target(tick.time_s(), command);
+    else
+      check_stall(tick.time_s(), target, closing_speed, command);
     if (!evader_.active()) return;
     command.set_series(evasion_series_, static_cast<double>(evader_.act()));
     if (const auto clearance = evader_.clearance_ahead())
@@ -259,18 +261,13 @@ class Hybrid final : public planning::Planner {
     if (!follows()) return;
     anchor_.set(goal);
     follower_.start(tick.q());
+    searches_target_ = false;
   }
 
   [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
 
-  // An escape ends where its target has left.
-  void watch_target(double now) {
-    if (!anchor_.left_by(*goal_)) return;
-    anchor_.set(*goal_);
-    enter(Mode::goal, now);
-  }
-
   void follow(const planning::Tick& tick) {
+    follower_.observe(ws_, v_, setup_.control_period_s());
     for (int k = 0; k < setup_.dof(); ++k) std::tie(lower_[k], upper_[k]) = joint_bounds(k);
     follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, lower_,
                        upper_, u_);
@@ -491,12 +488,61 @@ class Hybrid final : public planning::Planner {
            approach_speed(x, brake, joint_limit_rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
   }
 
+  // An arm that is kept from its target searches a way around while it goes on following. A target
+  // is never given up: it may come back.
+  void check_target(double now, planning::Command& command) {
+    command.disable_stall_rule();
+    if (!search_) return;
+    const double distance = law_.distance(model_, ws_, q_, {goal_});
+    if (mode_ == Mode::escape_path) {
+      if (distance < target_away || escape_has_ended(now)) resume_target(now);
+      return;
+    }
+    if (searches_target_) {
+      if (!search_->advance(search_steps_)) return;
+      searches_target_ = false;
+      blocked_since_s_ = now;
+      if (search_->path().empty() || distance < target_away) return;
+      escape_position_ = 0.0;
+      return enter(Mode::escape_path, now);
+    }
+    if (follower_.progress() > target_blocked_share || distance < target_away)
+      blocked_since_s_ = now;
+    if (now - blocked_since_s_ > target_blocked_s) search_target(now);
+  }
+
+  // An escape towards a place of the target ends there, or where it is stuck.
+  [[nodiscard]] bool escape_has_ended(double now) {
+    if (stall_.stalled(now, remaining({goal_, &via_}), v_.norm(), 1.0, held_back_)) return true;
+    return escape_position_ >= search_->path().length() &&
+           (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < via_reached;
+  }
+
+  void resume_target(double now) {
+    follower_.restart();
+    blocked_since_s_ = now;
+    enter(Mode::goal, now);
+  }
+
+  void search_target(double now) {
+    blocked_since_s_ = now;
+    if (anchor_.searches > 0 && !anchor_.left_by(*goal_)) {
+      if (anchor_.searches >= target_searches) return;
+      ++anchor_.searches;
+    } else {
+      anchor_.set(*goal_);
+      anchor_.searches = 1;
+    }
+    host_.info("searches a way to the target");
+    surroundings_.count(nullptr);
+    search_->begin(anchor_.goal(), q_, nullptr, 0.0);
+    searches_target_ = true;
+  }
+
   void check_stall(double now, const Target& target, double closing_speed,
                    planning::Command& command) {
     if (uses_memory_ || search_) command.disable_stall_rule();
     if (mode_ == Mode::search) return continue_search(now);
-    const bool tracks = follows() && law_.within(model_, ws_, q_, *goal_, 1.0);
-    if (tracks && mode_ == Mode::goal) return stall_.restart(now);
     if (!evader_.evades()) {
       evades_since_s_ = now;
     } else if (now - evades_since_s_ < longest_wait_s && !makes_no_progress(now, target)) {
@@ -517,7 +563,7 @@ class Hybrid final : public planning::Planner {
       const bool arrived =
           (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < escape_end_reached;
       // The escape path of a tip goal ends at a solution of the goal, so it is followed to its end.
-      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT && !follows();
+      const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
       if (arrived && (stalled || !stay)) {
         if (search_->arrives())
           path_position_ = std::max(path_position_, search_->rejoin_arc_length());
@@ -540,12 +586,7 @@ class Hybrid final : public planning::Planner {
   }
 
   void start_escape(double now, const Target& target, planning::Command& command) {
-    const bool searches = uses_memory_ || search_;
-    if (follows()) {  // a target may come back, so the arm waits near it
-      if (!searches || anchor_.searches++ >= target_searches) return stall_.restart(now);
-    } else if (!searches || escapes_ >= max_escapes_) {
-      return command.give_up(cause());
-    }
+    if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
     std::array<char, 64> line{};
     const int size = std::snprintf(line.data(), line.size(), "stalled: escape %d", escapes_);
@@ -554,8 +595,7 @@ class Hybrid final : public planning::Planner {
       // What moves may leave the way free, or come back to where it was: most searches assume the
       // one, each third the other.
       surroundings_.count(evader_.active() && escapes_ % 3 == 0 ? &evader_.sweep() : nullptr);
-      search_->begin(follows() ? anchor_.goal() : *goal_, q_, path_.empty() ? nullptr : &path_,
-                     path_position_);
+      search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_position_);
       return enter(Mode::search, now);
     }
     // On a path the distance from a point behind the blocked stretch counts.
@@ -625,7 +665,9 @@ class Hybrid final : public planning::Planner {
   SafetyFilter filter_;
   Evader evader_;
   Follower follower_;
-  TargetAnchor anchor_;
+  TargetAnchor anchor_;           ///< the last place of the target to which a way was searched
+  bool searches_target_ = false;  ///< whether such a search goes on
+  double blocked_since_s_ = 0.0;  ///< since when the arm has been kept from the target
   double evades_since_s_ = 0.0;
   double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
