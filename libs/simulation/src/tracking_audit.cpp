@@ -14,7 +14,10 @@ namespace {
 
 constexpr double check_every_s = 0.02;
 constexpr double free_by_m = 0.02, free_of_self_m = 0.01;  // clearance of a free target's posture
-// The iteration (16.11): its number of steps, their largest size, and its damping.
+// The way there is examined every so much of the joint that moves most [rad or m], for this
+// clearance.
+constexpr double way_step = 0.05, way_by_m = 0.001;
+// The iteration (16.12): its number of steps, their largest size, and its damping.
 constexpr int ik_iterations = 60;
 constexpr double ik_step_max = 0.2, ik_damping = 1e-4, ik_length = 0.25;
 constexpr double ik_tolerance = 0.2;  // share of the goal's tolerances
@@ -81,14 +84,25 @@ void TrackingAudit::note_resumption(bool tracked, double h) {
 bool TrackingAudit::is_free(const scene::Goal& goal, const geometry::SE3& target,
                             const Eigen::VectorXd& q, control::WorldView& judge) {
   q_ = q;
-  if (!solve(goal, target)) return false;
-  std::array<scene::Contact, 1> contact;
-  if (judge.has_obstacles() && judge.closest(q_, free_by_m, contact) > 0) return false;
-  std::array<scene::SelfContact, 1> pair;
-  return !judge.has_self() || judge.closest_self(q_, free_of_self_m, pair) == 0;
+  if (!solve(goal, target) || !is_clear(q_, judge, free_by_m, free_of_self_m)) return false;
+  const double length = (q_ - q).lpNorm<Eigen::Infinity>();
+  const int pieces = 1 + static_cast<int>(length / way_step);
+  for (int i = 1; i < pieces; ++i) {
+    between_ = q + static_cast<double>(i) / pieces * (q_ - q);
+    if (!is_clear(between_, judge, way_by_m, way_by_m)) return false;
+  }
+  return true;
 }
 
-// docs/theory.md (16.11)
+bool TrackingAudit::is_clear(const Eigen::VectorXd& q, control::WorldView& judge, double by_m,
+                             double from_self_by_m) {
+  std::array<scene::Contact, 1> contact;
+  if (judge.has_obstacles() && judge.closest(q, by_m, contact) > 0) return false;
+  std::array<scene::SelfContact, 1> pair;
+  return !judge.has_self() || judge.closest_self(q, from_self_by_m, pair) == 0;
+}
+
+// docs/theory.md (16.12)
 bool TrackingAudit::solve(const scene::Goal& goal, const geometry::SE3& target) {
   using Vector6d = Eigen::Matrix<double, 6, 1>;
   for (int i = 0; i < ik_iterations; ++i) {

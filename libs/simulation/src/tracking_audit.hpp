@@ -12,8 +12,8 @@ namespace hamelin::simulation {
 
 /// How well the tip follows a target, judged apart from planner and controller. A target is
 /// **free** while a posture that holds it is found from the arm's own by the damped iteration
-/// (16.11) of docs/theory.md, within the joint limits, and clear of obstacles and of the arm itself
-/// by 2 cm. This is examined every 20 ms.
+/// (16.12) of docs/theory.md, within the joint limits and clear of obstacles and of the arm itself
+/// by 2 cm, and the straight joint motion there is clear. This is examined every 20 ms.
 class TrackingAudit {
  public:
   /// @param limits joint limits, where they are modelled; all must outlive this
@@ -39,13 +39,15 @@ class TrackingAudit {
   [[nodiscard]] bool is_free(const scene::Goal& goal, const geometry::SE3& target,
                              const Eigen::VectorXd& q, control::WorldView& judge);
   [[nodiscard]] bool solve(const scene::Goal& goal, const geometry::SE3& target);
+  [[nodiscard]] bool is_clear(const Eigen::VectorXd& q, control::WorldView& judge, double by_m,
+                              double from_self_by_m);
   void note_resumption(bool tracked, double h);
 
   const model::Model& model_;
   const control::ModelledLimits& limits_;
   dynamics::Workspace ws_;
   dynamics::Matrix6Xd J_;
-  Eigen::VectorXd q_, step_;
+  Eigen::VectorXd q_, step_, between_;
   control::GoalError error_;
   bool free_ = false, observed_ = false;
   double since_check_s_ = 0.0;

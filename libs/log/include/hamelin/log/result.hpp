@@ -81,7 +81,7 @@ struct Result {
   };
   std::optional<Goal> goal;
   /// How well the tip followed a target. It is free while a posture that holds it is found near the
-  /// arm's own, clear of everything; see simulation::TrackingAudit.
+  /// arm's own, with a straight way there that is clear; see simulation::TrackingAudit.
   struct Following {
     /// Over some time: root mean square and largest error of position and orientation.
     struct Errors {
