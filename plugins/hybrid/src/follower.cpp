@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "approach_speed.hpp"
+
 namespace hamelin::hybrid {
 
 using Eigen::Vector3d;
@@ -23,6 +25,9 @@ constexpr int fixed_at_most = 3;      // joints that others replace at a limit
 // Desired motions below this are not compared with what took place [m/s]; time constant of the
 // comparison; and the least share of the pull that is left to an arm that is held back.
 constexpr double least_desired = 0.01, progress_time_s = 0.1, least_pull = 0.2;
+// The metric in which u is changed near obstacles: weight of joint velocities beside the tip's.
+constexpr double joint_weight = 0.02;
+constexpr int clear_passes = 20;
 constexpr double row_square = 0.05;  // least |a|² by which a repulsion is divided
 // A target that has gone so far has left its place.
 constexpr double left_m = 0.05, left_rad = 0.3;
@@ -41,7 +46,12 @@ Follower::Follower(const planning::Setup& setup, const model::Model& model)
       J_(6, model.dof()),
       preferred_(VectorXd::Zero(model.dof())),
       fixed_(preferred_),
-      is_fixed_(static_cast<std::size_t>(model.dof())) {
+      is_fixed_(static_cast<std::size_t>(model.dof())),
+      filter_(model.dof(), Obstacles::max_points),
+      identity_(Eigen::MatrixXd::Identity(model.dof(), model.dof())) {
+  metric_ = inverse_metric_ = identity_;
+  llt_.compute(metric_);  // allocates its memory
+
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   limited_ = lower && upper && lower->allFinite() && upper->allFinite();
   if (limited_) comfortable_ = 0.5 * (*lower + *upper);
@@ -71,6 +81,8 @@ void Follower::velocity(const dynamics::Workspace& ws, const VectorXd& q, const 
   desire(ws, goal, lag_s);
   remaining_ = desired_;
   place_jacobian(ws, rotates_);
+  metric_ = joint_weight * identity_;
+  metric_.noalias() += J_.transpose() * J_;
   prefer(q, points);
   std::fill(is_fixed_.begin(), is_fixed_.end(), false);
   fixed_.setZero();
@@ -128,6 +140,24 @@ void Follower::resolve(const Vector6d& tip_motion, VectorXd& u) const {
   const Vector6d along = modes_.eigenvectors().transpose() * tip_motion;
   const Vector6d force = modes_.eigenvectors() * inverse_.cwiseProduct(along);
   u.noalias() = J_.transpose() * force;
+}
+
+// docs/theory.md (16.11)
+void Follower::keep_clear(std::span<const NearPoint> points, double brake, double rate,
+                          const VectorXd& lower, const VectorXd& upper, VectorXd& u) {
+  if (points.empty()) return;
+  llt_.compute(metric_);
+  inverse_metric_ = identity_;
+  llt_.solveInPlace(inverse_metric_);
+  filter_.begin(metric_, inverse_metric_);
+  constexpr double no_floor = -1e9;
+  for (const auto& point : points)
+    (void)filter_.add_row(
+        point.row,
+        point.obstacle_speed - approach_speed(point.distance - point.margin, brake, rate),
+        no_floor);
+  filter_.set_box(lower, upper);
+  (void)filter_.project(u, clear_passes);
 }
 
 // docs/theory.md (16.8)

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <span>
@@ -8,6 +9,7 @@
 #include "hamelin/planning/plugin.hpp"
 #include "law.hpp"
 #include "obstacles.hpp"
+#include "safety_filter.hpp"
 
 namespace hamelin::hybrid {
 
@@ -48,6 +50,11 @@ class Follower {
   void velocity(const dynamics::Workspace& ws, const Eigen::VectorXd& q, const hamelin_goal& goal,
                 std::span<const NearPoint> points, double lag_s, const Eigen::VectorXd& lower,
                 const Eigen::VectorXd& upper, Eigen::VectorXd& u);
+  /// Changes u as little as possible in terms of the tip's motion, so that it keeps rows of near
+  /// points and the bounds, docs/theory.md (16.11): a hand that is held by a wall slides along it
+  /// and keeps its orientation, and an elbow goes aside. To be called after velocity().
+  void keep_clear(std::span<const NearPoint> points, double brake, double rate,
+                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, Eigen::VectorXd& u);
   /// The smallest singular value of the last tick's Jacobian, among those of the task.
   [[nodiscard]] double smallest_singular_value() const noexcept { return smallest_; }
 
@@ -81,10 +88,13 @@ class Follower {
   Eigen::VectorXd preferred_;  ///< velocity in the null space
   Eigen::VectorXd fixed_;      ///< velocities of the joints that are fixed, else zero
   std::vector<bool> is_fixed_;
+  SafetyFilter filter_;
+  Eigen::MatrixXd metric_, inverse_metric_, identity_;
+  Eigen::LLT<Eigen::MatrixXd> llt_;
 };
 
 /// Notices that the arm cannot follow a target that hardly moves, for which a search is worth
-/// while: docs/theory.md (16.11).
+/// while: docs/theory.md, chapter 16.
 class TargetAnchor {
  public:
   /// Takes the place of the target as a goal at rest.

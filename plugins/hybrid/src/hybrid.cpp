@@ -272,7 +272,7 @@ class Hybrid final : public planning::Planner {
     follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, lower_,
                        upper_, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
-    law_.repel(obstacles_.points(), std::min(1.0, law_.distance(model_, ws_, q_, {goal_})), u_);
+    follower_.keep_clear(obstacles_.points(), brake_, rate_, lower_, upper_, u_);
   }
 
   void measure_margins() {
