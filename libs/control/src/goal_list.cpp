@@ -53,7 +53,8 @@ void check_follow_goal(const scene::Goal& goal, std::size_t i, bool last, bool f
   for (const auto& [key, value] :
        {std::pair("tolerance_m", goal.tolerance_m), std::pair("tolerance_rad", goal.tolerance_rad),
         std::pair("gap_max_s", bounds.gap_max_s), std::pair("jump_max_m", bounds.jump_max_m),
-        std::pair("jump_max_rad", bounds.jump_max_rad), std::pair("leash_m", bounds.leash_m),
+        std::pair("jump_max_rad", bounds.jump_max_rad), std::pair("noise_m", bounds.noise_m),
+        std::pair("noise_rad", bounds.noise_rad), std::pair("leash_m", bounds.leash_m),
         std::pair("leash_rad", bounds.leash_rad)})
     check(value > 0.0 && std::isfinite(value), i,
           fmt::format("{}: {} is not allowed, expected more than 0", key, value));

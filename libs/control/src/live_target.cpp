@@ -13,6 +13,9 @@ using Eigen::Vector3d;
 
 namespace {
 
+// Root mean square of the jerk of targets up to 1 Hz, see ObservationOptions.
+constexpr double usual_jerk_m_s3 = 2.0, usual_jerk_rad_s3 = 10.0;
+
 [[noreturn]] void refuse_target(const std::string& what) {
   throw Error(ErrorCode::invalid, fmt::format("target: {}", what));
 }
@@ -28,10 +31,6 @@ Vector3d shortened(const Vector3d& x, double longest) {
 }
 
 }  // namespace
-
-TargetReceiver::TargetReceiver(const ObservationOptions& poses) : poses_(poses) {
-  check(poses);
-}
 
 void TargetReceiver::start(const scene::TargetStream& bounds) {
   bounds_ = bounds;
@@ -78,10 +77,13 @@ StreamedTarget TargetReceiver::take(const TargetPose& pose) {
   if (goes_on)
     estimator_->update(pose.time_s, pose.pose);
   else
-    estimator_.emplace(poses_, pose.time_s, pose.pose);
+    estimator_.emplace(
+        ObservationOptions{bounds_.noise_m, bounds_.noise_rad, usual_jerk_m_s3, usual_jerk_rad_s3},
+        pose.time_s, pose.pose);
   last_.kind = StreamedTarget::Kind::pose;
   last_.time_s = pose.time_s;
   last_.motion.pose = pose.pose;
+  if (!pose.velocity_m_s) last_.motion.pose = {estimator_->rotation(), estimator_->position()};
   last_.motion.velocity = pose.velocity_m_s.value_or(estimator_->velocity());
   last_.motion.acceleration = pose.acceleration_m_s2.value_or(estimator_->acceleration());
   last_.motion.angular_velocity =

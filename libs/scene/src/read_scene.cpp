@@ -256,6 +256,8 @@ TargetStream read_target_stream(const Reader& in, const std::filesystem::path& f
   stream.gap_max_s = in.get("gap_max_s", stream.gap_max_s);
   stream.jump_max_m = in.get("jump_max_m", stream.jump_max_m);
   stream.jump_max_rad = in.get("jump_max_rad", stream.jump_max_rad);
+  stream.noise_m = in.get("noise_m", stream.noise_m);
+  stream.noise_rad = in.get("noise_rad", stream.noise_rad);
   stream.leash_m = in.get("leash_m", stream.leash_m);
   stream.leash_rad = in.get("leash_rad", stream.leash_rad);
   if (in.get<std::string>("when_lost", "hold") == to_string(WhenLost::end))

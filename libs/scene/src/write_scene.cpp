@@ -52,6 +52,8 @@ Json follow_json(const Goal& goal) {
                    {"gap_max_s", stream.gap_max_s},
                    {"jump_max_m", stream.jump_max_m},
                    {"jump_max_rad", stream.jump_max_rad},
+                   {"noise_m", stream.noise_m},
+                   {"noise_rad", stream.noise_rad},
                    {"leash_m", stream.leash_m},
                    {"leash_rad", stream.leash_rad},
                    {"when_lost", to_string(stream.when_lost)}};

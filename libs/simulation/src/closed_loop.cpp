@@ -106,6 +106,8 @@ std::string shield_warning(const control::Shield& shield, const model::Model& mo
 constexpr double stop_again_s = 0.25;
 // An arm that is slower has come to rest [rad/s or m/s].
 constexpr double resting_speed = 2e-3;
+// A run whose target is lost ends at the latest after this time, if the arm does not rest before.
+constexpr double longest_halt_s = 2.0;
 
 /// CPU time of a tick: without the log, a judge of its own, a caller that watches, and a plant that
 /// is not hamelin's own.
@@ -513,6 +515,12 @@ void ClosedLoop::note_tracking() {
 void ClosedLoop::check_target() {
   const control::TargetState* const target = controller_->answer().target;
   if (target == nullptr || !feed_ || done_ || halting_) return;
+  if (ends_by_s_) {  // the planner brings the arm to rest at a target that rests
+    if (plant_->node().v.lpNorm<Eigen::Infinity>() < resting_speed ||
+        plant_->node().time_s > *ends_by_s_)
+      finish(log::Outcome::target_lost, std::string(result_.cause));
+    return;
+  }
   const scene::TargetStream& stream = controller_->goals().goal().stream;
   if (feed_->ended() && plant_->node().time_s > feed_->last_s().value_or(0.0) + stream.gap_max_s)
     return finish(log::Outcome::followed, "the stream of targets has ended");
@@ -524,7 +532,9 @@ void ClosedLoop::check_target() {
       "expected at most {} s between two lines",
       stream.gap_max_s, stream.gap_max_s);
   report_event(true, what);
-  if (stream.when_lost == scene::WhenLost::end) finish_at_rest(log::Outcome::target_lost, what);
+  if (stream.when_lost != scene::WhenLost::end) return;
+  result_.cause = what;
+  ends_by_s_ = plant_->node().time_s + longest_halt_s;
 }
 
 void ClosedLoop::ask_planner() {

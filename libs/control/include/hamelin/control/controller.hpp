@@ -68,9 +68,6 @@ struct ControllerOptions {
   ObservationOptions observations{};  ///< see World::Options
   /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
   bool certify = true;
-  /// What is known of the poses of targets, see set_target(). The timeout is not used: gap_max_s of
-  /// the goal applies.
-  ObservationOptions targets{0.0005, 0.002, 5.0, 20.0, 0.5};
   std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
   bool torque = true;              ///< fill Answer::torque
   bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque

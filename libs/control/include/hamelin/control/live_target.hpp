@@ -37,13 +37,11 @@ struct TargetState : scene::MotionState {
 /// belongs to the threads that write, one at a time.
 class TargetReceiver {
  public:
-  /// @param poses what is known of their noise; the timeout is that of the stream
-  explicit TargetReceiver(const ObservationOptions& poses);
   /// Starts a new stream. @param bounds of what is believed
   void start(const scene::TargetStream& bounds);
 
-  /// Takes a pose. Velocities that it lacks follow from the last poses, (11.46)–(11.49) of
-  /// docs/theory.md.
+  /// Takes a pose. If it has no velocity, the poses are smoothed and their velocities estimated by
+  /// (11.46)–(11.49) of docs/theory.md.
   /// @throws Error invalid, "target: …", for numbers that are not finite, a time that is not after
   ///         the last one, and a jump, (16.1); nothing changes then
   [[nodiscard]] StreamedTarget take(const TargetPose& pose);
@@ -54,7 +52,6 @@ class TargetReceiver {
   void check_time(double time_s) const;
   void check_jump(const TargetPose& pose) const;
 
-  ObservationOptions poses_;
   scene::TargetStream bounds_;
   StreamedTarget last_;
   std::optional<MotionEstimator> estimator_;

@@ -41,6 +41,8 @@ struct TargetStream {
   double gap_max_s = 0.2;      ///< after a longer time without a new line the target is lost
   /// Largest distance of a pose from where the target is expected by its last motion.
   double jump_max_m = 0.1, jump_max_rad = 0.5;
+  /// Standard deviation of poses per axis, which are smoothed if the stream has no velocities.
+  double noise_m = 0.0005, noise_rad = 0.002;
   /// Targets that are commanded by twists stay so near to the tip.
   double leash_m = 0.05, leash_rad = 0.3;
   WhenLost when_lost = WhenLost::hold;
