@@ -205,9 +205,8 @@ void Controller::update_target() {
   const scene::Goal* const goal = goals_.follows() ? &goals_.goal() : nullptr;
   answer_.target = nullptr;
   if (goal == nullptr) return;
-  const geometry::SE3 tip = dynamics::tip_pose(nominal_, view_.poses());
-  if (target_.goal() != goal) target_.start(*goal, tip);
-  answer_.target = &target_.update(time_s_, new_target_.take(), tip);
+  if (target_.goal() != goal) target_.start(*goal, tip());
+  answer_.target = &target_.update(time_s_, new_target_.take(), tip());
 }
 
 const hamelin_goal* Controller::goal_for_planner() {

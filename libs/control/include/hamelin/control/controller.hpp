@@ -189,6 +189,8 @@ class Controller {
   [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
     return planner_.series();
   }
+  /// Pose of the tip at the last tick, in the world.
+  [[nodiscard]] geometry::SE3 tip() const { return dynamics::tip_pose(nominal_, view_.poses()); }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
   /// Time that the planner should not exceed in a tick [s], see Answer::overruns.
