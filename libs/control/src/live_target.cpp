@@ -16,6 +16,8 @@ namespace {
 // Root mean square of the jerk of targets up to 1 Hz, see ObservationOptions.
 constexpr double usual_jerk_m_s3 = 2.0, usual_jerk_rad_s3 = 10.0;
 
+constexpr double rounding_s = 1e-9;  // of differences of times
+
 [[noreturn]] void refuse_target(const std::string& what) {
   throw Error(ErrorCode::invalid, fmt::format("target: {}", what));
 }
@@ -133,7 +135,7 @@ void LiveTarget::extrapolate(const StreamedTarget& streamed, double time_s) {
       scene::extrapolated(streamed.motion, std::min(age, longest), false);
   state_.acceleration = streamed.motion.acceleration;
   driven_ = false;
-  state_.lost = age > longest;
+  state_.lost = age > longest + rounding_s;
   if (!state_.lost) return;
   for (auto* rate : {&state_.velocity, &state_.acceleration, &state_.angular_velocity})
     rate->setZero();
@@ -147,7 +149,7 @@ void LiveTarget::move_by_twist(const StreamedTarget& streamed, double time_s,
   if (!goes_on) state_.pose = tip;
   const bool commanded =
       !streamed.motion.velocity.isZero(0.0) || !streamed.motion.angular_velocity.isZero(0.0);
-  state_.lost = commanded && time_s - streamed.time_s > goal_->stream.gap_max_s;
+  state_.lost = commanded && time_s - streamed.time_s > goal_->stream.gap_max_s + rounding_s;
   const bool moves = commanded && !state_.lost;
   state_.velocity = moves ? streamed.motion.velocity : Vector3d::Zero();
   state_.angular_velocity = moves ? streamed.motion.angular_velocity : Vector3d::Zero();
