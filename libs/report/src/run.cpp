@@ -297,8 +297,11 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
     row[residual] = number(extrema, "residual", reader);
   }
   ++ticks_;
-  if (const Json& target = object_member(line, "target", reader); !target.empty())
+  if (const Json& target = object_member(line, "target", reader); !target.empty()) {
     row[goal_m] = number(target, "error_m", reader);
+    const VectorXd at = numbers(target, "position_m", 3, "position_m", reader);
+    if (at.size() == 3 && at.allFinite()) frame.target = at;
+  }
   if (frame.q.allFinite()) {
     set_goal_distance(frame);
     bins_.add(t, row_);

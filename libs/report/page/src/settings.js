@@ -46,7 +46,7 @@ export class Settings {
       lines: runs.some((run) => run.frames.contacts),
       forces: runs.some((run) => run.frames.forces.length),
       stops: runs.some((run) => run.stops.length),
-      goals: used.some((world) => world.goals.length),
+      goals: used.some((world) => world.goals.length) || runs.some((run) => run.frames.target),
       obstacles: used.some((world) => world.obstacles?.length),
       paths: used.some((world) => world.obstacles?.some((o) => o.motion || o.poses)),
       predicted: used.some((world) => world.obstacles?.some((o) => o.predicted)),
