@@ -92,8 +92,7 @@ void add_run(CLI::App& app, int& exit_code) {
                   "hamelin run data/scenes/shelf.json --log shelf.jsonl --result shelf.json\n"
                   "hamelin run data/scenes/clutter.json --planner apf --duration 5\n"
                   "hamelin run data/scenes/shelf.json --set /planner/params/cruise_speed=1 --log "
-                  "slow.jsonl.zst\n"
-                  "my_joystick | hamelin run my_scene.json --target - --log joystick.jsonl");
+                  "slow.jsonl.zst");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   command

@@ -27,7 +27,7 @@ def main():
     period_s = length(args.amplitude) / args.speed
     count = round(period_s * args.rate)
     print(f"# A Lissajous figure of {args.amplitude} m at a mean of {args.speed} m/s,")
-    print("# by make_lissajous.py.")
+    print("# by tests/follow/make_lissajous.py.")
     print("time_s,x_m,y_m,z_m")
     for i in range(count + 1):
         x, y, z = figure(args.amplitude, 2 * math.pi * (i % count) / count)
