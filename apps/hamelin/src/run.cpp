@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <iostream>
 #include <memory>
 
 #include "command_line.hpp"
@@ -21,6 +22,7 @@ struct RunOptions {
   std::filesystem::path file;
   SceneFlags flags;
   std::vector<std::filesystem::path> plugin_path;
+  std::optional<std::string> target;  ///< a file, or - for standard input
   bool print_config = false;
   RecordOptions record;
 };
@@ -54,8 +56,21 @@ void note_unmodelled(const scene::Scene& scene, const model::Robot& robot) {
                      fmt::join(unused, ", ")));
 }
 
+// Lets the last goal follow the targets of a file; standard input is read by the run itself.
+void follow_file(scene::Scene& scene, const std::optional<std::string>& target) {
+  if (!target || *target == "-") return;
+  if (scene.goals.empty() || scene.goals.back().type != scene::GoalType::follow ||
+      scene.goals.back().motion)
+    throw Error(ErrorCode::usage,
+                fmt::format("--target {}: no goal of {} follows a streamed target, expected a last "
+                            "goal of type follow without a motion",
+                            *target, scene.name));
+  scene.goals.back().stream.file = *target;
+}
+
 int run(const RunOptions& options) {
-  const scene::Scene scene = read_scene(options.file, options.flags);
+  scene::Scene scene = read_scene(options.file, options.flags);
+  follow_file(scene, options.target);
   if (options.print_config) {
     print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
     return 0;
@@ -63,7 +78,8 @@ int run(const RunOptions& options) {
   const model::Model model = control::load_model(scene);
   note_warnings(model.robot(), scene.robot.file);
   note_unmodelled(scene, model.robot());
-  return record(options.record, files_of(scene), [&](const simulation::Watch& watch) {
+  return record(options.record, files_of(scene), [&](simulation::Watch watch) {
+    if (options.target == "-") watch.target = &std::cin;
     return simulation::run(scene, plugin_path(options.plugin_path), watch, plant_factory());
   });
 }
@@ -112,6 +128,11 @@ void add_run(CLI::App& app, int& exit_code) {
                    "directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
+  command
+      ->add_option("--target", options->target,
+                   "follow the targets of a file, or of standard input (-): JSON lines with time_s "
+                   "and position_m, quaternion_wxyz, or velocity_m_s, angular_velocity_rad_s")
+      ->type_name("FILE|-");
   command->add_flag("--print-config", options->print_config,
                     "print the resolved scene, with all defaults and with paths from the working "
                     "directory, and exit");

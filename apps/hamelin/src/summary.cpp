@@ -22,7 +22,7 @@ std::string joints(const Json& q) {
 }
 
 Colour colour_of(const std::string& outcome) {
-  if (outcome == "reached" || outcome == "completed") return Colour::good;
+  if (outcome == "reached" || outcome == "completed" || outcome == "followed") return Colour::good;
   if (outcome == "stalled" || outcome == "timeout" || outcome == "interrupted") return Colour::fair;
   return Colour::bad;
 }
@@ -36,6 +36,20 @@ std::string goal_line(const Json& goal) {
   if (!goal["error_rad"].is_null())
     text += fmt::format(", error {} rad", number(goal["error_rad"]));
   return text;
+}
+
+std::string following_line(const Json& f) {
+  const Json& free = f["free"];
+  return fmt::format(
+      "free for {} s of {} s: error {} mm, {} rad root mean square, {} mm, {} rad at most; tracked "
+      "for {} s{}",
+      number(free["time_s"]), number(f["all"]["time_s"]),
+      number(1e3 * free["rms_m"].get<double>(), 3), number(free["rms_rad"], 2),
+      number(1e3 * free["max_m"].get<double>(), 3), number(free["max_rad"], 2),
+      number(f["tracked_s"]),
+      f["resume_max_s"].is_null()
+          ? ""
+          : fmt::format(", resumed within {} s", number(f["resume_max_s"])));
 }
 
 std::string shield_line(const Json& shield) {
@@ -66,6 +80,7 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                                ? ""
                                : fmt::format(", planner {}", r["planner"].get<std::string>())));
   if (!r["goal"].is_null()) line("goal", goal_line(r["goal"]));
+  if (r.contains("following")) line("following", following_line(r["following"]));
   if (!r["min_clearance_m"].is_null())
     line("clearance",
          fmt::format("{} m at least{}", number(r["min_clearance_m"]),

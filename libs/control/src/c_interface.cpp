@@ -92,6 +92,37 @@ geometry::SE3 pose_of(const double* position, const double* wxyz) {
           Eigen::Map<const Eigen::Vector3d>(position)};
 }
 
+control::Observation observation_of(const hamelin_observation* given, const char* what) {
+  const hamelin_observation full = complete(given, sizeof(hamelin_observation), what);
+  return {full.time_s, pose_of(full.position_m, full.quaternion_wxyz),
+          optional_vector(full.velocity_m_s), optional_vector(full.acceleration_m_s2),
+          optional_vector(full.angular_velocity_rad_s)};
+}
+
+scene::Goal follow_goal_of_stream(const hamelin_target_stream* given) {
+  if (given == nullptr) return scene::follow_goal();
+  const hamelin_target_stream full = complete(given, sizeof(hamelin_target_stream), "stream");
+  scene::TargetStream stream;
+  for (auto [value, out] :
+       {std::pair(full.gap_max_s, &stream.gap_max_s),
+        std::pair(full.jump_max_m, &stream.jump_max_m),
+        std::pair(full.jump_max_rad, &stream.jump_max_rad),
+        std::pair(full.noise_m, &stream.noise_m), std::pair(full.noise_rad, &stream.noise_rad),
+        std::pair(full.leash_m, &stream.leash_m), std::pair(full.leash_rad, &stream.leash_rad)})
+    if (value != 0.0) *out = value;
+  return scene::follow_goal(full.position_only != 0, stream);
+}
+
+void write_target(const control::Controller& controller, hamelin_answer& out) {
+  const control::TargetState* const target = controller.answer().target;
+  if (target == nullptr) return;
+  out.target = target->waiting ? HAMELIN_TARGET_WAITING
+               : target->lost  ? HAMELIN_TARGET_LOST
+                               : HAMELIN_TARGET_FOLLOWED;
+  std::copy_n(target->pose.p().data(), 3, out.target_position_m);
+  out.target_error_m = (controller.tip().p() - target->pose.p()).norm();
+}
+
 scene::Obstacle obstacle_of(const hamelin_obstacle& given) {
   scene::Obstacle out;
   out.name = required(given.name, "obstacle: name");
@@ -215,6 +246,7 @@ void hamelin_controller_tick(hamelin_controller* controller, double time_s, cons
   full.refused_load = answer.refused_load;
   write_line(answer.load_refusal, controller->load_refusal.data(), controller->load_refusal.size());
   full.load_refusal = controller->load_refusal.data();
+  write_target(controller->controller, full);
   // A caller that was built against an earlier header has a shorter struct.
   std::memcpy(out, &full, std::min<std::size_t>(out->struct_size, sizeof full));
 }
@@ -243,6 +275,34 @@ std::int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller,
     if (tolerance_m > 0.0) goal.tolerance_m = tolerance_m;
     if (tolerance_rad > 0.0) goal.tolerance_rad = tolerance_rad;
     return controller->controller.set_goal(std::move(goal));
+  });
+}
+
+std::int32_t hamelin_controller_follow(hamelin_controller* controller,
+                                       const hamelin_target_stream* stream, std::uint64_t* number,
+                                       char* error, std::size_t error_size) {
+  return update(number, error, error_size,
+                [&] { return controller->controller.set_goal(follow_goal_of_stream(stream)); });
+}
+
+std::int32_t hamelin_controller_set_target(hamelin_controller* controller,
+                                           const hamelin_observation* pose, char* error,
+                                           std::size_t error_size) {
+  return guarded(error, error_size,
+                 [&] { controller->controller.set_target(observation_of(pose, "target")); });
+}
+
+std::int32_t hamelin_controller_set_target_twist(hamelin_controller* controller, double time_s,
+                                                 const double velocity_m_s[3],
+                                                 const double angular_velocity_rad_s[3],
+                                                 char* error, std::size_t error_size) {
+  return guarded(error, error_size, [&] {
+    control::TargetTwist twist{time_s};
+    twist.velocity_m_s =
+        Eigen::Map<const Eigen::Vector3d>(required(velocity_m_s, "target: velocity_m_s"));
+    twist.angular_velocity_rad_s = Eigen::Map<const Eigen::Vector3d>(
+        required(angular_velocity_rad_s, "target: angular_velocity_rad_s"));
+    controller->controller.set_target(twist);
   });
 }
 
@@ -307,13 +367,8 @@ std::int32_t hamelin_controller_observe_obstacle(hamelin_controller* controller,
                                                  std::uint64_t* snapshot, char* error,
                                                  std::size_t error_size) {
   return update(snapshot, error, error_size, [&] {
-    const hamelin_observation given =
-        complete(observation, sizeof(hamelin_observation), "observation");
     return controller->controller.world().observe_obstacle(
-        required(name, "obstacle: name"),
-        {given.time_s, pose_of(given.position_m, given.quaternion_wxyz),
-         optional_vector(given.velocity_m_s), optional_vector(given.acceleration_m_s2),
-         optional_vector(given.angular_velocity_rad_s)});
+        required(name, "obstacle: name"), observation_of(observation, "observation"));
   });
 }
 

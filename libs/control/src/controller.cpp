@@ -43,6 +43,14 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
   return one_or_per_joint(values, dof, place);
 }
 
+const planning::Plugin& plugin_for(const scene::Scene& scene, const planning::Plugin& plugin) {
+  if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return plugin;
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
+                          "expected one that does, such as hybrid",
+                          scene.name, scene.goals.size() - 1, plugin.name()));
+}
+
 std::size_t delay_periods(const scene::Scene& scene, double period_s) {
   return static_cast<std::size_t>(std::round(scene.actuation.delay_s / period_s));
 }
@@ -105,7 +113,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
       path_points_max_(std::max(longest_path(scene_.goals),
                                 options_.path_points_max.value_or(default_path_points))),
-      plugin_(plugin),
+      plugin_(plugin_for(scene_, plugin)),
       nominal_(nominal_of(scene_, arm)),
       acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
                                            nominal_.dof())),
@@ -120,7 +128,9 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       new_params_(std::make_unique<NewParams>()),
       new_load_(std::make_unique<NewLoad>()),
       goal_list_(&new_goals_.take()),
+      new_target_(std::make_unique<StreamedTarget>()),
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
+  expect_target(scene_.goals);
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
@@ -155,11 +165,35 @@ double steady_clock_s() {
 }
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
-  check_goals(goals, scene_, nominal_, path_points_max_);
+  check_goals(goals, scene_, nominal_, path_points_max_, plugin().follows_targets());
   const std::lock_guard lock(goals_mutex_);
   newest_goals_ = goals;
+  expect_target(goals);
   new_goals_.publish(std::make_unique<GoalList>(++goals_number_, std::move(goals)));
   return goals_number_;
+}
+
+void Controller::expect_target(const std::vector<scene::Goal>& goals) {
+  const scene::Goal* const follow = follow_goal_of(goals);
+  receives_ = follow != nullptr && !follow->motion;
+  if (receives_) receiver_.start(follow->stream);
+}
+
+template <class Sample>
+void Controller::receive_target(const Sample& sample) {
+  const std::lock_guard lock(goals_mutex_);
+  if (!receives_)
+    throw Error(ErrorCode::invalid,
+                "target: no goal follows a streamed target, expected a follow goal");
+  new_target_.publish(std::make_unique<StreamedTarget>(receiver_.take(sample)));
+}
+
+void Controller::set_target(const TargetPose& pose) {
+  receive_target(pose);
+}
+
+void Controller::set_target(const TargetTwist& twist) {
+  receive_target(twist);
 }
 
 void Controller::set_planner_params(const Json& changes) {
@@ -287,6 +321,24 @@ void Controller::take_goals() {
   goal_list_ = &newest;
   goals_.set_goals(newest.goals);
   goal_ = {nullptr, goal_.number + 1, 0};
+  listed_ = nullptr;
+  target_.stop();
+}
+
+// A target starts where the tip is when its goal becomes the current one.
+void Controller::update_target() {
+  const scene::Goal* const goal = goals_.follows() ? &goals_.goal() : nullptr;
+  answer_.target = nullptr;
+  if (goal == nullptr) return;
+  if (target_.goal() != goal) target_.start(*goal, tip());
+  answer_.target = &target_.update(time_s_, new_target_.take(), tip());
+}
+
+const hamelin_goal* Controller::goal_for_planner() {
+  if (answer_.target == nullptr) return listed_;
+  live_goal_ = *listed_;
+  control::set_target(*answer_.target, live_goal_);
+  return &live_goal_;
 }
 
 void Controller::take_params() {
@@ -301,6 +353,7 @@ void Controller::reset() {
   reset_ = true;
   late_answers_ = 0;
   goals_.restart();
+  target_.stop();
   verdict_.reset();
   answer_.state = ControlState::running;
   answer_.cause = {};
@@ -334,6 +387,7 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   answer_.cause = {};
   while (goals_.advance(arm_->view.poses(), q_, v_)) continue;
   answer_.goal_index = goals_.index();
+  update_target();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
   else if (!arm_->planner.detects_stalls() && goals_.stalled(arm_->view.poses(), v_, period_s_))
@@ -426,9 +480,10 @@ bool Controller::ask_planner() {
   take_params();
   if (reset_) arm_->planner.reset(q_, v_);
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
-  const hamelin_goal* const goal = &goal_list_->for_planner[index];
-  if (reset_ || (goal_.goal != nullptr && goal_.goal != goal)) ++goal_.number;
-  goal_ = {goal, goal_.number, index};
+  const hamelin_goal* const listed = &goal_list_->for_planner[index];
+  if (reset_ || (listed_ != nullptr && listed_ != listed)) ++goal_.number;
+  listed_ = listed;
+  goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
   const bool sends_torque = forms_torque() && !options_.position;

@@ -43,6 +43,23 @@ void check_joint_goal(const scene::Goal& goal, std::size_t i, const scene::Scene
                     path_points_max));
 }
 
+void check_follow_goal(const scene::Goal& goal, std::size_t i, bool last, bool follows) {
+  check(follows, i,
+        "follow: the planner does not follow targets, expected one that does, such as hybrid");
+  check(last, i, "follow: is never reached, expected it as the last goal");
+  check(goal.pose.p().allFinite() && goal.pose.R().allFinite(), i,
+        "pose: is not finite, expected finite numbers");
+  const scene::TargetStream& bounds = goal.stream;
+  for (const auto& [key, value] :
+       {std::pair("tolerance_m", goal.tolerance_m), std::pair("tolerance_rad", goal.tolerance_rad),
+        std::pair("gap_max_s", bounds.gap_max_s), std::pair("jump_max_m", bounds.jump_max_m),
+        std::pair("jump_max_rad", bounds.jump_max_rad), std::pair("noise_m", bounds.noise_m),
+        std::pair("noise_rad", bounds.noise_rad), std::pair("leash_m", bounds.leash_m),
+        std::pair("leash_rad", bounds.leash_rad)})
+    check(value > 0.0 && std::isfinite(value), i,
+          fmt::format("{}: {} is not allowed, expected more than 0", key, value));
+}
+
 void check_tip_goal(const scene::Goal& goal, std::size_t i) {
   check(goal.pose.p().allFinite() && goal.pose.R().allFinite(), i,
         "pose: is not finite, expected finite numbers");
@@ -65,7 +82,9 @@ hamelin_goal to_c(const scene::Goal& goal) {
   out.struct_size = sizeof out;
   out.type = joint                                    ? HAMELIN_GOAL_JOINT
              : goal.type == scene::GoalType::position ? HAMELIN_GOAL_POSITION
+             : goal.type == scene::GoalType::follow   ? HAMELIN_GOAL_FOLLOW
                                                       : HAMELIN_GOAL_POSE;
+  out.follows_rotation = goal.type == scene::GoalType::follow && !goal.position_only ? 1 : 0;
   const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(goal.pose.R());
   std::copy_n(goal.pose.p().data(), 3, out.position_world_m);
   std::copy_n(wxyz.data(), 4, out.quaternion_wxyz);
@@ -79,18 +98,36 @@ hamelin_goal to_c(const scene::Goal& goal) {
 }
 
 void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scene,
-                 const model::Model& model, std::size_t path_points_max) {
+                 const model::Model& model, std::size_t path_points_max, bool follows) {
   if (goals.empty())
     throw Error(ErrorCode::invalid, "goals: none are given, expected at least one");
   for (std::size_t i = 0; i < goals.size(); ++i) {
     const scene::Goal& goal = goals[i];
     if (goal.type == scene::GoalType::joint)
       check_joint_goal(goal, i, scene, model, path_points_max);
+    else if (goal.type == scene::GoalType::follow)
+      check_follow_goal(goal, i, i + 1 == goals.size(), follows);
     else
       check_tip_goal(goal, i);
     check(goal.speed_max > 0.0, i,
           fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
   }
+}
+
+void set_target(const TargetState& target, hamelin_goal& goal) noexcept {
+  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(target.pose.R());
+  std::copy_n(target.pose.p().data(), 3, goal.position_world_m);
+  std::copy_n(wxyz.data(), 4, goal.quaternion_wxyz);
+  std::copy_n(target.velocity.data(), 3, goal.velocity_world_m_s);
+  std::copy_n(target.acceleration.data(), 3, goal.acceleration_world_m_s2);
+  std::copy_n(target.angular_velocity.data(), 3, goal.angular_velocity_world_rad_s);
+  std::copy_n(target.angular_acceleration.data(), 3, goal.angular_acceleration_world_rad_s2);
+  goal.target_lost = target.lost ? 1 : 0;
+}
+
+const scene::Goal* follow_goal_of(const std::vector<scene::Goal>& goals) noexcept {
+  if (goals.empty() || goals.back().type != scene::GoalType::follow) return nullptr;
+  return &goals.back();
 }
 
 std::size_t longest_path(const std::vector<scene::Goal>& goals) {

@@ -23,6 +23,7 @@ GoalError goal_error(const scene::Goal& goal, const model::Model& model,
                      const Eigen::VectorXd& v) {
   const bool slow = v.lpNorm<Eigen::Infinity>() < goal.speed_max;
   GoalError error;
+  if (goal.type == scene::GoalType::follow) return error;
   if (goal.type == scene::GoalType::joint) {
     error.radians = (q - goal.q).lpNorm<Eigen::Infinity>();
     error.reached = *error.radians < goal.tolerance_rad && slow;
@@ -39,6 +40,15 @@ GoalError goal_error(const scene::Goal& goal, const model::Model& model,
   return error;
 }
 
+GoalError target_error(const scene::Goal& goal, const geometry::SE3& target,
+                       const model::Model& model, const dynamics::Workspace& ws) {
+  const geometry::SE3 tip = dynamics::tip_pose(model, ws);
+  GoalError error;
+  error.metres = (tip.p() - target.p()).norm();
+  if (!goal.position_only) error.radians = angle_between(tip.R(), target.R());
+  return error;
+}
+
 GoalTracker::GoalTracker(const std::vector<scene::Goal>& goals,
                          const std::optional<scene::StallRule>& rule, const model::Model& model)
     : goals_(&goals), rule_(rule), model_(&model) {}
@@ -52,7 +62,7 @@ bool GoalTracker::advance(const dynamics::Workspace& ws, const Eigen::VectorXd& 
 }
 
 bool GoalTracker::stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s) {
-  if (!rule_) return false;
+  if (!rule_ || follows()) return false;
   bool away = true;
   if (goal().type != scene::GoalType::joint)
     away = (dynamics::tip_pose(*model_, ws).p() - goal().pose.p()).norm() > rule_->distance_m;

@@ -29,6 +29,26 @@ Json goal(const std::optional<Result::Goal>& goal) {
           {"count", goal->count}};
 }
 
+Json errors_json(const Result::Following::Errors& errors) {
+  return {{"time_s", errors.time_s},
+          {"rms_m", errors.rms_m},
+          {"max_m", errors.max_m},
+          {"rms_rad", errors.rms_rad},
+          {"max_rad", errors.max_rad}};
+}
+
+Json following_json(const Result::Following& f) {
+  return {{"all", errors_json(f.all)},
+          {"free", errors_json(f.free)},
+          {"tracked_s", f.tracked_s},
+          {"free_not_tracked_s", f.free_not_tracked_s},
+          {"lost_s", f.lost_s},
+          {"resumed", f.resumed},
+          {"not_resumed", f.not_resumed},
+          {"resume_max_s", optional(f.resume_max_s)},
+          {"refused_lines", f.refused_lines}};
+}
+
 Json solver(const SolverSummary& s) {
   const auto mean = [&](long sum) {
     return s.steps > 0 ? Json(static_cast<double>(sum) / static_cast<double>(s.steps))
@@ -101,6 +121,10 @@ std::string_view to_string(Outcome outcome) noexcept {
       return "completed";
     case Outcome::reached:
       return "reached";
+    case Outcome::followed:
+      return "followed";
+    case Outcome::target_lost:
+      return "target_lost";
     case Outcome::stalled:
       return "stalled";
     case Outcome::collision:
@@ -123,7 +147,9 @@ int exit_code(Outcome outcome) noexcept {
   switch (outcome) {
     case Outcome::completed:
     case Outcome::reached:
+    case Outcome::followed:
       return 0;
+    case Outcome::target_lost:
     case Outcome::stalled:
     case Outcome::collision:
     case Outcome::timeout:
@@ -180,6 +206,7 @@ Json to_json(const Result& r) {
   if (r.position_excess) document["position_excess"] = *r.position_excess;
   if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);
+  if (r.following) document["following"] = following_json(*r.following);
   if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},

@@ -55,10 +55,14 @@ TEST_CASE("a full result fits its schema", "[log][unit]") {
   result.certified_share = 1.0;
   result.tightest_step_m = 0.004;
   result.tick_us = log::Result::TickTime{1.0, 2.0, 3.0};
+  result.following.emplace().free = {9.0, 0.001, 0.002, 0.01, 0.02};
+  result.following->resume_max_s = 0.5;
   const Json document = log::to_json(result);
   CHECK_NOTHROW(check_shipped_schema(document, "result", "result"));
   CHECK(document["goal"]["error_rad"] == 0.2);
   CHECK(document["cause"] == "at rest");
+  CHECK(document["following"]["free"]["rms_m"] == 0.001);
+  CHECK(document["following"]["resume_max_s"] == 0.5);
 }
 
 TEST_CASE("non-finite numbers become null and are named in the warnings", "[log][unit]") {
@@ -85,6 +89,8 @@ TEST_CASE("a result before its first step has no mean", "[log][unit]") {
 TEST_CASE("outcomes have the documented exit codes", "[log][unit]") {
   CHECK(log::exit_code(Outcome::completed) == 0);
   CHECK(log::exit_code(Outcome::reached) == 0);
+  CHECK(log::exit_code(Outcome::followed) == 0);
+  CHECK(log::exit_code(Outcome::target_lost) == 1);
   CHECK(log::exit_code(Outcome::stalled) == 1);
   CHECK(log::exit_code(Outcome::collision) == 1);
   CHECK(log::exit_code(Outcome::timeout) == 1);

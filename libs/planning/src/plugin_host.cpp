@@ -296,6 +296,9 @@ bool Plugin::tick_allocates() const noexcept {
 bool Plugin::uses_threads() const noexcept {
   return (library_->raw->properties & HAMELIN_USES_THREADS) != 0;
 }
+bool Plugin::follows_targets() const noexcept {
+  return (library_->raw->properties & HAMELIN_FOLLOWS_TARGETS) != 0;
+}
 bool Plugin::can_change_params() const noexcept {
   return library_->raw->prepare_params != nullptr;
 }

@@ -21,6 +21,16 @@ void Frames::add(const Frame& frame) {
   dynamics::forward_kinematics(world_.model, ws_, frame.q);
   if (world_.has_clearances) add_contacts(frame);
   add_forces(frame);
+  add_target(frame);
+}
+
+// The frames before the first target get its position, later ones without any that of the last.
+void Frames::add_target(const Frame& frame) {
+  if (targets_.empty() && !frame.target) return;
+  while (targets_.size() < 3 * t_.size()) {
+    const Eigen::Vector3d at = frame.target ? *frame.target : Eigen::Vector3d(&targets_.end()[-3]);
+    targets_.insert(targets_.end(), at.begin(), at.end());
+  }
 }
 
 void Frames::add_contacts(const Frame& frame) {
@@ -78,6 +88,8 @@ Json Frames::json(Container& container, double step_s) const {
     json["contacts"] = {{"count", container.exact(counts_)},
                         {"points", container.centred(points_, point_step)}};
   }
+  json["target"] = nullptr;
+  if (!targets_.empty()) json["target"] = container.centred(targets_, point_step);
   json["forces"] = Json::array();
   for (std::size_t i = 0; i < channel_names.size(); ++i)
     if (channel_used_[i])

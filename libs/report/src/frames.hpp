@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "container.hpp"
@@ -21,6 +22,7 @@ struct Frame {
   double time_s = 0.0;
   Eigen::VectorXd q;
   std::size_t goal_index = 0;
+  std::optional<Eigen::Vector3d> target{};  ///< position of the target that is followed
   /// Joint torques of the channels; empty if a channel is not used.
   std::array<Eigen::VectorXd, channel_names.size()> channels;
 };
@@ -38,6 +40,7 @@ class Frames {
   void add_contacts(const Frame& frame);
   /// Adds, for each channel, the force that accelerates the tip as the channel's torque does.
   void add_forces(const Frame& frame);
+  void add_target(const Frame& frame);
 
   const World& world_;
   dynamics::Workspace ws_;
@@ -47,6 +50,7 @@ class Frames {
   dynamics::Matrix3Xd J_;
   Eigen::VectorXd acceleration_;
   std::vector<double> t_, q_, clearances_, points_;
+  std::vector<double> targets_;  ///< three numbers per frame, from the first with a target on
   std::vector<std::uint16_t> goal_index_;
   std::vector<std::uint8_t> counts_;
   std::array<std::vector<double>, channel_names.size()> forces_;

@@ -316,6 +316,11 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
     row[residual] = number(extrema, "residual", reader);
   }
   ++ticks_;
+  if (const Json& target = object_member(line, "target", reader); !target.empty()) {
+    row[goal_m] = number(target, "error_m", reader);
+    const VectorXd at = numbers(target, "position_m", 3, "position_m", reader);
+    if (at.size() == 3 && at.allFinite()) frame.target = at;
+  }
   if (frame.q.allFinite()) {
     set_goal_distance(frame);
     bins_.add(t, row_);
@@ -361,6 +366,7 @@ void Run::set_goal_distance(const Frame& frame) {
   if (world_.goals.empty()) return;
   double* const row = &row_[3 * plotted_joints_];
   const auto& goal = world_.goals[std::min(frame.goal_index, world_.goals.size() - 1)];
+  if (goal.type == scene::GoalType::follow) return;  // the tick has the distance from its target
   if (goal.type == scene::GoalType::joint) {
     if (goal.q.size() == frame.q.size())
       row[goal_rad] = (frame.q - goal.q).lpNorm<Eigen::Infinity>();

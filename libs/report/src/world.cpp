@@ -390,7 +390,9 @@ std::unique_ptr<World> make_world(const simulation::Recorded& recorded, std::str
         "{}: changes during the run, from {} s on; cells and clearances are those at 0 s",
         scene.map->file.string(), scene.map->changes.front().time_s));
   Json goals = Json::array(), obstacles = Json::array();
-  for (const auto& goal : scene.goals) goals.push_back(goal_json(goal));
+  for (const auto& goal : scene.goals)
+    if (goal.type != scene::GoalType::follow)  // it has no place of its own
+      goals.push_back(goal_json(goal));
   for (const auto& obstacle : scene.obstacles)
     if (obstacle.shape != scene::Shape::frame)
       obstacles.push_back(obstacle_json(obstacle, scene.duration_s, container));

@@ -402,6 +402,26 @@ TEST_CASE("the planner's own series are plotted, one plot for each unit", "[repo
                     Catch::Contains("series: expected 3 numbers, one per series"));
 }
 
+TEST_CASE("the target that is followed is that of the ticks", "[report]") {
+  const auto log = test::scratch("target") / "run.jsonl";
+  scene::Scene scene =
+      scene::read_scene(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/follow.json");
+  scene.duration_s = 0.5;
+  (void)test::log_run(scene, log);
+  const auto ticks = test::ticks_of(log);
+  const Decoded page(report::make_data({log}, {2000, 1500}).bytes);
+  const Json& frames = page.head["runs"][0]["frames"];
+  const auto t = page(frames["t"]), target = page(frames["target"]);
+  REQUIRE(t.size() == ticks.size());
+  REQUIRE(target.size() == 3 * t.size());
+  for (std::size_t f = 0; f < t.size(); ++f)
+    REQUIRE((Vector3d::Map(&target[3 * f]) - vector_of(ticks[f]["target"]["position_m"])).norm() <
+            1e-4);
+  CHECK(page.head["worlds"][0]["goals"].empty());
+  (void)test::log_run(test::shelf(0.1), log);
+  CHECK(Decoded(report::make_data({log}).bytes).head["runs"][0]["frames"]["target"].is_null());
+}
+
 TEST_CASE("the stops are those of the ticks", "[report]") {
   const auto folder = test::scratch("stops");
   scene::Scene scene = test::shelf(4.0);

@@ -238,28 +238,71 @@ MapChangeSpec read_map_change(const Reader& in, const std::filesystem::path& fol
 }
 
 Goal default_goal(GoalType type) {
-  const bool joint = type == GoalType::joint, pose = type == GoalType::pose;
+  const bool joint = type == GoalType::joint, position = type == GoalType::position;
   Goal goal;
   goal.type = type;
-  goal.tolerance_m = joint ? 0.0 : pose ? 0.01 : 0.02;
-  goal.tolerance_rad = joint ? 0.05 : pose ? 0.26 : 0.0;
+  goal.tolerance_m = joint ? 0.0 : position ? 0.02 : 0.01;
+  goal.tolerance_rad = joint ? 0.05 : position ? 0.0 : type == GoalType::follow ? 0.1 : 0.26;
   goal.speed_max = joint ? 0.05 : std::numeric_limits<double>::infinity();
   return goal;
 }
 
-Goal read_goal(const Reader& in) {
+TargetStream read_target_stream(const Reader& in, const std::filesystem::path& folder) {
+  TargetStream stream;
+  if (const auto file = in.maybe<std::string>("file")) stream.file = resolve_path(folder, *file);
+  stream.gap_max_s = in.get("gap_max_s", stream.gap_max_s);
+  stream.jump_max_m = in.get("jump_max_m", stream.jump_max_m);
+  stream.jump_max_rad = in.get("jump_max_rad", stream.jump_max_rad);
+  stream.noise_m = in.get("noise_m", stream.noise_m);
+  stream.noise_rad = in.get("noise_rad", stream.noise_rad);
+  stream.leash_m = in.get("leash_m", stream.leash_m);
+  stream.leash_rad = in.get("leash_rad", stream.leash_rad);
+  if (in.get<std::string>("when_lost", "hold") == to_string(WhenLost::end))
+    stream.when_lost = WhenLost::end;
+  return stream;
+}
+
+// A target that moves by the scene has a place, unless its way-points have one.
+void read_target(const Reader& in, const std::filesystem::path& folder, Goal& goal) {
+  goal.position_only = in.get<std::string>("tracks", "pose") == "position";
+  if (in.find("motion") == nullptr) {
+    const std::string kind = "follow goal without a motion, whose target is streamed";
+    in.refuse("position_m", kind);
+    in.refuse("quaternion_wxyz", kind);
+    goal.stream = read_target_stream(in.child("stream"), folder);
+    return;
+  }
+  in.refuse("stream", "follow goal with a motion");
+  goal.motion = read_motion(in.child("motion"), folder);
+  check(*goal.motion, in.place_of("motion"));
+  if (std::holds_alternative<WaypointMotion>(*goal.motion)) return;
+  in.require("position_m", "follow goal with this motion");
+  if (!goal.position_only) in.require("quaternion_wxyz", "follow goal that tracks a pose");
+}
+
+GoalType goal_type_of(const std::string& type) {
+  if (type == "path") return GoalType::joint;
+  for (const GoalType known : {GoalType::position, GoalType::pose, GoalType::follow})
+    if (type == to_string(known)) return known;
+  return GoalType::joint;
+}
+
+Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   const auto type = in.get<std::string>("type", "");
   const bool path = type == "path";
-  Goal goal = default_goal(type == "joint" || path ? GoalType::joint
-                           : type == "position"    ? GoalType::position
-                                                   : GoalType::pose);
-  const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose;
+  Goal goal = default_goal(goal_type_of(type));
+  const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose,
+             follow = goal.type == GoalType::follow;
   const std::string kind = type + " goal";
   joint ? in.require("q", kind) : in.refuse("q", kind);
-  joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
-  pose ? in.require("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
+  if (!follow) {
+    joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
+    pose ? in.require("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
+    for (const char* key : {"tracks", "motion", "stream"}) in.refuse(key, kind);
+  }
   if (joint) in.refuse("tolerance_m", kind);
-  if (joint) in.refuse("tip_speed_max_m_s", kind);
+  if (joint || follow) in.refuse("tip_speed_max_m_s", kind);
+  if (follow) in.refuse("speed_max", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
   if (path) {
     goal.path = in.joint_path("q");
@@ -273,7 +316,20 @@ Goal read_goal(const Reader& in) {
   goal.tolerance_rad = in.get("tolerance_rad", goal.tolerance_rad);
   goal.speed_max = in.get("speed_max", goal.speed_max);
   goal.tip_speed_max_m_s = in.maybe<double>("tip_speed_max_m_s");
+  if (follow) read_target(in, folder, goal);
   return goal;
+}
+
+// A target is never reached, so no goal can come after it.
+std::vector<Goal> read_goals(const Reader& in, const std::filesystem::path& folder) {
+  std::vector<Goal> goals;
+  in.each("goals", [&](const Reader& goal) {
+    if (!goals.empty() && goals.back().type == GoalType::follow)
+      in.fail(fmt::format("goals/{}", goals.size() - 1).c_str(),
+              "is a follow goal, which is never reached, expected it as the last goal");
+    goals.push_back(read_goal(goal, folder));
+  });
+  return goals;
 }
 
 JointNumbers read_joint_numbers(const Reader& in, const char* key, JointNumbers fallback) {
@@ -509,7 +565,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
     scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
   scene.start_q = in.child("start").joints("q");
   scene.start_v = in.child("start").joints("v");
-  in.each("goals", [&](const Reader& goal) { scene.goals.push_back(read_goal(goal)); });
+  scene.goals = read_goals(in, base_dir);
   scene.obstacles = read_obstacles(in, base_dir);
   if (in.find("map") != nullptr) scene.map = read_map_spec(in.child("map"), base_dir);
   scene.model = read_model(in.child("model"));
@@ -542,6 +598,8 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
   for (const Obstacle& obstacle : scene.obstacles)
     if (const auto file = waypoint_file(obstacle); !file.empty()) files.push_back(file);
+  for (const Goal& goal : scene.goals)
+    if (const auto file = target_file(goal); !file.empty()) files.push_back(file);
   if (!scene.map) return files;
   files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)
@@ -567,6 +625,19 @@ Goal pose_goal(const geometry::SE3& pose) {
   Goal goal = default_goal(GoalType::pose);
   goal.pose = pose;
   return goal;
+}
+
+Goal follow_goal(bool position_only, const TargetStream& stream) {
+  Goal goal = default_goal(GoalType::follow);
+  goal.position_only = position_only;
+  goal.stream = stream;
+  return goal;
+}
+
+std::filesystem::path target_file(const Goal& goal) {
+  if (!goal.motion) return goal.stream.file;
+  const auto* waypoints = std::get_if<WaypointMotion>(&*goal.motion);
+  return waypoints != nullptr ? waypoints->path->file() : std::filesystem::path();
 }
 
 Scene read_scene(const std::filesystem::path& file) {

@@ -37,7 +37,31 @@ Json path_or_null(const std::optional<std::filesystem::path>& path) {
   return path ? Json(path->string()) : Json(nullptr);
 }
 
+Json follow_json(const Goal& goal) {
+  Json out{{"type", type_name(goal)},
+           {"tracks", goal.position_only ? "position" : "pose"},
+           {"tolerance_m", goal.tolerance_m},
+           {"tolerance_rad", goal.tolerance_rad}};
+  if (goal.motion) {
+    out.update(pose_json(goal.pose, goal.quaternion_wxyz));
+    out["motion"] = motion_json(*goal.motion);
+    return out;
+  }
+  const TargetStream& stream = goal.stream;
+  out["stream"] = {{"file", stream.file.empty() ? Json(nullptr) : Json(stream.file.string())},
+                   {"gap_max_s", stream.gap_max_s},
+                   {"jump_max_m", stream.jump_max_m},
+                   {"jump_max_rad", stream.jump_max_rad},
+                   {"noise_m", stream.noise_m},
+                   {"noise_rad", stream.noise_rad},
+                   {"leash_m", stream.leash_m},
+                   {"leash_rad", stream.leash_rad},
+                   {"when_lost", to_string(stream.when_lost)}};
+  return out;
+}
+
 Json goal_json(const Goal& goal) {
+  if (goal.type == GoalType::follow) return follow_json(goal);
   Json out{{"type", type_name(goal)}};
   if (goal.path.size() > 0) {
     out["q"] = Json::array();
@@ -189,8 +213,14 @@ std::string_view to_string(GoalType type) noexcept {
       return "position";
     case GoalType::pose:
       return "pose";
+    case GoalType::follow:
+      return "follow";
   }
   return "unknown";
+}
+
+std::string_view to_string(WhenLost when) noexcept {
+  return when == WhenLost::end ? "end" : "hold";
 }
 
 std::string_view type_name(const Goal& goal) noexcept {

@@ -421,6 +421,79 @@ TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[sce
   CHECK_THAT(refusal({{"type", "path"}}), Catch::Contains("/goals/0/q: is missing"));
 }
 
+TEST_CASE("goals that follow a target are read, and read back", "[scene][unit]") {
+  Json document = small_document();
+  document["goals"] = {
+      {{"type", "joint"}, {"q", {0.1}}},
+      {{"type", "follow"},
+       {"position_m", {0.5, 0.1, 0.4}},
+       {"quaternion_wxyz", {0, 1, 0, 0}},
+       {"motion", {{"type", "sine"}, {"amplitude_m", {0, 0.25, 0}}, {"period_s", 6}}},
+       {"tolerance_m", 0.02}}};
+  Scene scene = scene_from_json(document, ".", "x.json");
+  const Goal& by_motion = scene.goals.at(1);
+  CHECK(by_motion.type == GoalType::follow);
+  CHECK_FALSE(by_motion.position_only);
+  CHECK(std::get<SineMotion>(*by_motion.motion).period_s == 6.0);
+  CHECK(by_motion.pose.R()(2, 2) == -1.0);
+  CHECK(by_motion.tolerance_m == 0.02);
+  CHECK(by_motion.tolerance_rad == 0.1);
+  Json resolved = resolved_json(scene);
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+
+  document["goals"] = {{{"type", "follow"},
+                        {"tracks", "position"},
+                        {"stream",
+                         {{"file", "target.jsonl"},
+                          {"gap_max_s", 0.5},
+                          {"jump_max_m", 0.3},
+                          {"noise_m", 0.002},
+                          {"leash_m", 0.1},
+                          {"when_lost", "end"}}}}};
+  scene = scene_from_json(document, "/folder", "x.json");
+  const Goal& streamed = scene.goals.at(0);
+  CHECK(streamed.position_only);
+  CHECK_FALSE(streamed.motion);
+  CHECK(streamed.stream.file == "/folder/target.jsonl");
+  CHECK(streamed.stream.gap_max_s == 0.5);
+  CHECK(streamed.stream.jump_max_m == 0.3);
+  CHECK(streamed.stream.jump_max_rad == 0.5);
+  CHECK(streamed.stream.noise_m == 0.002);
+  CHECK(streamed.stream.leash_m == 0.1);
+  CHECK(streamed.stream.when_lost == WhenLost::end);
+  CHECK(target_file(streamed) == "/folder/target.jsonl");
+  const auto files = input_files(scene);
+  CHECK(std::find(files.begin(), files.end(), "/folder/target.jsonl") != files.end());
+  resolved = resolved_json(scene);
+  CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
+}
+
+TEST_CASE("goals that follow a target are refused where they are wrong", "[scene][unit]") {
+  const Json motion{{"type", "sine"}, {"amplitude_m", {0, 0.25, 0}}, {"period_s", 6}};
+  const auto message = [&](const Json& goals) {
+    Json document = small_document();
+    document["goals"] = goals;
+    return refusal(document);
+  };
+  CHECK(message({{{"type", "follow"}}, {{"type", "joint"}, {"q", {0.1}}}}) ==
+        "x.json: /goals/0: is a follow goal, which is never reached, expected it as the last goal");
+  CHECK_THAT(message({{{"type", "follow"}, {"motion", motion}}}),
+             Catch::Contains("/goals/0/position_m: is missing, expected for a follow goal"));
+  CHECK_THAT(
+      message({{{"type", "follow"}, {"motion", motion}, {"position_m", {0, 0, 0}}}}),
+      Catch::Contains("/goals/0/quaternion_wxyz: is missing, expected for a follow goal that "
+                      "tracks a pose"));
+  CHECK_THAT(message({{{"type", "follow"}, {"position_m", {0, 0, 0}}}}),
+             Catch::Contains("/goals/0/position_m: is not allowed for a follow goal without a "
+                             "motion"));
+  CHECK_THAT(message({{{"type", "follow"}, {"q", {0.1}}}}),
+             Catch::Contains("/goals/0/q: is not allowed for a follow goal"));
+  CHECK_THAT(message({{{"type", "position"}, {"position_m", {0, 0, 0}}, {"motion", motion}}}),
+             Catch::Contains("/goals/0/motion: is not allowed for a position goal"));
+  CHECK_THAT(message({{{"type", "follow"}, {"stream", {{"gap_max_s", 0}}}}}),
+             Catch::Contains("/goals/0/stream/gap_max_s"));
+}
+
 TEST_CASE("the largest tip speed at a goal is read, and read back", "[scene][unit]") {
   Json document = full_document();
   document["goals"][1]["tip_speed_max_m_s"] = 0.05;

@@ -47,6 +47,9 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
     if (const auto file = scene::waypoint_file(scene.obstacles[i]); !file.empty())
       inputs.push_back({fmt::format("waypoints_{}", i), file});
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    if (const auto file = scene::target_file(scene.goals[i]); !file.empty())
+      inputs.push_back({fmt::format("target_{}", i), file});
   inputs.push_back({"plugin", plugin.file()});
   return inputs;
 }
@@ -106,6 +109,8 @@ std::string shield_warning(const control::Shield& shield, const model::Model& mo
 constexpr double stop_again_s = 0.25;
 // An arm that is slower has come to rest [rad/s or m/s].
 constexpr double resting_speed = 2e-3;
+// A run whose target is lost ends at the latest after this time, if the arm does not rest before.
+constexpr double longest_halt_s = 2.0;
 
 /// CPU time of a tick: without the log, a judge of its own, a caller that watches, and a plant that
 /// is not hamelin's own.
@@ -228,12 +233,37 @@ void ClosedLoop::start(const Watch& watch) {
   audit_ =
       std::make_unique<EnergyAudit>(*recorder_, ideal && plant.integrator == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, *controller_, *actuation_);
+  if (control::follow_goal_of(scene_.goals) != nullptr)
+    tracking_ = std::make_unique<TrackingAudit>(model_, limits_);
+  if (tracking_) log_->add_target(controller_->answer(), *tracking_);
+  open_target_feed(watch);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging()) log_->header(scene_, planner_params_, result_.provenance, steps_);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = judge_->influence_m();
   min_self_clearance_ = judge_->self_influence_m();
   warn_of_goals_in_contact(watch);
+}
+
+void ClosedLoop::open_target_feed(const Watch& watch) {
+  const scene::Goal* const goal = control::follow_goal_of(scene_.goals);
+  if (goal == nullptr || goal->motion) {
+    if (watch.target == nullptr) return;
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: /goals: no goal follows a streamed target, expected one where a "
+                            "stream is given",
+                            scene_.name));
+  }
+  if (watch.target != nullptr) {
+    feed_ = std::make_unique<TargetFeed>(*watch.target, "target", goal->position_only);
+  } else if (!goal->stream.file.empty()) {
+    feed_ = std::make_unique<TargetFeed>(goal->stream.file, goal->position_only);
+  } else {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: /goals/{}/stream/file: is missing, expected a file, or --target "
+                            "FILE, where a target is streamed",
+                            scene_.name, scene_.goals.size() - 1));
+  }
 }
 
 log::Result ClosedLoop::run(const Watch& watch) {
@@ -354,6 +384,9 @@ void ClosedLoop::check_outcome() {
   if (tick) let_controller_observe();
   if (tick && next_event_ < scene_.events.size()) advance_events();
   if (done_) return;
+  note_tracking();
+  if (tick) check_target();
+  if (done_) return;
   const control::ControlState now = controller_->answer().state;
   if (now == control::ControlState::reached && arrived())
     finish(log::Outcome::reached, "");
@@ -362,6 +395,8 @@ void ClosedLoop::check_outcome() {
            fmt::format("at rest for {} s away from the goal", scene_.stall->hold_s));
   else if (halting_ && (rests() || node.k == steps_))
     finish(result_.outcome, result_.cause);
+  else if (node.k == steps_ && controller_->goals().follows())
+    finish(log::Outcome::followed, "");
   else if (node.k == steps_)
     finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
   else if (recorder_->stopped(node.k))
@@ -380,6 +415,8 @@ bool ClosedLoop::arrived() const {
 control::GoalError ClosedLoop::goal_error() const {
   dynamics::Workspace ws(model_);
   dynamics::forward_kinematics(model_, ws, plant_->node().q);
+  if (const control::TargetState* const target = controller_->answer().target)
+    return control::target_error(controller_->goals().goal(), target->pose, model_, ws);
   return control::goal_error(controller_->goals().goal(), model_, ws, plant_->node().q,
                              plant_->node().v);
 }
@@ -453,12 +490,54 @@ void ClosedLoop::refuse() {
 
 void ClosedLoop::let_controller_observe() {
   observed_k_ = plant_->node().k;
+  if (feed_) feed_target();
   actuation_->observe(q_shown_, v_shown_);
   controller_->observe(plant_->node().time_s, q_shown_, v_shown_);
   const control::GoalTracker& goals = controller_->goals();
   while (goals_reached_ < goals.index())
     recorder_->event(plant_->node().time_s,
                      fmt::format("goal {} of {} reached", ++goals_reached_, goals.size()));
+}
+
+void ClosedLoop::feed_target() {
+  feed_->advance(plant_->node().time_s, *controller_, [this](const std::string& line) {
+    // Only the first few become warnings of the result: a stream may be wrong line by line.
+    constexpr long warned = 5;
+    tracking_->count_refused_line();
+    if (++refused_lines_ <= warned) result_.warnings.push_back(line);
+    report_event(true, line);
+  });
+}
+
+void ClosedLoop::note_tracking() {
+  if (!tracking_ || controller_->answer().target == nullptr) return;
+  tracking_->observe(controller_->goals().goal(), *controller_->answer().target, plant_->node().q,
+                     *judge_, plant_->node().k > 0 ? scene_.step_s : 0.0);
+}
+
+void ClosedLoop::check_target() {
+  const control::TargetState* const target = controller_->answer().target;
+  if (target == nullptr || !feed_ || done_ || halting_) return;
+  if (ends_by_s_) {  // the planner brings the arm to rest at a target that rests
+    if (plant_->node().v.lpNorm<Eigen::Infinity>() < resting_speed ||
+        plant_->node().time_s > *ends_by_s_)
+      finish(log::Outcome::target_lost, std::string(result_.cause));
+    return;
+  }
+  const scene::TargetStream& stream = controller_->goals().goal().stream;
+  if (feed_->ended() && plant_->node().time_s > feed_->last_s().value_or(0.0) + stream.gap_max_s)
+    return finish(log::Outcome::followed, "the stream of targets has ended");
+  const bool lost = target->lost && !std::exchange(target_lost_, target->lost);
+  target_lost_ = target->lost;
+  if (!lost) return;
+  const std::string what = fmt::format(
+      "the target is lost: no line of its stream for {} s, "
+      "expected at most {} s between two lines",
+      stream.gap_max_s, stream.gap_max_s);
+  report_event(true, what);
+  if (stream.when_lost != scene::WhenLost::end) return;
+  result_.cause = what;
+  ends_by_s_ = plant_->node().time_s + longest_halt_s;
 }
 
 void ClosedLoop::ask_planner() {
@@ -568,6 +647,7 @@ void ClosedLoop::warn_of_goals_in_contact(const Watch& watch) {
       if (watch.diagnostics) watch.diagnostics->info(result_.warnings.back());
     };
     if (!judge_->has_obstacles() && !judge_->has_self()) return;
+    if (goal.type == scene::GoalType::follow) return;  // it moves
     const scene::Shapes placed =
         of_joints ? judge_->place(goal.q) : scene::Shapes{{&goal.pose.p(), 1}, point};
     scene::Contact deepest;
@@ -602,6 +682,7 @@ void ClosedLoop::fill_result() {
   result_.seed = scene_.seed;
   result_.deadline_us = 1e6 * controller_->deadline_s();
   result_.late_ticks = controller_->answer().overruns;
+  if (tracking_) result_.following = tracking_->figures();
   const control::GoalTracker& goals = controller_->goals();
   const control::GoalError error = goal_error();
   log::Result::Goal out;

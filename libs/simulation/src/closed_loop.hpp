@@ -10,7 +10,9 @@
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "recorder.hpp"
+#include "target_feed.hpp"
 #include "tick_log.hpp"
+#include "tracking_audit.hpp"
 
 namespace hamelin::simulation {
 
@@ -34,6 +36,8 @@ class ClosedLoop {
   /// Makes the plant, at the scene's start, and the actuation that drives it.
   void make_plant(const PlantFactory& factory);
   void start(const Watch& watch);
+  /// Opens the stream of targets, if a goal follows one.
+  void open_target_feed(const Watch& watch);
   void warn_of_goals_in_contact(const Watch& watch);
 
   /// Observes the node that the last step reached: velocity, surroundings, proof that the step
@@ -78,6 +82,11 @@ class ClosedLoop {
   void refuse();
   /// Lets the controller look at the arm, as it measures it, and at its goals.
   void let_controller_observe();
+  /// Passes on the targets that are due.
+  void feed_target();
+  void note_tracking();
+  /// Ends the run where the target has come to its end, or is lost in a scene that ends then.
+  void check_target();
   void ask_planner();
   /// Ends the run if the controller's planner failed, at rest if a shield can stop the arm.
   /// @return whether it did not
@@ -117,6 +126,11 @@ class ClosedLoop {
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<EnergyAudit> audit_;
   std::unique_ptr<TickLog> log_;
+  std::unique_ptr<TargetFeed> feed_;         ///< only of a streamed target
+  std::unique_ptr<TrackingAudit> tracking_;  ///< only with a follow goal
+  bool target_lost_ = false;                 ///< at the last tick
+  std::optional<double> ends_by_s_;          ///< once the target is lost in a scene that ends then
+  long refused_lines_ = 0;                   ///< of the stream of targets
   const Watch* watch_ = nullptr;
   struct Message {
     bool warning;

@@ -101,6 +101,7 @@ void ClosedLoop::take_load() {
                              plant_->node().q);
   plant_->take_load();
   actuation_->take_load();
+  if (tracking_) tracking_->take_load();
   const integration::Energy after = plant_->energy();
   audit_->book_load(after.kinetic_J + after.potential_J - before.kinetic_J - before.potential_J);
   own_judge_ = control::WorldView::for_other_load(scene_, model_, *own_judge_);

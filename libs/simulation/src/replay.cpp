@@ -94,6 +94,10 @@ std::vector<std::pair<std::string, std::string>> file_pointers(const Json& confi
   for (std::size_t i = 0; config.contains(obstacles) && i < config[obstacles].size(); ++i)
     places.emplace_back(fmt::format("waypoints_{}", i),
                         fmt::format("/obstacles/{}/motion/file", i));
+  const Json::json_pointer goals("/goals");
+  for (std::size_t i = 0; config.contains(goals) && i < config[goals].size(); ++i)
+    for (const char* place : {"motion", "stream"})
+      places.emplace_back(fmt::format("target_{}", i), fmt::format("/goals/{}/{}/file", i, place));
   return places;
 }
 

@@ -30,6 +30,17 @@ Json paths_json(const control::PlannerHost::Drawing& drawing) {
   return paths;
 }
 
+Json target_json(const control::TargetState& target, const TrackingAudit& tracking) {
+  const Eigen::Vector4d wxyz = geometry::quaternion_wxyz(target.pose.R());
+  Json out{{"position_m", to_json(target.pose.p())},
+           {"quaternion_wxyz", to_json(wxyz)},
+           {"error_m", tracking.error().metres.value_or(0.0)},
+           {"free", tracking.free()}};
+  if (tracking.error().radians) out["error_rad"] = *tracking.error().radians;
+  if (target.lost) out["lost"] = true;
+  return out;
+}
+
 }  // namespace
 
 void TickLog::header(const scene::Scene& scene, const Json& params, const Json& provenance,
@@ -82,6 +93,8 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
                       {"q_end", to_json(shield->stop().end())}};
     if (shield->stop().moves()) fields["stop"]["evades"] = true;
   }
+  if (answer_ != nullptr && answer_->target != nullptr && !answer_->target->waiting)
+    fields["target"] = target_json(*answer_->target, *tracking_);
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_->has_self()) fields["self_clearance_m"] = world_->self_clearance_m();
   if (world_->has_obstacles()) {

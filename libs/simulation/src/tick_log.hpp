@@ -6,6 +6,7 @@
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "recorder.hpp"
+#include "tracking_audit.hpp"
 
 namespace hamelin::simulation {
 
@@ -28,6 +29,16 @@ class TickLog {
   void header(const scene::Scene& scene, const Json& params, const Json& provenance, long steps);
   /// The judge's view is another one from now on.
   void set_world(const control::WorldView& world) noexcept { world_ = &world; }
+
+  /// Writes the target that is followed, too. Both must outlive this.
+  void add_target(const control::Answer& answer, const TrackingAudit& tracking) {
+    answer_ = &answer;
+    tracking_ = &tracking;
+  }
+
+  /// @param params the planner's, with defaults @param series that it declared
+  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
+              const std::vector<planning::Series>& series, const Json& provenance, long steps);
   /// Writes the line of this node. @param answer the planner's, which acts from here on; null if
   /// there is none
   void tick(bool certified, const planning::CommandBuffers* answer);
@@ -39,6 +50,8 @@ class TickLog {
   const control::WorldView* world_;
   control::Controller& controller_;
   Actuation& actuation_;
+  const control::Answer* answer_ = nullptr;  ///< null if no goal follows a target
+  const TrackingAudit* tracking_ = nullptr;  ///< the same
   std::uint64_t drawn_ = 0;  ///< number of the planner's drawing that was written last
   Eigen::VectorXd torque_;   ///< of the last node with an answer
 };

@@ -7,9 +7,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "approach_speed.hpp"
 #include "evader.hpp"
+#include "follower.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
@@ -51,6 +54,11 @@ constexpr int hurried_steps = 2;  // factor of the steps of a search where somet
 constexpr double longest_wait_s = 6.0;
 // Largest |error| of a joint at a reached via and at the end of an escape path [rad or m].
 constexpr double via_reached = 0.1, escape_end_reached = 0.08;
+// An arm that is kept from its target, farther than so far [m and ½ rad], for so long and up to
+// this share of the desired motion, searches a way to it. To a target that rests it does so a few
+// times.
+constexpr double target_away = 0.06, target_blocked_s = 0.3, target_blocked_share = 0.3;
+constexpr int target_searches = 3;
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -78,6 +86,8 @@ VectorXd lever_weights(const model::Model& model) {
 
 class Hybrid final : public planning::Planner {
  public:
+  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS;
+
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
         setup_(setup),
@@ -91,6 +101,7 @@ class Hybrid final : public planning::Planner {
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
         evader_(host, setup_, model_, law_, margins_),
+        follower_(setup, model_),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
@@ -141,6 +152,8 @@ class Hybrid final : public planning::Planner {
     if (rollout_) rollout_->set_params(tuning.search_law);
     if (roots_) roots_->set_params(tuning.search_law);
     margins_.set_params(tuning.margins);
+    follower_.set_params(tuning.follow);
+    target_velocity_gain_ = tuning.target_velocity_gain;
     measure_margins_ = true;
     velocity_gain_ = tuning.velocity_gain;
     follow_gain_ = tuning.follow_gain;
@@ -185,6 +198,8 @@ class Hybrid final : public planning::Planner {
       evader_.velocity(q_, u_);
     } else if (mode_ == Mode::search) {
       u_.setZero();
+    } else if (follows() && mode_ == Mode::goal) {
+      follow(tick);
     } else {
       closing_speed = law_.attract(model_, ws_, q_, target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
@@ -200,6 +215,7 @@ class Hybrid final : public planning::Planner {
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
            drive = drive_acceleration_;
+    if (follows() && mode_ == Mode::goal) gain = target_velocity_gain_;
     if (evader_.evades()) gain = evasion_gain, drive = evasion_acceleration;
     x_ = w_ + horizon_s_ * (gain * (u_ - w_)).cwiseMin(drive).cwiseMax(-drive);
     project(command);
@@ -208,7 +224,10 @@ class Hybrid final : public planning::Planner {
     else
       answer_by_velocity(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
-    check_stall(tick.time_s(), target, closing_speed, command);
+    if (follows())
+      check_target(tick.time_s(), command);
+    else
+      check_stall(tick.time_s(), target, closing_speed, command);
     if (!evader_.active()) return;
     command.set_series(evasion_series_, static_cast<double>(evader_.act()));
     if (const auto clearance = evader_.clearance_ahead())
@@ -239,6 +258,21 @@ class Hybrid final : public planning::Planner {
     for (Eigen::Index i = 0; i < path.cols(); ++i) path_.add(path.col(i));
     path_position_ = 0.0;
     enter(Mode::goal, tick.time_s());
+    if (!follows()) return;
+    anchor_.set(goal);
+    follower_.start(tick.q());
+    searches_target_ = false;
+  }
+
+  [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
+
+  void follow(const planning::Tick& tick) {
+    follower_.observe(ws_, v_, setup_.control_period_s());
+    for (int k = 0; k < setup_.dof(); ++k) std::tie(lower_[k], upper_[k]) = joint_bounds(k);
+    follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, lower_,
+                       upper_, u_);
+    if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
+    follower_.keep_clear(obstacles_.points(), brake_, rate_, lower_, upper_, u_);
   }
 
   void measure_margins() {
@@ -377,12 +411,8 @@ class Hybrid final : public planning::Planner {
         excess = std::max(excess, std::abs(x_[k]) / (*velocity_max)[k]);
       x_ /= excess;
     }
-    const auto q_lower = setup_.q_lower(), q_upper = setup_.q_upper();
     for (int k = 0; k < setup_.dof(); ++k) {
-      double low = -std::numeric_limits<double>::infinity(), high = -low;
-      if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
-      if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
-      if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
+      const auto [low, high] = joint_bounds(k);
       // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
       // approached with the hardest braking.
       const double slowest = w_[k] - dt * acceleration_max_,
@@ -393,6 +423,17 @@ class Hybrid final : public planning::Planner {
         lower_[k] = upper_[k] = std::clamp(0.5 * (low + high), slowest, fastest);
     }
     filter_.set_box(lower_, upper_);
+  }
+
+  // The bounds of a joint's velocity by its limits, where these are modelled.
+  [[nodiscard]] std::pair<double, double> joint_bounds(int k) const {
+    const auto velocity_max = setup_.velocity_max(), q_lower = setup_.q_lower(),
+               q_upper = setup_.q_upper();
+    double low = -std::numeric_limits<double>::infinity(), high = -low;
+    if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
+    if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
+    if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
+    return {low, high};
   }
 
   // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at
@@ -445,6 +486,57 @@ class Hybrid final : public planning::Planner {
     if (!ramp_) return side * approach_speed(x, brake, joint_limit_rate);
     return side *
            approach_speed(x, brake, joint_limit_rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
+  }
+
+  // An arm that is kept from its target searches a way around while it goes on following. A target
+  // is never given up: it may come back.
+  void check_target(double now, planning::Command& command) {
+    command.disable_stall_rule();
+    if (!search_) return;
+    const double distance = law_.distance(model_, ws_, q_, {goal_});
+    if (mode_ == Mode::escape_path) {
+      if (distance < target_away || escape_has_ended(now)) resume_target(now);
+      return;
+    }
+    if (searches_target_) {
+      if (!search_->advance(search_steps_)) return;
+      searches_target_ = false;
+      blocked_since_s_ = now;
+      if (search_->path().empty() || distance < target_away) return;
+      escape_position_ = 0.0;
+      return enter(Mode::escape_path, now);
+    }
+    if (follower_.progress() > target_blocked_share || distance < target_away)
+      blocked_since_s_ = now;
+    if (now - blocked_since_s_ > target_blocked_s) search_target(now);
+  }
+
+  // An escape towards a place of the target ends there, or where it is stuck.
+  [[nodiscard]] bool escape_has_ended(double now) {
+    if (stall_.stalled(now, remaining({goal_, &via_}), v_.norm(), 1.0, held_back_)) return true;
+    return escape_position_ >= search_->path().length() &&
+           (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < via_reached;
+  }
+
+  void resume_target(double now) {
+    follower_.restart();
+    blocked_since_s_ = now;
+    enter(Mode::goal, now);
+  }
+
+  void search_target(double now) {
+    blocked_since_s_ = now;
+    if (anchor_.searches > 0 && !anchor_.left_by(*goal_)) {
+      if (anchor_.searches >= target_searches) return;
+      ++anchor_.searches;
+    } else {
+      anchor_.set(*goal_);
+      anchor_.searches = 1;
+    }
+    host_.info("searches a way to the target");
+    surroundings_.count(nullptr);
+    search_->begin(anchor_.goal(), q_, nullptr, 0.0);
+    searches_target_ = true;
   }
 
   void check_stall(double now, const Target& target, double closing_speed,
@@ -572,6 +664,10 @@ class Hybrid final : public planning::Planner {
   JointBox box_;
   SafetyFilter filter_;
   Evader evader_;
+  Follower follower_;
+  TargetAnchor anchor_;           ///< the last place of the target to which a way was searched
+  bool searches_target_ = false;  ///< whether such a search goes on
+  double blocked_since_s_ = 0.0;  ///< since when the arm has been kept from the target
   double evades_since_s_ = 0.0;
   double least_left_ = 0.0, progress_s_ = 0.0;  ///< least remaining length, and since when
   std::int32_t evasion_series_ = -1, clearance_series_ = -1;
@@ -580,8 +676,9 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
-  double velocity_gain_ = 0.0, follow_gain_ = 0.0, drive_acceleration_ = 0.0,
-         acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
+  double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
+         drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0,
+         joint_damping_ = 0.0, contact_radius_;
   int passes_ = 1, max_escapes_, search_steps_ = 1;
   double horizon_s_;                  ///< time after which the velocity is to be x
   std::optional<Observer> observer_;  ///< only under sampled actuation

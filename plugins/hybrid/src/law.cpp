@@ -34,16 +34,16 @@ Law::Law(const planning::Setup& setup, const model::Model& model, const LawParam
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
 
-void Law::task_error(const model::Model& model, const dynamics::Workspace& ws,
-                     const hamelin_goal& goal, Vector3d& position, Vector3d& rotation) const {
+TipError tip_error(const model::Model& model, const dynamics::Workspace& ws,
+                   const hamelin_goal& goal) {
   const geometry::SE3 tip = dynamics::tip_pose(model, ws);
-  position = planning::vec3(goal.position_world_m) - tip.p();
-  rotation.setZero();
-  if (goal.type != HAMELIN_GOAL_POSE) return;
+  TipError error{planning::vec3(goal.position_world_m) - tip.p(), Vector3d::Zero()};
+  if (!rotates(goal)) return error;
   const auto& q = goal.quaternion_wxyz;
   const Eigen::AngleAxisd turn(Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix() *
                                tip.R().transpose());
-  rotation = turn.axis() * turn.angle();
+  error.rotation = turn.axis() * turn.angle();
+  return error;
 }
 
 double Law::distance(const model::Model& model, const dynamics::Workspace& ws,
@@ -51,8 +51,7 @@ double Law::distance(const model::Model& model, const dynamics::Workspace& ws,
   if (target.via != nullptr) return (*target.via - q).norm();
   if (target.goal->type == HAMELIN_GOAL_JOINT)
     return (planning::ConstVectorMap(target.goal->q, q.size()) - q).norm();
-  Vector3d position, rotation;
-  task_error(model, ws, *target.goal, position, rotation);
+  const auto [position, rotation] = tip_error(model, ws, *target.goal);
   return 2.0 * position.norm() + 0.5 * rotation.norm();
 }
 
@@ -61,10 +60,9 @@ bool Law::within(const model::Model& model, const dynamics::Workspace& ws, const
   if (goal.type == HAMELIN_GOAL_JOINT)
     return (planning::ConstVectorMap(goal.q, q.size()) - q).lpNorm<Eigen::Infinity>() <
            share * goal.tolerance_rad;
-  Vector3d position, rotation;
-  task_error(model, ws, goal, position, rotation);
+  const auto [position, rotation] = tip_error(model, ws, goal);
   return position.norm() < share * goal.tolerance_m &&
-         (goal.type != HAMELIN_GOAL_POSE || rotation.norm() < share * goal.tolerance_rad);
+         (!rotates(goal) || rotation.norm() < share * goal.tolerance_rad);
 }
 
 double Law::margin_weight(const model::Model& model, const dynamics::Workspace& ws,
@@ -93,13 +91,11 @@ double Law::attract(const model::Model& model, const dynamics::Workspace& ws,
                     params_.cruise_speed / error);
     return u.norm();
   }
-  Vector3d position, rotation;
-  task_error(model, ws, *target.goal, position, rotation);
+  const auto [position, rotation] = tip_error(model, ws, *target.goal);
   dynamics::frame_jacobian(model, ws, model.robot().tip.link, dynamics::tip_pose(model, ws).p(),
                            J_);
-  const bool rotates = target.goal->type == HAMELIN_GOAL_POSE;
   Eigen::Matrix<double, 6, 1> desired = Eigen::Matrix<double, 6, 1>::Zero();
-  if (rotates) {
+  if (rotates(*target.goal)) {
     J_.topRows<3>() *= rotation_length;
     const double angle = rotation.norm();
     if (angle > 0.0)

@@ -14,6 +14,20 @@ struct Target {
   bool passing = false;                  ///< whether the via is passed at full speed
 };
 
+/// Whether a goal of the tip prescribes its orientation.
+[[nodiscard]] inline bool rotates(const hamelin_goal& goal) noexcept {
+  return goal.type == HAMELIN_GOAL_POSE ||
+         (goal.type == HAMELIN_GOAL_FOLLOW && goal.follows_rotation != 0);
+}
+
+/// Error of the tip in the world: from its position to that of the goal [m], and the rotation that
+/// leads to the goal's orientation, axis times angle [rad]; zero if the goal prescribes none.
+struct TipError {
+  Eigen::Vector3d position, rotation;
+};
+[[nodiscard]] TipError tip_error(const model::Model& model, const dynamics::Workspace& ws,
+                                 const hamelin_goal& goal);
+
 struct LawParams {
   double joint_gain, tip_gain;  ///< near a target of the joints and of the tip [1/s]
   double cruise_speed, tip_speed, tip_turn;
@@ -57,10 +71,6 @@ class Law {
              double strength, planning::Command& command);
 
  private:
-  void task_error(const model::Model& model, const dynamics::Workspace& ws,
-                  const hamelin_goal& goal, Eigen::Vector3d& position,
-                  Eigen::Vector3d& rotation) const;
-
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;

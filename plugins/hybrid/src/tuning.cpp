@@ -9,6 +9,7 @@ namespace hamelin::hybrid {
 namespace {
 
 constexpr double beyond_shield_m = 0.002;  // what is kept of the distance between parts besides
+constexpr double joint_speed_share = 1.5;  // of the cruise speed, for |u| towards a target
 constexpr double voxel_at_goal = 0.4;      // share of a voxel that is kept near a tip goal
 
 // These determine the crop of the map, the kind of search, or the size of memory.
@@ -49,8 +50,12 @@ Tuning::Tuning(const planning::Setup& setup, const Json& params)
     : law(law_params(params, true)),
       search_law(law_params(params, false)),
       margins(margin_params(setup, params)),
+      follow{params["target_gain"],       params["tip_speed_m_s"],
+             params["tip_turn_rad_s"],    joint_speed_share * params["cruise_speed"].get<double>(),
+             params["repulsion_range_m"], params["repulsion_speed_m_s"]},
       velocity_gain(value_or(params["k_v"], params["velocity_gain"])),
       follow_gain(params["velocity_gain"]),
+      target_velocity_gain(params["target_velocity_gain"]),
       drive_acceleration(params["drive_acceleration"]),
       acceleration_max(params["acceleration_max"]),
       brake_acceleration(params["brake_acceleration"]),

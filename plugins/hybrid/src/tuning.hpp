@@ -1,4 +1,5 @@
 #pragma once
+#include "follower.hpp"
 #include "hamelin/io/json.hpp"
 #include "law.hpp"
 #include "margins.hpp"
@@ -12,8 +13,9 @@ struct Tuning {
   LawParams law;         ///< of the arm
   LawParams search_law;  ///< of searches, which ignore k_p and k_v
   MarginParams margins;
-  double velocity_gain, follow_gain, drive_acceleration, acceleration_max, brake_acceleration,
-      approach_rate, joint_damping, stall_time_s;
+  FollowParams follow;
+  double velocity_gain, follow_gain, target_velocity_gain, drive_acceleration, acceleration_max,
+      brake_acceleration, approach_rate, joint_damping, stall_time_s;
   int filter_passes, search_steps, look_budget, look_steps;
 };
 

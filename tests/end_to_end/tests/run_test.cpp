@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <signal.h>
 
 #include <chrono>
@@ -69,6 +70,35 @@ TEST_CASE("the arm moves in MuJoCo where the build has it, and one line says so 
   const Json own = run_scene(sandbox, "clutter", 0, {"--plant", "hamelin"});
   CHECK(own["integrator"] == "hamel-variational");
   CHECK_FALSE(own.contains("plant"));
+}
+
+TEST_CASE("a target is streamed from a file or standard input", "[end_to_end]") {
+  Sandbox sandbox;
+  std::string lines;
+  for (int i = 0; i <= 50; ++i)
+    lines += fmt::format("{{\"time_s\": {:.2f}, \"velocity_m_s\": [0, 0.1, 0]}}\n", 0.02 * i);
+  write_file_atomically(sandbox.path("stick.jsonl"), lines + "wrong\n");
+  Json scene = read_json(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/follow.json");
+  scene["goals"] = {{{"type", "follow"}}};
+  for (const char* key : {"file", "spheres"})
+    scene["robot"][key] = (std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes" /
+                           scene["robot"][key].get<std::string>())
+                              .lexically_normal()
+                              .string();
+  write_file_atomically(sandbox.path("stick.json"), scene.dump());
+  const std::vector<std::string> command{"run",        "stick.json", "--target", "stick.jsonl",
+                                         "--duration", "3",          "--log",    "stick.log.jsonl"};
+  const Json result = test::run_json(sandbox, command);
+  CHECK(result["outcome"] == "followed");
+  CHECK(result["following"]["refused_lines"] == 1);
+  CHECK(result["warnings"][0].get<std::string>().find("stick.jsonl: line 52: is not a JSON") !=
+        std::string::npos);
+  CHECK(result["following"]["all"]["rms_m"].get<double>() < 0.003);
+  CHECK(sandbox.run({"replay", "stick.log.jsonl", "--verify"}).exit_code == 0);
+  CHECK(sandbox.run({"validate", "stick.log.jsonl"}).exit_code == 0);
+  const auto without = sandbox.run({"run", "stick.json"});
+  CHECK(without.exit_code == 2);
+  CHECK(without.err.find("/goals/0/stream/file: is missing") != std::string::npos);
 }
 
 TEST_CASE("energy-neutral steering does no work at any step size", "[end_to_end]") {

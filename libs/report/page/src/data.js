@@ -75,6 +75,7 @@ function prepare(report) {
       goalIndex: frames.goal_index ?? new Float64Array(frames.t.length),
       clearance: frames.clearance ?? null,
       influence: frames.influence_m ?? 0,
+      target: frames.target ?? null,
       contacts: null,
       forces: (frames.forces ?? []).filter((force) => force.f.length === 3 * frames.t.length),
     };

@@ -276,6 +276,42 @@ export class Goals {
   }
 }
 
+/** The target that is followed: a ring and a dot, and the path that it takes. */
+export class Target {
+  /** @param {Float64Array | null} at x, y, z of each frame */
+  constructor(at, reach) {
+    this.at = at ?? new Float64Array(0);
+    this.group = new Group();
+    if (!this.at.length) return;
+    this.material = new MeshLambertMaterial();
+    this.mark = new Group();
+    const ball = new Mesh(BALL, this.material);
+    ball.scale.setScalar(0.011 * reach);
+    const ring = new Mesh(new TorusGeometry(0.034 * reach, 0.0035 * reach, 8, 40), this.material);
+    const cross = new Mesh(ring.geometry, this.material);
+    cross.rotation.x = Math.PI / 2;
+    this.mark.add(ball, ring, cross);
+    this.lineMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.6 });
+    const path = new BufferGeometry().setAttribute('position', new BufferAttribute(Float32Array.from(this.at), 3));
+    this.group.add(this.mark, new Line(path, this.lineMaterial));
+  }
+
+  paint(colors) {
+    if (!this.at.length) return;
+    this.material.color.set(colors.goal);
+    this.material.emissive.set(colors.goal).multiplyScalar(0.4);
+    this.lineMaterial.color.set(colors.goal);
+  }
+
+  /** Shows it between the frames k and k + 1, at the share a. */
+  update(k, a) {
+    if (!this.at.length) return;
+    const next = Math.min(k + 1, this.at.length / 3 - 1);
+    const along = (i) => (1 - a) * this.at[3 * k + i] + a * this.at[3 * next + i];
+    this.mark.position.set(along(0), along(1), along(2));
+  }
+}
+
 /** A grid under the arm, or in the plane of a planar one. */
 export class Floor {
   constructor(step, half, center, normal) {

@@ -2,7 +2,7 @@
 import { DirectionalLight, Group, HemisphereLight, Scene } from 'three';
 import { Arm } from './arm.js';
 import { runColor, theme } from './colors.js';
-import { Contacts, coordinateAxes, Floor, Forces, Goals, Spheres, Trail } from './markers.js';
+import { Contacts, coordinateAxes, Floor, Forces, Goals, Spheres, Target, Trail } from './markers.js';
 import { Drawings } from './drawings.js';
 import { Loads } from './loads.js';
 import { Obstacles, Paths, Predictions } from './obstacles.js';
@@ -31,13 +31,14 @@ export class RunScene {
     this.trail = new Trail(replay.tips, reach);
     this.stop = new StopLine(replay.run, world.robot, reach);
     this.goals = new Goals(world);
+    this.target = new Target(frames.target, reach);
     this.obstacles = new Obstacles(world.obstacles ?? [], world.robot.planar_normal);
     this.paths = new Paths(world.obstacles ?? [], replay.end);
     this.predictions = new Predictions(world.obstacles ?? []);
     this.floor = new Floor(floor.step, floor.half, floor.center, floor.normal);
     this.tipFrame = world.goals.some((goal) => goal.type === 'pose') ? coordinateAxes(0.07 * reach) : new Group();
     this.tipFrame.matrixAutoUpdate = false;
-    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.arm, this.loads, this.drawings, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
+    this.parts = [this.floor, this.voxels, this.obstacles, this.paths, this.predictions, this.goals, this.target, this.arm, this.loads, this.drawings, this.spheres, this.contacts, this.forces, this.trail, this.stop].filter(Boolean);
     for (const part of this.parts) this.scene.add(part.group);
     this.scene.add(this.tipFrame);
     this.probes = this.probesOf(world.robot);
@@ -101,6 +102,7 @@ export class RunScene {
     this.drawings.group.visible = show.drawings;
     this.stop.group.visible = show.stops;
     this.goals.group.visible = show.goals;
+    this.target.group.visible = show.goals;
     this.tipFrame.visible = show.goals;
     this.obstacles.group.visible = show.obstacles;
     this.paths.group.visible = show.paths;
@@ -120,6 +122,7 @@ export class RunScene {
     this.drawings.update(t);
     this.stop.update(t);
     this.goals.setCurrent(replay.goalIndex);
+    this.target.update(k, a);
     this.obstacles.update(t);
     this.predictions.update(t);
     const pose = chain.link(replay.world.robot.tip_link);

@@ -47,7 +47,7 @@ export class Settings {
       forces: runs.some((run) => run.frames.forces.length),
       drawings: runs.some((run) => run.drawings),
       stops: runs.some((run) => run.stops.length),
-      goals: used.some((world) => world.goals.length),
+      goals: used.some((world) => world.goals.length) || runs.some((run) => run.frames.target),
       obstacles: used.some((world) => world.obstacles?.length),
       paths: used.some((world) => world.obstacles?.some((o) => o.motion || o.poses)),
       predicted: used.some((world) => world.obstacles?.some((o) => o.predicted)),

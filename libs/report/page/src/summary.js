@@ -3,7 +3,7 @@ import { runColor } from './colors.js';
 import { h } from './dom.js';
 import { number, seconds, splitUnit } from './format.js';
 
-const GOOD = new Set(['reached', 'completed']);
+const GOOD = new Set(['reached', 'followed', 'completed']);
 const BAD = new Set(['collision', 'diverged', 'defect', 'refused', 'crashed']);
 
 /** The outcome as a coloured word. */

@@ -14,6 +14,7 @@
 
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/live_target.hpp"
 #include "hamelin/control/loaded_arm.hpp"
 #include "hamelin/control/newest.hpp"
 #include "hamelin/control/state_estimator.hpp"
@@ -43,6 +44,8 @@ struct Answer {
   /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
   std::uint64_t goals_number = 0;
   std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
+  /// The target of the current goal, where that is a follow goal; else null.
+  const TargetState* target = nullptr;
   /// Number of the World's snapshot that the answer is for.
   std::uint64_t snapshot = 0;
   /// Number of what the arm carries: 0 at first, else what attach() or detach() returned last of
@@ -150,6 +153,15 @@ class Controller {
   /// The names of what is attached, or will be at the next tick. Any thread.
   [[nodiscard]] std::vector<std::string> attached() const;
 
+  /// Moves the target of the follow goal, from the next tick on: a pose, from where it goes on with
+  /// the velocities that are given or else estimated, or a twist, as of a joystick. Any thread; the
+  /// tick takes the newest without a lock. Times must increase. The bounds are those of the goal,
+  /// scene::TargetStream.
+  /// @throws Error invalid, "target: …", if no goal follows a streamed target, for numbers that are
+  ///         not finite, times that do not increase, and poses that jump; nothing changes then
+  void set_target(const TargetPose& pose);
+  void set_target(const TargetTwist& twist);
+
   /// Changes parameters of the planner, from the next tick on. Any thread.
   /// @param changes an object with those that change; the others stay
   /// @throws Error invalid for values that the planner's schema or the planner refuses, also if it
@@ -212,6 +224,10 @@ class Controller {
   [[nodiscard]] const PlannerHost::Drawing& drawing() const noexcept {
     return arm_->planner.drawing();
   }
+  /// Pose of the tip at the last tick, in the world.
+  [[nodiscard]] geometry::SE3 tip() const {
+    return dynamics::tip_pose(arm_->model, arm_->view.poses());
+  }
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
   /// Time that the planner should not exceed in a tick [s], see Answer::overruns.
@@ -242,6 +258,13 @@ class Controller {
   void take_braking_state();
   void start_outputs();
   void take_goals();
+  /// Notes whether these goals follow a streamed target.
+  void expect_target(const std::vector<scene::Goal>& goals);
+  template <class Sample>
+  void receive_target(const Sample& sample);
+  void update_target();
+  /// The current goal as the planner sees it.
+  [[nodiscard]] const hamelin_goal* goal_for_planner();
   void take_params();
   /// Calls the planner. @return whether it has not failed; else failure_ says why
   [[nodiscard]] bool ask_planner();
@@ -281,6 +304,12 @@ class Controller {
   Newest<NewParams> new_params_;
   Newest<NewLoad> new_load_;
   const GoalList* goal_list_;  ///< that the tick uses
+  TargetReceiver receiver_;    ///< among writers, as goals_mutex_
+  bool receives_ = false;      ///< whether the newest goals follow a streamed target
+  Newest<StreamedTarget> new_target_;
+  LiveTarget target_;
+  const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
+  hamelin_goal live_goal_{};              ///< the current one if it is a follow goal
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
   GoalTracker goals_;

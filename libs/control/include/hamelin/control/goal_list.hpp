@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/control/live_target.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/planning/plugin_abi.h"
 #include "hamelin/scene/scene.hpp"
@@ -25,11 +26,18 @@ struct GoalList {
 /// A goal as planners see it. Its pointers refer to `goal`.
 [[nodiscard]] hamelin_goal to_c(const scene::Goal& goal);
 
+/// Sets what changes from tick to tick in a follow goal.
+void set_target(const TargetState& target, hamelin_goal& goal) noexcept;
+
 /// Checks goals that are to replace those of a scene.
 /// @param path_points_max the largest number of way-points of a path
+/// @param follows whether the planner accepts goals that follow a target
 /// @throws Error invalid, "goal 1: what is wrong, what was expected"
 void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scene,
-                 const model::Model& model, std::size_t path_points_max);
+                 const model::Model& model, std::size_t path_points_max, bool follows);
+
+/// The goal that follows a target, which is the last one; null if there is none.
+[[nodiscard]] const scene::Goal* follow_goal_of(const std::vector<scene::Goal>& goals) noexcept;
 
 /// The largest number of way-points of the paths of these goals; 0 without paths.
 [[nodiscard]] std::size_t longest_path(const std::vector<scene::Goal>& goals);

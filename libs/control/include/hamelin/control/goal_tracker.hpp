@@ -16,10 +16,16 @@ struct GoalError {
   bool reached = false;  ///< within the goal's tolerances, speeds included
 };
 
-/// Error of a goal. `ws` must have the poses of q by this model.
+/// Error of a goal. `ws` must have the poses of q by this model. A follow goal has none of its own,
+/// see target_error().
 [[nodiscard]] GoalError goal_error(const scene::Goal& goal, const model::Model& model,
                                    const dynamics::Workspace& ws, const Eigen::VectorXd& q,
                                    const Eigen::VectorXd& v);
+
+/// The distance of the tip from the target of a follow goal. It is never reached. `ws` must have
+/// the arm's poses by this model.
+[[nodiscard]] GoalError target_error(const scene::Goal& goal, const geometry::SE3& target,
+                                     const model::Model& model, const dynamics::Workspace& ws);
 
 /// Keeps track of the current goal, and detects stalls: an arm at rest away from the goal.
 class GoalTracker {
@@ -55,9 +61,12 @@ class GoalTracker {
     return (*goals_)[std::min(index_, goals_->size() - 1)];
   }
 
-  /// Evaluates the scene's stall rule; to be called once per step of dt_s. A stall is a tip whose
-  /// speed stayed below that of the rule for its hold time, and for position and pose goals also
-  /// farther from the goal than its distance.
+  /// Whether the current goal follows a target.
+  [[nodiscard]] bool follows() const { return goal().type == scene::GoalType::follow; }
+
+  /// Evaluates the scene's stall rule, which does not apply to a follow goal; to be called once per
+  /// step of dt_s. A stall is a tip whose speed stayed below that of the rule for its hold time,
+  /// and for position and pose goals also farther from the goal than its distance.
   [[nodiscard]] bool stalled(const dynamics::Workspace& ws, const Eigen::VectorXd& v, double dt_s);
 
  private:

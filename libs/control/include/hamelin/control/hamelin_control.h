@@ -72,7 +72,17 @@ typedef struct hamelin_answer {
   uint64_t load;                 /* number of what the arm carries: 0 at first */
   uint64_t refused_load;         /* number of the last load that was refused; 0: none was */
   const char* load_refusal;      /* why; empty if none was */
+  int32_t target;                /* HAMELIN_TARGET_..., where a target is followed */
+  double target_position_m[3];   /* where it is */
+  double target_error_m;         /* distance of the tip from it */
 } hamelin_answer;
+
+enum {
+  HAMELIN_TARGET_NONE = 0,     /* the goal does not follow a target */
+  HAMELIN_TARGET_WAITING = 1,  /* nothing has arrived yet; the arm holds its place */
+  HAMELIN_TARGET_FOLLOWED = 2, /* it is followed, if it is in reach */
+  HAMELIN_TARGET_LOST = 3      /* the stream broke off, and the target rests */
+};
 
 enum { HAMELIN_SPHERE = 0, HAMELIN_BOX = 1, HAMELIN_CYLINDER = 2, HAMELIN_CAPSULE = 3 };
 
@@ -109,8 +119,8 @@ typedef struct hamelin_payload {
   size_t shape_count;
 } hamelin_payload;
 
-/* A measured pose of an obstacle. Pointers to three numbers may be null: then the velocity, the
- * acceleration or the angular velocity [rad/s] is estimated from the poses. */
+/* A measured pose of an obstacle or a target. Pointers to three numbers may be null: then the
+ * velocity, the acceleration or the angular velocity [rad/s] is estimated from the poses. */
 typedef struct hamelin_observation {
   uint32_t struct_size;
   double time_s; /* of the measurement, on the clock of hamelin_controller_tick */
@@ -129,9 +139,19 @@ double hamelin_controller_period_s(const hamelin_controller* controller);
 void hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
                              const double* v, hamelin_answer* answer);
 
+/* What is believed of a stream of targets, see scene::TargetStream. 0 selects the default. */
+typedef struct hamelin_target_stream {
+  uint32_t struct_size;
+  int32_t position_only;           /* 1: any orientation will do */
+  double gap_max_s;                /* after a longer gap the target is lost; 0.2 */
+  double jump_max_m, jump_max_rad; /* from where the target is expected; 0.1, 0.5 */
+  double noise_m, noise_rad;       /* standard deviation of poses, per axis; 0.0005, 0.002 */
+  double leash_m, leash_rad;       /* of targets that are moved by twists; 0.05, 0.3 */
+} hamelin_target_stream;
+
 /* The goals, replaced by one, from the next tick on; by any thread. *number, unless null, receives
- * what hamelin_answer.goals will be. Tolerances of zero or less select the defaults of scene files.
- * A target that moves from tick to tick is to get a function of its own. */
+ * what hamelin_answer.goals will be. Tolerances of zero or less select the defaults of scene
+ * files. */
 int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, const double* q,
                                           double tolerance_rad, uint64_t* number, char* error,
                                           size_t error_size);
@@ -140,6 +160,22 @@ int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const d
                                          const double quaternion_wxyz[4], double tolerance_m,
                                          double tolerance_rad, uint64_t* number, char* error,
                                          size_t error_size);
+/* A goal that follows a target, until another goal is set. The planner must be one that follows
+ * targets, such as hybrid. stream may be null. */
+int32_t hamelin_controller_follow(hamelin_controller* controller,
+                                  const hamelin_target_stream* stream, uint64_t* number,
+                                  char* error, size_t error_size);
+/* Moves that target, from the next tick on; by any thread: to a pose, from where it goes on with
+ * the velocities that are given or estimated, or with a twist in the axes of the world, as of a
+ * joystick. Times must increase. Fails for numbers that are not finite and poses that jump; the
+ * target stays as it was then. */
+int32_t hamelin_controller_set_target(hamelin_controller* controller,
+                                      const hamelin_observation* pose, char* error,
+                                      size_t error_size);
+int32_t hamelin_controller_set_target_twist(hamelin_controller* controller, double time_s,
+                                            const double velocity_m_s[3],
+                                            const double angular_velocity_rad_s[3], char* error,
+                                            size_t error_size);
 /* Changes parameters of the planner, from the next tick on; by any thread. params_json: an object
  * with those that change. */
 int32_t hamelin_controller_set_planner_params(hamelin_controller* controller,

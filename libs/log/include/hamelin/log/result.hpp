@@ -15,6 +15,8 @@ namespace hamelin::log {
 enum class Outcome : std::int32_t {
   completed,  ///< free motion ran to its end
   reached,
+  followed,     ///< a target was followed to the end of the run, or of its stream
+  target_lost,  ///< the stream of targets broke off in a scene that ends then
   stalled,
   collision,
   timeout,
@@ -24,7 +26,8 @@ enum class Outcome : std::int32_t {
   interrupted,
 };
 [[nodiscard]] std::string_view to_string(Outcome outcome) noexcept;
-/// Exit code of the program: 0 completed or reached, 1 goal not reached, 2 refused, 3 diverged or
+/// Exit code of the program: 0 completed, reached or followed, 1 goal not reached or target lost, 2
+/// refused, 3 diverged or
 /// defect, 130 interrupted.
 [[nodiscard]] int exit_code(Outcome outcome) noexcept;
 
@@ -77,6 +80,23 @@ struct Result {
     std::optional<double> error_m, error_rad;
   };
   std::optional<Goal> goal;
+  /// How well the tip followed a target. It is free while a posture that holds it is found near the
+  /// arm's own, with a straight way there that is clear; see simulation::TrackingAudit.
+  struct Following {
+    /// Over some time: root mean square and largest error of position and orientation.
+    struct Errors {
+      double time_s = 0.0, rms_m = 0.0, max_m = 0.0, rms_rad = 0.0, max_rad = 0.0;
+    };
+    Errors all, free;        ///< always, and while the target was free
+    double tracked_s = 0.0;  ///< within the tolerances of the goal
+    double free_not_tracked_s = 0.0;
+    double lost_s = 0.0;                 ///< after the stream broke off
+    long resumed = 0;                    ///< times a target became free again and was tracked again
+    long not_resumed = 0;                ///< times it was no longer free before that
+    std::optional<double> resume_max_s;  ///< longest time from free to tracked, or to the end
+    long refused_lines = 0;              ///< of the stream
+  };
+  std::optional<Following> following;
   SolverSummary solver;
   double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0,
          held_work_J = 0.0;

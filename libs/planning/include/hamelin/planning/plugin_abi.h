@@ -123,21 +123,34 @@ typedef struct hamelin_box {
   double quaternion_wxyz[4]; /* orientation: the same for all boxes of a map */
 } hamelin_box;
 
-enum { HAMELIN_GOAL_JOINT = 0, HAMELIN_GOAL_POSITION = 1, HAMELIN_GOAL_POSE = 2 };
+/* FOLLOW: a target that moves, which the tip follows until the run ends. Only planners with the
+ * property HAMELIN_FOLLOWS_TARGETS get such goals. */
+enum {
+  HAMELIN_GOAL_JOINT = 0,
+  HAMELIN_GOAL_POSITION = 1,
+  HAMELIN_GOAL_POSE = 2,
+  HAMELIN_GOAL_FOLLOW = 3
+};
 
-/* Later versions of the interface may add types of goals, as targets that move (a pose and a twist
- * per tick). Planners that support older versions only do not get them. */
 typedef struct hamelin_goal {
   uint32_t struct_size;
   int32_t type;
-  double position_world_m[3]; /* position and pose goals: desired position of the tip */
-  double quaternion_wxyz[4];  /* pose goals: desired orientation of the tip */
+  double position_world_m[3]; /* position, pose and follow goals: desired position of the tip */
+  double quaternion_wxyz[4];  /* pose and follow goals: desired orientation of the tip */
   const double* q;            /* joint goals: dof numbers; else null */
   double tolerance_m, tolerance_rad, speed_max;
   /* A joint goal may be the end of a path of joint vectors, of which the goal's q is the last. The
    * path is a guide; only its end must be reached. Null and 0 without a path. */
   const double* path; /* path_points * dof numbers, point by point */
   size_t path_points; /* at most hamelin_setup.path_points_max */
+  /* Appended in version 4. */
+  /* Follow goals: position and orientation above are those of the target at the time of the tick,
+   * and below are their derivatives, as far as they are known. All of these change from tick to
+   * tick while the goal keeps its goal_number. */
+  int32_t follows_rotation; /* 1: position and orientation; 0: any orientation will do */
+  int32_t target_lost;      /* 1: the stream of targets broke off, and the target rests */
+  double velocity_world_m_s[3], acceleration_world_m_s2[3];
+  double angular_velocity_world_rad_s[3], angular_acceleration_world_rad_s2[3];
 } hamelin_goal;
 
 /* A gyroscopic term: the force w x (velocity of the point) acts at a point of a link. It does no
@@ -351,10 +364,11 @@ typedef struct hamelin_host {
   void (*draw_path)(void* context, const double* points_world_m, size_t count);
 } hamelin_host;
 
-/* hamelin_plugin.properties: what a planner does not promise. */
+/* hamelin_plugin.properties: what a planner does not promise, and what it can do besides. */
 enum {
   HAMELIN_TICK_ALLOCATES = 1, /* its tick may use the heap, and so may wait for other threads */
-  HAMELIN_USES_THREADS = 2    /* it starts threads of its own */
+  HAMELIN_USES_THREADS = 2,   /* it starts threads of its own */
+  HAMELIN_FOLLOWS_TARGETS = 4 /* it accepts goals of the type HAMELIN_GOAL_FOLLOW */
 };
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;
@@ -365,7 +379,7 @@ typedef struct hamelin_plugin {
   uint32_t struct_size;
   uint32_t abi_version;     /* the newest version that the plugin supports */
   uint32_t abi_version_min; /* the oldest one */
-  uint32_t properties;      /* HAMELIN_TICK_ALLOCATES, HAMELIN_USES_THREADS, or 0 */
+  uint32_t properties;      /* sum of HAMELIN_TICK_ALLOCATES and the like, or 0 */
   const char* name;
   const char* version;
   const char* description;

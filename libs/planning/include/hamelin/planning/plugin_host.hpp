@@ -224,6 +224,8 @@ class Plugin {
   /// Whether its tick may use the heap, and whether it starts threads, by its own declaration.
   [[nodiscard]] bool tick_allocates() const noexcept;
   [[nodiscard]] bool uses_threads() const noexcept;
+  /// Whether it accepts goals that follow a target.
+  [[nodiscard]] bool follows_targets() const noexcept;
   /// Whether its planners' parameters can be changed while they run, and whether they can be told
   /// of a new start.
   [[nodiscard]] bool can_change_params() const noexcept;

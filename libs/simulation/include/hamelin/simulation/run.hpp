@@ -2,6 +2,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <istream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +26,9 @@ struct Watch {
   log::LineSink* log = nullptr;   ///< null: no log, at no cost
   long every = 1;                 ///< steps between tick lines; first and last always written
   std::vector<std::string> argv;  ///< the command line, for the provenance
+  /// A stream of targets for a goal that follows one, JSON lines; it takes the place of the scene's
+  /// file. Null: that file.
+  std::istream* target = nullptr;
   /// Set by a signal handler: the run stops, and its log ends properly.
   const std::atomic<bool>* stop = nullptr;
   std::optional<long> stop_at;  ///< stops at this step, to repeat a run that was interrupted
