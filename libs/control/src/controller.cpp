@@ -150,7 +150,9 @@ std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
 void Controller::expect_target(const std::vector<scene::Goal>& goals) {
   const scene::Goal* const follow = follow_goal_of(goals);
   receives_ = follow != nullptr && !follow->motion;
-  if (receives_) receiver_.start(follow->stream);
+  if (!receives_) return;
+  receiver_.start(follow->stream);
+  new_target_.publish(std::make_unique<StreamedTarget>());  // what belongs to an earlier goal
 }
 
 template <class Sample>
