@@ -47,6 +47,14 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
   return one_or_per_joint(values, dof, place);
 }
 
+void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
+  if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return;
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
+                          "expected one that does, such as hybrid",
+                          scene.name, scene.goals.size() - 1, plugin.name()));
+}
+
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
   check_numbers(scene, arm);
   return scaled_masses(arm, scene.actuation.planner_mass_scale);
@@ -86,7 +94,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
               options_.prepare_maps, options_.observations}),
       view_(scene_, nominal_, world_),
       shield_(make_shield()),
-      planner_(plugin, make_setup(plugin), params, nominal_, world_, view_, options_.log),
+      planner_(plugin, make_setup(), params, nominal_, world_, view_, options_.log),
       params_(params),
       new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
       new_params_(std::make_unique<NewParams>()),
@@ -96,6 +104,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       limits_(limits_of(scene_, nominal_)),
       sum_(nominal_, view_.contacts_max()),
       ws_(nominal_) {
+  check_follows(scene_, plugin);
   expect_target(scene_.goals);
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
@@ -110,12 +119,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   issued_.assign(delay_ticks + 1, zero);
 }
 
-planning::SetupData Controller::make_setup(const planning::Plugin& plugin) {
-  if (follow_goal_of(scene_.goals) != nullptr && !plugin.follows_targets())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
-                            "expected one that does, such as hybrid",
-                            scene_.name, scene_.goals.size() - 1, plugin.name()));
+planning::SetupData Controller::make_setup() {
   planning::SetupData setup = planner_setup(scene_, nominal_, view_, period_s_,
                                             shield_ ? shield_->limit_reserve() : LimitReserve{});
   setup.path_points_max = path_points_max_;

@@ -203,7 +203,7 @@ class Controller {
     std::optional<planning::PreparedParams> params;
   };
   [[nodiscard]] std::unique_ptr<Shield> make_shield();
-  [[nodiscard]] planning::SetupData make_setup(const planning::Plugin& plugin);
+  [[nodiscard]] planning::SetupData make_setup();
   void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   void take_braking_state();
   void start_outputs();
