@@ -161,7 +161,7 @@ scene::Scene scene_beside_ball(const scene::Goal& goal) {
 
 }  // namespace
 
-std::vector<TrialScene> built_in_scenes() {
+std::vector<TrialScene> built_in_scenes(bool follows_targets) {
   model::ChainOptions chain;
   chain.links = 3;
   const model::Model arm(model::make_chain(chain), geometry::SE3{},
@@ -175,6 +175,11 @@ std::vector<TrialScene> built_in_scenes() {
                                    std::pair("a position goal", scene::position_goal(tip.p())),
                                    std::pair("a pose goal", scene::pose_goal(tip))})
     scenes.push_back({name, scene_beside_ball(goal), arm});
+  if (!follows_targets) return scenes;
+  scene::Goal follow = scene::follow_goal();
+  follow.pose = tip;
+  follow.motion = scene::SineMotion{{0.05, 0.05, 0.0}, 0.5};
+  scenes.push_back({"a target that moves", scene_beside_ball(follow), arm});
   return scenes;
 }
 

@@ -43,8 +43,8 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
   return one_or_per_joint(values, dof, place);
 }
 
-const planning::Plugin& plugin_for(const scene::Scene& scene, const planning::Plugin& plugin) {
-  if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return plugin;
+void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
+  if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return;
   throw Error(ErrorCode::invalid,
               fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
                           "expected one that does, such as hybrid",
@@ -113,7 +113,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
       path_points_max_(std::max(longest_path(scene_.goals),
                                 options_.path_points_max.value_or(default_path_points))),
-      plugin_(plugin_for(scene_, plugin)),
+      plugin_(plugin),
       nominal_(nominal_of(scene_, arm)),
       acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
                                            nominal_.dof())),
@@ -130,6 +130,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       goal_list_(&new_goals_.take()),
       new_target_(std::make_unique<StreamedTarget>()),
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
+  check_follows(scene_, plugin);
   expect_target(scene_.goals);
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
@@ -176,7 +177,9 @@ std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
 void Controller::expect_target(const std::vector<scene::Goal>& goals) {
   const scene::Goal* const follow = follow_goal_of(goals);
   receives_ = follow != nullptr && !follow->motion;
-  if (receives_) receiver_.start(follow->stream);
+  if (!receives_) return;
+  receiver_.start(follow->stream);
+  new_target_.publish(std::make_unique<StreamedTarget>());  // what belongs to an earlier goal
 }
 
 template <class Sample>

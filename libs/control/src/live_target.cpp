@@ -106,7 +106,6 @@ StreamedTarget TargetReceiver::take(const TargetTwist& twist) {
 
 void LiveTarget::start(const scene::Goal& goal, const geometry::SE3& tip) {
   goal_ = &goal;
-  frame_ = {goal.pose, goal.motion, nullptr};
   state_ = {};
   state_.pose = tip;
   state_.waiting = !goal.motion;
@@ -116,7 +115,8 @@ void LiveTarget::start(const scene::Goal& goal, const geometry::SE3& tip) {
 const TargetState& LiveTarget::update(double time_s, const StreamedTarget& streamed,
                                       const geometry::SE3& tip) {
   if (goal_->motion) {
-    static_cast<scene::MotionState&>(state_) = scene::motion_at(frame_, time_s);
+    static_cast<scene::MotionState&>(state_) =
+        scene::motion_at({goal_->pose, goal_->motion, nullptr}, time_s);
   } else if (streamed.kind != StreamedTarget::Kind::none) {
     state_.waiting = false;
     if (streamed.kind == StreamedTarget::Kind::pose)

@@ -525,6 +525,9 @@ void ClosedLoop::check_target() {
     return;
   }
   const scene::TargetStream& stream = controller_->goals().goal().stream;
+  if (feed_->ended() && !feed_->last_s())
+    return finish(log::Outcome::target_lost,
+                  "the stream of targets has no line that is right, expected poses or twists");
   if (feed_->ended() && plant_->node().time_s > feed_->last_s().value_or(0.0) + stream.gap_max_s)
     return finish(log::Outcome::followed, "the stream of targets has ended");
   const bool lost = target->lost && !std::exchange(target_lost_, target->lost);

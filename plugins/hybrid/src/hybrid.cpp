@@ -260,7 +260,7 @@ class Hybrid final : public planning::Planner {
     enter(Mode::goal, tick.time_s());
     if (!follows()) return;
     anchor_.set(goal);
-    follower_.start(tick.q());
+    follower_.start(q_);
     searches_target_ = false;
   }
 

@@ -73,7 +73,10 @@ TEST_CASE("a joystick moves the tip, in turn with goals", "[control][controller]
   loop.step(loop.tick().torque);
   CHECK(controller.answer().goals_number == home);
   CHECK(controller.answer().target == nullptr);
-  controller.set_goal(scene::follow_goal());  // its times begin again
+  controller.set_goal(scene::follow_goal());  // its times begin again, and the arm waits
+  loop.step(loop.tick().torque);
+  CHECK(controller.answer().target->waiting);
+  CHECK((controller.answer().target->pose.p() - controller.tip().p()).norm() < 1e-12);
   push({0.0, 0.1, 0.0}, 500);
   CHECK(controller.answer().target != nullptr);
   CHECK((controller.tip().p() - from.p() - Vector3d(0.1, 0.05, 0.0)).norm() < 0.01);

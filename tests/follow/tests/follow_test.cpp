@@ -192,6 +192,15 @@ TEST_CASE("after a gap the arm holds and resumes, or the run ends, as the scene 
   CHECK(ended.v.lpNorm<Eigen::Infinity>() < 0.005);
 }
 
+TEST_CASE("a stream without a right line is lost at once", "[follow]") {
+  for (const char* lines : {"", "wrong\n"}) {
+    const log::Result result = run_stream(streamed(), lines);
+    CHECK(result.outcome == Outcome::target_lost);
+    CHECK_THAT(result.cause, Contains("has no line that is right, expected poses or twists"));
+    CHECK(result.steps == 0);
+  }
+}
+
 TEST_CASE("twists drive the arm as a joystick does", "[follow]") {
   std::string lines;
   for (int i = 0; i <= 150; ++i) {

@@ -78,7 +78,6 @@ class LiveTarget {
   void move_by_twist(const StreamedTarget& streamed, double time_s, const geometry::SE3& tip);
 
   const scene::Goal* goal_ = nullptr;
-  scene::Frame frame_;  ///< of a target that moves by the scene
   TargetState state_;
   double time_s_ = 0.0;  ///< of the last update
   bool driven_ = false;  ///< whether the last update was by a twist
