@@ -36,7 +36,7 @@ class IdealActuation final : public Actuation {
   void reserve(std::size_t gyroscopic_terms) override {
     arm_.channels.gyroscopic.reserve(gyroscopic_terms);
   }
-  // The planner of the arm with the other load begins anew, so nothing is left to be closed.
+  // The planner of the arm with the other load starts from rest, so no half-kick is due.
   void take_load() override {
     kicked_ = false;
     gradient_.setZero();
