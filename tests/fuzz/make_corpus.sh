@@ -5,7 +5,7 @@ set -euo pipefail
 hamelin=$(realpath "$1")
 out=$2
 source=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
-mkdir -p "$out"/{maps,scene,robot,spheres,urdf,srdf,log,primitives,waypoints}
+mkdir -p "$out"/{maps,scene,robot,spheres,urdf,srdf,log,primitives,waypoints,target_line}
 out=$(realpath "$out")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -21,6 +21,9 @@ done
 
 printf 'time_s,x_m,y_m,z_m\n0,0,0,0\n0.5,0.2,0,0\n1,0.5,0.1,0\n' >"$out/waypoints/walk.csv"
 printf '[{"time_s": 0, "position_m": [0, 0, 0]}, {"time_s": 1, "position_m": [1, 0, 0]}]' >"$out/waypoints/list.json"
+
+printf '{"time_s": 0.5, "position_m": [0.4, 0, 0.5], "quaternion_wxyz": [1, 0, 0, 0], "velocity_m_s": [0, 0.1, 0]}' >"$out/target_line/pose.json"
+printf '{"time_s": 0.5, "velocity_m_s": [0.1, 0, 0], "angular_velocity_rad_s": [0, 0, 1]}' >"$out/target_line/twist.json"
 
 cat >"$out/srdf/two_links.srdf" <<'XML'
 <?xml version="1.0"?>

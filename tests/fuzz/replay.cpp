@@ -35,7 +35,8 @@ const std::map<std::string, void (*)(std::string_view)> targets{
     {"srdf", hamelin::fuzz::srdf},
     {"log", hamelin::fuzz::log},
     {"primitives", hamelin::fuzz::primitives},
-    {"waypoints", hamelin::fuzz::waypoints}};
+    {"waypoints", hamelin::fuzz::waypoints},
+    {"target_line", hamelin::fuzz::target_line}};
 
 // Sanitizers slow the program down and need shadow memory.
 #ifdef HAMELIN_SANITIZED

@@ -20,6 +20,7 @@ void srdf(std::string_view bytes);
 void log(std::string_view bytes);
 void primitives(std::string_view bytes);
 void waypoints(std::string_view bytes);
+void target_line(std::string_view bytes);
 
 /// Aborts unless `holds`, and prints the condition.
 void require(bool holds, const std::string& condition);

@@ -5,9 +5,9 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 
 #include "hamelin/control/controller.hpp"
+#include "hamelin/control/target_line.hpp"
 
 namespace hamelin::simulation {
 
@@ -30,7 +30,6 @@ class TargetFeed {
   [[nodiscard]] std::optional<double> last_s() const noexcept { return last_s_; }
 
  private:
-  using Sample = std::variant<control::TargetPose, control::TargetTwist>;
   /// Reads lines until one is right.
   void read_next(const std::function<void(const std::string&)>& refused);
 
@@ -39,7 +38,7 @@ class TargetFeed {
   std::string name_;
   bool position_only_;
   long line_ = 0;
-  std::optional<Sample> next_;  ///< the line after those that were passed on
+  std::optional<control::TargetSample> next_;  ///< the line after those that were passed on
   long next_line_ = 0;
   bool ended_ = false;
   std::optional<double> last_s_;
