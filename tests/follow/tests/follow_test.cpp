@@ -266,3 +266,23 @@ TEST_CASE("what cannot follow a target is refused with one line", "[follow]") {
              Contains("/goals/0: follows a target, which planner 'apf' does not support"));
   CHECK_THAT(refusal(streamed(), nullptr), Contains("/goals/0/stream/file: is missing"));
 }
+
+TEST_CASE("an arm that follows a target picks up a body, carries it and puts it down", "[follow]") {
+  scene::Scene scene = shipped("data/scenes/follow.json");
+  scene.duration_s = 8.0;
+  scene::Payload box;
+  box.name = "box";
+  box.mass_kg = 1.0;
+  box.position_m = {0.0, 0.0, 0.05};
+  box.spheres = {{{0.0, 0.0, 0.06}, 0.04}};
+  scene.events.resize(2);
+  scene.events[0].time_s = 2.0;
+  scene.events[0].attach = box;
+  scene.events[1].time_s = 5.0;
+  scene.events[1].detach = "box";
+  const log::Result result = simulation::run(scene, plugins, {});
+  CHECK(result.outcome == Outcome::followed);
+  CHECK(result.following->tracked_s > 7.99);
+  CHECK(result.following->free.rms_m < 0.003);
+  CHECK(result.energy_error_max_J < 1e-4);
+}
