@@ -137,9 +137,15 @@ TEST_CASE("targets come from another thread while the arm follows", "[control][c
   }
   stop = true;
   writer.join();
+  // How far the arm is behind depends on the threads; a target that rests is reached in any case.
   const control::TargetState& target = *loop.controller.answer().target;
-  CHECK(std::isfinite(target.pose.p().norm()));
-  CHECK((loop.controller.tip().p() - target.pose.p()).norm() < 0.05);
+  REQUIRE(target.pose.p().allFinite());
+  const geometry::SE3 rest = target.pose;
+  for (int k = 0; k < 1500; ++k) {
+    if (k % 20 == 0) loop.controller.set_target(control::TargetPose{loop.state.time_s, rest});
+    loop.step(loop.tick().torque);
+  }
+  CHECK((loop.controller.tip().p() - rest.p()).norm() < 0.005);
 }
 
 TEST_CASE("the C interface follows poses and twists", "[control][c]") {
