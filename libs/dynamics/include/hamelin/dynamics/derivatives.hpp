@@ -9,6 +9,12 @@ namespace hamelin::dynamics {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
 
+struct DerivativeKernels;
+namespace kernel {
+struct DerivativeLink;
+struct DerivativeFrame;
+}  // namespace kernel
+
 /// Scratch memory of one thread for derivatives; as Workspace, for one model or its copies.
 class DerivativesWorkspace {
  public:
@@ -16,31 +22,16 @@ class DerivativesWorkspace {
   explicit DerivativesWorkspace(const model::Model& model, Isa isa = default_isa());
   /// Deleted: a temporary model is gone before any call could use the workspace.
   explicit DerivativesWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;
-
-  /// A motion (angular velocity, and velocity at the reference point), or a wrench (moment about
-  /// the reference point, and force); world axes. The reference point is the base's origin.
-  struct Pair {
-    Eigen::Vector3d angular, linear;
-  };
-  /// Sums over a link and all links outboard.
-  struct Composite {
-    double mass;
-    Eigen::Vector3d moment;    ///< Σ m r
-    Eigen::Matrix3d second;    ///< Σ m r rᵀ
-    Eigen::Vector3d momentum;  ///< Σ m ṙ
-    Eigen::Matrix3d flow;      ///< Σ m ṙ rᵀ
-    Pair wrench;               ///< that moves them
-  };
-  /// The screw of a joint, and its first and second derivative with the parent's motion, (2.25).
-  struct Axis {
-    Pair screw, first, second;
-  };
+  ~DerivativesWorkspace();
+  DerivativesWorkspace(const DerivativesWorkspace&) = delete;
+  DerivativesWorkspace& operator=(const DerivativesWorkspace&) = delete;
 
   Workspace ws;
-  std::vector<Axis> axes;
-  std::vector<Composite> links;
-  Eigen::MatrixXd mass, dq, dv;  ///< of forward_dynamics_derivatives
-  Eigen::VectorXd acceleration;
+  const DerivativeKernels* kernels;
+  AlignedBuffer sweep;     ///< scratch of the kernels
+  AlignedBuffer matrices;  ///< five, with the kernels' leading dimension
+  std::vector<kernel::DerivativeLink> links;
+  std::vector<kernel::DerivativeFrame> frames;
 };
 
 /// ∂τ/∂q, ∂τ/∂v and ∂τ/∂a = M(q) of inverse dynamics at (q, v, a): n × n each, row i the torque of
