@@ -18,6 +18,7 @@ model::Robot chain(int n, bool planar) {
   for (int i = 0; i < n; ++i) {
     model::Link link;
     link.name = std::to_string(i);
+    link.joint.name = "joint" + link.name;
     link.parent = i - 1;
     const Eigen::Vector3d axis =
         planar || i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
