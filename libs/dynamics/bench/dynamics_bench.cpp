@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 
 using namespace hamelin;
@@ -17,6 +18,7 @@ model::Robot chain(int n, bool planar) {
   for (int i = 0; i < n; ++i) {
     model::Link link;
     link.name = std::to_string(i);
+    link.joint.name = "joint" + link.name;
     link.parent = i - 1;
     const Eigen::Vector3d axis =
         planar || i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
@@ -48,6 +50,16 @@ TEST_CASE("time of dynamics over the number of links", "[!benchmark][dynamics]")
       BENCHMARK("RNEA, " + label) {
         dynamics::inverse_dynamics(model, ws, q, v, v, x);
         return x[0];
+      };
+      dynamics::DerivativesWorkspace derivatives(model);
+      Eigen::MatrixXd A(n, n), B(n, n), C(n, n);
+      BENCHMARK("derivatives of RNEA, " + label) {
+        dynamics::inverse_dynamics_derivatives(model, derivatives, q, v, v, A, B, C);
+        return A(0, 0);
+      };
+      BENCHMARK("derivatives of ABA, " + label) {
+        dynamics::forward_dynamics_derivatives(model, derivatives, q, v, v, x, A, B, C);
+        return A(0, 0);
       };
     }
   }

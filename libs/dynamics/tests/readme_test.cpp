@@ -1,6 +1,7 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 
+#include "hamelin/dynamics/derivatives.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/readme.hpp"
@@ -20,6 +21,9 @@ dynamics::forward_kinematics(arm, ws, q);
 const Eigen::Vector3d tip = dynamics::tip_pose(arm, ws).p();
 dynamics::Matrix3Xd J(3, 7);
 dynamics::point_jacobian(arm, ws, arm.robot().tip.link, tip, J);  // the tip's velocity is J v
+dynamics::DerivativesWorkspace derivatives(arm);
+Eigen::MatrixXd by_q(7, 7), by_v(7, 7), by_tau(7, 7);  // row i: the acceleration of joint i
+dynamics::forward_dynamics_derivatives(arm, derivatives, q, v, tau, a, by_q, by_v, by_tau);
   // [example]
   // clang-format on
   Eigen::MatrixXd M(7, 7);
@@ -27,6 +31,7 @@ dynamics::point_jacobian(arm, ws, arm.robot().tip.link, tip, J);  // the tip's v
   dynamics::mass_matrix(arm, ws, q, M);
   dynamics::bias_torque(arm, ws, q, v, bias);
   CHECK((M * a + bias - tau).norm() < 1e-12);
+  CHECK((M * by_tau - Eigen::MatrixXd::Identity(7, 7)).norm() < 1e-10);
   CHECK(bias.norm() > 1.0);
   const double e = 1e-6;
   dynamics::forward_kinematics(arm, ws, q + e * v);

@@ -1,0 +1,53 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "hamelin/dynamics/dynamics.hpp"
+
+/// Exact first derivatives of inverse and forward dynamics, in O(n²): docs/theory.md (2.24)–(2.29).
+namespace hamelin::dynamics {
+
+using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
+
+struct DerivativeKernels;
+namespace kernel {
+struct DerivativeLink;
+struct DerivativeFrame;
+}  // namespace kernel
+
+/// Scratch memory of one thread for derivatives; as Workspace, for one model or its copies.
+class DerivativesWorkspace {
+ public:
+  /// @throws Error usage if this machine does not have the instruction set
+  explicit DerivativesWorkspace(const model::Model& model, Isa isa = default_isa());
+  /// Deleted: a temporary model is gone before any call could use the workspace.
+  explicit DerivativesWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;
+  ~DerivativesWorkspace();
+  DerivativesWorkspace(const DerivativesWorkspace&) = delete;
+  DerivativesWorkspace& operator=(const DerivativesWorkspace&) = delete;
+
+  Workspace ws;
+  const DerivativeKernels* kernels;
+  AlignedBuffer sweep;     ///< scratch of the kernels
+  AlignedBuffer matrices;  ///< five, with the kernels' leading dimension
+  std::vector<kernel::DerivativeLink> links;
+  std::vector<kernel::DerivativeFrame> frames;
+};
+
+/// ∂τ/∂q, ∂τ/∂v and ∂τ/∂a = M(q) of inverse dynamics at (q, v, a): n × n each, row i the torque of
+/// joint i. The columns of ∂τ/∂q are torques per radian or metre.
+/// @throws Error usage for sizes or a workspace that do not fit the model
+void inverse_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
+                                  const ConstVectorRef& q, const ConstVectorRef& v,
+                                  const ConstVectorRef& a, MatrixRef dtau_dq, MatrixRef dtau_dv,
+                                  MatrixRef dtau_da);
+
+/// ∂a/∂q, ∂a/∂v and ∂a/∂τ = M(q)⁻¹ of forward dynamics at (q, v, τ): n × n each, row i the
+/// acceleration of joint i; and a itself.
+/// @throws Error usage for sizes or a workspace that do not fit the model
+void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
+                                  const ConstVectorRef& q, const ConstVectorRef& v,
+                                  const ConstVectorRef& tau, VectorRef a, MatrixRef da_dq,
+                                  MatrixRef da_dv, MatrixRef da_dtau);
+
+}  // namespace hamelin::dynamics

@@ -1,0 +1,268 @@
+#pragma once
+#include <cmath>
+#include <cstddef>
+
+#include "hamelin/dynamics/kernel/lanes.hpp"
+#include "hamelin/geometry/small.hpp"
+
+/// Derivatives of inverse and forward dynamics, docs/theory.md (2.24)–(2.29), for chains in either
+/// group: everything is expressed in the axes of the world about one point.
+namespace hamelin::dynamics::kernel {
+
+/// Constants of a link: mass, Σ m r and Σ m r rᵀ of its particles in the axes of its frame, about
+/// the frame's origin.
+struct DerivativeLink {
+  double mass, armature;
+  geometry::Vec3<double> moment;
+  geometry::Sym3<double> second;
+  bool prismatic;
+};
+
+/// A link's frame in the world: columns of its rotation, its origin from the reference point, and
+/// the joint's axis.
+struct DerivativeFrame {
+  geometry::Vec3<double> x, y, z, p, axis;
+};
+
+inline namespace HAMELIN_ISA_NAMESPACE {
+
+using geometry::Mat3;
+using geometry::Sym3;
+using geometry::Vec3;
+
+/// A twist (angular, linear), or a wrench (moment, force).
+struct Screw {
+  Vec3<double> a, b;
+};
+HAMELIN_INLINE Screw operator+(const Screw& m, const Screw& n) noexcept {
+  return {m.a + n.a, m.b + n.b};
+}
+HAMELIN_INLINE Screw operator*(const Screw& m, double k) noexcept {
+  return {m.a * k, m.b * k};
+}
+/// m × n of twists.
+HAMELIN_INLINE Screw bracket(const Screw& m, const Screw& n) noexcept {
+  return {cross(m.a, n.a), cross(m.a, n.b) + cross(m.b, n.a)};
+}
+/// m ×* f of a twist and a wrench.
+HAMELIN_INLINE Screw bracket_wrench(const Screw& m, const Screw& f) noexcept {
+  return {cross(m.a, f.a) + cross(m.b, f.b), cross(m.a, f.b)};
+}
+
+/// Sums over a link and all links outboard, docs/theory.md (2.26), (2.27).
+struct Outboard {
+  double mass;
+  Vec3<double> moment, momentum;
+  Sym3<double> second;
+  Mat3<double> flow;
+  Screw wrench;
+};
+HAMELIN_INLINE Outboard operator+(const Outboard& p, const Outboard& q) noexcept {
+  return {p.mass + q.mass,     p.moment + q.moment, p.momentum + q.momentum,
+          p.second + q.second, p.flow + q.flow,     p.wrench + q.wrench};
+}
+HAMELIN_INLINE double trace(const Sym3<double>& a) noexcept {
+  return a.xx + a.yy + a.zz;
+}
+HAMELIN_INLINE double trace(const Mat3<double>& a) noexcept {
+  return a.x.x + a.y.y + a.z.z;
+}
+/// I m.
+HAMELIN_INLINE Screw inertia_times(const Outboard& o, const Screw& m) noexcept {
+  return {m.a * trace(o.second) - o.second * m.a + cross(o.moment, m.b),
+          m.b * o.mass + cross(m.a, o.moment)};
+}
+/// 2B m.
+HAMELIN_INLINE Screw coriolis_times(const Outboard& o, const Screw& m) noexcept {
+  return {(m.a * trace(o.flow) - o.flow * m.a) * 2.0, cross(m.a, o.momentum) * 2.0};
+}
+
+/// A link about the reference point, with its velocity and acceleration.
+HAMELIN_INLINE Outboard single(const DerivativeLink& l, const DerivativeFrame& f,
+                               const Screw& velocity, const Screw& acceleration) noexcept {
+  Outboard o;
+  o.mass = l.mass;
+  const Vec3<double> h = f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z;
+  o.moment = h + f.p * l.mass;
+  // R E Rᵀ + h pᵀ + p (h + m p)ᵀ
+  const Sym3<double>& e = l.second;
+  const Vec3<double> ex = f.x * e.xx + f.y * e.xy + f.z * e.xz,
+                     ey = f.x * e.xy + f.y * e.yy + f.z * e.yz,
+                     ez = f.x * e.xz + f.y * e.yz + f.z * e.zz;
+  const auto entry = [&](double Vec3<double>::*i, double Vec3<double>::*k) {
+    return ex.*i * f.x.*k + ey.*i * f.y.*k + ez.*i * f.z.*k + h.*i * f.p.*k + f.p.*i * o.moment.*k;
+  };
+  using V = Vec3<double>;
+  o.second = {entry(&V::x, &V::x), entry(&V::x, &V::y), entry(&V::x, &V::z),
+              entry(&V::y, &V::y), entry(&V::y, &V::z), entry(&V::z, &V::z)};
+  o.momentum = velocity.b * l.mass + cross(velocity.a, o.moment);
+  const Mat3<double> turned = hat_times(velocity.a, full(o.second));
+  o.flow = {turned.x + o.moment * velocity.b.x, turned.y + o.moment * velocity.b.y,
+            turned.z + o.moment * velocity.b.z};
+  o.wrench = inertia_times(o, acceleration) + bracket_wrench(velocity, inertia_times(o, velocity));
+  return o;
+}
+
+/// The screws of all joints, number by number, so that a row of the derivatives is computed in
+/// lanes.
+struct AxisRows {
+  double* row[6];
+  HAMELIN_INLINE Screw at(std::size_t j) const noexcept {
+    return {{row[0][j], row[1][j], row[2][j]}, {row[3][j], row[4][j], row[5][j]}};
+  }
+  HAMELIN_INLINE void set(std::size_t j, const Screw& s) const noexcept {
+    row[0][j] = s.a.x, row[1][j] = s.a.y, row[2][j] = s.a.z;
+    row[3][j] = s.b.x, row[4][j] = s.b.y, row[5][j] = s.b.z;
+  }
+};
+
+/// Scratch of a chain in memory that the caller owns; matrices have the leading dimension `ld`.
+struct DerivativeScratch {
+  std::size_t n, ld;
+  AxisRows screw, first, second;
+  double *rows_q, *rows_v;  ///< n × ld: rows of derivatives up to the diagonal
+  Outboard* outboard;
+
+  HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
+    return (n + 7) & ~std::size_t{7};
+  }
+  HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
+    return (18 + 2 * n) * padded(n) * sizeof(double) + n * sizeof(Outboard);
+  }
+  HAMELIN_INLINE static DerivativeScratch at(void* memory, std::size_t n) noexcept {
+    DerivativeScratch s{};
+    s.n = n;
+    s.ld = padded(n);
+    double* at = static_cast<double*>(memory);
+    const auto take = [&](std::size_t rows) {
+      double* const taken = at;
+      at += rows * s.ld;
+      return taken;
+    };
+    for (AxisRows* rows : {&s.screw, &s.first, &s.second})
+      for (double*& row : rows->row) row = take(1);
+    s.rows_q = take(n);
+    s.rows_v = take(n);
+    s.outboard = reinterpret_cast<Outboard*>(at);
+    return s;
+  }
+};
+
+/// docs/theory.md (2.24), (2.25)
+HAMELIN_INLINE void sweep_outwards(const DerivativeScratch& k, const DerivativeLink* links,
+                                   const DerivativeFrame* frames, const Vec3<double>& gravity,
+                                   const double* v, const double* a) noexcept {
+  const Vec3<double> zero{0.0, 0.0, 0.0};
+  Screw velocity{zero, zero}, acceleration{zero, zero - gravity};
+  for (std::size_t i = 0; i < k.n; ++i) {
+    const DerivativeFrame& f = frames[i];
+    const Screw screw =
+        links[i].prismatic ? Screw{zero, f.axis} : Screw{f.axis, cross(f.p, f.axis)};
+    const Screw first = bracket(velocity, screw);
+    k.screw.set(i, screw);
+    k.first.set(i, first);
+    k.second.set(i, bracket(acceleration, screw) + bracket(velocity, first));
+    acceleration = acceleration + screw * a[i] + first * v[i];
+    velocity = velocity + screw * v[i];
+    k.outboard[i] = single(links[i], f, velocity, acceleration);
+  }
+}
+
+using NativePack = Lanes<native_lanes>;
+
+/// out[j] = rows[j]·f for all j in packets up to `count`. Adds to what is there if `add`.
+template <bool add>
+HAMELIN_INLINE void products(const AxisRows& rows, const Screw& f, std::size_t count,
+                             double* out) noexcept {
+  const double factor[] = {f.a.x, f.a.y, f.a.z, f.b.x, f.b.y, f.b.z};
+  for (std::size_t j = 0; j < count; j += native_lanes) {
+    NativePack sum = add ? NativePack::load(out + j) : NativePack(0.0);
+    for (int k = 0; k < 6; ++k) sum += NativePack::load(rows.row[k] + j) * NativePack(factor[k]);
+    sum.store(out + j);
+  }
+}
+/// The same for wrenches without force.
+template <bool add>
+HAMELIN_INLINE void products(const AxisRows& rows, const Vec3<double>& moment, std::size_t count,
+                             double* out) noexcept {
+  for (std::size_t j = 0; j < count; j += native_lanes) {
+    NativePack sum = add ? NativePack::load(out + j) : NativePack(0.0);
+    sum += NativePack::load(rows.row[0] + j) * NativePack(moment.x);
+    sum += NativePack::load(rows.row[1] + j) * NativePack(moment.y);
+    sum += NativePack::load(rows.row[2] + j) * NativePack(moment.z);
+    sum.store(out + j);
+  }
+}
+
+/// docs/theory.md (2.28). dq, dv and M are column-major with leading dimension ld.
+HAMELIN_INLINE void sweep_inwards(const DerivativeScratch& k, const DerivativeLink* links,
+                                  double* dq, double* dv, double* M) noexcept {
+  const std::size_t ld = k.ld;
+  for (std::size_t i = k.n; i-- > 0;) {
+    const Outboard& o = k.outboard[i];
+    const Screw screw = k.screw.at(i), first = k.first.at(i);
+    const Screw column = inertia_times(o, screw);
+    const Vec3<double> row =
+        (screw.a * trace(o.flow) - transposed_times(o.flow, screw.a) + cross(o.momentum, screw.b)) *
+        2.0;
+    const Screw by_q = coriolis_times(o, first) + inertia_times(o, k.second.at(i)) +
+                       bracket_wrench(screw, o.wrench);
+    const Screw by_v = coriolis_times(o, screw) + inertia_times(o, first) * 2.0;
+    const std::size_t count = i + 1;
+    products<false>(k.screw, by_q, count, dq + i * ld);
+    products<false>(k.screw, by_v, count, dv + i * ld);
+    products<false>(k.screw, column, count, M + i * ld);
+    products<false>(k.first, row, count, k.rows_q + i * ld);
+    products<true>(k.second, column, count, k.rows_q + i * ld);
+    products<false>(k.screw, row, count, k.rows_v + i * ld);
+    products<true>(k.first, column * 2.0, count, k.rows_v + i * ld);
+    M[i + i * ld] += links[i].armature;
+    if (i > 0) k.outboard[i - 1] = k.outboard[i - 1] + o;
+  }
+  // Packets have written beyond the diagonal, where the rows belong.
+  for (std::size_t i = 0; i < k.n; ++i) {
+    dq[i + i * ld] = k.rows_q[i + i * ld];
+    dv[i + i * ld] = k.rows_v[i + i * ld];
+    for (std::size_t j = 0; j < i; ++j) {
+      dq[i + j * ld] = k.rows_q[j + i * ld];
+      dv[i + j * ld] = k.rows_v[j + i * ld];
+      M[i + j * ld] = M[j + i * ld];
+    }
+  }
+}
+
+/// Inverts a symmetric positive definite matrix in place by Gauss–Jordan elimination, which needs
+/// no pivots for such matrices. Rows from n to ld may have any finite numbers.
+HAMELIN_INLINE void invert(std::size_t n, std::size_t ld, double* A) noexcept {
+  for (std::size_t k = 0; k < n; ++k) {
+    double* const pivot = A + k * ld;
+    const double inverse = 1.0 / pivot[k];
+    for (std::size_t j = 0; j < n; ++j) {
+      if (j == k) continue;
+      double* const column = A + j * ld;
+      const double factor = column[k] * inverse;
+      for (std::size_t i = 0; i < ld; i += native_lanes)
+        (NativePack::load(column + i) - NativePack::load(pivot + i) * NativePack(factor))
+            .store(column + i);
+      column[k] = factor;
+    }
+    for (std::size_t i = 0; i < ld; i += native_lanes)
+      (NativePack::load(pivot + i) * NativePack(-inverse)).store(pivot + i);
+    pivot[k] = inverse;
+  }
+}
+
+/// out = −A B, all n × n.
+HAMELIN_INLINE void minus_product(std::size_t n, std::size_t ld, const double* A, const double* B,
+                                  double* out) noexcept {
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t i = 0; i < ld; i += native_lanes) {
+      NativePack sum(0.0);
+      for (std::size_t j = 0; j < n; ++j)
+        sum -= NativePack::load(A + i + j * ld) * NativePack(B[j + k * ld]);
+      sum.store(out + i + k * ld);
+    }
+}
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::dynamics::kernel

@@ -1,0 +1,133 @@
+#include "hamelin/dynamics/derivatives.hpp"
+
+#include <algorithm>
+
+#include "derivative_kernels.hpp"
+#include "hamelin/core/isa_kernels.hpp"
+
+namespace hamelin::dynamics {
+
+HAMELIN_SELECT_KERNELS(DerivativeKernels, derivative_set)
+
+const DerivativeKernels& derivative_kernels(Isa isa) {
+  return select_derivative_set(isa);
+}
+
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+geometry::Vec3<double> vec3(const Vector3d& x) {
+  return {x.x(), x.y(), x.z()};
+}
+
+// The particles of a link about the origin of its joint-aligned frame, from its COM frame.
+kernel::DerivativeLink link_of(const model::Link& link, const geometry::SE3& com) {
+  const Matrix3d inertia = com.R() * link.inertia_kg_m2 * com.R().transpose();
+  Matrix3d second = link.mass_kg * com.p() * com.p().transpose() - inertia;
+  second.diagonal().array() += 0.5 * inertia.trace();
+  return {link.mass_kg,
+          link.joint.armature,
+          vec3(link.mass_kg * com.p()),
+          {second(0, 0), second(0, 1), second(0, 2), second(1, 1), second(1, 2), second(2, 2)},
+          link.joint.type == model::JointType::prismatic};
+}
+
+void place_frames(const Model& model, DerivativesWorkspace& ws) {
+  const Vector3d origin = model.base().p();
+  for (std::size_t i = 0; i < ws.frames.size(); ++i) {
+    const Workspace::Frame& f = ws.ws.frames[i];
+    ws.frames[i] = {vec3(f.R.col(0)), vec3(f.R.col(1)), vec3(f.R.col(2)), vec3(f.p - origin),
+                    vec3(f.axis)};
+  }
+}
+
+// The kernels' matrices, one after the other.
+struct Matrices {
+  explicit Matrices(DerivativesWorkspace& ws)
+      : n(ws.ws.owner.dof),
+        ld(static_cast<Index>(ws.kernels->leading(static_cast<std::size_t>(n)))),
+        first(static_cast<double*>(ws.matrices.get())) {}
+  [[nodiscard]] double* at(Index k) const { return first + k * ld * n; }
+  void copy(Index k, MatrixRef out) const {
+    out = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(at(k), n, n,
+                                                                     Eigen::OuterStride<>(ld));
+  }
+  Index n, ld;
+  double* first;
+};
+
+void compute(const Model& model, DerivativesWorkspace& ws, const Matrices& out,
+             const ConstVectorRef& q, const ConstVectorRef& v, const ConstVectorRef& a) {
+  forward_kinematics(model, ws.ws, q);
+  place_frames(model, ws);
+  ws.kernels->inverse_dynamics(ws.links.size(), ws.sweep.get(), ws.links.data(), ws.frames.data(),
+                               vec3(model.gravity()), v.data(), a.data(), out.at(0), out.at(1),
+                               out.at(2));
+}
+
+void check_square(const detail::Call& call, Index n, const char* rows, const char* columns,
+                  const MatrixRef& matrix) {
+  call.size(rows, matrix.rows(), n).size(columns, matrix.cols(), n);
+}
+
+}  // namespace
+
+DerivativesWorkspace::DerivativesWorkspace(const model::Model& model, Isa isa)
+    : ws(model, isa),
+      kernels(&derivative_kernels(isa)),
+      sweep(kernels->bytes(static_cast<std::size_t>(model.dof()))),
+      matrices(5 * kernels->leading(static_cast<std::size_t>(model.dof())) *
+               static_cast<std::size_t>(model.dof()) * sizeof(double)),
+      frames(static_cast<std::size_t>(model.dof())) {
+  // what packets read beyond the last joint must be finite
+  const auto n = static_cast<std::size_t>(model.dof());
+  std::fill_n(static_cast<std::byte*>(sweep.get()), kernels->bytes(n), std::byte{});
+  std::fill_n(static_cast<double*>(matrices.get()), 5 * kernels->leading(n) * n, 0.0);
+  for (int i = 0; i < model.dof(); ++i)
+    links.push_back(
+        link_of(model.robot().links[static_cast<std::size_t>(i)], model.com_in_frame(i)));
+}
+
+DerivativesWorkspace::~DerivativesWorkspace() = default;
+
+void inverse_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
+                                  const ConstVectorRef& q, const ConstVectorRef& v,
+                                  const ConstVectorRef& a, MatrixRef dtau_dq, MatrixRef dtau_dv,
+                                  MatrixRef dtau_da) {
+  const detail::Call call("inverse_dynamics_derivatives", model, ws.ws.owner);
+  const Index n = ws.ws.owner.dof;
+  call.joints("v", v).joints("a", a);
+  check_square(call, n, "dtau_dq (rows)", "dtau_dq (columns)", dtau_dq);
+  check_square(call, n, "dtau_dv (rows)", "dtau_dv (columns)", dtau_dv);
+  check_square(call, n, "dtau_da (rows)", "dtau_da (columns)", dtau_da);
+  const Matrices out(ws);
+  compute(model, ws, out, q, v, a);
+  out.copy(0, dtau_dq);
+  out.copy(1, dtau_dv);
+  out.copy(2, dtau_da);
+}
+
+// docs/theory.md (2.29)
+void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
+                                  const ConstVectorRef& q, const ConstVectorRef& v,
+                                  const ConstVectorRef& tau, VectorRef a, MatrixRef da_dq,
+                                  MatrixRef da_dv, MatrixRef da_dtau) {
+  const detail::Call call("forward_dynamics_derivatives", model, ws.ws.owner);
+  const Index n = ws.ws.owner.dof;
+  check_square(call, n, "da_dq (rows)", "da_dq (columns)", da_dq);
+  check_square(call, n, "da_dv (rows)", "da_dv (columns)", da_dv);
+  check_square(call, n, "da_dtau (rows)", "da_dtau (columns)", da_dtau);
+  forward_dynamics(model, ws.ws, q, v, tau, a);
+  const Matrices out(ws);
+  compute(model, ws, out, q, v, a);
+  ws.kernels->forward_dynamics(ws.links.size(), out.at(0), out.at(1), out.at(2), out.at(3),
+                               out.at(4));
+  out.copy(3, da_dq);
+  out.copy(4, da_dv);
+  out.copy(2, da_dtau);
+}
+
+}  // namespace hamelin::dynamics

@@ -1,0 +1,39 @@
+// Compiled once per instruction set; kernel/lanes.hpp explains which functions may be used here.
+#include "derivative_kernels.hpp"
+
+namespace hamelin::dynamics {
+namespace HAMELIN_ISA_NAMESPACE {
+
+namespace {
+
+using kernel::DerivativeScratch;
+
+std::size_t bytes(std::size_t links) noexcept {
+  return DerivativeScratch::bytes(links);
+}
+std::size_t leading(std::size_t links) noexcept {
+  return DerivativeScratch::padded(links);
+}
+void inverse_dynamics(std::size_t n, void* memory, const kernel::DerivativeLink* links,
+                      const kernel::DerivativeFrame* frames, const geometry::Vec3<double>& gravity,
+                      const double* v, const double* a, double* dq, double* dv,
+                      double* M) noexcept {
+  const DerivativeScratch k = DerivativeScratch::at(memory, n);
+  kernel::sweep_outwards(k, links, frames, gravity, v, a);
+  kernel::sweep_inwards(k, links, dq, dv, M);
+}
+void forward_dynamics(std::size_t n, const double* dq, const double* dv, double* M, double* da_dq,
+                      double* da_dv) noexcept {
+  const std::size_t ld = leading(n);
+  kernel::invert(n, ld, M);
+  kernel::minus_product(n, ld, M, dq, da_dq);
+  kernel::minus_product(n, ld, M, dv, da_dv);
+}
+
+}  // namespace
+
+extern const DerivativeKernels derivative_set;
+constexpr DerivativeKernels derivative_set{bytes, leading, inverse_dynamics, forward_dynamics};
+
+}  // namespace HAMELIN_ISA_NAMESPACE
+}  // namespace hamelin::dynamics
