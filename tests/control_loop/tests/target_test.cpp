@@ -142,7 +142,7 @@ TEST_CASE("targets come from another thread while the arm follows", "[control][c
   REQUIRE(target.pose.p().allFinite());
   const geometry::SE3 rest = target.pose;
   for (int k = 0; k < 1500; ++k) {
-    if (k % 20 == 0) loop.controller.set_target(control::TargetPose{loop.state.time_s, rest});
+    if (k % 20 == 19) loop.controller.set_target(control::TargetPose{loop.state.time_s, rest});
     loop.step(loop.tick().torque);
   }
   CHECK((loop.controller.tip().p() - rest.p()).norm() < 0.005);
