@@ -18,6 +18,15 @@ model::Model Setup::model() const {
                       vec3(raw_->gravity_world_m_s2));
 }
 
+void check_fixed_params(const Json& params, const Json& initial,
+                        std::span<const char* const> keys) {
+  for (const char* key : keys)
+    if (params.at(key) != initial.at(key))
+      throw Error(ErrorCode::invalid, std::string("/") + key +
+                                          ": cannot be changed while it runs, expected " +
+                                          initial.at(key).dump());
+}
+
 namespace detail {
 namespace {
 

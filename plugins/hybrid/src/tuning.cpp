@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
 
 namespace hamelin::hybrid {
 
@@ -68,11 +67,7 @@ Tuning::Tuning(const planning::Setup& setup, const Json& params)
       look_steps(params["look_steps"]) {}
 
 void check_fixed_params(const Json& params, const Json& initial) {
-  for (const char* key : fixed)
-    if (params.at(key) != initial.at(key))
-      throw Error(ErrorCode::invalid, std::string("/") + key +
-                                          ": cannot be changed while it runs, expected " +
-                                          initial.at(key).dump());
+  planning::check_fixed_params(params, initial, fixed);
 }
 
 }  // namespace hamelin::hybrid

@@ -1,7 +1,6 @@
 #include "tuning.hpp"
 
 #include <array>
-#include <string>
 
 namespace hamelin::mppi {
 
@@ -25,11 +24,7 @@ Tuning::Tuning(const Json& params)
       max_searches(params["max_searches"]) {}
 
 void check_fixed_params(const Json& params, const Json& initial) {
-  for (const char* key : fixed_params)
-    if (params.at(key) != initial.at(key))
-      throw Error(ErrorCode::invalid, std::string("/") + key +
-                                          ": cannot be changed while it runs, expected " +
-                                          initial.at(key).dump());
+  planning::check_fixed_params(params, initial, fixed_params);
 }
 
 }  // namespace hamelin::mppi

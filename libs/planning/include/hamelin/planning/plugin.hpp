@@ -480,6 +480,10 @@ class Planner {
   virtual void tick(const Tick& tick, Command& command) = 0;
 };
 
+/// Checks new parameters of a running planner: those with these names must be the initial ones.
+/// @throws Error invalid, naming the first that differs
+void check_fixed_params(const Json& params, const Json& initial, std::span<const char* const> keys);
+
 namespace detail {
 
 /// Makes the host's instruction set the default of this plugin's copy of the libraries.
