@@ -40,19 +40,12 @@ const nlohmann::json* schema_at(const nlohmann::json& schema,
                                 nlohmann::json::json_pointer pointer) {
   std::vector<std::string> tokens;
   for (; !pointer.empty(); pointer.pop_back()) tokens.insert(tokens.begin(), pointer.back());
-  const auto resolved = [&schema](const nlohmann::json* part) {
-    while (part->contains("$ref")) {
-      const auto ref = (*part)["$ref"].get<std::string>();
-      part = &schema.at(nlohmann::json::json_pointer(ref.substr(1)));
-    }
-    return part;
-  };
-  const nlohmann::json* at = resolved(&schema);
+  const nlohmann::json* at = &resolve_reference(schema, schema);
   for (const auto& token : tokens) {
     if (at->contains("properties") && (*at)["properties"].contains(token)) {
-      at = resolved(&(*at)["properties"][token]);
+      at = &resolve_reference(schema, (*at)["properties"][token]);
     } else if (at->contains("items") && (*at)["items"].is_object()) {
-      at = resolved(&(*at)["items"]);
+      at = &resolve_reference(schema, (*at)["items"]);
     } else {
       return nullptr;
     }

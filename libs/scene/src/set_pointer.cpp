@@ -61,12 +61,6 @@ void check_known(const Json& properties, const std::string& key, const Assignmen
       near.empty() ? fmt::format("one of {}", fmt::join(known, ", ")) : fmt::format("'{}'", near)));
 }
 
-// A rule of the schema, or the definition that it refers to.
-const Json* resolved(const Json& schema, const Json* rule) {
-  if (rule == nullptr || !rule->contains("$ref")) return rule;
-  return &schema.at(Json::json_pointer((*rule)["$ref"].get<std::string>().substr(1)));
-}
-
 }  // namespace
 
 void set_pointer(Json& document, std::string_view text) {
@@ -78,8 +72,9 @@ void set_pointer(Json& document, std::string_view text) {
   for (const std::string& key : assignment.keys) {
     if (at->is_array()) {
       at = &element_of(*at, key, assignment);
-      rule = rule != nullptr && rule->contains("items") ? resolved(schema, &(*rule)["items"])
-                                                        : nullptr;
+      rule = rule != nullptr && rule->contains("items")
+                 ? &resolve_reference(schema, (*rule)["items"])
+                 : nullptr;
       continue;
     }
     if (!at->is_object() && !at->is_null())
@@ -89,7 +84,7 @@ void set_pointer(Json& document, std::string_view text) {
     if (has_properties) check_known((*rule)["properties"], key, assignment);
     if (at->is_null()) *at = Json::object();
     at = &(*at)[key];
-    rule = has_properties ? resolved(schema, &(*rule)["properties"][key]) : nullptr;
+    rule = has_properties ? &resolve_reference(schema, (*rule)["properties"][key]) : nullptr;
   }
   *at = std::move(assignment.value);
   document = std::move(changed);

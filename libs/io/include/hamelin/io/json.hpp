@@ -50,6 +50,18 @@ void check_schema(const Json& document, std::string_view schema_name,
 void check_shipped_schema(const Json& document, std::string_view schema_name,
                           const std::string& where);
 
+/// A part of a schema, or the definition that it refers to by "$ref".
+/// @param schema the whole, of type Json or nlohmann::json as its part
+template <class AnyJson>
+[[nodiscard]] const AnyJson& resolve_reference(const AnyJson& schema, const AnyJson& part) {
+  const AnyJson* at = &part;
+  while (at->contains("$ref")) {
+    const auto reference = (*at)["$ref"].template get<std::string>();
+    at = &schema.at(typename AnyJson::json_pointer(reference.substr(1)));
+  }
+  return *at;
+}
+
 /// A copy of `document` (an object) in which missing properties have the `default` of the schema,
 /// also in nested objects that the document contains.
 [[nodiscard]] Json with_defaults(Json document, const Json& schema);
