@@ -532,6 +532,10 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
       given.fail("attach/name",
                  fmt::format("'{}' is attached already, expected another name or a detach before",
                              event.attach->name));
+    if (event.detach && scene.model.payload && *event.detach == scene.model.payload->name)
+      given.fail("detach", fmt::format("'{}' is the payload of /model, which stays attached, "
+                                       "expected what an earlier event attaches",
+                                       *event.detach));
     if (event.detach && attached.erase(*event.detach) == 0)
       given.fail("detach",
                  fmt::format("'{}' is not attached, expected what an earlier event attaches",

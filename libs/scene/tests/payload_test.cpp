@@ -172,6 +172,12 @@ TEST_CASE("events that cannot happen are refused with place and expectation", "[
              Contains("/events/3/detach: is given in addition to attach"));
   CHECK_THAT(refusal("/model/payload={\"name\":\"can\",\"mass_kg\":1}"),
              Contains("/events/0/attach/name: 'can' is attached already"));
+  CHECK_THAT(refusal("/events/3={\"time_s\":9,\"detach\":\"can\"}"), Contains("no error"));
+  Json fixed = read_json(data / "scenes" / "shelf_carry.json");
+  fixed["model"]["payload"] = {{"name", "tool"}, {"mass_kg", 1}};
+  fixed["events"][3]["detach"] = "tool";
+  CHECK_THAT(message_of([&] { (void)scene::scene_from_json(fixed, data / "scenes", "scene"); }),
+             Contains("/events/3/detach: 'tool' is the payload of /model"));
   CHECK_THAT(refusal("/events/1/map=null"),
              Contains("/events/1/attach: is missing, expected attach, detach or map"));
   CHECK_THAT(refusal("/map=null"), Contains("/events/0/map: there is no map"));
