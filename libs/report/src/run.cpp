@@ -227,16 +227,15 @@ void Run::add_event(const Json& line, const log::LogReader& reader) {
   if (text == nullptr || !text->is_string())
     throw line_error(reader, "text: expected one line of text");
   const double t = number(line, "time_s", reader);
-  for (const char* what : {"attached", "detached"}) {
-    const Json* name = find(line, what);
-    if (name == nullptr || std::isnan(t)) continue;
-    if (!name->is_string()) throw line_error(reader, fmt::format("{}: expected a name", what));
-    const VectorXd q = joint_vector(line, "q", world_.model.dof(), reader);
-    if (*what == 'a')
-      loads_.attach(name->get<std::string>(), t);
-    else
-      loads_.detach(name->get<std::string>(), t, q);
-  }
+  const auto name_of = [&](const char* key) -> std::optional<std::string> {
+    const Json* name = find(line, key);
+    if (name == nullptr || std::isnan(t)) return std::nullopt;
+    if (!name->is_string()) throw line_error(reader, fmt::format("{}: expected a name", key));
+    return name->get<std::string>();
+  };
+  const VectorXd q = joint_vector(line, "q", world_.model.dof(), reader);
+  if (const auto name = name_of("attached")) loads_.attach(*name, t);
+  if (const auto name = name_of("detached")) loads_.detach(*name, t, q);
   if (events_.size() < events_max)
     events_.push_back({{"t", std::isnan(t) ? Json(nullptr) : Json(t)}, {"text", *text}});
   else

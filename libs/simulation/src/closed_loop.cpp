@@ -233,9 +233,10 @@ void ClosedLoop::start(const Watch& watch) {
   audit_ =
       std::make_unique<EnergyAudit>(*recorder_, ideal && plant.integrator == "hamel-variational");
   log_ = std::make_unique<TickLog>(*recorder_, model_, *plant_, *judge_, *controller_, *actuation_);
-  if (control::follow_goal_of(scene_.goals) != nullptr)
+  if (control::follow_goal_of(scene_.goals) != nullptr) {
     tracking_ = std::make_unique<TrackingAudit>(model_, limits_);
-  if (tracking_) log_->add_target(controller_->answer(), *tracking_);
+    log_->add_target(*tracking_);
+  }
   open_target_feed(watch);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging()) log_->header(scene_, planner_params_, result_.provenance, steps_);
@@ -530,9 +531,8 @@ void ClosedLoop::check_target() {
                   "the stream of targets has no line that is right, expected poses or twists");
   if (feed_->ended() && plant_->node().time_s > feed_->last_s().value_or(0.0) + stream.gap_max_s)
     return finish(log::Outcome::followed, "the stream of targets has ended");
-  const bool lost = target->lost && !std::exchange(target_lost_, target->lost);
-  target_lost_ = target->lost;
-  if (!lost) return;
+  const bool lost_before = std::exchange(target_lost_, target->lost);
+  if (!target->lost || lost_before) return;
   const std::string what = fmt::format(
       "the target is lost: no line of its stream for {} s, "
       "expected at most {} s between two lines",

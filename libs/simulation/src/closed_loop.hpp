@@ -56,7 +56,8 @@ class ClosedLoop {
   [[nodiscard]] bool is_due(const scene::Event& event) const;
   void begin(const scene::Event& event);
   /// What the controller has accepted becomes true of the arm, the map and the judge.
-  void complete(const scene::Event& event);
+  /// @param accepted whether it has accepted another load
+  void complete(const scene::Event& event, bool accepted);
   /// The arm carries what `carried_` lists from this node on.
   void take_load();
   /// Logs that something of this name is "attached" or "detached".

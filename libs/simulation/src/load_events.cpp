@@ -28,12 +28,12 @@ void ClosedLoop::advance_events() {
     expected_load_ = 0;
     const scene::Event& event = events[next_event_++];
     if (refused) note_refused_load(event);
-    complete(event);
+    complete(event, !refused);
   }
   while (!done_ && next_event_ < events.size() && is_due(events[next_event_])) {
     begin(events[next_event_]);
     if (expected_load_ != 0) return;
-    complete(events[next_event_++]);
+    complete(events[next_event_++], false);
   }
 }
 
@@ -66,14 +66,12 @@ void ClosedLoop::note_refused_load(const scene::Event& event) {
   result_.warnings.push_back(std::move(cause));
 }
 
-void ClosedLoop::complete(const scene::Event& event) {
-  const std::size_t before = carried_.size();
+void ClosedLoop::complete(const scene::Event& event, bool accepted) {
   if (event.map) {
     own_judge_->change_map(*event.map);
     plant_->change_map(*event.map);
     report_event(false, "the map changes");
   }
-  const bool accepted = controller_->attached().size() != before;
   if (accepted && event.attach) {
     carried_.push_back(*event.attach);
     record_load(event.attach->name, "attached");

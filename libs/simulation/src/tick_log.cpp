@@ -93,8 +93,9 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
                       {"q_end", to_json(shield->stop().end())}};
     if (shield->stop().moves()) fields["stop"]["evades"] = true;
   }
-  if (answer_ != nullptr && answer_->target != nullptr && !answer_->target->waiting)
-    fields["target"] = target_json(*answer_->target, *tracking_);
+  const control::TargetState* const target = controller_.answer().target;
+  if (tracking_ != nullptr && target != nullptr && !target->waiting)
+    fields["target"] = target_json(*target, *tracking_);
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_->has_self()) fields["self_clearance_m"] = world_->self_clearance_m();
   if (world_->has_obstacles()) {

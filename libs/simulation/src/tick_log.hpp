@@ -30,11 +30,8 @@ class TickLog {
   /// The judge's view is another one from now on.
   void set_world(const control::WorldView& world) noexcept { world_ = &world; }
 
-  /// Writes the target that is followed, too. Both must outlive this.
-  void add_target(const control::Answer& answer, const TrackingAudit& tracking) {
-    answer_ = &answer;
-    tracking_ = &tracking;
-  }
+  /// Writes the target that is followed, too. `tracking` must outlive this.
+  void add_target(const TrackingAudit& tracking) noexcept { tracking_ = &tracking; }
 
   /// @param params the planner's, with defaults @param series that it declared
   void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
@@ -50,8 +47,7 @@ class TickLog {
   const control::WorldView* world_;
   control::Controller& controller_;
   Actuation& actuation_;
-  const control::Answer* answer_ = nullptr;  ///< null if no goal follows a target
-  const TrackingAudit* tracking_ = nullptr;  ///< the same
+  const TrackingAudit* tracking_ = nullptr;  ///< null if no goal follows a target
   std::uint64_t drawn_ = 0;  ///< number of the planner's drawing that was written last
   Eigen::VectorXd torque_;   ///< of the last node with an answer
 };

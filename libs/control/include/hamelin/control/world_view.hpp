@@ -19,8 +19,7 @@ namespace hamelin::control {
 
 /// The surroundings of the arm at a configuration: near points of obstacles and of its own parts,
 /// the smallest clearances, and the proof that the motion between two configurations was clear of
-/// both. One object per thread. After construction, only advance_map()
-/// and change_map() allocate.
+/// both. One object per thread. After construction, only advance_map() and change_map() allocate.
 class WorldView {
  public:
   /// All obstacles of a scene, those that a planner is not shown included.
@@ -154,7 +153,7 @@ class WorldView {
   const model::Model& model_;
   std::optional<Own> own_;                 ///< without a World
   World* world_;                           ///< null without one
-  std::optional<World::View> first_view_;  ///< of the world, until the first take_newest()
+  std::optional<World::View> first_view_;  ///< of the world; kept, since ticks free no memory
   const scene::Environment* environment_ = nullptr;
   scene::Environment::Scratch* scratch_ = nullptr;
   std::span<const std::int32_t> ids_;
