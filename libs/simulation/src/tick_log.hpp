@@ -27,15 +27,12 @@ class TickLog {
 
   /// @param params the planner's, with defaults
   void header(const scene::Scene& scene, const Json& params, const Json& provenance, long steps);
-  /// The judge's view is another one from now on.
-  void set_world(const control::WorldView& world) noexcept { world_ = &world; }
 
+  /// Replaces the view of the world, after the arm or the map has changed. It must outlive this.
+  void set_world(const control::WorldView& world) noexcept { world_ = &world; }
   /// Writes the target that is followed, too. `tracking` must outlive this.
   void add_target(const TrackingAudit& tracking) noexcept { tracking_ = &tracking; }
 
-  /// @param params the planner's, with defaults @param series that it declared
-  void header(const scene::Scene& scene, const planning::Plugin& plugin, const Json& params,
-              const std::vector<planning::Series>& series, const Json& provenance, long steps);
   /// Writes the line of this node. @param answer the planner's, which acts from here on; null if
   /// there is none
   void tick(bool certified, const planning::CommandBuffers* answer);
