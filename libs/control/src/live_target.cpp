@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/geometry/so3.hpp"

@@ -9,6 +9,7 @@
 #include "hamelin/geometry/so3.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/arm_loop.hpp"
+#include "hamelin/test/errors.hpp"
 
 using namespace hamelin;
 using Catch::Contains;
@@ -29,15 +30,6 @@ scene::Obstacle ball(const std::string& name, const Vector3d& at, double radius 
   out.radius_m = radius;
   out.pose = {Eigen::Matrix3d::Identity(), at};
   return out;
-}
-
-std::string message_of(const std::function<void()>& update) {
-  try {
-    update();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 control::Observation seen(double time_s, const Vector3d& at) {
@@ -81,40 +73,40 @@ TEST_CASE("an update that cannot be applied names what is wrong and changes noth
   const auto before = world.latest();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const geometry::SE3 here;
-  CHECK_THAT(message_of([&] { world.remove_obstacle("b"); }),
+  CHECK_THAT(test::error_of([&] { world.remove_obstacle("b"); }),
              Equals("obstacle 'b': there is none of this name, expected one of the 1 that exist"));
-  CHECK_THAT(message_of([&] { world.move_obstacle("b", here, Vector3d::Zero(), 0.0); }),
+  CHECK_THAT(test::error_of([&] { world.move_obstacle("b", here, Vector3d::Zero(), 0.0); }),
              Contains("obstacle 'b'"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                world.move_obstacle("a", here, {nan, 0.0, 0.0}, 0.0);
              }),
              Contains("obstacle 'a'") && Contains("not finite"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                world.set_obstacle(ball("a", {0.0, nan, 0.0}));
              }),
              Contains("obstacle 'a'") && Contains("not finite"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                world.set_obstacle(ball("a", {0.0, 0.0, 0.0}, -1.0));
              }),
              Contains("obstacle 'a'"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                world.set_obstacle(ball("", {0.0, 0.0, 0.0}));
              }),
              Contains("no name"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                scene::Obstacle hidden = ball("a", {0.0, 0.0, 0.0});
                hidden.known = false;
                world.set_obstacle(hidden);
              }),
              Contains("obstacle 'a'") && Contains("hidden from the planner"));
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                world.set_obstacle(ball("b", {0.0, 0.0, 0.0}));
              }),
              Contains("obstacle 'b'") && Contains("1 already"));
-  CHECK_THAT(message_of([&] { world.change_map({}); }), Contains("map"));
+  CHECK_THAT(test::error_of([&] { world.change_map({}); }), Contains("map"));
   scene::MapSpec no_file;
   no_file.file = "no_such_map.bt";
-  CHECK_THAT(message_of([&] { world.set_map(no_file); }), Contains("no_such_map.bt"));
+  CHECK_THAT(test::error_of([&] { world.set_map(no_file); }), Contains("no_such_map.bt"));
   CHECK(world.latest() == before);
 }
 
@@ -197,11 +189,11 @@ TEST_CASE("observations that cannot be right are refused and change nothing",
   const auto before = world.latest();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto refused = [&](const control::Observation& observation, const char* name = "a") {
-    return message_of([&] { world.observe_obstacle(name, observation); });
+    return test::error_of([&] { world.observe_obstacle(name, observation); });
   };
   const Vector3d here(0.002, 0.0, 0.0);
   CHECK_THAT(refused(seen(2.02, here), "b"), Contains("obstacle 'b': there is none of this name"));
-  CHECK_THAT(message_of([&] { (void)world.last_observed("b"); }),
+  CHECK_THAT(test::error_of([&] { (void)world.last_observed("b"); }),
              Contains("obstacle 'b': there is none of this name"));
   CHECK_THAT(refused(seen(2.01, here)),
              Equals("obstacle 'a': observed at 2.01 s, expected a time after its last observation "
@@ -228,7 +220,7 @@ TEST_CASE("observations that cannot be right are refused and change nothing",
   CHECK(observed(world).velocity_m_s.isZero(0.0));
   control::World::Options bad{0.5, 3};
   bad.observations.noise_m = -1.0;
-  CHECK_THAT(message_of([&] { const control::World with(empty_scene(), arm, bad); }),
+  CHECK_THAT(test::error_of([&] { const control::World with(empty_scene(), arm, bad); }),
              Contains("observations: noise_m is -1"));
 }
 
@@ -256,7 +248,7 @@ TEST_CASE("what is estimated of an obstacle stays below its stated speed",
   CHECK(fastest == Approx(0.2));  // without the bound it would be more
   control::Observation given = seen(5.0, {1.0, 0.0, 0.0});
   given.velocity_m_s = {0.3, 0.0, 0.0};
-  CHECK_THAT(message_of([&] { world.observe_obstacle("a", given); }),
+  CHECK_THAT(test::error_of([&] { world.observe_obstacle("a", given); }),
              Contains("obstacle 'a': its motion reaches 0.3 m/s, expected at most 0.2 m/s"));
 }
 

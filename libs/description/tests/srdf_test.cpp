@@ -6,22 +6,13 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "hamelin/test/errors.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
 namespace fs = std::filesystem;
 
 namespace {
-
-template <class Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
 
 const fs::path robots = fs::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
 
@@ -52,7 +43,7 @@ TEST_CASE("a broken SRDF ends in one line with file, line and what was expected"
           "[description][unit]") {
   const test::TemporaryFolder folder;
   const auto of = [&](const std::string& text) {
-    return error_of([&] { (void)description::read_srdf(folder.put("x.srdf", text)); });
+    return test::error_of([&] { (void)description::read_srdf(folder.put("x.srdf", text)); });
   };
   CHECK_THAT(of(""), Catch::Contains("x.srdf") && Catch::Contains("empty"));
   CHECK_THAT(of("<robot>\n<disable_collisions link1=\"a\"/></robot>"),
@@ -96,7 +87,7 @@ TEST_CASE("a link that is not in the URDF is an error with the nearest name",
   const test::TemporaryFolder folder;
   const auto srdf = folder.put(
       "x.srdf", "<robot>\n<disable_collisions link1=\"link1\" link2=\"linc2\"/></robot>");
-  const std::string message = error_of([&] {
+  const std::string message = test::error_of([&] {
     (void)description::read_robot(robots / "arm7.urdf", {{}, {}, srdf});
   });
   CHECK_THAT(message, Catch::Contains("x.srdf: line 2") && Catch::Contains("no link 'linc2'") &&

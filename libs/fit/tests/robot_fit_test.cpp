@@ -5,6 +5,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "hamelin/test/errors.hpp"
 #include "meshes.hpp"
 
 using namespace hamelin;
@@ -41,12 +42,7 @@ std::string robot(const std::string& shapes) {
 }
 
 std::string error_of(const std::filesystem::path& urdf, const FitOptions& options = {}) {
-  try {
-    (void)fit_robot(urdf, options);
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
+  return test::error_of([&] { (void)fit_robot(urdf, options); });
 }
 
 double least_distance(const LinkFit& of, const Vector3d& p) {

@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <optional>
 #include <stdexcept>
 
@@ -12,6 +11,7 @@
 #include "hamelin/core/isa.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "hamelin/test/allocations.hpp"
+#include "hamelin/test/errors.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -26,17 +26,8 @@ fs::path test_plugin(const std::string& name) {
   return test_plugins / (name + ".hamelin.so");
 }
 
-std::string error_of(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
-
 std::string refusal(const fs::path& file) {
-  return error_of([&] { (void)Plugin::load(file); });
+  return test::error_of([&] { (void)Plugin::load(file); });
 }
 
 struct Services : HostServices {
@@ -117,19 +108,21 @@ TEST_CASE("a file that is not a valid plugin is refused with one line that names
 TEST_CASE("an exception of a planner's constructor becomes one line with its text",
           "[planning][plugin]") {
   const std::string file = test_plugin("awkward").string();
-  CHECK(error_of([] { Bench("throw in constructor"); }) ==
+  CHECK(test::error_of([] { Bench("throw in constructor"); }) ==
         file + ": planner 'awkward' cannot start: this gain is out of tune");
-  CHECK(error_of([] { Bench("throw an int"); }) ==
+  CHECK(test::error_of([] { Bench("throw an int"); }) ==
         file + ": planner 'awkward' cannot start: an exception that is not a std::exception");
 
   Services services;
   const Plugin empty = Plugin::load(test_plugin("creates_nothing"));
-  CHECK_THAT(error_of([&] { (void)empty.create(SetupData(arm()), services, Json::object()); }),
-             Catch::EndsWith("cannot start: create returned no planner"));
+  CHECK_THAT(
+      test::error_of([&] { (void)empty.create(SetupData(arm()), services, Json::object()); }),
+      Catch::EndsWith("cannot start: create returned no planner"));
   services.log_throws = true;
   const Plugin plain = Plugin::load(test_plugin("plain_c"));
-  CHECK_THAT(error_of([&] { (void)plain.create(SetupData(arm()), services, Json::object()); }),
-             Catch::EndsWith("cannot start: the log is full"));
+  CHECK_THAT(
+      test::error_of([&] { (void)plain.create(SetupData(arm()), services, Json::object()); }),
+      Catch::EndsWith("cannot start: the log is full"));
 }
 
 TEST_CASE("a planner written in plain C answers ticks and keeps its library loaded",
@@ -269,7 +262,7 @@ TEST_CASE("parameters are completed, and errors name planner, key and range",
   CHECK(check_params(plugin, nullptr).at("gain") == 2);
 
   const auto error = [&](const char* params) {
-    return error_of([&] { (void)check_params(plugin, Json::parse(params)); });
+    return test::error_of([&] { (void)check_params(plugin, Json::parse(params)); });
   };
   CHECK(error(R"({"gain": 11})") ==
         "parameters of planner 'awkward': /gain: 11 is not allowed, expected type number, at least "
@@ -292,7 +285,7 @@ TEST_CASE("a missing planner is reported with all directories and a similar name
   fs::copy_file(test_plugin("old_abi"), root / "two/old.hamelin.so");
   const std::vector<fs::path> directories{root / "one", root / "two", root / "three"};
 
-  CHECK(error_of([&] { (void)find_plugin("plain-c", directories); }) ==
+  CHECK(test::error_of([&] { (void)find_plugin("plain-c", directories); }) ==
         "planner 'plain-c': not found, did you mean 'plain_c'?; searched for plain-c.hamelin.so "
         "in: " +
             (root / "one").string() + " (no plugins); " + (root / "two").string() +

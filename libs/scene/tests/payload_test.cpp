@@ -9,6 +9,7 @@
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/test/errors.hpp"
 
 using namespace hamelin;
 using Catch::Contains;
@@ -35,15 +36,6 @@ scene::Payload lump() {
   lump.spheres = {{{0.0, 0.1, 0.2}, 0.03}};
   lump.capsules = {{{-0.1, 0.0, 0.1}, {0.1, 0.05, 0.1}, 0.02}};
   return lump;
-}
-
-std::string message_of(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 }  // namespace
@@ -107,7 +99,7 @@ TEST_CASE("payloads that are no bodies are refused with one line", "[scene][payl
   const auto refusal = [](const auto& change) {
     scene::Payload body = lump();
     change(body);
-    return message_of([&] { scene::check(body, "payload"); });
+    return test::error_of([&] { scene::check(body, "payload"); });
   };
   CHECK(refusal([](auto&) {}) == "no error");
   CHECK(refusal([](auto& b) { b.name.clear(); }) ==
@@ -120,7 +112,7 @@ TEST_CASE("payloads that are no bodies are refused with one line", "[scene][payl
   CHECK_THAT(refusal([&](auto& b) { b.capsules[0].to_m.x() = nan; }), Contains("capsule 0"));
   scene::Payload body = lump();
   body.name = "link3";
-  CHECK_THAT(message_of([&] {
+  CHECK_THAT(test::error_of([&] {
                (void)scene::with_payloads(arm7(), {&body, 1});
              }),
              Contains("'arm7' has a link or part of this name"));
@@ -141,7 +133,7 @@ TEST_CASE("the bounds of events count what is carried at a time", "[scene][paylo
   CHECK(apart.reach_m == Approx(1.1));
   CHECK(scene::payload_bounds({}, arm, "events").reach_m == 0.0);
   const std::vector<scene::Event> twice{first, first};
-  CHECK_THAT(message_of([&] { (void)scene::payload_bounds(twice, arm, "events"); }),
+  CHECK_THAT(test::error_of([&] { (void)scene::payload_bounds(twice, arm, "events"); }),
              Contains("events/1/attach: payload 'lump'"));
 }
 
@@ -158,7 +150,8 @@ TEST_CASE("events that cannot happen are refused with place and expectation", "[
   const auto refusal = [](const std::string& assignment) {
     Json document = read_json(data / "scenes" / "shelf_carry.json");
     scene::set_pointer(document, assignment);
-    return message_of([&] { (void)scene::scene_from_json(document, data / "scenes", "scene"); });
+    return test::error_of(
+        [&] { (void)scene::scene_from_json(document, data / "scenes", "scene"); });
   };
   CHECK(refusal("/seed=1") == "no error");
   CHECK_THAT(refusal("/events/0/time_s=3"),
@@ -176,7 +169,7 @@ TEST_CASE("events that cannot happen are refused with place and expectation", "[
   Json fixed = read_json(data / "scenes" / "shelf_carry.json");
   fixed["model"]["payload"] = {{"name", "tool"}, {"mass_kg", 1}};
   fixed["events"][3]["detach"] = "tool";
-  CHECK_THAT(message_of([&] { (void)scene::scene_from_json(fixed, data / "scenes", "scene"); }),
+  CHECK_THAT(test::error_of([&] { (void)scene::scene_from_json(fixed, data / "scenes", "scene"); }),
              Contains("/events/3/detach: 'tool' is the payload of /model"));
   CHECK_THAT(refusal("/events/1/map=null"),
              Contains("/events/1/attach: is missing, expected attach, detach or map"));

@@ -504,8 +504,7 @@ void ClosedLoop::feed_target() {
   feed_->advance(plant_->node().time_s, *controller_, [this](const std::string& line) {
     // Only the first few become warnings of the result: a stream may be wrong line by line.
     constexpr long warned = 5;
-    tracking_->count_refused_line();
-    if (++refused_lines_ <= warned) result_.warnings.push_back(line);
+    if (tracking_->count_refused_line() <= warned) result_.warnings.push_back(line);
     report_event(true, line);
   });
 }
@@ -528,7 +527,7 @@ void ClosedLoop::check_target() {
   const scene::TargetStream& stream = controller_->goals().goal().stream;
   if (feed_->ended() && !feed_->last_s())
     return finish(log::Outcome::target_lost,
-                  "the stream of targets has no line that is right, expected poses or twists");
+                  "no line of the stream of targets is valid, expected poses or twists");
   if (feed_->ended() && plant_->node().time_s > feed_->last_s().value_or(0.0) + stream.gap_max_s)
     return finish(log::Outcome::followed, "the stream of targets has ended");
   const bool lost_before = std::exchange(target_lost_, target->lost);

@@ -131,7 +131,6 @@ class ClosedLoop {
   std::unique_ptr<TrackingAudit> tracking_;  ///< only with a follow goal
   bool target_lost_ = false;                 ///< at the last tick
   std::optional<double> ends_by_s_;          ///< once the target is lost in a scene that ends then
-  long refused_lines_ = 0;                   ///< of the stream of targets
   const Watch* watch_ = nullptr;
   struct Message {
     bool warning;

@@ -24,7 +24,8 @@ class TrackingAudit {
                const Eigen::VectorXd& q, control::WorldView& judge, double h);
   /// The arm carries something else: its model has changed, in place.
   void take_load() { ws_ = dynamics::Workspace(model_); }
-  void count_refused_line() noexcept { ++out_.refused_lines; }
+  /// Counts a line of the stream that is refused. @return the number of these so far
+  long count_refused_line() noexcept { return ++out_.refused_lines; }
 
   /// The figures so far; none if no target was followed.
   [[nodiscard]] std::optional<log::Result::Following> figures() const;

@@ -9,6 +9,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/test/errors.hpp"
 
 using namespace hamelin;
 using namespace hamelin::sweep;
@@ -60,12 +61,7 @@ double pillar_clearance(const Eigen::VectorXd& q) {
 }
 
 std::string message_of(const scene::Scene& scene, const PairOptions& options) {
-  try {
-    (void)draw_pairs(scene, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { (void)draw_pairs(scene, options); });
 }
 
 }  // namespace

@@ -196,7 +196,8 @@ TEST_CASE("a stream without a right line is lost at once", "[follow]") {
   for (const char* lines : {"", "wrong\n"}) {
     const log::Result result = run_stream(streamed(), lines);
     CHECK(result.outcome == Outcome::target_lost);
-    CHECK_THAT(result.cause, Contains("has no line that is right, expected poses or twists"));
+    CHECK_THAT(result.cause,
+               Contains("no line of the stream of targets is valid, expected poses or twists"));
     CHECK(result.steps == 0);
   }
 }
