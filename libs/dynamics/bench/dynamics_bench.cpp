@@ -61,6 +61,12 @@ TEST_CASE("time of dynamics over the number of links", "[!benchmark][dynamics]")
         dynamics::forward_dynamics_derivatives(model, derivatives, q, v, v, x, A, B, C);
         return A(0, 0);
       };
+      dynamics::KineticDerivatives kinetic(n);
+      dynamics::PotentialDerivatives potential(n);
+      BENCHMARK("second derivatives of the energies, " + label) {
+        dynamics::energy_derivatives(model, derivatives, q, v, kinetic, potential);
+        return kinetic.M(0, 0);
+      };
     }
   }
 }

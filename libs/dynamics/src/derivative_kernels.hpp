@@ -18,6 +18,12 @@ struct DerivativeKernels {
   /// From the derivatives of inverse dynamics, those of forward dynamics; M becomes its inverse.
   void (*forward_dynamics)(std::size_t links, const double* dq, const double* dv, double* M,
                            double* da_dq, double* da_dv) noexcept;
+  void (*kinetic)(std::size_t links, void* memory, const kernel::DerivativeLink*,
+                  const kernel::DerivativeFrame*, const double* v,
+                  const kernel::KineticOutput&) noexcept;
+  void (*potential)(std::size_t links, void* memory, const kernel::DerivativeLink*,
+                    const kernel::DerivativeFrame*, const geometry::Vec3<double>& gravity,
+                    const kernel::PotentialOutput&) noexcept;
 };
 
 /// @throws Error usage if this machine does not have the instruction set

@@ -35,7 +35,8 @@ kernel::DerivativeLink link_of(const model::Link& link, const geometry::SE3& com
           link.joint.type == model::JointType::prismatic};
 }
 
-void place_frames(const Model& model, DerivativesWorkspace& ws) {
+void place_frames(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q) {
+  forward_kinematics(model, ws.ws, q);
   const Vector3d origin = model.base().p();
   for (std::size_t i = 0; i < ws.frames.size(); ++i) {
     const Workspace::Frame& f = ws.ws.frames[i];
@@ -61,19 +62,52 @@ struct Matrices {
 
 void compute(const Model& model, DerivativesWorkspace& ws, const Matrices& out,
              const ConstVectorRef& q, const ConstVectorRef& v, const ConstVectorRef& a) {
-  forward_kinematics(model, ws.ws, q);
-  place_frames(model, ws);
+  place_frames(model, ws, q);
   ws.kernels->inverse_dynamics(ws.links.size(), ws.sweep.get(), ws.links.data(), ws.frames.data(),
                                vec3(model.gravity()), v.data(), a.data(), out.at(0), out.at(1),
                                out.at(2));
 }
 
 void check_square(const detail::Call& call, Index n, const char* rows, const char* columns,
-                  const MatrixRef& matrix) {
+                  const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
   call.size(rows, matrix.rows(), n).size(columns, matrix.cols(), n);
 }
 
+void check(const detail::Call& call, const KineticDerivatives& out, Index n) {
+  call.size("kinetic", out.p.size(), n).size("kinetic.dK_dq", out.dK_dq.size(), n);
+  check_square(call, n, "kinetic.M (rows)", "kinetic.M (columns)", out.M);
+  check_square(call, n, "kinetic.dp_dq (rows)", "kinetic.dp_dq (columns)", out.dp_dq);
+  check_square(call, n, "kinetic.d2K_dq2 (rows)", "kinetic.d2K_dq2 (columns)", out.d2K_dq2);
+}
+void check(const detail::Call& call, const PotentialDerivatives& out, Index n) {
+  call.size("potential", out.dU_dq.size(), n);
+  check_square(call, n, "potential.d2U_dq2 (rows)", "potential.d2U_dq2 (columns)", out.d2U_dq2);
+}
+
+// After place_frames().
+void compute(DerivativesWorkspace& ws, const ConstVectorRef& v, KineticDerivatives& out) {
+  const Matrices matrices(ws);
+  ws.kernels->kinetic(
+      ws.links.size(), ws.sweep.get(), ws.links.data(), ws.frames.data(), v.data(),
+      {out.p.data(), out.dK_dq.data(), matrices.at(0), matrices.at(1), matrices.at(2)});
+  matrices.copy(0, out.M);
+  matrices.copy(1, out.dp_dq);
+  matrices.copy(2, out.d2K_dq2);
+}
+void compute(const Model& model, DerivativesWorkspace& ws, PotentialDerivatives& out) {
+  const Matrices matrices(ws);
+  ws.kernels->potential(ws.links.size(), ws.sweep.get(), ws.links.data(), ws.frames.data(),
+                        vec3(model.gravity()), {out.dU_dq.data(), matrices.at(0)});
+  matrices.copy(0, out.d2U_dq2);
+}
+
 }  // namespace
+
+KineticDerivatives::KineticDerivatives(Index dof)
+    : p(VectorXd::Zero(dof)), dK_dq(p), M(Eigen::MatrixXd::Zero(dof, dof)), dp_dq(M), d2K_dq2(M) {}
+
+PotentialDerivatives::PotentialDerivatives(Index dof)
+    : dU_dq(VectorXd::Zero(dof)), d2U_dq2(Eigen::MatrixXd::Zero(dof, dof)) {}
 
 DerivativesWorkspace::DerivativesWorkspace(const model::Model& model, Isa isa)
     : ws(model, isa),
@@ -128,6 +162,36 @@ void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
   out.copy(3, da_dq);
   out.copy(4, da_dv);
   out.copy(2, da_dtau);
+}
+
+void kinetic_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                         const ConstVectorRef& v, KineticDerivatives& out) {
+  const detail::Call call("kinetic_derivatives", model, ws.ws.owner);
+  call.joints("q", q).joints("v", v);
+  check(call, out, ws.ws.owner.dof);
+  place_frames(model, ws, q);
+  compute(ws, v, out);
+}
+
+void potential_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                           PotentialDerivatives& out) {
+  const detail::Call call("potential_derivatives", model, ws.ws.owner);
+  call.joints("q", q);
+  check(call, out, ws.ws.owner.dof);
+  place_frames(model, ws, q);
+  compute(model, ws, out);
+}
+
+void energy_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                        const ConstVectorRef& v, KineticDerivatives& kinetic,
+                        PotentialDerivatives& potential) {
+  const detail::Call call("energy_derivatives", model, ws.ws.owner);
+  call.joints("q", q).joints("v", v);
+  check(call, kinetic, ws.ws.owner.dof);
+  check(call, potential, ws.ws.owner.dof);
+  place_frames(model, ws, q);
+  compute(ws, v, kinetic);
+  compute(model, ws, potential);
 }
 
 }  // namespace hamelin::dynamics

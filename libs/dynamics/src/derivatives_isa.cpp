@@ -30,10 +30,22 @@ void forward_dynamics(std::size_t n, const double* dq, const double* dv, double*
   kernel::minus_product(n, ld, M, dv, da_dv);
 }
 
+void kinetic(std::size_t n, void* memory, const kernel::DerivativeLink* links,
+             const kernel::DerivativeFrame* frames, const double* v,
+             const kernel::KineticOutput& out) noexcept {
+  kernel::kinetic_hessian(DerivativeScratch::at(memory, n), links, frames, v, out);
+}
+void potential(std::size_t n, void* memory, const kernel::DerivativeLink* links,
+               const kernel::DerivativeFrame* frames, const geometry::Vec3<double>& gravity,
+               const kernel::PotentialOutput& out) noexcept {
+  kernel::potential_hessian(DerivativeScratch::at(memory, n), links, frames, gravity, out);
+}
+
 }  // namespace
 
 extern const DerivativeKernels derivative_set;
-constexpr DerivativeKernels derivative_set{bytes, leading, inverse_dynamics, forward_dynamics};
+constexpr DerivativeKernels derivative_set{bytes,   leading,  inverse_dynamics, forward_dynamics,
+                                           kinetic, potential};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::dynamics

@@ -5,7 +5,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/test/allocations.hpp"
-#include "hamelin/test/complex_step.hpp"
+#include "hamelin/test/exact_derivatives.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -33,16 +33,16 @@ Model model_of(const DerivativeCase& c) {
 // Derivatives of inverse dynamics by complex steps, side by side: by q, v and a.
 MatrixXd complex_steps(const Model& model, const VectorXd& q, const VectorXd& v,
                        const VectorXd& a) {
-  using Complex = test::ComplexInverseDynamics;
+  using Complex = test::ReferenceDynamics<std::complex<double>>;
   constexpr double step = 1e-30;
-  const Complex inverse(model);
+  const Complex reference(model);
   const Index n = q.size();
   MatrixXd out(n, 3 * n);
   Complex::VectorXc x[] = {q.cast<Complex::C>(), v.cast<Complex::C>(), a.cast<Complex::C>()};
   for (Index k = 0; k < 3 * n; ++k) {
     auto& entry = x[k / n][k % n];
     entry += Complex::C(0.0, step);
-    out.col(k) = inverse(x[0], x[1], x[2]).imag() / step;
+    out.col(k) = reference.inverse_dynamics(x[0], x[1], x[2]).imag() / step;
     entry -= Complex::C(0.0, step);
   }
   return out;
@@ -88,6 +88,49 @@ TEST_CASE("derivatives of inverse and forward dynamics agree with complex steps"
         1e-14 * condition);
 }
 
+TEST_CASE("second derivatives of the energies agree with nested dual numbers",
+          "[dynamics][derivatives]") {
+  const auto c = GENERATE(DerivativeCase{1, 1, 0, false}, DerivativeCase{3, 7, 0, false},
+                          DerivativeCase{4, 6, 2, false}, DerivativeCase{5, 5, 1, false},
+                          DerivativeCase{6, 4, 0, true}, DerivativeCase{7, 6, 3, true},
+                          DerivativeCase{9, 12, 4, false});
+  CAPTURE(c.seed, c.n, c.prismatic_every, c.planar);
+  const Model model = model_of(c);
+  Rng rng(c.seed + 200);
+  const VectorXd q = test::random_joints(rng, c.n, 2.0), v = test::random_joints(rng, c.n, 2.0);
+  KineticDerivatives kinetic(c.n);
+  PotentialDerivatives potential(c.n);
+  DerivativesWorkspace ws(model);
+  energy_derivatives(model, ws, q, v, kinetic, potential);
+
+  const test::ReferenceDynamics<test::HyperDual> reference(model);
+  const auto close = [](const MatrixXd& x, const MatrixXd& y, double scale) {
+    return (x - y).norm() <= 1e-12 * scale;
+  };
+  const Index n = c.n;
+  VectorXd x(2 * n), gradient;
+  x << q, v;
+  MatrixXd H;
+  test::hessian([&](const auto& at) { return reference.kinetic_energy(at.head(n), at.tail(n)); }, x,
+                gradient, H);
+  const double scale = H.norm();
+  CHECK(close(kinetic.p, gradient.tail(n), scale));
+  CHECK(close(kinetic.dK_dq, gradient.head(n), scale));
+  CHECK(close(kinetic.M, H.bottomRightCorner(n, n), scale));
+  CHECK(close(kinetic.dp_dq, H.bottomLeftCorner(n, n), scale));
+  CHECK(close(kinetic.d2K_dq2, H.topLeftCorner(n, n), scale));
+  test::hessian([&](const auto& at) { return reference.potential_energy(at); }, q, gradient, H);
+  CHECK(close(potential.dU_dq, gradient, gradient.norm()));
+  CHECK(close(potential.d2U_dq2, H, gradient.norm()));
+
+  KineticDerivatives alone(c.n);
+  PotentialDerivatives alone_too(c.n);
+  kinetic_derivatives(model, ws, q, v, alone);
+  potential_derivatives(model, ws, q, alone_too);
+  CHECK(alone.d2K_dq2 == kinetic.d2K_dq2);
+  CHECK(alone_too.d2U_dq2 == potential.d2U_dq2);
+}
+
 TEST_CASE("derivatives do not allocate, and refuse what does not fit", "[dynamics][derivatives]") {
   const Model model = model_of({3, 7, 3, false}), other = model_of({4, 6, 0, false});
   DerivativesWorkspace ws(model);
@@ -97,6 +140,14 @@ TEST_CASE("derivatives do not allocate, and refuse what does not fit", "[dynamic
   if (test::counts_allocations())
     CHECK(test::allocations_in(
               [&] { forward_dynamics_derivatives(model, ws, x, x, x, a, dq, dv, dtau); }) == 0);
+  KineticDerivatives kinetic(7), small(6);
+  PotentialDerivatives potential(7);
+  if (test::counts_allocations())
+    CHECK(test::allocations_in([&] { energy_derivatives(model, ws, x, x, kinetic, potential); }) ==
+          0);
+  CHECK_THROWS_AS(kinetic_derivatives(model, ws, x, x, small), Error);
+  CHECK_THROWS_AS(kinetic_derivatives(model, ws, x, x.head(6), kinetic), Error);
+  CHECK_THROWS_AS(potential_derivatives(model, ws, x.head(6), potential), Error);
   CHECK_THROWS_AS(inverse_dynamics_derivatives(other, ws, x, x, x, dq, dv, dtau), Error);
   CHECK_THROWS_AS(inverse_dynamics_derivatives(model, ws, x, x, x, dq, wide, dtau), Error);
   CHECK_THROWS_AS(inverse_dynamics_derivatives(model, ws, x, x.head(6), x, dq, dv, dtau), Error);

@@ -4,7 +4,8 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 
-/// Exact first derivatives of inverse and forward dynamics, in O(n²): docs/theory.md (2.24)–(2.29).
+/// Exact derivatives in O(n²), docs/theory.md (2.24)–(2.32): the first ones of inverse and forward
+/// dynamics, and the first and second ones of the energies.
 namespace hamelin::dynamics {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
@@ -49,5 +50,34 @@ void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
                                   const ConstVectorRef& q, const ConstVectorRef& v,
                                   const ConstVectorRef& tau, VectorRef a, MatrixRef da_dq,
                                   MatrixRef da_dv, MatrixRef da_dtau);
+
+/// Derivatives of the kinetic energy K(q, v) = ½ vᵀM(q)v, docs/theory.md (2.31). Matrices are n ×
+/// n.
+struct KineticDerivatives {
+  explicit KineticDerivatives(Eigen::Index dof);
+  VectorXd p;             ///< momenta ∂K/∂v = M(q) v
+  VectorXd dK_dq;         ///< ∂K/∂q at constant v
+  Eigen::MatrixXd M;      ///< ∂²K/∂v²
+  Eigen::MatrixXd dp_dq;  ///< ∂²K/∂v∂q: row i the momentum of joint i
+  Eigen::MatrixXd d2K_dq2;
+};
+/// Derivatives of the potential energy U(q), docs/theory.md (2.32).
+struct PotentialDerivatives {
+  explicit PotentialDerivatives(Eigen::Index dof);
+  VectorXd dU_dq;
+  Eigen::MatrixXd d2U_dq2;
+};
+
+/// @param out made for as many joints
+/// @throws Error usage for sizes or a workspace that do not fit the model
+void kinetic_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                         const ConstVectorRef& v, KineticDerivatives& out);
+/// The same for the potential energy.
+void potential_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                           PotentialDerivatives& out);
+/// Both at one q, cheaper than two calls.
+void energy_derivatives(const Model& model, DerivativesWorkspace& ws, const ConstVectorRef& q,
+                        const ConstVectorRef& v, KineticDerivatives& kinetic,
+                        PotentialDerivatives& potential);
 
 }  // namespace hamelin::dynamics

@@ -44,23 +44,39 @@ HAMELIN_INLINE Screw operator*(const Screw& m, double k) noexcept {
 HAMELIN_INLINE Screw bracket(const Screw& m, const Screw& n) noexcept {
   return {cross(m.a, n.a), cross(m.a, n.b) + cross(m.b, n.a)};
 }
+HAMELIN_INLINE double dot(const Screw& m, const Screw& f) noexcept {
+  return dot(m.a, f.a) + dot(m.b, f.b);
+}
 /// m ×* f of a twist and a wrench.
 HAMELIN_INLINE Screw bracket_wrench(const Screw& m, const Screw& f) noexcept {
   return {cross(m.a, f.a) + cross(m.b, f.b), cross(m.a, f.b)};
 }
 
+/// Mass, Σ m r and Σ m r rᵀ of particles about the reference point.
+struct Inertia {
+  double mass;
+  Vec3<double> moment;
+  Sym3<double> second;
+};
+HAMELIN_INLINE Inertia operator+(const Inertia& p, const Inertia& q) noexcept {
+  return {p.mass + q.mass, p.moment + q.moment, p.second + q.second};
+}
+
 /// Sums over a link and all links outboard, docs/theory.md (2.26), (2.27).
 struct Outboard {
-  double mass;
-  Vec3<double> moment, momentum;
-  Sym3<double> second;
+  Inertia inertia;
+  Vec3<double> momentum;
   Mat3<double> flow;
   Screw wrench;
 };
 HAMELIN_INLINE Outboard operator+(const Outboard& p, const Outboard& q) noexcept {
-  return {p.mass + q.mass,     p.moment + q.moment, p.momentum + q.momentum,
-          p.second + q.second, p.flow + q.flow,     p.wrench + q.wrench};
+  return {p.inertia + q.inertia, p.momentum + q.momentum, p.flow + q.flow, p.wrench + q.wrench};
 }
+/// The same for the energies, with the momentum as a wrench: docs/theory.md (2.30).
+struct OutboardMomentum {
+  Inertia inertia;
+  Screw momentum;
+};
 HAMELIN_INLINE double trace(const Sym3<double>& a) noexcept {
   return a.xx + a.yy + a.zz;
 }
@@ -68,39 +84,51 @@ HAMELIN_INLINE double trace(const Mat3<double>& a) noexcept {
   return a.x.x + a.y.y + a.z.z;
 }
 /// I m.
-HAMELIN_INLINE Screw inertia_times(const Outboard& o, const Screw& m) noexcept {
-  return {m.a * trace(o.second) - o.second * m.a + cross(o.moment, m.b),
-          m.b * o.mass + cross(m.a, o.moment)};
+HAMELIN_INLINE Screw operator*(const Inertia& I, const Screw& m) noexcept {
+  return {m.a * trace(I.second) - I.second * m.a + cross(I.moment, m.b),
+          m.b * I.mass + cross(m.a, I.moment)};
 }
 /// 2B m.
 HAMELIN_INLINE Screw coriolis_times(const Outboard& o, const Screw& m) noexcept {
   return {(m.a * trace(o.flow) - o.flow * m.a) * 2.0, cross(m.a, o.momentum) * 2.0};
 }
 
-/// A link about the reference point, with its velocity and acceleration.
-HAMELIN_INLINE Outboard single(const DerivativeLink& l, const DerivativeFrame& f,
-                               const Screw& velocity, const Screw& acceleration) noexcept {
-  Outboard o;
-  o.mass = l.mass;
-  const Vec3<double> h = f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z;
-  o.moment = h + f.p * l.mass;
+/// The inertia of a link about the reference point.
+HAMELIN_INLINE Inertia placed(const DerivativeLink& l, const DerivativeFrame& f) noexcept {
+  const Vec3<double> h = f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z,
+                     moment = h + f.p * l.mass;
   // R E Rᵀ + h pᵀ + p (h + m p)ᵀ
   const Sym3<double>& e = l.second;
   const Vec3<double> ex = f.x * e.xx + f.y * e.xy + f.z * e.xz,
                      ey = f.x * e.xy + f.y * e.yy + f.z * e.yz,
                      ez = f.x * e.xz + f.y * e.yz + f.z * e.zz;
   const auto entry = [&](double Vec3<double>::*i, double Vec3<double>::*k) {
-    return ex.*i * f.x.*k + ey.*i * f.y.*k + ez.*i * f.z.*k + h.*i * f.p.*k + f.p.*i * o.moment.*k;
+    return ex.*i * f.x.*k + ey.*i * f.y.*k + ez.*i * f.z.*k + h.*i * f.p.*k + f.p.*i * moment.*k;
   };
   using V = Vec3<double>;
-  o.second = {entry(&V::x, &V::x), entry(&V::x, &V::y), entry(&V::x, &V::z),
-              entry(&V::y, &V::y), entry(&V::y, &V::z), entry(&V::z, &V::z)};
-  o.momentum = velocity.b * l.mass + cross(velocity.a, o.moment);
-  const Mat3<double> turned = hat_times(velocity.a, full(o.second));
-  o.flow = {turned.x + o.moment * velocity.b.x, turned.y + o.moment * velocity.b.y,
-            turned.z + o.moment * velocity.b.z};
-  o.wrench = inertia_times(o, acceleration) + bracket_wrench(velocity, inertia_times(o, velocity));
+  return {l.mass,
+          moment,
+          {entry(&V::x, &V::x), entry(&V::x, &V::y), entry(&V::x, &V::z), entry(&V::y, &V::y),
+           entry(&V::y, &V::z), entry(&V::z, &V::z)}};
+}
+
+/// A link with its velocity and acceleration.
+HAMELIN_INLINE Outboard single(const DerivativeLink& l, const DerivativeFrame& f,
+                               const Screw& velocity, const Screw& acceleration) noexcept {
+  Outboard o;
+  o.inertia = placed(l, f);
+  const Vec3<double>& moment = o.inertia.moment;
+  o.momentum = velocity.b * l.mass + cross(velocity.a, moment);
+  const Mat3<double> turned = hat_times(velocity.a, full(o.inertia.second));
+  o.flow = {turned.x + moment * velocity.b.x, turned.y + moment * velocity.b.y,
+            turned.z + moment * velocity.b.z};
+  o.wrench = o.inertia * acceleration + bracket_wrench(velocity, o.inertia * velocity);
   return o;
+}
+
+/// The screw of a joint about the reference point.
+HAMELIN_INLINE Screw screw_of(const DerivativeLink& l, const DerivativeFrame& f) noexcept {
+  return l.prismatic ? Screw{{0.0, 0.0, 0.0}, f.axis} : Screw{f.axis, cross(f.p, f.axis)};
 }
 
 /// The screws of all joints, number by number, so that a row of the derivatives is computed in
@@ -122,12 +150,14 @@ struct DerivativeScratch {
   AxisRows screw, first, second;
   double *rows_q, *rows_v;  ///< n × ld: rows of derivatives up to the diagonal
   Outboard* outboard;
+  OutboardMomentum* momenta;
 
   HAMELIN_INLINE static std::size_t padded(std::size_t n) noexcept {
     return (n + 7) & ~std::size_t{7};
   }
   HAMELIN_INLINE static std::size_t bytes(std::size_t n) noexcept {
-    return (18 + 2 * n) * padded(n) * sizeof(double) + n * sizeof(Outboard);
+    return (18 + 2 * n) * padded(n) * sizeof(double) +
+           n * (sizeof(Outboard) + sizeof(OutboardMomentum));
   }
   HAMELIN_INLINE static DerivativeScratch at(void* memory, std::size_t n) noexcept {
     DerivativeScratch s{};
@@ -144,6 +174,7 @@ struct DerivativeScratch {
     s.rows_q = take(n);
     s.rows_v = take(n);
     s.outboard = reinterpret_cast<Outboard*>(at);
+    s.momenta = reinterpret_cast<OutboardMomentum*>(s.outboard + n);
     return s;
   }
 };
@@ -156,8 +187,7 @@ HAMELIN_INLINE void sweep_outwards(const DerivativeScratch& k, const DerivativeL
   Screw velocity{zero, zero}, acceleration{zero, zero - gravity};
   for (std::size_t i = 0; i < k.n; ++i) {
     const DerivativeFrame& f = frames[i];
-    const Screw screw =
-        links[i].prismatic ? Screw{zero, f.axis} : Screw{f.axis, cross(f.p, f.axis)};
+    const Screw screw = screw_of(links[i], f);
     const Screw first = bracket(velocity, screw);
     k.screw.set(i, screw);
     k.first.set(i, first);
@@ -201,13 +231,13 @@ HAMELIN_INLINE void sweep_inwards(const DerivativeScratch& k, const DerivativeLi
   for (std::size_t i = k.n; i-- > 0;) {
     const Outboard& o = k.outboard[i];
     const Screw screw = k.screw.at(i), first = k.first.at(i);
-    const Screw column = inertia_times(o, screw);
+    const Screw column = o.inertia * screw;
     const Vec3<double> row =
         (screw.a * trace(o.flow) - transposed_times(o.flow, screw.a) + cross(o.momentum, screw.b)) *
         2.0;
-    const Screw by_q = coriolis_times(o, first) + inertia_times(o, k.second.at(i)) +
-                       bracket_wrench(screw, o.wrench);
-    const Screw by_v = coriolis_times(o, screw) + inertia_times(o, first) * 2.0;
+    const Screw by_q =
+        coriolis_times(o, first) + o.inertia * k.second.at(i) + bracket_wrench(screw, o.wrench);
+    const Screw by_v = coriolis_times(o, screw) + o.inertia * first * 2.0;
     const std::size_t count = i + 1;
     products<false>(k.screw, by_q, count, dq + i * ld);
     products<false>(k.screw, by_v, count, dv + i * ld);
@@ -229,6 +259,81 @@ HAMELIN_INLINE void sweep_inwards(const DerivativeScratch& k, const DerivativeLi
       M[i + j * ld] = M[j + i * ld];
     }
   }
+}
+
+/// Gradients and second derivatives of the energies, docs/theory.md (2.31), (2.32). Matrices are
+/// column-major with leading dimension ld.
+struct KineticOutput {
+  double *p, *dq;         ///< ∂K/∂v and ∂K/∂q, n
+  double *M, *mixed, *Q;  ///< ∂²K/∂v², ∂²K/∂v∂q with the momenta as rows, ∂²K/∂q²
+};
+struct PotentialOutput {
+  double *dq, *Q;  ///< ∂U/∂q, n, and ∂²U/∂q²
+};
+
+/// docs/theory.md (2.30), (2.31)
+HAMELIN_INLINE void kinetic_hessian(const DerivativeScratch& k, const DerivativeLink* links,
+                                    const DerivativeFrame* frames, const double* v,
+                                    const KineticOutput& out) noexcept {
+  const std::size_t ld = k.ld;
+  const Vec3<double> zero{0.0, 0.0, 0.0};
+  Screw velocity{zero, zero};
+  for (std::size_t i = 0; i < k.n; ++i) {
+    const Screw screw = screw_of(links[i], frames[i]);
+    k.screw.set(i, screw);
+    k.first.set(i, bracket(velocity, screw));
+    velocity = velocity + screw * v[i];
+    const Inertia inertia = placed(links[i], frames[i]);
+    k.momenta[i] = {inertia, inertia * velocity};
+  }
+  for (std::size_t i = k.n; i-- > 0;) {
+    const OutboardMomentum& o = k.momenta[i];
+    const Screw screw = k.screw.at(i), first = k.first.at(i), column = o.inertia * screw,
+                turned = o.inertia * first + bracket_wrench(screw, o.momentum);
+    const std::size_t count = i + 1;
+    products<false>(k.screw, column, count, out.M + i * ld);
+    products<false>(k.screw, turned, count, out.mixed + i * ld);
+    products<false>(k.first, column, count, k.rows_v + i * ld);
+    products<false>(k.first, turned, count, out.Q + i * ld);
+    out.M[i + i * ld] += links[i].armature;
+    out.p[i] = dot(screw, o.momentum) + links[i].armature * v[i];
+    out.dq[i] = dot(first, o.momentum);
+    if (i > 0) {
+      OutboardMomentum& inboard = k.momenta[i - 1];
+      inboard = {inboard.inertia + o.inertia, inboard.momentum + o.momentum};
+    }
+  }
+  for (std::size_t i = 0; i < k.n; ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      out.M[i + j * ld] = out.M[j + i * ld];
+      out.Q[i + j * ld] = out.Q[j + i * ld];
+      out.mixed[i + j * ld] = k.rows_v[j + i * ld];
+    }
+}
+
+/// docs/theory.md (2.32)
+HAMELIN_INLINE void potential_hessian(const DerivativeScratch& k, const DerivativeLink* links,
+                                      const DerivativeFrame* frames, const Vec3<double>& gravity,
+                                      const PotentialOutput& out) noexcept {
+  const std::size_t ld = k.ld;
+  double mass = 0.0;
+  Vec3<double> moment{0.0, 0.0, 0.0};
+  for (std::size_t i = 0; i < k.n; ++i) {
+    const Screw screw = screw_of(links[i], frames[i]);
+    k.first.set(i, {cross(screw.a, gravity), screw.b});
+  }
+  for (std::size_t i = k.n; i-- > 0;) {
+    const DerivativeFrame& f = frames[i];
+    const DerivativeLink& l = links[i];
+    mass += l.mass;
+    moment = moment + f.x * l.moment.x + f.y * l.moment.y + f.z * l.moment.z + f.p * l.mass;
+    const Screw screw = screw_of(l, f);
+    const Vec3<double> force = screw.b * mass + cross(screw.a, moment);
+    products<false>(k.first, force, i + 1, out.Q + i * ld);
+    out.dq[i] = -dot(force, gravity);
+  }
+  for (std::size_t i = 0; i < k.n; ++i)
+    for (std::size_t j = 0; j < i; ++j) out.Q[i + j * ld] = out.Q[j + i * ld];
 }
 
 /// Inverts a symmetric positive definite matrix in place by Gauss–Jordan elimination, which needs
