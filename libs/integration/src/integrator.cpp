@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "check_channels.hpp"
 #include "finite.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
@@ -29,13 +30,6 @@ Integrator::Shape Integrator::shape_of(const State& state) noexcept {
           state.history.size()};
 }
 
-void Integrator::check_size(const char* function, const char* argument, Eigen::Index given) const {
-  if (given != model_.dof()) [[unlikely]]
-    throw Error(ErrorCode::usage,
-                formatted("{}: {}: {} numbers given, expected {} (one per joint of '{}')", function,
-                          argument, given, model_.dof(), model_.robot().name));
-}
-
 void Integrator::check(const char* function, const State& state) const {
   const dynamics::detail::Call call(function, model_, ws_.owner);  // refuses a replaced model
   if (shape_of(state) != shape_) [[unlikely]]
@@ -43,7 +37,7 @@ void Integrator::check(const char* function, const State& state) const {
 }
 
 void Integrator::refuse_shape(const char* function, const State& state) const {
-  check_size(function, "state.q", state.q.size());
+  check_size(function, "state.q", model_, state.q.size());
   if (saved_.empty()) return;  // the expected sizes are not known before prepare()
   const Shape given = shape_of(state);
   throw Error(ErrorCode::usage, formatted("{}: state: {} velocities, {} momenta and {} numbers of "
@@ -57,30 +51,15 @@ void Integrator::check(const char* function, const State& state, const Channels&
                        double h) {
   if (saved_.empty()) prepare();
   check(function, state);
-  if (!channels.none()) check_channels(function, channels);
+  if (!channels.none()) check_channels(function, model_, channels);
   if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
     throw Error(ErrorCode::usage,
                 formatted("{}: a step of {} s given, expected a positive number", function, h));
 }
 
-void Integrator::check_channels(const char* function, const Channels& channels) const {
-  const auto sized = [&](const char* argument, const VectorXd& x) {
-    if (x.size() != 0) check_size(function, argument, x.size());
-  };
-  sized("channels.damping", channels.damping);
-  sized("channels.coulomb", channels.coulomb);
-  sized("channels.held_torque", channels.held_torque);
-  for (const auto& term : channels.gyroscopic)
-    if (term.link < 0 || term.link >= model_.dof()) [[unlikely]]
-      throw Error(
-          ErrorCode::usage,
-          formatted("{}: channels.gyroscopic: link {} given, expected an index from 0 to {}",
-                    function, term.link, model_.dof() - 1));
-}
-
 State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
-  check_size("start", "q0", q0.size());
-  check_size("start", "v0", v0.size());
+  check_size("start", "q0", model_, q0.size());
+  check_size("start", "v0", model_, v0.size());
   State state;
   state.q = q0;
   if (!all_finite(state.q) || !v0.allFinite())
@@ -102,7 +81,7 @@ void Integrator::prepare() {
 
 void Integrator::velocity(const State& state, VectorRef v) const {
   check("velocity", state);
-  check_size("velocity", "v", v.size());
+  check_size("velocity", "v", model_, v.size());
   node_velocity(state, v);
 }
 
@@ -113,20 +92,20 @@ Energy Integrator::energy(const State& state) const {
 
 Energy Integrator::energy(const State& state, const ConstVectorRef& v) const {
   check("energy", state);
-  check_size("energy", "v", v.size());
+  check_size("energy", "v", model_, v.size());
   return node_energy(state, v);
 }
 
 void Integrator::kick(State& state, const ConstVectorRef& dp) {
   check("kick", state);
-  check_size("kick", "dp", dp.size());
+  check_size("kick", "dp", model_, dp.size());
   add_momentum(state, dp);
   state.jumped = true;
 }
 
 void Integrator::set_velocity(State& state, const ConstVectorRef& v) {
   check("set_velocity", state);
-  check_size("set_velocity", "v", v.size());
+  check_size("set_velocity", "v", model_, v.size());
   replace_velocity(state, v);
   state.jumped = true;
 }

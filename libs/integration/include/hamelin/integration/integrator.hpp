@@ -163,9 +163,7 @@ class Integrator {
   static Shape shape_of(const State& state) noexcept;
   void check(const char* function, const State& state) const;
   void check(const char* function, const State& state, const Channels& channels, double h);
-  void check_channels(const char* function, const Channels& channels) const;
   void refuse_shape(const char* function, const State& state) const;
-  void check_size(const char* function, const char* argument, Eigen::Index given) const;
   /// Allocates the memory that steps need, at the latest before the first step.
   void prepare();
   StepReport take_step(State& state, const Channels& channels, double limit);

@@ -23,6 +23,8 @@ class StepHistory {
   void guess(double h, dynamics::VectorRef delta) const;
   /// The last displacement recorded.
   [[nodiscard]] const Eigen::VectorXd& last() const noexcept { return displacements_[0]; }
+  /// The length of that step.
+  [[nodiscard]] double step() const noexcept { return step_; }
 
   friend bool operator==(const StepHistory&, const StepHistory&) = default;
 
