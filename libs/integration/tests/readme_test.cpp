@@ -1,6 +1,8 @@
+#include <Eigen/LU>
 #include <catch2/catch.hpp>
 
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/integration/step_derivatives.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/readme.hpp"
 
@@ -24,10 +26,14 @@ for (int k = 0; k < 1000; ++k) {
   dissipated += report.dissipated_J;
 }
 const double error = integrator->energy(state).total() + dissipated - before;
+StepDerivatives step(7);  // of the last step, by (q, p), torque and step length
+make_step_differentiator(arm, make_options("hamel-variational"))
+    ->differentiate(state, channels, step);
   // [example]
   // clang-format on
   CHECK(state.k == 1000);
   CHECK(dissipated > 0.1);
   CHECK(std::abs(error) < 1e-3 * dissipated);
+  CHECK(step.by_state.determinant() < 1.0);  // damping contracts phase space
   test::check_readme_example("libs/integration");
 }
