@@ -1,0 +1,68 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "hamelin/model/model.hpp"
+
+namespace hamelin::optimal {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// What a motion minimises.
+enum class Objective : std::int32_t {
+  effort,  ///< ∫ τᵀRτ dt in a given time
+  time,    ///< the time itself
+};
+
+/// Bounds of the motion, one number per joint each; a vector of size zero, or an infinite number,
+/// is no bound. All but the positions are bounds of absolute values.
+struct Limits {
+  VectorXd position_min, position_max;  ///< [rad or m]
+  VectorXd velocity;                    ///< [rad/s or m/s]
+  VectorXd acceleration;                ///< [rad/s² or m/s²]
+  VectorXd jerk;                        ///< [rad/s³ or m/s³]
+  VectorXd torque;                      ///< [Nm or N]
+
+  /// Positions, velocities and torques of the robot's joints.
+  static Limits of(const model::Model& model);
+};
+
+/// Distances of the arm from what it must not touch, as functions of the configuration.
+class Clearance {
+ public:
+  virtual ~Clearance() = default;
+  /// How many distances evaluate() gives, always the same.
+  [[nodiscard]] virtual Eigen::Index rows() const = 0;
+  /// @param q dof numbers
+  /// @param distances in metres, rows() numbers, bounded from above
+  /// @param gradients dof × rows() [m per rad or m]; zero where a distance is at its bound
+  virtual void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) = 0;
+};
+
+/// A motion between two states that is sought: docs/theory.md, chapter 17.
+struct Problem {
+  const model::Model* model = nullptr;
+  VectorXd q_start, v_start, q_goal, v_goal;  ///< dof numbers each
+  int intervals = 50;                         ///< N: the motion has N + 1 knots
+  Objective objective = Objective::effort;
+  double duration_s = 1.0;  ///< of the motion, or with Objective::time of the first guess
+  Limits limits;
+  /// R of the effort, diagonal, dof numbers; with size zero the inverse squares of the torque
+  /// limits, or ones without limits.
+  VectorXd effort_weights;
+  /// With Objective::time, the weight of the mean of τᵀRτ beside the time [s]: it makes the
+  /// solution unique and smooth.
+  double time_effort_weight = 1e-3;
+  Clearance* clearance = nullptr;  ///< null: none; called by one thread at a time
+  double margin_m = 0.0;           ///< least clearance
+  /// Configurations per interval at which clearance is required: the knots, and between them.
+  int clearance_points = 1;
+};
+
+/// @throws Error invalid, one line that names what is wrong: sizes, numbers that are not finite, a
+///         start or goal outside the limits or too near to an obstacle, too few intervals, joints
+///         that cannot hold the arm at an end
+void check(const Problem& problem);
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,40 @@
+#pragma once
+#include <string>
+
+#include "hamelin/optimal/problem.hpp"
+
+namespace hamelin::optimal {
+
+struct SolveOptions {
+  int iterations_max = 300;
+  /// On stationarity, violation of bounds as shares of them, and complementarity.
+  double tolerance = 1e-8;
+};
+
+/// What a solver found.
+struct Solution {
+  bool converged = false;
+  std::string cause;       ///< why it did not converge: one line, or empty
+  MatrixXd q;              ///< knots, dof × (N + 1)
+  MatrixXd torque;         ///< at the knots
+  double step_s = 0.0;     ///< between two knots
+  double cost = 0.0;       ///< ∫ τᵀRτ dt, or the time plus its weight of the effort
+  double violation = 0.0;  ///< the largest, as a share of the bound, or in decimetres of clearance
+  int iterations = 0;
+  int evaluations = 0;
+  double stationarity = 0.0;
+};
+
+/// Solves the problem by an interior-point method on the banded equations, docs/theory.md
+/// (17.8)–(17.11).
+/// @param guess knots, dof × (N + 1), of which the inner ones are used
+/// @throws Error invalid for a Problem that check() refuses
+[[nodiscard]] Solution solve(const Problem& problem, const MatrixXd& guess,
+                             const SolveOptions& options = {});
+
+/// A guess at rest at both ends: along way-points at equal shares of length, with the smooth
+/// profile 10 s³ − 15 s⁴ + 6 s⁵ of the arc length.
+/// @param way_points dof × (2 or more), from start to goal
+[[nodiscard]] MatrixXd guess_along(const MatrixXd& way_points, int intervals);
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,209 @@
+#include "interior_point.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace hamelin::optimal {
+
+namespace {
+
+constexpr double first_slack = 1e-2;  // shares of bounds
+constexpr double first_shift = 1e-4, largest_shift = 1e12;
+constexpr double gradient_max = 100.0;     // of the scaled cost at the guess
+constexpr double multiplier_range = 1e10;  // of slack · multiplier / μ
+constexpr int backtracks_max = 30;
+
+}  // namespace
+
+InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options)
+    : program_(program),
+      options_(options),
+      hessian_(program.hessian_matrix()),
+      lower_{1.0, program.lower()},
+      upper_{-1.0, program.upper()},
+      gradient_(VectorXd::Zero(program.variables())),
+      row_(VectorXd::Zero(program.rows())),
+      weights_(row_),
+      row_step_(row_) {
+  for_each_side([&](Side& side) {
+    side.slack = VectorXd::Ones(program.rows());
+    side.multiplier = side.residual = side.slack_step = side.multiplier_step = row_;
+  });
+}
+
+void InteriorPoint::start(VectorXd x) {
+  x_ = std::move(x);
+  ++evaluations_;
+  program_.evaluate(x_);
+  program_.gradient(gradient_);
+  scale_ = std::min(1.0, gradient_max / gradient_.lpNorm<Eigen::Infinity>());
+  for_each_side([&](Side& side) {
+    for (Index r = 0; r < program_.rows(); ++r) {
+      if (!side.bounds(r)) continue;
+      side.slack[r] = std::max(first_slack, side.sign * (program_.values()[r] - side.bound[r]));
+      side.multiplier[r] = mu_ / side.slack[r];
+    }
+    find_residuals(side);
+  });
+}
+
+void InteriorPoint::find_residuals(Side& side) const {
+  for (Index r = 0; r < program_.rows(); ++r)
+    side.residual[r] =
+        side.bounds(r) ? side.sign * (program_.values()[r] - side.bound[r]) - side.slack[r] : 0.0;
+}
+
+// docs/theory.md (17.9). Multipliers far above one measure stationarity, as in IPOPT.
+InteriorPoint::Errors InteriorPoint::errors(double mu) {
+  program_.gradient(gradient_);
+  gradient_ *= scale_;
+  right_ = gradient_;
+  row_ = upper_.multiplier - lower_.multiplier;
+  program_.for_each_entry([&](Index r, Index v, double d) { right_[v] += d * row_[r]; });
+  const double sum = upper_.multiplier.sum() + lower_.multiplier.sum(),
+               mean = sum / std::max<double>(1.0, 2.0 * static_cast<double>(program_.rows())),
+               divisor = std::max(100.0, mean) / 100.0;
+  Errors out{right_.lpNorm<Eigen::Infinity>() / divisor, 0.0, 0.0};
+  for_each_side([&](const Side& side) {
+    for (Index r = 0; r < program_.rows(); ++r) {
+      if (!side.bounds(r)) continue;
+      out.violation = std::max(out.violation, std::abs(side.residual[r]));
+      out.complementarity = std::max(out.complementarity,
+                                     std::abs(side.slack[r] * side.multiplier[r] - mu) / divisor);
+    }
+  });
+  return out;
+}
+
+void InteriorPoint::lower_barrier() {
+  while (mu_ > options_.tolerance / 10.0 && errors(mu_).largest() <= 10.0 * mu_)
+    mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
+}
+
+// docs/theory.md (17.10)
+bool InteriorPoint::find_direction() {
+  const Index rows = program_.rows();
+  weights_.setZero();
+  VectorXd push = VectorXd::Zero(rows);
+  for_each_side([&](const Side& side) {
+    for (Index r = 0; r < rows; ++r) {
+      if (!side.bounds(r)) continue;
+      const double weight = side.multiplier[r] / side.slack[r];
+      weights_[r] += weight;
+      push[r] += side.sign * (mu_ / side.slack[r] - weight * side.residual[r]);
+    }
+  });
+  row_ = upper_.multiplier - lower_.multiplier;
+  right_ = -gradient_;
+  program_.for_each_entry([&](Index r, Index v, double d) { right_[v] += d * push[r]; });
+  for (double shift = 0.0; shift < largest_shift;
+       shift = shift == 0.0 ? std::max(first_shift, shift_ / 3.0) : 8.0 * shift) {
+    program_.hessian(scale_, row_, weights_, hessian_);
+    if (!hessian_.factor(shift)) continue;
+    if (shift > 0.0) shift_ = shift;
+    dx_ = right_;
+    hessian_.solve(dx_);
+    row_step_.setZero();
+    program_.for_each_entry([&](Index r, Index v, double d) { row_step_[r] += d * dx_[v]; });
+    for_each_side([&](Side& side) { find_side_steps(side); });
+    return dx_.allFinite();
+  }
+  return false;
+}
+
+void InteriorPoint::find_side_steps(Side& side) {
+  for (Index r = 0; r < program_.rows(); ++r) {
+    if (!side.bounds(r)) continue;
+    side.slack_step[r] = side.sign * row_step_[r] + side.residual[r];
+    side.multiplier_step[r] = mu_ / side.slack[r] - side.multiplier[r] -
+                              side.multiplier[r] / side.slack[r] * side.slack_step[r];
+  }
+}
+
+double InteriorPoint::largest_step(const VectorXd& x, const VectorXd& dx) const {
+  const double share = std::max(0.99, 1.0 - mu_);
+  double step = 1.0;
+  for (Index r = 0; r < x.size(); ++r)
+    if (dx[r] < 0.0) step = std::min(step, -share * x[r] / dx[r]);
+  return step;
+}
+
+double InteriorPoint::violation_sum() const {
+  return lower_.residual.lpNorm<1>() + upper_.residual.lpNorm<1>();
+}
+
+// docs/theory.md (17.11)
+double InteriorPoint::merit() const {
+  double barrier = 0.0;
+  for_each_side([&](const Side& side) { barrier += side.slack.array().log().sum(); });
+  return scale_ * program_.cost() - mu_ * barrier + penalty_ * violation_sum();
+}
+
+// The slope of the merit along the step, with a penalty for which it is a descent.
+double InteriorPoint::merit_slope() {
+  double slope = gradient_.dot(dx_);
+  for_each_side(
+      [&](const Side& side) { slope -= mu_ * side.slack_step.cwiseQuotient(side.slack).sum(); });
+  const double violation = violation_sum();
+  if (violation > 1e-14) {
+    const double needed = slope / (0.5 * violation);
+    if (penalty_ < needed) penalty_ = 2.0 * needed;
+  }
+  return slope - penalty_ * violation;
+}
+
+bool InteriorPoint::take_step() {
+  const VectorXd x = x_;
+  const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
+  const double slope = merit_slope(), before = merit();
+  double step = std::min(largest_step(lower_.slack, lower_.slack_step),
+                         largest_step(upper_.slack, upper_.slack_step));
+  bool accepted = false;
+  for (int k = 0; k < backtracks_max && !accepted; ++k, step *= 0.5) {
+    x_ = x + step * dx_;
+    lower_.slack = slack_l + step * lower_.slack_step;
+    upper_.slack = slack_u + step * upper_.slack_step;
+    ++evaluations_;
+    if (!program_.evaluate(x_)) continue;
+    for_each_side([&](Side& side) { find_residuals(side); });
+    accepted = merit() <= before + 1e-4 * step * slope + 1e-13 * std::abs(before);
+  }
+  for_each_side([&](Side& side) {
+    side.multiplier += largest_step(side.multiplier, side.multiplier_step) * side.multiplier_step;
+    keep_multipliers_near(side);
+  });
+  return accepted;
+}
+
+void InteriorPoint::keep_multipliers_near(Side& side) const {
+  for (Index r = 0; r < program_.rows(); ++r)
+    if (side.bounds(r))
+      side.multiplier[r] = std::clamp(side.multiplier[r], mu_ / (multiplier_range * side.slack[r]),
+                                      multiplier_range * mu_ / side.slack[r]);
+}
+
+Solution InteriorPoint::solve(VectorXd x) {
+  Solution out;
+  start(std::move(x));
+  for (out.iterations = 0;; ++out.iterations) {
+    const Errors now = errors(0.0);
+    out.stationarity = now.stationarity;
+    out.converged = now.largest() <= options_.tolerance;
+    if (out.converged) break;
+    lower_barrier();
+    if (out.iterations == options_.iterations_max) {
+      out.cause = fmt::format("no solution within {} iterations", options_.iterations_max);
+      break;
+    }
+    if (!find_direction() || !take_step()) {
+      out.cause = "no step decreases cost and violation any further";
+      break;
+    }
+  }
+  out.evaluations = evaluations_;
+  return out;
+}
+
+}  // namespace hamelin::optimal

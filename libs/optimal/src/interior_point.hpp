@@ -1,0 +1,66 @@
+#pragma once
+#include "hamelin/optimal/solve.hpp"
+#include "transcription.hpp"
+
+namespace hamelin::optimal {
+
+/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (17.8)–(17.11).
+class InteriorPoint {
+ public:
+  InteriorPoint(Transcription& program, const SolveOptions& options);
+  /// From x; the program is at the last iterate afterwards.
+  Solution solve(VectorXd x);
+
+ private:
+  /// One side of all rows: sign (c − bound) = slack ≥ 0 with a multiplier; where the bound is
+  /// infinite, the multiplier is 0 and the slack 1.
+  struct Side {
+    double sign;
+    const VectorXd& bound;
+    VectorXd slack{}, multiplier{}, residual{}, slack_step{}, multiplier_step{};
+    [[nodiscard]] bool bounds(Index r) const { return std::isfinite(bound[r]); }
+  };
+  /// How far an iterate is from a solution of the problem with the barrier μ.
+  struct Errors {
+    double stationarity, violation, complementarity;
+    [[nodiscard]] double largest() const {
+      return std::max({stationarity, violation, complementarity});
+    }
+  };
+
+  void start(VectorXd x);
+  void find_residuals(Side& side) const;
+  [[nodiscard]] Errors errors(double mu);
+  void lower_barrier();
+  [[nodiscard]] bool find_direction();
+  void find_side_steps(Side& side);
+  [[nodiscard]] bool take_step();
+  [[nodiscard]] double merit() const;
+  [[nodiscard]] double merit_slope();
+  [[nodiscard]] double violation_sum() const;
+  [[nodiscard]] double largest_step(const VectorXd& x, const VectorXd& dx) const;
+  void keep_multipliers_near(Side& side) const;
+  template <class F>
+  void for_each_side(F&& f) {
+    f(lower_);
+    f(upper_);
+  }
+  template <class F>
+  void for_each_side(F&& f) const {
+    f(lower_);
+    f(upper_);
+  }
+
+  Transcription& program_;
+  SolveOptions options_;
+  BandedMatrix hessian_;
+  Side lower_, upper_;
+  VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
+  double scale_ = 1.0;  ///< of the cost
+  double mu_ = 0.1;     ///< of the barrier
+  double shift_ = 0.0;  ///< of the Hessian, the last that made it positive definite
+  double penalty_ = 1.0;
+  int evaluations_ = 0;
+};
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,67 @@
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "banded.hpp"
+#include "layout.hpp"
+
+namespace hamelin::optimal {
+
+/// Bounds of positions, velocities, accelerations and jerks: of difference quotients of one joint,
+/// docs/theory.md (17.6).
+class QuotientRows {
+ public:
+  /// Appends its rows to the bounds.
+  QuotientRows(const Problem& problem, const Layout& layout, Bounds& bounds);
+
+  /// Knots that the longest quotient reaches over beyond its first.
+  [[nodiscard]] Index reach() const noexcept { return reach_; }
+  [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(rows_.size()); }
+  /// Writes rows() numbers.
+  void evaluate(const Knots& knots, double* values);
+  /// Calls f(row, variable, derivative) at the knots of the last evaluate().
+  template <class F>
+  void for_each_entry(F&& f) const {
+    for (Index r = 0; r < rows(); ++r) {
+      const Row& row = rows_[static_cast<std::size_t>(r)];
+      for (Index a = 0; a < row.count; ++a)
+        if (layout_.varies(row.first + a))
+          f(r, layout_.variable(row.first + a, row.joint), by_knot(row, a));
+      if (layout_.free_time && row.power > 0) f(r, layout_.step_variable(), by_step(r));
+    }
+  }
+  /// Adds Σ y_i ∇²c_i + Jᵀ diag(weights) J.
+  void add_hessian(const double* y, const double* weights, BandedMatrix& out) const;
+  /// "velocity of joint 3 after knot 7"
+  [[nodiscard]] std::string describe(Index row) const;
+
+ private:
+  /// scale (Σ_a coefficient_a q_{first+a} / h^power + rate / h^{power−1})
+  struct Row {
+    const char* of;
+    Index first, count, joint;
+    std::array<double, 4> coefficient;
+    int power;
+    double rate, scale;
+  };
+  void add(const VectorXd& bound, Row row, Bounds& bounds);
+  void add_positions(const Limits& limits, Bounds& bounds);
+  void add_velocities(const Limits& limits, Bounds& bounds);
+  void add_accelerations(const Problem& problem, Bounds& bounds);
+  void add_jerks(const Problem& problem, Bounds& bounds);
+  [[nodiscard]] double by_knot(const Row& row, Index a) const {
+    return row.scale * row.coefficient[static_cast<std::size_t>(a)] *
+           inverse_[static_cast<std::size_t>(row.power)];
+  }
+  /// By h/h_ref.
+  [[nodiscard]] double by_step(Index r) const;
+
+  Layout layout_;
+  Index reach_ = 0;
+  std::vector<Row> rows_;
+  std::vector<double> sums_;         ///< Σ_a coefficient_a q of each row
+  std::array<double, 6> inverse_{};  ///< h^−k
+};
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,74 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "banded.hpp"
+#include "discrete_lagrangian.hpp"
+#include "layout.hpp"
+
+namespace hamelin::optimal {
+
+/// The torques at the knots by the discrete equations of motion, docs/theory.md (17.3), their
+/// bounds, and the effort Σ_k w_k τ_kᵀRτ_k.
+class Torques {
+ public:
+  /// Appends its rows to the bounds.
+  Torques(const Problem& problem, const Layout& layout, Bounds& bounds);
+
+  [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(rows_.size()); }
+  /// Torques, their derivatives and the effort; writes rows() numbers.
+  void evaluate(const Knots& knots, double* values);
+  [[nodiscard]] double effort() const noexcept { return effort_; }
+  /// dof × (N + 1)
+  [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_; }
+  /// Adds factor · ∂(effort).
+  void add_gradient(double factor, VectorXd& out) const;
+  template <class F>
+  void for_each_entry(F&& f) const {
+    for (Index r = 0; r < rows(); ++r) {
+      const Row& row = rows_[static_cast<std::size_t>(r)];
+      const Node& node = nodes_[static_cast<std::size_t>(row.knot)];
+      for (Index a = -1; a <= 1; ++a)
+        if (layout_.varies(row.knot + a))
+          for (Index j = 0; j < layout_.n; ++j)
+            f(r, layout_.variable(row.knot + a, j),
+              row.scale * node.by_q(row.joint, (a + 1) * layout_.n + j));
+      if (layout_.free_time)
+        f(r, layout_.step_variable(), row.scale * layout_.h_ref * node.by_h[row.joint]);
+    }
+  }
+  /// Adds factor · ∇²(effort) + Σ y_i ∇²c_i + Jᵀ diag(weights) J.
+  void add_hessian(double factor, const double* y, const double* weights, BandedMatrix& out);
+  [[nodiscard]] std::string describe(Index row) const;
+
+ private:
+  struct Row {
+    Index knot, joint;
+    double scale;
+  };
+  /// Derivatives of the torques at a knot by the knots before, at and after it, and by h.
+  struct Node {
+    MatrixXd by_q;
+    VectorXd by_h;
+  };
+  void add_products(const MatrixXd& weights, BandedMatrix& out);
+  void add_curvature(const MatrixXd& y, BandedMatrix& out);
+  [[nodiscard]] double share(Index knot) const noexcept {
+    return knot == 0 || knot == layout_.intervals ? 0.5 : 1.0;
+  }
+
+  const Problem& problem_;
+  Layout layout_;
+  DiscreteLagrangian lagrangian_;
+  VectorXd effort_weights_, p_start_, p_goal_;
+  std::vector<Row> rows_;
+
+  Knots knots_;
+  double effort_ = 0.0;
+  MatrixXd torques_;
+  std::vector<DiscreteLagrangian::Derivatives> intervals_;
+  std::vector<Node> nodes_;
+  DiscreteLagrangian::Derivatives direction_;
+};
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,69 @@
+#pragma once
+#include <string>
+
+#include "banded.hpp"
+#include "places.hpp"
+#include "quotients.hpp"
+#include "torques.hpp"
+
+namespace hamelin::optimal {
+
+/// A Problem as a nonlinear program: minimise f(x) with lower ≤ c(x) ≤ upper. The discrete
+/// equations of motion hold for every x, as torques follow from them: docs/theory.md (17.3). Rows
+/// touch few successive knots, so that the Hessian is banded.
+class Transcription {
+ public:
+  /// @param problem is kept by reference
+  explicit Transcription(const Problem& problem);
+
+  [[nodiscard]] const Layout& layout() const noexcept { return layout_; }
+  [[nodiscard]] Index variables() const noexcept { return layout_.variables(); }
+  [[nodiscard]] Index rows() const noexcept { return lower_.size(); }
+  [[nodiscard]] const VectorXd& lower() const noexcept { return lower_; }
+  [[nodiscard]] const VectorXd& upper() const noexcept { return upper_; }
+  /// A matrix of the shape of the Hessian.
+  [[nodiscard]] BandedMatrix hessian_matrix() const;
+
+  /// x for knots, dof × (N + 1), of which the inner ones are used, in the time of the problem.
+  [[nodiscard]] VectorXd variables_of(const MatrixXd& knots) const;
+  /// Cost, rows and their first derivatives at x. @return false if a number is not finite
+  bool evaluate(const VectorXd& x);
+
+  // at the last x
+  [[nodiscard]] double cost() const noexcept { return cost_; }
+  [[nodiscard]] const VectorXd& values() const noexcept { return values_; }
+  void gradient(VectorXd& out) const;
+  /// Calls f(row, variable, derivative) for the entries of J, always in the same order.
+  template <class F>
+  void for_each_entry(F&& f) const {
+    quotients_.for_each_entry(f);
+    const Index first_torque = quotients_.rows(), first_place = first_torque + torques_.rows();
+    torques_.for_each_entry([&](Index r, Index v, double d) { f(first_torque + r, v, d); });
+    places_.for_each_entry([&](Index r, Index v, double d) { f(first_place + r, v, d); });
+  }
+  /// factor ∇²f + Σ y_i ∇²c_i + Jᵀ diag(weights) J, without the curvature of distances.
+  void hessian(double factor, const VectorXd& y, const VectorXd& weights, BandedMatrix& out);
+  [[nodiscard]] const Knots& knots() const noexcept { return knots_; }
+  [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_.torques(); }
+  /// The largest violation of a row, and what the row bounds.
+  [[nodiscard]] double violation(std::string* what = nullptr) const;
+
+ private:
+  /// The weight of the effort in the cost.
+  [[nodiscard]] double effort_factor() const;
+  [[nodiscard]] std::string describe(Index row) const;
+
+  const Problem& problem_;
+  Layout layout_;
+  Bounds bounds_;  ///< filled by the members below in this order
+  QuotientRows quotients_;
+  Torques torques_;
+  ClearanceRows places_;
+  VectorXd lower_, upper_;
+
+  Knots knots_;
+  double cost_ = 0.0;
+  VectorXd values_;
+};
+
+}  // namespace hamelin::optimal
