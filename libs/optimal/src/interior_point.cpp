@@ -14,6 +14,7 @@ constexpr double first_shift = 1e-4, largest_shift = 1e12;
 constexpr double gradient_max = 100.0;     // of the scaled cost at the guess
 constexpr double multiplier_range = 1e10;  // of slack · multiplier / μ
 constexpr int backtracks_max = 30;
+constexpr double least_share = 0.01;  // of a slack or multiplier that a step leaves
 
 }  // namespace
 
@@ -78,7 +79,7 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
 }
 
 void InteriorPoint::lower_barrier() {
-  while (mu_ > options_.tolerance / 10.0 && errors(mu_).largest() <= 10.0 * mu_)
+  if (mu_ > options_.tolerance / 10.0 && errors(mu_).largest() <= 10.0 * mu_)
     mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
 }
 
@@ -123,7 +124,7 @@ void InteriorPoint::find_side_steps(Side& side) {
 }
 
 double InteriorPoint::largest_step(const VectorXd& x, const VectorXd& dx) const {
-  const double share = std::max(0.99, 1.0 - mu_);
+  const double share = 1.0 - std::min(least_share, mu_);
   double step = 1.0;
   for (Index r = 0; r < x.size(); ++r)
     if (dx[r] < 0.0) step = std::min(step, -share * x[r] / dx[r]);
@@ -154,6 +155,18 @@ double InteriorPoint::merit_slope() {
   return slope - penalty_ * violation;
 }
 
+// Where a row is inside its bound, the slack is its distance from the bound, so that the barrier
+// itself sees how the row bends; elsewhere it takes its own step.
+void InteriorPoint::take_slacks(Side& side, const VectorXd& before, double step) const {
+  for (Index r = 0; r < program_.rows(); ++r) {
+    if (!side.bounds(r)) continue;
+    const double inside = side.sign * (program_.values()[r] - side.bound[r]);
+    side.slack[r] =
+        inside >= least_share * before[r] ? inside : before[r] + step * side.slack_step[r];
+  }
+  find_residuals(side);
+}
+
 bool InteriorPoint::take_step() {
   const VectorXd x = x_;
   const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
@@ -163,11 +176,10 @@ bool InteriorPoint::take_step() {
   bool accepted = false;
   for (int k = 0; k < backtracks_max && !accepted; ++k, step *= 0.5) {
     x_ = x + step * dx_;
-    lower_.slack = slack_l + step * lower_.slack_step;
-    upper_.slack = slack_u + step * upper_.slack_step;
     ++evaluations_;
     if (!program_.evaluate(x_)) continue;
-    for_each_side([&](Side& side) { find_residuals(side); });
+    take_slacks(lower_, slack_l, step);
+    take_slacks(upper_, slack_u, step);
     accepted = merit() <= before + 1e-4 * step * slope + 1e-13 * std::abs(before);
   }
   for_each_side([&](Side& side) {

@@ -34,6 +34,7 @@ class InteriorPoint {
   void lower_barrier();
   [[nodiscard]] bool find_direction();
   void find_side_steps(Side& side);
+  void take_slacks(Side& side, const VectorXd& before, double step) const;
   [[nodiscard]] bool take_step();
   [[nodiscard]] double merit() const;
   [[nodiscard]] double merit_slope();

@@ -2,16 +2,55 @@
 
 #include <cmath>
 
+#include "hamelin/core/error.hpp"
 #include "interior_point.hpp"
 #include "transcription.hpp"
+#ifdef HAMELIN_HAS_IPOPT
+#include "ipopt_solver.hpp"
+#include "transcription_program.hpp"
+#endif
 
 namespace hamelin::optimal {
+
+namespace {
+
+#ifdef HAMELIN_HAS_IPOPT
+Solution solve_with_ipopt(Transcription& program, const VectorXd& guess,
+                          const SolveOptions& options) {
+  TranscriptionProgram adapted(program);
+  const IpoptResult found = solve_by_ipopt(adapted, guess, options);
+  Solution out;
+  out.converged = found.converged;
+  out.cause = found.cause;
+  out.iterations = found.iterations;
+  out.evaluations = found.evaluations;
+  out.stationarity = found.stationarity;
+  return out;
+}
+#else
+Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) {
+  throw Error(ErrorCode::usage,
+              "solver ipopt: this build has no IPOPT, expected solver banded, or a build with "
+              "coinor-libipopt-dev installed");
+}
+#endif
+
+}  // namespace
+
+bool has_ipopt() noexcept {
+#ifdef HAMELIN_HAS_IPOPT
+  return true;
+#else
+  return false;
+#endif
+}
 
 Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions& options) {
   check(problem);
   Transcription program(problem);
-  InteriorPoint method(program, options);
-  Solution out = method.solve(program.variables_of(guess));
+  const VectorXd x = program.variables_of(guess);
+  Solution out = options.solver == Solver::ipopt ? solve_with_ipopt(program, x, options)
+                                                 : InteriorPoint(program, options).solve(x);
   std::string what;
   out.violation = program.violation(&what);
   if (!out.converged && out.violation > options.tolerance) out.cause += "; violated: " + what;

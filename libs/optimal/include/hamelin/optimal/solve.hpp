@@ -5,7 +5,16 @@
 
 namespace hamelin::optimal {
 
+enum class Solver : std::int32_t {
+  banded,  ///< an interior-point method on the banded equations, docs/theory.md (17.8)–(17.11)
+  ipopt,   ///< IPOPT, where this build has it
+};
+
+/// Whether this build has IPOPT.
+[[nodiscard]] bool has_ipopt() noexcept;
+
 struct SolveOptions {
+  Solver solver = Solver::banded;
   int iterations_max = 300;
   /// On stationarity, violation of bounds as shares of them, and complementarity.
   double tolerance = 1e-8;
@@ -25,10 +34,9 @@ struct Solution {
   double stationarity = 0.0;
 };
 
-/// Solves the problem by an interior-point method on the banded equations, docs/theory.md
-/// (17.8)–(17.11).
+/// Solves the problem on the discrete equations of motion, docs/theory.md (17.1)–(17.7).
 /// @param guess knots, dof × (N + 1), of which the inner ones are used
-/// @throws Error invalid for a Problem that check() refuses
+/// @throws Error invalid for a Problem that check() refuses, usage for a solver that is not there
 [[nodiscard]] Solution solve(const Problem& problem, const MatrixXd& guess,
                              const SolveOptions& options = {});
 
