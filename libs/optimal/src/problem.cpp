@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include <limits>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
 
 namespace hamelin::optimal {
 
@@ -26,8 +29,91 @@ Limits Limits::of(const model::Model& model) {
   return out;
 }
 
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::invalid, what);
+}
+
+void check_size(const char* what, const VectorXd& x, Index n, bool may_be_empty) {
+  if (x.size() != n && !(may_be_empty && x.size() == 0))
+    refuse(fmt::format("{}: {} numbers given, expected {} (one per joint)", what, x.size(), n));
+}
+
+void check_bounds(const char* what, const VectorXd& bound, Index n) {
+  check_size(what, bound, n, true);
+  for (Index j = 0; j < bound.size(); ++j)
+    if (!(bound[j] > 0.0))
+      refuse(fmt::format("{}: {} given for joint {}, expected a positive number", what, bound[j],
+                         j + 1));
+}
+
+// One end of the motion.
+struct End {
+  const char* name;
+  const VectorXd &q, &v;
+};
+
+void check_end(const Problem& problem, const End& end) {
+  const Limits& limits = problem.limits;
+  const Index n = problem.model->dof();
+  check_size(fmt::format("{}, position", end.name).c_str(), end.q, n, false);
+  check_size(fmt::format("{}, velocity", end.name).c_str(), end.v, n, false);
+  if (!end.q.allFinite() || !end.v.allFinite())
+    refuse(fmt::format("{}: a number is not finite, expected finite numbers", end.name));
+  for (Index j = 0; j < limits.position_min.size(); ++j)
+    if (end.q[j] < limits.position_min[j] || end.q[j] > limits.position_max[j])
+      refuse(fmt::format("{}: the position of joint {} is {:.6g}, expected {:.6g} to {:.6g}",
+                         end.name, j + 1, end.q[j], limits.position_min[j],
+                         limits.position_max[j]));
+  for (Index j = 0; j < limits.velocity.size(); ++j)
+    if (std::abs(end.v[j]) > limits.velocity[j])
+      refuse(fmt::format("{}: the velocity of joint {} is {:.6g}, expected at most {:.6g}",
+                         end.name, j + 1, end.v[j], limits.velocity[j]));
+  if (limits.torque.size() == 0) return;
+  dynamics::Workspace ws(*problem.model);
+  VectorXd hold(n);
+  dynamics::gravity_torque(*problem.model, ws, end.q, hold);
+  for (Index j = 0; j < n; ++j)
+    if (std::abs(hold[j]) >= limits.torque[j])
+      refuse(
+          fmt::format("{}: joint {} needs a torque of {:.6g} to hold the arm, expected less than "
+                      "its limit {:.6g}",
+                      end.name, j + 1, std::abs(hold[j]), limits.torque[j]));
+}
+
+void check_clearance(const Problem& problem, const End& end) {
+  if (problem.clearance == nullptr || problem.clearance->rows() == 0) return;
+  VectorXd distances(problem.clearance->rows());
+  MatrixXd gradients(end.q.size(), distances.size());
+  problem.clearance->evaluate(end.q, distances, gradients);
+  if (const double least = distances.minCoeff(); least < problem.margin_m)
+    refuse(fmt::format("{}: the clearance is {:.4f} m, expected at least the margin {:.4f} m",
+                       end.name, least, problem.margin_m));
+}
+
+}  // namespace
+
 void check(const Problem& problem) {
-  (void)problem;
+  const Limits& limits = problem.limits;
+  const Index n = problem.model->dof();
+  if (problem.intervals < least_intervals || problem.intervals > most_intervals)
+    refuse(fmt::format("{} intervals between knots given, expected {} to {}", problem.intervals,
+                       least_intervals, most_intervals));
+  if (!(problem.duration_s > 0.0) || !std::isfinite(problem.duration_s))
+    refuse(fmt::format("a duration of {} s given, expected a positive number", problem.duration_s));
+  check_size("lower position limits", limits.position_min, n, true);
+  check_size("upper position limits", limits.position_max, limits.position_min.size(), false);
+  check_bounds("velocity limits", limits.velocity, n);
+  check_bounds("acceleration limits", limits.acceleration, n);
+  check_bounds("jerk limits", limits.jerk, n);
+  check_bounds("torque limits", limits.torque, n);
+  check_bounds("weights of the effort", problem.effort_weights, n);
+  for (const End& end : {End{"start", problem.q_start, problem.v_start},
+                         End{"goal", problem.q_goal, problem.v_goal}}) {
+    check_end(problem, end);
+    check_clearance(problem, end);
+  }
 }
 
 }  // namespace hamelin::optimal

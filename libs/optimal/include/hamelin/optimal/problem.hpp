@@ -40,6 +40,9 @@ class Clearance {
   virtual void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) = 0;
 };
 
+/// Numbers of intervals that a Problem may have.
+inline constexpr int least_intervals = 4, most_intervals = 100000;
+
 /// A motion between two states that is sought: docs/theory.md, chapter 17.
 struct Problem {
   const model::Model* model = nullptr;
