@@ -24,7 +24,7 @@ struct OptimizeOptions {
   std::filesystem::path file;
   SceneFlags flags;
   std::string minimize = "effort", solver = "hamelin", format = "json";
-  int intervals = 50;
+  int intervals = 50, points = 2;
   double duration_s = 2.0, margin_m = 0.005;
   std::optional<double> acceleration, jerk, rate_hz;
   std::optional<std::filesystem::path> output;
@@ -51,6 +51,7 @@ optimal::Problem problem_of(const OptimizeOptions& options, const scene::Scene& 
     problem.limits.acceleration = Eigen::VectorXd::Constant(n, *options.acceleration);
   if (options.jerk) problem.limits.jerk = Eigen::VectorXd::Constant(n, *options.jerk);
   problem.margin_m = options.margin_m;
+  problem.clearance_points = options.points;
   return problem;
 }
 
@@ -68,8 +69,13 @@ int optimize(const OptimizeOptions& options) {
   problem.v_goal = rest;
   optimal::SolveOptions solve_options;
   if (options.solver == "ipopt") solve_options.solver = optimal::Solver::ipopt;
-  Eigen::MatrixXd ends(model.dof(), 2);
-  ends << problem.q_start, problem.q_goal;
+  const Eigen::MatrixXd& path = scene.goals.back().path;
+  Eigen::MatrixXd ends(model.dof(), 1 + std::max<Eigen::Index>(1, path.cols()));
+  ends.col(0) = problem.q_start;
+  if (path.cols() > 0)
+    ends.rightCols(path.cols()) = path;
+  else
+    ends.col(1) = problem.q_goal;
   const optimal::Solution found =
       optimal::solve(problem, optimal::guess_along(ends, problem.intervals), solve_options);
   const optimal::TimedMotion motion = optimal::motion_of(problem, found);
@@ -110,6 +116,7 @@ void add_optimize(CLI::App& app, int& exit_code) {
   command->add_option("--margin", options->margin_m, "least clearance [m]")
       ->type_name("M")
       ->capture_default_str();
+  command->add_option("--points", options->points);
   command->add_option("--acceleration", options->acceleration, "limit of all joints")
       ->type_name("A");
   command->add_option("--jerk", options->jerk, "limit of all joints")->type_name("J");

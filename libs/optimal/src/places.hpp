@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <string>
 #include <vector>
 
@@ -7,41 +8,55 @@
 
 namespace hamelin::optimal {
 
-/// Bounds of the clearance at knots and between them, docs/theory.md (17.7).
+/// Bounds of the clearance at the knots and between them, docs/theory.md (17.7).
 class ClearanceRows {
  public:
+  /// Appends its rows to the bounds.
   ClearanceRows(const Problem& problem, const Layout& layout, Bounds& bounds);
 
+  /// Knots that a place reaches over beyond its first.
+  [[nodiscard]] Index reach() const noexcept { return reach_; }
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(places_.size()) * each_; }
+  /// Writes rows() numbers.
   void evaluate(const Knots& knots, double* values);
+  /// Calls f(row, variable, derivative) at the knots of the last evaluate().
   template <class F>
   void for_each_entry(F&& f) const {
     Index r = 0;
     for (const Place& place : places_)
-      for (Index i = 0; i < each_; ++i, ++r)
-        for (Index a = 0; a < 2; ++a)
-          if (place.share(a) > 0.0 && layout_.varies(place.first + a))
+      for (Index i = 0; i < each_; ++i, ++r) {
+        for (Index a = 0; a < place.count; ++a)
+          if (layout_.varies(place.first + a))
             for (Index j = 0; j < layout_.n; ++j)
               f(r, layout_.variable(place.first + a, j),
-                scale * place.share(a) * place.gradients(j, i));
+                scale * place.weight(a) * place.gradients(j, i));
+        if (layout_.free_time)
+          f(r, layout_.step_variable(),
+            scale * layout_.h_ref * place.gradients.col(i).dot(place.rate));
+      }
   }
   /// Adds Jᵀ diag(weights) J; the curvature of distances is left out.
   void add_hessian(const double* weights, BandedMatrix& out) const;
+  /// "clearance after knot 7"
   [[nodiscard]] std::string describe(Index row) const;
 
  private:
   static constexpr double scale = 10.0;  ///< rows per metre
-  /// The configuration `s` of the way from knot `first` to the next.
+  /// A configuration Σ_a weights_a q_{first+a} + h rate.
   struct Place {
-    Index first;
-    double s;
-    MatrixXd gradients;
-    [[nodiscard]] double share(Index a) const noexcept { return a == 0 ? 1.0 - s : s; }
+    Index first, count;
+    std::array<double, 4> weights;
+    VectorXd rate;
+    Index knot;  ///< it lies at this one or after it
+    MatrixXd gradients{};
+    [[nodiscard]] double weight(Index a) const { return weights[static_cast<std::size_t>(a)]; }
   };
+  void add_place(const Problem& problem, Index knot, double s);
 
   Clearance* clearance_;
   Layout layout_;
   Index each_ = 0;  ///< rows of a place
+  Index reach_ = 0;
   std::vector<Place> places_;
   VectorXd distances_, q_;
 };

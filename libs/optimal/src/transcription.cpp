@@ -30,7 +30,8 @@ Transcription::Transcription(const Problem& problem)
 }
 
 BandedMatrix Transcription::hessian_matrix() const {
-  return {layout_.blocks(), layout_.n, std::max<Index>(2, quotients_.reach()), layout_.free_time};
+  return {layout_.blocks(), layout_.n, std::max({Index{2}, quotients_.reach(), places_.reach()}),
+          layout_.free_time};
 }
 
 VectorXd Transcription::variables_of(const MatrixXd& knots) const {
