@@ -14,7 +14,9 @@ constexpr double first_shift = 1e-4, largest_shift = 1e12;
 constexpr double gradient_max = 100.0;     // of the scaled cost at the guess
 constexpr double multiplier_range = 1e10;  // of slack · multiplier / μ
 constexpr int backtracks_max = 30;
-constexpr double least_share = 0.01;  // of a slack or multiplier that a step leaves
+constexpr double small_decrease = 0.1;  // of the merit, in μ
+constexpr int small_decreases_max = 4;  // in a row, until the barrier is lowered
+constexpr double least_share = 0.01;    // of a slack or multiplier that a step leaves
 
 }  // namespace
 
@@ -78,9 +80,12 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
   return out;
 }
 
+// Where distances have kinks, stationarity may stay large although the merit decreases no more.
 void InteriorPoint::lower_barrier() {
-  if (mu_ > options_.tolerance / 10.0 && errors(mu_).largest() <= 10.0 * mu_)
-    mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
+  if (!can_lower_barrier()) return;
+  if (small_decreases_ < small_decreases_max && errors(mu_).largest() > 10.0 * mu_) return;
+  small_decreases_ = 0;
+  mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
 }
 
 // docs/theory.md (17.10)
@@ -180,7 +185,9 @@ bool InteriorPoint::take_step() {
     if (!program_.evaluate(x_)) continue;
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
-    accepted = merit() <= before + 1e-4 * step * slope + 1e-13 * std::abs(before);
+    const double now = merit();
+    accepted = now <= before + 1e-4 * step * slope + 1e-13 * std::abs(before);
+    if (accepted) small_decreases_ = before - now < small_decrease * mu_ ? small_decreases_ + 1 : 0;
   }
   for_each_side([&](Side& side) {
     side.multiplier += largest_step(side.multiplier, side.multiplier_step) * side.multiplier_step;
@@ -209,10 +216,13 @@ Solution InteriorPoint::solve(VectorXd x) {
       out.cause = fmt::format("no solution within {} iterations", options_.iterations_max);
       break;
     }
-    if (!find_direction() || !take_step()) {
-      out.cause = "no step decreases cost and violation any further";
-      break;
+    if (find_direction() && take_step() && !(small_decreases_ > small_decreases_max)) continue;
+    if (can_lower_barrier()) {
+      small_decreases_ = small_decreases_max;
+      continue;
     }
+    out.cause = "no step decreases cost and violation any further";
+    break;
   }
   out.evaluations = evaluations_;
   return out;

@@ -31,6 +31,7 @@ class InteriorPoint {
   void start(VectorXd x);
   void find_residuals(Side& side) const;
   [[nodiscard]] Errors errors(double mu);
+  [[nodiscard]] bool can_lower_barrier() const noexcept { return mu_ > options_.tolerance / 10.0; }
   void lower_barrier();
   [[nodiscard]] bool find_direction();
   void find_side_steps(Side& side);
@@ -62,6 +63,7 @@ class InteriorPoint {
   double shift_ = 0.0;  ///< of the Hessian, the last that made it positive definite
   double penalty_ = 1.0;
   int evaluations_ = 0;
+  int small_decreases_ = 0;  ///< of the merit, in a row
 };
 
 }  // namespace hamelin::optimal
