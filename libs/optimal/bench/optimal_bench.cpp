@@ -105,33 +105,33 @@ TEST_CASE("discrete mechanics beside trapezoidal collocation at equal knots",
   const auto robots = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
   fmt::print("{:<12} {:<7} {:>4} {:<30} {:>13} {:>10} {:>11} {:>6} {:>9}\n", "robot", "least", "N",
              "method", "cost", "time, s", "error, rad", "iter.", "ms");
-  for (const char* name : {"planar4.json", "arm7.urdf"}) {
+  for (const char* name : {"planar4.json", "arm7.urdf", "third_party/panda.urdf"}) {
     const model::Model model(description::read_robot(robots / name, {}));
     const Index n = model.dof();
     for (const auto objective : {Objective::effort, Objective::time})
-      for (const int intervals : {10, 20, 50, 100}) {
+      for (const int intervals : {10, 20, 50, 100, 200}) {
         Problem problem;
         problem.model = &model;
         problem.objective = objective;
         problem.intervals = intervals;
-        problem.duration_s = 1.0;
+        problem.duration_s = 0.5;
         problem.q_start = middle_of(model) + VectorXd::LinSpaced(n, -0.4, 0.3);
-        problem.q_goal = middle_of(model) + VectorXd::LinSpaced(n, 0.9, -0.8);
+        problem.q_goal = middle_of(model) + VectorXd::LinSpaced(n, 0.3, -0.4);
         problem.v_start = problem.v_goal = VectorXd::Zero(n);
         problem.limits = Limits::of(model);
-        // with a torque of three times what holds the arm stretched out, or that of the robot
-        const VectorXd strength = VectorXd::Constant(n, 60.0);
+        const VectorXd strength = VectorXd::Constant(n, 300.0);
         problem.limits.torque = problem.limits.torque.cwiseMin(strength);
         problem.effort_weights = problem.limits.torque.cwiseAbs2().cwiseInverse();
         MatrixXd ends(n, 2);
         ends << problem.q_start, problem.q_goal;
         const MatrixXd guess = guess_along(ends, intervals);
-        print(name, problem, "discrete mechanics, banded",
+        print(model.robot().name.c_str(), problem, "discrete mechanics, banded",
               discrete_mechanics(problem, guess, Solver::banded));
 #ifdef HAMELIN_HAS_IPOPT
-        print(name, problem, "discrete mechanics, IPOPT",
+        print(model.robot().name.c_str(), problem, "discrete mechanics, IPOPT",
               discrete_mechanics(problem, guess, Solver::ipopt));
-        print(name, problem, "trapezoidal, IPOPT", trapezoidal(problem, guess));
+        print(model.robot().name.c_str(), problem, "trapezoidal, IPOPT",
+              trapezoidal(problem, guess));
 #endif
       }
   }

@@ -9,8 +9,7 @@ namespace hamelin::optimal {
 
 namespace {
 
-constexpr double first_slack = 1e-2;  // shares of bounds
-constexpr double first_shift = 1e-4, largest_shift = 1e12;
+constexpr double least_shift = 1e-8, largest_shift = 1e12;
 constexpr double gradient_max = 100.0;     // of the scaled cost at the guess
 constexpr double multiplier_range = 1e10;  // of slack · multiplier / μ
 constexpr int backtracks_max = 30;
@@ -20,9 +19,11 @@ constexpr double least_share = 0.01;    // of a slack or multiplier that a step 
 
 }  // namespace
 
-InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options)
+InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options,
+                             double first_slack)
     : program_(program),
       options_(options),
+      first_slack_(first_slack),
       hessian_(program.hessian_matrix()),
       lower_{1.0, program.lower()},
       upper_{-1.0, program.upper()},
@@ -45,7 +46,7 @@ void InteriorPoint::start(VectorXd x) {
   for_each_side([&](Side& side) {
     for (Index r = 0; r < program_.rows(); ++r) {
       if (!side.bounds(r)) continue;
-      side.slack[r] = std::max(first_slack, side.sign * (program_.values()[r] - side.bound[r]));
+      side.slack[r] = std::max(first_slack_, side.sign * (program_.values()[r] - side.bound[r]));
       side.multiplier[r] = mu_ / side.slack[r];
     }
     find_residuals(side);
@@ -104,17 +105,22 @@ bool InteriorPoint::find_direction() {
   row_ = upper_.multiplier - lower_.multiplier;
   right_ = -gradient_;
   program_.for_each_entry([&](Index r, Index v, double d) { right_[v] += d * push[r]; });
-  for (double shift = 0.0; shift < largest_shift;
-       shift = shift == 0.0 ? std::max(first_shift, shift_ / 3.0) : 8.0 * shift) {
-    program_.hessian(scale_, row_, weights_, hessian_);
-    if (!hessian_.factor(shift)) continue;
-    if (shift > 0.0) shift_ = shift;
-    dx_ = right_;
-    hessian_.solve(dx_);
-    row_step_.setZero();
-    program_.for_each_entry([&](Index r, Index v, double d) { row_step_[r] += d * dx_[v]; });
-    for_each_side([&](Side& side) { find_side_steps(side); });
-    return dx_.allFinite();
+  if (!factor()) return false;
+  dx_ = right_;
+  hessian_.solve(dx_);
+  row_step_.setZero();
+  program_.for_each_entry([&](Index r, Index v, double d) { row_step_[r] += d * dx_[v]; });
+  for_each_side([&](Side& side) { find_side_steps(side); });
+  return dx_.allFinite();
+}
+
+// The Hessian of the Lagrangian if it is positive definite, else its part that is never negative.
+bool InteriorPoint::factor() {
+  program_.hessian(scale_, row_, weights_, true, hessian_);
+  if (hessian_.factor(0.0)) return true;
+  for (double shift = least_shift; shift < largest_shift; shift *= 100.0) {
+    program_.hessian(scale_, row_, weights_, false, hessian_);
+    if (hessian_.factor(shift)) return true;
   }
   return false;
 }

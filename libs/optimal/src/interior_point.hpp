@@ -7,7 +7,9 @@ namespace hamelin::optimal {
 /// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (17.8)–(17.11).
 class InteriorPoint {
  public:
-  InteriorPoint(Transcription& program, const SolveOptions& options);
+  /// @param first_slack least slack at the guess, as a share of a bound: how far rows near their
+  ///        bounds may move in the first steps
+  InteriorPoint(Transcription& program, const SolveOptions& options, double first_slack);
   /// From x; the program is at the last iterate afterwards.
   Solution solve(VectorXd x);
 
@@ -34,6 +36,7 @@ class InteriorPoint {
   [[nodiscard]] bool can_lower_barrier() const noexcept { return mu_ > options_.tolerance / 10.0; }
   void lower_barrier();
   [[nodiscard]] bool find_direction();
+  [[nodiscard]] bool factor();
   void find_side_steps(Side& side);
   void take_slacks(Side& side, const VectorXd& before, double step) const;
   [[nodiscard]] bool take_step();
@@ -55,12 +58,12 @@ class InteriorPoint {
 
   Transcription& program_;
   SolveOptions options_;
+  double first_slack_;
   BandedMatrix hessian_;
   Side lower_, upper_;
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
   double scale_ = 1.0;  ///< of the cost
   double mu_ = 0.1;     ///< of the barrier
-  double shift_ = 0.0;  ///< of the Hessian, the last that made it positive definite
   double penalty_ = 1.0;
   int evaluations_ = 0;
   int small_decreases_ = 0;  ///< of the merit, in a row

@@ -99,7 +99,8 @@ double QuotientRows::by_step(Index r) const {
           (row.power - 1) * row.rate * inverse_[p]);
 }
 
-void QuotientRows::add_hessian(const double* y, const double* weights, BandedMatrix& out) const {
+void QuotientRows::add_hessian(const double* y, const double* weights, bool curved,
+                               BandedMatrix& out) const {
   for (Index r = 0; r < rows(); ++r) {
     const Row& row = rows_[static_cast<std::size_t>(r)];
     const auto block_of = [&](Index a) { return row.first + a - 1; };
@@ -111,13 +112,13 @@ void QuotientRows::add_hessian(const double* y, const double* weights, BandedMat
     if (!layout_.free_time || row.power == 0) continue;
     const auto p = static_cast<std::size_t>(row.power);
     const double power = row.power, step = by_step(r),
-                 by_knot_step = -power * layout_.h_ref * inverse_[1];
+                 by_knot_step = -power * layout_.h_ref * inverse_[1], slope = curved ? y[r] : 0.0;
     for (Index a = 0; a < row.count; ++a)
       if (layout_.varies(row.first + a))
         out.border()[layout_.variable(row.first + a, row.joint)] +=
-            (weights[r] * step + y[r] * by_knot_step) * by_knot(row, a);
+            (weights[r] * step + slope * by_knot_step) * by_knot(row, a);
     out.corner() += weights[r] * step * step +
-                    y[r] * row.scale * layout_.h_ref * layout_.h_ref * power *
+                    slope * row.scale * layout_.h_ref * layout_.h_ref * power *
                         ((power + 1.0) * sums_[static_cast<std::size_t>(r)] * inverse_[p + 2] +
                          (power - 1.0) * row.rate * inverse_[p + 1]);
   }

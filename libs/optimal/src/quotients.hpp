@@ -31,8 +31,8 @@ class QuotientRows {
       if (layout_.free_time && row.power > 0) f(r, layout_.step_variable(), by_step(r));
     }
   }
-  /// Adds Σ y_i ∇²c_i + Jᵀ diag(weights) J.
-  void add_hessian(const double* y, const double* weights, BandedMatrix& out) const;
+  /// Adds Jᵀ diag(weights) J, and with `curved` Σ y_i ∇²c_i.
+  void add_hessian(const double* y, const double* weights, bool curved, BandedMatrix& out) const;
   /// "velocity of joint 3 after knot 7"
   [[nodiscard]] std::string describe(Index row) const;
 

@@ -35,6 +35,21 @@ Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) 
 }
 #endif
 
+// From the same guess with other slacks if a minimum of the violation was found that is not zero.
+Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options) {
+  Solution out;
+  int iterations = 0, evaluations = 0;
+  for (const double first_slack : {1.0, 0.01, 0.1}) {
+    out = InteriorPoint(program, options, first_slack).solve(guess);
+    iterations += out.iterations;
+    evaluations += out.evaluations;
+    if (program.violation() <= options.tolerance) break;
+  }
+  out.iterations = iterations;
+  out.evaluations = evaluations;
+  return out;
+}
+
 }  // namespace
 
 bool has_ipopt() noexcept {
@@ -50,7 +65,7 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
   Transcription program(problem);
   const VectorXd x = program.variables_of(guess);
   Solution out = options.solver == Solver::ipopt ? solve_with_ipopt(program, x, options)
-                                                 : InteriorPoint(program, options).solve(x);
+                                                 : solve_banded(program, x, options);
   std::string what;
   out.violation = program.violation(&what);
   if (!out.converged && out.violation > options.tolerance) out.cause += "; violated: " + what;

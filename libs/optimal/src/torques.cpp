@@ -101,7 +101,7 @@ void Torques::add_gradient(double factor, VectorXd& out) const {
   }
 }
 
-void Torques::add_hessian(double factor, const double* y, const double* weights,
+void Torques::add_hessian(double factor, const double* y, const double* weights, bool curved,
                           BandedMatrix& out) {
   const Index n = layout_.n, N = layout_.intervals;
   // of each torque: what multiplies its second derivative, and the weight of its square
@@ -116,7 +116,7 @@ void Torques::add_hessian(double factor, const double* y, const double* weights,
     square(row.joint, row.knot) += row.scale * row.scale * weights[r];
   }
   add_products(square, out);
-  add_curvature(slope, out);
+  if (curved) add_curvature(slope, out);
 }
 
 // Σ_k J_kᵀ diag(weights_k) J_k

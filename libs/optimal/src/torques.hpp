@@ -37,8 +37,10 @@ class Torques {
         f(r, layout_.step_variable(), row.scale * layout_.h_ref * node.by_h[row.joint]);
     }
   }
-  /// Adds factor · ∇²(effort) + Σ y_i ∇²c_i + Jᵀ diag(weights) J.
-  void add_hessian(double factor, const double* y, const double* weights, BandedMatrix& out);
+  /// Adds factor · ∇²(effort) + Σ y_i ∇²c_i + Jᵀ diag(weights) J, or without `curved` only the part
+  /// of it that is never negative: that of the squares of first derivatives.
+  void add_hessian(double factor, const double* y, const double* weights, bool curved,
+                   BandedMatrix& out);
   [[nodiscard]] std::string describe(Index row) const;
 
  private:

@@ -67,14 +67,14 @@ void Transcription::gradient(VectorXd& out) const {
     out[layout_.step_variable()] += layout_.h_ref * static_cast<double>(layout_.intervals);
 }
 
-void Transcription::hessian(double factor, const VectorXd& y, const VectorXd& weights,
+void Transcription::hessian(double factor, const VectorXd& y, const VectorXd& weights, bool curved,
                             BandedMatrix& out) {
   out.set_zero();
   const double *at = y.data(), *weight = weights.data();
-  quotients_.add_hessian(at, weight, out);
+  quotients_.add_hessian(at, weight, curved, out);
   at += quotients_.rows();
   weight += quotients_.rows();
-  torques_.add_hessian(factor * effort_factor(), at, weight, out);
+  torques_.add_hessian(factor * effort_factor(), at, weight, curved, out);
   places_.add_hessian(weight + torques_.rows(), out);
 }
 

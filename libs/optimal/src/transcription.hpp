@@ -41,8 +41,10 @@ class Transcription {
     torques_.for_each_entry([&](Index r, Index v, double d) { f(first_torque + r, v, d); });
     places_.for_each_entry([&](Index r, Index v, double d) { f(first_place + r, v, d); });
   }
-  /// factor ∇²f + Σ y_i ∇²c_i + Jᵀ diag(weights) J, without the curvature of distances.
-  void hessian(double factor, const VectorXd& y, const VectorXd& weights, BandedMatrix& out);
+  /// factor ∇²f + Σ y_i ∇²c_i + Jᵀ diag(weights) J, without the curvature of distances; without
+  /// `curved` only the part that is never negative, as in the Gauss–Newton method.
+  void hessian(double factor, const VectorXd& y, const VectorXd& weights, bool curved,
+               BandedMatrix& out);
   [[nodiscard]] const Knots& knots() const noexcept { return knots_; }
   [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_.torques(); }
   /// The largest violation of a row, and what the row bounds.

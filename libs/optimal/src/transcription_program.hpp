@@ -31,7 +31,7 @@ class TranscriptionProgram final : public NonlinearProgram {
     return out;
   }
   void hessian(double factor, const VectorXd& y, double* values) override {
-    of_.hessian(factor, y, no_weights_, matrix_);
+    of_.hessian(factor, y, no_weights_, true, matrix_);
     for_each_in_triangle([&](Index, Index, double x) { *values++ = x; });
   }
 

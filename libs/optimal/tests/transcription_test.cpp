@@ -65,10 +65,10 @@ TEST_CASE("derivatives of cost and rows agree with differences", "[optimal]") {
   VectorXd y(m), weights = VectorXd::Zero(m);
   for (Index r = 0; r < m; ++r) y[r] = std::sin(1.0 + static_cast<double>(r));
   BandedMatrix H = program.hessian_matrix();
-  program.hessian(0.7, y, weights, H);
+  program.hessian(0.7, y, weights, true, H);
   const MatrixXd lagrangian = dense(H, 4);
   weights.setConstant(0.3);
-  program.hessian(0.7, y, weights, H);
+  program.hessian(0.7, y, weights, true, H);
   const MatrixXd with_weights = dense(H, 4) - lagrangian;
   CHECK((with_weights - 0.3 * J.transpose() * J).norm() <= 1e-8 * with_weights.norm());
 
