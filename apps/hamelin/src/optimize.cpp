@@ -4,14 +4,10 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "hamelin/control/planner_setup.hpp"
-#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/trajectory.hpp"
-#include "hamelin/optimal/solve.hpp"
-#include "hamelin/optimal/timed_motion.hpp"
-#include "hamelin/optimal/world_clearance.hpp"
+#include "hamelin/optimal/scene_motion.hpp"
 #include "output.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
@@ -23,110 +19,142 @@ namespace {
 struct OptimizeOptions {
   std::filesystem::path file;
   SceneFlags flags;
-  std::string minimize = "effort", solver = "hamelin", format = "json";
-  int intervals = 50, points = 2;
-  double duration_s = 2.0, margin_m = 0.005;
-  std::optional<double> acceleration, jerk, rate_hz;
+  std::string minimize = "effort", solver = "banded", format = "json";
+  optimal::SceneMotionOptions motion;
+  std::optional<double> rate_hz;
   std::optional<std::filesystem::path> output;
+  bool json = false;
 };
 
-// The arm's world, and how far clearances count.
-constexpr double influence_m = 0.1;
-
-optimal::Problem problem_of(const OptimizeOptions& options, const scene::Scene& scene,
-                            const model::Model& model) {
-  const Eigen::Index n = model.dof();
-  optimal::Problem problem;
-  problem.model = &model;
-  problem.intervals = options.intervals;
-  problem.objective =
-      options.minimize == "time" ? optimal::Objective::time : optimal::Objective::effort;
-  problem.duration_s = options.duration_s;
-  const control::ModelledLimits limits = control::modelled_limits(scene, model.robot());
-  problem.limits.position_min = limits.q_lower;
-  problem.limits.position_max = limits.q_upper;
-  problem.limits.velocity = limits.velocity_max;
-  problem.limits.torque = limits.effort_max;
-  if (options.acceleration)
-    problem.limits.acceleration = Eigen::VectorXd::Constant(n, *options.acceleration);
-  if (options.jerk) problem.limits.jerk = Eigen::VectorXd::Constant(n, *options.jerk);
-  problem.margin_m = options.margin_m;
-  problem.clearance_points = options.points;
-  return problem;
+std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
+  const optimal::Optimized& f = goal.found;
+  const optimal::Solution& s = f.solution;
+  const std::string name = fmt::format("goal {}", index + 1);
+  const char* const state = s.converged    ? "optimal"
+                            : goal.valid() ? "valid, not proved optimal"
+                                           : "no motion";
+  std::string text = fmt::format("{:<12}{} after {} iterations: {:.6g} s, cost {:.6g}\n", name,
+                                 coloured(state, s.converged    ? Colour::good
+                                                 : goal.valid() ? Colour::fair
+                                                                : Colour::bad),
+                                 s.iterations, f.motion.duration_s(), s.cost);
+  if (!s.converged) text += fmt::format("{:<12}{}\n", "", s.cause);
+  text += fmt::format(
+      "{:<12}limits violated by {:.2g} of them at the knots; torques up to {:.4g} of "
+      "their limits along the motion\n",
+      "", s.violation, f.torque_share);
+  text += f.proof.certified
+              ? fmt::format("{:<12}proved to keep {:.4g} m between the knots, too\n", "",
+                            f.proof.margin_m)
+              : fmt::format("{:<12}{} from {:.4g} s on\n", "",
+                            coloured("not proved clear", Colour::bad), f.proof.first_open_s);
+  return text;
 }
 
-int optimize(const OptimizeOptions& options) {
+log::Trajectory trajectory_of(const optimal::SceneMotion& motion, std::optional<double> rate_hz) {
+  log::Trajectory out;
+  out.joints = motion.joints;
+  for (auto& point : motion.points(rate_hz))
+    out.points.push_back({point.time_s, point.q, point.v, point.torque});
+  return out;
+}
+
+std::string file_text(const OptimizeOptions& options, const optimal::SceneMotion& motion) {
+  if (options.format == "csv") return log::to_csv(trajectory_of(motion, options.rate_hz));
+  if (options.format == "ros")
+    return log::to_joint_trajectory(trajectory_of(motion, options.rate_hz)).dump(1) + "\n";
+  return optimal::to_json(motion, options.motion, options.rate_hz).dump(1) + "\n";
+}
+
+int optimize(OptimizeOptions options) {
+  options.motion.objective =
+      options.minimize == "time" ? optimal::Objective::time : optimal::Objective::effort;
+  options.motion.solve.solver =
+      options.solver == "ipopt" ? optimal::Solver::ipopt : optimal::Solver::banded;
   const scene::Scene scene = read_scene(options.file, options.flags);
-  const model::Model model = control::load_model(scene);
-  control::WorldView view(scene, model, influence_m);
-  optimal::WorldClearance clearance(model, view);
-  optimal::Problem problem = problem_of(options, scene, model);
-  problem.clearance = &clearance;
-  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(model.dof());
-  problem.q_start = scene.start_q.size() > 0 ? scene.start_q : rest;
-  problem.v_start = scene.start_v.size() > 0 ? scene.start_v : rest;
-  problem.q_goal = scene.goals.back().q;
-  problem.v_goal = rest;
-  optimal::SolveOptions solve_options;
-  if (options.solver == "ipopt") solve_options.solver = optimal::Solver::ipopt;
-  const Eigen::MatrixXd& path = scene.goals.back().path;
-  Eigen::MatrixXd ends(model.dof(), 1 + std::max<Eigen::Index>(1, path.cols()));
-  ends.col(0) = problem.q_start;
-  if (path.cols() > 0)
-    ends.rightCols(path.cols()) = path;
-  else
-    ends.col(1) = problem.q_goal;
-  const optimal::Solution found =
-      optimal::solve(problem, optimal::guess_along(ends, problem.intervals), solve_options);
-  const optimal::TimedMotion motion = optimal::motion_of(problem, found);
-  const optimal::MotionProof proof = optimal::prove(motion, view);
-  fmt::print(
-      "{} {} iterations, cost {}, duration {} s, violation {}, stationarity {}, margin {} "
-      "certified {}\n",
-      found.converged ? "solved" : found.cause, found.iterations, found.cost, motion.duration_s(),
-      found.violation, found.stationarity, proof.margin_m, proof.certified);
-  return found.converged && proof.certified ? 0 : 1;
+  std::optional<std::filesystem::path> target;
+  if (options.output) target = output_target(*options.output, files_of(scene));
+  const optimal::SceneMotion motion = optimal::optimize_scene(scene, options.motion);
+  if (target && motion.valid()) write_file_atomically(*target, file_text(options, motion));
+  if (options.json) {
+    print_json(optimal::to_json(motion, options.motion, options.rate_hz));
+  } else {
+    std::string text;
+    for (std::size_t i = 0; i < motion.goals.size(); ++i) text += goal_text(motion.goals[i], i);
+    report(text);
+  }
+  return motion.valid() ? 0 : 1;
 }
 
 }  // namespace
 
 void add_optimize(CLI::App& app, int& exit_code) {
   auto* command = add_command(
-      app, "optimize", "Find the motion of least effort or time to the goals of a scene",
+      app, "optimize",
+      "Find the motion of least effort or least time to the goals of a scene within all limits, "
+      "and prove it clear. The exit code is 1 if a goal has no such motion",
       "hamelin optimize data/scenes/shelf.json -o shelf-motion.json\n"
-      "hamelin optimize data/scenes/shelf.json --minimize time --jerk 5000 -o fast.json");
+      "hamelin optimize data/scenes/shelf.json --minimize time --jerk 5000 --rate 1000 --format "
+      "csv "
+      "-o fast.csv");
   const auto options = std::make_shared<OptimizeOptions>();
+  optimal::SceneMotionOptions& motion = options->motion;
+  const CLI::Range positive(1e-9, 1e12);
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
-  restrict_values(command->add_option("--minimize", options->minimize, "effort, or time")
-                      ->type_name("NAME")
-                      ->capture_default_str(),
-                  {"effort", "time"});
-  restrict_values(command->add_option("--solver", options->solver, "hamelin, or ipopt")
-                      ->type_name("NAME")
-                      ->capture_default_str(),
-                  {"hamelin", "ipopt"});
-  command->add_option("--intervals", options->intervals, "number of intervals between knots")
+  restrict_values(
+      command
+          ->add_option("--minimize", options->minimize,
+                       "effort: the integral of squared torques, each as a share of its limit; or "
+                       "time")
+          ->capture_default_str(),
+      {"effort", "time"});
+  command
+      ->add_option("--duration", motion.duration_s,
+                   "time to each goal [s]; with --minimize time the first guess (default: at half "
+                   "of the velocity limits)")
+      ->type_name("T")
+      ->check(positive);
+  command->add_option("--intervals", motion.intervals, "intervals between knots, to each goal")
       ->type_name("N")
+      ->check(CLI::Range(optimal::least_intervals, optimal::most_intervals))
+      ->capture_default_str();
+  command->add_option("--margin", motion.margin_m, "least clearance [m]")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();
   command
-      ->add_option("--duration", options->duration_s,
-                   "time of the motion [s]; with --minimize time the first guess")
-      ->type_name("T")
-      ->capture_default_str();
-  command->add_option("--margin", options->margin_m, "least clearance [m]")
-      ->type_name("M")
-      ->capture_default_str();
-  command->add_option("--points", options->points);
-  command->add_option("--acceleration", options->acceleration, "limit of all joints")
-      ->type_name("A");
-  command->add_option("--jerk", options->jerk, "limit of all joints")->type_name("J");
+      ->add_option("--acceleration", motion.acceleration,
+                   "limit of all joints [rad/s^2 or m/s^2] (default: none)")
+      ->type_name("A")
+      ->check(positive);
+  command
+      ->add_option("--jerk", motion.jerk, "limit of all joints [rad/s^3 or m/s^3] (default: none)")
+      ->type_name("J")
+      ->check(positive);
+  restrict_values(command
+                      ->add_option("--solver", options->solver,
+                                   "banded: hamelin's own; or ipopt, where this build has it")
+                      ->capture_default_str(),
+                  {"banded", "ipopt"});
   command
       ->add_option("--set", options->flags.set,
-                   "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
+                   "set one value of the scene, e.g. /model/torque_limits=true; may be repeated")
       ->type_name("/json/pointer=VALUE")
       ->allow_extra_args(false);
-  command->add_option("-o,--output", options->output, "file to write (default: standard output)")
+  restrict_values(command
+                      ->add_option("--format", options->format,
+                                   "of the output: json, csv, or ros for the fields of "
+                                   "trajectory_msgs/msg/JointTrajectory")
+                      ->capture_default_str(),
+                  {"json", "csv", "ros"});
+  command
+      ->add_option("--rate", options->rate_hz,
+                   "write this number of points per second (default: the knots)")
+      ->type_name("HZ")
+      ->check(positive);
+  command->add_option("-o,--output", options->output, "file to write the motion to")
       ->type_name("FILE");
+  command->add_flag("--json", options->json, "print JSON");
   command->callback([options, &exit_code] { exit_code = optimize(*options); });
 }
 

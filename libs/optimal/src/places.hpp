@@ -8,7 +8,7 @@
 
 namespace hamelin::optimal {
 
-/// Bounds of the clearance at the knots and between them, docs/theory.md (17.7).
+/// Bounds of the clearance at the knots and between them, docs/theory.md (18.7).
 class ClearanceRows {
  public:
   /// Appends its rows to the bounds.

@@ -45,7 +45,7 @@ void QuotientRows::add_velocities(const Limits& limits, Bounds& bounds) {
       add(limits.velocity, {"velocity", k, 2, j, {-1.0, 1.0}, 1, 0.0, 1.0}, bounds);
 }
 
-// docs/theory.md (17.6): at the ends, half a step lies between the velocities
+// docs/theory.md (18.6): at the ends, half a step lies between the velocities
 void QuotientRows::add_accelerations(const Problem& problem, Bounds& bounds) {
   const VectorXd& limit = problem.limits.acceleration;
   if (limit.size() == 0) return;

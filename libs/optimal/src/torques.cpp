@@ -47,7 +47,7 @@ Torques::Torques(const Problem& problem, const Layout& layout, Bounds& bounds)
     }
 }
 
-// docs/theory.md (17.3), (17.4)
+// docs/theory.md (18.3), (18.4)
 void Torques::evaluate(const Knots& knots, double* values) {
   knots_ = knots;
   const Index n = layout_.n, N = layout_.intervals;
@@ -142,7 +142,7 @@ void Torques::add_products(const MatrixXd& weights, BandedMatrix& out) {
   }
 }
 
-// Σ_k y_k·∇²τ_k, docs/theory.md (17.5)
+// Σ_k y_k·∇²τ_k, docs/theory.md (18.5)
 void Torques::add_curvature(const MatrixXd& y, BandedMatrix& out) {
   const Index n = layout_.n, N = layout_.intervals;
   const double h = knots_.h;

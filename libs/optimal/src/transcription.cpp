@@ -54,7 +54,7 @@ bool Transcription::evaluate(const VectorXd& x) {
   return std::isfinite(cost_) && values_.allFinite();
 }
 
-// docs/theory.md (17.1): h Σ τᵀRτ, or the mean of τᵀRτ beside the time
+// docs/theory.md (18.1): h Σ τᵀRτ, or the mean of τᵀRτ beside the time
 double Transcription::effort_factor() const {
   return layout_.free_time ? problem_.time_effort_weight / static_cast<double>(layout_.intervals)
                            : knots_.h;

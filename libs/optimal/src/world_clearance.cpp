@@ -25,7 +25,7 @@ void WorldClearance::evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& 
   add_pairs(q, distances, gradients);
 }
 
-// The distance changes with the point of the arm along the direction to it, docs/theory.md (17.7).
+// The distance changes with the point of the arm along the direction to it, docs/theory.md (18.7).
 void WorldClearance::add_contacts(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) {
   std::fill(found_.begin(), found_.end(), 0);
   const std::size_t count =

@@ -5,7 +5,7 @@
 namespace hamelin::optimal {
 
 /// A motion over time: knots at equal steps, and between them polynomials of degree five through
-/// positions, velocities and accelerations, docs/theory.md (17.12).
+/// positions, velocities and accelerations, docs/theory.md (18.12).
 struct TimedMotion {
   double step_s = 0.0;
   MatrixXd q, v, a, torque;  ///< dof × (N + 1)

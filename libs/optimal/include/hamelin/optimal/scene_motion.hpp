@@ -1,0 +1,70 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hamelin/io/json.hpp"
+#include "hamelin/optimal/optimize.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::optimal {
+
+/// What is asked of the motion to the goals of a scene, besides what the scene models.
+struct SceneMotionOptions {
+  Objective objective = Objective::effort;
+  int intervals = 50;  ///< to each goal
+  /// Time to each goal [s]; none: that in which no joint exceeds half of its velocity limit on the
+  /// way of the guess. With Objective::time the first guess.
+  std::optional<double> duration_s;
+  double margin_m = 0.005;                   ///< least clearance
+  std::optional<double> acceleration, jerk;  ///< limits of all joints [rad/s² and rad/s³, or m]
+  double time_effort_weight = 1e-3;          ///< see Problem
+  SolveOptions solve{};
+};
+
+/// The motion to one goal, at rest at both ends but for the start of the scene.
+struct GoalMotion {
+  Problem problem;
+  Optimized found;
+  /// Whether it keeps all limits and is proved clear.
+  [[nodiscard]] bool valid() const {
+    return found.solution.violation <= 1e-6 && found.proof.certified;
+  }
+};
+
+/// The motions of a scene, one after the other.
+struct SceneMotion {
+  std::string scene, robot;
+  std::vector<std::string> joints;
+  model::Model model;
+  std::vector<GoalMotion> goals;  ///< up to the first that is not valid
+  std::size_t goal_count = 0;     ///< of the scene
+  [[nodiscard]] bool valid() const {
+    return goals.size() == goal_count && (goals.empty() || goals.back().valid());
+  }
+  [[nodiscard]] double duration_s() const;
+
+  struct Point {
+    double time_s;
+    VectorXd q, v, a, torque;
+  };
+  /// The knots of all motions, or if a rate is given, that number of points per second, with the
+  /// torques along the motion; and the last knot.
+  [[nodiscard]] std::vector<Point> points(std::optional<double> rate_hz = {}) const;
+};
+
+/// Optimises the motion from the start of a scene to its first goal, and from each goal to the
+/// next, among the obstacles that stand still.
+/// @param paths for each goal way-points from the configuration before it, dof × (2 or more), along
+///        which the guess goes; empty: along the goals' own paths, or straight
+/// @throws Error io, parse or invalid for bad input, a scene with damping or friction, goals of the
+///         tip without a path, or goals that follow a target
+[[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
+                                         const SceneMotionOptions& options,
+                                         const std::vector<MatrixXd>& paths = {});
+
+/// As hamelin.trajectory/1, docs/schema/trajectory.schema.json.
+[[nodiscard]] Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
+                           std::optional<double> rate_hz = {});
+
+}  // namespace hamelin::optimal

@@ -1,0 +1,198 @@
+#include "hamelin/optimal/scene_motion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/preparation.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+
+namespace hamelin::optimal {
+
+using Eigen::Index;
+
+namespace {
+
+// Larger clearances count as this [m].
+constexpr double influence_m = 0.1;
+
+[[noreturn]] void refuse(const scene::Scene& scene, const std::string& what) {
+  throw Error(ErrorCode::invalid, scene.name + ": " + what);
+}
+
+bool any(const scene::JointNumbers& numbers) {
+  return numbers.from_robot || std::any_of(numbers.values.begin(), numbers.values.end(),
+                                           [](double x) { return x != 0.0; });
+}
+
+void check_scene(const scene::Scene& scene, bool has_paths) {
+  if (any(scene.model.joint_damping) || any(scene.model.friction))
+    refuse(scene,
+           "/model: damping or friction is modelled, expected neither: optimised motions "
+           "do not include it");
+  if (scene.goals.empty()) refuse(scene, "/goals: there is none, expected at least one");
+  for (std::size_t i = 0; i < scene.goals.size(); ++i) {
+    const auto type = scene.goals[i].type;
+    if (type == scene::GoalType::follow)
+      refuse(scene, fmt::format("/goals/{}: follows a target, expected a goal to arrive at", i));
+    if (type != scene::GoalType::joint && !has_paths)
+      refuse(scene, fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "
+                                "finds them (--guide)",
+                                i, scene::type_name(scene.goals[i])));
+  }
+}
+
+MatrixXd way_points(const scene::Goal& goal, const VectorXd& from, const MatrixXd* path) {
+  if (path != nullptr) return *path;
+  MatrixXd out(from.size(), 1 + std::max<Index>(1, goal.path.cols()));
+  out.col(0) = from;
+  if (goal.path.cols() > 0)
+    out.rightCols(goal.path.cols()) = goal.path;
+  else
+    out.col(1) = goal.q;
+  return out;
+}
+
+// The guess's speed is at most 15/8 of its mean, docs/theory.md (18.13).
+double usual_duration(const MatrixXd& points, const VectorXd& velocity) {
+  VectorXd travel = VectorXd::Zero(points.rows());
+  for (Index i = 1; i < points.cols(); ++i)
+    travel += (points.col(i) - points.col(i - 1)).cwiseAbs();
+  double duration = 0.1;
+  for (Index j = 0; j < travel.size(); ++j) {
+    const double limit = velocity.size() > 0 && std::isfinite(velocity[j]) ? velocity[j] : 2.0;
+    duration = std::max(duration, 15.0 / 8.0 * travel[j] / (0.5 * limit));
+  }
+  return duration;
+}
+
+Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
+                   const model::Model& model) {
+  Problem problem;
+  problem.objective = options.objective;
+  problem.intervals = options.intervals;
+  problem.margin_m = options.margin_m;
+  problem.time_effort_weight = options.time_effort_weight;
+  problem.clearance_points = 2;
+  const control::ModelledLimits limits = control::modelled_limits(scene, model.robot());
+  problem.limits.position_min = limits.q_lower;
+  problem.limits.position_max = limits.q_upper;
+  problem.limits.velocity = limits.velocity_max;
+  problem.limits.torque = limits.effort_max;
+  const Index n = model.dof();
+  if (options.acceleration)
+    problem.limits.acceleration = VectorXd::Constant(n, *options.acceleration);
+  if (options.jerk) problem.limits.jerk = VectorXd::Constant(n, *options.jerk);
+  return problem;
+}
+
+}  // namespace
+
+SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
+                           const std::vector<MatrixXd>& paths) {
+  check_scene(scene, !paths.empty());
+  SceneMotion out{scene.name, {}, {}, control::load_model(scene), {}, scene.goals.size()};
+  out.robot = out.model.robot().name;
+  for (const auto& link : out.model.robot().links) out.joints.push_back(link.joint.name);
+  control::WorldView view(scene, out.model, influence_m);
+  const VectorXd rest = VectorXd::Zero(out.model.dof());
+  VectorXd q = scene.start_q.size() > 0 ? scene.start_q : rest,
+           v = scene.start_v.size() > 0 ? scene.start_v : rest;
+  for (std::size_t i = 0; i < scene.goals.size(); ++i) {
+    const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
+    GoalMotion goal{problem_of(scene, options, out.model), {}};
+    Problem& problem = goal.problem;
+    problem.model = &out.model;
+    problem.q_start = q;
+    problem.v_start = v;
+    problem.q_goal = points.rightCols<1>();
+    problem.v_goal = rest;
+    problem.duration_s =
+        options.duration_s.value_or(usual_duration(points, problem.limits.velocity));
+    try {
+      goal.found = optimize(problem, points, view, options.solve);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::invalid) throw;
+      refuse(scene, fmt::format("/goals/{}: {}", i, e.what()));
+    }
+    q = problem.q_goal;
+    v = rest;
+    out.goals.push_back(std::move(goal));
+    if (!out.goals.back().valid()) break;
+  }
+  return out;
+}
+
+double SceneMotion::duration_s() const {
+  double sum = 0.0;
+  for (const auto& goal : goals) sum += goal.found.motion.duration_s();
+  return sum;
+}
+
+std::vector<SceneMotion::Point> SceneMotion::points(std::optional<double> rate_hz) const {
+  std::vector<Point> out;
+  dynamics::Workspace ws(model);
+  double begun = 0.0, next = 0.0;
+  for (const auto& goal : goals) {
+    const TimedMotion& motion = goal.found.motion;
+    const double end = begun + motion.duration_s();
+    if (!rate_hz) {
+      for (Index k = out.empty() ? 0 : 1; k < motion.knots(); ++k)
+        out.push_back({begun + motion.step_s * static_cast<double>(k), motion.q.col(k),
+                       motion.v.col(k), motion.a.col(k), motion.torque.col(k)});
+    } else {
+      const bool last = &goal == &goals.back();
+      const auto add = [&](double time_s) {
+        Point point{time_s, {}, {}, {}, VectorXd::Zero(model.dof())};
+        motion.at(time_s - begun, point.q, point.v, point.a);
+        dynamics::inverse_dynamics(model, ws, point.q, point.v, point.a, point.torque);
+        out.push_back(std::move(point));
+      };
+      for (; next < end - 1e-9; next = static_cast<double>(out.size()) / *rate_hz) add(next);
+      if (last) add(end);
+    }
+    begun = end;
+  }
+  return out;
+}
+
+Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
+             std::optional<double> rate_hz) {
+  const auto numbers = [](const VectorXd& x) {
+    return Json(std::vector<double>(x.data(), x.data() + x.size()));
+  };
+  Json goals = Json::array(), points = Json::array();
+  for (const auto& goal : motion.goals) {
+    const Optimized& f = goal.found;
+    goals.push_back({{"duration_s", f.motion.duration_s()},
+                     {"cost", f.solution.cost},
+                     {"converged", f.solution.converged},
+                     {"cause", f.solution.cause},
+                     {"iterations", f.solution.iterations},
+                     {"stationarity", f.solution.stationarity},
+                     {"violation", f.solution.violation},
+                     {"torque_share", f.torque_share},
+                     {"certified", f.proof.certified},
+                     {"margin_m", f.proof.margin_m},
+                     {"clearance_points", f.clearance_points}});
+  }
+  for (const auto& point : motion.points(rate_hz))
+    points.push_back({{"time_s", point.time_s},
+                      {"q", numbers(point.q)},
+                      {"v", numbers(point.v)},
+                      {"a", numbers(point.a)},
+                      {"tau", numbers(point.torque)}});
+  return {{"schema", "hamelin.trajectory/1"},
+          {"scene", motion.scene},
+          {"robot", motion.robot},
+          {"joints", motion.joints},
+          {"minimize", options.objective == Objective::time ? "time" : "effort"},
+          {"solver", options.solve.solver == Solver::ipopt ? "ipopt" : "banded"},
+          {"goals", std::move(goals)},
+          {"points", std::move(points)}};
+}
+
+}  // namespace hamelin::optimal
