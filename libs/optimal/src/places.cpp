@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
+
+#include "hamelin/optimal/timed_motion.hpp"
 
 namespace hamelin::optimal {
 
@@ -20,33 +23,19 @@ ClearanceRows::ClearanceRows(const Problem& problem, const Layout& layout, Bound
   }
 }
 
-// Cubic between two knots, with the velocities (q_{k+1} − q_{k−1})/2h at them, or those of an end.
+// docs/theory.md (18.2); the control points beyond the ends are q_0 − h v and q_N + h v.
 void ClearanceRows::add_place(const Problem& problem, Index knot, double s) {
-  Place place{knot, 1, {1.0}, VectorXd::Zero(layout_.n), knot, MatrixXd::Zero(layout_.n, each_)};
-  if (s > 0.0) {
-    const bool first = knot == 0, last = knot + 1 == layout_.intervals;
-    const double r = 1.0 - s, here = (1.0 + 2.0 * s) * r * r, next = s * s * (3.0 - 2.0 * s),
-                 leaving = s * r * r, arriving = -s * s * r;
-    place.first = first ? knot : knot - 1;
-    const std::size_t at = first ? 0 : 1;
-    place.weights = {};
-    place.weights[at] = here;
-    place.weights[at + 1] = next;
-    const auto add_velocity = [&](std::size_t before, std::size_t after, double weight) {
-      place.weights[before] -= 0.5 * weight;
-      place.weights[after] += 0.5 * weight;
-    };
-    if (first)
-      place.rate += leaving * problem.v_start;
-    else
-      add_velocity(0, 2, leaving);
-    if (last)
-      place.rate += arriving * problem.v_goal;
-    else
-      add_velocity(at, at + 2, arriving);
-    place.count = static_cast<Index>(at) + (last ? 2 : 3);
+  const std::array<double, 4> basis = spline_weights(s);
+  const Index N = layout_.intervals, first = std::max<Index>(0, knot - 1);
+  Place place{first, std::min(N, knot + 2) - first + 1, {}, VectorXd::Zero(layout_.n),
+              knot,  MatrixXd::Zero(layout_.n, each_)};
+  for (Index a = 0; a < 4; ++a) {
+    const Index point = knot - 1 + a;
+    const double weight = basis[static_cast<std::size_t>(a)];
+    place.weights[static_cast<std::size_t>(std::clamp<Index>(point, 0, N) - first)] += weight;
+    if (point < 0) place.rate -= weight * problem.v_start;
+    if (point > N) place.rate += weight * problem.v_goal;
   }
-  reach_ = std::max(reach_, place.count - 1);
   places_.push_back(std::move(place));
 }
 
@@ -59,7 +48,7 @@ void ClearanceRows::evaluate(const Knots& knots, double* values) {
   }
 }
 
-void ClearanceRows::add_hessian(const double* weights, BandedMatrix& out) const {
+void ClearanceRows::add_hessian(const double* weights, HessianSum& out) const {
   const Index n = layout_.n;
   MatrixXd square(n, n);
   for (const Place& place : places_) {
@@ -68,23 +57,18 @@ void ClearanceRows::add_hessian(const double* weights, BandedMatrix& out) const 
       if (const auto g = place.gradients.col(i); *weights > 0.0 && !g.isZero(0.0))
         square.noalias() += (*weights * scale * scale) * g * g.transpose();
     for (Index a = 0; a < place.count; ++a) {
-      if (!layout_.varies(place.first + a)) continue;
       for (Index b = 0; b <= a; ++b)
-        if (layout_.varies(place.first + b))
-          out.block(place.first + a - 1, place.first + b - 1) +=
-              place.weight(a) * place.weight(b) * square;
+        out.add(place.first + a, place.first + b, place.weight(a) * place.weight(b) * square);
       if (layout_.free_time)
-        out.border().segment((place.first + a - 1) * n, n).noalias() +=
-            (place.weight(a) * layout_.h_ref) * (square * place.rate);
+        out.add_mixed(place.first + a, (place.weight(a) * layout_.h_ref) * (square * place.rate));
     }
-    if (layout_.free_time)
-      out.corner() += layout_.h_ref * layout_.h_ref * place.rate.dot(square * place.rate);
+    out.add_step(layout_.h_ref * layout_.h_ref * place.rate.dot(square * place.rate));
   }
 }
 
 std::string ClearanceRows::describe(Index row) const {
   const Place& place = places_[static_cast<std::size_t>(row / each_)];
-  return fmt::format("clearance {} knot {}", place.count > 1 ? "after" : "at", place.knot);
+  return fmt::format("clearance after knot {}", place.knot);
 }
 
 }  // namespace hamelin::optimal

@@ -3,19 +3,17 @@
 #include <string>
 #include <vector>
 
-#include "banded.hpp"
+#include "hessian_sum.hpp"
 #include "layout.hpp"
 
 namespace hamelin::optimal {
 
-/// Bounds of the clearance at the knots and between them, docs/theory.md (18.7).
+/// Bounds of the clearance along the motion, docs/theory.md (18.7).
 class ClearanceRows {
  public:
   /// Appends its rows to the bounds.
   ClearanceRows(const Problem& problem, const Layout& layout, Bounds& bounds);
 
-  /// Knots that a place reaches over beyond its first.
-  [[nodiscard]] Index reach() const noexcept { return reach_; }
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(places_.size()) * each_; }
   /// Writes rows() numbers.
   void evaluate(const Knots& knots, double* values);
@@ -26,17 +24,16 @@ class ClearanceRows {
     for (const Place& place : places_)
       for (Index i = 0; i < each_; ++i, ++r) {
         for (Index a = 0; a < place.count; ++a)
-          if (layout_.varies(place.first + a))
-            for (Index j = 0; j < layout_.n; ++j)
-              f(r, layout_.variable(place.first + a, j),
-                scale * place.weight(a) * place.gradients(j, i));
+          for (Index j = 0; j < layout_.n; ++j)
+            layout_.chain(place.first + a, j, scale * place.weight(a) * place.gradients(j, i),
+                          [&](Index v, double d) { f(r, v, d); });
         if (layout_.free_time)
           f(r, layout_.step_variable(),
             scale * layout_.h_ref * place.gradients.col(i).dot(place.rate));
       }
   }
   /// Adds Jᵀ diag(weights) J; the curvature of distances is left out.
-  void add_hessian(const double* weights, BandedMatrix& out) const;
+  void add_hessian(const double* weights, HessianSum& out) const;
   /// "clearance after knot 7"
   [[nodiscard]] std::string describe(Index row) const;
 
@@ -56,7 +53,6 @@ class ClearanceRows {
   Clearance* clearance_;
   Layout layout_;
   Index each_ = 0;  ///< rows of a place
-  Index reach_ = 0;
   std::vector<Place> places_;
   VectorXd distances_, q_;
 };

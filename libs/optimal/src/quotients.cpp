@@ -10,8 +10,8 @@ QuotientRows::QuotientRows(const Problem& problem, const Layout& layout, Bounds&
     : layout_(layout) {
   add_positions(problem.limits, bounds);
   add_velocities(problem.limits, bounds);
-  add_accelerations(problem, bounds);
-  add_jerks(problem, bounds);
+  add_accelerations(problem.limits, bounds);
+  add_jerks(problem.limits, bounds);
   sums_.resize(rows_.size());
 }
 
@@ -32,7 +32,7 @@ void QuotientRows::add_positions(const Limits& limits, Bounds& bounds) {
     for (Index j = 0; j < layout_.n; ++j) {
       const double low = limits.position_min[j], high = limits.position_max[j];
       if (!std::isfinite(low) && !std::isfinite(high)) continue;
-      rows_.push_back({"position", k, 1, j, {1.0}, 0, 0.0, 1.0});
+      rows_.push_back({"position", k, 1, j, {1.0}, 0, 1.0});
       bounds.lower.push_back(low);
       bounds.upper.push_back(high);
     }
@@ -40,40 +40,27 @@ void QuotientRows::add_positions(const Limits& limits, Bounds& bounds) {
 
 void QuotientRows::add_velocities(const Limits& limits, Bounds& bounds) {
   if (limits.velocity.size() == 0) return;
-  for (Index k = 0; k < layout_.intervals; ++k)
+  for (Index k = 1; k + 1 < layout_.intervals; ++k)
     for (Index j = 0; j < layout_.n; ++j)
-      add(limits.velocity, {"velocity", k, 2, j, {-1.0, 1.0}, 1, 0.0, 1.0}, bounds);
+      add(limits.velocity, {"velocity", k, 2, j, {-1.0, 1.0}, 1, 1.0}, bounds);
 }
 
-// docs/theory.md (18.6): at the ends, half a step lies between the velocities
-void QuotientRows::add_accelerations(const Problem& problem, Bounds& bounds) {
-  const VectorXd& limit = problem.limits.acceleration;
-  if (limit.size() == 0) return;
-  const Index N = layout_.intervals;
-  const char* const of = "acceleration";
-  for (Index j = 0; j < layout_.n; ++j) {
-    add(limit, {of, 0, 2, j, {-2.0, 2.0}, 2, -2.0 * problem.v_start[j], 1.0}, bounds);
-    for (Index k = 1; k < N; ++k)
-      add(limit, {of, k - 1, 3, j, {1.0, -2.0, 1.0}, 2, 0.0, 1.0}, bounds);
-    add(limit, {of, N - 1, 2, j, {2.0, -2.0}, 2, 2.0 * problem.v_goal[j], 1.0}, bounds);
-  }
+void QuotientRows::add_accelerations(const Limits& limits, Bounds& bounds) {
+  if (limits.acceleration.size() == 0) return;
+  for (Index k = 1; k < layout_.intervals; ++k)
+    for (Index j = 0; j < layout_.n; ++j)
+      add(limits.acceleration, {"acceleration", k - 1, 3, j, {1.0, -2.0, 1.0}, 2, 1.0}, bounds);
 }
 
-// The change of the acceleration from knot to knot; before the first and behind the last knot it is
-// zero, a step away.
-void QuotientRows::add_jerks(const Problem& problem, Bounds& bounds) {
-  const VectorXd& limit = problem.limits.jerk;
-  if (limit.size() == 0) return;
+// The acceleration is zero at both ends.
+void QuotientRows::add_jerks(const Limits& limits, Bounds& bounds) {
+  if (limits.jerk.size() == 0) return;
   const Index N = layout_.intervals;
-  const char* const of = "jerk";
   for (Index j = 0; j < layout_.n; ++j) {
-    const double v = problem.v_start[j], w = problem.v_goal[j];
-    add(limit, {of, 0, 2, j, {-2.0, 2.0}, 3, -2.0 * v, 1.0}, bounds);
-    add(limit, {of, 0, 3, j, {3.0, -4.0, 1.0}, 3, 2.0 * v, 1.0}, bounds);
+    add(limits.jerk, {"jerk", 0, 3, j, {1.0, -2.0, 1.0}, 3, 1.0}, bounds);
     for (Index k = 1; k + 1 < N; ++k)
-      add(limit, {of, k - 1, 4, j, {-1.0, 3.0, -3.0, 1.0}, 3, 0.0, 1.0}, bounds);
-    add(limit, {of, N - 2, 3, j, {-1.0, 4.0, -3.0}, 3, 2.0 * w, 1.0}, bounds);
-    add(limit, {of, N - 1, 2, j, {-2.0, 2.0}, 3, -2.0 * w, 1.0}, bounds);
+      add(limits.jerk, {"jerk", k - 1, 4, j, {-1.0, 3.0, -3.0, 1.0}, 3, 1.0}, bounds);
+    add(limits.jerk, {"jerk", N - 2, 3, j, {-1.0, 2.0, -1.0}, 3, 1.0}, bounds);
   }
 }
 
@@ -86,41 +73,42 @@ void QuotientRows::evaluate(const Knots& knots, double* values) {
     for (Index a = 0; a < row.count; ++a)
       sum += row.coefficient[static_cast<std::size_t>(a)] * knots.q(row.joint, row.first + a);
     sums_[r] = sum;
-    const auto p = static_cast<std::size_t>(row.power);
-    values[r] = row.scale * (sum * inverse_[p] + (p > 0 ? row.rate * inverse_[p - 1] : 0.0));
+    values[r] = row.scale * sum * inverse_[static_cast<std::size_t>(row.power)];
   }
 }
 
 double QuotientRows::by_step(Index r) const {
   const Row& row = rows_[static_cast<std::size_t>(r)];
-  const auto p = static_cast<std::size_t>(row.power);
-  return -layout_.h_ref * row.scale *
-         (row.power * sums_[static_cast<std::size_t>(r)] * inverse_[p + 1] +
-          (row.power - 1) * row.rate * inverse_[p]);
+  return -layout_.h_ref * row.scale * row.power * sums_[static_cast<std::size_t>(r)] *
+         inverse_[static_cast<std::size_t>(row.power) + 1];
 }
 
 void QuotientRows::add_hessian(const double* y, const double* weights, bool curved,
-                               BandedMatrix& out) const {
+                               HessianSum& out) const {
+  // of one joint each, as matrices with one entry
+  MatrixXd block = MatrixXd::Zero(layout_.n, layout_.n);
+  VectorXd mixed = VectorXd::Zero(layout_.n);
   for (Index r = 0; r < rows(); ++r) {
     const Row& row = rows_[static_cast<std::size_t>(r)];
-    const auto block_of = [&](Index a) { return row.first + a - 1; };
+    double& entry = block(row.joint, row.joint);
     for (Index a = 0; a < row.count; ++a)
-      for (Index b = 0; b <= a; ++b)
-        if (layout_.varies(row.first + a) && layout_.varies(row.first + b))
-          out.block(block_of(a), block_of(b))(row.joint, row.joint) +=
-              weights[r] * by_knot(row, a) * by_knot(row, b);
+      for (Index b = 0; b <= a; ++b) {
+        entry = weights[r] * by_knot(row, a) * by_knot(row, b);
+        out.add(row.first + a, row.first + b, block);
+      }
+    entry = 0.0;
     if (!layout_.free_time || row.power == 0) continue;
-    const auto p = static_cast<std::size_t>(row.power);
-    const double power = row.power, step = by_step(r),
-                 by_knot_step = -power * layout_.h_ref * inverse_[1], slope = curved ? y[r] : 0.0;
-    for (Index a = 0; a < row.count; ++a)
-      if (layout_.varies(row.first + a))
-        out.border()[layout_.variable(row.first + a, row.joint)] +=
-            (weights[r] * step + slope * by_knot_step) * by_knot(row, a);
-    out.corner() += weights[r] * step * step +
-                    slope * row.scale * layout_.h_ref * layout_.h_ref * power *
-                        ((power + 1.0) * sums_[static_cast<std::size_t>(r)] * inverse_[p + 2] +
-                         (power - 1.0) * row.rate * inverse_[p + 1]);
+    const double power = row.power, step = by_step(r), slope = curved ? y[r] : 0.0,
+                 by_knot_step = -power * layout_.h_ref * inverse_[1];
+    for (Index a = 0; a < row.count; ++a) {
+      mixed[row.joint] = (weights[r] * step + slope * by_knot_step) * by_knot(row, a);
+      out.add_mixed(row.first + a, mixed);
+    }
+    mixed[row.joint] = 0.0;
+    out.add_step(weights[r] * step * step + slope * row.scale * layout_.h_ref * layout_.h_ref *
+                                                power * (power + 1.0) *
+                                                sums_[static_cast<std::size_t>(r)] *
+                                                inverse_[static_cast<std::size_t>(row.power) + 2]);
   }
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "banded.hpp"
+#include "hessian_sum.hpp"
 #include "layout.hpp"
 
 namespace hamelin::optimal {
@@ -26,30 +26,30 @@ class QuotientRows {
     for (Index r = 0; r < rows(); ++r) {
       const Row& row = rows_[static_cast<std::size_t>(r)];
       for (Index a = 0; a < row.count; ++a)
-        if (layout_.varies(row.first + a))
-          f(r, layout_.variable(row.first + a, row.joint), by_knot(row, a));
+        layout_.chain(row.first + a, row.joint, by_knot(row, a),
+                      [&](Index v, double d) { f(r, v, d); });
       if (layout_.free_time && row.power > 0) f(r, layout_.step_variable(), by_step(r));
     }
   }
   /// Adds Jᵀ diag(weights) J, and with `curved` Σ y_i ∇²c_i.
-  void add_hessian(const double* y, const double* weights, bool curved, BandedMatrix& out) const;
+  void add_hessian(const double* y, const double* weights, bool curved, HessianSum& out) const;
   /// "velocity of joint 3 after knot 7"
   [[nodiscard]] std::string describe(Index row) const;
 
  private:
-  /// scale (Σ_a coefficient_a q_{first+a} / h^power + rate / h^{power−1})
+  /// scale Σ_a coefficient_a q_{first+a} / h^power
   struct Row {
     const char* of;
     Index first, count, joint;
     std::array<double, 4> coefficient;
     int power;
-    double rate, scale;
+    double scale;
   };
   void add(const VectorXd& bound, Row row, Bounds& bounds);
   void add_positions(const Limits& limits, Bounds& bounds);
   void add_velocities(const Limits& limits, Bounds& bounds);
-  void add_accelerations(const Problem& problem, Bounds& bounds);
-  void add_jerks(const Problem& problem, Bounds& bounds);
+  void add_accelerations(const Limits& limits, Bounds& bounds);
+  void add_jerks(const Limits& limits, Bounds& bounds);
   [[nodiscard]] double by_knot(const Row& row, Index a) const {
     return row.scale * row.coefficient[static_cast<std::size_t>(a)] *
            inverse_[static_cast<std::size_t>(row.power)];

@@ -139,18 +139,17 @@ std::vector<SceneMotion::Point> SceneMotion::points(std::optional<double> rate_h
   for (const auto& goal : goals) {
     const TimedMotion& motion = goal.found.motion;
     const double end = begun + motion.duration_s();
+    const auto add = [&](double time_s) {
+      Point point{time_s, {}, {}, {}, VectorXd::Zero(model.dof())};
+      motion.at(time_s - begun, point.q, point.v, point.a);
+      dynamics::inverse_dynamics(model, ws, point.q, point.v, point.a, point.torque);
+      out.push_back(std::move(point));
+    };
     if (!rate_hz) {
-      for (Index k = out.empty() ? 0 : 1; k < motion.knots(); ++k)
-        out.push_back({begun + motion.step_s * static_cast<double>(k), motion.q.col(k),
-                       motion.v.col(k), motion.a.col(k), motion.torque.col(k)});
+      for (Index k = out.empty() ? 0 : 1; k <= motion.intervals(); ++k)
+        add(begun + motion.step_s * static_cast<double>(k));
     } else {
       const bool last = &goal == &goals.back();
-      const auto add = [&](double time_s) {
-        Point point{time_s, {}, {}, {}, VectorXd::Zero(model.dof())};
-        motion.at(time_s - begun, point.q, point.v, point.a);
-        dynamics::inverse_dynamics(model, ws, point.q, point.v, point.a, point.torque);
-        out.push_back(std::move(point));
-      };
       for (; next < end - 1e-9; next = static_cast<double>(out.size()) / *rate_hz) add(next);
       if (last) add(end);
     }

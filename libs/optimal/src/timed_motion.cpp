@@ -4,75 +4,74 @@
 #include <cmath>
 #include <limits>
 
-#include "discrete_lagrangian.hpp"
-#include "hamelin/dynamics/dynamics.hpp"
-
 namespace hamelin::optimal {
 
 using Eigen::Index;
 
-void TimedMotion::at(double time_s, VectorXd& q_out, VectorXd& v_out, VectorXd& a_out) const {
-  const double place = std::clamp(time_s / step_s, 0.0, static_cast<double>(knots() - 1));
-  const Index k = std::min(static_cast<Index>(place), knots() - 2);
-  const double s = place - static_cast<double>(k), h = step_s;
-  // coefficients of s³, s⁴ and s⁵ that meet position, velocity and acceleration at the next knot
-  const VectorXd v0 = h * v.col(k), a0 = h * h * a.col(k),
-                 dq = q.col(k + 1) - q.col(k) - v0 - 0.5 * a0, dv = h * v.col(k + 1) - v0 - a0,
-                 da = h * h * a.col(k + 1) - a0;
-  const VectorXd c3 = 10.0 * dq - 4.0 * dv + 0.5 * da, c4 = -15.0 * dq + 7.0 * dv - da,
-                 c5 = 6.0 * dq - 3.0 * dv + 0.5 * da;
-  q_out = q.col(k) + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))));
-  v_out = (v0 + s * (a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / h;
-  a_out = (a0 + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))) / (h * h);
+std::array<double, 4> spline_weights(double s) noexcept {
+  const double r = 1.0 - s;
+  return {r * r * r / 6.0, (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
+          (4.0 - 6.0 * r * r + 3.0 * r * r * r) / 6.0, s * s * s / 6.0};
+}
+
+// docs/theory.md (18.2)
+void TimedMotion::at(double time_s, VectorXd& q, VectorXd& v, VectorXd& a) const {
+  const double place = std::clamp(time_s / step_s, 0.0, static_cast<double>(intervals()));
+  const Index k = std::min(static_cast<Index>(place), intervals() - 1);
+  const double s = place - static_cast<double>(k), r = 1.0 - s, h = step_s;
+  const auto points = control.middleCols(k, 4);
+  const std::array<double, 4> weights = spline_weights(s);
+  q = weights[0] * points.col(0);
+  for (Index i = 1; i < 4; ++i) q += weights[static_cast<std::size_t>(i)] * points.col(i);
+  const double first = 0.5 * r * r, last = 0.5 * s * s;
+  v = (first * (points.col(1) - points.col(0)) +
+       (1.0 - first - last) * (points.col(2) - points.col(1)) +
+       last * (points.col(3) - points.col(2))) /
+      h;
+  a = (r * (points.col(0) - 2.0 * points.col(1) + points.col(2)) +
+       s * (points.col(1) - 2.0 * points.col(2) + points.col(3))) /
+      (h * h);
 }
 
 TimedMotion motion_of(const Problem& problem, const Solution& solution) {
-  const model::Model& model = *problem.model;
-  const Index n = model.dof(), N = solution.q.cols() - 1;
+  const Index N = solution.q.cols() - 1;
+  const double h = solution.step_s;
   TimedMotion out;
-  out.step_s = solution.step_s;
-  out.q = solution.q;
-  out.torque = solution.torque;
-  out.v = out.a = MatrixXd::Zero(n, N + 1);
-  DiscreteLagrangian lagrangian(model);
-  DiscreteLagrangian::Derivatives at(n);
-  dynamics::Workspace ws(model);
-  VectorXd x(n);
-  out.v.col(0) = problem.v_start;
-  for (Index k = 1; k < N; ++k) {
-    lagrangian.evaluate(out.q.col(k), out.q.col(k + 1), out.step_s, at);
-    const VectorXd p = -at.a - 0.5 * out.step_s * out.torque.col(k);
-    dynamics::solve_mass(model, ws, VectorXd(out.q.col(k)), p, x);
-    out.v.col(k) = x;
-  }
-  out.v.col(N) = problem.v_goal;
-  for (Index k = 0; k <= N; ++k) {
-    dynamics::forward_dynamics(model, ws, VectorXd(out.q.col(k)), VectorXd(out.v.col(k)),
-                               VectorXd(out.torque.col(k)), x);
-    out.a.col(k) = x;
-  }
+  out.step_s = h;
+  out.control.resize(solution.q.rows(), N + 3);
+  out.control.middleCols(1, N + 1) = solution.q;
+  out.control.col(0) = solution.q.col(0) - h * problem.v_start;
+  out.control.col(N + 2) = solution.q.col(N) + h * problem.v_goal;
   return out;
 }
 
-MotionProof prove(const TimedMotion& motion, control::WorldView& view, double sample_s) {
+void torque_at(const model::Model& model, dynamics::Workspace& ws, const TimedMotion& motion,
+               double time_s, VectorXd& torque) {
+  VectorXd q, v, a;
+  motion.at(time_s, q, v, a);
+  torque.resize(q.size());
+  dynamics::inverse_dynamics(model, ws, q, v, a, torque);
+}
+
+MotionProof prove(const TimedMotion& motion, control::WorldView& view, double piece_s) {
   const double duration = motion.duration_s();
-  const auto pieces = static_cast<long>(std::ceil(duration / sample_s - 1e-9));
+  const auto pieces = static_cast<long>(std::ceil(duration / piece_s - 1e-9));
   MotionProof out;
-  out.sample_s = duration / static_cast<double>(pieces);
+  out.piece_s = duration / static_cast<double>(pieces);
   out.margin_m = std::numeric_limits<double>::infinity();
   VectorXd q, v, a;
   motion.at(0.0, q, v, a);
   view.look(q, 0.0);
   view.depart(q, v);
   for (long i = 1; i <= pieces; ++i) {
-    const double time = out.sample_s * static_cast<double>(i);
+    const double time = out.piece_s * static_cast<double>(i);
     motion.at(time, q, v, a);
     view.look(q, time);
     const auto verdict = view.certify(q, v);
     out.margin_m = std::min(out.margin_m, verdict.margin_m);
     if (!verdict.certified && out.certified) {
       out.certified = false;
-      out.first_open_s = time - out.sample_s;
+      out.first_open_s = time - out.piece_s;
     }
     view.depart(q, v);
   }

@@ -2,14 +2,14 @@
 #include <string>
 #include <vector>
 
-#include "banded.hpp"
 #include "discrete_lagrangian.hpp"
+#include "hessian_sum.hpp"
 #include "layout.hpp"
 
 namespace hamelin::optimal {
 
 /// The torques at the knots by the discrete equations of motion, docs/theory.md (18.3), their
-/// bounds, and the effort Σ_k w_k τ_kᵀRτ_k.
+/// bounds, and the effort Σ_k τ_kᵀRτ_k, in which the ends count half.
 class Torques {
  public:
   /// Appends its rows to the bounds.
@@ -19,7 +19,7 @@ class Torques {
   /// Torques, their derivatives and the effort; writes rows() numbers.
   void evaluate(const Knots& knots, double* values);
   [[nodiscard]] double effort() const noexcept { return effort_; }
-  /// dof × (N + 1)
+  /// dof × (N + 1); those of the ends are constant
   [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_; }
   /// Adds factor · ∂(effort).
   void add_gradient(double factor, VectorXd& out) const;
@@ -29,10 +29,9 @@ class Torques {
       const Row& row = rows_[static_cast<std::size_t>(r)];
       const Node& node = nodes_[static_cast<std::size_t>(row.knot)];
       for (Index a = -1; a <= 1; ++a)
-        if (layout_.varies(row.knot + a))
-          for (Index j = 0; j < layout_.n; ++j)
-            f(r, layout_.variable(row.knot + a, j),
-              row.scale * node.by_q(row.joint, (a + 1) * layout_.n + j));
+        for (Index j = 0; j < layout_.n; ++j)
+          layout_.chain(row.knot + a, j, row.scale * node.by_q(row.joint, (a + 1) * layout_.n + j),
+                        [&](Index v, double d) { f(r, v, d); });
       if (layout_.free_time)
         f(r, layout_.step_variable(), row.scale * layout_.h_ref * node.by_h[row.joint]);
     }
@@ -40,7 +39,7 @@ class Torques {
   /// Adds factor · ∇²(effort) + Σ y_i ∇²c_i + Jᵀ diag(weights) J, or without `curved` only the part
   /// of it that is never negative: that of the squares of first derivatives.
   void add_hessian(double factor, const double* y, const double* weights, bool curved,
-                   BandedMatrix& out);
+                   HessianSum& out);
   [[nodiscard]] std::string describe(Index row) const;
 
  private:
@@ -53,16 +52,13 @@ class Torques {
     MatrixXd by_q;
     VectorXd by_h;
   };
-  void add_products(const MatrixXd& weights, BandedMatrix& out);
-  void add_curvature(const MatrixXd& y, BandedMatrix& out);
-  [[nodiscard]] double share(Index knot) const noexcept {
-    return knot == 0 || knot == layout_.intervals ? 0.5 : 1.0;
-  }
+  void add_products(const MatrixXd& weights, HessianSum& out);
+  void add_curvature(const MatrixXd& y, HessianSum& out);
 
-  const Problem& problem_;
   Layout layout_;
   DiscreteLagrangian lagrangian_;
-  VectorXd effort_weights_, p_start_, p_goal_;
+  VectorXd effort_weights_;
+  double end_effort_ = 0.0;  ///< half of that of the ends
   std::vector<Row> rows_;
 
   Knots knots_;

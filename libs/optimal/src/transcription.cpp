@@ -8,8 +8,12 @@ namespace hamelin::optimal {
 namespace {
 
 Layout layout_of(const Problem& problem) {
-  return {problem.q_start.size(), problem.intervals, problem.objective == Objective::time,
-          problem.duration_s / problem.intervals};
+  return {problem.q_start.size(),
+          problem.intervals,
+          problem.objective == Objective::time,
+          problem.duration_s / problem.intervals,
+          problem.v_start,
+          problem.v_goal};
 }
 
 }  // namespace
@@ -30,21 +34,24 @@ Transcription::Transcription(const Problem& problem)
 }
 
 BandedMatrix Transcription::hessian_matrix() const {
-  return {layout_.blocks(), layout_.n, std::max({Index{2}, quotients_.reach(), places_.reach()}),
-          layout_.free_time};
+  return {layout_.blocks(), layout_.n,
+          std::max<Index>(places_.rows() > 0 ? 3 : 2, quotients_.reach()), layout_.free_time};
 }
 
 VectorXd Transcription::variables_of(const MatrixXd& knots) const {
   VectorXd x = VectorXd::Ones(variables());
-  x.head(layout_.blocks() * layout_.n) = knots.middleCols(1, layout_.blocks()).reshaped();
+  x.head(layout_.blocks() * layout_.n) = knots.middleCols(2, layout_.blocks()).reshaped();
   return x;
 }
 
 bool Transcription::evaluate(const VectorXd& x) {
   const Index n = layout_.n, blocks = layout_.blocks();
-  knots_.q.middleCols(1, blocks) = x.head(n * blocks).reshaped(n, blocks);
+  knots_.q.middleCols(2, blocks) = x.head(n * blocks).reshaped(n, blocks);
   if (layout_.free_time) knots_.h = x[layout_.step_variable()] * layout_.h_ref;
   if (!(knots_.h > 0.0)) return false;
+  const Index N = layout_.intervals;
+  knots_.q.col(1) = problem_.q_start + knots_.h * problem_.v_start;
+  knots_.q.col(N - 1) = problem_.q_goal - knots_.h * problem_.v_goal;
   double* values = values_.data();
   quotients_.evaluate(knots_, values);
   torques_.evaluate(knots_, values + quotients_.rows());
@@ -70,12 +77,13 @@ void Transcription::gradient(VectorXd& out) const {
 void Transcription::hessian(double factor, const VectorXd& y, const VectorXd& weights, bool curved,
                             BandedMatrix& out) {
   out.set_zero();
+  HessianSum sum(layout_, out);
   const double *at = y.data(), *weight = weights.data();
-  quotients_.add_hessian(at, weight, curved, out);
+  quotients_.add_hessian(at, weight, curved, sum);
   at += quotients_.rows();
   weight += quotients_.rows();
-  torques_.add_hessian(factor * effort_factor(), at, weight, curved, out);
-  places_.add_hessian(weight + torques_.rows(), out);
+  torques_.add_hessian(factor * effort_factor(), at, weight, curved, sum);
+  places_.add_hessian(weight + torques_.rows(), sum);
 }
 
 double Transcription::violation(std::string* what) const {

@@ -13,17 +13,14 @@ struct Optimized {
   double torque_share = 0.0;
 };
 
-/// Solves a problem and proves the motion clear between its knots. If that fails, it is solved
-/// again with twice as many points of clearance per interval, up to `clearance_points_max`.
+/// Solves a problem and proves the motion clear at all times. If that fails, it is solved again
+/// with twice as many points of clearance per interval, up to `clearance_points_max`; if the
+/// torques along the motion exceed limits, with limits that are so much lower.
 /// @param way_points of a path from start to goal, dof × (2 or more), along which the guess goes
 /// @throws Error like solve()
 [[nodiscard]] Optimized optimize(Problem problem, const MatrixXd& way_points,
                                  control::WorldView& view, const SolveOptions& options = {});
 
 inline constexpr int clearance_points_max = 16;
-
-/// Torques along a motion at a time: those that move the arm along the polynomials exactly.
-void torque_at(const model::Model& model, dynamics::Workspace& ws, const TimedMotion& motion,
-               double time_s, VectorXd& torque);
 
 }  // namespace hamelin::optimal

@@ -41,7 +41,7 @@ class Clearance {
 };
 
 /// Numbers of intervals that a Problem may have.
-inline constexpr int least_intervals = 4, most_intervals = 100000;
+inline constexpr int least_intervals = 6, most_intervals = 100000;
 
 /// A motion between two states that is sought: docs/theory.md, chapter 17.
 struct Problem {
