@@ -47,7 +47,7 @@ VectorXd middle_of(const model::Model& model) {
 
 // The same with the torques along the motion, at 20 points per interval and linear between them.
 double motion_error(const Problem& problem, const Solution& found) {
-  const TimedMotion motion = motion_of(problem, found);
+  const TimedMotion motion{found.step_s, found.control};
   constexpr Index parts = 20;
   dynamics::Workspace ws(*problem.model);
   MatrixXd torque(problem.q_start.size(), parts * problem.intervals + 1);

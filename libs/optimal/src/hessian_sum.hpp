@@ -1,50 +1,63 @@
 #pragma once
+#include <algorithm>
+
 #include "banded.hpp"
 #include "layout.hpp"
 
 namespace hamelin::optimal {
 
-/// Adds second derivatives by knots and step to a matrix over the variables.
+/// Adds second derivatives by control points and step to a matrix over the variables.
 class HessianSum {
  public:
   HessianSum(const Layout& layout, BandedMatrix& out) : layout_(layout), out_(out) {}
 
-  /// ∂²/∂q_row∂q_column, once for each pair of knots row ≥ column.
+  /// ∂²/∂P_row∂P_column, once for each pair of points row ≥ column.
   template <class Block>
   void add(Index row, Index column, const Block& block) {
-    if (layout_.varies(row) && layout_.varies(column)) {
-      out_.block(Layout::block(row), Layout::block(column)) += block;
+    const auto &r = layout_.source(row), &c = layout_.source(column);
+    if (r.block >= 0 && c.block >= 0) add_block(row, column, r, c, block);
+    if (!layout_.free_time()) return;
+    if (r.block >= 0 && c.steps != 0.0) border(r) += r.share * (block * rate(c));
+    if (row == column) {
+      if (r.steps != 0.0) out_.corner() += rate(r).dot(block * rate(r));
       return;
     }
-    if (!layout_.free_time) return;
-    if (layout_.varies(row) && layout_.moves_with_step(column))
-      border(row) += block * rate(column);
-    else if (layout_.moves_with_step(row) && layout_.varies(column))
-      border(column) += block.transpose() * rate(row);
-    else if (layout_.moves_with_step(row) && layout_.moves_with_step(column))
-      out_.corner() += (row == column ? 1.0 : 2.0) * rate(row).dot(block * rate(column));
+    if (c.block >= 0 && r.steps != 0.0) border(c) += c.share * (block.transpose() * rate(r));
+    if (r.steps != 0.0 && c.steps != 0.0) out_.corner() += 2.0 * rate(r).dot(block * rate(c));
   }
-  /// ∂²/∂q_knot∂(h/h_ref)
+  /// ∂²/∂P_point∂(h/h_ref)
   template <class Vector>
-  void add_mixed(Index knot, const Vector& vector) {
-    if (!layout_.free_time) return;
-    if (layout_.varies(knot))
-      border(knot) += vector;
-    else if (layout_.moves_with_step(knot))
-      out_.corner() += 2.0 * rate(knot).dot(vector);
+  void add_mixed(Index point, const Vector& vector) {
+    if (!layout_.free_time()) return;
+    const auto& s = layout_.source(point);
+    if (s.block >= 0) border(s) += s.share * vector;
+    if (s.steps != 0.0) out_.corner() += 2.0 * rate(s).dot(vector);
   }
   /// ∂²/∂(h/h_ref)²
   void add_step(double value) {
-    if (layout_.free_time) out_.corner() += value;
+    if (layout_.free_time()) out_.corner() += value;
   }
 
  private:
-  [[nodiscard]] VectorXd rate(Index knot) const {
-    return knot == 1 ? VectorXd(layout_.h_ref * layout_.v_start)
-                     : VectorXd(-layout_.h_ref * layout_.v_goal);
+  /// Two points may follow from one variable point, and a pair of points stands for both orders.
+  template <class Block>
+  void add_block(Index row, Index column, const Layout::Source& r, const Layout::Source& c,
+                 const Block& block) {
+    const double share = r.share * c.share;
+    if (r.block == c.block) {
+      out_.block(r.block, r.block) += share * block;
+      if (row != column) out_.block(r.block, r.block) += share * block.transpose();
+    } else if (r.block > c.block) {
+      out_.block(r.block, c.block) += share * block;
+    } else {
+      out_.block(c.block, r.block) += share * block.transpose();
+    }
   }
-  auto border(Index knot) {
-    return out_.border().segment(Layout::block(knot) * layout_.n, layout_.n);
+  [[nodiscard]] VectorXd rate(const Layout::Source& s) const {
+    return s.steps * layout_.h_ref() * layout_.velocity(s);
+  }
+  auto border(const Layout::Source& s) {
+    return out_.border().segment(s.block * layout_.joints(), layout_.joints());
   }
 
   const Layout& layout_;

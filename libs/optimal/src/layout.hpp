@@ -7,46 +7,64 @@ namespace hamelin::optimal {
 
 using Eigen::Index;
 
-/// How the variables x = (q_2, …, q_{N−2}, h/h_ref) are arranged; the last only if the time is
-/// free. The two outermost knots at each end follow from the states there: q_0 and q_1 = q_0 + h
-/// v_start, q_N and q_{N−1} = q_N − h v_goal, docs/theory.md (18.1).
-struct Layout {
-  Index n, intervals;
-  bool free_time;
-  double h_ref;  ///< [s]
-  VectorXd v_start, v_goal;
+/// How the control points P_0 … P_{N+2} follow from the variables x = (inner points, h/h_ref), the
+/// last only if the time is free: P_i = share · (a variable point) + constant + steps · h · v, with
+/// the velocity v of an end, docs/theory.md (18.2), (18.3).
+class Layout {
+ public:
+  explicit Layout(const Problem& problem);
 
-  [[nodiscard]] Index blocks() const noexcept { return intervals - 3; }
-  [[nodiscard]] Index variables() const noexcept { return blocks() * n + (free_time ? 1 : 0); }
-  [[nodiscard]] bool varies(Index knot) const noexcept { return knot > 1 && knot < intervals - 1; }
-  /// The block of a knot that varies.
-  [[nodiscard]] static Index block(Index knot) noexcept { return knot - 2; }
-  [[nodiscard]] Index variable(Index knot, Index joint) const noexcept {
-    return block(knot) * n + joint;
+  struct Source {
+    Index block = -1;  ///< of the variable point; −1: none
+    double share = 0.0;
+    int end = 0;  ///< whose position and velocity follow: 0 the start, 1 the goal
+    double position_share = 0.0;
+    double steps = 0.0;  ///< 0 also if the velocity there is zero
+  };
+
+  [[nodiscard]] Index joints() const noexcept { return n_; }
+  [[nodiscard]] Index intervals() const noexcept { return intervals_; }
+  [[nodiscard]] Index points() const noexcept { return intervals_ + 3; }
+  [[nodiscard]] Index blocks() const noexcept { return intervals_ - 1 - 2 * fixed_; }
+  [[nodiscard]] bool free_time() const noexcept { return free_time_; }
+  [[nodiscard]] double h_ref() const noexcept { return h_ref_; }
+  [[nodiscard]] Index variables() const noexcept { return blocks() * n_ + (free_time_ ? 1 : 0); }
+  [[nodiscard]] Index step_variable() const noexcept { return blocks() * n_; }
+  /// The first variable point.
+  [[nodiscard]] Index first_point() const noexcept { return 2 + fixed_; }
+  [[nodiscard]] const Source& source(Index point) const {
+    return sources_[static_cast<std::size_t>(point)];
   }
-  [[nodiscard]] Index step_variable() const noexcept { return blocks() * n; }
-  /// ∂q_knot/∂(h/h_ref) of a knot that does not vary.
-  [[nodiscard]] double rate(Index knot, Index joint) const {
-    return knot == 1               ? h_ref * v_start[joint]
-           : knot == intervals - 1 ? -h_ref * v_goal[joint]
-                                   : 0.0;
+  [[nodiscard]] const VectorXd& position(const Source& s) const {
+    return s.end == 0 ? q_start_ : q_goal_;
   }
-  [[nodiscard]] bool moves_with_step(Index knot) const {
-    return free_time &&
-           ((knot == 1 && !v_start.isZero(0.0)) || (knot == intervals - 1 && !v_goal.isZero(0.0)));
+  [[nodiscard]] const VectorXd& velocity(const Source& s) const {
+    return s.end == 0 ? v_start_ : v_goal_;
   }
-  /// Calls f(variable, derivative) for a derivative by a joint at a knot.
+  /// Calls f(variable, derivative) for a derivative by a joint of a control point.
   template <class F>
-  void chain(Index knot, Index joint, double derivative, F&& f) const {
-    if (varies(knot))
-      f(variable(knot, joint), derivative);
-    else if (moves_with_step(knot))
-      f(step_variable(), derivative * rate(knot, joint));
+  void chain(Index point, Index joint, double derivative, F&& f) const {
+    const Source& s = source(point);
+    if (s.block >= 0) f(s.block * n_ + joint, derivative * s.share);
+    if (free_time_ && s.steps != 0.0)
+      f(step_variable(), derivative * s.steps * h_ref_ * velocity(s)[joint]);
   }
+
+ private:
+  void set_end(int end, Index outermost, Index step);
+
+  Index n_, intervals_;
+  bool free_time_;
+  double h_ref_;  ///< [s]
+  /// Points at each end, besides the two outermost, that do not vary: 1 if the acceleration is zero
+  /// at the ends, since jerks are bounded.
+  Index fixed_;
+  VectorXd q_start_, v_start_, q_goal_, v_goal_;
+  std::vector<Source> sources_;
 };
 
-/// All knots, dof × (N + 1), and the step between them.
-struct Knots {
+/// All control points, dof × (N + 3), and the step between them.
+struct Points {
   MatrixXd q;
   double h = 0.0;
 };

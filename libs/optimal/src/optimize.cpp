@@ -41,7 +41,7 @@ Optimized optimize(Problem problem, const MatrixXd& way_points, control::WorldVi
   Optimized out;
   for (;;) {
     out.solution = solve(problem, guess, options);
-    out.motion = motion_of(problem, out.solution);
+    out.motion = {out.solution.step_s, out.solution.control};
     out.proof = prove(out.motion, view);
     out.clearance_points = problem.clearance_points;
     out.torque_share = largest_torque_share(limits, problem, out.motion);
@@ -54,7 +54,7 @@ Optimized optimize(Problem problem, const MatrixXd& way_points, control::WorldVi
       problem.limits.torque *= 1.0 - 1.2 * (out.torque_share - 1.0);
       ++lowered;
     }
-    guess = out.solution.q;
+    guess = out.solution.control.middleCols(1, problem.intervals + 1);
     problem.duration_s = out.motion.duration_s();
   }
   return out;

@@ -16,21 +16,17 @@ class ClearanceRows {
 
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(places_.size()) * each_; }
   /// Writes rows() numbers.
-  void evaluate(const Knots& knots, double* values);
+  void evaluate(const Points& points, double* values);
   /// Calls f(row, variable, derivative) at the knots of the last evaluate().
   template <class F>
   void for_each_entry(F&& f) const {
     Index r = 0;
     for (const Place& place : places_)
-      for (Index i = 0; i < each_; ++i, ++r) {
-        for (Index a = 0; a < place.count; ++a)
-          for (Index j = 0; j < layout_.n; ++j)
+      for (Index i = 0; i < each_; ++i, ++r)
+        for (Index a = 0; a < 4; ++a)
+          for (Index j = 0; j < layout_.joints(); ++j)
             layout_.chain(place.first + a, j, scale * place.weight(a) * place.gradients(j, i),
                           [&](Index v, double d) { f(r, v, d); });
-        if (layout_.free_time)
-          f(r, layout_.step_variable(),
-            scale * layout_.h_ref * place.gradients.col(i).dot(place.rate));
-      }
   }
   /// Adds Jᵀ diag(weights) J; the curvature of distances is left out.
   void add_hessian(const double* weights, HessianSum& out) const;
@@ -39,16 +35,13 @@ class ClearanceRows {
 
  private:
   static constexpr double scale = 10.0;  ///< rows per metre
-  /// A configuration Σ_a weights_a q_{first+a} + h rate.
+  /// A configuration Σ_a weights_a P_{first+a} after the knot `first`.
   struct Place {
-    Index first, count;
+    Index first;
     std::array<double, 4> weights;
-    VectorXd rate;
-    Index knot;  ///< it lies at this one or after it
-    MatrixXd gradients{};
+    MatrixXd gradients;
     [[nodiscard]] double weight(Index a) const { return weights[static_cast<std::size_t>(a)]; }
   };
-  void add_place(const Problem& problem, Index knot, double s);
 
   Clearance* clearance_;
   Layout layout_;

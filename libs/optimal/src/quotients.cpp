@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace hamelin::optimal {
@@ -28,11 +29,11 @@ void QuotientRows::add(const VectorXd& bound, Row row, Bounds& bounds) {
 
 void QuotientRows::add_positions(const Limits& limits, Bounds& bounds) {
   if (limits.position_min.size() == 0) return;
-  for (Index k = 1; k < layout_.intervals; ++k)
-    for (Index j = 0; j < layout_.n; ++j) {
+  for (Index i = layout_.first_point(); i < layout_.points() - layout_.first_point(); ++i)
+    for (Index j = 0; j < layout_.joints(); ++j) {
       const double low = limits.position_min[j], high = limits.position_max[j];
       if (!std::isfinite(low) && !std::isfinite(high)) continue;
-      rows_.push_back({"position", k, 1, j, {1.0}, 0, 1.0});
+      rows_.push_back({"position", i, 1, j, {1.0}, 0, 1.0});
       bounds.lower.push_back(low);
       bounds.upper.push_back(high);
     }
@@ -40,38 +41,33 @@ void QuotientRows::add_positions(const Limits& limits, Bounds& bounds) {
 
 void QuotientRows::add_velocities(const Limits& limits, Bounds& bounds) {
   if (limits.velocity.size() == 0) return;
-  for (Index k = 1; k + 1 < layout_.intervals; ++k)
-    for (Index j = 0; j < layout_.n; ++j)
-      add(limits.velocity, {"velocity", k, 2, j, {-1.0, 1.0}, 1, 1.0}, bounds);
+  for (Index i = 1; i <= layout_.intervals(); ++i)
+    for (Index j = 0; j < layout_.joints(); ++j)
+      add(limits.velocity, {"velocity", i, 2, j, {-1.0, 1.0}, 1, 1.0}, bounds);
 }
 
 void QuotientRows::add_accelerations(const Limits& limits, Bounds& bounds) {
   if (limits.acceleration.size() == 0) return;
-  for (Index k = 1; k < layout_.intervals; ++k)
-    for (Index j = 0; j < layout_.n; ++j)
-      add(limits.acceleration, {"acceleration", k - 1, 3, j, {1.0, -2.0, 1.0}, 2, 1.0}, bounds);
+  for (Index i = 0; i <= layout_.intervals(); ++i)
+    for (Index j = 0; j < layout_.joints(); ++j)
+      add(limits.acceleration, {"acceleration", i, 3, j, {1.0, -2.0, 1.0}, 2, 1.0}, bounds);
 }
 
-// The acceleration is zero at both ends.
 void QuotientRows::add_jerks(const Limits& limits, Bounds& bounds) {
   if (limits.jerk.size() == 0) return;
-  const Index N = layout_.intervals;
-  for (Index j = 0; j < layout_.n; ++j) {
-    add(limits.jerk, {"jerk", 0, 3, j, {1.0, -2.0, 1.0}, 3, 1.0}, bounds);
-    for (Index k = 1; k + 1 < N; ++k)
-      add(limits.jerk, {"jerk", k - 1, 4, j, {-1.0, 3.0, -3.0, 1.0}, 3, 1.0}, bounds);
-    add(limits.jerk, {"jerk", N - 2, 3, j, {-1.0, 2.0, -1.0}, 3, 1.0}, bounds);
-  }
+  for (Index j = 0; j < layout_.joints(); ++j)
+    for (Index i = 0; i < layout_.intervals(); ++i)
+      add(limits.jerk, {"jerk", i, 4, j, {-1.0, 3.0, -3.0, 1.0}, 3, 1.0}, bounds);
 }
 
-void QuotientRows::evaluate(const Knots& knots, double* values) {
+void QuotientRows::evaluate(const Points& points, double* values) {
   inverse_[0] = 1.0;
-  for (std::size_t k = 1; k < inverse_.size(); ++k) inverse_[k] = inverse_[k - 1] / knots.h;
+  for (std::size_t k = 1; k < inverse_.size(); ++k) inverse_[k] = inverse_[k - 1] / points.h;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Row& row = rows_[r];
     double sum = 0.0;
     for (Index a = 0; a < row.count; ++a)
-      sum += row.coefficient[static_cast<std::size_t>(a)] * knots.q(row.joint, row.first + a);
+      sum += row.coefficient[static_cast<std::size_t>(a)] * points.q(row.joint, row.first + a);
     sums_[r] = sum;
     values[r] = row.scale * sum * inverse_[static_cast<std::size_t>(row.power)];
   }
@@ -79,15 +75,15 @@ void QuotientRows::evaluate(const Knots& knots, double* values) {
 
 double QuotientRows::by_step(Index r) const {
   const Row& row = rows_[static_cast<std::size_t>(r)];
-  return -layout_.h_ref * row.scale * row.power * sums_[static_cast<std::size_t>(r)] *
+  return -layout_.h_ref() * row.scale * row.power * sums_[static_cast<std::size_t>(r)] *
          inverse_[static_cast<std::size_t>(row.power) + 1];
 }
 
 void QuotientRows::add_hessian(const double* y, const double* weights, bool curved,
                                HessianSum& out) const {
   // of one joint each, as matrices with one entry
-  MatrixXd block = MatrixXd::Zero(layout_.n, layout_.n);
-  VectorXd mixed = VectorXd::Zero(layout_.n);
+  MatrixXd block = MatrixXd::Zero(layout_.joints(), layout_.joints());
+  VectorXd mixed = VectorXd::Zero(layout_.joints());
   for (Index r = 0; r < rows(); ++r) {
     const Row& row = rows_[static_cast<std::size_t>(r)];
     double& entry = block(row.joint, row.joint);
@@ -97,15 +93,15 @@ void QuotientRows::add_hessian(const double* y, const double* weights, bool curv
         out.add(row.first + a, row.first + b, block);
       }
     entry = 0.0;
-    if (!layout_.free_time || row.power == 0) continue;
+    if (!layout_.free_time() || row.power == 0) continue;
     const double power = row.power, step = by_step(r), slope = curved ? y[r] : 0.0,
-                 by_knot_step = -power * layout_.h_ref * inverse_[1];
+                 by_knot_step = -power * layout_.h_ref() * inverse_[1];
     for (Index a = 0; a < row.count; ++a) {
       mixed[row.joint] = (weights[r] * step + slope * by_knot_step) * by_knot(row, a);
       out.add_mixed(row.first + a, mixed);
     }
     mixed[row.joint] = 0.0;
-    out.add_step(weights[r] * step * step + slope * row.scale * layout_.h_ref * layout_.h_ref *
+    out.add_step(weights[r] * step * step + slope * row.scale * layout_.h_ref() * layout_.h_ref() *
                                                 power * (power + 1.0) *
                                                 sums_[static_cast<std::size_t>(r)] *
                                                 inverse_[static_cast<std::size_t>(row.power) + 2]);
@@ -114,7 +110,8 @@ void QuotientRows::add_hessian(const double* y, const double* weights, bool curv
 
 std::string QuotientRows::describe(Index r) const {
   const Row& row = rows_[static_cast<std::size_t>(r)];
-  return fmt::format("{} of joint {} at knot {}", row.of, row.joint + 1, row.first + row.count / 2);
+  return fmt::format("{} of joint {} near knot {}", row.of, row.joint + 1,
+                     std::max<Index>(0, row.first + row.count / 2 - 1));
 }
 
 }  // namespace hamelin::optimal

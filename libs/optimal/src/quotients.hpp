@@ -19,7 +19,7 @@ class QuotientRows {
   [[nodiscard]] Index reach() const noexcept { return reach_; }
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(rows_.size()); }
   /// Writes rows() numbers.
-  void evaluate(const Knots& knots, double* values);
+  void evaluate(const Points& points, double* values);
   /// Calls f(row, variable, derivative) at the knots of the last evaluate().
   template <class F>
   void for_each_entry(F&& f) const {
@@ -28,7 +28,7 @@ class QuotientRows {
       for (Index a = 0; a < row.count; ++a)
         layout_.chain(row.first + a, row.joint, by_knot(row, a),
                       [&](Index v, double d) { f(r, v, d); });
-      if (layout_.free_time && row.power > 0) f(r, layout_.step_variable(), by_step(r));
+      if (layout_.free_time() && row.power > 0) f(r, layout_.step_variable(), by_step(r));
     }
   }
   /// Adds Jᵀ diag(weights) J, and with `curved` Σ y_i ∇²c_i.

@@ -70,9 +70,9 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
   out.violation = program.violation(&what);
   if (!out.converged && out.violation > options.tolerance) out.cause += "; violated: " + what;
   out.cost = program.cost();
-  out.q = program.knots().q;
+  out.control = program.points().q;
   out.torque = program.torques();
-  out.step_s = program.knots().h;
+  out.step_s = program.points().h;
   return out;
 }
 

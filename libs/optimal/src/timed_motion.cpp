@@ -33,18 +33,6 @@ void TimedMotion::at(double time_s, VectorXd& q, VectorXd& v, VectorXd& a) const
       (h * h);
 }
 
-TimedMotion motion_of(const Problem& problem, const Solution& solution) {
-  const Index N = solution.q.cols() - 1;
-  const double h = solution.step_s;
-  TimedMotion out;
-  out.step_s = h;
-  out.control.resize(solution.q.rows(), N + 3);
-  out.control.middleCols(1, N + 1) = solution.q;
-  out.control.col(0) = solution.q.col(0) - h * problem.v_start;
-  out.control.col(N + 2) = solution.q.col(N) + h * problem.v_goal;
-  return out;
-}
-
 void torque_at(const model::Model& model, dynamics::Workspace& ws, const TimedMotion& motion,
                double time_s, VectorXd& torque) {
   VectorXd q, v, a;

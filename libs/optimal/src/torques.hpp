@@ -17,9 +17,9 @@ class Torques {
 
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(rows_.size()); }
   /// Torques, their derivatives and the effort; writes rows() numbers.
-  void evaluate(const Knots& knots, double* values);
+  void evaluate(const Points& points, double* values);
   [[nodiscard]] double effort() const noexcept { return effort_; }
-  /// dof × (N + 1); those of the ends are constant
+  /// dof × (N + 1)
   [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_; }
   /// Adds factor · ∂(effort).
   void add_gradient(double factor, VectorXd& out) const;
@@ -27,13 +27,13 @@ class Torques {
   void for_each_entry(F&& f) const {
     for (Index r = 0; r < rows(); ++r) {
       const Row& row = rows_[static_cast<std::size_t>(r)];
-      const Node& node = nodes_[static_cast<std::size_t>(row.knot)];
-      for (Index a = -1; a <= 1; ++a)
-        for (Index j = 0; j < layout_.n; ++j)
-          layout_.chain(row.knot + a, j, row.scale * node.by_q(row.joint, (a + 1) * layout_.n + j),
+      const Knot& knot = knots_[static_cast<std::size_t>(row.knot)];
+      for (Index a = 0; a < 3; ++a)
+        for (Index j = 0; j < layout_.joints(); ++j)
+          layout_.chain(row.knot + a, j, row.scale * knot.by_q(row.joint, a * layout_.joints() + j),
                         [&](Index v, double d) { f(r, v, d); });
-      if (layout_.free_time)
-        f(r, layout_.step_variable(), row.scale * layout_.h_ref * node.by_h[row.joint]);
+      if (layout_.free_time())
+        f(r, layout_.step_variable(), row.scale * layout_.h_ref() * knot.by_h[row.joint]);
     }
   }
   /// Adds factor · ∇²(effort) + Σ y_i ∇²c_i + Jᵀ diag(weights) J, or without `curved` only the part
@@ -47,25 +47,28 @@ class Torques {
     Index knot, joint;
     double scale;
   };
-  /// Derivatives of the torques at a knot by the knots before, at and after it, and by h.
-  struct Node {
+  /// Derivatives of the torques at a knot by the control points before, at and after it, and by h.
+  struct Knot {
     MatrixXd by_q;
     VectorXd by_h;
   };
   void add_products(const MatrixXd& weights, HessianSum& out);
   void add_curvature(const MatrixXd& y, HessianSum& out);
+  /// The weight of a knot's effort.
+  [[nodiscard]] double share(Index knot) const noexcept {
+    return knot == 0 || knot == layout_.intervals() ? 0.5 : 1.0;
+  }
 
   Layout layout_;
   DiscreteLagrangian lagrangian_;
   VectorXd effort_weights_;
-  double end_effort_ = 0.0;  ///< half of that of the ends
   std::vector<Row> rows_;
 
-  Knots knots_;
+  Points points_;
   double effort_ = 0.0;
   MatrixXd torques_;
   std::vector<DiscreteLagrangian::Derivatives> intervals_;
-  std::vector<Node> nodes_;
+  std::vector<Knot> knots_;
   DiscreteLagrangian::Derivatives direction_;
 };
 

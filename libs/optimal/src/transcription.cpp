@@ -5,73 +5,68 @@
 
 namespace hamelin::optimal {
 
-namespace {
-
-Layout layout_of(const Problem& problem) {
-  return {problem.q_start.size(),
-          problem.intervals,
-          problem.objective == Objective::time,
-          problem.duration_s / problem.intervals,
-          problem.v_start,
-          problem.v_goal};
-}
-
-}  // namespace
-
 Transcription::Transcription(const Problem& problem)
     : problem_(problem),
-      layout_(layout_of(problem)),
+      layout_(problem),
       quotients_(problem, layout_, bounds_),
       torques_(problem, layout_, bounds_),
       places_(problem, layout_, bounds_),
       lower_(Eigen::Map<const VectorXd>(bounds_.lower.data(), bounds_.size())),
       upper_(Eigen::Map<const VectorXd>(bounds_.upper.data(), bounds_.size())),
       values_(VectorXd::Zero(bounds_.size())) {
-  knots_.q.resize(layout_.n, layout_.intervals + 1);
-  knots_.q.col(0) = problem.q_start;
-  knots_.q.col(layout_.intervals) = problem.q_goal;
-  knots_.h = layout_.h_ref;
+  points_.q = MatrixXd::Zero(layout_.joints(), layout_.points());
 }
 
 BandedMatrix Transcription::hessian_matrix() const {
-  return {layout_.blocks(), layout_.n,
-          std::max<Index>(places_.rows() > 0 ? 3 : 2, quotients_.reach()), layout_.free_time};
+  return {layout_.blocks(), layout_.joints(),
+          std::max<Index>(places_.rows() > 0 ? 3 : 2, quotients_.reach()), layout_.free_time()};
 }
 
 VectorXd Transcription::variables_of(const MatrixXd& knots) const {
   VectorXd x = VectorXd::Ones(variables());
-  x.head(layout_.blocks() * layout_.n) = knots.middleCols(2, layout_.blocks()).reshaped();
+  x.head(layout_.blocks() * layout_.joints()) =
+      knots.middleCols(layout_.first_point() - 1, layout_.blocks()).reshaped();
   return x;
 }
 
+// docs/theory.md (18.2), (18.3)
+void Transcription::place_points(const VectorXd& x) {
+  const Index n = layout_.joints();
+  points_.h = layout_.h_ref() * (layout_.free_time() ? x[layout_.step_variable()] : 1.0);
+  for (Index i = 0; i < layout_.points(); ++i) {
+    const Layout::Source& source = layout_.source(i);
+    auto point = points_.q.col(i);
+    point.setZero();
+    if (source.block >= 0) point += source.share * x.segment(source.block * n, n);
+    if (source.position_share != 0.0) point += source.position_share * layout_.position(source);
+    if (source.steps != 0.0) point += source.steps * points_.h * layout_.velocity(source);
+  }
+}
+
 bool Transcription::evaluate(const VectorXd& x) {
-  const Index n = layout_.n, blocks = layout_.blocks();
-  knots_.q.middleCols(2, blocks) = x.head(n * blocks).reshaped(n, blocks);
-  if (layout_.free_time) knots_.h = x[layout_.step_variable()] * layout_.h_ref;
-  if (!(knots_.h > 0.0)) return false;
-  const Index N = layout_.intervals;
-  knots_.q.col(1) = problem_.q_start + knots_.h * problem_.v_start;
-  knots_.q.col(N - 1) = problem_.q_goal - knots_.h * problem_.v_goal;
+  place_points(x);
+  if (!(points_.h > 0.0)) return false;
   double* values = values_.data();
-  quotients_.evaluate(knots_, values);
-  torques_.evaluate(knots_, values + quotients_.rows());
-  places_.evaluate(knots_, values + quotients_.rows() + torques_.rows());
+  quotients_.evaluate(points_, values);
+  torques_.evaluate(points_, values + quotients_.rows());
+  places_.evaluate(points_, values + quotients_.rows() + torques_.rows());
   cost_ = effort_factor() * torques_.effort();
-  if (layout_.free_time) cost_ += knots_.h * static_cast<double>(layout_.intervals);
+  if (layout_.free_time()) cost_ += points_.h * static_cast<double>(layout_.intervals());
   return std::isfinite(cost_) && values_.allFinite();
 }
 
 // docs/theory.md (18.1): h Σ τᵀRτ, or the mean of τᵀRτ beside the time
 double Transcription::effort_factor() const {
-  return layout_.free_time ? problem_.time_effort_weight / static_cast<double>(layout_.intervals)
-                           : knots_.h;
+  return layout_.free_time()
+             ? problem_.time_effort_weight / static_cast<double>(layout_.intervals())
+             : points_.h;
 }
 
 void Transcription::gradient(VectorXd& out) const {
   out.setZero();
   torques_.add_gradient(effort_factor(), out);
-  if (layout_.free_time)
-    out[layout_.step_variable()] += layout_.h_ref * static_cast<double>(layout_.intervals);
+  if (layout_.free_time())
+    out[layout_.step_variable()] += layout_.h_ref() * static_cast<double>(layout_.intervals());
 }
 
 void Transcription::hessian(double factor, const VectorXd& y, const VectorXd& weights, bool curved,

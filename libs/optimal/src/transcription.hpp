@@ -24,7 +24,7 @@ class Transcription {
   /// A matrix of the shape of the Hessian.
   [[nodiscard]] BandedMatrix hessian_matrix() const;
 
-  /// x for knots, dof × (N + 1), of which the inner ones are used, in the time of the problem.
+  /// x for a guess of the inner control points by knots, dof × (N + 1), in the time of the problem.
   [[nodiscard]] VectorXd variables_of(const MatrixXd& knots) const;
   /// Cost, rows and their first derivatives at x. @return false if a number is not finite
   bool evaluate(const VectorXd& x);
@@ -45,12 +45,13 @@ class Transcription {
   /// `curved` only the part that is never negative, as in the Gauss–Newton method.
   void hessian(double factor, const VectorXd& y, const VectorXd& weights, bool curved,
                BandedMatrix& out);
-  [[nodiscard]] const Knots& knots() const noexcept { return knots_; }
+  [[nodiscard]] const Points& points() const noexcept { return points_; }
   [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_.torques(); }
   /// The largest violation of a row, and what the row bounds.
   [[nodiscard]] double violation(std::string* what = nullptr) const;
 
  private:
+  void place_points(const VectorXd& x);
   /// The weight of the effort in the cost.
   [[nodiscard]] double effort_factor() const;
   [[nodiscard]] std::string describe(Index row) const;
@@ -63,7 +64,7 @@ class Transcription {
   ClearanceRows places_;
   VectorXd lower_, upper_;
 
-  Knots knots_;
+  Points points_;
   double cost_ = 0.0;
   VectorXd values_;
 };

@@ -39,7 +39,7 @@ class TranscriptionProgram final : public NonlinearProgram {
   /// Calls f(row, column, value) for the lower triangle of matrix_.
   template <class F>
   void for_each_in_triangle(F&& f) const {
-    const Index n = of_.layout().n, blocks = matrix_.blocks();
+    const Index n = of_.layout().joints(), blocks = matrix_.blocks();
     for (Index c = 0; c < blocks; ++c)
       for (Index r = c; r < std::min(blocks, c + matrix_.reach() + 1); ++r) {
         const auto block = matrix_.block(r, c);

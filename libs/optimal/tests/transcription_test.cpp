@@ -49,7 +49,10 @@ MatrixXd dense(const BandedMatrix& H, Index n) {
 TEST_CASE("derivatives of cost and rows agree with differences", "[optimal]") {
   const auto objective = GENERATE(Objective::effort, Objective::time);
   const model::Model arm(test::random_robot(3, 4, 3));
-  const Problem problem = problem_of(arm, objective);
+  Problem problem = problem_of(arm, objective);
+  const bool jerk = GENERATE(false, true);
+  const Index inner = jerk ? 5 : 7;
+  if (!jerk) problem.limits.jerk.resize(0);
   Transcription program(problem);
   Rng rng(5);
   MatrixXd knots = guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 8);
@@ -57,7 +60,7 @@ TEST_CASE("derivatives of cost and rows agree with differences", "[optimal]") {
   const VectorXd x = program.variables_of(knots);
   REQUIRE(program.evaluate(x));
   const Index m = program.rows(), size = program.variables();
-  REQUIRE(m == 4 * (7 + 6 + 7 + 8 + 7));
+  REQUIRE(m == 4 * (inner + 8 + 9 + (jerk ? 8 : 0) + 9));
   VectorXd gradient(size);
   program.gradient(gradient);
   MatrixXd J = MatrixXd::Zero(m, size);
@@ -115,7 +118,7 @@ TEST_CASE("both solvers find the same motion", "[optimal]") {
   CAPTURE(reference.cause, reference.iterations, reference.cost);
   CHECK(reference.converged);
   CHECK(found.cost == Approx(reference.cost).epsilon(1e-6));
-  CHECK((found.q - reference.q).norm() <= 1e-3);
+  CHECK((found.control - reference.control).norm() <= 1e-2);
   WARN(found.iterations << " " << reference.iterations << " cost " << found.cost << " "
-                        << reference.cost << " dq " << (found.q - reference.q).norm());
+                        << reference.cost << " dq " << (found.control - reference.control).norm());
 }

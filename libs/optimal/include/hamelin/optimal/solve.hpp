@@ -24,8 +24,8 @@ struct SolveOptions {
 struct Solution {
   bool converged = false;
   std::string cause;       ///< why it did not converge: one line, or empty
-  MatrixXd q;              ///< knots, dof × (N + 1)
-  MatrixXd torque;         ///< at the knots
+  MatrixXd control;        ///< control points, dof × (N + 3), see TimedMotion
+  MatrixXd torque;         ///< at the knots, dof × (N + 1), by the discrete equations
   double step_s = 0.0;     ///< between two knots
   double cost = 0.0;       ///< ∫ τᵀRτ dt, or the time plus its weight of the effort
   double violation = 0.0;  ///< the largest, as a share of the bound, or in decimetres of clearance

@@ -7,9 +7,9 @@
 
 namespace hamelin::optimal {
 
-/// A motion over time: the uniform cubic B-spline whose control points are the knots of a solution,
-/// docs/theory.md (18.2). Its velocities, accelerations and jerks are means of the difference
-/// quotients of the knots, so that it keeps their limits at all times.
+/// A motion over time: a uniform cubic B-spline, docs/theory.md (18.2). Its velocities,
+/// accelerations and jerks are means of the difference quotients of its control points, so that it
+/// keeps their limits at all times.
 struct TimedMotion {
   double step_s = 0.0;
   MatrixXd control;  ///< dof × (N + 3), one point beyond each end
@@ -25,8 +25,6 @@ struct TimedMotion {
 /// Weights of the control points k − 1 to k + 2 at the place s, 0 to 1, between the knots k and
 /// k + 1.
 [[nodiscard]] std::array<double, 4> spline_weights(double s) noexcept;
-
-[[nodiscard]] TimedMotion motion_of(const Problem& problem, const Solution& solution);
 
 /// Torques that move the arm along a motion.
 void torque_at(const model::Model& model, dynamics::Workspace& ws, const TimedMotion& motion,
