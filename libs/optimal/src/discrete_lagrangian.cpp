@@ -18,7 +18,7 @@ DiscreteLagrangian::DiscreteLagrangian(const model::Model& model)
       b_(q_),
       ahead_(model.dof()) {}
 
-// docs/theory.md (18.2)
+// docs/theory.md (18.5)
 void DiscreteLagrangian::evaluate(const VectorXd& a, const VectorXd& b, double h,
                                   Derivatives& out) {
   q_ = 0.5 * (a + b);

@@ -6,7 +6,7 @@ namespace hamelin::optimal {
 
 /// The discrete Lagrangian of hamel-variational between two knots,
 ///   L_d(a, b, h) = h [K((a + b)/2, (b − a)/h) − ½ U(a) − ½ U(b)],
-/// with its first and second derivatives: docs/theory.md (4.1), (18.2).
+/// with its first and second derivatives: docs/theory.md (4.1), (18.5).
 class DiscreteLagrangian {
  public:
   explicit DiscreteLagrangian(const model::Model& model);

@@ -89,7 +89,7 @@ void InteriorPoint::lower_barrier() {
   mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
 }
 
-// docs/theory.md (18.10)
+// docs/theory.md (18.10), (18.11)
 bool InteriorPoint::find_direction() {
   const Index rows = program_.rows();
   weights_.setZero();
@@ -146,7 +146,7 @@ double InteriorPoint::violation_sum() const {
   return lower_.residual.lpNorm<1>() + upper_.residual.lpNorm<1>();
 }
 
-// docs/theory.md (18.11)
+// docs/theory.md (18.12)
 double InteriorPoint::merit() const {
   double barrier = 0.0;
   for_each_side([&](const Side& side) { barrier += side.slack.array().log().sum(); });

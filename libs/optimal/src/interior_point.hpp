@@ -4,7 +4,7 @@
 
 namespace hamelin::optimal {
 
-/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.8)–(18.11).
+/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.12).
 class InteriorPoint {
  public:
   /// @param first_slack least slack at the guess, as a share of a bound: how far rows near their

@@ -9,7 +9,7 @@
 namespace hamelin::optimal {
 
 /// Bounds of positions, velocities, accelerations and jerks: of difference quotients of one joint,
-/// docs/theory.md (18.6).
+/// docs/theory.md (18.8).
 class QuotientRows {
  public:
   /// Appends its rows to the bounds.

@@ -8,7 +8,7 @@
 
 namespace hamelin::optimal {
 
-/// The torques at the knots by the discrete equations of motion, docs/theory.md (18.3), their
+/// The torques at the knots by the discrete equations of motion, docs/theory.md (18.4), their
 /// bounds, and the effort Σ_k τ_kᵀRτ_k, in which the ends count half.
 class Torques {
  public:

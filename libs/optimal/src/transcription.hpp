@@ -9,7 +9,7 @@
 namespace hamelin::optimal {
 
 /// A Problem as a nonlinear program: minimise f(x) with lower ≤ c(x) ≤ upper. The discrete
-/// equations of motion hold for every x, as torques follow from them: docs/theory.md (18.3). Rows
+/// equations of motion hold for every x, as torques follow from them: docs/theory.md (18.4). Rows
 /// touch few successive knots, so that the Hessian is banded.
 class Transcription {
  public:

@@ -1,9 +1,13 @@
 #include "../src/transcription.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <tuple>
 
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/optimal/solve.hpp"
+#include "hamelin/optimal/timed_motion.hpp"
+#include "hamelin/test/errors.hpp"
 #include "hamelin/test/robots.hpp"
 
 using namespace hamelin;
@@ -119,6 +123,103 @@ TEST_CASE("both solvers find the same motion", "[optimal]") {
   CHECK(reference.converged);
   CHECK(found.cost == Approx(reference.cost).epsilon(1e-6));
   CHECK((found.control - reference.control).norm() <= 1e-2);
-  WARN(found.iterations << " " << reference.iterations << " cost " << found.cost << " "
-                        << reference.cost << " dq " << (found.control - reference.control).norm());
+}
+
+TEST_CASE("a motion keeps its limits at all times and its ends exactly", "[optimal]") {
+  const bool jerk = GENERATE(false, true);
+  const model::Model arm(test::random_robot(3, 4, 3));
+  Problem problem = problem_of(arm, Objective::time);
+  if (!jerk) problem.limits.jerk.resize(0);
+  problem.intervals = 30;
+  const Solution found = solve(
+      problem, guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 30));
+  REQUIRE(found.converged);
+  const TimedMotion motion{found.step_s, found.control};
+  VectorXd q, v, a, q_before, v_before, a_before;
+  motion.at(0.0, q, v, a);
+  CHECK((q - problem.q_start).norm() <= 1e-14);
+  CHECK((v - problem.v_start).norm() <= 1e-12);
+  if (jerk) CHECK(a.norm() <= 1e-10);
+  motion.at(motion.duration_s(), q, v, a);
+  CHECK((q - problem.q_goal).norm() <= 1e-14);
+  CHECK((v - problem.v_goal).norm() <= 1e-12);
+  constexpr int samples = 1000;
+  const double dt = motion.duration_s() / samples;
+  double fastest = 0.0;
+  for (int i = 0; i <= samples; ++i) {
+    motion.at(dt * i, q, v, a);
+    CHECK((q.cwiseAbs().array() <= 2.0).all());
+    CHECK((v.cwiseAbs().array() <= 3.0).all());
+    CHECK((a.cwiseAbs().array() <= 20.0).all());
+    fastest =
+        std::max({fastest, v.lpNorm<Eigen::Infinity>() / 3.0, a.lpNorm<Eigen::Infinity>() / 20.0});
+    if (i > 0) {  // v is the derivative of q, and a that of v
+      CHECK((q - q_before - 0.5 * dt * (v + v_before)).norm() <= 300.0 * dt * dt * dt);
+      CHECK((v - v_before - 0.5 * dt * (a + a_before)).norm() <= 1e-9 + 4e3 * dt * dt);
+    }
+    q_before = q, v_before = v, a_before = a;
+  }
+  CHECK(fastest > 0.9);  // some limit binds
+}
+
+TEST_CASE("torques by the discrete equations converge to those along the motion", "[optimal]") {
+  const model::Model arm(test::random_robot(3, 4, 3));
+  dynamics::Workspace ws(arm);
+  const auto difference = [&](int intervals) {
+    Problem problem = problem_of(arm, Objective::effort);
+    problem.limits = {};
+    problem.intervals = intervals;
+    const Solution found = solve(
+        problem,
+        guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), intervals));
+    REQUIRE(found.converged);
+    const TimedMotion motion{found.step_s, found.control};
+    double most = 0.0;
+    VectorXd torque;
+    for (Index k = 1; k < intervals; ++k) {
+      torque_at(arm, ws, motion, found.step_s * static_cast<double>(k), torque);
+      most = std::max(most, (torque - found.torque.col(k)).norm());
+    }
+    return most / found.torque.norm() * std::sqrt(static_cast<double>(intervals));
+  };
+  const double coarse = difference(20), fine = difference(80);
+  CHECK(coarse < 0.2);
+  CHECK(std::log2(coarse / fine) / 2.0 == Approx(2.0).margin(0.4));  // second order
+}
+
+TEST_CASE("problems without a solution are refused in one line that names the constraint",
+          "[optimal]") {
+  const model::Model arm(test::random_robot(3, 4, 3));
+  const Problem good = problem_of(arm, Objective::effort);
+  const MatrixXd guess =
+      guess_along((MatrixXd(4, 2) << good.q_start, good.q_goal).finished(), good.intervals);
+  const auto message = [&](auto&& change) {
+    Problem problem = good;
+    change(problem);
+    return test::error_of([&] { (void)solve(problem, guess); });
+  };
+  using Catch::Contains;
+  CHECK(message([](Problem&) {}) == "no error");
+  CHECK_THAT(message([](Problem& p) { p.intervals = 3; }), Contains("3 intervals"));
+  CHECK_THAT(message([](Problem& p) { p.duration_s = 0.0; }), Contains("duration of 0 s"));
+  CHECK_THAT(message([](Problem& p) { p.q_start[1] = 2.5; }),
+             Contains("start") && Contains("position of joint 2"));
+  CHECK_THAT(message([](Problem& p) { p.v_goal[2] = -4.0; }),
+             Contains("goal") && Contains("velocity of joint 3"));
+  CHECK_THAT(message([](Problem& p) { p.q_goal[0] = std::nan(""); }), Contains("not finite"));
+  CHECK_THAT(message([](Problem& p) { p.q_goal.resize(3); }), Contains("3 numbers"));
+  CHECK_THAT(message([](Problem& p) { p.limits.torque.setConstant(1.0); }),
+             Contains("to hold the arm"));
+  CHECK_THAT(message([](Problem& p) { p.limits.jerk[3] = -1.0; }),
+             Contains("jerk limits") && Contains("joint 4"));
+  CHECK_THAT(message([](Problem& p) { p.effort_weights = VectorXd::Zero(4); }),
+             Contains("weights of the effort"));
+
+  Problem hurried = good;
+  hurried.duration_s = 0.1;
+  const Solution none = solve(hurried, guess);
+  CHECK_FALSE(none.converged);
+  CHECK(none.violation > 0.1);
+  CHECK_THAT(none.cause, Contains("violated: "));
+  CHECK_THAT(none.cause, !Contains("\n"));
 }

@@ -6,7 +6,7 @@
 namespace hamelin::optimal {
 
 enum class Solver : std::int32_t {
-  banded,  ///< an interior-point method on the banded equations, docs/theory.md (18.8)–(18.11)
+  banded,  ///< an interior-point method on the banded equations, docs/theory.md (18.9)–(18.12)
   ipopt,   ///< IPOPT, where this build has it
 };
 
@@ -34,7 +34,7 @@ struct Solution {
   double stationarity = 0.0;
 };
 
-/// Solves the problem on the discrete equations of motion, docs/theory.md (18.1)–(18.7).
+/// Solves the problem on the discrete equations of motion, docs/theory.md (18.1)–(18.8).
 /// @param guess knots, dof × (N + 1), of which the inner ones are used
 /// @throws Error invalid for a Problem that check() refuses, usage for a solver that is not there
 [[nodiscard]] Solution solve(const Problem& problem, const MatrixXd& guess,
