@@ -20,10 +20,11 @@ constexpr double least_share = 0.01;    // of a slack or multiplier that a step 
 }  // namespace
 
 InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options,
-                             double first_slack)
+                             const Start& start)
     : program_(program),
       options_(options),
-      first_slack_(first_slack),
+      first_slack_(start.slack),
+      mu_(start.mu),
       hessian_(program.hessian_matrix()),
       lower_{1.0, program.lower()},
       upper_{-1.0, program.upper()},

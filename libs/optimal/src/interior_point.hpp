@@ -7,9 +7,13 @@ namespace hamelin::optimal {
 /// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.12).
 class InteriorPoint {
  public:
-  /// @param first_slack least slack at the guess, as a share of a bound: how far rows near their
-  ///        bounds may move in the first steps
-  InteriorPoint(Transcription& program, const SolveOptions& options, double first_slack);
+  struct Start {
+    double mu;  ///< of the barrier
+    /// Least slack at the guess, as a share of a bound: how far rows near their bounds may move in
+    /// the first steps.
+    double slack;
+  };
+  InteriorPoint(Transcription& program, const SolveOptions& options, const Start& start);
   /// From x; the program is at the last iterate afterwards.
   Solution solve(VectorXd x);
 
@@ -59,11 +63,11 @@ class InteriorPoint {
   Transcription& program_;
   SolveOptions options_;
   double first_slack_;
+  double mu_;  ///< of the barrier
   BandedMatrix hessian_;
   Side lower_, upper_;
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
   double scale_ = 1.0;  ///< of the cost
-  double mu_ = 0.1;     ///< of the barrier
   double penalty_ = 1.0;
   int evaluations_ = 0;
   int small_decreases_ = 0;  ///< of the merit, in a row

@@ -31,7 +31,7 @@ double largest_torque_share(const VectorXd& limit, const Problem& problem,
 }  // namespace
 
 Optimized optimize(Problem problem, const MatrixXd& way_points, control::WorldView& view,
-                   const SolveOptions& options) {
+                   SolveOptions options) {
   WorldClearance clearance(*problem.model, view);
   if (clearance.rows() > 0) problem.clearance = &clearance;
   MatrixXd guess = guess_along(way_points, problem.intervals);
@@ -54,6 +54,7 @@ Optimized optimize(Problem problem, const MatrixXd& way_points, control::WorldVi
       problem.limits.torque *= 1.0 - 1.2 * (out.torque_share - 1.0);
       ++lowered;
     }
+    options.near_solution = true;
     guess = out.solution.control.middleCols(1, problem.intervals + 1);
     problem.duration_s = out.motion.duration_s();
   }

@@ -17,16 +17,19 @@ class ClearanceRows {
   [[nodiscard]] Index rows() const noexcept { return static_cast<Index>(places_.size()) * each_; }
   /// Writes rows() numbers.
   void evaluate(const Points& points, double* values);
-  /// Calls f(row, variable, derivative) at the knots of the last evaluate().
-  template <class F>
+  /// Calls f(row, variable, derivative) at the points of the last evaluate(); with `all` also for
+  /// rows at their bound, whose derivatives are zero.
+  template <bool all, class F>
   void for_each_entry(F&& f) const {
     Index r = 0;
     for (const Place& place : places_)
-      for (Index i = 0; i < each_; ++i, ++r)
+      for (Index i = 0; i < each_; ++i, ++r) {
+        if (!all && place.gradients.col(i).isZero(0.0)) continue;
         for (Index a = 0; a < 4; ++a)
           for (Index j = 0; j < layout_.joints(); ++j)
             layout_.chain(place.first + a, j, scale * place.weight(a) * place.gradients(j, i),
                           [&](Index v, double d) { f(r, v, d); });
+      }
   }
   /// Adds Jᵀ diag(weights) J; the curvature of distances is left out.
   void add_hessian(const double* weights, HessianSum& out) const;

@@ -1,5 +1,6 @@
 #include "hamelin/optimal/solve.hpp"
 
+#include <array>
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
@@ -39,8 +40,12 @@ Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) 
 Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options) {
   Solution out;
   int iterations = 0, evaluations = 0;
-  for (const double first_slack : {1.0, 0.01, 0.1}) {
-    out = InteriorPoint(program, options, first_slack).solve(guess);
+  using Start = InteriorPoint::Start;
+  const std::array<Start, 3> starts =
+      options.near_solution ? std::array{Start{1e-3, 1e-3}, Start{0.1, 1.0}, Start{0.1, 0.01}}
+                            : std::array{Start{0.1, 1.0}, Start{0.1, 0.01}, Start{0.1, 0.1}};
+  for (const Start& start : starts) {
+    out = InteriorPoint(program, options, start).solve(guess);
     iterations += out.iterations;
     evaluations += out.evaluations;
     if (program.violation() <= options.tolerance) break;

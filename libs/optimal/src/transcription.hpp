@@ -33,13 +33,14 @@ class Transcription {
   [[nodiscard]] double cost() const noexcept { return cost_; }
   [[nodiscard]] const VectorXd& values() const noexcept { return values_; }
   void gradient(VectorXd& out) const;
-  /// Calls f(row, variable, derivative) for the entries of J, always in the same order.
-  template <class F>
+  /// Calls f(row, variable, derivative) for the entries of J; with `all` for the same ones in the
+  /// same order at every x.
+  template <bool all = false, class F>
   void for_each_entry(F&& f) const {
     quotients_.for_each_entry(f);
     const Index first_torque = quotients_.rows(), first_place = first_torque + torques_.rows();
     torques_.for_each_entry([&](Index r, Index v, double d) { f(first_torque + r, v, d); });
-    places_.for_each_entry([&](Index r, Index v, double d) { f(first_place + r, v, d); });
+    places_.for_each_entry<all>([&](Index r, Index v, double d) { f(first_place + r, v, d); });
   }
   /// factor ∇²f + Σ y_i ∇²c_i + Jᵀ diag(weights) J, without the curvature of distances; without
   /// `curved` only the part that is never negative, as in the Gauss–Newton method.

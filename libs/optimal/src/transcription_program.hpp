@@ -19,11 +19,11 @@ class TranscriptionProgram final : public NonlinearProgram {
   [[nodiscard]] const VectorXd& values() const override { return of_.values(); }
   [[nodiscard]] std::vector<Entry> jacobian_entries() const override {
     std::vector<Entry> out;
-    of_.for_each_entry([&](Index r, Index v, double) { out.push_back({r, v}); });
+    of_.for_each_entry<true>([&](Index r, Index v, double) { out.push_back({r, v}); });
     return out;
   }
   void jacobian(double* values) const override {
-    of_.for_each_entry([&](Index, Index, double d) { *values++ = d; });
+    of_.for_each_entry<true>([&](Index, Index, double d) { *values++ = d; });
   }
   [[nodiscard]] std::vector<Entry> hessian_entries() const override {
     std::vector<Entry> out;

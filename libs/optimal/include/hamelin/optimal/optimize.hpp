@@ -19,7 +19,7 @@ struct Optimized {
 /// @param way_points of a path from start to goal, dof × (2 or more), along which the guess goes
 /// @throws Error like solve()
 [[nodiscard]] Optimized optimize(Problem problem, const MatrixXd& way_points,
-                                 control::WorldView& view, const SolveOptions& options = {});
+                                 control::WorldView& view, SolveOptions options = {});
 
 inline constexpr int clearance_points_max = 16;
 

@@ -18,6 +18,8 @@ struct SolveOptions {
   int iterations_max = 300;
   /// On stationarity, violation of bounds as shares of them, and complementarity.
   double tolerance = 1e-8;
+  /// Whether the guess is the solution of a similar problem. Used by Solver::banded.
+  bool near_solution = false;
 };
 
 /// What a solver found.
