@@ -25,7 +25,7 @@ constexpr int max_sweeps = 60;
 // drifts with it: of planar3 by 3e-13 J in 10⁶ steps at 1e-17, by 3e-11 J at 1e-14.
 constexpr double structure_tolerance = 1e-20;
 // The share of the allowed error that the iteration may leave, and the factor of docs/theory.md
-// (5.15) for the estimate, which is cautious. Both were found by work and error on falling arms.
+// (5.13) for the estimate, which is cautious. Both were found by work and error on falling arms.
 constexpr double iteration_share = 1e-3, estimate_share = 30.0;
 
 }  // namespace
@@ -155,7 +155,7 @@ StepReport GaussLegendre::attempt(State& state, const Channels& channels, double
   return report;
 }
 
-// docs/theory.md (5.15), (5.16): the change e in the first sweep is the error of the guess,
+// docs/theory.md (5.13), (5.14): the change e in the first sweep is the error of the guess,
 // O(h^{s+3}), and the error of the step is estimated from it as e^{(2s+1)/(s+3)}. A first step has
 // no guess, and after an impulse the guess belongs to another motion: such a step is judged by a
 // second step of the same length, which is then dropped.

@@ -10,7 +10,7 @@ namespace hamelin::integration::kernel {
 
 inline constexpr std::size_t max_stages = 8;
 
-/// The guess of a step from the increments of the step before, docs/theory.md (5.8): the polynomial
+/// The guess of a step from the increments of the step before, docs/theory.md (5.9): the polynomial
 /// through its slopes at the nodes c_j, and, if `nodes` is s + 1, through one of the step before
 /// that. Increments are columnᵀ times increments; `end` gives h' times the slope at the end of the
 /// step before.
@@ -19,9 +19,9 @@ struct GaussGuess {
   double column[max_stages + 1][max_stages], end[max_stages + 1];
 };
 
-/// Gauss–Legendre collocation with s stages on [0, 1], docs/theory.md (5.2): nodes c, weights b,
-/// and by columns μ_ij = a_ij/b_j and ν_ij = (a²)_ij/b_j of docs/theory.md (5.4), (5.6). μ_ij +
-/// μ_ji = 1 holds exactly. Rows beyond s repeat the first, for lanes without a stage.
+/// Gauss–Legendre collocation with s stages on [0, 1], docs/theory.md (5.1), (5.2): nodes c,
+/// weights b, and by columns μ_ij = a_ij/b_j and ν_ij = (a²)_ij/b_j of docs/theory.md (5.4), (5.6).
+/// μ_ij + μ_ji = 1 holds exactly. Rows beyond s repeat the first, for lanes without a stage.
 struct GaussTableau {
   std::size_t stages;
   double c[max_stages], b[max_stages];
@@ -76,9 +76,9 @@ struct GaussCall {
 struct GaussOutcome {
   bool converged;
   int sweeps;            ///< each evaluates all stages once
-  double residual;       ///< docs/theory.md (5.8), of the last sweep [rad or m]
+  double residual;       ///< docs/theory.md (5.12), of the last sweep [rad or m]
   double starter_error;  ///< the change in the first sweep [rad or m]; 0 without a guess
-  Work work;             ///< docs/theory.md (5.4)
+  Work work;             ///< docs/theory.md (5.8)
 };
 
 /// The entry points for one instruction set.
@@ -233,8 +233,8 @@ class Gauss {
   }
 
   /// Evaluates the polynomial through the slopes of the step before, and through the last one of
-  /// the step before that, at this step's stages: docs/theory.md (5.8) and (5.9). The latter, after
-  /// an impulse, saves more than one sweep per step where every tick sets a velocity.
+  /// the step before that, at this step's stages: docs/theory.md (5.9) and (5.10). The latter,
+  /// after an impulse, saves more than one sweep per step where every tick sets a velocity.
   void extrapolate() noexcept {
     const GaussGuess& guess = *call_.guess;
     Pack column[max_groups][max_stages + 1];
@@ -345,7 +345,7 @@ class Gauss {
     return next;
   }
 
-  /// The work of the forces, docs/theory.md (5.14), at the converged stages.
+  /// The work of the forces, docs/theory.md (5.8), at the converged stages.
   void add_works(Work& work) noexcept {
     const Forces& f = call_.forces;
     if (f.held == nullptr && f.damping == nullptr && f.coulomb == nullptr && f.spin_count == 0)
