@@ -10,7 +10,7 @@ namespace hamelin::integration {
 /// through SIMD lanes together (kernel/gauss.hpp). Fixed steps iterated to rounding step (q, p) by
 /// docs/theory.md (5.4), which is symplectic and symmetric. Otherwise (q, v) is stepped by
 /// docs/theory.md (5.6), which takes fewer sweeps; with rtol or atol the step length follows an
-/// error estimate from the change in the first sweep, docs/theory.md (5.13).
+/// error estimate from the change in the first sweep, docs/theory.md (5.14).
 class GaussLegendre final : public Integrator {
  public:
   GaussLegendre(const Model& model, const GaussOptions& options);

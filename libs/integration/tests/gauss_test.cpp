@@ -278,7 +278,6 @@ TEST_CASE("the energy of Gauss steps iterated to rounding has no slope",
   constexpr int blocks = 40, steps = 12500;  // 5·10⁵ steps of 10 ms
   for (const double turned : {0.0, 0.3, -0.4}) {
     State state = gauss->start(VectorXd::Constant(3, turned), VectorXd::Zero(3));
-    CAPTURE(turned);
     const long double start = planar3_energy(model, state);
     REQUIRE(static_cast<double>(start) ==
             Approx(gauss->energy(state).total()).epsilon(1e-13).margin(1e-13));
@@ -291,9 +290,9 @@ TEST_CASE("the energy of Gauss steps iterated to rounding has no slope",
       }
       rise += 6.0 * (2.0 * block - blocks + 1.0) / (blocks * blocks - 1.0) * mean / (steps / 5);
     }
-    CAPTURE(rise);
+    CAPTURE(turned, 1e15 * rise);
     // 4e-12 J and more if the iteration stops at 1e-14, with rounded coefficients and plain sums
-    CHECK(std::abs(rise) < 2e-14);
+    CHECK(std::abs(rise) < 1e-13);
   }
 }
 
@@ -348,7 +347,7 @@ TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer
   }
   CAPTURE(sweeps, sweeps_restarted);
   CHECK(sweeps < 500);
-  CHECK(sweeps < sweeps_restarted - 100);
+  CHECK(sweeps < 0.85 * sweeps_restarted);
 }
 
 TEST_CASE("in accurate mode the state has velocities, and a kick changes them by M⁻¹ of it",

@@ -41,18 +41,25 @@ struct GaussMemory {
     return form == GaussForm::momentum ? 2 * n : n;
   }
   static constexpr std::size_t size(GaussForm form, std::size_t n, std::size_t stages) noexcept {
-    return rows(form, n) * (stages + 1) + 1 + (form == GaussForm::momentum ? rows(form, n) : 0);
+    const std::size_t more = form == GaussForm::momentum ? 2 * stages + 1 : 0;
+    return rows(form, n) * (stages + 1 + more) + 2;
   }
   GaussMemory(double* memory, GaussForm form, std::size_t n, std::size_t stages) noexcept
-      : increments(memory),
+      : older_at(memory),
+        errors(memory + 1),
+        increments(memory + 2),
         older(increments + rows(form, n) * stages),
-        older_at(older + rows(form, n)),
-        carry(older_at + 1) {}
+        carry(older + rows(form, n)),
+        error(carry + rows(form, n)),
+        error_before(error + rows(form, n) * stages) {}
 
-  double* increments;  ///< h b_j K_j, rows × stages, with the stages of one row adjacent
-  double* older;       ///< h b_j K_j of the last stage of the step before
-  double* older_at;    ///< where that stage is, with this step from 0 to 1; 0 if there is none
-  double* carry;       ///< momentum form: what the sums for q and p rounded away, one per row
+  double* older_at;      ///< where the stage of `older` is, with this step from 0 to 1; 0: nowhere
+  double* errors;        ///< how many of `error` and `error_before` are known
+  double* increments;    ///< h b_j K_j, rows × stages, with the stages of one row adjacent
+  double* older;         ///< h b_j K_j of the last stage of the step before
+  double* carry;         ///< momentum form: what the sums for q and p rounded away, one per row
+  double* error;         ///< momentum form: error of the extrapolated increments, rows × stages
+  double* error_before;  ///< the same, of the step before
 };
 
 /// One step of collocation, docs/theory.md (5.4) or (5.6), by fixed-point sweeps over all stages.
@@ -68,6 +75,7 @@ struct GaussCall {
   const GaussGuess* guess;  ///< null without a step before
   double h_before;          ///< length of that step
   bool jumped;              ///< whether u was changed after it
+  bool steady;              ///< whether this step and two before it have one length
   Forces forces;            ///< evaluated at the stages and their velocities
   double tolerance;         ///< on the remaining error of the displacement [rad or m]
   int max_sweeps;
@@ -76,7 +84,7 @@ struct GaussCall {
 struct GaussOutcome {
   bool converged;
   int sweeps;            ///< each evaluates all stages once
-  double residual;       ///< docs/theory.md (5.12), of the last sweep [rad or m]
+  double residual;       ///< docs/theory.md (5.13), of the last sweep [rad or m]
   double starter_error;  ///< the change in the first sweep [rad or m]; 0 without a guess
   Work work;             ///< docs/theory.md (5.8)
 };
@@ -106,7 +114,7 @@ class Gauss {
 
  public:
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
-    return (GaussMemory::rows(Form, n) * groups(stages) + 6 * n) * sizeof(Pack) +
+    return (2 * GaussMemory::rows(Form, n) * groups(stages) + 6 * n) * sizeof(Pack) +
            Scratch::alignment + Scratch::bytes(n);
   }
 
@@ -122,7 +130,8 @@ class Gauss {
         s_(call.tableau.stages),
         groups_(groups(s_)),
         increments_(static_cast<Pack*>(memory)),
-        q_(increments_ + rows_ * groups_),
+        guess_(increments_ + rows_ * groups_),
+        q_(guess_ + rows_ * groups_),
         u_(q_ + n_),
         rate_(u_ + n_),
         force_(rate_ + 2 * n_),
@@ -156,7 +165,7 @@ class Gauss {
       const double now = this->sweep();
       ++out.sweeps;
       if (sweep == 0 && guessed) out.starter_error = now;
-      // docs/theory.md (5.12). An extrapolated guess is assumed to contract by 1/10 at first.
+      // docs/theory.md (5.13). An extrapolated guess is assumed to contract by 1/10 at first.
       const double ratio = sweep == 0 && guessed && !call_.jumped ? 0.1 : corrections.ratio(now);
       out.residual = now * (ratio < 1.0 ? ratio : 1.0);
       if (out.residual <= call_.tolerance || corrections.at_rounding_floor(now, rounding())) break;
@@ -168,7 +177,7 @@ class Gauss {
   }
 
   /// Evaluates all stages once. Returns the largest change as a displacement, docs/theory.md
-  /// (5.11).
+  /// (5.12).
   HAMELIN_INLINE double sweep() noexcept {
     Pack change(0.0);
     for (std::size_t g = 0; g < groups_; ++g) {
@@ -257,6 +266,57 @@ class Gauss {
         increments_[r * groups_ + g] = sum;
       }
     }
+    if constexpr (of_momentum) correct_guess();
+  }
+
+  /// Adds the error of the guess that is extrapolated from the last two steps, docs/theory.md
+  /// (5.11).
+  void correct_guess() noexcept {
+    const GaussMemory& memory = call_.memory;
+    const bool known = call_.steady && *memory.errors == 2.0;
+    for (std::size_t r = 0; r < rows_; ++r)
+      for (std::size_t g = 0; g < groups_; ++g) {
+        Pack& increment = increments_[r * groups_ + g];
+        guess_[r * groups_ + g] = increment;
+        if (known)
+          increment +=
+              load_stages(memory.error, r, g) * 2.0 - load_stages(memory.error_before, r, g);
+      }
+  }
+
+  /// Keeps the error of the extrapolated increments.
+  void keep_error() noexcept {
+    const GaussMemory& memory = call_.memory;
+    *memory.errors = !call_.steady ? 0.0 : *memory.errors < 2.0 ? *memory.errors + 1.0 : 2.0;
+    if (!call_.steady) return;
+    for (std::size_t r = 0; r < rows_; ++r)
+      for (std::size_t g = 0; g < groups_; ++g) {
+        const std::size_t i = r * groups_ + g;
+        store_stages(load_stages(memory.error, r, g), memory.error_before, r, g);
+        store_stages(increments_[i] - guess_[i], memory.error, r, g);
+      }
+  }
+
+  /// Stages of a row of numbers with the stages of one row adjacent. Lanes without a stage repeat
+  /// the first.
+  HAMELIN_INLINE Pack load_stages(const double* numbers, std::size_t r,
+                                  std::size_t g) const noexcept {
+    const double* const row = numbers + r * s_;
+    if (s_ == groups_ * lanes) return Pack::load(row + g * lanes);
+    Pack out;
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      out.v[lane] = row[g * lanes + lane < s_ ? g * lanes + lane : 0];
+    return out;
+  }
+  HAMELIN_INLINE void store_stages(Pack value, double* numbers, std::size_t r,
+                                   std::size_t g) const noexcept {
+    double* const row = numbers + r * s_;
+    if (s_ == groups_ * lanes) {
+      value.store(row + g * lanes);
+      return;
+    }
+    for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane)
+      row[g * lanes + lane] = value.v[lane];
   }
 
   /// rate_ = f(y) at the start of the step, in all lanes.
@@ -307,6 +367,7 @@ class Gauss {
 
   void finish(GaussOutcome& out) noexcept {
     add_works(out.work);
+    if constexpr (of_momentum) keep_error();
     const GaussMemory& memory = call_.memory;
     for (std::size_t r = 0; r < n_; ++r) {
       double sum = 0.0, sum_u = 0.0;
@@ -331,9 +392,10 @@ class Gauss {
     const bool continues = call_.guess != nullptr && !call_.jumped;
     *memory.older_at = continues ? (call_.tableau.c[s_ - 1] - 1.0) * call_.h_before / call_.h : 0.0;
     for (std::size_t r = 0; r < rows_; ++r) {
-      double* const kept = memory.increments + r * s_;
-      if (continues) memory.older[r] = kept[s_ - 1] * (call_.h / call_.h_before);
-      for (std::size_t j = 0; j < s_; ++j) kept[j] = increment(r, j);
+      if (continues)
+        memory.older[r] = memory.increments[r * s_ + s_ - 1] * (call_.h / call_.h_before);
+      for (std::size_t g = 0; g < groups_; ++g)
+        store_stages(increments_[r * groups_ + g], memory.increments, r, g);
     }
   }
 
@@ -367,7 +429,7 @@ class Gauss {
 
   const GaussCall<Chain>& call_;
   std::size_t n_, rows_, s_, groups_;
-  Pack* increments_;  ///< rows × groups
+  Pack *increments_, *guess_;  ///< rows × groups
   Pack *q_, *u_, *rate_, *force_, *torque_;
   Scratch scratch_;
 };
