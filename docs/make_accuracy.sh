@@ -128,7 +128,8 @@ EOF
 long_run data/robots/planar3.json --duration 10000 --steps 0.01 \
   --integrators hamel,hamel-midpoint,hamel-variational,composition:4,gauss:8,semi-implicit-euler,rk4,dop853
 cat <<'EOF'
-The same, 10⁷ steps:
+The same, 10⁷ steps. The energy of `gauss` is a random walk of rounding errors, which has a slope
+too; [theory, chapter 5](theory/gauss.md#two-modes) has means over several starts.
 
 EOF
 long_run data/robots/planar3.json --duration 100000 --steps 0.01 --integrators hamel-variational,gauss:8,dop853
