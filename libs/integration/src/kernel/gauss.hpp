@@ -390,7 +390,8 @@ class Gauss {
     }
     // the motion before an impulse does not continue the polynomial of this step
     const bool continues = call_.guess != nullptr && !call_.jumped;
-    *memory.older_at = continues ? (call_.tableau.c[s_ - 1] - 1.0) * call_.h_before / call_.h : 0.0;
+    *memory.older_at =
+        continues ? (call_.tableau.c[s_ - 1] - 1.0) * (call_.h_before / call_.h) : 0.0;
     for (std::size_t r = 0; r < rows_; ++r) {
       if (continues)
         memory.older[r] = memory.increments[r * s_ + s_ - 1] * (call_.h / call_.h_before);
