@@ -46,8 +46,9 @@ struct Motion {
   Barrier barrier{};
 };
 
-inline Outcome run(const Motion& motion, const std::string& scheme) {
-  const auto integrator = integration::make_integrator(scheme, motion.model);
+inline Outcome run(const Motion& motion, const std::string& scheme,
+                   const integration::Parameters& parameters = {}) {
+  const auto integrator = integration::make_integrator(scheme, motion.model, parameters);
   auto state = integrator->start(motion.q0, motion.v0);
   const int n = motion.model.dof();
   VectorXd gradient = VectorXd::Zero(n), kick(n);
@@ -92,13 +93,18 @@ inline Outcome run(const Motion& motion, const std::string& scheme) {
   return out;
 }
 
+/// Step control with the same relative and absolute tolerance.
+inline integration::Parameters controlled(double tolerance) {
+  integration::Parameters parameters;
+  parameters.rtol = parameters.atol = tolerance;
+  return parameters;
+}
+
 /// The end of the motion by dop853 at a tolerance of 1e-12. It shares neither stages nor step
 /// lengths with a variational step, nor its equations, because it uses the articulated-body
 /// algorithm. Not for barriers.
 inline VectorXd reference_end(const Motion& motion) {
-  integration::Parameters options;
-  options.rtol = options.atol = 1e-12;
-  const auto integrator = integration::make_integrator("dop853", motion.model, options);
+  const auto integrator = integration::make_integrator("dop853", motion.model, controlled(1e-12));
   auto state = integrator->start(motion.q0, motion.v0);
   const auto report =
       integrator->step(state, {}, motion.step_s * static_cast<double>(motion.steps));

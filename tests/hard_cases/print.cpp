@@ -11,9 +11,10 @@ using namespace hamelin::hard_cases;
 
 namespace {
 
-void print(const std::string& name, const Motion& motion, const std::vector<std::string>& schemes) {
+void print(const std::string& name, const Motion& motion, const std::vector<std::string>& schemes,
+           const integration::Parameters& parameters = {}) {
   for (const auto& scheme : schemes) {
-    const Outcome o = run(motion, scheme);
+    const Outcome o = run(motion, scheme, parameters);
     fmt::print("{:<42} {:<20} {:>9.2e} {:>9.2e} {:>7.2f} {:>8.2f} {:>8} {:>8.2f} {:>9}  {}{}\n",
                name, scheme, o.energy_error_J, o.energy_scale_J, o.late_over_early, o.updates_mean,
                o.updates_max, o.factorizations_mean, o.halvings,
@@ -36,6 +37,8 @@ int main(int argc, char** argv) {
   print("100 links, 1 ms, 0.2 s", stretched(100, 1e-3, 200), schemes);
   print("200 links, 1 ms, 0.2 s", stretched(200, 1e-3, 200), schemes);
   print("tip 10^6 times as heavy, 1 ms, 1 s", mass_ratio(6, 1e-3, 1000), schemes);
+  print("the same under step control, 1e-9", mass_ratio(6, 1e-3, 1000), {"gauss:8"},
+        controlled(1e-9));
   print("first link 10^6 times as heavy, 1 ms, 1 s", mass_ratio(0, 1e-3, 1000), schemes);
   for (const double h : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1})
     print(fmt::format("grid of steps, 7 links, {} s", h),

@@ -6,13 +6,13 @@
 
 namespace hamelin::integration {
 
-/// Weights γ_i of a symmetric composition of sub-steps γ_i h, docs/theory.md (5.11).
+/// Weights γ_i of a symmetric composition of sub-steps γ_i h, docs/theory.md (5.16).
 /// @param order 4, 6 or 8
 [[nodiscard]] std::span<const double> composition_weights(int order);
 
-/// Symmetric compositions of the variational step φ, docs/theory.md (5.11): Φ_h = φ_{γ_s h} ∘ … ∘
+/// Symmetric compositions of the variational step φ, docs/theory.md (5.16): Φ_h = φ_{γ_s h} ∘ … ∘
 /// φ_{γ_1 h}. φ is symmetric and symplectic, so Φ is too. Some γ_i are negative, docs/theory.md
-/// (5.13): in such a sub-step damping feeds energy in, and its work is booked with that sign.
+/// (5.18): in such a sub-step damping feeds energy in, and its work is booked with that sign.
 class Composition final : public Momentum {
  public:
   Composition(const Model& model, const CompositionOptions& options);

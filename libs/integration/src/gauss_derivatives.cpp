@@ -32,8 +32,10 @@ GaussDifferentiator::GaussDifferentiator(const Model& model, const GaussOptions&
       p_by_v_(model.dof(), stages_ * model.dof()),
       q_by_all_(model.dof(), padded(3 * model.dof() + 1)),
       p_by_all_(q_by_all_),
-      q_(VectorXd::Zero(model.dof())) {
-  // docs/theory.md (5.15): the rows for pairs of stages, then for stages, then for the end
+      q_(VectorXd::Zero(model.dof())),
+      memory_(VectorXd::Zero(static_cast<Index>(kernel::GaussMemory::size(
+          kernel::GaussForm::momentum, static_cast<std::size_t>(model.dof()), tableau_.stages)))) {
+  // docs/theory.md (5.20): the rows for pairs of stages, then for stages, then for the end
   for (Index l = 0; l < stages_; ++l) {
     for (Index i = 0; i < stages_; ++i) {
       for (Index j = 0; j < stages_; ++j) weights_(i * stages_ + j, l) = a(i, l) * a(l, j);
@@ -45,7 +47,10 @@ GaussDifferentiator::GaussDifferentiator(const Model& model, const GaussOptions&
 }
 
 double GaussDifferentiator::last_step(const State& after) const {
-  return after.memory.size() == 2 * stages_ * model_.dof() ? after.step_previous : 0.0;
+  using Memory = kernel::GaussMemory;
+  const auto size = Memory::size(kernel::GaussForm::momentum,
+                                 static_cast<std::size_t>(model_.dof()), tableau_.stages);
+  return after.memory.size() == static_cast<Index>(size) ? after.step_previous : 0.0;
 }
 
 bool GaussDifferentiator::compute(const State& after, const Channels& channels,
@@ -60,19 +65,23 @@ bool GaussDifferentiator::compute(const State& after, const Channels& channels,
   return true;
 }
 
-// docs/theory.md (5.14)
+// docs/theory.md (5.19)
 void GaussDifferentiator::evaluate(const State& after, const Channels& channels, double h) {
   const Index n = model_.dof();
-  using Slopes = Eigen::Map<const RowMatrixXd>;
-  const Slopes v(after.memory.data(), n, stages_), p_rate(v.data() + v.size(), n, stages_);
+  // the increments h b_j K_j
+  memory_ = after.memory;
+  const kernel::GaussMemory memory(memory_.data(), kernel::GaussForm::momentum,
+                                   static_cast<std::size_t>(n), tableau_.stages);
+  const Eigen::Map<const RowMatrixXd> dq(memory.increments, n, stages_),
+      dp(memory.increments + dq.size(), n, stages_);
   for (Index i = 0; i < stages_; ++i) {
     Stage& stage = stage_[static_cast<std::size_t>(i)];
-    stage.v = v.col(i);
-    stage.p_rate = p_rate.col(i);
+    stage.v = dq.col(i) / (h * tableau_.b[i]);
+    stage.p_rate = dp.col(i) / (h * tableau_.b[i]);
     stage.v_sum.setZero();
-    for (Index j = 0; j < stages_; ++j) stage.v_sum += a(i, j) * v.col(j);
+    for (Index j = 0; j < stages_; ++j) stage.v_sum += (tableau_.mu_column[j][i] / h) * dq.col(j);
     q_ = after.q + h * stage.v_sum;
-    for (Index j = 0; j < stages_; ++j) q_ -= (h * tableau_.b[j]) * v.col(j);
+    for (Index j = 0; j < stages_; ++j) q_ -= dq.col(j);
     dynamics::energy_derivatives(model_, ws_, q_, stage.v, kinetic_, potential_);
     forces_.evaluate(model_, channels, ws_.ws, q_, stage.v);
     stage.M = kinetic_.M;
@@ -83,7 +92,7 @@ void GaussDifferentiator::evaluate(const State& after, const Channels& channels,
   }
 }
 
-// docs/theory.md (5.16)
+// docs/theory.md (5.21)
 void GaussDifferentiator::assemble(double h) {
   const Index n = model_.dof();
   auto S = system_.matrix();
@@ -112,7 +121,7 @@ void GaussDifferentiator::assemble(double h) {
   }
 }
 
-// docs/theory.md (5.17)
+// docs/theory.md (5.22)
 void GaussDifferentiator::write(double h, StepDerivatives& out) {
   const Index n = model_.dof();
   q_by_all_.setZero();

@@ -9,7 +9,7 @@
 
 namespace hamelin::integration {
 
-/// Differentiates steps of gauss, docs/theory.md (5.14)–(5.17).
+/// Differentiates steps of gauss in the form (5.4), docs/theory.md (5.19)–(5.22).
 class GaussDifferentiator final : public StepDifferentiator {
  public:
   GaussDifferentiator(const Model& model, const GaussOptions& options);
@@ -31,7 +31,9 @@ class GaussDifferentiator final : public StepDifferentiator {
   void evaluate(const State& after, const Channels& channels, double h);
   void assemble(double h);
   void write(double h, StepDerivatives& out);
-  [[nodiscard]] double a(Eigen::Index i, Eigen::Index j) const { return tableau_.a_column[j][i]; }
+  [[nodiscard]] double a(Eigen::Index i, Eigen::Index j) const {
+    return tableau_.mu_column[j][i] * tableau_.b[j];
+  }
   [[nodiscard]] auto weighed(Eigen::Index row) const {
     return Eigen::Map<const Eigen::MatrixXd>(weighed_.row(row).data(), model_.dof(), model_.dof());
   }
@@ -44,9 +46,9 @@ class GaussDifferentiator final : public StepDifferentiator {
   ForceDerivatives forces_;
   std::vector<Stage> stage_;
   LinearSystem system_;
-  RowMatrixXd weights_, by_q_, weighed_;  ///< sums of E over the stages, docs/theory.md (5.15)
+  RowMatrixXd weights_, by_q_, weighed_;  ///< sums of E over the stages, docs/theory.md (5.20)
   RowMatrixXd p_by_v_, q_by_all_, p_by_all_;
-  VectorXd q_;
+  VectorXd q_, memory_;
 };
 
 }  // namespace hamelin::integration

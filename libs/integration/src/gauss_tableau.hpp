@@ -7,4 +7,9 @@ namespace hamelin::integration {
 /// stages, correct to rounding.
 [[nodiscard]] kernel::GaussTableau gauss_tableau(std::size_t stages);
 
+/// The guess of a step, docs/theory.md (5.9). @param ratio length of the step over that of the step
+/// before @param older_at GaussMemory::older_at
+[[nodiscard]] kernel::GaussGuess gauss_guess(const kernel::GaussTableau& tableau, double ratio,
+                                             double older_at);
+
 }  // namespace hamelin::integration

@@ -46,8 +46,14 @@ std::unique_ptr<StepDifferentiator> make_step_differentiator(const Model& model,
   const Options valid = checked(options);
   if (const auto* o = std::get_if<VariationalOptions>(&valid))
     return std::make_unique<VariationalDifferentiator>(model, *o);
-  if (const auto* o = std::get_if<GaussOptions>(&valid))
+  if (const auto* o = std::get_if<GaussOptions>(&valid)) {
+    if (o->rtol > 0.0 || o->atol > 0.0 || o->tolerance > 1e-12)
+      throw Error(
+          ErrorCode::usage,
+          "make_step_differentiator: gauss in its accurate mode given, expected fixed steps "
+          "with a tolerance of at most 1e-12");
     return std::make_unique<GaussDifferentiator>(model, *o);
+  }
   throw Error(ErrorCode::usage, formatted("make_step_differentiator: scheme '{}' given, expected "
                                           "hamel-variational or gauss",
                                           integrator_names()[valid.index()]));

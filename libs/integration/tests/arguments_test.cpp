@@ -134,7 +134,7 @@ TEST_CASE("a state of gauss of another order is refused", "[integration][gauss][
   const Model model(test::random_robot(4, n));
   const auto four = make_integrator("gauss:4", model), eight = make_integrator("gauss:8", model);
   State state = four->start(VectorXd::Zero(n), VectorXd::Zero(n));
-  CHECK_THROWS_WITH(eight->step(state, {}, 1e-3), Contains("20 numbers of memory given"));
+  CHECK_THROWS_WITH(eight->step(state, {}, 1e-3), Contains("82 numbers of memory given"));
 }
 
 TEST_CASE("an integrator whose model was replaced at its address is refused",

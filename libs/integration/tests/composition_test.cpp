@@ -24,7 +24,7 @@ VectorXd end_of(Integrator& integrator, const VectorXd& q0, double duration, int
 
 TEST_CASE("composition weights are symmetric and meet the first order conditions",
           "[integration][composition]") {
-  // docs/theory.md (5.12), the conditions on single powers; the mixed conditions are covered by the
+  // docs/theory.md (5.17), the conditions on single powers; the mixed conditions are covered by the
   // observed orders.
   for (const int order : {4, 6, 8}) {
     CAPTURE(order);

@@ -25,26 +25,29 @@ State run(const Model& model, const Parameters& options, const VectorXd& q0, con
 }  // namespace
 
 TEST_CASE("Gauss steps have the order of twice their stages", "[integration][gauss][order]") {
+  const double tolerance = GENERATE(1e-12, 2e-12);  // of momenta, and of velocities
   // A slow swing, so that the errors are in the asymptotic range and well above rounding.
   const Model model(test::random_robot(20, 3, GENERATE(0, 2)));
   const VectorXd q0 = (VectorXd(3) << 0.3, -0.25, 0.4).finished(), v0 = VectorXd::Constant(3, 0.5);
-  const VectorXd truth = run(model, test::of_order(16), q0, v0, 1e-3, 400).q;
+  const VectorXd truth = run(model, test::of_order(16), q0, v0, 1e-3, 800).q;
   const auto rk4 = make_integrator("rk4", model);
   State peer = rk4->start(q0, v0);
-  for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(peer, {}, 0.4 / 8000).converged);
+  for (int k = 0; k < 16000; ++k) REQUIRE(rk4->step(peer, {}, 0.8 / 16000).converged);
   REQUIRE((truth - peer.q).norm() < 1e-10);
   for (const int order : {4, 6, 8}) {
+    auto options = test::of_order(order);
+    options.tolerance = tolerance;
     const auto error = [&](int n) {
-      return (run(model, test::of_order(order), q0, v0, 0.4 / n, n).q - truth).norm();
+      return (run(model, options, q0, v0, 0.8 / n, n).q - truth).norm();
     };
     int steps = 2;
     while (error(steps) > 1e-5) ++steps;  // the coarse end of the asymptotic range
-    CAPTURE(order, steps, error(steps), error(2 * steps));
+    CAPTURE(order, tolerance, steps, error(steps), error(2 * steps));
     const double observed = std::log2(error(steps) / error(2 * steps));
     CHECK(observed > order - 0.7);
   }
   for (const int order : {10, 12, 14, 16})  // errors at the level of rounding
-    CHECK((run(model, test::of_order(order), q0, v0, 0.1, 4).q - truth).norm() < 1e-10);
+    CHECK((run(model, test::of_order(order), q0, v0, 0.05, 16).q - truth).norm() < 1e-10);
 }
 
 TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), and is symplectic",
@@ -55,7 +58,7 @@ TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), a
     CAPTURE(s);
     const auto t = gauss_tableau(s);
     REQUIRE(t.stages == s);
-    const auto a = [&](std::size_t i, std::size_t j) { return t.a_column[j][i]; };
+    const auto a = [&](std::size_t i, std::size_t j) { return t.mu_column[j][i] * t.b[j]; };
     const auto power = [](double c, std::size_t k) { return std::pow(c, static_cast<double>(k)); };
     const auto sum_b = [&](std::size_t k) {
       double sum = 0.0;
@@ -70,7 +73,6 @@ TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), a
     const double missed = std::pow(some * some / all, 2) / (2.0 * stages + 1.0);
     CHECK(1.0 / (2.0 * stages + 1.0) - sum_b(2 * s + 1) == Approx(missed).epsilon(1e-4));
     for (std::size_t i = 0; i < s; ++i) {
-      double distances = t.barycentric[i];
       for (std::size_t k = 1; k <= s; ++k) {
         double c = 0.0, d = 0.0;
         for (std::size_t j = 0; j < s; ++j) {
@@ -83,13 +85,48 @@ TEST_CASE("the tableau meets the simplifying assumptions B(2s), C(s) and D(s), a
       }
       for (std::size_t j = 0; j < s; ++j) {
         CHECK(std::abs(t.b[i] * a(i, j) + t.b[j] * a(j, i) - t.b[i] * t.b[j]) < 5e-17);
-        if (j != i) distances *= t.c[i] - t.c[j];
+        CHECK(t.mu_column[j][i] + t.mu_column[i][j] == 1.0);  // exactly
+        double square = 0.0;
+        for (std::size_t m = 0; m < s; ++m) square += a(i, m) * a(m, j);
+        CHECK(std::abs(t.nu_column[j][i] * t.b[j] - square) < 1e-16);
       }
-      CHECK(distances == Approx(1.0).epsilon(1e-13));
     }
     for (std::size_t i = s; i < kernel::max_stages; ++i) {  // lanes without a stage
       CHECK(t.c[i] == t.c[0]);
+      CHECK(t.b[i] == t.b[0]);
       for (std::size_t j = 0; j < s; ++j) CHECK(a(i, j) == a(0, j));
+    }
+  }
+}
+
+TEST_CASE("the guess continues polynomials through the steps before exactly",
+          "[integration][gauss]") {
+  for (const double ratio : {1.0, 0.3, 2.5}) {
+    for (const double ratio_before : {0.0, 1.0, 0.4}) {  // 0: no step before that
+      const std::size_t s = GENERATE(2, 4, 8);
+      CAPTURE(s, ratio, ratio_before);
+      const auto t = gauss_tableau(s);
+      const double older_at = ratio_before > 0.0 ? (t.c[s - 1] - 1.0) / ratio_before : 0.0;
+      const auto guess = gauss_guess(t, ratio, older_at);
+      REQUIRE(guess.nodes == (ratio_before > 0.0 ? s + 1 : s));
+      // slopes x^degree, with the step before from x = 0 to 1
+      for (std::size_t degree = 0; degree < guess.nodes; ++degree) {
+        const auto slope = [&](double x) { return std::pow(x, static_cast<double>(degree)); };
+        const auto check = [&](const auto& weight, double expected) {
+          double sum = 0.0, size = 0.0;
+          for (std::size_t j = 0; j < guess.nodes; ++j) {
+            const double term =
+                weight(j) * t.b[j < s ? j : s - 1] * slope(j < s ? t.c[j] : older_at);
+            sum += term;
+            size += std::abs(term);
+          }
+          CHECK(std::abs(sum - expected) < 2e-14 * size);
+        };
+        check([&](std::size_t j) { return guess.end[j]; }, 1.0);
+        for (std::size_t i = 0; i < s; ++i)
+          check([&](std::size_t j) { return guess.column[j][i]; },
+                ratio * t.b[i] * slope(1.0 + ratio * t.c[i]));
+      }
     }
   }
 }
@@ -146,6 +183,7 @@ TEST_CASE("Gauss under step control follows its tolerance", "[integration][gauss
 TEST_CASE("forces act at the stages: Gauss agrees with rk4 under all channels and books their work",
           "[integration][gauss][channels]") {
   const bool planar = GENERATE(false, true);
+  const double tolerance = GENERATE(1e-12, 2e-12);  // of momenta, and of velocities
   const Model model(test::random_robot(7, 4, 3, planar));
   Rng rng(7);
   const VectorXd q0 = test::random_joints(rng, 4), v0 = test::random_joints(rng, 4);
@@ -161,7 +199,7 @@ TEST_CASE("forces act at the stages: Gauss agrees with rk4 under all channels an
   const auto rk4 = make_integrator("rk4", model);
   State truth = rk4->start(q0, v0);
   for (int k = 0; k < 8000; ++k) REQUIRE(rk4->step(truth, channels, 0.5 / 8000).converged);
-  const auto gauss = make_integrator("gauss", model, test::of_order(8));
+  const auto gauss = make_integrator(model, GaussOptions{.order = 8, .tolerance = tolerance});
   State state = gauss->start(q0, v0);
   const double start = gauss->energy(state).total();
   double booked = 0.0;
@@ -191,6 +229,71 @@ TEST_CASE("Gauss keeps the energy over long runs at fixed steps iterated to roun
   }
   CHECK(late < 1e-9);
   CHECK(late < 1.5 * early + 1e-10);
+}
+
+namespace {
+
+/// Energy of planar3 (example 5.1 of the paper) from joints and momenta in extended precision, from
+/// the planar kinematics of its centres of mass alone. Angles are from the stretched pose along y.
+long double planar3_energy(const Model& model, const State& state) {
+  using Real = long double;
+  const auto& links = model.robot().links;
+  Real M[3][3]{}, potential = 0.0L, turned = 0.0L;
+  Real origin_y = 0.0L, origin_z = 0.0L, joint_y[3], joint_z[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    turned += static_cast<Real>(state.q[static_cast<Eigen::Index>(i)]);
+    joint_y[i] = origin_y;
+    joint_z[i] = origin_z;
+    const Real y = std::cos(turned), z = std::sin(turned), m = links[i].mass_kg;
+    const Real com_y = origin_y + 0.05L * y, com_z = origin_z + 0.05L * z;
+    for (std::size_t a = 0; a <= i; ++a)
+      for (std::size_t b = 0; b <= i; ++b)
+        M[a][b] += static_cast<Real>(links[i].inertia_kg_m2(0, 0)) +
+                   m * ((com_y - joint_y[a]) * (com_y - joint_y[b]) +
+                        (com_z - joint_z[a]) * (com_z - joint_z[b]));
+    potential += m * -static_cast<Real>(model.gravity().z()) * com_z;
+    origin_y += 0.1L * y;
+    origin_z += 0.1L * z;
+  }
+  // ½ pᵀM⁻¹p by Gaussian elimination
+  Real p[3], kinetic = 0.0L;
+  for (std::size_t i = 0; i < 3; ++i) p[i] = state.p[static_cast<Eigen::Index>(i)];
+  for (std::size_t i = 0; i < 3; ++i) {
+    kinetic += 0.5L * p[i] * p[i] / M[i][i];
+    for (std::size_t j = i + 1; j < 3; ++j) {
+      const Real factor = M[j][i] / M[i][i];
+      p[j] -= factor * p[i];
+      for (std::size_t k = i; k < 3; ++k) M[j][k] -= factor * M[i][k];
+    }
+  }
+  return kinetic + potential;
+}
+
+}  // namespace
+
+TEST_CASE("the energy of Gauss steps iterated to rounding has no slope",
+          "[integration][gauss][slow]") {
+  const Model model(test::planar3());
+  const auto gauss = make_integrator("gauss", model, test::of_order(8));
+  constexpr int blocks = 40, steps = 12500;  // 5·10⁵ steps of 10 ms
+  for (const double turned : {0.0, 0.3, -0.4}) {
+    State state = gauss->start(VectorXd::Constant(3, turned), VectorXd::Zero(3));
+    const long double start = planar3_energy(model, state);
+    REQUIRE(static_cast<double>(start) ==
+            Approx(gauss->energy(state).total()).epsilon(1e-13).margin(1e-13));
+    double rise = 0.0;  // least-squares line through the means of the blocks
+    for (int block = 0; block < blocks; ++block) {
+      double mean = 0.0;
+      for (int k = 0; k < steps; ++k) {
+        REQUIRE(gauss->step(state, {}, 0.01).converged);
+        if (k % 5 == 0) mean += static_cast<double>(planar3_energy(model, state) - start);
+      }
+      rise += 6.0 * (2.0 * block - blocks + 1.0) / (blocks * blocks - 1.0) * mean / (steps / 5);
+    }
+    CAPTURE(turned, 1e15 * rise);
+    // 4e-12 J and more if the iteration stops at 1e-14, with rounded coefficients and plain sums
+    CHECK(std::abs(rise) < 1e-13);
+  }
 }
 
 TEST_CASE("all instruction sets give the same motion except for rounding",
@@ -243,8 +346,32 @@ TEST_CASE("after impulses gauss is as exact as from a new start, and takes fewer
     sweeps_restarted += report_restarted.updates;
   }
   CAPTURE(sweeps, sweeps_restarted);
-  CHECK(sweeps < 400);  // 480 if the guess ignores the impulse
-  CHECK(sweeps < sweeps_restarted - 100);
+  CHECK(sweeps < 500);
+  CHECK(sweeps < 0.85 * sweeps_restarted);
+}
+
+TEST_CASE("in accurate mode the state has velocities, and a kick changes them by M⁻¹ of it",
+          "[integration][gauss][impulse]") {
+  const int n = 5;
+  const Model model(test::random_robot(23, n, 3));
+  Rng rng(23);
+  const auto gauss = make_integrator(model, GaussOptions{.tolerance = 1e-10});
+  CHECK(gauss->mode() == "accurate");
+  State kicked = gauss->start(test::random_joints(rng, n), test::random_joints(rng, n)),
+        set = kicked;
+  CHECK(kicked.p.size() == 0);
+  const VectorXd change = test::random_joints(rng, n);
+  dynamics::Workspace ws(model);
+  VectorXd dp(n);
+  for (int k = 0; k < 3; ++k) {
+    dynamics::momentum(model, ws, kicked.q, change, dp);
+    gauss->kick(kicked, dp);
+    gauss->set_velocity(set, test::velocity(*gauss, set) + change);
+    CHECK((kicked.v - set.v).norm() < 1e-12 * set.v.norm());
+    REQUIRE(gauss->step(kicked, {}, 1e-3).converged);
+    REQUIRE(gauss->step(set, {}, 1e-3).converged);
+    CHECK((kicked.q - set.q).norm() < 1e-12);
+  }
 }
 
 TEST_CASE("an impulse does not disturb step control of the step after it",

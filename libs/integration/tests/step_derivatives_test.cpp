@@ -153,9 +153,11 @@ StepDerivatives reference_gauss4(const Stepped& s, double h) {
   const MatrixXd one = MatrixXd::Identity(n, n);
   MatrixXd A = MatrixXd::Zero(10 * n, 10 * n), B = MatrixXd::Zero(10 * n, 3 * n + 1);
   const auto at = [n](Index block) { return block * n; };  // q⁺ p⁺ Q1 Q2 P1 P2 v1 v2 r1 r2
-  Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> v(
-      s.after.memory.data(), n, 2),
-      rate(s.after.memory.data() + 2 * n, n, 2);
+  // the step's memory begins with two numbers and the increments h K/2
+  Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> dq(
+      s.after.memory.data() + 2, n, 2),
+      dp(s.after.memory.data() + 2 + 2 * n, n, 2);
+  const MatrixXd v = 2.0 / h * dq, rate = 2.0 / h * dp;
   A.topLeftCorner(2 * n, 2 * n).setIdentity();
   B.topLeftCorner(2 * n, 2 * n).setIdentity();
   for (Index i = 0; i < 2; ++i) {

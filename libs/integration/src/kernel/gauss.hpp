@@ -10,40 +10,83 @@ namespace hamelin::integration::kernel {
 
 inline constexpr std::size_t max_stages = 8;
 
-/// Gauss–Legendre collocation with s stages on [0, 1], docs/theory.md (5.2): nodes c, weights b,
-/// a_ij by columns, and the barycentric weights 1/Π_{m≠j}(c_j − c_m). Rows beyond s repeat the
-/// first, for lanes without a stage.
-struct GaussTableau {
-  std::size_t stages;
-  double c[max_stages], b[max_stages], a_column[max_stages][max_stages], barycentric[max_stages];
+/// The guess of a step from the increments of the step before, docs/theory.md (5.9): the polynomial
+/// through its slopes at the nodes c_j, and, if `nodes` is s + 1, through one of the step before
+/// that. Increments are columnᵀ times increments; `end` gives h' times the slope at the end of the
+/// step before.
+struct GaussGuess {
+  std::size_t nodes;
+  double column[max_stages + 1][max_stages], end[max_stages + 1];
 };
 
-/// One step y = (q, p) → y + h Σ b_j K_j with K_i = f(y + h Σ a_ij K_j), docs/theory.md (5.1), by
-/// fixed-point sweeps over all stages.
+/// Gauss–Legendre collocation with s stages on [0, 1], docs/theory.md (5.1), (5.2): nodes c,
+/// weights b, and by columns μ_ij = a_ij/b_j and ν_ij = (a²)_ij/b_j of docs/theory.md (5.4), (5.6).
+/// μ_ij + μ_ji = 1 holds exactly. Rows beyond s repeat the first, for lanes without a stage.
+struct GaussTableau {
+  std::size_t stages;
+  double c[max_stages], b[max_stages];
+  double mu_column[max_stages][max_stages], nu_column[max_stages][max_stages];
+};
+
+/// The equations that are collocated.
+enum class GaussForm : unsigned char {
+  momentum,  ///< y = (q, p), docs/theory.md (5.3): symplectic
+  velocity,  ///< q̈ = a(q, q̇), docs/theory.md (5.5): half of the unknowns, fewer sweeps
+};
+
+/// What a step leaves to the next. Rows are joints, first for q and then for p in momentum form,
+/// joints for v in velocity form.
+struct GaussMemory {
+  static constexpr std::size_t rows(GaussForm form, std::size_t n) noexcept {
+    return form == GaussForm::momentum ? 2 * n : n;
+  }
+  static constexpr std::size_t size(GaussForm form, std::size_t n, std::size_t stages) noexcept {
+    const std::size_t more = form == GaussForm::momentum ? 2 * stages + 1 : 0;
+    return rows(form, n) * (stages + 1 + more) + 2;
+  }
+  GaussMemory(double* memory, GaussForm form, std::size_t n, std::size_t stages) noexcept
+      : older_at(memory),
+        errors(memory + 1),
+        increments(memory + 2),
+        older(increments + rows(form, n) * stages),
+        carry(older + rows(form, n)),
+        error(carry + rows(form, n)),
+        error_before(error + rows(form, n) * stages) {}
+
+  double* older_at;      ///< where the stage of `older` is, with this step from 0 to 1; 0: nowhere
+  double* errors;        ///< how many of `error` and `error_before` are known
+  double* increments;    ///< h b_j K_j, rows × stages, with the stages of one row adjacent
+  double* older;         ///< h b_j K_j of the last stage of the step before
+  double* carry;         ///< momentum form: what the sums for q and p rounded away, one per row
+  double* error;         ///< momentum form: error of the extrapolated increments, rows × stages
+  double* error_before;  ///< the same, of the step before
+};
+
+/// One step of collocation, docs/theory.md (5.4) or (5.6), by fixed-point sweeps over all stages.
 template <class Chain>
 struct GaussCall {
   const Chain& chain;
   const GaussTableau& tableau;
+  GaussForm form;
   double h;
-  const double *q, *p;
-  double *q_next, *p_next;  ///< written if the step converges
-  /// Slopes K, 2n × stages: all of q̇, then all of ṗ, with the stages of one component adjacent.
-  /// In: those of the step before, of length `h_before` (0: none). Out, if it converges: this
-  /// step's.
-  double* slopes;
-  double h_before;
-  bool jumped;       ///< whether p was changed after that step
-  Forces forces;     ///< evaluated at the stages and their velocities
-  double tolerance;  ///< on the remaining error of the displacement [rad or m]
+  const double *q, *u;      ///< u: p or v, as the form has it
+  double *q_next, *u_next;  ///< written if the step converges
+  GaussMemory memory;       ///< read, and written if the step converges
+  const GaussGuess* guess;  ///< null without a step before
+  double h_before;          ///< length of that step
+  bool jumped;              ///< whether u was changed after it
+  bool steady;              ///< whether this step and two before it have one length
+  Forces forces;            ///< evaluated at the stages and their velocities
+  double tolerance;         ///< on the remaining error of the displacement [rad or m]
   int max_sweeps;
 };
 
 struct GaussOutcome {
   bool converged;
   int sweeps;            ///< each evaluates all stages once
-  double residual;       ///< docs/theory.md (5.8), of the last sweep [rad or m]
+  double residual;       ///< docs/theory.md (5.13), of the last sweep [rad or m]
   double starter_error;  ///< the change in the first sweep [rad or m]; 0 without a guess
-  Work work;             ///< docs/theory.md (5.4)
+  Work work;             ///< docs/theory.md (5.8)
 };
 
 /// The entry points for one instruction set.
@@ -59,7 +102,7 @@ inline namespace HAMELIN_ISA_NAMESPACE {
 /// The stages of a step are independent within a sweep, so they go into the lanes of a register:
 /// `W` at a time. Each group of lanes uses the results of the groups before it. Lanes without a
 /// stage repeat the first.
-template <template <class> class Group, int W>
+template <template <class> class Group, int W, GaussForm Form>
 class Gauss {
   using Pack = dynamics::kernel::Lanes<W>;
   using Space = Group<Pack>;
@@ -67,10 +110,12 @@ class Gauss {
   using Scratch = dynamics::kernel::Scratch<Space>;
   static constexpr auto lanes = static_cast<std::size_t>(W);
   static constexpr std::size_t max_groups = (max_stages + lanes - 1) / lanes;
+  static constexpr bool of_momentum = Form == GaussForm::momentum;
 
  public:
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
-    return (2 * n * groups(stages) + 5 * n) * sizeof(Pack) + Scratch::alignment + Scratch::bytes(n);
+    return (2 * GaussMemory::rows(Form, n) * groups(stages) + 6 * n) * sizeof(Pack) +
+           Scratch::alignment + Scratch::bytes(n);
   }
 
   static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
@@ -81,13 +126,17 @@ class Gauss {
   Gauss(const GaussCall<Chain>& call, void* memory) noexcept
       : call_(call),
         n_(dynamics::kernel::count<Space>(call.chain)),
+        rows_(GaussMemory::rows(Form, n_)),
         s_(call.tableau.stages),
         groups_(groups(s_)),
-        slopes_(static_cast<Pack*>(memory)),
-        y_(slopes_ + 2 * n_ * groups_),
-        rate_(y_ + 2 * n_),
+        increments_(static_cast<Pack*>(memory)),
+        guess_(increments_ + rows_ * groups_),
+        q_(guess_ + rows_ * groups_),
+        u_(q_ + n_),
+        rate_(u_ + n_),
         force_(rate_ + 2 * n_),
-        scratch_(Scratch::at(aligned(force_ + n_), n_)) {}
+        torque_(force_ + n_),
+        scratch_(Scratch::at(aligned(torque_ + n_), n_)) {}
 
   static std::size_t groups(std::size_t stages) noexcept { return (stages + lanes - 1) / lanes; }
   static void* aligned(Pack* p) noexcept {
@@ -95,19 +144,16 @@ class Gauss {
     address = (address + Scratch::alignment - 1) / Scratch::alignment * Scratch::alignment;
     return reinterpret_cast<void*>(address);
   }
-  /// Slope of component r at stage j.
-  HAMELIN_INLINE double slope(std::size_t r, std::size_t j) const noexcept {
-    return slopes_[r * groups_ + j / lanes].v[j % lanes];
+  HAMELIN_INLINE double increment(std::size_t r, std::size_t j) const noexcept {
+    return increments_[r * groups_ + j / lanes].v[j % lanes];
+  }
+  HAMELIN_INLINE Pack weights(std::size_t group) const noexcept {
+    return Pack::load(call_.tableau.b + group * lanes) * call_.h;
   }
 
   GaussOutcome solve() noexcept {
     GaussOutcome out{};
-    const double h = call_.h;
-    Pack weights[max_groups][max_stages];
-    for (std::size_t g = 0; g < groups_; ++g)
-      for (std::size_t j = 0; j < s_; ++j)
-        weights[g][j] = Pack::load(call_.tableau.a_column[j] + g * lanes) * h;
-    const bool guessed = call_.h_before > 0.0;
+    const bool guessed = call_.guess != nullptr;
     if (call_.jumped || !guessed) evaluate_start();
     if (guessed)
       extrapolate();
@@ -116,33 +162,11 @@ class Gauss {
     // the first sweeps may change much, later ones less and less
     Corrections corrections({1e3, 1.0, 0.0, 2});
     for (int sweep = 0;; ++sweep) {
-      Pack change(0.0);
-      for (std::size_t g = 0; g < groups_; ++g) {
-        for (std::size_t r = 0; r < 2 * n_; ++r) {
-          Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
-          for (std::size_t j = 0; j < s_; ++j) sum += weights[g][j] * slope(r, j);
-          y_[r] = sum;
-        }
-        rates();
-        for (std::size_t r = 0; r < n_; ++r) {
-          Pack& v = slopes_[r * groups_ + g];
-          Pack& p_rate = slopes_[(n_ + r) * groups_ + g];
-          change = max(change, abs(rate_[r] - v));
-          // docs/theory.md (5.7): the change of momentum as a displacement
-          change = max(change, abs(rate_[n_ + r] - p_rate) * scratch_[r].inv_d * h);
-          v = rate_[r];
-          p_rate = rate_[n_ + r];
-        }
-      }
-      const double now = h * largest(change);
+      const double now = this->sweep();
       ++out.sweeps;
       if (sweep == 0 && guessed) out.starter_error = now;
-      // docs/theory.md (5.8). An extrapolated guess is assumed to contract by 1/10 at first. After
-      // a constant guess each sweep gains one order in h, at a pace that says nothing about the
-      // next.
-      const double ratio = !guessed                      ? 1.0
-                           : sweep == 0 && !call_.jumped ? 0.1
-                                                         : corrections.ratio(now);
+      // docs/theory.md (5.13). An extrapolated guess is assumed to contract by 1/10 at first.
+      const double ratio = sweep == 0 && guessed && !call_.jumped ? 0.1 : corrections.ratio(now);
       out.residual = now * (ratio < 1.0 ? ratio : 1.0);
       if (out.residual <= call_.tolerance || corrections.at_rounding_floor(now, rounding())) break;
       if (!corrections.record(now) || sweep + 1 == call_.max_sweeps) return out;
@@ -150,6 +174,61 @@ class Gauss {
     out.converged = true;
     finish(out);
     return out;
+  }
+
+  /// Evaluates all stages once. Returns the largest change as a displacement, docs/theory.md
+  /// (5.12).
+  HAMELIN_INLINE double sweep() noexcept {
+    Pack change(0.0);
+    for (std::size_t g = 0; g < groups_; ++g) {
+      place_stages(g);
+      rates();
+      const Pack weight = weights(g);
+      Pack moved(0.0);
+      for (std::size_t r = 0; r < n_; ++r) {
+        moved = max(moved, replace(r, g, rate_[r] * weight));
+        if constexpr (of_momentum)
+          moved =
+              max(moved, replace(n_ + r, g, rate_[n_ + r] * weight) * scratch_[r].inv_d * call_.h);
+      }
+      change = max(change, moved * call_.h / weight);
+    }
+    const double displacement = largest(change);
+    return of_momentum ? displacement : 0.5 * call_.h * displacement;
+  }
+
+  /// Sets an increment; returns the size of its change.
+  HAMELIN_INLINE Pack replace(std::size_t r, std::size_t g, Pack value) noexcept {
+    Pack& increment = increments_[r * groups_ + g];
+    const Pack change = abs(value - increment);
+    increment = value;
+    return change;
+  }
+
+  /// q_ and u_ at the stages of a group: docs/theory.md (5.4), (5.6).
+  HAMELIN_INLINE void place_stages(std::size_t g) noexcept {
+    const auto& t = call_.tableau;
+    const double* const carry = call_.memory.carry;
+    const Pack time = Pack::load(t.c + g * lanes);
+    Pack mu[max_stages], nu[max_stages];
+    for (std::size_t j = 0; j < s_; ++j) {
+      mu[j] = Pack::load(t.mu_column[j] + g * lanes);
+      if constexpr (!of_momentum) nu[j] = Pack::load(t.nu_column[j] + g * lanes);
+    }
+    for (std::size_t r = 0; r < n_; ++r) {
+      if constexpr (of_momentum) {
+        q_[r] = Pack(call_.q[r]) + combination(r, mu, carry[r]);
+        u_[r] = Pack(call_.u[r]) + combination(n_ + r, mu, carry[n_ + r]);
+      } else {
+        q_[r] = Pack(call_.q[r]) + combination(r, nu, time * call_.u[r]) * call_.h;
+        u_[r] = Pack(call_.u[r]) + combination(r, mu, 0.0);
+      }
+    }
+  }
+  /// first + Σ_j weight_j · increment_j of component r.
+  HAMELIN_INLINE Pack combination(std::size_t r, const Pack* weight, Pack first) const noexcept {
+    for (std::size_t j = 0; j < s_; ++j) first += weight[j] * increment(r, j);
+    return first;
   }
 
   /// The change in a sweep that rounding alone can cause.
@@ -162,107 +241,197 @@ class Gauss {
     return 4e-16 * most;
   }
 
-  /// Evaluates the polynomial through the slopes of the step before at this step's stages:
-  /// docs/theory.md (5.5) and (5.6). The latter, after an impulse, saves more than one sweep per
-  /// step where every tick sets a velocity.
+  /// Evaluates the polynomial through the slopes of the step before, and through the last one of
+  /// the step before that, at this step's stages: docs/theory.md (5.9) and (5.10). The latter,
+  /// after an impulse, saves more than one sweep per step where every tick sets a velocity.
   void extrapolate() noexcept {
-    const Pack ratio(call_.h / call_.h_before);
-    const auto& t = call_.tableau;
-    Pack weights[max_groups][max_stages];
-    for (std::size_t g = 0; g < groups_; ++g) {
-      const Pack at = Pack(1.0) + ratio * Pack::load(t.c + g * lanes);  // beyond all nodes
-      Pack product(1.0);
-      for (std::size_t j = 0; j < s_; ++j) product *= at - t.c[j];
-      for (std::size_t j = 0; j < s_; ++j)
-        weights[g][j] = product * t.barycentric[j] / (at - t.c[j]);
-    }
-    double end[max_stages];  // ℓ_j(1), the end of the step before
-    for (std::size_t j = 0; j < s_; ++j) {
-      end[j] = t.barycentric[j];
-      for (std::size_t m = 0; m < s_; ++m)
-        if (m != j) end[j] *= 1.0 - t.c[m];
-    }
-    for (std::size_t r = 0; r < 2 * n_; ++r) {
-      const double* const old = call_.slopes + r * s_;
+    const GaussGuess& guess = *call_.guess;
+    Pack column[max_groups][max_stages + 1];
+    for (std::size_t g = 0; g < groups_; ++g)
+      for (std::size_t j = 0; j < guess.nodes; ++j)
+        column[g][j] = Pack::load(guess.column[j] + g * lanes);
+    double old[max_stages + 1];
+    for (std::size_t r = 0; r < rows_; ++r) {
+      for (std::size_t j = 0; j < s_; ++j) old[j] = call_.memory.increments[r * s_ + j];
+      old[s_] = call_.memory.older[r];
       Pack jump(0.0);
       if (call_.jumped) {
-        jump = rate_[r];
-        for (std::size_t j = 0; j < s_; ++j) jump -= Pack(end[j] * old[j]);
+        double end = 0.0;
+        for (std::size_t j = 0; j < guess.nodes; ++j) end += guess.end[j] * old[j];
+        jump = rate_[r] - Pack(end / call_.h_before);
       }
       for (std::size_t g = 0; g < groups_; ++g) {
-        Pack sum = jump;
-        for (std::size_t j = 0; j < s_; ++j) sum += weights[g][j] * old[j];
-        slopes_[r * groups_ + g] = sum;
+        Pack sum = jump * weights(g);
+        for (std::size_t j = 0; j < guess.nodes; ++j) sum += column[g][j] * old[j];
+        increments_[r * groups_ + g] = sum;
       }
     }
+    if constexpr (of_momentum) correct_guess();
+  }
+
+  /// Adds the error of the guess that is extrapolated from the last two steps, docs/theory.md
+  /// (5.11).
+  void correct_guess() noexcept {
+    const GaussMemory& memory = call_.memory;
+    const bool known = call_.steady && *memory.errors == 2.0;
+    for (std::size_t r = 0; r < rows_; ++r)
+      for (std::size_t g = 0; g < groups_; ++g) {
+        Pack& increment = increments_[r * groups_ + g];
+        guess_[r * groups_ + g] = increment;
+        if (known)
+          increment +=
+              load_stages(memory.error, r, g) * 2.0 - load_stages(memory.error_before, r, g);
+      }
+  }
+
+  /// Keeps the error of the extrapolated increments.
+  void keep_error() noexcept {
+    const GaussMemory& memory = call_.memory;
+    *memory.errors = !call_.steady ? 0.0 : *memory.errors < 2.0 ? *memory.errors + 1.0 : 2.0;
+    if (!call_.steady) return;
+    for (std::size_t r = 0; r < rows_; ++r)
+      for (std::size_t g = 0; g < groups_; ++g) {
+        const std::size_t i = r * groups_ + g;
+        store_stages(load_stages(memory.error, r, g), memory.error_before, r, g);
+        store_stages(increments_[i] - guess_[i], memory.error, r, g);
+      }
+  }
+
+  /// Stages of a row of numbers with the stages of one row adjacent. Lanes without a stage repeat
+  /// the first.
+  HAMELIN_INLINE Pack load_stages(const double* numbers, std::size_t r,
+                                  std::size_t g) const noexcept {
+    const double* const row = numbers + r * s_;
+    if (s_ == groups_ * lanes) return Pack::load(row + g * lanes);
+    Pack out;
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      out.v[lane] = row[g * lanes + lane < s_ ? g * lanes + lane : 0];
+    return out;
+  }
+  HAMELIN_INLINE void store_stages(Pack value, double* numbers, std::size_t r,
+                                   std::size_t g) const noexcept {
+    double* const row = numbers + r * s_;
+    if (s_ == groups_ * lanes) {
+      value.store(row + g * lanes);
+      return;
+    }
+    for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane)
+      row[g * lanes + lane] = value.v[lane];
   }
 
   /// rate_ = f(y) at the start of the step, in all lanes.
   void evaluate_start() noexcept {
     for (std::size_t r = 0; r < n_; ++r) {
-      y_[r] = Pack(call_.q[r]);
-      y_[n_ + r] = Pack(call_.p[r]);
+      q_[r] = Pack(call_.q[r]);
+      u_[r] = Pack(call_.u[r]);
     }
     rates();
   }
 
   void repeat_start() noexcept {
-    for (std::size_t r = 0; r < 2 * n_; ++r)
-      for (std::size_t g = 0; g < groups_; ++g) slopes_[r * groups_ + g] = rate_[r];
+    for (std::size_t g = 0; g < groups_; ++g)
+      for (std::size_t r = 0; r < rows_; ++r) increments_[r * groups_ + g] = rate_[r] * weights(g);
   }
 
-  /// rate_ = f(y_), docs/theory.md (5.3): Hamilton's equations, and the forces at the velocities of
-  /// the stages.
+  /// rate_ = f(y) with the forces at the velocities of the stages: Hamilton's equations,
+  /// docs/theory.md (5.3), or accelerations, docs/theory.md (5.5).
   HAMELIN_INLINE void rates() noexcept {
-    dynamics::kernel::hamilton<Space>(call_.chain, scratch_, y_, y_ + n_, rate_, rate_ + n_);
+    if constexpr (of_momentum) {
+      dynamics::kernel::hamilton<Space>(call_.chain, scratch_, q_, u_, rate_, rate_ + n_);
+      add_forces(rate_, rate_ + n_);
+    } else {
+      for (std::size_t r = 0; r < n_; ++r) torque_[r] = Pack(0.0);
+      if (call_.forces.spin_count > 0) move_links();
+      add_forces(u_, torque_);
+      dynamics::kernel::forward_dynamics<Space>(call_.chain, scratch_, q_, u_, torque_, rate_);
+    }
+  }
+
+  /// Placements and twists, which gyroscopic terms need, at q_ and the velocities u_.
+  void move_links() noexcept {
+    dynamics::kernel::place<Space>(call_.chain, scratch_, q_);
+    dynamics::kernel::twists<Space>(call_.chain, scratch_, u_);
+  }
+
+  /// Adds the forces of the channels at the velocities v; those of gyroscopic terms stay in force_.
+  HAMELIN_INLINE void add_forces(const Pack* v, Pack* torque) noexcept {
     const Forces& f = call_.forces;
     if (f.held != nullptr || f.damping != nullptr || f.coulomb != nullptr)
-      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += joint_force(f, r, rate_[r]);
+      for (std::size_t r = 0; r < n_; ++r) torque[r] += joint_force(f, r, v[r]);
     if (f.spin_count > 0) {
       dynamics::kernel::gyroscopic_torque<Space>(call_.chain, scratch_, f.spins, f.spin_count,
                                                  force_);
-      for (std::size_t r = 0; r < n_; ++r) rate_[n_ + r] += force_[r];
+      for (std::size_t r = 0; r < n_; ++r) torque[r] += force_[r];
     }
   }
 
   void finish(GaussOutcome& out) noexcept {
-    const double h = call_.h;
-    const auto& b = call_.tableau.b;
+    add_works(out.work);
+    if constexpr (of_momentum) keep_error();
+    const GaussMemory& memory = call_.memory;
     for (std::size_t r = 0; r < n_; ++r) {
-      double dq = 0.0, dp = 0.0;
+      double sum = 0.0, sum_u = 0.0;
       for (std::size_t j = 0; j < s_; ++j) {
-        const double v = slope(r, j), p_rate = slope(n_ + r, j), weight = h * b[j];
-        dq += weight * v;
-        dp += weight * p_rate;
-        call_.slopes[r * s_ + j] = v;
-        call_.slopes[(n_ + r) * s_ + j] = p_rate;
+        if constexpr (of_momentum) {
+          sum += increment(r, j);
+          sum_u += increment(n_ + r, j);
+        } else {
+          sum += (1.0 - call_.tableau.c[j]) * increment(r, j);  // Σ_j b_j a_jk = b_k (1 − c_k)
+          sum_u += increment(r, j);
+        }
       }
-      call_.q_next[r] = call_.q[r] + dq;
-      call_.p_next[r] = call_.p[r] + dp;
+      if constexpr (of_momentum) {
+        call_.q_next[r] = compensated(call_.q[r], sum, memory.carry[r]);
+        call_.u_next[r] = compensated(call_.u[r], sum_u, memory.carry[n_ + r]);
+      } else {
+        call_.q_next[r] = call_.q[r] + call_.h * (call_.u[r] + sum);
+        call_.u_next[r] = call_.u[r] + sum_u;
+      }
     }
-    for (std::size_t j = 0; j < s_; ++j)
-      add_joint_work(call_.forces, n_, h * b[j], out.work,
-                     [&](std::size_t r) { return slope(r, j); });
-    if (call_.forces.spin_count == 0) return;
+    // the motion before an impulse does not continue the polynomial of this step
+    const bool continues = call_.guess != nullptr && !call_.jumped;
+    *memory.older_at =
+        continues ? (call_.tableau.c[s_ - 1] - 1.0) * (call_.h_before / call_.h) : 0.0;
+    for (std::size_t r = 0; r < rows_; ++r) {
+      if (continues)
+        memory.older[r] = memory.increments[r * s_ + s_ - 1] * (call_.h / call_.h_before);
+      for (std::size_t g = 0; g < groups_; ++g)
+        store_stages(increments_[r * groups_ + g], memory.increments, r, g);
+    }
+  }
+
+  /// y + dy + carry; carry becomes what this sum rounds away: docs/theory.md (5.7).
+  HAMELIN_INLINE static double compensated(double y, double dy, double& carry) noexcept {
+    const double add = dy + carry, next = y + add;
+    const double added = next - y;  // two-sum, exact for any sizes
+    carry = (y - (next - added)) + (add - added);
+    return next;
+  }
+
+  /// The work of the forces, docs/theory.md (5.8), at the converged stages.
+  void add_works(Work& work) noexcept {
+    const Forces& f = call_.forces;
+    if (f.held == nullptr && f.damping == nullptr && f.coulomb == nullptr && f.spin_count == 0)
+      return;
     for (std::size_t g = 0; g < groups_; ++g) {
-      // the power of the gyroscopic terms at the converged stages
-      for (std::size_t r = 0; r < 2 * n_; ++r) {
-        Pack sum(r < n_ ? call_.q[r] : call_.p[r - n_]);
-        for (std::size_t j = 0; j < s_; ++j)
-          sum += Pack::load(call_.tableau.a_column[j] + g * lanes) * (h * slope(r, j));
-        y_[r] = sum;
+      const Pack* const v = of_momentum ? rate_ : u_;
+      if (f.spin_count > 0 || !of_momentum) place_stages(g);
+      if (f.spin_count > 0) rates();
+      if (f.spin_count == 0 && of_momentum)
+        for (std::size_t r = 0; r < n_; ++r) rate_[r] = increments_[r * groups_ + g] / weights(g);
+      for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane) {
+        const double weight = call_.h * call_.tableau.b[g * lanes + lane];
+        add_joint_work(f, n_, weight, work, [&](std::size_t r) { return v[r].v[lane]; });
+        for (std::size_t r = 0; f.spin_count > 0 && r < n_; ++r)
+          work.gyroscopic += weight * force_[r].v[lane] * v[r].v[lane];
       }
-      rates();
-      for (std::size_t r = 0; r < n_; ++r)
-        for (std::size_t lane = 0; lane < lanes && g * lanes + lane < s_; ++lane)
-          out.work.gyroscopic += h * b[g * lanes + lane] * force_[r].v[lane] * rate_[r].v[lane];
     }
   }
 
   const GaussCall<Chain>& call_;
-  std::size_t n_, s_, groups_;
-  Pack* slopes_;  ///< 2n × groups
-  Pack *y_, *rate_, *force_;
+  std::size_t n_, rows_, s_, groups_;
+  Pack *increments_, *guess_;  ///< rows × groups
+  Pack *q_, *u_, *rate_, *force_, *torque_;
   Scratch scratch_;
 };
 

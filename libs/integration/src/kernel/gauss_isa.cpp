@@ -18,12 +18,19 @@ struct Entry {
   static constexpr int wide = dynamics::kernel::native_lanes;
 
   static std::size_t bytes(std::size_t n, std::size_t stages) noexcept {
-    return stages <= 4 ? Gauss<Group, narrow>::bytes(n, stages)
-                       : Gauss<Group, wide>::bytes(n, stages);
+    // the momentum form has more unknowns
+    return stages <= 4 ? Gauss<Group, narrow, GaussForm::momentum>::bytes(n, stages)
+                       : Gauss<Group, wide, GaussForm::momentum>::bytes(n, stages);
   }
   static GaussOutcome step(const GaussCall<Chain>& call, void* memory) noexcept {
-    return call.tableau.stages <= 4 ? Gauss<Group, narrow>::step(call, memory)
-                                    : Gauss<Group, wide>::step(call, memory);
+    return call.tableau.stages <= 4 ? step_in_form<narrow>(call, memory)
+                                    : step_in_form<wide>(call, memory);
+  }
+  template <int W>
+  static GaussOutcome step_in_form(const GaussCall<Chain>& call, void* memory) noexcept {
+    return call.form == GaussForm::momentum
+               ? Gauss<Group, W, GaussForm::momentum>::step(call, memory)
+               : Gauss<Group, W, GaussForm::velocity>::step(call, memory);
   }
   static constexpr GaussEntry<Chain> entry{bytes, step};
 };

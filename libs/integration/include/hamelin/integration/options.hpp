@@ -49,8 +49,10 @@ struct VariationalOptions {
 };
 
 struct GaussOptions {
-  int order = 8;             ///< even, 4 to 16
-  double tolerance = 1e-12;  ///< of the iteration at fixed steps, on ‖δΔ‖∞ [rad or m]
+  int order = 8;  ///< even, 4 to 16
+  /// Of the iteration at fixed steps, on ‖δΔ‖∞ [rad or m]. Up to 1e-12 the steps are symplectic and
+  /// iterated to rounding, docs/theory.md (5.4); above, accelerations are collocated, (5.6).
+  double tolerance = 1e-12;
   /// A value above 0 switches step control on; State::step_next is then the first step. rtol alone
   /// sets atol to the same number [rad or m, and per second]; atol alone stays absolute.
   double rtol = 0.0, atol = 0.0;

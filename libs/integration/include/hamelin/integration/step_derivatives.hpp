@@ -17,10 +17,10 @@ struct StepDerivatives {
   Eigen::VectorXd by_step;    ///< ∂(q⁺, p⁺)/∂h, 2 dof
 };
 
-/// Differentiates the steps of hamel-variational or gauss exactly, by the implicit function theorem
-/// at the step's solution, which the state remembers: docs/theory.md (4.31)–(4.33), (5.14)–(5.17).
-/// An object belongs to one thread; it allocates nothing after its construction. The model must
-/// outlive it.
+/// Differentiates the steps of hamel-variational, or of gauss in its structure mode, exactly, by
+/// the implicit function theorem at the step's solution, which the state remembers: docs/theory.md
+/// (4.31)–(4.33), (5.19)–(5.22). An object belongs to one thread; it allocates nothing after its
+/// construction. The model must outlive it.
 class StepDifferentiator {
  public:
   virtual ~StepDifferentiator() = default;
