@@ -545,6 +545,18 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
   return out;
 }
 
+GuideSpec read_guide(const Reader& planner) {
+  GuideSpec guide;
+  guide.type = guide_type(planner.get<std::string>("guide", "none")).value_or(GuideType::none);
+  const Reader options = planner.child("guide_options");
+  guide.margin_m = options.maybe<double>("margin_m");
+  guide.checks_max = options.get("checks_max", guide.checks_max);
+  guide.improve_checks = options.get("improve_checks", guide.improve_checks);
+  guide.searches_max = options.get("searches_max", guide.searches_max);
+  guide.check_time_s = options.get("check_time_s", guide.check_time_s);
+  return guide;
+}
+
 }  // namespace
 
 Obstacle obstacle_from_json(const Json& document, const std::string& where) {
@@ -577,6 +589,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
     const Reader planner = in.child("planner");
     scene.planner =
         Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
+    scene.guide = read_guide(planner);
   }
   const Reader integrator = in.child("integrator");
   scene.integrator = {integrator.get<std::string>("name", "hamel-variational"),
