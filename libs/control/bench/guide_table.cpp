@@ -185,14 +185,14 @@ int run(int argc, char** argv) {
           scene.guide.improve_checks = 0;
           guide::Settings settings = control::guide_settings(
               scene, rig->arm, rig->view, {}, scene.planner ? scene.planner->params : Json());
+          settings.seed = static_cast<std::uint64_t>(seed);
           const guide::Guide guide(rig->arm, settings);
           settings.shortens = false;
           const guide::Guide first(rig->arm, settings);
           rig->query.refresh(0.0);
           SampledQuery sampling(rig->query, 32.0);
           guide::Query& query = sampled ? static_cast<guide::Query&>(sampling) : rig->query;
-          const guide::Problem problem{scene.start_q, scene.goals.front(),
-                                       static_cast<std::uint64_t>(seed), 0};
+          const guide::Problem problem{scene.start_q, scene.goals.front(), 0};
           const double since = cpu_s();
           (void)first.search(problem, query);
           const double first_time = cpu_s() - since;

@@ -69,6 +69,7 @@ guide::Settings guide_settings(const scene::Scene& scene, const model::Model& no
                                                guide_reserve_m);
   out.least_m = std::min(out.margin_m, setup.sampled ? least_sampled_m : least_m);
   out.root_clearance_m = shield + root_reserve_m;
+  out.seed = scene.seed;
   out.checks_max = scene.guide.checks_max;
   out.improve_checks = scene.guide.improve_checks;
   return out;

@@ -141,7 +141,7 @@ Path Guide::search(const Problem& problem, Query& query) const {
     out.checks = query.checks() - before;
     return out;
   };
-  Rng rng(problem.seed + 0x632be59bd9b4e019ULL * (problem.number + 1));
+  Rng rng(settings_.seed + 0x632be59bd9b4e019ULL * (problem.number + 1));
   const double at_start = query.clearance(problem.start, -1.0);
   if (at_start <= 0.0) return ended("the arm is in contact where it is");
   const JointBox box(model_.dof(), settings_.q_lower, settings_.q_upper, limit_reserve);

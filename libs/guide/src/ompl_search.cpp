@@ -309,7 +309,10 @@ Found solve(const Search& search) {
                                                  const ob::Cost) { note_first(); });
   planner->setProblemDefinition(problem);
   planner->setup();
-  const ob::PlannerTerminationCondition ends([&] { return search.edges.checks() >= end; });
+  // Iterations count as well: a planner may go on without checking anything.
+  long iterations = 0;
+  const ob::PlannerTerminationCondition ends(
+      [&] { return search.edges.checks() + ++iterations >= end; });
   planner->solve(ends);
   ob::PlannerData data(info);
   planner->getPlannerData(data);

@@ -86,7 +86,7 @@ VectorXd lever_weights(const model::Model& model) {
 
 class Hybrid final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS;
+  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),

@@ -48,6 +48,7 @@ struct Settings {
   long checks_max = 200000;       ///< after which a search ends without a path
   /// For how many checks a planner that optimises goes on after its first path.
   long improve_checks = 20000;
+  std::uint64_t seed = 1;
   bool shortens = true;  ///< whether the path is shortened
 };
 
@@ -55,7 +56,6 @@ struct Settings {
 struct Problem {
   Eigen::VectorXd start;
   scene::Goal goal;  ///< joint, position or pose
-  std::uint64_t seed = 1;
   std::uint64_t number = 0;  ///< of the search: distinguishes the random numbers
 };
 

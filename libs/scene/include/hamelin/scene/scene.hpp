@@ -54,6 +54,7 @@ struct Goal {
   Eigen::VectorXd q;  ///< joint [rad or m]
   /// Joint, if given as a path: way-points as columns, q the last; else empty.
   Eigen::MatrixXd path;
+  std::filesystem::path path_file;  ///< that the path was read from; empty: the scene file
   /// Position, pose: of the tip in the world; rotation unused for position. Follow: of the target
   /// at rest, see Frame::pose.
   geometry::SE3 pose;
@@ -228,7 +229,7 @@ struct Scene {
 [[nodiscard]] std::filesystem::path target_file(const Goal& goal);
 
 /// The files that a run of the scene reads, without the scene file itself: robot, spheres, SRDF,
-/// way-points of obstacles and targets, streams of targets, map and its changes.
+/// paths of goals, way-points of obstacles and targets, streams of targets, map and its changes.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const Scene& scene);
 
 /// Reads a scene file; paths in it are relative to its folder, see resolve_path().
