@@ -97,14 +97,14 @@ bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin
   return prove({0.0, 1.0, first_.view(), last_.view()}, all_, 0);
 }
 
-// docs/theory.md (17.2): a sphere strays from its chord, all else from the middle of the piece.
+// docs/theory.md (17.2)–(17.4): a sphere strays from its chord, all else from the middle of the
+// piece.
 double EdgeCheck::stray(const Piece& piece, int subject) const {
   if (subject >= shape_count()) return 0.5 * piece.width * pair_way_[subject - shape_count()];
   if (piece.from.is_capsule(at(subject)) || movers_) return 0.5 * piece.width * way_[subject];
   return piece.width * piece.width * bend_[subject];
 }
 
-// docs/theory.md (17.3), (17.4)
 bool EdgeCheck::proved(const Piece& piece, int subject, const scene::Shapes& middle) {
   const double keep = margin_ + stray(piece, subject);
   if (subject >= shape_count())

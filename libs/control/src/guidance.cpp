@@ -95,6 +95,7 @@ void Guidance::ask(const Now& now, GuideSearch& search) {
 Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
   const GuideAnswer& answer = search.take();
   if (answer.number != asked_) return News::none;
+  // docs/theory.md (17.5)
   if (now.time_s < asked_s_ + check_time_s_ * static_cast<double>(answer.checks)) return News::none;
   awaits_ = false;
   world_ = answer.snapshot;

@@ -68,7 +68,7 @@ guide::Settings guide_settings(const scene::Scene& scene, const model::Model& no
   out.margin_m = scene.guide.margin_m.value_or(std::max({margin, setup.map_resolution_m, shield}) +
                                                guide_reserve_m);
   out.least_m = std::min(out.margin_m, setup.sampled ? least_sampled_m : least_m);
-  out.root_clearance_m = shield + root_reserve_m;
+  out.root_clearance_m = std::max(shield + root_reserve_m, out.margin_m + out.slack_m);
   out.seed = scene.seed;
   out.checks_max = scene.guide.checks_max;
   out.improve_checks = scene.guide.improve_checks;

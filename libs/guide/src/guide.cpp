@@ -21,10 +21,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Largest difference of a joint from a tight place at which its margin counts fully, and not at all
-// [rad or m].
-constexpr double near_place = 0.1, far_place = 0.8;
-// Pieces of a motion on which margins vary are no longer than this, in any joint [rad or m].
+// Distance from a goal and from the start at which its margin counts fully, and not at all [rad or
+// m]. A path soon leads away from a tight start: planners keep their margin there.
+constexpr double near_goal = 0.2, far_goal = 0.9, near_start = 0.02, far_start = 0.3;
+// Pieces of a motion on which margins vary are no longer than this [rad or m].
 constexpr double piece = 0.1;
 // Margins are constant if they vary by less than this [m].
 constexpr double constant_m = 5e-4;
@@ -73,6 +73,16 @@ JointBox box_with(JointBox box, const VectorXd& start, const std::vector<VectorX
   return box;
 }
 
+// The straight way to the nearest configuration at the goal, which nothing can shorten.
+Found straight(const VectorXd& start, const VectorXd& goal, Edges& edges) {
+  Found found;
+  if (!edges.clear(start, goal)) return found;
+  found.points.resize(start.size(), 2);
+  found.points << start, goal;
+  found.first_checks = edges.checks();
+  return found;
+}
+
 }  // namespace
 
 std::string_view why_unavailable() noexcept {
@@ -87,12 +97,12 @@ double path_length(const MatrixXd& points) {
   return length;
 }
 
-void Margins::add(const VectorXd& q, double margin_m) {
-  if (margin_m < full_) places_.push_back({q, margin_m});
+void Margins::add(const VectorXd& q, double margin_m, double near, double far) {
+  if (margin_m < full_) places_.push_back({q, margin_m, near, far});
 }
 
-double Margins::near(const Place& place, double distance) const {
-  const double weight = std::clamp((distance - near_place) / (far_place - near_place), 0.0, 1.0);
+double Margins::margin_at(const Place& place, double distance) const {
+  const double weight = std::clamp((distance - place.near) / (place.far - place.near), 0.0, 1.0);
   return place.margin + weight * (full_ - place.margin);
 }
 
@@ -100,19 +110,18 @@ double Margins::near(const Place& place, double distance) const {
 double Margins::required(const VectorXd& q) const {
   double margin = full_;
   for (const Place& place : places_)
-    margin = std::min(margin, near(place, (q - place.q).lpNorm<Eigen::Infinity>()));
+    margin = std::min(margin, margin_at(place, (q - place.q).norm()));
   return margin;
 }
 
-// The distance of a place from the box around both ends bounds that from the line between them.
 double Margins::least(const VectorXd& a, const VectorXd& b) const {
   double margin = full_;
+  const VectorXd line = b - a;
+  const double square = line.squaredNorm();
   for (const Place& place : places_) {
-    const double distance = (a.cwiseMin(b) - place.q)
-                                .cwiseMax(place.q - a.cwiseMax(b))
-                                .cwiseMax(0.0)
-                                .lpNorm<Eigen::Infinity>();
-    margin = std::min(margin, near(place, distance));
+    const double along =
+        square > 0.0 ? std::clamp((place.q - a).dot(line) / square, 0.0, 1.0) : 0.0;
+    margin = std::min(margin, margin_at(place, (a + along * line - place.q).norm()));
   }
   return margin;
 }
@@ -120,8 +129,7 @@ double Margins::least(const VectorXd& a, const VectorXd& b) const {
 bool Edges::clear(const VectorXd& a, const VectorXd& b) {
   const double least = margins_.least(a, b);
   const bool constant = std::max(margins_.required(a), margins_.required(b)) - least < constant_m;
-  if (constant || (b - a).lpNorm<Eigen::Infinity>() <= piece)
-    return query_.motion_clear(a, b, least);
+  if (constant || (b - a).norm() <= piece) return query_.motion_clear(a, b, least);
   // The half at b first: it is new to the caller, and likelier to be in collision.
   const VectorXd middle = 0.5 * (a + b);
   return clear(middle, b) && clear(a, middle);
@@ -153,14 +161,18 @@ Path Guide::search(const Problem& problem, Query& query) const {
   const JointBox bounds = box_with(box, problem.start, goals);
   for (const auto& [share, used] : attempts) {
     Margins margins(share * settings_.margin_m);
-    margins.add(problem.start, std::max(0.0, at_start - start_slack_m));
+    margins.add(problem.start, std::max(0.0, at_start - start_slack_m), near_start, far_start);
     for (const Root& root : roots)
-      margins.add(root.q, std::max(std::min(settings_.least_m, 0.5 * root.clearance),
-                                   root.clearance - settings_.slack_m));
+      margins.add(root.q,
+                  std::max(std::min(settings_.least_m, 0.5 * root.clearance),
+                           root.clearance - settings_.slack_m),
+                  near_goal, far_goal);
     Edges edges(query, margins);
     const auto end = static_cast<long>(used * static_cast<double>(settings_.checks_max));
-    Found found = guide::search({settings_.type, bounds, problem.start, goals, edges, rng.next(),
-                                 before + end, settings_.improve_checks});
+    Found found = straight(problem.start, goals.front(), edges);
+    if (found.points.cols() == 0)
+      found = guide::search({settings_.type, bounds, problem.start, goals, edges, rng.next(),
+                             before + end, settings_.improve_checks});
     out.states += found.states;
     if (found.points.cols() == 0) continue;
     out.first_checks = found.first_checks - before;

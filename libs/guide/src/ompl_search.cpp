@@ -62,22 +62,24 @@ class JointSpace final : public ob::RealVectorStateSpace {
   [[nodiscard]] bool isMetricSpace() const override { return false; }
 };
 
+/// Uniform in the box, or normal around the start or a goal.
+void draw_sample(const Search& search, Rng& rng, double* q) {
+  const JointBox& box = search.box;
+  if (rng.uniform() >= near_share) {
+    for (Index i = 0; i < box.lower.size(); ++i) q[i] = rng.uniform(box.lower[i], box.upper[i]);
+    return;
+  }
+  const auto k = static_cast<std::size_t>(rng.below(search.goals.size() + 1));
+  const VectorXd& center = k < search.goals.size() ? search.goals[k] : search.start;
+  for (Index i = 0; i < center.size(); ++i)
+    q[i] = std::clamp(center[i] + near_spread * rng.normal(), box.lower[i], box.upper[i]);
+}
+
 class Sampler final : public ob::StateSampler {
  public:
   Sampler(const ob::StateSpace* space, const Search& search, Rng& rng)
       : StateSampler(space), search_(search), box_(search.box), rng_(rng) {}
-  void sampleUniform(ob::State* state) override {
-    if (rng_.uniform() < near_share) return sample_near_end(state);
-    for (Index i = 0; i < box_.lower.size(); ++i)
-      values(state)[i] = rng_.uniform(box_.lower[i], box_.upper[i]);
-  }
-  void sample_near_end(ob::State* state) {
-    const auto k = static_cast<std::size_t>(rng_.below(search_.goals.size() + 1));
-    const VectorXd& center = k < search_.goals.size() ? search_.goals[k] : search_.start;
-    for (Index i = 0; i < center.size(); ++i)
-      values(state)[i] =
-          std::clamp(center[i] + near_spread * rng_.normal(), box_.lower[i], box_.upper[i]);
-  }
+  void sampleUniform(ob::State* state) override { draw_sample(search_, rng_, values(state)); }
   void sampleUniformNear(ob::State* state, const ob::State* near, double distance) override {
     const VectorXd center = vector(near, box_.lower.size());
     for (Index i = 0; i < center.size(); ++i)
@@ -111,7 +113,7 @@ class InformedSampler final : public ob::PathLengthDirectInfSampler {
   }
   bool sampleUniform(ob::State* state, const ob::Cost& most) override {
     if (!std::isfinite(most.value())) {
-      draw_in_box(state);
+      draw_sample(search_, rng_, values(state));
       return true;
     }
     for (int i = 0; i < informed_tries; ++i)
@@ -126,23 +128,21 @@ class InformedSampler final : public ob::PathLengthDirectInfSampler {
   }
 
  private:
-  void draw_in_box(ob::State* state) {
-    for (Index i = 0; i < search_.start.size(); ++i)
-      values(state)[i] = rng_.uniform(search_.box.lower[i], search_.box.upper[i]);
-  }
   // Draws from one of the sets, in proportion to their size, and rejects what others have as well.
   bool draw(ob::State* state, double most) {
     double total = 0.0;
     for (const auto& set : sets_)
-      if (most > set->getMinTransverseDiameter()) total += set->getPhsMeasure(most);
+      if (most > set->getMinTransverseDiameter()) {
+        set->setTransverseDiameter(most);
+        total += set->getPhsMeasure();
+      }
     if (!(total > 0.0) || !std::isfinite(total)) return false;
     double place = total * rng_.uniform();
     const ompl::ProlateHyperspheroid* from = nullptr;
     for (const auto& set : sets_) {
       if (most <= set->getMinTransverseDiameter()) continue;
-      set->setTransverseDiameter(most);
       from = set.get();
-      if ((place -= set->getPhsMeasure(most)) <= 0.0) break;
+      if ((place -= set->getPhsMeasure()) <= 0.0) break;
     }
     VectorXd ball(search_.start.size());
     for (double& x : ball) x = rng_.normal();
@@ -230,8 +230,12 @@ ob::PlannerPtr make_planner(scene::GuideType type, const ob::SpaceInformationPtr
       return std::make_shared<Seeded<og::RRTstar>>(info, seed);
     case scene::GuideType::informed_rrt_star:
       return std::make_shared<Seeded<og::InformedRRTstar>>(info, seed);
-    case scene::GuideType::bit_star:
-      return std::make_shared<og::BITstar>(info);
+    case scene::GuideType::bit_star: {
+      auto planner = std::make_shared<og::BITstar>(info);
+      // OMPL 1.5 crashes where it prunes the goal of its best path (ompl/ompl#949).
+      planner->setPruning(false);
+      return planner;
+    }
     default:
       return std::make_shared<Seeded<og::RRTConnect>>(info, seed);
   }
@@ -240,6 +244,12 @@ ob::PlannerPtr make_planner(scene::GuideType type, const ob::SpaceInformationPtr
 bool optimises(scene::GuideType type) {
   return type == scene::GuideType::rrt_star || type == scene::GuideType::bit_star ||
          type == scene::GuideType::informed_rrt_star;
+}
+
+// A single tree comes out of a narrow place more easily than into it, and goals are narrower than
+// starts: it grows from the goals.
+bool grows_from_goals(scene::GuideType type) {
+  return type != scene::GuideType::rrt_connect && type != scene::GuideType::bit_star;
 }
 
 // OMPL would write what it does to the standard output.
@@ -271,14 +281,17 @@ ob::ProblemDefinitionPtr make_problem(const Search& search, const ob::SpaceInfor
                                       Rng& rng) {
   auto problem = std::make_shared<ob::ProblemDefinition>(info);
   ob::ScopedState<ob::RealVectorStateSpace> state(info);
-  const auto set = [&](const VectorXd& q) { std::copy(q.begin(), q.end(), values(state.get())); };
-  set(search.start);
-  problem->addStartState(state);
   auto goals = std::make_shared<ob::GoalStates>(info);
-  for (const VectorXd& goal : search.goals) {
-    set(goal);
-    goals->addState(state);
-  }
+  const bool backwards = grows_from_goals(search.type);
+  const auto add = [&](const VectorXd& q, bool as_start) {
+    std::copy(q.begin(), q.end(), values(state.get()));
+    if (as_start)
+      problem->addStartState(state);
+    else
+      goals->addState(state);
+  };
+  add(search.start, !backwards);
+  for (const VectorXd& goal : search.goals) add(goal, backwards);
   problem->setGoal(goals);
   problem->setOptimizationObjective(std::make_shared<Objective>(info, search, rng));
   return problem;
@@ -320,6 +333,7 @@ Found solve(const Search& search) {
   if (!problem->hasExactSolution()) return {{}, 0, out.states};
   note_first();
   out.points = to_matrix(*problem->getSolutionPath()->as<og::PathGeometric>(), search.start.size());
+  if (grows_from_goals(search.type)) out.points = out.points.rowwise().reverse().eval();
   return out;
 }
 

@@ -13,19 +13,21 @@ class Margins {
 
   void clear() noexcept { places_.clear(); }
   /// A place at which `margin_m` is kept; one that is not less than the full margin has no effect.
-  void add(const Eigen::VectorXd& q, double margin_m);
+  /// @param near, far distance from the place at which its margin counts fully, and not at all [rad
+  ///        or m]
+  void add(const Eigen::VectorXd& q, double margin_m, double near, double far);
   [[nodiscard]] double full_m() const noexcept { return full_; }
   /// What a configuration must keep [m].
   [[nodiscard]] double required(const Eigen::VectorXd& q) const;
-  /// The least that any configuration between two others must keep, or less.
+  /// The least that a configuration on the line between two others must keep.
   [[nodiscard]] double least(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const;
 
  private:
   struct Place {
     Eigen::VectorXd q;
-    double margin;
+    double margin, near, far;
   };
-  [[nodiscard]] double near(const Place& place, double distance) const;
+  [[nodiscard]] double margin_at(const Place& place, double distance) const;
 
   double full_;
   std::vector<Place> places_;

@@ -193,7 +193,7 @@ struct GuideSpec {
   long improve_checks = 20000;  ///< how long a planner that optimises goes on after its first path
   int searches_max = 5;         ///< of a goal, after stalls
   /// Simulated time that a check takes [s]. With real time nothing is charged.
-  double check_time_s = 1e-5;
+  double check_time_s = 2e-6;
 };
 
 struct StallRule {
