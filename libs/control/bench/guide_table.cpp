@@ -201,12 +201,16 @@ int run(int argc, char** argv) {
           ++f.searches;
           f.all_s += time;
           f.all_checks += static_cast<double>(path.checks);
+          double reference = 0.0;
+          if (path.found() && !sampled)
+            reference = simplified_length(*rig, path.planned, settings.least_m);
           if (list)
             fmt::print(
-                "  {} {} {:.2f} ms, {} checks, first {}, roots {}, margin {:.4f}, length {:.2f}, "
-                "points {} {}\n",
-                scene.name, to_string(type), 1e3 * time, path.checks, path.first_checks, path.roots,
-                path.margin_m, path.length, path.points.cols(), path.cause);
+                "  {} {}: {} in {:.2f} ms, {} checks, {} until the first path, {} roots, margin "
+                "{:.4f} m, length {:.3f}, OMPL's {:.3f} {}\n",
+                scene.name, to_string(type), path.found() ? "found" : "not found", 1e3 * time,
+                path.checks, path.first_checks, path.roots, path.margin_m, path.length, reference,
+                path.cause);
           if (!path.found()) continue;
           ++f.found;
           f.certified += certified(*rig, path.points) ? 1 : 0;
@@ -215,7 +219,7 @@ int run(int argc, char** argv) {
           f.first_checks.push_back(static_cast<double>(path.first_checks));
           f.length.push_back(path.length);
           if (!sampled) {
-            f.simplified.push_back(simplified_length(*rig, path.planned, settings.least_m));
+            f.simplified.push_back(reference);
             f.ratio.push_back(path.length / f.simplified.back());
           }
         }

@@ -98,7 +98,7 @@ PathPlan plan_paths(const scene::Scene& scene) {
     PlannedGoal planned;
     planned.type = scene::type_name(goal);
     const double since = process_cpu_s();
-    planned.path = guide.search({start, goal, plan.goals.size()}, query);
+    planned.path = guide.search({start, goal, plan.goals.size() + 1}, query);
     planned.search_s = process_cpu_s() - since;
     const Eigen::MatrixXd& points = planned.path.points;
     for (Index i = 0; i + 1 < points.cols(); ++i)

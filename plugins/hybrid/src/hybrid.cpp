@@ -205,8 +205,9 @@ class Hybrid final : public planning::Planner {
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-      // Steering turns faster than the law follows, so the arm would circle around a near target.
-      if (!observer_)
+      // Steering turns faster than the law follows, so the arm would circle around a near target,
+      // and leave a path that is clear.
+      if (!observer_ && !(mode_ == Mode::goal && !path_.empty()))
         law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_,
                    std::min(1.0, distance / steering_fade), command);
     }

@@ -62,7 +62,7 @@ TEST_CASE("without a thread the guide searches when it is told to, and the arm w
   CHECK(loop.controller.guide_figures()->found == 1);
 }
 
-TEST_CASE("a path that stays clear is kept where the world changes, and searched anew where not",
+TEST_CASE("a path that stays clear is kept where the world changes, and searched again where not",
           "[control][guide]") {
   if (!guide::available()) return;
   control::Controller::Options options;
