@@ -1,5 +1,6 @@
 #include "hamelin/control/guide_search.hpp"
 
+#include <exception>
 #include <memory>
 #include <utility>
 
@@ -62,7 +63,11 @@ void GuideSearch::answer() {
   out->number = request_.number;
   out->snapshot = query_.refresh(request_.time_s);
   out->kept = still_clear();
-  if (!out->kept) out->path = guide_.search({request_.q, request_.goal, request_.search}, query_);
+  try {
+    if (!out->kept) out->path = guide_.search({request_.q, request_.goal, request_.search}, query_);
+  } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
+    out->path.cause = e.what();
+  }
   out->checks = query_.checks() - before;
   answers_.publish(std::move(out));
 }

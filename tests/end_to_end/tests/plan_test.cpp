@@ -48,6 +48,15 @@ TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
     CHECK(std::abs(result["q"][i].get<double>() - end[i].get<double>()) < 0.05);
 }
 
+TEST_CASE("a guided run is replayed to the byte", "[plan]") {
+  if (!guide::available()) return;
+  Sandbox sandbox;
+  const auto run = sandbox.run({"run", "data/scenes/shelf.json", "--guide", "informed-rrt-star",
+                                "--log", "run.jsonl.zst", "--every", "100"});
+  CHECK(run.exit_code == 0);
+  CHECK(sandbox.run({"replay", "run.jsonl.zst", "--verify"}).exit_code == 0);
+}
+
 TEST_CASE("plan has exit code 1 where there is no path", "[plan]") {
   if (!guide::available()) return;
   Sandbox sandbox;
