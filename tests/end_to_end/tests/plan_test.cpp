@@ -11,8 +11,8 @@ namespace {
 const std::vector<std::string> plan_shelf{"plan", "data/scenes/shelf.json", "--guide",
                                           "rrt-connect"};
 
-std::vector<std::string> with(std::vector<std::string> command,
-                              const std::vector<std::string>& more) {
+std::vector<std::string> plan_with(std::vector<std::string> command,
+                                   const std::vector<std::string>& more) {
   command.insert(command.end(), more.begin(), more.end());
   return command;
 }
@@ -22,7 +22,7 @@ std::vector<std::string> with(std::vector<std::string> command,
 TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
   if (!guide::available()) return;
   Sandbox sandbox;
-  const auto text = sandbox.run(with(plan_shelf, {"-o", "path.json"}));
+  const auto text = sandbox.run(plan_with(plan_shelf, {"-o", "path.json"}));
   CHECK(text.exit_code == 0);
   CHECK(text.err == "");
   CHECK_THAT(text.out, Catch::StartsWith("guide       rrt-connect, seed 1\n") &&
@@ -36,7 +36,7 @@ TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
     CHECK(again["paths"][i]["q"] == file["paths"][i]["q"]);
     CHECK(again["paths"][i]["certificate"]["smallest_m"].get<double>() > 0.005);
   }
-  CHECK(test::run_json(sandbox, with(plan_shelf, {"--seed", "2"}))["paths"][0]["q"] !=
+  CHECK(test::run_json(sandbox, plan_with(plan_shelf, {"--seed", "2"}))["paths"][0]["q"] !=
         file["paths"][0]["q"]);
 
   const std::string goals = R"(/goals=[{"type": "path", "file": ")" +
@@ -61,11 +61,11 @@ TEST_CASE("plan has exit code 1 where there is no path", "[plan]") {
   if (!guide::available()) return;
   Sandbox sandbox;
   const std::string unreachable = R"(/goals=[{"type": "position", "position_m": [5.0, 0.0, 0.5]}])";
-  const Json plan = test::run_json(sandbox, with(plan_shelf, {"--set", unreachable}), 1);
+  const Json plan = test::run_json(sandbox, plan_with(plan_shelf, {"--set", unreachable}), 1);
   CHECK(plan["paths"][0]["found"] == false);
   CHECK(plan["paths"][0]["cause"] == "no clear configuration was found at the goal");
   CHECK(plan["paths"][0]["certificate"].is_null());
-  CHECK(sandbox.run(with(plan_shelf, {"--checks", "1"})).exit_code == 1);
+  CHECK(sandbox.run(plan_with(plan_shelf, {"--checks", "1"})).exit_code == 1);
 }
 
 TEST_CASE("bad input of plan and of paths ends in one line", "[plan]") {

@@ -55,7 +55,7 @@ struct Settings {
 /// A search to be made.
 struct Problem {
   Eigen::VectorXd start;
-  scene::Goal goal;  ///< joint, position or pose
+  scene::Goal goal;          ///< joint, position or pose
   std::uint64_t number = 0;  ///< of the search: distinguishes the random numbers
 };
 
