@@ -14,6 +14,7 @@ enum class Kind {
   scene,
   result,
   explanation,
+  path,
   primitives,
   spheres,
   waypoints,

@@ -99,6 +99,7 @@ void add_run(CLI::App& app, int& exit_code) {
       ->add_option("--planner", options->flags.planner,
                    "planner plugin, by name or path (default the scene's)")
       ->type_name("NAME|PATH");
+  add_guide_option(*command, options->flags);
   restrict_to_integrators(
       command->add_option("--integrator", options->flags.integrator,
                           "time integrator (default the scene's, or hamel-variational)"));

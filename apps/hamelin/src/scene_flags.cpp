@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
 
@@ -19,6 +20,11 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
       document[key] = {{"name", name}};
   };
   if (flags.planner) choose("planner", *flags.planner);
+  if (flags.guide) {
+    if (!document.contains("planner") || !document["planner"].is_object())
+      document["planner"] = {{"name", "hybrid"}};
+    document["planner"]["guide"] = *flags.guide;
+  }
   if (flags.integrator) choose("integrator", *flags.integrator);
   if (flags.plant) document["plant"] = {{"type", *flags.plant}};
   if (flags.step_s) document["step_s"] = *flags.step_s;
@@ -26,6 +32,14 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
   if (flags.seed) document["seed"] = *flags.seed;
   for (const auto& assignment : flags.set) scene::set_pointer(document, assignment);
   return scene::scene_from_json(document, file.parent_path(), file.string());
+}
+
+void add_guide_option(CLI::App& command, SceneFlags& flags) {
+  restrict_values(
+      command.add_option("--guide", flags.guide,
+                         "planner of OMPL that searches a path to each goal (default the scene's, "
+                         "or none)"),
+      {"none", "rrt", "rrt-connect", "rrt-star", "bit-star", "informed-rrt-star"});
 }
 
 std::vector<std::filesystem::path> files_of(const scene::Scene& scene) {

@@ -7,11 +7,15 @@
 
 #include "hamelin/scene/scene.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace hamelin::app {
 
 /// Values of a scene file that the command line overrides.
 struct SceneFlags {
-  std::optional<std::string> planner, integrator, plant;
+  std::optional<std::string> planner, guide, integrator, plant;
   std::optional<double> step_s, duration_s;
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;  ///< "/json/pointer=VALUE", applied last
@@ -20,6 +24,9 @@ struct SceneFlags {
 /// Reads a scene after writing the flags into its JSON document, whose checks then cover them.
 /// @throws Error like scene::scene_from_json, and for a file that is not a scene
 [[nodiscard]] scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags);
+
+/// Adds --guide.
+void add_guide_option(CLI::App& command, SceneFlags& flags);
 
 /// The scene file and the files that it names.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const scene::Scene& scene);

@@ -26,6 +26,8 @@ constexpr double default_influence_m = 0.2;
 constexpr double brake_time_s = 0.05, brake_periods = 10.0;
 // The longest path of goals that are set later, if the caller gives no other.
 constexpr std::size_t default_path_points = 256;
+// The longest path of a guide.
+constexpr std::size_t guide_path_points = 256;
 
 double period_of(const scene::Scene& scene) {
   return scene.actuation.type == scene::ActuationType::ideal ? scene.step_s
@@ -93,8 +95,9 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       options_(std::move(options)),
       period_s_(options_.period_s.value_or(period_of(scene_))),
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
-      path_points_max_(std::max(longest_path(scene_.goals),
-                                options_.path_points_max.value_or(default_path_points))),
+      path_points_max_(std::max(
+          {longest_path(scene_.goals), options_.path_points_max.value_or(default_path_points),
+           scene_.guide.type != scene::GuideType::none ? guide_path_points : std::size_t{0}})),
       plugin_(plugin),
       nominal_(nominal_of(scene_, arm)),
       acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
@@ -117,6 +120,9 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
+  if (arm_->guide)
+    guidance_.emplace(scene_.guide, nominal_.dof(), static_cast<Eigen::Index>(path_points_max_),
+                      plugin.follows_paths(), !options_.guide_thread);
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
@@ -139,7 +145,8 @@ LoadedArm::Common Controller::common() noexcept {
           std::move(drive),
           options_.torque && !options_.position,
           delay_periods(scene_, period_s_),
-          time_s_.load()};
+          time_s_.load(),
+          options_.guide_thread};
 }
 
 double steady_clock_s() {
@@ -189,8 +196,13 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   update_target();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
-  else if (!arm_->planner.detects_stalls() && goals_.stalled(arm_->view.poses(), v_, period_s_))
-    answer_.state = ControlState::stalled;
+  else if (!(guidance_ && guidance_->waits()) && !arm_->planner.detects_stalls() &&
+           goals_.stalled(arm_->view.poses(), v_, period_s_)) {
+    if (guidance_ && guidance_->stalled())
+      goals_.forget_rest();
+    else
+      answer_.state = ControlState::stalled;
+  }
 }
 
 void Controller::measure(const VectorXd& q, const VectorXd& v) {
@@ -254,7 +266,7 @@ void Controller::decide() {
       start_braking("the measured q or v is not finite, expected numbers");
     } else if (!ask_planner()) {
       start_braking(failure_);
-    } else if (arm_->planner.gave_up()) {
+    } else if (arm_->planner.gave_up() && !(guidance_ && guidance_->stalled())) {
       answer_.state = ControlState::gave_up;
       answer_.cause = arm_->planner.command().raw().cause;
     }
@@ -280,8 +292,12 @@ bool Controller::ask_planner() {
   if (reset_) arm_->planner.reset(q_, v_);
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
   const hamelin_goal* const listed = &goal_list_->for_planner[index];
-  if (reset_ || (listed_ != nullptr && listed_ != listed)) ++goal_.number;
+  if (reset_ || (listed_ != nullptr && listed_ != listed)) {
+    ++goal_.number;
+    ++listed_number_;
+  }
   listed_ = listed;
+  if (guidance_) update_guidance();
   goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;

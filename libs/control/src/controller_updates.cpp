@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "hamelin/control/controller.hpp"
@@ -185,6 +186,7 @@ void Controller::take_load() {
   answer_.load = newest.number;
   used_load_.store(newest.number);
   if (goal_.goal != nullptr) ++goal_.number;
+  ++listed_number_;
 }
 
 void Controller::take_goals() {
@@ -193,6 +195,7 @@ void Controller::take_goals() {
   goal_list_ = &newest;
   goals_.set_goals(newest.goals);
   goal_ = {nullptr, goal_.number + 1, 0};
+  ++listed_number_;
   listed_ = nullptr;
   target_.stop();
 }
@@ -207,10 +210,30 @@ void Controller::update_target() {
 }
 
 const hamelin_goal* Controller::goal_for_planner() {
+  if (guidance_ && guidance_->goal() != nullptr) return guidance_->goal();
   if (answer_.target == nullptr) return listed_;
   live_goal_ = *listed_;
   control::set_target(*answer_.target, live_goal_);
   return &live_goal_;
+}
+
+void Controller::update_guidance() {
+  const Guidance::News news = guidance_->update(
+      {time_s_, period_s_, q_, goals_.goal(), listed_number_ + 1, arm_->view.snapshot()},
+      *arm_->guide);
+  if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
+    guidance_number_ = number;
+    ++goal_.number;
+  }
+  if (news == Guidance::News::none || !options_.log) return;
+  std::array<char, 256> line{};  // not a string, which would be allocated
+  const auto end =
+      news == Guidance::News::path
+          ? fmt::format_to_n(line.data(), line.size(), "guide: a path of length {:.4g}",
+                             guidance_->figures().length)
+          : fmt::format_to_n(line.data(), line.size(), "guide: {}", guidance_->cause());
+  options_.log(HAMELIN_LOG_INFO,
+               {line.data(), std::min(line.size(), static_cast<std::size_t>(end.size))});
 }
 
 void Controller::take_params() {

@@ -86,6 +86,12 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
       sum(model, view.contacts_max()),
       ws(model) {
   if (shield && common.sends_torque) pipeline.emplace(model, common.delay_periods, common.period_s);
+  if (scene.guide.type != scene::GuideType::none)
+    guide = std::make_unique<GuideSearch>(
+        model, common.world, view,
+        guide_settings(scene, model, view, shield ? shield->limit_reserve() : LimitReserve{},
+                       params),
+        static_cast<Eigen::Index>(common.path_points_max), common.guide_thread);
 }
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const Common& common) {

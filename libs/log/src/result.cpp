@@ -206,6 +206,14 @@ Json to_json(const Result& r) {
   if (r.position_excess) document["position_excess"] = *r.position_excess;
   if (r.speed_excess) document["speed_excess"] = *r.speed_excess;
   if (r.shield) document["shield"] = shield(*r.shield);
+  if (r.guide)
+    document["guide"] = {{"type", r.guide->type},
+                         {"searches", r.guide->searches},
+                         {"found", r.guide->found},
+                         {"kept", r.guide->kept},
+                         {"checks", r.guide->checks},
+                         {"waited_s", r.guide->waited_s},
+                         {"length", r.guide->length ? Json(*r.guide->length) : Json(nullptr)}};
   if (r.following) document["following"] = following_json(*r.following);
   if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)

@@ -287,6 +287,18 @@ GoalType goal_type_of(const std::string& type) {
   return GoalType::joint;
 }
 
+// One of the paths of a file that `hamelin plan` wrote: way-points as columns.
+Eigen::MatrixXd read_path_file(const std::filesystem::path& file, std::size_t index) {
+  const Json document = read_json(file);
+  check_shipped_schema(document, "path", file.string());
+  const Json& paths = document["paths"];
+  if (index >= paths.size() || paths[index]["q"].empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /paths/{}: has no way-points, expected a path that was found",
+                            file.string(), index));
+  return Reader(paths[index], fmt::format("{}: /paths/{}", file.string(), index)).joint_path("q");
+}
+
 Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   const auto type = in.get<std::string>("type", "");
   const bool path = type == "path";
@@ -294,7 +306,10 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose,
              follow = goal.type == GoalType::follow;
   const std::string kind = type + " goal";
-  joint ? in.require("q", kind) : in.refuse("q", kind);
+  const bool from_file = path && in.find("file") != nullptr;
+  joint && !from_file ? in.require("q", kind) : in.refuse("q", kind);
+  if (!path) in.refuse("file", kind);
+  if (!from_file) in.refuse("index", kind);
   if (!follow) {
     joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
     pose ? in.require("quaternion_wxyz", kind) : in.refuse("quaternion_wxyz", kind);
@@ -304,7 +319,11 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   if (joint || follow) in.refuse("tip_speed_max_m_s", kind);
   if (follow) in.refuse("speed_max", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
-  if (path) {
+  if (from_file) {
+    goal.path_file = resolve_path(folder, in.get<std::string>("file", ""));
+    goal.path = read_path_file(goal.path_file, in.get<std::size_t>("index", 0));
+    goal.q = goal.path.rightCols(1);
+  } else if (path) {
     goal.path = in.joint_path("q");
     goal.q = goal.path.rightCols(1);
   } else {
@@ -545,6 +564,18 @@ std::vector<Event> read_events(const Reader& in, const std::filesystem::path& fo
   return out;
 }
 
+GuideSpec read_guide(const Reader& planner) {
+  GuideSpec guide;
+  guide.type = guide_type(planner.get<std::string>("guide", "none")).value_or(GuideType::none);
+  const Reader options = planner.child("guide_options");
+  guide.margin_m = options.maybe<double>("margin_m");
+  guide.checks_max = options.get("checks_max", guide.checks_max);
+  guide.improve_checks = options.get("improve_checks", guide.improve_checks);
+  guide.searches_max = options.get("searches_max", guide.searches_max);
+  guide.check_time_s = options.get("check_time_s", guide.check_time_s);
+  return guide;
+}
+
 }  // namespace
 
 Obstacle obstacle_from_json(const Json& document, const std::string& where) {
@@ -577,6 +608,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
     const Reader planner = in.child("planner");
     scene.planner =
         Choice{planner.get<std::string>("name", ""), planner.get<Json>("params", Json::object())};
+    scene.guide = read_guide(planner);
   }
   const Reader integrator = in.child("integrator");
   scene.integrator = {integrator.get<std::string>("name", "hamel-variational"),
@@ -602,8 +634,10 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
   if (scene.robot.srdf) files.push_back(*scene.robot.srdf);
   for (const Obstacle& obstacle : scene.obstacles)
     if (const auto file = waypoint_file(obstacle); !file.empty()) files.push_back(file);
-  for (const Goal& goal : scene.goals)
+  for (const Goal& goal : scene.goals) {
+    if (!goal.path_file.empty()) files.push_back(goal.path_file);
     if (const auto file = target_file(goal); !file.empty()) files.push_back(file);
+  }
   if (!scene.map) return files;
   files.push_back(scene.map->file);
   for (const MapChangeSpec& change : scene.map->changes)

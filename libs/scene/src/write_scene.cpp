@@ -33,6 +33,15 @@ Json choice_json(const Choice& choice) {
   return {{"name", choice.name}, {"params", choice.params}};
 }
 
+void add_guide(const GuideSpec& guide, Json& planner) {
+  planner["guide"] = to_string(guide.type);
+  planner["guide_options"] = {{"margin_m", or_null(guide.margin_m)},
+                              {"checks_max", guide.checks_max},
+                              {"improve_checks", guide.improve_checks},
+                              {"searches_max", guide.searches_max},
+                              {"check_time_s", guide.check_time_s}};
+}
+
 Json path_or_null(const std::optional<std::filesystem::path>& path) {
   return path ? Json(path->string()) : Json(nullptr);
 }
@@ -261,6 +270,32 @@ std::string_view to_string(SafetyType type) noexcept {
   return "none";
 }
 
+std::string_view to_string(GuideType type) noexcept {
+  switch (type) {
+    case GuideType::none:
+      return "none";
+    case GuideType::rrt:
+      return "rrt";
+    case GuideType::rrt_connect:
+      return "rrt-connect";
+    case GuideType::rrt_star:
+      return "rrt-star";
+    case GuideType::bit_star:
+      return "bit-star";
+    case GuideType::informed_rrt_star:
+      return "informed-rrt-star";
+  }
+  return "";
+}
+
+std::optional<GuideType> guide_type(std::string_view name) noexcept {
+  for (const GuideType type :
+       {GuideType::none, GuideType::rrt, GuideType::rrt_connect, GuideType::rrt_star,
+        GuideType::bit_star, GuideType::informed_rrt_star})
+    if (name == to_string(type)) return type;
+  return std::nullopt;
+}
+
 std::string_view to_string(PlantType type) noexcept {
   switch (type) {
     case PlantType::hamelin:
@@ -352,6 +387,7 @@ Json resolved_json(const Scene& scene) {
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};
   out["safety"] = safety_json(scene.safety);
   out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
+  if (scene.planner && scene.guide.type != GuideType::none) add_guide(scene.guide, out["planner"]);
   out["integrator"] = choice_json(scene.integrator);
   out["stall"] = nullptr;
   if (scene.stall)

@@ -144,8 +144,9 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
-  options.path_points_max = 0;  // no more than the scene's
-  options.certify = false;      // the judge does, for every step and with all obstacles
+  options.path_points_max = 0;   // no more than the scene's
+  options.guide_thread = false;  // results do not depend on the speed of the machine
+  options.certify = false;       // the judge does, for every step and with all obstacles
   options.torque = scene.actuation.type != scene::ActuationType::ideal;
   options.position = scene.actuation.type == scene::ActuationType::position;
   const auto bounds = [&](const std::vector<double>& values, const char* key) {
@@ -285,6 +286,11 @@ log::Result ClosedLoop::run(const Watch& watch) {
     else if (actuation_->asks_planner(plant_->node().k))
       ask_planner();
     if (!done_) apply_answer();
+    if (controller_->guide_figures() != nullptr) {
+      timer.pause();
+      controller_->run_guide();
+      timer.resume();
+    }
     if (recorder_->logging()) timer.pause();
     write_tick();
     if (recorder_->logging()) timer.resume();
@@ -675,6 +681,14 @@ void ClosedLoop::fill_result() {
     result_.shield = shield_figures(*shield, audit_->ledger().stop);
   if (result_.shield && result_.shield->strayed_share > 1.0)
     result_.warnings.push_back(shield_warning(*controller_->shield(), model_));
+  if (const control::Guidance::Figures* const guide = controller_->guide_figures())
+    result_.guide = {std::string(to_string(scene_.guide.type)),
+                     guide->searches,
+                     guide->found,
+                     guide->kept,
+                     guide->checks,
+                     guide->waited_s,
+                     guide->found > 0 ? std::optional(guide->length) : std::nullopt};
   result_.scene = scene_.name;
   result_.planner = controller_->plugin().name();
   result_.time_s = plant_->node().time_s;

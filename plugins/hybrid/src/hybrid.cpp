@@ -86,7 +86,7 @@ VectorXd lever_weights(const model::Model& model) {
 
 class Hybrid final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS;
+  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
@@ -205,8 +205,9 @@ class Hybrid final : public planning::Planner {
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-      // Steering turns faster than the law follows, so the arm would circle around a near target.
-      if (!observer_)
+      // Steering turns faster than the law follows, so the arm would circle around a near target,
+      // and leave a path.
+      if (!observer_ && !(mode_ == Mode::goal && !path_.empty() && !evader_.active()))
         law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_,
                    std::min(1.0, distance / steering_fade), command);
     }

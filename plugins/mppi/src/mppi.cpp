@@ -49,7 +49,8 @@ constexpr std::size_t candidate_count = 4;
 
 class Mppi final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS;
+  static constexpr std::uint32_t properties =
+      HAMELIN_TICK_ALLOCATES | HAMELIN_USES_THREADS | HAMELIN_FOLLOWS_PATHS;
 
   Mppi(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),

@@ -14,6 +14,7 @@
 
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
+#include "hamelin/control/guidance.hpp"
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/control/loaded_arm.hpp"
 #include "hamelin/control/newest.hpp"
@@ -90,6 +91,9 @@ struct ControllerOptions {
   /// farther.
   std::optional<double> payload_reach_m;
   std::optional<std::size_t> payload_shapes_max;
+  /// Whether a scene's guide searches on a thread of its own, at no charge. Else the caller calls
+  /// run_guide(), and each check of a search delays the path by the scene's check_time_s.
+  bool guide_thread = true;
   /// Receives the planner's messages on the thread that calls the planner; empty: none.
   PlannerHost::LineSink log;
   /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
@@ -190,6 +194,16 @@ class Controller {
   /// of tick(). @param cause for Answer::cause; must outlive this
   void stop(std::string_view cause) { start_braking(cause); }
 
+  /// Searches the path that the last tick has asked for, if it did, without Options::guide_thread.
+  /// For the thread of tick(); this allocates.
+  void run_guide() {
+    if (arm_->guide) arm_->guide->run();
+  }
+  /// What the scene's guide did; null if it has none.
+  [[nodiscard]] const Guidance::Figures* guide_figures() const noexcept {
+    return guidance_ ? &guidance_->figures() : nullptr;
+  }
+
   /// The proof for the motion between the last two ticks; empty after the first one and without
   /// Options::certify.
   [[nodiscard]] const std::optional<Certificate::Verdict>& verdict() const noexcept {
@@ -266,6 +280,8 @@ class Controller {
   /// The current goal as the planner sees it.
   [[nodiscard]] const hamelin_goal* goal_for_planner();
   void take_params();
+  /// Lets the guide choose what the planner is shown.
+  void update_guidance();
   /// Calls the planner. @return whether it has not failed; else failure_ says why
   [[nodiscard]] bool ask_planner();
   [[nodiscard]] bool in_time(double planner_s);
@@ -312,6 +328,8 @@ class Controller {
   hamelin_goal live_goal_{};              ///< the current one if it is a follow goal
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
+  std::optional<Guidance> guidance_;  ///< none without a guide
+  std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
   std::optional<StateEstimator> estimator_;
   std::vector<Eigen::VectorXd> issued_;  ///< for the estimator: torques, or accelerations

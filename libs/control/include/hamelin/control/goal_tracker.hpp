@@ -52,6 +52,8 @@ class GoalTracker {
     index_ = 0;
     rest_s_ = 0.0;
   }
+  /// Looks for a stall as if the arm had just come to rest.
+  void forget_rest() noexcept { rest_s_ = 0.0; }
   [[nodiscard]] bool all_reached() const noexcept { return index_ == goals_->size(); }
   /// Index of the current goal; size() after the last.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }

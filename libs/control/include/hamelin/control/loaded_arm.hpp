@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "hamelin/control/guide_search.hpp"
 #include "hamelin/control/planner_host.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/shield.hpp"
@@ -34,7 +35,8 @@ struct LoadedArm {
     /// Whether torques are the output, so that a shield must predict where they lead.
     bool sends_torque;
     std::size_t delay_periods;
-    double now_s;  ///< time of the last tick; 0 before the first
+    double now_s;       ///< time of the last tick; 0 before the first
+    bool guide_thread;  ///< whether a guide searches on a thread of its own
   };
 
   /// @param scene start and goals are those that the planner is to begin with
@@ -54,6 +56,7 @@ struct LoadedArm {
   ChannelSum sum;
   dynamics::Workspace ws;
   std::optional<TorquePipeline> pipeline;  ///< with a shield, where torques are the output
+  std::unique_ptr<GuideSearch> guide;      ///< null if the scene asks for none
 
  private:
   [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene, const Common& common);

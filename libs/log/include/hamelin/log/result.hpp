@@ -122,6 +122,16 @@ struct Result {
     double work_J = 0.0;  ///< of the torques of stops
   };
   std::optional<Shield> shield;
+  /// What the scene's guide did.
+  struct Guide {
+    std::string type;
+    long searches = 0, found = 0;
+    long kept = 0;                 ///< paths that were still clear after a change of the world
+    long checks = 0;               ///< of all searches
+    double waited_s = 0.0;         ///< simulated time for which the arm held its place
+    std::optional<double> length;  ///< of the last path [rad or m]
+  };
+  std::optional<Guide> guide;
   /// A plant other than hamelin's own, with the contacts that it and the judge counted.
   struct Plant {
     std::string type, version;

@@ -366,9 +366,12 @@ typedef struct hamelin_host {
 
 /* hamelin_plugin.properties: what a planner does not promise, and what it can do besides. */
 enum {
-  HAMELIN_TICK_ALLOCATES = 1, /* its tick may use the heap, and so may wait for other threads */
-  HAMELIN_USES_THREADS = 2,   /* it starts threads of its own */
-  HAMELIN_FOLLOWS_TARGETS = 4 /* it accepts goals of the type HAMELIN_GOAL_FOLLOW */
+  HAMELIN_TICK_ALLOCATES = 1,  /* its tick may use the heap, and so may wait for other threads */
+  HAMELIN_USES_THREADS = 2,    /* it starts threads of its own */
+  HAMELIN_FOLLOWS_TARGETS = 4, /* it accepts goals of the type HAMELIN_GOAL_FOLLOW */
+  /* It follows the paths of joint goals. Where a guide searches paths, other planners are shown
+   * the way-points as joint goals, one after the other. */
+  HAMELIN_FOLLOWS_PATHS = 8
 };
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;

@@ -226,6 +226,8 @@ class Plugin {
   [[nodiscard]] bool uses_threads() const noexcept;
   /// Whether it accepts goals that follow a target.
   [[nodiscard]] bool follows_targets() const noexcept;
+  /// Whether it follows the paths of joint goals.
+  [[nodiscard]] bool follows_paths() const noexcept;
   /// Whether its planners' parameters can be changed while they run, and whether they can be told
   /// of a new start.
   [[nodiscard]] bool can_change_params() const noexcept;

@@ -54,6 +54,7 @@ struct Goal {
   Eigen::VectorXd q;  ///< joint [rad or m]
   /// Joint, if given as a path: way-points as columns, q the last; else empty.
   Eigen::MatrixXd path;
+  std::filesystem::path path_file;  ///< that the path was read from; empty: the scene file
   /// Position, pose: of the tip in the world; rotation unused for position. Follow: of the target
   /// at rest, see Frame::pose.
   geometry::SE3 pose;
@@ -167,6 +168,34 @@ struct Choice {
   Json params = Json::object();
 };
 
+/// Which planner of OMPL searches the joint path along which the arm is guided to each goal.
+enum class GuideType : std::int32_t {
+  none,
+  rrt,
+  rrt_connect,
+  rrt_star,
+  bit_star,
+  informed_rrt_star
+};
+
+/// The name in a scene file, such as "rrt-connect".
+[[nodiscard]] std::string_view to_string(GuideType type) noexcept;
+/// @return none for a name that is not that of a guide
+[[nodiscard]] std::optional<GuideType> guide_type(std::string_view name) noexcept;
+
+/// A guide, and how it searches.
+struct GuideSpec {
+  GuideType type = GuideType::none;
+  /// Clearance that paths keep away from the start and goals [m]; none: somewhat more than the
+  /// planner's margin.
+  std::optional<double> margin_m;
+  long checks_max = 200000;     ///< after which a search ends without a path
+  long improve_checks = 20000;  ///< how long a planner that optimises goes on after its first path
+  int searches_max = 5;         ///< of a goal, after stalls
+  /// Simulated time that a check takes [s]. With real time nothing is charged.
+  double check_time_s = 2e-6;
+};
+
 struct StallRule {
   double speed_m_s = 0.002, distance_m = 0.2, hold_s = 1.0;
 };
@@ -189,6 +218,7 @@ struct Scene {
   PlantType plant = PlantType::hamelin;
   Safety safety;
   std::optional<Choice> planner;
+  GuideSpec guide;
   Choice integrator{"hamel-variational", Json::object()};
   std::optional<StallRule> stall;
   double step_s = 0.001, duration_s = 10.0;
@@ -199,7 +229,7 @@ struct Scene {
 [[nodiscard]] std::filesystem::path target_file(const Goal& goal);
 
 /// The files that a run of the scene reads, without the scene file itself: robot, spheres, SRDF,
-/// way-points of obstacles and targets, streams of targets, map and its changes.
+/// paths of goals, way-points of obstacles and targets, streams of targets, map and its changes.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const Scene& scene);
 
 /// Reads a scene file; paths in it are relative to its folder, see resolve_path().

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/simulation/plan_paths.hpp"
+#include "output.hpp"
+#include "scene_flags.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+struct PlanOptions {
+  std::filesystem::path file;
+  SceneFlags flags;
+  std::optional<long> checks;
+  std::optional<std::filesystem::path> output;
+  bool json = false;
+};
+
+std::string plan_text(const simulation::PlannedGoal& goal, std::size_t index) {
+  const guide::Path& path = goal.path;
+  const std::string name = fmt::format("goal {}", index + 1);
+  if (!path.found())
+    return fmt::format("{:<12}{}: {}: {}, {} checks\n", name, goal.type,
+                       coloured("no path", Colour::bad), path.cause, path.checks);
+  return fmt::format(
+      "{:<12}{}: {} of length {:.4g} with {} way-points\n"
+      "{:<12}proved to keep {:.3g} m from obstacles and from itself\n"
+      "{:<12}{} checks, {} until the first path, which had the length {:.4g}; {:.3g} ms\n",
+      name, goal.type, coloured("path", Colour::good), path.length, path.points.cols(), "",
+      *std::min_element(goal.clearance_m.begin(), goal.clearance_m.end()), "", path.checks,
+      path.first_checks, guide::path_length(path.planned), 1e3 * goal.search_s);
+}
+
+int plan(PlanOptions options) {
+  if (options.checks)
+    options.flags.set.push_back(
+        fmt::format("/planner/guide_options/checks_max={}", *options.checks));
+  const scene::Scene scene = read_scene(options.file, options.flags);
+  std::optional<std::filesystem::path> target;
+  if (options.output) target = output_target(*options.output, files_of(scene));
+  const simulation::PathPlan plan = simulation::plan_paths(scene);
+  const Json document = simulation::to_json(plan);
+  if (target) write_file_atomically(*target, document.dump(1) + "\n");
+  if (options.json) {
+    print_json(document);
+  } else {
+    std::string text = fmt::format("{:<12}{}, seed {}\n", "guide", plan.guide, plan.seed);
+    for (std::size_t i = 0; i < plan.goals.size(); ++i) text += plan_text(plan.goals[i], i);
+    report(text);
+  }
+  return plan.found() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_plan(CLI::App& app, int& exit_code) {
+  auto* command = add_command(
+      app, "plan",
+      "Search a collision-free joint path to each goal of a scene, prove it clear, and write it. "
+      "The exit code is 1 if there is a goal to which no path was found",
+      "hamelin plan data/scenes/shelf.json --guide rrt-connect -o path.json\n"
+      "hamelin plan data/scenes/shelf.json --guide bit-star --checks 100000 --json");
+  const auto options = std::make_shared<PlanOptions>();
+  command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
+  add_guide_option(*command, options->flags);
+  command
+      ->add_option("--checks", options->checks,
+                   "checks after which a search ends without a path (default the scene's, or "
+                   "200000)")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 1000000000L));
+  command
+      ->add_option("--seed", options->flags.seed,
+                   "seed of all random numbers (default the scene's)")
+      ->type_name("S")
+      ->check(unsigned_range());
+  command
+      ->add_option("--set", options->flags.set,
+                   "set one value of the scene, e.g. /planner/guide_options/margin_m=0.02; may be "
+                   "repeated")
+      ->type_name("/json/pointer=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", options->output, "file to write the paths to")
+      ->type_name("FILE.json");
+  command->add_flag("--json", options->json, "print JSON");
+  command->callback([options, &exit_code] { exit_code = plan(*options); });
+}
+
+}  // namespace hamelin::app

@@ -1,0 +1,38 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/guide/joint_box.hpp"
+
+namespace hamelin::guide {
+
+/// Where the tip is to be, in the world.
+struct TipTarget {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  bool turns = true;  ///< whether the rotation counts
+  double tolerance_m = 0.01, tolerance_rad = 0.1;
+};
+
+/// Finds joint vectors at which the tip is at a target. One thread; no allocation after
+/// construction.
+class InverseKinematics {
+ public:
+  /// Both must outlive this.
+  InverseKinematics(const model::Model& model, const JointBox& box);
+  /// Damped least squares from q, docs/theory.md (15.16).
+  /// @return whether q is now within a third of the target's tolerances
+  [[nodiscard]] bool solve(const TipTarget& target, Eigen::VectorXd& q);
+  /// The number of iterations of the last call.
+  [[nodiscard]] int iterations() const noexcept { return iterations_; }
+
+ private:
+  const model::Model& model_;
+  const JointBox& box_;
+  dynamics::Workspace ws_;
+  dynamics::Matrix6Xd J_;
+  Eigen::VectorXd step_;
+  int iterations_ = 0;
+};
+
+}  // namespace hamelin::guide

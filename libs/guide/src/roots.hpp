@@ -1,0 +1,23 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "hamelin/core/rng.hpp"
+#include "hamelin/guide/guide.hpp"
+#include "hamelin/guide/joint_box.hpp"
+
+namespace hamelin::guide {
+
+/// A configuration at which a goal is reached, with its clearance [m].
+struct Root {
+  Eigen::VectorXd q;
+  double clearance;
+};
+
+/// Finds configurations at a goal, nearest to `start` first: the goal of a joint goal, or a clear
+/// place within its tolerance; several solutions of inverse kinematics for a goal of the tip.
+[[nodiscard]] std::vector<Root> find_roots(const model::Model& model, const JointBox& box,
+                                           const Settings& settings, const Problem& problem,
+                                           Query& query, Rng& rng);
+
+}  // namespace hamelin::guide

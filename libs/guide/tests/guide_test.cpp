@@ -1,0 +1,239 @@
+#include "hamelin/guide/guide.hpp"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <thread>
+
+#include "hamelin/core/rng.hpp"
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/guide/margins.hpp"
+#include "hamelin/model/make_chain.hpp"
+#include "hamelin/test/errors.hpp"
+#include "joint_space_world.hpp"
+
+using namespace hamelin;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+const std::vector<scene::GuideType> all_guides{
+    scene::GuideType::rrt_connect, scene::GuideType::rrt, scene::GuideType::rrt_star,
+    scene::GuideType::bit_star, scene::GuideType::informed_rrt_star};
+
+/// An arm of three joints, with a ball between start and goal in joint space.
+struct GuideRig {
+  GuideRig() : arm(model::make_chain({3})) {
+    settings.q_lower = VectorXd::Constant(3, -2.0);
+    settings.q_upper = VectorXd::Constant(3, 2.0);
+    settings.margin_m = 0.05;
+    settings.checks_max = 50000;
+    settings.improve_checks = 3000;
+    problem.start = VectorXd::Constant(3, -1.0);
+    problem.goal = scene::joint_goal(VectorXd::Constant(3, 1.0));
+  }
+  static std::vector<test::JointSpaceWorld::Ball> ball() { return {{VectorXd::Zero(3), 0.8}}; }
+
+  model::Model arm;
+  guide::Settings settings;
+  guide::Problem problem;
+};
+
+// The smallest distance from the balls at many places of a path, without the query's own proof.
+double sampled_distance(const test::JointSpaceWorld& world, const MatrixXd& points) {
+  double least = 1.0;
+  for (Index i = 0; i + 1 < points.cols(); ++i)
+    for (int k = 0; k <= 1000; ++k) {
+      const VectorXd q = points.col(i) + 1e-3 * k * (points.col(i + 1) - points.col(i));
+      least = std::min(least, world.distance(q, q));
+    }
+  return least;
+}
+
+}  // namespace
+
+TEST_CASE("each guide finds a path around an obstacle, which keeps the margin", "[guide]") {
+  if (!guide::available()) return;
+  for (const auto type : all_guides) {
+    CAPTURE(to_string(type));
+    GuideRig rig;
+    rig.settings.type = type;
+    test::JointSpaceWorld world(GuideRig::ball());
+    const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+    REQUIRE(path.found());
+    CHECK(path.cause.empty());
+    CHECK(path.points.col(0) == rig.problem.start);
+    CHECK(path.points.rightCols(1) == rig.problem.goal.q);
+    CHECK(path.margin_m == 0.05);
+    CHECK(sampled_distance(world, path.points) > 0.05 - 1e-9);
+    CHECK(path.points.cwiseAbs().maxCoeff() <= 2.0);
+    CHECK(path.checks == world.checks());
+    CHECK(path.first_checks > 0);
+    CHECK(path.first_checks <= path.checks);
+    CHECK(path.roots == 1);
+    CHECK(path.length <= guide::path_length(path.planned) + 1e-12);
+    // The shortest way has two tangents of the ball with the margin, and an arc between them.
+    const double half = std::sqrt(3.0), radius = 0.85;
+    const double shortest = 2.0 * std::sqrt(half * half - radius * radius) +
+                            radius * (std::numbers::pi - 2.0 * std::acos(radius / half));
+    CHECK(path.length >= shortest - 1e-9);
+    CHECK(path.length <= 1.2 * shortest);
+  }
+}
+
+TEST_CASE("a search depends on seed, number and problem alone", "[guide][threads]") {
+  if (!guide::available()) return;
+  for (const auto type : all_guides) {
+    CAPTURE(to_string(type));
+    GuideRig rig;
+    rig.settings.type = type;
+    const auto search = [&](std::uint64_t seed, std::uint64_t number) {
+      GuideRig own;
+      own.settings.type = type;
+      own.settings.seed = seed;
+      own.problem.number = number;
+      test::JointSpaceWorld world(GuideRig::ball());
+      return guide::Guide(own.arm, own.settings).search(own.problem, world);
+    };
+    const guide::Path first = search(7, 2);
+    (void)search(8, 2);
+    (void)search(7, 3);
+    const guide::Path again = search(7, 2);
+    CHECK(again.points == first.points);
+    CHECK(again.planned == first.planned);
+    CHECK(again.checks == first.checks);
+    CHECK(search(8, 2).planned != first.planned);
+    CHECK(search(7, 3).planned != first.planned);
+    std::vector<guide::Path> paths(3);
+    std::vector<std::thread> threads;
+    for (auto& path : paths) threads.emplace_back([&] { path = search(7, 2); });
+    for (auto& thread : threads) thread.join();
+    for (const auto& path : paths) CHECK(path.points == first.points);
+  }
+}
+
+TEST_CASE("a path to a goal of the tip ends within its tolerances", "[guide]") {
+  if (!guide::available()) return;
+  const model::Model arm(model::make_chain({}));
+  dynamics::Workspace ws(arm);
+  Rng rng(5);
+  for (const bool turns : {false, true}) {
+    const VectorXd reached = VectorXd::NullaryExpr(7, [&] { return rng.uniform(-1.0, 1.0); });
+    dynamics::forward_kinematics(arm, ws, reached);
+    const geometry::SE3 tip = dynamics::tip_pose(arm, ws);
+    guide::Problem problem;
+    problem.start = VectorXd::Zero(7);
+    problem.goal = turns ? scene::pose_goal(tip) : scene::position_goal(tip.p());
+    test::JointSpaceWorld world({{VectorXd::Constant(7, 0.3), 0.1}});
+    const guide::Path path = guide::Guide(arm, {}).search(problem, world);
+    REQUIRE(path.found());
+    CHECK(path.roots > 1);
+    dynamics::forward_kinematics(arm, ws, VectorXd(path.points.rightCols(1)));
+    const geometry::SE3 end = dynamics::tip_pose(arm, ws);
+    CHECK((end.p() - tip.p()).norm() < problem.goal.tolerance_m);
+    if (turns)
+      CHECK(Eigen::AngleAxisd(end.R().transpose() * tip.R()).angle() < problem.goal.tolerance_rad);
+  }
+}
+
+TEST_CASE("a search says why it found no path, and keeps to its checks", "[guide]") {
+  if (!guide::available()) return;
+  GuideRig rig;
+  rig.settings.checks_max = 2000;
+  const auto search = [&](const VectorXd& center, double radius) {
+    test::JointSpaceWorld world({{center, radius}});
+    return guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+  };
+  CHECK(search(rig.problem.start, 0.1).cause == "the arm is in contact where it is");
+  CHECK(search(rig.problem.goal.q, 0.2).cause == "no clear configuration was found at the goal");
+  // a ball that is wider than the joint limits, but contains neither start nor goal
+  rig.problem.start = VectorXd::Constant(3, -2.0);
+  rig.problem.goal.q = VectorXd::Constant(3, 2.0);
+  test::JointSpaceWorld wall({{VectorXd::Zero(3), 3.2}});
+  for (const auto type : all_guides) {
+    CAPTURE(to_string(type));
+    rig.settings.type = type;
+    const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, wall);
+    CHECK_FALSE(path.found());
+    CHECK(path.points.cols() == 0);
+    CHECK(path.cause == "no path was found within 2000 checks");
+    CHECK(path.checks < 4000);
+  }
+}
+
+TEST_CASE("a goal that is not clear is replaced by a clear place within its tolerance", "[guide]") {
+  if (!guide::available()) return;
+  GuideRig rig;
+  rig.problem.goal.tolerance_rad = 0.2;
+  test::JointSpaceWorld world({{rig.problem.goal.q, 0.05}});
+  const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+  REQUIRE(path.found());
+  const VectorXd end = path.points.rightCols(1);
+  CHECK(world.distance(end, end) > 0.0);
+  CHECK((end - rig.problem.goal.q).lpNorm<Eigen::Infinity>() < 0.2);
+}
+
+TEST_CASE("tight starts and goals are reached with the clearance that they have", "[guide]") {
+  if (!guide::available()) return;
+  GuideRig rig;
+  const VectorXd beside = VectorXd::Unit(3, 0);
+  test::JointSpaceWorld world({{rig.problem.start + 0.31 * beside, 0.3},
+                               {rig.problem.start - 0.31 * beside, 0.3},
+                               {rig.problem.goal.q + 0.32 * beside, 0.3}});
+  const guide::Path path = guide::Guide(rig.arm, rig.settings).search(rig.problem, world);
+  REQUIRE(path.found());
+  CHECK(sampled_distance(world, path.points) > 0.009);
+}
+
+TEST_CASE("bad settings and problems are refused in one line", "[guide]") {
+  if (!guide::available()) {
+    CHECK(test::error_of([] {
+            guide::Guide(model::Model(model::make_chain({3})), {});
+          }).find("install libompl-dev") != std::string::npos);
+    return;
+  }
+  GuideRig rig;
+  test::JointSpaceWorld world({});
+  const auto error = [&] {
+    return test::error_of(
+        [&] { (void)guide::Guide(rig.arm, rig.settings).search(rig.problem, world); });
+  };
+  rig.problem.start = VectorXd::Zero(2);
+  CHECK(error() ==
+        "guide: start: 2 values given, expected 3 finite numbers (one per joint of 'chain3')");
+  rig.problem.start = VectorXd::Constant(3, std::nan(""));
+  CHECK(error().starts_with("guide: start: 3 values given, expected 3 finite numbers"));
+  rig.problem.start = VectorXd::Zero(3);
+  rig.problem.goal.q = VectorXd::Zero(4);
+  CHECK(error().starts_with("guide: goal: 4 values given"));
+  rig.problem.goal = scene::follow_goal();
+  CHECK(error() == "guide: goal: follows a target, expected a goal that stays where it is");
+  rig.problem.goal = scene::position_goal({std::nan(""), 0.0, 0.0});
+  CHECK(error() == "guide: goal: is not finite, expected finite numbers");
+  rig.settings.q_lower = VectorXd::Zero(1);
+  CHECK(error() == "guide: 1 joint limits given, expected 3");
+  rig.settings.q_lower = {};
+  rig.settings.checks_max = 0;
+  CHECK(error().starts_with("guide: margins and checks_max:"));
+}
+
+TEST_CASE("the least margin on a line is that of its configurations", "[guide]") {
+  Rng rng(3);
+  const auto draw = [&] {
+    return VectorXd(VectorXd::NullaryExpr(4, [&] { return rng.uniform(-1.0, 1.0); }));
+  };
+  for (int i = 0; i < 200; ++i) {
+    guide::Margins margins(0.02);
+    margins.add(draw(), 0.005, 0.2, 0.9);
+    margins.add(draw(), 0.001, 0.02, 0.3);
+    margins.add(draw(), 0.05, 0.2, 0.9);  // has no effect
+    const VectorXd a = draw(), b = draw();
+    double least = 1.0;
+    for (int k = 0; k <= 2000; ++k)
+      least = std::min(least, margins.required(a + 5e-4 * k * (b - a)));
+    CHECK(margins.least(a, b) <= least + 1e-15);
+    CHECK(margins.least(a, b) > least - 1e-4);
+  }
+}

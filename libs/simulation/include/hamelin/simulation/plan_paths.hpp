@@ -1,0 +1,43 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "hamelin/guide/guide.hpp"
+#include "hamelin/io/json.hpp"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::simulation {
+
+/// The path to one goal of a scene, with its certificate.
+struct PlannedGoal {
+  std::string type;  ///< of the goal, as in a scene file
+  guide::Path path;
+  /// For each straight line of the path, the smallest distance of the arm from obstacles and from
+  /// itself that is proved, but for 0.1 mm [m]; at most 0.2 m.
+  std::vector<double> clearance_m;
+  double search_s = 0.0;  ///< CPU time of the search; no result depends on it
+};
+
+/// The paths of a scene's guide, one after the other.
+struct PathPlan {
+  std::string scene, robot, guide;
+  std::vector<std::string> joints;
+  std::uint64_t seed = 1;
+  std::vector<PlannedGoal> goals;  ///< up to the first without a path
+  std::size_t goal_count = 0;      ///< of the scene
+  [[nodiscard]] bool found() const noexcept {
+    return goals.size() == goal_count && (goals.empty() || goals.back().path.found());
+  }
+};
+
+/// Searches a path from the start of a scene to its first goal, and from each goal to the next, in
+/// the world as it is at time 0.
+/// @throws Error io, parse or invalid for bad input, a scene without guide, a goal that follows a
+///         target, or a build without OMPL
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene);
+
+/// As hamelin.path/1, docs/schema/path.schema.json.
+[[nodiscard]] Json to_json(const PathPlan& plan);
+
+}  // namespace hamelin::simulation

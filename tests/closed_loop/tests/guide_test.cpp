@@ -1,0 +1,133 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "hamelin/guide/guide.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/log/read_log.hpp"
+#include "hamelin/simulation/plan_paths.hpp"
+#include "hamelin/simulation/run.hpp"
+#include "hamelin/test/errors.hpp"
+#include "hamelin/test/temporary.hpp"
+
+using namespace hamelin;
+
+namespace {
+
+scene::Scene shelf(const std::vector<std::string>& settings) {
+  const std::filesystem::path file =
+      std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/shelf.json";
+  Json document = read_json(file);
+  for (const auto& setting : settings) scene::set_pointer(document, setting);
+  return scene::scene_from_json(document, file.parent_path(), file.string());
+}
+
+log::Result run(const std::vector<std::string>& settings, const simulation::Watch& watch = {}) {
+  return simulation::run(shelf(settings), {HAMELIN_TEST_PLUGIN_DIR}, watch);
+}
+
+std::vector<Json> logged_ticks(const std::vector<std::string>& settings) {
+  const test::TemporaryFolder folder;
+  log::RunLog log(folder.path() / "run.jsonl");
+  simulation::Watch watch;
+  watch.log = &log;
+  watch.every = 10;
+  (void)run(settings, watch);
+  std::vector<Json> ticks;
+  for (auto& line : log::read_log(log.file()).lines)
+    if (line["type"] == "tick" || line["type"] == "event") {
+      line.erase("timing");
+      ticks.push_back(std::move(line));
+    }
+  return ticks;
+}
+
+const std::string connect = "/planner/guide=rrt-connect";
+
+}  // namespace
+
+TEST_CASE("a guided planner without an escape reaches all goals, clear and certified",
+          "[closed_loop][guide]") {
+  if (!guide::available()) return;
+  const auto guide = GENERATE(as<std::string>{}, "rrt", "rrt-connect", "rrt-star", "bit-star",
+                              "informed-rrt-star");
+  CAPTURE(guide);
+  const log::Result result = run({"/planner/guide=" + guide, "/planner/params/escape=none",
+                                  "/duration_s=60", "/planner/guide_options/improve_checks=2000"});
+  CHECK(result.outcome == log::Outcome::reached);
+  CHECK(*result.min_clearance_m > 0.0);
+  CHECK(result.certified_share == 1.0);
+  REQUIRE(result.guide);
+  CHECK(result.guide->type == guide);
+  CHECK(result.guide->searches >= 5);  // one per goal
+  CHECK(result.guide->found == result.guide->searches);
+  CHECK(result.guide->kept == 0);
+  CHECK(*result.guide->length > 0.0);
+}
+
+TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
+  if (!guide::available()) return;
+  const std::vector<Json> first = logged_ticks({connect}), again = logged_ticks({connect});
+  REQUIRE(first.size() > 100);
+  CHECK(first == again);
+  CHECK(first != logged_ticks({connect, "/seed=2"}));
+}
+
+TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
+  if (!guide::available()) return;
+  const std::string one_goal =
+      R"(/goals=[{"type": "joint", "q": [0.3, -0.4, 0, -1.5, 0, 1.4, 0]}])";
+  for (const double check_s : {0.0, 1e-4, 1e-3}) {
+    CAPTURE(check_s);
+    const log::Result result =
+        run({connect, one_goal, "/planner/guide_options/check_time_s=" + std::to_string(check_s)});
+    CHECK(result.outcome == log::Outcome::reached);
+    REQUIRE(result.guide);
+    CHECK(result.guide->searches == 1);
+    // docs/theory.md (17.5); an answer arrives at the next tick
+    const double charge = check_s * static_cast<double>(result.guide->checks);
+    CHECK(result.guide->waited_s >= charge);
+    CHECK(result.guide->waited_s < charge + 0.0025);
+  }
+}
+
+TEST_CASE("a guided run whose map changes in its way searches again", "[closed_loop][guide]") {
+  if (!guide::available()) return;
+  const scene::Scene scene = shelf({connect});
+  const simulation::PathPlan plan = simulation::plan_paths(scene);
+  REQUIRE(plan.found());
+  CHECK(plan.goals.size() == 5);
+  // A change far away from the arm: the paths stay clear.
+  const std::string map = R"(/map/changes=[{"time_s": 0.5, "occupied_boxes_m": [[)";
+  const log::Result away = run({connect, map + R"(-0.8, -0.8, 0.0, -0.78, -0.78, 0.02]]}])"});
+  CHECK(away.outcome == log::Outcome::reached);
+  REQUIRE(away.guide);
+  CHECK(away.guide->kept == 1);
+  CHECK(away.guide->searches == 5);
+}
+
+TEST_CASE("plans have a certificate for each line and chain from goal to goal",
+          "[closed_loop][guide]") {
+  if (!guide::available()) return;
+  const simulation::PathPlan plan = simulation::plan_paths(shelf({connect}));
+  const Json document = simulation::to_json(plan);
+  check_shipped_schema(document, "path", "plan");
+  for (std::size_t i = 0; i < plan.goals.size(); ++i) {
+    const Eigen::MatrixXd& points = plan.goals[i].path.points;
+    REQUIRE(plan.goals[i].clearance_m.size() + 1 == static_cast<std::size_t>(points.cols()));
+    for (const double clearance : plan.goals[i].clearance_m) CHECK(clearance > 0.0);
+    if (i > 0) CHECK(points.col(0) == plan.goals[i - 1].path.points.rightCols(1));
+  }
+  const Json again = simulation::to_json(simulation::plan_paths(shelf({connect})));
+  CHECK(again["paths"][0]["q"] == document["paths"][0]["q"]);
+  CHECK(test::error_of([] { (void)simulation::plan_paths(shelf({})); })
+            .ends_with("shelf.json: /planner/guide: is none, expected a guide such as "
+                       "rrt-connect"));
+}
+
+TEST_CASE("a scene that asks for a guide says in one line that the build has none",
+          "[closed_loop][guide]") {
+  if (guide::available()) return;
+  CHECK(test::error_of([] { (void)run({connect}); }) ==
+        "guide: this build of hamelin is without OMPL, expected guide none; to build with OMPL, "
+        "install libompl-dev and configure again");
+}

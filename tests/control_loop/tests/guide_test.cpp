@@ -1,0 +1,179 @@
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
+
+#include "../loop.hpp"
+#include "hamelin/guide/guide.hpp"
+#include "hamelin/test/allocations.hpp"
+
+using namespace hamelin;
+using Eigen::VectorXd;
+using test::Loop;
+using test::sampled;
+
+namespace {
+
+scene::Scene guided_scene() {
+  scene::Scene scene = sampled("clutter.json");
+  scene.guide.type = scene::GuideType::rrt_connect;
+  return scene;
+}
+
+const Json no_escape{{"escape", "none"}};
+
+}  // namespace
+
+TEST_CASE("a controller follows paths that its guide's thread finds, without allocating in ticks",
+          "[control][guide][threads]") {
+  if (!guide::available()) return;
+  Loop loop(guided_scene(), {}, no_escape);
+  control::ControlState state = control::ControlState::running;
+  long allocations = 0;
+  for (long k = 0; k < 60000 && state == control::ControlState::running; ++k) {
+    const control::Answer* answer = nullptr;
+    const long made = test::allocations_in([&] { answer = &loop.tick(); });
+    if (k > 0) allocations += made;
+    state = answer->state;
+    loop.step(answer->torque);
+    if (k > 0) CHECK(loop.controller.verdict()->certified);
+    // The thread runs in real time, the loop does not.
+    if (loop.controller.guide_figures()->found == 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  CHECK(state == control::ControlState::reached);
+  CHECK(loop.controller.guide_figures()->found > 0);
+  if (test::counts_allocations()) CHECK(allocations == 0);
+}
+
+TEST_CASE("without a thread the guide searches when it is told to, and the arm waits until then",
+          "[control][guide]") {
+  if (!guide::available()) return;
+  control::Controller::Options options;
+  options.guide_thread = false;
+  Loop loop(guided_scene(), options, no_escape);
+  const VectorXd start = loop.state.q;
+  for (int k = 0; k < 300; ++k) loop.step(loop.tick().torque);
+  CHECK((loop.state.q - start).lpNorm<Eigen::Infinity>() < 1e-3);
+  CHECK(loop.controller.guide_figures()->searches == 0);
+  CHECK(loop.controller.guide_figures()->waited_s == Approx(0.3));
+  loop.controller.run_guide();
+  for (int k = 0; k < 500; ++k) loop.step(loop.tick().torque);
+  CHECK((loop.state.q - start).lpNorm<Eigen::Infinity>() > 0.05);
+  CHECK(loop.controller.guide_figures()->found == 1);
+}
+
+TEST_CASE("a path that stays clear is kept where the world changes, and searched again where not",
+          "[control][guide]") {
+  if (!guide::available()) return;
+  control::Controller::Options options;
+  options.guide_thread = false;
+  Loop loop(guided_scene(), options, no_escape);
+  const auto ticks = [&](int count) {
+    for (int k = 0; k < count; ++k) {
+      loop.step(loop.tick().torque);
+      loop.controller.run_guide();
+    }
+  };
+  ticks(400);
+  const control::Guidance::Figures& figures = *loop.controller.guide_figures();
+  REQUIRE(figures.found == 1);
+  scene::Obstacle ball;
+  ball.name = "ball";
+  ball.radius_m = 0.05;
+  ball.pose = {Eigen::Matrix3d::Identity(), {0.0, 0.0, 1.9}};  // out of reach
+  loop.controller.world().set_obstacle(ball);
+  ticks(100);
+  CHECK(figures.kept == 1);
+  CHECK(figures.searches == 1);
+  // where the tip is to be
+  dynamics::Workspace ws(loop.arm);
+  const scene::Goal& goal = loop.controller.goals().goal();
+  geometry::SE3 place = goal.pose;
+  if (goal.type == scene::GoalType::joint) {
+    dynamics::forward_kinematics(loop.arm, ws, goal.q);
+    place = dynamics::tip_pose(loop.arm, ws);
+  }
+  ball.pose = place;
+  loop.controller.world().set_obstacle(ball);
+  ticks(100);
+  CHECK(figures.searches == 2);
+  CHECK(figures.kept == 1);
+}
+
+TEST_CASE("new goals, a new start and a load begin with a search of their own",
+          "[control][guide]") {
+  if (!guide::available()) return;
+  control::Controller::Options options;
+  options.guide_thread = false;
+  options.payload_reach_m = 0.3;
+  options.payload_shapes_max = 2;
+  Loop loop(guided_scene(), options, no_escape);
+  const auto ticks = [&](int count) {
+    for (int k = 0; k < count; ++k) {
+      loop.step(loop.tick().torque);
+      loop.controller.run_guide();
+    }
+  };
+  const control::Guidance::Figures& figures = *loop.controller.guide_figures();
+  ticks(50);
+  CHECK(figures.searches == 1);
+  loop.controller.set_goal(scene::joint_goal(loop.state.q + VectorXd::Constant(7, 0.1)));
+  ticks(50);
+  CHECK(figures.searches == 2);
+  scene::Payload cup;
+  cup.name = "cup";
+  cup.mass_kg = 0.1;
+  cup.spheres = {{{0.0, 0.0, 0.05}, 0.02}};
+  loop.controller.attach(cup, loop.state.q);
+  ticks(50);
+  CHECK(figures.searches == 3);
+  loop.controller.reset();
+  ticks(50);
+  CHECK(figures.searches == 4);
+}
+
+TEST_CASE("planners that follow no paths are shown their way-points", "[control][guide]") {
+  const scene::GuideSpec spec{scene::GuideType::rrt_connect, {}, 1000, 0, 1, 0.0};
+  CHECK(planning::find_plugin("hybrid", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
+  CHECK_FALSE(planning::find_plugin("apf", {HAMELIN_TEST_PLUGIN_DIR}).follows_paths());
+  if (!guide::available()) return;
+  scene::Scene scene = guided_scene();
+  scene.planner->name = "apf";
+  control::Controller::Options options;
+  options.guide_thread = false;
+  Loop loop(scene, options);
+  control::GuideSearch search(
+      loop.arm, loop.controller.world(), loop.controller.view(),
+      control::guide_settings(scene, loop.arm, loop.controller.view(), {}, Json::object()), 64,
+      false);
+  for (const bool follows : {true, false}) {
+    control::Guidance guidance(spec, loop.arm.dof(), 64, follows, false);
+    VectorXd q = scene.start_q;
+    const auto update = [&](double time_s) {
+      const auto news =
+          guidance.update({time_s, 0.001, q, scene.goals.front(), follows ? 1U : 2U, 0}, search);
+      search.run();
+      return news;
+    };
+    CHECK(update(0.0) == control::Guidance::News::none);
+    REQUIRE(guidance.goal() != nullptr);  // holds its place
+    CHECK(VectorXd::Map(guidance.goal()->q, q.size()) == q);
+    CHECK(update(0.001) == control::Guidance::News::path);
+    const std::size_t points = guidance.goal()->path_points;
+    if (follows) {
+      CHECK(points >= 2);
+      continue;
+    }
+    CHECK(points == 0);
+    // An arm that jumps to whatever it is shown passes the way-points one after the other.
+    const Eigen::MatrixXd path = search.take().path.points;
+    for (int k = 2; k < 100; ++k) {
+      (void)update(0.001 * k);
+      q = VectorXd::Map(guidance.goal()->q, q.size());
+      bool on_path = false;
+      for (Eigen::Index i = 0; i < path.cols(); ++i) on_path = on_path || path.col(i) == q;
+      CHECK(on_path);
+    }
+    CHECK(q == path.rightCols(1));
+  }
+}
