@@ -8,6 +8,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/trajectory.hpp"
 #include "hamelin/optimal/scene_motion.hpp"
+#include "hamelin/simulation/plan_paths.hpp"
 #include "output.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
@@ -66,6 +67,19 @@ std::string file_text(const OptimizeOptions& options, const optimal::SceneMotion
   return optimal::to_json(motion, options.motion, options.rate_hz).dump(1) + "\n";
 }
 
+// The paths of the scene's guide, along which the guesses go; none without a guide.
+std::vector<Eigen::MatrixXd> guide_paths(const scene::Scene& scene) {
+  std::vector<Eigen::MatrixXd> paths;
+  if (scene.guide.type == scene::GuideType::none) return paths;
+  const simulation::PathPlan plan = simulation::plan_paths(scene);
+  if (!plan.found())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /goals/{}: {} found no path: {}", scene.name,
+                            plan.goals.size() - 1, plan.guide, plan.goals.back().path.cause));
+  for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
+  return paths;
+}
+
 int optimize(OptimizeOptions options) {
   options.motion.objective =
       options.minimize == "time" ? optimal::Objective::time : optimal::Objective::effort;
@@ -74,7 +88,8 @@ int optimize(OptimizeOptions options) {
   const scene::Scene scene = read_scene(options.file, options.flags);
   std::optional<std::filesystem::path> target;
   if (options.output) target = output_target(*options.output, files_of(scene));
-  const optimal::SceneMotion motion = optimal::optimize_scene(scene, options.motion);
+  const optimal::SceneMotion motion =
+      optimal::optimize_scene(scene, options.motion, guide_paths(scene));
   if (target && motion.valid()) write_file_atomically(*target, file_text(options, motion));
   if (options.json) {
     print_json(optimal::to_json(motion, options.motion, options.rate_hz));
@@ -93,14 +108,15 @@ void add_optimize(CLI::App& app, int& exit_code) {
       app, "optimize",
       "Find the motion of least effort or least time to the goals of a scene within all limits, "
       "and prove it clear. The exit code is 1 if a goal has no such motion",
-      "hamelin optimize data/scenes/shelf.json -o shelf-motion.json\n"
-      "hamelin optimize data/scenes/shelf.json --minimize time --jerk 5000 --rate 1000 --format "
+      "hamelin optimize data/scenes/shelf.json --guide rrt-connect -o shelf-motion.json\n"
+      "hamelin optimize data/scenes/pillar.json --minimize time --jerk 5000 --rate 1000 --format "
       "csv "
       "-o fast.csv");
   const auto options = std::make_shared<OptimizeOptions>();
   optimal::SceneMotionOptions& motion = options->motion;
   const CLI::Range positive(1e-9, 1e12);
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
+  add_guide_option(*command, options->flags);
   restrict_values(
       command
           ->add_option("--minimize", options->minimize,
