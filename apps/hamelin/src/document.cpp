@@ -25,6 +25,8 @@ std::string_view to_string(Kind kind) noexcept {
       return "explanation";
     case Kind::path:
       return "path";
+    case Kind::trajectory:
+      return "trajectory";
     case Kind::primitives:
       return "primitives";
     case Kind::spheres:
@@ -85,6 +87,7 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.result/1") return Kind::result;
   if (schema == "hamelin.explanation/1") return Kind::explanation;
   if (schema == "hamelin.path/1") return Kind::path;
+  if (schema == "hamelin.trajectory/1") return Kind::trajectory;
   if (schema == "hamelin.primitives/1") return Kind::primitives;
   if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema == "hamelin.summary/1") return Kind::summary;
@@ -96,9 +99,8 @@ Kind recognise(const std::filesystem::path& file) {
       ErrorCode::invalid,
       fmt::format(
           "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
-          "hamelin.explanation/1, hamelin.path/1, hamelin.primitives/1, hamelin.sweep/1, "
-          "hamelin.summary/1 or "
-          "hamelin.accuracy/1",
+          "hamelin.explanation/1, hamelin.path/1, hamelin.trajectory/1, hamelin.primitives/1, "
+          "hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

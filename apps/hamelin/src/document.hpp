@@ -15,6 +15,7 @@ enum class Kind {
   result,
   explanation,
   path,
+  trajectory,
   primitives,
   spheres,
   waypoints,

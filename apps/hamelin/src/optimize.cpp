@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 
 #include "command_line.hpp"
@@ -40,15 +41,15 @@ std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
                                                                 : Colour::bad),
                                  s.iterations, f.motion.duration_s(), s.cost);
   if (!s.converged) text += fmt::format("{:<12}{}\n", "", s.cause);
-  text += fmt::format(
-      "{:<12}limits violated by {:.2g} of them at the knots; torques up to {:.4g} of "
-      "their limits along the motion\n",
-      "", s.violation, f.torque_share);
-  text += f.proof.certified
-              ? fmt::format("{:<12}proved to keep {:.4g} m between the knots, too\n", "",
-                            f.proof.margin_m)
-              : fmt::format("{:<12}{} from {:.4g} s on\n", "",
-                            coloured("not proved clear", Colour::bad), f.proof.first_open_s);
+  if (goal.valid())
+    text += fmt::format("{:<12}limits kept; torques up to {:.3g} % of theirs\n", "",
+                        100.0 * f.torque_share);
+  if (!f.proof.certified)
+    text += fmt::format("{:<12}{} from {:.4g} s on\n", "",
+                        coloured("not proved clear", Colour::bad), f.proof.first_open_s);
+  else if (std::isfinite(f.proof.margin_m))
+    text += fmt::format("{:<12}proved to keep {:.3g} m from obstacles and from itself\n", "",
+                        f.proof.margin_m);
   return text;
 }
 

@@ -91,6 +91,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::path:
       check_shipped_schema(read_json(file), "path", file.string());
       return "path";
+    case Kind::trajectory:
+      check_shipped_schema(read_json(file), "trajectory", file.string());
+      return "trajectory";
     case Kind::primitives:
       return fmt::format(
           "primitives, {} obstacles",
@@ -152,7 +155,7 @@ void add_validate(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "validate",
                   "Check robots, collision spheres, scenes, maps, way-points, logs, results, "
-                  "explanations, paths and sweeps against their formats. The kind of "
+                  "explanations, paths, trajectories and sweeps against their formats. The kind of "
                   "each file is recognised by its content",
                   "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
                   "hamelin validate arm.urdf --tip tool0\n"

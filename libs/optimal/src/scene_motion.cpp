@@ -163,6 +163,7 @@ Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
   const auto numbers = [](const VectorXd& x) {
     return Json(std::vector<double>(x.data(), x.data() + x.size()));
   };
+  const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
   Json goals = Json::array(), points = Json::array();
   for (const auto& goal : motion.goals) {
     const Optimized& f = goal.found;
@@ -171,11 +172,11 @@ Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
                      {"converged", f.solution.converged},
                      {"cause", f.solution.cause},
                      {"iterations", f.solution.iterations},
-                     {"stationarity", f.solution.stationarity},
+                     {"stationarity", finite(f.solution.stationarity)},
                      {"violation", f.solution.violation},
                      {"torque_share", f.torque_share},
                      {"certified", f.proof.certified},
-                     {"margin_m", f.proof.margin_m},
+                     {"margin_m", finite(f.proof.margin_m)},
                      {"clearance_points", f.clearance_points}});
   }
   for (const auto& point : motion.points(rate_hz))
