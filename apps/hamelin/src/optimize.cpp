@@ -42,8 +42,10 @@ std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
                                  s.iterations, f.motion.duration_s(), s.cost);
   if (!s.converged) text += fmt::format("{:<12}{}\n", "", s.cause);
   if (goal.valid())
-    text += fmt::format("{:<12}limits kept; torques up to {:.3g} % of theirs\n", "",
-                        100.0 * f.torque_share);
+    text += fmt::format("{:<12}limits kept{}\n", "",
+                        f.torque_share > 0.0 ? fmt::format("; torques up to {:.3g} % of theirs",
+                                                           100.0 * f.torque_share)
+                                             : "");
   if (!f.proof.certified)
     text += fmt::format("{:<12}{} from {:.4g} s on\n", "",
                         coloured("not proved clear", Colour::bad), f.proof.first_open_s);

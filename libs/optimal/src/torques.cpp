@@ -10,13 +10,27 @@ namespace hamelin::optimal {
 
 namespace {
 
+// Torques that hold the arm at the start and accelerate one joint there [Nm or N].
+VectorXd usual_torques(const Problem& problem) {
+  constexpr double acceleration = 10.0;
+  const Index n = problem.model->dof();
+  dynamics::Workspace ws(*problem.model);
+  VectorXd hold(n);
+  MatrixXd M(n, n);
+  dynamics::gravity_torque(*problem.model, ws, problem.q_start, hold);
+  dynamics::mass_matrix(*problem.model, ws, problem.q_start, M);
+  return hold.cwiseAbs() + acceleration * M.diagonal();
+}
+
 VectorXd weights_of(const Problem& problem) {
   if (problem.effort_weights.size() > 0) return problem.effort_weights;
+  VectorXd scale = problem.objective == Objective::time
+                       ? usual_torques(problem)
+                       : VectorXd(VectorXd::Ones(problem.q_start.size()));
   const VectorXd& limit = problem.limits.torque;
-  VectorXd out = VectorXd::Ones(problem.q_start.size());
   for (Index j = 0; j < limit.size(); ++j)
-    if (std::isfinite(limit[j])) out[j] = 1.0 / (limit[j] * limit[j]);
-  return out;
+    if (std::isfinite(limit[j])) scale[j] = limit[j];
+  return scale.cwiseAbs2().cwiseInverse();
 }
 
 }  // namespace

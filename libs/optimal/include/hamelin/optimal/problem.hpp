@@ -52,7 +52,8 @@ struct Problem {
   double duration_s = 1.0;  ///< of the motion, or with Objective::time of the first guess
   Limits limits;
   /// R of the effort, diagonal, dof numbers; with size zero the inverse squares of the torque
-  /// limits, or ones without limits.
+  /// limits, or of 1 without limits; of usual torques
+  /// with Objective::time.
   VectorXd effort_weights;
   /// With Objective::time, the weight of the mean of τᵀRτ beside the time [s]: it makes the
   /// solution unique and smooth.
