@@ -192,7 +192,7 @@ int run(int argc, char** argv) {
           rig->query.refresh(0.0);
           SampledQuery sampling(rig->query, 32.0);
           guide::Query& query = sampled ? static_cast<guide::Query&>(sampling) : rig->query;
-          const guide::Problem problem{scene.start_q, scene.goals.front(), 0};
+          const guide::Problem problem{scene.start_q, scene.goals.front(), 1};
           const double since = cpu_s();
           (void)first.search(problem, query);
           const double first_time = cpu_s() - since;

@@ -1,6 +1,10 @@
 #include "hamelin/control/guide_query.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "hamelin/core/error.hpp"
 
 namespace hamelin::control {
 
@@ -56,6 +60,12 @@ double GuideQuery::proved_clearance(const VectorXd& a, const VectorXd& b) {
 guide::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
                                const WorldView& view, const LimitReserve& reserve,
                                const Json& params) {
+  if (!guide::available())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: /planner/guide: is {}, which this build of hamelin is without, "
+                            "expected none; to build with OMPL, install libompl-dev and configure "
+                            "again",
+                            scene.name, scene::to_string(scene.guide.type)));
   guide::Settings out;
   out.type = scene.guide.type;
   const planning::SetupData setup = planner_setup(scene, nominal, view, scene.step_s, reserve);

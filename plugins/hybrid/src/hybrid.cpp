@@ -206,7 +206,7 @@ class Hybrid final : public planning::Planner {
       const double distance = law_.distance(model_, ws_, q_, target);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
       // Steering turns faster than the law follows, so the arm would circle around a near target,
-      // and leave a path.
+      // or stray from a path.
       if (!observer_ && !(mode_ == Mode::goal && !path_.empty() && !evader_.active()))
         law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_,
                    std::min(1.0, distance / steering_fade), command);

@@ -99,6 +99,7 @@ TEST_CASE("bad input of plan and of paths ends in one line", "[plan]") {
   CHECK_THAT(error(path_goal("path.json", 0)), Catch::Contains("2 values given, expected 7"));
   if (guide::available()) return;
   CHECK(error(plan_shelf) ==
-        "hamelin: guide: this build of hamelin is without OMPL, expected guide none; to build with "
-        "OMPL, install libompl-dev and configure again\n");
+        "hamelin: data/scenes/shelf.json: /planner/guide: is rrt-connect, which this build of "
+        "hamelin is without, expected none; to build with OMPL, install libompl-dev and configure "
+        "again\n");
 }

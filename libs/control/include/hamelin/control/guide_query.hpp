@@ -48,6 +48,7 @@ class GuideQuery final : public guide::Query {
 /// @param nominal the controller's model @param view of the world
 /// @param reserve what a shield keeps
 /// @param params of the planner: guides keep somewhat more than its margin_m
+/// @throws Error invalid if the build has no OMPL
 [[nodiscard]] guide::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
                                              const WorldView& view, const LimitReserve& reserve,
                                              const Json& params);
