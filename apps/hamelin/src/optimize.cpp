@@ -112,8 +112,7 @@ void add_optimize(CLI::App& app, int& exit_code) {
       "Find the motion of least effort or least time to the goals of a scene within all limits, "
       "and prove it clear. The exit code is 1 if a goal has no such motion",
       "hamelin optimize data/scenes/shelf.json --guide rrt-connect -o shelf-motion.json\n"
-      "hamelin optimize data/scenes/pillar.json --minimize time --jerk 5000 --rate 1000 --format "
-      "csv "
+      "hamelin optimize data/scenes/pillar.json --minimize time --rate 1000 --format csv "
       "-o fast.csv");
   const auto options = std::make_shared<OptimizeOptions>();
   optimal::SceneMotionOptions& motion = options->motion;

@@ -154,9 +154,8 @@ int validate(const ValidateOptions& options) {
 void add_validate(CLI::App& app, int& exit_code) {
   auto* command =
       add_command(app, "validate",
-                  "Check robots, collision spheres, scenes, maps, way-points, logs, results, "
-                  "explanations, paths, trajectories and sweeps against their formats. The kind of "
-                  "each file is recognised by its content",
+                  "Check files of all formats: robots, scenes, maps, logs, results and the others. "
+                  "The kind of each file is recognised by its content",
                   "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
                   "hamelin validate arm.urdf --tip tool0\n"
                   "hamelin validate run.jsonl --json");
