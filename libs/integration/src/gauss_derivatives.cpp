@@ -8,13 +8,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 GaussDifferentiator::Stage::Stage(Index dof)
-    : M(MatrixXd::Zero(dof, dof)),
+    : M(MatrixXd::Zero(padded(dof), dof)),
       dp_dq(M),
       by_q(M),
       by_v(M),
       v(VectorXd::Zero(dof)),
-      p_rate(v),
-      v_sum(v) {}
+      v_sum(v),
+      p_rate(v) {}
 
 GaussDifferentiator::GaussDifferentiator(const Model& model, const GaussOptions& options)
     : StepDifferentiator("gauss", model),
@@ -25,26 +25,14 @@ GaussDifferentiator::GaussDifferentiator(const Model& model, const GaussOptions&
       potential_(model.dof()),
       forces_(model.dof()),
       stage_(tableau_.stages, Stage(model.dof())),
-      system_(stages_ * model.dof(), 3 * model.dof() + 1, options.isa),
-      weights_(stages_ * stages_ + 2 * stages_ + 1, stages_),
-      by_q_(RowMatrixXd::Zero(stages_, padded(Index{model.dof()} * model.dof()))),
-      weighed_(RowMatrixXd::Zero(weights_.rows(), by_q_.cols())),
-      p_by_v_(model.dof(), stages_ * model.dof()),
-      q_by_all_(model.dof(), padded(3 * model.dof() + 1)),
-      p_by_all_(q_by_all_),
+      system_(stages_ * model.dof(), 2 * model.dof(), options.isa),
+      minus_right_(RowMatrixXd::Zero(model.dof() + 1, padded(stages_ * model.dof()) + padded(1))),
+      by_start_(RowMatrixXd::Zero(model.dof() + 1, padded(2 * model.dof()) + padded(1))),
+      by_momentum_(RowMatrixXd::Zero(model.dof(), padded(2 * model.dof()))),
+      by_torque_(by_momentum_),
       q_(VectorXd::Zero(model.dof())),
       memory_(VectorXd::Zero(static_cast<Index>(kernel::GaussMemory::size(
-          kernel::GaussForm::momentum, static_cast<std::size_t>(model.dof()), tableau_.stages)))) {
-  // docs/theory.md (5.20): the rows for pairs of stages, then for stages, then for the end
-  for (Index l = 0; l < stages_; ++l) {
-    for (Index i = 0; i < stages_; ++i) {
-      for (Index j = 0; j < stages_; ++j) weights_(i * stages_ + j, l) = a(i, l) * a(l, j);
-      weights_(stages_ * stages_ + i, l) = a(i, l);
-      weights_(stages_ * (stages_ + 1) + i, l) = tableau_.b[l] * a(l, i);
-    }
-    weights_(weights_.rows() - 1, l) = tableau_.b[l];
-  }
-}
+          kernel::GaussForm::momentum, static_cast<std::size_t>(model.dof()), tableau_.stages)))) {}
 
 double GaussDifferentiator::last_step(const State& after) const {
   using Memory = kernel::GaussMemory;
@@ -57,10 +45,10 @@ bool GaussDifferentiator::compute(const State& after, const Channels& channels,
                                   StepDerivatives& out) {
   const double h = out.step_s;
   evaluate(after, channels, h);
-  weighed_.setZero();
-  system_.add_product(weights_, by_q_, weighed_);
   assemble(h);
+  assemble_right(h);
   if (!system_.solve()) return false;
+  combine_solution(h);
   write(h, out);
   return true;
 }
@@ -84,71 +72,105 @@ void GaussDifferentiator::evaluate(const State& after, const Channels& channels,
     for (Index j = 0; j < stages_; ++j) q_ -= dq.col(j);
     dynamics::energy_derivatives(model_, ws_, q_, stage.v, kinetic_, potential_);
     forces_.evaluate(model_, channels, ws_.ws, q_, stage.v);
-    stage.M = kinetic_.M;
-    stage.dp_dq = kinetic_.dp_dq;
-    stage.by_q = kinetic_.d2K_dq2 - potential_.d2U_dq2 + forces_.by_q;
-    stage.by_v = kinetic_.dp_dq.transpose() + forces_.by_v;
-    Eigen::Map<MatrixXd>(by_q_.row(i).data(), n, n) = stage.by_q;
+    stage.M.topRows(n) = kinetic_.M;
+    stage.dp_dq.topRows(n) = kinetic_.dp_dq;
+    stage.by_q.topRows(n) = kinetic_.d2K_dq2 - potential_.d2U_dq2 + forces_.by_q;
+    stage.by_v.topRows(n) = kinetic_.dp_dq.transpose() + forces_.by_v;
+    stage.p_rate += h * stage.by_q.topRows(n).lazyProduct(stage.v_sum);
   }
 }
 
-// docs/theory.md (5.21)
+GaussDifferentiator::Sum& GaussDifferentiator::Sum::add(double weight, const double* matrix) {
+  terms[count] = matrix;
+  weights[count++] = weight;
+  return *this;
+}
+
+void GaussDifferentiator::store(const Sum& sum, Index term_stride, Index size, double* out,
+                                Index out_stride) const {
+  const auto unsigned_of = [](Index x) { return static_cast<std::size_t>(x); };
+  system_.kernels().combine(sum.count, sum.terms.data(), sum.weights.data(),
+                            unsigned_of(model_.dof()), unsigned_of(size), unsigned_of(term_stride),
+                            out, unsigned_of(out_stride));
+}
+
+// docs/theory.md (5.21), (5.23): the rows are transposed, so a column of a block is contiguous. A
+// block is written before the one after it, whose first numbers its padding overwrites.
 void GaussDifferentiator::assemble(double h) {
+  const Index n = model_.dof(), right = padded(stages_ * n);
+  RowMatrixXd& rows = system_.rows();
+  rows.setZero();
+  for (Index j = 0; j < stages_; ++j) {
+    const Stage& from = stage_[static_cast<std::size_t>(j)];
+    const double b = tableau_.b[j];
+    for (Index i = 0; i < stages_; ++i) {
+      const Stage& at = stage_[static_cast<std::size_t>(i)];
+      Sum block;
+      block.add(h * a(i, j), at.dp_dq.data()).add(-h * a(i, j), from.by_v.data());
+      for (Index l = 0; l < stages_; ++l)
+        block.add(-h * h * a(i, l) * a(l, j), stage_[static_cast<std::size_t>(l)].by_q.data());
+      if (i == j) block.add(1.0, at.M.data());
+      store(block, padded(n), n, &rows(j * n, i * n), rows.outerStride());
+    }
+    rows.block(j * n, right, n, n).diagonal().setConstant(h * b);
+    Sum p_by_v;
+    p_by_v.add(h * b, from.by_v.data());
+    for (Index l = 0; l < stages_; ++l)
+      p_by_v.add(h * h * tableau_.b[l] * a(l, j), stage_[static_cast<std::size_t>(l)].by_q.data());
+    store(p_by_v, padded(n), n, &rows(j * n, right + n), rows.outerStride());
+  }
+}
+
+// docs/theory.md (5.21), (5.22): what multiplies δq and δh, transposed
+void GaussDifferentiator::assemble_right(double h) {
   const Index n = model_.dof();
-  auto S = system_.matrix();
-  auto R = system_.right();
   for (Index i = 0; i < stages_; ++i) {
     const Stage& at = stage_[static_cast<std::size_t>(i)];
-    for (Index j = 0; j < stages_; ++j) {
-      const Stage& from = stage_[static_cast<std::size_t>(j)];
-      auto block = S.block(i * n, j * n, n, n);
-      block = (h * a(i, j)) * (at.dp_dq - from.by_v) - (h * h) * weighed(i * stages_ + j);
-      if (i == j) block += at.M;
-    }
-    auto right = R.middleRows(i * n, n);
-    right.leftCols(n) = h * weighed(stages_ * stages_ + i) - at.dp_dq;
-    right.middleCols(n, n).setIdentity();
-    right.middleCols(2 * n, n).setZero();
-    right.middleCols(2 * n, n).diagonal().setConstant(h * tableau_.c[i]);
-    auto by_step = right.col(3 * n);
-    by_step.setZero();
-    by_step.noalias() -= at.dp_dq * at.v_sum;
-    for (Index l = 0; l < stages_; ++l) {
-      const Stage& from = stage_[static_cast<std::size_t>(l)];
-      by_step += a(i, l) * from.p_rate;
-      by_step.noalias() += (h * a(i, l)) * (from.by_q * from.v_sum);
-    }
+    Sum by_q;
+    by_q.add(1.0, at.dp_dq.data());
+    for (Index l = 0; l < stages_; ++l)
+      by_q.add(-h * a(i, l), stage_[static_cast<std::size_t>(l)].by_q.data());
+    store(by_q, padded(n), n, &minus_right_(0, i * n), minus_right_.outerStride());
+    auto by_step = minus_right_.row(n).segment(i * n, n).transpose();
+    by_step = at.dp_dq.topRows(n).lazyProduct(at.v_sum);
+    for (Index l = 0; l < stages_; ++l)
+      by_step -= a(i, l) * stage_[static_cast<std::size_t>(l)].p_rate;
   }
+  by_start_.setZero();
+  by_start_.leftCols(n).diagonal().setOnes();
+  Sum p_by_q;
+  for (Index l = 0; l < stages_; ++l) {
+    const Stage& stage = stage_[static_cast<std::size_t>(l)];
+    p_by_q.add(h * tableau_.b[l], stage.by_q.data());
+    by_start_.row(n).head(n) += tableau_.b[l] * stage.v.transpose();
+    by_start_.row(n).segment(n, n) += tableau_.b[l] * stage.p_rate.transpose();
+  }
+  store(p_by_q, padded(n), n, &by_start_(0, n), by_start_.outerStride());
+}
+
+// docs/theory.md (5.23)
+void GaussDifferentiator::combine_solution(double h) {
+  const Index n = model_.dof(), stride = system_.rows().outerStride();
+  system_.subtract_product(minus_right_, by_start_);
+  Sum momentum, torque;
+  for (Index i = 0; i < stages_; ++i) {
+    const double* const Y = system_.solution().data() + i * n * stride;
+    momentum.add(1.0, Y);
+    torque.add(h * tableau_.c[i], Y);
+  }
+  store(momentum, stride, 2 * n, by_momentum_.data(), by_momentum_.outerStride());
+  store(torque, stride, 2 * n, by_torque_.data(), by_torque_.outerStride());
 }
 
 // docs/theory.md (5.22)
-void GaussDifferentiator::write(double h, StepDerivatives& out) {
+void GaussDifferentiator::write(double h, StepDerivatives& out) const {
   const Index n = model_.dof();
-  q_by_all_.setZero();
-  p_by_all_.setZero();
-  q_by_all_.leftCols(n).setIdentity();
-  p_by_all_.leftCols(n) = h * weighed(weights_.rows() - 1);
-  p_by_all_.middleCols(n, n).setIdentity();
-  p_by_all_.middleCols(2 * n, n).diagonal().setConstant(h);
-  for (Index j = 0; j < stages_; ++j) {
-    const Stage& stage = stage_[static_cast<std::size_t>(j)];
-    const double b = tableau_.b[j];
-    p_by_v_.middleCols(j * n, n) =
-        (h * b) * stage.by_v + (h * h) * weighed(stages_ * (stages_ + 1) + j);
-    q_by_all_.col(3 * n) += b * stage.v;
-    p_by_all_.col(3 * n) += b * stage.p_rate;
-    p_by_all_.col(3 * n).noalias() += (h * b) * (stage.by_q * stage.v_sum);
-  }
-  const RowMatrixXd& X = system_.solution();
-  for (Index j = 0; j < stages_; ++j) q_by_all_ += (h * tableau_.b[j]) * X.middleRows(j * n, n);
-  system_.add_product(p_by_v_, X, p_by_all_);
-
-  out.by_state.topRows(n) = q_by_all_.leftCols(2 * n);
-  out.by_state.bottomRows(n) = p_by_all_.leftCols(2 * n);
-  out.by_torque.topRows(n) = q_by_all_.middleCols(2 * n, n);
-  out.by_torque.bottomRows(n) = p_by_all_.middleCols(2 * n, n);
-  out.by_step.head(n) = q_by_all_.col(3 * n);
-  out.by_step.tail(n) = p_by_all_.col(3 * n);
+  out.by_state.leftCols(n) = by_start_.topLeftCorner(n, 2 * n).transpose();
+  out.by_state.rightCols(n) = by_momentum_.leftCols(2 * n).transpose();
+  out.by_state.bottomRightCorner(n, n).diagonal().array() += 1.0;
+  out.by_torque = by_torque_.leftCols(2 * n).transpose();
+  out.by_torque.bottomRows(n).diagonal().array() += h;
+  out.by_step = by_start_.row(n).head(2 * n).transpose();
 }
 
 }  // namespace hamelin::integration

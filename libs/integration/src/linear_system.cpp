@@ -12,29 +12,29 @@ HAMELIN_SELECT_KERNELS(LinearKernels, linear_set)
 
 }  // namespace kernel
 
+namespace {
+
+std::size_t size(Index n) {
+  return static_cast<std::size_t>(n);
+}
+
+}  // namespace
+
 LinearSystem::LinearSystem(Index n, Index columns, Isa isa)
     : kernels_(&kernel::select_linear_set(isa)),
       columns_(columns),
-      rows_(RowMatrixXd::Zero(n, padded(n) + padded(columns))),
-      solution_(RowMatrixXd::Zero(n, padded(columns))),
-      order_(static_cast<std::size_t>(n)) {
-  for (Index i = 0; i < n; ++i) given_.push_back(rows_.row(i).data());
-}
+      rows_(RowMatrixXd::Zero(n, padded(n) + padded(columns) + padded(1))),
+      factors_(RowMatrixXd::Zero(n, padded(1))) {}
 
 bool LinearSystem::solve() {
-  const auto n = order_.size(), width = static_cast<std::size_t>(solution_.cols());
-  const bool solved = kernels_->solve(n, width, given_.data(), order_.data());
-  for (std::size_t i = 0; i < n; ++i)
-    solution_.row(static_cast<Index>(i)) =
-        Eigen::Map<const Eigen::RowVectorXd>(order_[i] + kernel::padded(n), solution_.cols());
-  return solved && solution_.allFinite();
+  return kernels_->solve(size(rows_.rows()), size(padded(columns_)), rows_.data(),
+                         size(rows_.outerStride()), factors_.data());
 }
 
-void LinearSystem::add_product(const RowMatrixXd& A, const RowMatrixXd& B, RowMatrixXd& out) const {
-  const auto size = [](Index n) { return static_cast<std::size_t>(n); };
-  kernels_->add_product(size(A.rows()), size(B.rows()), size(B.cols()), A.data(),
-                        size(A.outerStride()), B.data(), size(B.outerStride()), out.data(),
-                        size(out.outerStride()));
+void LinearSystem::subtract_product(const RowMatrixXd& A, RowMatrixXd& out) const {
+  kernels_->subtract_product(size(A.rows()), size(rows_.rows()), size(padded(columns_)), A.data(),
+                             size(A.outerStride()), solution().data(), size(rows_.outerStride()),
+                             out.data(), size(out.outerStride()));
 }
 
 }  // namespace hamelin::integration

@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <vector>
 
 #include "hamelin/core/isa.hpp"
 #include "kernel/linear.hpp"
@@ -14,8 +13,8 @@ using RowMatrixXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen:
   return static_cast<Eigen::Index>(kernel::padded(static_cast<std::size_t>(n)));
 }
 
-/// Small dense products and equations in memory that is allocated once. Matrices have padded
-/// columns; those beyond what was asked for are zero.
+/// Small dense equations in memory that is allocated once. Rows are padded; what is written beyond
+/// the columns that were asked for must be finite.
 class LinearSystem {
  public:
   /// S X = R with n rows and this number of columns.
@@ -24,18 +23,22 @@ class LinearSystem {
   /// S and R, to be written before each solve(), which destroys them.
   [[nodiscard]] auto matrix() { return rows_.leftCols(rows_.rows()); }
   [[nodiscard]] auto right() { return rows_.middleCols(padded(rows_.rows()), columns_); }
+  /// [S | R] with padding: R begins in column padded(n), and a matrix of padded rows fits anywhere.
+  [[nodiscard]] RowMatrixXd& rows() noexcept { return rows_; }
   /// @return false if S is singular or not finite
   [[nodiscard]] bool solve();
   /// X
-  [[nodiscard]] const RowMatrixXd& solution() const noexcept { return solution_; }
-  /// out += A B
-  void add_product(const RowMatrixXd& A, const RowMatrixXd& B, RowMatrixXd& out) const;
+  [[nodiscard]] auto solution() const {
+    return rows_.middleCols(padded(rows_.rows()), padded(columns_));
+  }
+  /// out −= A X
+  void subtract_product(const RowMatrixXd& A, RowMatrixXd& out) const;
+  [[nodiscard]] const kernel::LinearKernels& kernels() const noexcept { return *kernels_; }
 
  private:
   const kernel::LinearKernels* kernels_;
   Eigen::Index columns_;
-  RowMatrixXd rows_, solution_;
-  std::vector<double*> given_, order_;
+  RowMatrixXd rows_, factors_;
 };
 
 }  // namespace hamelin::integration

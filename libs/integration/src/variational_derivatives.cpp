@@ -14,7 +14,7 @@ VariationalDifferentiator::VariationalDifferentiator(const Model& model,
       forces_(model.dof()),
       system_(model.dof(), 2 * model.dof() + 1, options.isa),
       curvature_(kinetic_.M),
-      p_by_delta_(model.dof(), model.dof()),
+      minus_p_by_delta_(model.dof(), model.dof()),
       p_by_all_(model.dof(), padded(2 * model.dof() + 1)),
       q_(VectorXd::Zero(model.dof())),
       v_(q_) {}
@@ -62,15 +62,15 @@ void VariationalDifferentiator::assemble(double h) {
 void VariationalDifferentiator::write(double h, StepDerivatives& out) {
   const Index n = model_.dof();
   const auto& k = kinetic_;
-  p_by_delta_ = k.M / h + 0.5 * (k.dp_dq + k.dp_dq.transpose()) + (0.25 * h) * curvature_ +
-                0.5 * forces_.by_v - (0.5 * h) * next_.d2U_dq2;
+  minus_p_by_delta_ = (0.5 * h) * next_.d2U_dq2 - k.M / h - 0.5 * (k.dp_dq + k.dp_dq.transpose()) -
+                      (0.25 * h) * curvature_ - 0.5 * forces_.by_v;
   p_by_all_.setZero();
   p_by_all_.leftCols(n) = k.dp_dq + (0.5 * h) * (curvature_ - next_.d2U_dq2);
   p_by_all_.col(2 * n) = 0.5 * (k.dK_dq + forces_.force - next_.dU_dq) - k.p / h;
   p_by_all_.col(2 * n).noalias() -= 0.5 * (k.dp_dq.transpose() * v_);
   p_by_all_.col(2 * n).noalias() -= 0.5 * (forces_.by_v * v_);
-  const RowMatrixXd& X = system_.solution();
-  system_.add_product(p_by_delta_, X, p_by_all_);
+  const auto X = system_.solution();
+  system_.subtract_product(minus_p_by_delta_, p_by_all_);
 
   out.by_state.topRows(n) = X.leftCols(2 * n);
   out.by_state.topLeftCorner(n, n).diagonal().array() += 1.0;

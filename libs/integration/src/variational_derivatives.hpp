@@ -23,8 +23,8 @@ class VariationalDifferentiator final : public StepDifferentiator {
   dynamics::PotentialDerivatives potential_, next_;  ///< at q and at q⁺
   ForceDerivatives forces_;                          ///< at the midpoint
   LinearSystem system_;
-  Eigen::MatrixXd curvature_;          ///< ∂²K/∂q² + ∂F/∂q
-  RowMatrixXd p_by_delta_, p_by_all_;  ///< ∂p⁺/∂Δ, and the derivatives of p⁺ by (q, p, h)
+  Eigen::MatrixXd curvature_;                ///< ∂²K/∂q² + ∂F/∂q
+  RowMatrixXd minus_p_by_delta_, p_by_all_;  ///< −∂p⁺/∂Δ; the derivatives of p⁺ by (q, p, h)
   VectorXd q_, v_;
 };
 

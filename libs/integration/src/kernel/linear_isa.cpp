@@ -5,7 +5,7 @@ namespace hamelin::integration::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
 
 extern const LinearKernels linear_set;
-constexpr LinearKernels linear_set{solve, add_product};
+constexpr LinearKernels linear_set{solve, subtract_product, combine};
 
 }  // namespace HAMELIN_ISA_NAMESPACE
 }  // namespace hamelin::integration::kernel
