@@ -2,8 +2,8 @@
 #include <string>
 
 #include "banded.hpp"
-#include "places.hpp"
-#include "quotients.hpp"
+#include "clearance_rows.hpp"
+#include "quotient_rows.hpp"
 #include "torques.hpp"
 
 namespace hamelin::optimal {

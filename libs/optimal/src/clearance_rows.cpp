@@ -1,4 +1,4 @@
-#include "places.hpp"
+#include "clearance_rows.hpp"
 
 #include <fmt/format.h>
 

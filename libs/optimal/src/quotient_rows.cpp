@@ -1,4 +1,4 @@
-#include "quotients.hpp"
+#include "quotient_rows.hpp"
 
 #include <fmt/format.h>
 
