@@ -63,7 +63,8 @@ void check(const model::Model& model, const Settings& settings) {
 }
 
 // The box of the joint limits, with start and goals, which may be nearer to a limit.
-JointBox box_with(JointBox box, const VectorXd& start, const std::vector<VectorXd>& goals) {
+dynamics::JointBox box_with(dynamics::JointBox box, const VectorXd& start,
+                            const std::vector<VectorXd>& goals) {
   const auto include = [&](const VectorXd& q) {
     box.lower = box.lower.cwiseMin(q);
     box.upper = box.upper.cwiseMax(q);
@@ -152,13 +153,13 @@ Path Guide::search(const Problem& problem, Query& query) const {
   Rng rng(settings_.seed + 0x632be59bd9b4e019ULL * (problem.number + 1));
   const double at_start = query.clearance(problem.start, -1.0);
   if (at_start <= 0.0) return ended("the arm is in contact where it is");
-  const JointBox box(model_.dof(), settings_.q_lower, settings_.q_upper, limit_reserve);
+  const dynamics::JointBox box(model_.dof(), settings_.q_lower, settings_.q_upper, limit_reserve);
   const std::vector<Root> roots = find_roots(model_, box, settings_, problem, query, rng);
   out.roots = static_cast<int>(roots.size());
   if (roots.empty()) return ended("no clear configuration was found at the goal");
   std::vector<VectorXd> goals;
   for (const Root& root : roots) goals.push_back(root.q);
-  const JointBox bounds = box_with(box, problem.start, goals);
+  const dynamics::JointBox bounds = box_with(box, problem.start, goals);
   for (const auto& [share, used] : attempts) {
     Margins margins(share * settings_.margin_m);
     margins.add(problem.start, std::max(0.0, at_start - start_slack_m), near_start, far_start);

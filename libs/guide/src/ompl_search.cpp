@@ -64,7 +64,7 @@ class JointSpace final : public ob::RealVectorStateSpace {
 
 /// Uniform in the box, or normal around the start or a goal.
 void draw_sample(const Search& search, Rng& rng, double* q) {
-  const JointBox& box = search.box;
+  const dynamics::JointBox& box = search.box;
   if (rng.uniform() >= near_share) {
     for (Index i = 0; i < box.lower.size(); ++i) q[i] = rng.uniform(box.lower[i], box.upper[i]);
     return;
@@ -95,7 +95,7 @@ class Sampler final : public ob::StateSampler {
 
  private:
   const Search& search_;
-  const JointBox& box_;
+  const dynamics::JointBox& box_;
   Rng& rng_;
 };
 

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "hamelin/guide/inverse_kinematics.hpp"
+#include "hamelin/dynamics/inverse_kinematics.hpp"
 
 namespace hamelin::guide {
 
@@ -22,13 +22,13 @@ constexpr double joint_tolerance_share = 0.9;
 constexpr double tip_tolerance_share = 0.6;
 
 // Another pose within the tolerances of the goal, since the goal itself is often near an obstacle.
-TipTarget draw_near(const TipTarget& target, Rng& rng) {
+dynamics::TipTarget draw_near(const dynamics::TipTarget& target, Rng& rng) {
   const auto draw = [&](double radius) -> Vector3d {
     Vector3d out;
     for (int i = 0; i < 3; ++i) out[i] = rng.uniform(-1.0, 1.0);
     return out * (radius / std::max(1.0, out.norm()));
   };
-  TipTarget out = target;
+  dynamics::TipTarget out = target;
   out.position += draw(tip_tolerance_share * target.tolerance_m);
   const Vector3d turn = draw(tip_tolerance_share * target.tolerance_rad);
   out.rotation =
@@ -58,11 +58,11 @@ double clearance_of_attempt(const Settings& settings, int attempt) {
   return quarter == 2 ? 0.5 * (settings.root_clearance_m + settings.least_m) : settings.least_m;
 }
 
-std::vector<Root> tip_roots(const model::Model& model, const JointBox& box,
+std::vector<Root> tip_roots(const model::Model& model, const dynamics::JointBox& box,
                             const Settings& settings, const Problem& problem, Query& query,
                             Rng& rng) {
-  InverseKinematics kinematics(model, box);
-  TipTarget goal;
+  dynamics::InverseKinematics kinematics(model, box);
+  dynamics::TipTarget goal;
   goal.position = problem.goal.pose.p();
   goal.rotation = problem.goal.pose.R();
   goal.turns = problem.goal.type == scene::GoalType::pose;
@@ -84,7 +84,7 @@ std::vector<Root> tip_roots(const model::Model& model, const JointBox& box,
 
 }  // namespace
 
-std::vector<Root> find_roots(const model::Model& model, const JointBox& box,
+std::vector<Root> find_roots(const model::Model& model, const dynamics::JointBox& box,
                              const Settings& settings, const Problem& problem, Query& query,
                              Rng& rng) {
   std::vector<Root> roots = problem.goal.type == scene::GoalType::joint

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
+#include "hamelin/dynamics/joint_box.hpp"
 #include "hamelin/guide/guide.hpp"
-#include "hamelin/guide/joint_box.hpp"
 
 namespace hamelin::guide {
 
@@ -16,7 +16,7 @@ struct Root {
 
 /// Finds configurations at a goal, nearest to `start` first: the goal of a joint goal, or a clear
 /// place within its tolerance; several solutions of inverse kinematics for a goal of the tip.
-[[nodiscard]] std::vector<Root> find_roots(const model::Model& model, const JointBox& box,
+[[nodiscard]] std::vector<Root> find_roots(const model::Model& model, const dynamics::JointBox& box,
                                            const Settings& settings, const Problem& problem,
                                            Query& query, Rng& rng);
 

@@ -4,14 +4,14 @@
 #include <vector>
 
 #include "edges.hpp"
-#include "hamelin/guide/joint_box.hpp"
+#include "hamelin/dynamics/joint_box.hpp"
 
 namespace hamelin::guide {
 
 /// A search of one of OMPL's planners.
 struct Search {
   scene::GuideType type;
-  const JointBox& box;
+  const dynamics::JointBox& box;
   const Eigen::VectorXd& start;
   const std::vector<Eigen::VectorXd>& goals;
   Edges& edges;

@@ -30,7 +30,7 @@ constexpr int iterations_per_check = 4;  // of inverse kinematics count as much 
 }  // namespace
 
 Guide::Guide(const planning::Setup& setup, const model::Model& model, const Margins& margins,
-             const JointBox& box, const Eigen::VectorXd& levers, long budget)
+             const dynamics::JointBox& box, const Eigen::VectorXd& levers, long budget)
     : shield_m_(std::max(setup.shield_margin_m(), setup.shield_self_margin_m())),
       kinematics_(model, box),
       box_(box),
@@ -144,7 +144,7 @@ void Guide::find_root(planning::Query& query) {
     add_root(query, x_);
   } else {
     if (attempt_ > 0) draw_near_goal();
-    if (kinematics_.solve(near_goal_, x_)) add_root(query, x_);
+    if (kinematics_.solve(tip_target(near_goal_), x_)) add_root(query, x_);
     checks_ += kinematics_.iterations() / iterations_per_check + 1;
     box_.draw(rng_, x_);
   }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
-#include "inverse_kinematics.hpp"
+#include "hamelin/dynamics/inverse_kinematics.hpp"
 #include "joint_path.hpp"
 #include "margins.hpp"
 #include "task.hpp"
@@ -18,7 +18,7 @@ class Guide {
  public:
   /// @param budget number of queries after which a search ends without a path
   Guide(const planning::Setup& setup, const model::Model& model, const Margins& margins,
-        const JointBox& box, const Eigen::VectorXd& levers, long budget);
+        const dynamics::JointBox& box, const Eigen::VectorXd& levers, long budget);
 
   /// Starts a search from q. @param number distinguishes the random numbers of searches
   /// @param reserve_m clearance at goals of the tip in addition, as far as it is found
@@ -68,8 +68,8 @@ class Guide {
                                   const Eigen::VectorXd& to);
 
   double shield_m_, reserve_m_ = 0.0;
-  InverseKinematics kinematics_;
-  const JointBox& box_;
+  dynamics::InverseKinematics kinematics_;
+  const dynamics::JointBox& box_;
   Eigen::VectorXd levers_;
   Margins margins_;
   long budget_, checks_ = 0;

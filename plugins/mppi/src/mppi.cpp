@@ -63,7 +63,7 @@ class Mppi final : public planning::Planner {
             1L, std::lround(params["plan_period_s"].get<double>() / setup.control_period_s()))),
         spacing_s_(static_cast<double>(ticks_per_plan_) * setup.control_period_s()),
         point_count_(3 + std::max(6L, std::lround(params["horizon_s"].get<double>() / spacing_s_))),
-        box_(setup, reserve(setup)),
+        box_(joint_box(setup)),
         kinematics_(model_, box_),
         margins_(make_margins(setup, params)),
         task_(setup.dof(), point_count_,
@@ -145,6 +145,10 @@ class Mppi final : public planning::Planner {
   }
   static double reserve(const planning::Setup& setup) {
     return setup.sampled() ? limit_reserve_sampled : limit_reserve;
+  }
+  static dynamics::JointBox joint_box(const planning::Setup& setup) {
+    const auto limits = [](const auto& of) { return of ? VectorXd(*of) : VectorXd(); };
+    return {setup.dof(), limits(setup.q_lower()), limits(setup.q_upper()), reserve(setup)};
   }
 
   void check_horizon() const {
@@ -282,7 +286,7 @@ class Mppi final : public planning::Planner {
     double least = std::numeric_limits<double>::infinity();
     VectorXd q = target_;
     for (int i = 0; i < posture_attempts; ++i) {
-      if (kinematics_.solve(task_.goal, q)) {
+      if (kinematics_.solve(tip_target(task_.goal), q)) {
         const double distance = (q - task_.mean.rightCols<1>()).norm();
         if (distance < least) least = distance, target_ = q;
       }
@@ -463,8 +467,8 @@ class Mppi final : public planning::Planner {
   long ticks_per_plan_, ticks_ = 0;
   double spacing_s_;
   Index point_count_;
-  JointBox box_;
-  InverseKinematics kinematics_;
+  dynamics::JointBox box_;
+  dynamics::InverseKinematics kinematics_;
   Margins margins_;
   Task task_;
   Guide guide_;

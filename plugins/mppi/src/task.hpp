@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "hamelin/dynamics/inverse_kinematics.hpp"
 #include "hamelin/planning/plugin.hpp"
 #include "joint_path.hpp"
 #include "margins.hpp"
@@ -18,6 +19,12 @@ struct Goal {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   double tolerance_m = 0.0, tolerance_rad = 0.0;
 };
+
+/// Where a goal of the tip asks it to be.
+[[nodiscard]] inline dynamics::TipTarget tip_target(const Goal& goal) {
+  return {goal.position, goal.rotation, goal.type == HAMELIN_GOAL_POSE, goal.tolerance_m,
+          goal.tolerance_rad};
+}
 
 /// Weights of the cost, docs/theory.md (15.6), (15.9)–(15.11).
 struct CostParams {

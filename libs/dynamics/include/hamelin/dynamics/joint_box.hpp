@@ -3,7 +3,7 @@
 
 #include "hamelin/core/rng.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::dynamics {
 
 /// The box in joint space from which random joint vectors are drawn [rad or m].
 struct JointBox {
@@ -15,4 +15,4 @@ struct JointBox {
   Eigen::VectorXd lower, upper;
 };
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::dynamics

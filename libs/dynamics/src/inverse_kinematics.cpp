@@ -1,11 +1,11 @@
-#include "inverse_kinematics.hpp"
+#include "hamelin/dynamics/inverse_kinematics.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 
-namespace hamelin::mppi {
+namespace hamelin::dynamics {
 
 namespace {
 
@@ -17,12 +17,13 @@ constexpr double tolerance_share = 1.0 / 3.0;
 
 }  // namespace
 
-JointBox::JointBox(const planning::Setup& setup, double reserve)
-    : lower(setup.dof()), upper(setup.dof()) {
-  const auto low = setup.q_lower(), high = setup.q_upper();
-  for (int i = 0; i < setup.dof(); ++i) {
-    lower[i] = low && std::isfinite((*low)[i]) ? (*low)[i] + reserve : -std::numbers::pi;
-    upper[i] = high && std::isfinite((*high)[i]) ? (*high)[i] - reserve : std::numbers::pi;
+JointBox::JointBox(Eigen::Index dof, const Eigen::VectorXd& q_lower, const Eigen::VectorXd& q_upper,
+                   double reserve)
+    : lower(Eigen::VectorXd::Constant(dof, -std::numbers::pi)),
+      upper(Eigen::VectorXd::Constant(dof, std::numbers::pi)) {
+  for (Eigen::Index i = 0; i < dof; ++i) {
+    if (q_lower.size() == dof && std::isfinite(q_lower[i])) lower[i] = q_lower[i] + reserve;
+    if (q_upper.size() == dof && std::isfinite(q_upper[i])) upper[i] = q_upper[i] - reserve;
   }
 }
 
@@ -37,24 +38,23 @@ InverseKinematics::InverseKinematics(const model::Model& model, const JointBox& 
       J_(6, model.dof()),
       step_(Eigen::VectorXd::Zero(model.dof())) {}
 
-bool InverseKinematics::solve(const Goal& goal, Eigen::VectorXd& q) {
-  const bool turns = goal.type == HAMELIN_GOAL_POSE;
+bool InverseKinematics::solve(const TipTarget& target, Eigen::VectorXd& q) {
   for (iterations_ = 0; iterations_ < iterations_max; ++iterations_) {
-    dynamics::forward_kinematics(model_, ws_, q);
-    const geometry::SE3 tip = dynamics::tip_pose(model_, ws_);
+    forward_kinematics(model_, ws_, q);
+    const geometry::SE3 tip = tip_pose(model_, ws_);
     Eigen::Matrix<double, 6, 1> error = Eigen::Matrix<double, 6, 1>::Zero();
-    error.tail<3>() = goal.position - tip.p();
+    error.tail<3>() = target.position - tip.p();
     double angle = 0.0;
-    if (turns) {
-      const Eigen::AngleAxisd turn(goal.rotation * tip.R().transpose());
+    if (target.turns) {
+      const Eigen::AngleAxisd turn(target.rotation * tip.R().transpose());
       angle = turn.angle();
       error.head<3>() = rotation_length * angle * turn.axis();
     }
-    if (error.tail<3>().norm() < tolerance_share * goal.tolerance_m &&
-        (!turns || angle < tolerance_share * goal.tolerance_rad))
+    if (error.tail<3>().norm() < tolerance_share * target.tolerance_m &&
+        (!target.turns || angle < tolerance_share * target.tolerance_rad))
       return true;
-    dynamics::frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
-    J_.topRows<3>() *= turns ? rotation_length : 0.0;
+    frame_jacobian(model_, ws_, model_.robot().tip.link, tip.p(), J_);
+    J_.topRows<3>() *= target.turns ? rotation_length : 0.0;
     Eigen::Matrix<double, 6, 6> G = J_ * J_.transpose();
     G.diagonal().array() += root_damping;
     step_.noalias() = J_.transpose() * G.llt().solve(error).eval();
@@ -65,4 +65,4 @@ bool InverseKinematics::solve(const Goal& goal, Eigen::VectorXd& q) {
   return false;
 }
 
-}  // namespace hamelin::mppi
+}  // namespace hamelin::dynamics

@@ -2,9 +2,9 @@
 #include <Eigen/Core>
 
 #include "hamelin/dynamics/dynamics.hpp"
-#include "hamelin/guide/joint_box.hpp"
+#include "hamelin/dynamics/joint_box.hpp"
 
-namespace hamelin::guide {
+namespace hamelin::dynamics {
 
 /// Where the tip is to be, in the world.
 struct TipTarget {
@@ -29,10 +29,10 @@ class InverseKinematics {
  private:
   const model::Model& model_;
   const JointBox& box_;
-  dynamics::Workspace ws_;
-  dynamics::Matrix6Xd J_;
+  Workspace ws_;
+  Matrix6Xd J_;
   Eigen::VectorXd step_;
   int iterations_ = 0;
 };
 
-}  // namespace hamelin::guide
+}  // namespace hamelin::dynamics
