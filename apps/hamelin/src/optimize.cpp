@@ -154,11 +154,8 @@ void add_optimize(CLI::App& app, int& exit_code) {
                                    "banded: hamelin's own; or ipopt, where this build has it")
                       ->capture_default_str(),
                   {"banded", "ipopt"});
-  command
-      ->add_option("--set", options->flags.set,
-                   "set one value of the scene, e.g. /model/torque_limits=true; may be repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*command, options->flags.set,
+                 "set one value of the scene, e.g. /model/torque_limits=true; may be repeated");
   restrict_values(command
                       ->add_option("--format", options->format,
                                    "of the output: json, csv, or ros for the fields of "

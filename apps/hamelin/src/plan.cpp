@@ -76,17 +76,10 @@ void add_plan(CLI::App& app, int& exit_code) {
                    "200000)")
       ->type_name("N")
       ->check(CLI::Range(1L, 1000000000L));
-  command
-      ->add_option("--seed", options->flags.seed,
-                   "seed of all random numbers (default the scene's)")
-      ->type_name("S")
-      ->check(unsigned_range());
-  command
-      ->add_option("--set", options->flags.set,
-                   "set one value of the scene, e.g. /planner/guide_options/margin_m=0.02; may be "
-                   "repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_seed_option(*command, options->flags);
+  add_set_option(*command, options->flags.set,
+                 "set one value of the scene, e.g. /planner/guide_options/margin_m=0.02; may be "
+                 "repeated");
   command->add_option("-o,--output", options->output, "file to write the paths to")
       ->type_name("FILE.json");
   command->add_flag("--json", options->json, "print JSON");

@@ -114,16 +114,9 @@ void add_run(CLI::App& app, int& exit_code) {
       ->add_option("--duration", options->flags.duration_s,
                    "longest simulated time [s] (default the scene's)")
       ->type_name("T");
-  command
-      ->add_option("--seed", options->flags.seed,
-                   "seed of all random numbers (default the scene's)")
-      ->type_name("S")
-      ->check(unsigned_range());
-  command
-      ->add_option("--set", options->flags.set,
-                   "set one value of the scene, e.g. /planner/params/gain=2; may be repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_seed_option(*command, options->flags);
+  add_set_option(*command, options->flags.set,
+                 "set one value of the scene, e.g. /planner/params/gain=2; may be repeated");
   command
       ->add_option("--plugin-path", options->plugin_path,
                    "directory to search first for planners; may be repeated")

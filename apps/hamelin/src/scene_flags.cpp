@@ -34,6 +34,16 @@ scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& fla
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
+void add_set_option(CLI::App& command, std::vector<std::string>& set, const std::string& help) {
+  command.add_option("--set", set, help)->type_name("/json/pointer=VALUE")->allow_extra_args(false);
+}
+
+void add_seed_option(CLI::App& command, SceneFlags& flags) {
+  command.add_option("--seed", flags.seed, "seed of all random numbers (default the scene's)")
+      ->type_name("S")
+      ->check(unsigned_range());
+}
+
 void add_guide_option(CLI::App& command, SceneFlags& flags) {
   restrict_values(
       command.add_option("--guide", flags.guide,

@@ -25,6 +25,12 @@ struct SceneFlags {
 /// @throws Error like scene::scene_from_json, and for a file that is not a scene
 [[nodiscard]] scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags);
 
+/// Adds --set, whose assignments scene::set_pointer() takes.
+void add_set_option(CLI::App& command, std::vector<std::string>& set, const std::string& help);
+
+/// Adds --seed.
+void add_seed_option(CLI::App& command, SceneFlags& flags);
+
 /// Adds --guide.
 void add_guide_option(CLI::App& command, SceneFlags& flags);
 

@@ -177,11 +177,8 @@ void add_sweep_pairs(CLI::App& sweep, int& exit_code) {
       ->add_option("--planner", options->flags.planner,
                    "planner plugin, by name or path (default the scene's)")
       ->type_name("NAME|PATH");
-  pairs
-      ->add_option("--set", options->flags.set,
-                   "set one value of the scene, e.g. /map/file=cell.bt; may be repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*pairs, options->flags.set,
+                 "set one value of the scene, e.g. /map/file=cell.bt; may be repeated");
   pairs
       ->add_option("--plugin-path", options->plugin_path,
                    "directory to search first for planners; may be repeated")

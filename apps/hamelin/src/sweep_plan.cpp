@@ -5,6 +5,7 @@
 
 #include "command_line.hpp"
 #include "hamelin/sweep/make_plan.hpp"
+#include "scene_flags.hpp"
 #include "sweep.hpp"
 #include "terminal.hpp"
 
@@ -161,11 +162,8 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
                    "repeated (default the scene's)")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  command
-      ->add_option("--set", plan.set,
-                   "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*command, plan.set,
+                 "set one value of all scenes, e.g. /step_s=0.002; may be repeated");
   command
       ->add_option("--vary", plan.vary,
                    "plan a run for each of these values; if repeated, for each combination")

@@ -128,9 +128,7 @@ void add_sweep_one(CLI::App& sweep, int& exit_code) {
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   command->add_option("--planner", options->flags.planner, "planner plugin, by name or path")
       ->type_name("NAME|PATH");
-  command->add_option("--set", options->flags.set, "set one value of the scene; may be repeated")
-      ->type_name("/json/pointer=VALUE")
-      ->allow_extra_args(false);
+  add_set_option(*command, options->flags.set, "set one value of the scene; may be repeated");
   command->add_option("--seed", options->flags.seed, "seed of all random numbers")
       ->type_name("S")
       ->check(unsigned_range());
