@@ -40,7 +40,6 @@ InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options
 
 void InteriorPoint::start(VectorXd x) {
   x_ = std::move(x);
-  ++evaluations_;
   program_.evaluate(x_);
   program_.gradient(gradient_);
   scale_ = std::min(1.0, gradient_max / gradient_.lpNorm<Eigen::Infinity>());
@@ -188,7 +187,6 @@ bool InteriorPoint::take_step() {
   bool accepted = false;
   for (int k = 0; k < backtracks_max && !accepted; ++k, step *= 0.5) {
     x_ = x + step * dx_;
-    ++evaluations_;
     if (!program_.evaluate(x_)) continue;
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
@@ -231,7 +229,6 @@ Solution InteriorPoint::solve(VectorXd x) {
     out.cause = "no step decreases cost and violation any further";
     break;
   }
-  out.evaluations = evaluations_;
   return out;
 }
 

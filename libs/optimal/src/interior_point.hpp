@@ -69,7 +69,6 @@ class InteriorPoint {
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
   double scale_ = 1.0;  ///< of the cost
   double penalty_ = 1.0;
-  int evaluations_ = 0;
   int small_decreases_ = 0;  ///< of the merit, in a row
 };
 

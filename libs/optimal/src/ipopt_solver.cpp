@@ -114,7 +114,6 @@ class Adapter final : public Ipopt::TNLP {
     if (fresh || !evaluated_) {
       finite_ = program_.evaluate(map(x, n));
       evaluated_ = true;
-      ++result.evaluations;
     }
     return finite_;
   }

@@ -10,7 +10,7 @@ struct IpoptResult {
   bool converged = false;
   std::string cause;
   Eigen::VectorXd x;
-  int iterations = 0, evaluations = 0;
+  int iterations = 0;
   double stationarity = 0.0;
 };
 

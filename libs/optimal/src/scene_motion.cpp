@@ -72,6 +72,7 @@ double usual_duration(const MatrixXd& points, const VectorXd& velocity) {
 Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
                    const model::Model& model) {
   Problem problem;
+  problem.model = &model;
   problem.objective = options.objective;
   problem.intervals = options.intervals;
   problem.margin_m = options.margin_m;
@@ -101,26 +102,23 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
   const VectorXd rest = VectorXd::Zero(out.model.dof());
   VectorXd q = scene.start_q.size() > 0 ? scene.start_q : rest,
            v = scene.start_v.size() > 0 ? scene.start_v : rest;
+  Problem problem = problem_of(scene, options, out.model);
+  problem.v_goal = rest;
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
-    GoalMotion goal{problem_of(scene, options, out.model), {}};
-    Problem& problem = goal.problem;
-    problem.model = &out.model;
     problem.q_start = q;
     problem.v_start = v;
     problem.q_goal = points.rightCols<1>();
-    problem.v_goal = rest;
     problem.duration_s =
         options.duration_s.value_or(usual_duration(points, problem.limits.velocity));
     try {
-      goal.found = optimize(problem, points, view, options.solve);
+      out.goals.push_back({optimize(problem, points, view, options.solve)});
     } catch (const Error& e) {
       if (e.code() != ErrorCode::invalid) throw;
       refuse(scene, fmt::format("/goals/{}: {}", i, e.what()));
     }
     q = problem.q_goal;
     v = rest;
-    out.goals.push_back(std::move(goal));
     if (!out.goals.back().valid()) break;
   }
   return out;

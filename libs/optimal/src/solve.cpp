@@ -24,7 +24,6 @@ Solution solve_with_ipopt(Transcription& program, const VectorXd& guess,
   out.converged = found.converged;
   out.cause = found.cause;
   out.iterations = found.iterations;
-  out.evaluations = found.evaluations;
   out.stationarity = found.stationarity;
   return out;
 }
@@ -39,7 +38,7 @@ Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) 
 // From the same guess with other slacks if a minimum of the violation was found that is not zero.
 Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options) {
   Solution out;
-  int iterations = 0, evaluations = 0;
+  int iterations = 0;
   using Start = InteriorPoint::Start;
   const std::array<Start, 3> starts =
       options.near_solution ? std::array{Start{1e-3, 1e-3}, Start{0.1, 1.0}, Start{0.1, 0.01}}
@@ -47,11 +46,9 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
   for (const Start& start : starts) {
     out = InteriorPoint(program, options, start).solve(guess);
     iterations += out.iterations;
-    evaluations += out.evaluations;
     if (program.violation() <= options.tolerance) break;
   }
   out.iterations = iterations;
-  out.evaluations = evaluations;
   return out;
 }
 

@@ -24,7 +24,6 @@ struct SceneMotionOptions {
 
 /// The motion to one goal, at rest at both ends but for the start of the scene.
 struct GoalMotion {
-  Problem problem;
   Optimized found;
   /// Whether it keeps all limits and is proved clear.
   [[nodiscard]] bool valid() const {

@@ -32,7 +32,6 @@ struct Solution {
   double cost = 0.0;       ///< ∫ τᵀRτ dt, or the time plus its weight of the effort
   double violation = 0.0;  ///< the largest, as a share of the bound, or in decimetres of clearance
   int iterations = 0;
-  int evaluations = 0;
   double stationarity = 0.0;
 };
 
