@@ -23,6 +23,7 @@ struct RunOptions {
   SceneFlags flags;
   std::vector<std::filesystem::path> plugin_path;
   std::optional<std::string> target;  ///< a file, or - for standard input
+  std::optional<std::filesystem::path> trajectory;
   bool print_config = false;
   RecordOptions record;
 };
@@ -68,8 +69,17 @@ void follow_file(scene::Scene& scene, const std::optional<std::string>& target) 
   scene.goals.back().stream.file = *target;
 }
 
+// Replaces the goals by the motion of a file.
+void follow_trajectory(scene::Scene& scene, const std::optional<std::filesystem::path>& file) {
+  if (!file) return;
+  scene::Goal goal = scene::trajectory_goal(scene::read_joint_trajectory(*file));
+  goal.path_file = *file;
+  scene.goals = {std::move(goal)};
+}
+
 int run(const RunOptions& options) {
   scene::Scene scene = read_scene(options.file, options.flags);
+  follow_trajectory(scene, options.trajectory);
   follow_file(scene, options.target);
   if (options.print_config) {
     print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
@@ -127,6 +137,11 @@ void add_run(CLI::App& app, int& exit_code) {
                    "follow the targets of a file, or of standard input (-): JSON lines with time_s "
                    "and position_m, quaternion_wxyz, or velocity_m_s, angular_velocity_rad_s")
       ->type_name("FILE|-");
+  command
+      ->add_option("--trajectory", options->trajectory,
+                   "follow the motion of a file in place of the scene's goals, as hamelin optimize "
+                   "writes it, or ROS 2's JointTrajectory as JSON")
+      ->type_name("FILE");
   command->add_flag("--print-config", options->print_config,
                     "print the resolved scene, with all defaults and with paths from the working "
                     "directory, and exit");

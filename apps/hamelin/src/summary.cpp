@@ -52,6 +52,12 @@ std::string following_line(const Json& f) {
           : fmt::format(", resumed within {} s", number(f["resume_max_s"])));
 }
 
+std::string trajectory_line(const Json& t) {
+  return fmt::format("{} s long, took {} s; error {} root mean square, {} at most",
+                     number(t["duration_s"]), number(t["time_s"]), number(t["error_rms"], 2),
+                     number(t["error_max"], 2));
+}
+
 std::string shield_line(const Json& shield) {
   std::string causes;
   for (const auto& [cause, count] : shield["causes"].items())
@@ -80,6 +86,7 @@ std::string summary(const Json& r, const std::vector<std::filesystem::path>& wri
                                ? ""
                                : fmt::format(", planner {}", r["planner"].get<std::string>())));
   if (!r["goal"].is_null()) line("goal", goal_line(r["goal"]));
+  if (r.contains("trajectory")) line("trajectory", trajectory_line(r["trajectory"]));
   if (r.contains("following")) line("following", following_line(r["following"]));
   if (!r["min_clearance_m"].is_null())
     line("clearance",

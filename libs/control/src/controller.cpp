@@ -45,6 +45,12 @@ VectorXd positive_per_joint(const scene::Scene& scene, const std::vector<double>
 }
 
 void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
+  for (std::size_t i = 0; i < scene.goals.size(); ++i)
+    if (scene.goals[i].trajectory && !plugin.follows_trajectories())
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: /goals/{}: is a trajectory, which planner '{}' does not follow, "
+                              "expected one that does, such as hybrid, or a goal of type path",
+                              scene.name, i, plugin.name()));
   if (follow_goal_of(scene.goals) == nullptr || plugin.follows_targets()) return;
   throw Error(ErrorCode::invalid,
               fmt::format("{}: /goals/{}: follows a target, which planner '{}' does not support, "
@@ -114,6 +120,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       new_load_(std::make_unique<NewLoad>()),
       goal_list_(&new_goals_.take()),
       new_target_(std::make_unique<StreamedTarget>()),
+      reference_(nominal_.dof()),
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
   check_follows(scene_, plugin);
   expect_target(scene_.goals);
@@ -160,6 +167,7 @@ void Controller::reset() {
   late_answers_ = 0;
   goals_.restart();
   target_.stop();
+  reference_.stop();
   verdict_.reset();
   answer_.state = ControlState::running;
   answer_.cause = {};
@@ -191,7 +199,8 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   if (answer_.state == ControlState::stopping) return;
   answer_.state = ControlState::running;
   answer_.cause = {};
-  while (goals_.advance(arm_->view.poses(), q_, v_)) continue;
+  update_reference();
+  while (!reference_.on_the_way() && goals_.advance(arm_->view.poses(), q_, v_)) update_reference();
   answer_.goal_index = goals_.index();
   update_target();
   if (goals_.all_reached())

@@ -36,7 +36,7 @@ void check_size(std::span<const scene::Payload> payloads, const model::Model& lo
 }  // namespace
 
 std::uint64_t Controller::set_goals(std::vector<scene::Goal> goals) {
-  check_goals(goals, scene_, nominal_, path_points_max_, plugin().follows_targets());
+  check_goals(goals, scene_, nominal_, path_points_max_, plugin());
   const std::lock_guard lock(goals_mutex_);
   newest_goals_ = goals;
   expect_target(goals);
@@ -198,6 +198,7 @@ void Controller::take_goals() {
   ++listed_number_;
   listed_ = nullptr;
   target_.stop();
+  reference_.stop();
 }
 
 // A target starts where the tip is when its goal becomes the current one.
@@ -209,11 +210,23 @@ void Controller::update_target() {
   answer_.target = &target_.update(time_s_, new_target_.take(), tip());
 }
 
+// A trajectory begins when its goal becomes the current one.
+void Controller::update_reference() {
+  const scene::Goal& goal = goals_.goal();
+  answer_.reference = nullptr;
+  if (!goal.trajectory) return reference_.stop();
+  if (reference_.goal() != &goal) reference_.start(goal);
+  answer_.reference = &reference_.update(period_s_, q_, v_);
+  // an arm that waits where its reference does has not stalled
+  if (reference_.on_the_way() && answer_.reference->rate > 0.0) goals_.forget_rest();
+}
+
 const hamelin_goal* Controller::goal_for_planner() {
   if (guidance_ && guidance_->goal() != nullptr) return guidance_->goal();
-  if (answer_.target == nullptr) return listed_;
+  if (answer_.target == nullptr && answer_.reference == nullptr) return listed_;
   live_goal_ = *listed_;
-  control::set_target(*answer_.target, live_goal_);
+  if (answer_.target != nullptr) control::set_target(*answer_.target, live_goal_);
+  if (answer_.reference != nullptr) control::set_reference(*answer_.reference, live_goal_);
   return &live_goal_;
 }
 

@@ -35,6 +35,13 @@ void check_joint_goal(const scene::Goal& goal, std::size_t i, const scene::Scene
                         joint.upper.value_or(goal.q[k])));
     }
   if (goal.path.size() == 0) return;
+  if (goal.trajectory) {
+    scene::check(*goal.trajectory, fmt::format("goal {}: trajectory", i + 1));
+    const std::string defect = joints_defect(*goal.trajectory, model);
+    check(defect.empty(), i, "trajectory: " + defect);
+    check(goal.trajectory->q == goal.path, i,
+          "path: differs from the trajectory, expected its points");
+  }
   check(goal.path.rows() == dof && goal.path.allFinite(), i,
         fmt::format("path: expected {} finite numbers per way-point", dof));
   check(goal.path.rightCols(1) == goal.q, i, "path: its end is not q, expected q as its end");
@@ -98,7 +105,8 @@ hamelin_goal to_c(const scene::Goal& goal) {
 }
 
 void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scene,
-                 const model::Model& model, std::size_t path_points_max, bool follows) {
+                 const model::Model& model, std::size_t path_points_max,
+                 const planning::Plugin& planner) {
   if (goals.empty())
     throw Error(ErrorCode::invalid, "goals: none are given, expected at least one");
   for (std::size_t i = 0; i < goals.size(); ++i) {
@@ -106,9 +114,12 @@ void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scen
     if (goal.type == scene::GoalType::joint)
       check_joint_goal(goal, i, scene, model, path_points_max);
     else if (goal.type == scene::GoalType::follow)
-      check_follow_goal(goal, i, i + 1 == goals.size(), follows);
+      check_follow_goal(goal, i, i + 1 == goals.size(), planner.follows_targets());
     else
       check_tip_goal(goal, i);
+    check(!goal.trajectory || planner.follows_trajectories(), i,
+          "trajectory: the planner does not follow trajectories, expected one that does, such as "
+          "hybrid");
     check(goal.speed_max > 0.0, i,
           fmt::format("speed_max: {} is not allowed, expected more than 0", goal.speed_max));
   }
@@ -123,6 +134,26 @@ void set_target(const TargetState& target, hamelin_goal& goal) noexcept {
   std::copy_n(target.angular_velocity.data(), 3, goal.angular_velocity_world_rad_s);
   std::copy_n(target.angular_acceleration.data(), 3, goal.angular_acceleration_world_rad_s2);
   goal.target_lost = target.lost ? 1 : 0;
+}
+
+void set_reference(const ReferenceState& reference, hamelin_goal& goal) noexcept {
+  goal.reference_q = reference.q.data();
+  goal.reference_v = reference.v.data();
+  goal.reference_a = reference.a.data();
+  goal.reference_time_s = reference.time_s;
+  goal.reference_rate = reference.rate;
+}
+
+std::string joints_defect(const scene::JointTrajectory& trajectory, const model::Model& model) {
+  const auto& links = model.robot().links;
+  if (trajectory.q.rows() != model.dof())
+    return fmt::format("{} joints, expected {} (those of '{}')", trajectory.q.rows(), model.dof(),
+                       model.robot().name);
+  for (std::size_t i = 0; i < trajectory.joints.size(); ++i)
+    if (trajectory.joints[i] != links[i].joint.name)
+      return fmt::format("joint {} is '{}', expected '{}' (the joints of '{}' in their order)",
+                         i + 1, trajectory.joints[i], links[i].joint.name, model.robot().name);
+  return {};
 }
 
 const scene::Goal* follow_goal_of(const std::vector<scene::Goal>& goals) noexcept {

@@ -68,7 +68,11 @@ void check_numbers(const scene::Scene& scene, const model::Model& model) {
   if (scene.start_q.size() > 0) sized(scene.start_q, "/start/q");
   if (scene.start_v.size() > 0) sized(scene.start_v, "/start/v");
   for (std::size_t i = 0; i < scene.goals.size(); ++i)
-    if (scene.goals[i].type == scene::GoalType::joint)
+    if (scene.goals[i].trajectory) {
+      if (const std::string defect = joints_defect(*scene.goals[i].trajectory, model);
+          !defect.empty())
+        throw Error(ErrorCode::invalid, fmt::format("{}: /goals/{}: {}", scene.name, i, defect));
+    } else if (scene.goals[i].type == scene::GoalType::joint)
       sized(scene.goals[i].q,
             fmt::format("/goals/{}/q{}", i, scene.goals[i].path.size() > 0 ? "/0" : ""));
   if (scene.actuation.coulomb_friction_share > 0.0)

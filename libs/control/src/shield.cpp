@@ -27,8 +27,10 @@ constexpr double dwell_s = 0.005;
 // arm at once would not resolve the motion.
 constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
-// bounds a little [rad or m], and as a share of the speed limits where velocities are not exact.
-constexpr double planner_reserve = 0.002, planner_speed_reserve = 0.02;
+// bounds a little [rad or m]; and as shares of the speed limits, where velocities are exact, which
+// change a little within a step, and where they are not.
+constexpr double planner_reserve = 0.002, exact_speed_reserve = 0.001,
+                 planner_speed_reserve = 0.02;
 // What the shield keeps from speed limits, as a share, because velocities are not exact; and the
 // share that it leaves in any case.
 constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,
@@ -430,7 +432,7 @@ void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
     reserve_.self_m = stop_line_.largest_pair_stray({tracking, straying_.shapes(), margin_m_});
   speed_max_ = limits_.velocity_max;
   if (speed_max_.size() == 0) return;
-  reserve_.velocity = VectorXd::Zero(speed_max_.size());
+  reserve_.velocity = exact_speed_reserve * limits_.velocity_max;
   if (!sampled_) return;
   const bool estimates = scene.actuation.estimates_velocity;
   speed_max_ *= 1.0 - (estimates ? estimated_speed_reserve : sampled_speed_reserve);

@@ -215,6 +215,11 @@ Json to_json(const Result& r) {
                          {"waited_s", r.guide->waited_s},
                          {"length", r.guide->length ? Json(*r.guide->length) : Json(nullptr)}};
   if (r.following) document["following"] = following_json(*r.following);
+  if (r.trajectory)
+    document["trajectory"] = {{"duration_s", r.trajectory->duration_s},
+                              {"time_s", r.trajectory->time_s},
+                              {"error_rms", r.trajectory->error_rms},
+                              {"error_max", r.trajectory->error_max}};
   if (r.mover_contact) document["mover_contact"] = contact_json(*r.mover_contact);
   if (r.plant)
     document["plant"] = {{"type", r.plant->type},

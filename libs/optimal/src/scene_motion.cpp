@@ -81,8 +81,8 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
   const control::ModelledLimits limits = control::modelled_limits(scene, model.robot());
   problem.limits.position_min = limits.q_lower;
   problem.limits.position_max = limits.q_upper;
-  problem.limits.velocity = limits.velocity_max;
-  problem.limits.torque = limits.effort_max;
+  problem.limits.velocity = options.limit_share * limits.velocity_max;
+  problem.limits.torque = options.limit_share * limits.effort_max;
   const Index n = model.dof();
   if (options.acceleration)
     problem.limits.acceleration = VectorXd::Constant(n, *options.acceleration);

@@ -299,6 +299,9 @@ bool Plugin::uses_threads() const noexcept {
 bool Plugin::follows_targets() const noexcept {
   return (library_->raw->properties & HAMELIN_FOLLOWS_TARGETS) != 0;
 }
+bool Plugin::follows_trajectories() const noexcept {
+  return (library_->raw->properties & HAMELIN_FOLLOWS_TRAJECTORIES) != 0;
+}
 bool Plugin::follows_paths() const noexcept {
   return (library_->raw->properties & HAMELIN_FOLLOWS_PATHS) != 0;
 }

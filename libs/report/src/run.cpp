@@ -30,6 +30,7 @@ enum Column : std::size_t {
   clearance,
   goal_m,
   goal_rad,
+  off_trajectory,
   kinetic,
   potential,
   control,
@@ -141,11 +142,14 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   const auto unit = [](bool first, bool second, const char* one, const char* other) {
     return first && second ? fmt::format("{}, {}", one, other) : std::string(first ? one : other);
   };
-  bool has_revolute = false, has_prismatic = false, has_tip_goal = false, has_joint_goal = false;
+  bool has_revolute = false, has_prismatic = false, has_tip_goal = false, has_joint_goal = false,
+       has_trajectory = false;
   for (const auto& link : links)
     (link.joint.type == model::JointType::revolute ? has_revolute : has_prismatic) = true;
-  for (const auto& goal : world.goals)
+  for (const auto& goal : world.goals) {
     (goal.type == scene::GoalType::joint ? has_joint_goal : has_tip_goal) = true;
+    has_trajectory = has_trajectory || goal.trajectory;
+  }
   const std::string suffix =
       plotted_joints_ < links.size() ? fmt::format(" (first {})", plotted_joints_) : "";
   std::size_t column = 0;
@@ -168,6 +172,9 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   if (has_joint_goal)
     add(has_tip_goal ? "goal_joint" : "goal", "distance to the joint goal",
         unit(has_revolute, has_prismatic, "rad", "m"), false, {{"largest joint error", goal_rad}});
+  if (has_trajectory)
+    add("trajectory", "distance from the trajectory", unit(has_revolute, has_prismatic, "rad", "m"),
+        false, {{"largest joint error", off_trajectory}});
   add("energy", "energy account", "J", false,
       {{"kinetic", kinetic},
        {"potential", potential},
@@ -320,6 +327,9 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
     const VectorXd at = numbers(target, "position_m", 3, "position_m", reader);
     if (at.size() == 3 && at.allFinite()) frame.target = at;
   }
+  if (const Json& reference = object_member(line, "reference", reader); !reference.empty())
+    if (const VectorXd at = joint_vector(reference, "q", dof, reader); at.size() > 0)
+      row[off_trajectory] = (frame.q - at).lpNorm<Eigen::Infinity>();
   if (frame.q.allFinite()) {
     set_goal_distance(frame);
     bins_.add(t, row_);

@@ -281,7 +281,7 @@ void read_target(const Reader& in, const std::filesystem::path& folder, Goal& go
 }
 
 GoalType goal_type_of(const std::string& type) {
-  if (type == "path") return GoalType::joint;
+  if (type == "path" || type == "trajectory") return GoalType::joint;
   for (const GoalType known : {GoalType::position, GoalType::pose, GoalType::follow})
     if (type == to_string(known)) return known;
   return GoalType::joint;
@@ -299,16 +299,36 @@ Eigen::MatrixXd read_path_file(const std::filesystem::path& file, std::size_t in
   return Reader(paths[index], fmt::format("{}: /paths/{}", file.string(), index)).joint_path("q");
 }
 
+// The motion of a goal of type trajectory, and its points as a path.
+void set_trajectory(Goal& goal, JointTrajectory trajectory) {
+  goal.path = trajectory.q;
+  goal.q = goal.path.rightCols(1);
+  goal.trajectory = std::move(trajectory);
+}
+
+void read_trajectory_of(const Reader& in, const std::filesystem::path& folder, Goal& goal) {
+  if (in.find("file") == nullptr) {
+    in.require("trajectory", "trajectory goal without a file");
+    set_trajectory(goal, joint_trajectory_from_json(*in.find("trajectory"),
+                                                    in.place_of("trajectory")));
+    return;
+  }
+  in.refuse("trajectory", "trajectory goal with a file");
+  goal.path_file = resolve_path(folder, in.get<std::string>("file", ""));
+  set_trajectory(goal, read_joint_trajectory(goal.path_file));
+}
+
 Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   const auto type = in.get<std::string>("type", "");
-  const bool path = type == "path";
+  const bool path = type == "path", trajectory = type == "trajectory";
   Goal goal = default_goal(goal_type_of(type));
   const bool joint = goal.type == GoalType::joint, pose = goal.type == GoalType::pose,
              follow = goal.type == GoalType::follow;
   const std::string kind = type + " goal";
   const bool from_file = path && in.find("file") != nullptr;
-  joint && !from_file ? in.require("q", kind) : in.refuse("q", kind);
-  if (!path) in.refuse("file", kind);
+  joint && !from_file && !trajectory ? in.require("q", kind) : in.refuse("q", kind);
+  if (!path && !trajectory) in.refuse("file", kind);
+  if (!trajectory) in.refuse("trajectory", kind);
   if (!from_file) in.refuse("index", kind);
   if (!follow) {
     joint ? in.refuse("position_m", kind) : in.require("position_m", kind);
@@ -319,7 +339,9 @@ Goal read_goal(const Reader& in, const std::filesystem::path& folder) {
   if (joint || follow) in.refuse("tip_speed_max_m_s", kind);
   if (follow) in.refuse("speed_max", kind);
   if (goal.type == GoalType::position) in.refuse("tolerance_rad", kind);
-  if (from_file) {
+  if (trajectory) {
+    read_trajectory_of(in, folder, goal);
+  } else if (from_file) {
     goal.path_file = resolve_path(folder, in.get<std::string>("file", ""));
     goal.path = read_path_file(goal.path_file, in.get<std::size_t>("index", 0));
     goal.q = goal.path.rightCols(1);
@@ -650,6 +672,13 @@ std::vector<std::filesystem::path> input_files(const Scene& scene) {
 Goal joint_goal(Eigen::VectorXd q) {
   Goal goal = default_goal(GoalType::joint);
   goal.q = std::move(q);
+  return goal;
+}
+
+Goal trajectory_goal(JointTrajectory trajectory) {
+  check(trajectory, "trajectory");
+  Goal goal = default_goal(GoalType::joint);
+  set_trajectory(goal, std::move(trajectory));
   return goal;
 }
 

@@ -72,7 +72,9 @@ Json follow_json(const Goal& goal) {
 Json goal_json(const Goal& goal) {
   if (goal.type == GoalType::follow) return follow_json(goal);
   Json out{{"type", type_name(goal)}};
-  if (goal.path.size() > 0) {
+  if (goal.trajectory) {
+    out["trajectory"] = to_json(*goal.trajectory);
+  } else if (goal.path.size() > 0) {
     out["q"] = Json::array();
     for (Eigen::Index i = 0; i < goal.path.cols(); ++i) out["q"].push_back(array(goal.path.col(i)));
   } else if (goal.type == GoalType::joint) {
@@ -233,6 +235,7 @@ std::string_view to_string(WhenLost when) noexcept {
 }
 
 std::string_view type_name(const Goal& goal) noexcept {
+  if (goal.trajectory) return "trajectory";
   return goal.path.size() > 0 ? "path" : to_string(goal.type);
 }
 

@@ -392,6 +392,7 @@ void ClosedLoop::check_outcome() {
   if (tick && next_event_ < scene_.events.size()) advance_events();
   if (done_) return;
   note_tracking();
+  if (tick) note_reference();
   if (tick) check_target();
   if (done_) return;
   const control::ControlState now = controller_->answer().state;
@@ -513,6 +514,13 @@ void ClosedLoop::feed_target() {
     if (tracking_->count_refused_line() <= warned) result_.warnings.push_back(line);
     report_event(true, line);
   });
+}
+
+void ClosedLoop::note_reference() {
+  const control::ReferenceState* const reference = controller_->answer().reference;
+  if (reference != nullptr)
+    trajectory_.observe(controller_->goals().goal(), *reference, plant_->node().q,
+                        controller_->period_s());
 }
 
 void ClosedLoop::note_tracking() {
@@ -699,6 +707,7 @@ void ClosedLoop::fill_result() {
   result_.deadline_us = 1e6 * controller_->deadline_s();
   result_.late_ticks = controller_->answer().overruns;
   if (tracking_) result_.following = tracking_->figures();
+  result_.trajectory = trajectory_.figures();
   const control::GoalTracker& goals = controller_->goals();
   const control::GoalError error = goal_error();
   log::Result::Goal out;

@@ -13,6 +13,7 @@
 #include "target_feed.hpp"
 #include "tick_log.hpp"
 #include "tracking_audit.hpp"
+#include "trajectory_audit.hpp"
 
 namespace hamelin::simulation {
 
@@ -85,6 +86,7 @@ class ClosedLoop {
   void let_controller_observe();
   /// Passes on the targets that are due.
   void feed_target();
+  void note_reference();
   void note_tracking();
   /// Ends the run where the target has come to its end, or is lost in a scene that ends then.
   void check_target();
@@ -129,6 +131,7 @@ class ClosedLoop {
   std::unique_ptr<TickLog> log_;
   std::unique_ptr<TargetFeed> feed_;         ///< only of a streamed target
   std::unique_ptr<TrackingAudit> tracking_;  ///< only with a follow goal
+  TrajectoryAudit trajectory_;
   bool target_lost_ = false;                 ///< at the last tick
   std::optional<double> ends_by_s_;          ///< once the target is lost in a scene that ends then
   const Watch* watch_ = nullptr;

@@ -59,6 +59,12 @@ constexpr double via_reached = 0.1, escape_end_reached = 0.08;
 // times.
 constexpr double target_away = 0.06, target_blocked_s = 0.3, target_blocked_share = 0.3;
 constexpr int target_searches = 3;
+// An arm so near to the reference of a trajectory tracks it [rad or m], unless its clock hardly
+// runs: then something holds the arm up, and the trajectory is a path.
+constexpr double track_within = 0.1, track_rate_least = 0.1;
+// It was planned to be clear, so it may come near to obstacles fast: braking [m/s^2] and rate [1/s]
+// as in (10.10), the rate at most this share of one over the horizon.
+constexpr double track_brake = 20.0, track_rate = 100.0, track_rate_share = 0.5;
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -86,7 +92,8 @@ VectorXd lever_weights(const model::Model& model) {
 
 class Hybrid final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties = HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS;
+  static constexpr std::uint32_t properties =
+      HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES;
 
   Hybrid(const planning::Host& host, const planning::Setup& setup, const Json& params)
       : host_(host),
@@ -154,6 +161,7 @@ class Hybrid final : public planning::Planner {
     margins_.set_params(tuning.margins);
     follower_.set_params(tuning.follow);
     target_velocity_gain_ = tuning.target_velocity_gain;
+    tracking_gain_ = tuning.follow.gain;
     measure_margins_ = true;
     velocity_gain_ = tuning.velocity_gain;
     follow_gain_ = tuning.follow_gain;
@@ -192,7 +200,11 @@ class Hybrid final : public planning::Planner {
 
     const Target target = choose_target();
     evader_.update(tick, arm(), course());
-    margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, goal));
+    tracks_ = tracks(tick);
+    if (tracks_)
+      margins_.set_least(obstacles_.points());
+    else
+      margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, goal));
     double closing_speed = 0.0;
     if (evader_.evades()) {
       evader_.velocity(q_, u_);
@@ -200,6 +212,8 @@ class Hybrid final : public planning::Planner {
       u_.setZero();
     } else if (follows() && mode_ == Mode::goal) {
       follow(tick);
+    } else if (tracks_) {
+      track(tick);
     } else {
       closing_speed = law_.attract(model_, ws_, q_, target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
@@ -216,9 +230,11 @@ class Hybrid final : public planning::Planner {
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
            drive = drive_acceleration_;
-    if (follows() && mode_ == Mode::goal) gain = target_velocity_gain_;
+    if ((follows() && mode_ == Mode::goal) || tracks_) gain = target_velocity_gain_;
+    if (tracks_) drive = acceleration_max_;
     if (evader_.evades()) gain = evasion_gain, drive = evasion_acceleration;
-    x_ = w_ + horizon_s_ * (gain * (u_ - w_)).cwiseMin(drive).cwiseMax(-drive);
+    // A reference accelerates as the motors can, so the velocity that counts is the present one.
+    x_ = w_ + horizon_s_ * (gain * (u_ - (tracks_ ? v_ : w_))).cwiseMin(drive).cwiseMax(-drive);
     project(command);
     if (observer_)
       answer_by_torque(command);
@@ -227,6 +243,8 @@ class Hybrid final : public planning::Planner {
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     if (follows())
       check_target(tick.time_s(), command);
+    else if (tracks_)
+      stall_.restart(tick.time_s());
     else
       check_stall(tick.time_s(), target, closing_speed, command);
     if (!evader_.active()) return;
@@ -274,6 +292,23 @@ class Hybrid final : public planning::Planner {
                        upper_, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
     follower_.keep_clear(obstacles_.points(), brake_, rate_, lower_, upper_, u_);
+  }
+
+  // Whether the arm is near the reference of a trajectory; away from it, the trajectory is a path.
+  [[nodiscard]] bool tracks(const planning::Tick& tick) const {
+    const auto reference = tick.reference();
+    return reference && reference->rate > track_rate_least && mode_ == Mode::goal &&
+           !evader_.evades() && (reference->q - q_).lpNorm<Eigen::Infinity>() < track_within;
+  }
+
+  // docs/theory.md (18.17)
+  void track(const planning::Tick& tick) {
+    const auto reference = *tick.reference();
+    // Under ideal actuation v_ is that of the step before, on average half a period old.
+    const double lead =
+        1.0 / target_velocity_gain_ - (observer_ ? 0.0 : 0.5 * setup_.control_period_s());
+    u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - q_);
+    if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
   }
 
   void measure_margins() {
@@ -452,26 +487,28 @@ class Hybrid final : public planning::Planner {
 
   void add_rows() {
     const double dt = horizon_s_;
+    const double brake_max = tracks_ ? track_brake : brake_,
+                 rate = tracks_ ? std::min(track_rate, track_rate_share / dt) : rate_;
     for (const auto& point : obstacles_.points()) {
       const bool moves = evader_.moves(point.obstacle);
       if (moves && !evader_.has_rows()) continue;
       const double x = point.distance - point.margin;
       // docs/theory.md (10.11)
-      double bound = point.obstacle_speed - approach_speed(x, brake_, rate_);
+      double bound = point.obstacle_speed - approach_speed(x, brake_max, rate);
       const double present = point.row.dot(w_);
       // Near its limit a row demands no more braking than the boxes surely allow:
       // docs/theory.md (10.20).
       if (ramp_ || present - least_brake * dt <
-                       point.obstacle_speed - approach_speed(x, least_brake, rate_)) {
+                       point.obstacle_speed - approach_speed(x, least_brake, rate)) {
         const double room = filter_.braking_room(point.row, w_);
-        const double brake = std::clamp(brake_share * room / dt, least_brake, brake_);
+        const double brake = std::clamp(brake_share * room / dt, least_brake, brake_max);
         const double speed =
-            ramp_ ? approach_speed(x, brake, rate_, ramp_->loss(point.row, M_inv_, brake))
-                  : approach_speed(x, brake, rate_);
+            ramp_ ? approach_speed(x, brake, rate, ramp_->loss(point.row, M_inv_, brake))
+                  : approach_speed(x, brake, rate);
         bound = std::min(point.obstacle_speed - speed, present + room);
       }
       const double floor =
-          point.obstacle_speed - rate_ * std::max(1e-9, point.distance - 0.5 * point.margin);
+          point.obstacle_speed - rate * std::max(1e-9, point.distance - 0.5 * point.margin);
       (void)filter_.add_row(point.row, bound, floor, moves ? MoverRows::softness : 0.0);
     }
     if (evader_.active() && evader_.has_rows()) evader_.add_rows(arm(), w_, filter_);
@@ -678,8 +715,8 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
-         drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0, rate_ = 0.0,
-         joint_damping_ = 0.0, contact_radius_;
+         tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
+         rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
   int passes_ = 1, max_escapes_, search_steps_ = 1;
   double horizon_s_;                  ///< time after which the velocity is to be x
   std::optional<Observer> observer_;  ///< only under sampled actuation
@@ -693,6 +730,7 @@ class Hybrid final : public planning::Planner {
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
   std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
+  bool tracks_ = false;          ///< the reference of a trajectory
   bool held_back_ = false;       ///< by the filter or a near obstacle
   bool measure_margins_ = true;  ///< whether goal or margins have changed
   int escapes_ = 0;

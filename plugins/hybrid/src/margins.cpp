@@ -8,12 +8,16 @@ namespace {
 
 // Motors that act late, with friction and noise, let the arm come about a millimetre nearer.
 constexpr double smallest_m = 0.001, smallest_sampled_m = 0.003;
+// Least margins are so much wider than those of a shield.
+constexpr double least_beyond_shield_m = 0.001;
 
 }  // namespace
 
 Margins::Margins(const planning::Setup& setup, const MarginParams& params)
     : params_(params),
       smallest_m_(setup.sampled() ? smallest_sampled_m : smallest_m),
+      least_m_(std::max(smallest_m, setup.shield_margin_m() + least_beyond_shield_m)),
+      least_self_m_(std::max(smallest_m, setup.shield_self_margin_m() + least_beyond_shield_m)),
       goal_q_(Eigen::VectorXd::Zero(setup.dof())),
       self_at_goal_(params.self_m),
       clearance_at_goal_(setup.shapes().size()) {}
@@ -47,6 +51,11 @@ void Margins::set(std::span<NearPoint> points, double weight) const {
     const double full = point.obstacle == NearPoint::self ? params_.self_m : params_.full_m;
     point.margin = (1.0 - weight) * at_goal(point) + weight * full;
   }
+}
+
+void Margins::set_least(std::span<NearPoint> points) const {
+  for (auto& point : points)
+    point.margin = point.obstacle == NearPoint::self ? least_self_m_ : least_m_;
 }
 
 bool Margins::tight_at_goal(const NearPoint& point) const {

@@ -26,6 +26,8 @@ class Margins {
   void set_goal(Surroundings& surroundings, const hamelin_goal& goal, double radius);
   /// Sets the margin of each point. @param weight Law::margin_weight: 0 at the goal, 1 far from it
   void set(std::span<NearPoint> points, double weight) const;
+  /// The least margins, for a motion that was planned to be clear.
+  void set_least(std::span<NearPoint> points) const;
   /// Whether the clearance of this point's shape at a joint goal is less than the full margin.
   [[nodiscard]] bool tight_at_goal(const NearPoint& point) const;
   [[nodiscard]] const MarginParams& params() const noexcept { return params_; }
@@ -35,6 +37,7 @@ class Margins {
 
   MarginParams params_;
   double smallest_m_;       ///< of a margin at a joint goal
+  double least_m_, least_self_m_;
   Eigen::VectorXd goal_q_;  ///< of a joint goal; sized once, since a tick does not allocate
   bool joint_goal_ = false;
   double self_at_goal_ = 0.0;

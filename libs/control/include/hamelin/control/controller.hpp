@@ -15,6 +15,7 @@
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/guidance.hpp"
+#include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/control/loaded_arm.hpp"
 #include "hamelin/control/newest.hpp"
@@ -47,6 +48,8 @@ struct Answer {
   std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
   /// The target of the current goal, where that is a follow goal; else null.
   const TargetState* target = nullptr;
+  /// The reference of the current goal, where that has a trajectory; else null.
+  const ReferenceState* reference = nullptr;
   /// Number of the World's snapshot that the answer is for.
   std::uint64_t snapshot = 0;
   /// Number of what the arm carries: 0 at first, else what attach() or detach() returned last of
@@ -277,6 +280,7 @@ class Controller {
   template <class Sample>
   void receive_target(const Sample& sample);
   void update_target();
+  void update_reference();
   /// The current goal as the planner sees it.
   [[nodiscard]] const hamelin_goal* goal_for_planner();
   void take_params();
@@ -324,8 +328,9 @@ class Controller {
   bool receives_ = false;      ///< whether the newest goals follow a streamed target
   Newest<StreamedTarget> new_target_;
   LiveTarget target_;
+  LiveReference reference_;
   const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
-  hamelin_goal live_goal_{};              ///< the current one if it is a follow goal
+  hamelin_goal live_goal_{};              ///< the current one if it changes from tick to tick
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
   std::optional<Guidance> guidance_;  ///< none without a guide

@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/planning/plugin_abi.h"
+#include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::control {
@@ -28,13 +29,21 @@ struct GoalList {
 
 /// Sets what changes from tick to tick in a follow goal.
 void set_target(const TargetState& target, hamelin_goal& goal) noexcept;
+/// Sets what changes from tick to tick in a goal with a trajectory. Its pointers refer to
+/// `reference`.
+void set_reference(const ReferenceState& reference, hamelin_goal& goal) noexcept;
 
 /// Checks goals that are to replace those of a scene.
 /// @param path_points_max the largest number of way-points of a path
-/// @param follows whether the planner accepts goals that follow a target
+/// @param planner that must accept goals which follow a target or have a trajectory
 /// @throws Error invalid, "goal 1: what is wrong, what was expected"
 void check_goals(const std::vector<scene::Goal>& goals, const scene::Scene& scene,
-                 const model::Model& model, std::size_t path_points_max, bool follows);
+                 const model::Model& model, std::size_t path_points_max,
+                 const planning::Plugin& planner);
+
+/// What is wrong with the joints of a trajectory for this arm; empty if nothing is.
+[[nodiscard]] std::string joints_defect(const scene::JointTrajectory& trajectory,
+                                        const model::Model& model);
 
 /// The goal that follows a target, which is the last one; null if there is none.
 [[nodiscard]] const scene::Goal* follow_goal_of(const std::vector<scene::Goal>& goals) noexcept;

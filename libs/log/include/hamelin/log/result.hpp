@@ -97,6 +97,15 @@ struct Result {
     long refused_lines = 0;              ///< of the stream
   };
   std::optional<Following> following;
+  /// How well the arm followed the trajectories of goals, tick by tick.
+  struct Trajectory {
+    double duration_s = 0.0;  ///< of those that were begun
+    double time_s = 0.0;      ///< that the arm took for them; more where it was held up
+    /// Root mean square and maximum of the largest distance of a joint from the reference
+    /// [rad or m].
+    double error_rms = 0.0, error_max = 0.0;
+  };
+  std::optional<Trajectory> trajectory;
   SolverSummary solver;
   double gyroscopic_work_J = 0.0, filter_work_J = 0.0, recovery_work_J = 0.0, dissipated_J = 0.0,
          held_work_J = 0.0;

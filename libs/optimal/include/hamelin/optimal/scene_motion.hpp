@@ -19,6 +19,9 @@ struct SceneMotionOptions {
   double margin_m = 0.005;                   ///< least clearance
   std::optional<double> acceleration, jerk;  ///< limits of all joints [rad/s² and rad/s³, or m]
   double time_effort_weight = 1e-3;          ///< see Problem
+  /// Share of the limits of velocity and torque that the motion may use: the rest is for the
+  /// feedback of an arm that follows it.
+  double limit_share = 1.0;
   SolveOptions solve{};
 };
 

@@ -181,6 +181,13 @@ class Setup {
   const hamelin_setup* raw_;
 };
 
+/// Where the arm should be by the trajectory of its goal: dof numbers each. The rate, 1 or less
+/// where the arm is held up, is contained in v and a.
+struct Reference {
+  ConstVectorMap q, v, a;
+  double time_s, rate;
+};
+
 /// The input of one tick.
 class Tick {
  public:
@@ -202,6 +209,15 @@ class Tick {
   }
   /// The current goal. It stays valid until a tick with another goal_number().
   [[nodiscard]] const hamelin_goal& goal() const { return *raw_->goal; }
+  /// Where the arm should be now by the trajectory of its goal; none without a trajectory.
+  [[nodiscard]] std::optional<Reference> reference() const {
+    const hamelin_goal& goal = *raw_->goal;
+    if (!HAMELIN_HAS_FIELD(&goal, hamelin_goal, reference_rate) || goal.reference_q == nullptr)
+      return std::nullopt;
+    return Reference{ConstVectorMap(goal.reference_q, dof_), ConstVectorMap(goal.reference_v, dof_),
+                     ConstVectorMap(goal.reference_a, dof_), goal.reference_time_s,
+                     goal.reference_rate};
+  }
   /// Another number means another goal.
   [[nodiscard]] std::uint64_t goal_number() const { return raw_->goal_number; }
   /// The index of the goal in its list.

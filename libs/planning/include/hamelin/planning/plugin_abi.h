@@ -151,6 +151,15 @@ typedef struct hamelin_goal {
   int32_t target_lost;      /* 1: the stream of targets broke off, and the target rests */
   double velocity_world_m_s[3], acceleration_world_m_s2[3];
   double angular_velocity_world_rad_s[3], angular_acceleration_world_rad_s2[3];
+  /* Joint goals with a trajectory, whose points are the path: where the arm should be at the time
+   * of the tick, dof numbers each [rad or m, and per s and s^2]; else null. They change from tick
+   * to tick while the goal keeps its goal_number. Only planners with the property
+   * HAMELIN_FOLLOWS_TRAJECTORIES get such goals. */
+  const double *reference_q, *reference_v, *reference_a;
+  double reference_time_s; /* on the clock of the trajectory */
+  /* How fast that clock runs: 1, or less while the arm is held up, down to 0. It is contained in
+   * reference_v and reference_a. */
+  double reference_rate;
 } hamelin_goal;
 
 /* A gyroscopic term: the force w x (velocity of the point) acts at a point of a link. It does no
@@ -371,7 +380,8 @@ enum {
   HAMELIN_FOLLOWS_TARGETS = 4, /* it accepts goals of the type HAMELIN_GOAL_FOLLOW */
   /* It follows the paths of joint goals. Where a guide searches paths, other planners are shown
    * the way-points as joint goals, one after the other. */
-  HAMELIN_FOLLOWS_PATHS = 8
+  HAMELIN_FOLLOWS_PATHS = 8,
+  HAMELIN_FOLLOWS_TRAJECTORIES = 16 /* it accepts joint goals with a trajectory */
 };
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;

@@ -228,6 +228,8 @@ class Plugin {
   [[nodiscard]] bool follows_targets() const noexcept;
   /// Whether it follows the paths of joint goals.
   [[nodiscard]] bool follows_paths() const noexcept;
+  /// Whether it accepts joint goals with a trajectory.
+  [[nodiscard]] bool follows_trajectories() const noexcept;
   /// Whether its planners' parameters can be changed while they run, and whether they can be told
   /// of a new start.
   [[nodiscard]] bool can_change_params() const noexcept;

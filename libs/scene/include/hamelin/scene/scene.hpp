@@ -12,6 +12,7 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/joint_trajectory.hpp"
 #include "hamelin/scene/motion.hpp"
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/scene/payload.hpp"
@@ -52,9 +53,11 @@ struct TargetStream {
 struct Goal {
   GoalType type = GoalType::joint;
   Eigen::VectorXd q;  ///< joint [rad or m]
-  /// Joint, if given as a path: way-points as columns, q the last; else empty.
+  /// Joint, if given as a path or a trajectory: way-points as columns, q the last; else empty.
   Eigen::MatrixXd path;
-  std::filesystem::path path_file;  ///< that the path was read from; empty: the scene file
+  std::filesystem::path path_file;  ///< that these were read from; empty: the scene file
+  /// Joint, if given as a trajectory: the motion to q, whose points are the path.
+  std::optional<JointTrajectory> trajectory;
   /// Position, pose: of the tip in the world; rotation unused for position. Follow: of the target
   /// at rest, see Frame::pose.
   geometry::SE3 pose;
@@ -71,13 +74,16 @@ struct Goal {
 
 /// Goals with the tolerances that a scene file gets by default.
 [[nodiscard]] Goal joint_goal(Eigen::VectorXd q);
+/// @throws Error invalid as check(trajectory) does
+[[nodiscard]] Goal trajectory_goal(JointTrajectory trajectory);
 [[nodiscard]] Goal position_goal(const Eigen::Vector3d& position_m);
 [[nodiscard]] Goal pose_goal(const geometry::SE3& pose);
 
 /// A goal that follows a target that is streamed.
 [[nodiscard]] Goal follow_goal(bool position_only = false, const TargetStream& stream = {});
 
-/// The goal's "type" in a scene file: "path" is a joint goal with way-points.
+/// The goal's "type" in a scene file: "path" is a joint goal with way-points, "trajectory" one whose
+/// way-points have times.
 [[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
 /// One value per joint.
