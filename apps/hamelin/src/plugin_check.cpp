@@ -192,7 +192,7 @@ void check_scene(Checks& checks, const planning::Plugin& plugin, const Json& par
 
 std::vector<TrialScene> trial_scenes(const planning::Plugin& plugin, const Json& params,
                                      const std::vector<std::filesystem::path>& files) {
-  std::vector<TrialScene> scenes = built_in_scenes(plugin.follows_targets());
+  std::vector<TrialScene> scenes = built_in_scenes(plugin);
   for (const auto& file : files) {
     scenes.push_back(read_trial_scene(file));
     scenes.back().scene.planner = scene::Choice{plugin.name(), params};

@@ -159,9 +159,18 @@ scene::Scene scene_beside_ball(const scene::Goal& goal) {
   return scene;
 }
 
+// From zero to q in one second.
+scene::JointTrajectory trial_motion(const Eigen::VectorXd& q) {
+  scene::JointTrajectory motion;
+  motion.time_s = Eigen::Vector2d(0.0, 1.0);
+  motion.q = motion.v = Eigen::MatrixXd::Zero(q.size(), 2);
+  motion.q.col(1) = q;
+  return motion;
+}
+
 }  // namespace
 
-std::vector<TrialScene> built_in_scenes(bool follows_targets) {
+std::vector<TrialScene> built_in_scenes(const planning::Plugin& plugin) {
   model::ChainOptions chain;
   chain.links = 3;
   const model::Model arm(model::make_chain(chain), geometry::SE3{},
@@ -175,7 +184,10 @@ std::vector<TrialScene> built_in_scenes(bool follows_targets) {
                                    std::pair("a position goal", scene::position_goal(tip.p())),
                                    std::pair("a pose goal", scene::pose_goal(tip))})
     scenes.push_back({name, scene_beside_ball(goal), arm});
-  if (!follows_targets) return scenes;
+  if (plugin.follows_trajectories())
+    scenes.push_back(
+        {"a trajectory", scene_beside_ball(scene::trajectory_goal(trial_motion(q))), arm});
+  if (!plugin.follows_targets()) return scenes;
   scene::Goal follow = scene::follow_goal();
   follow.pose = tip;
   follow.motion = scene::SineMotion{{0.05, 0.05, 0.0}, 0.5};

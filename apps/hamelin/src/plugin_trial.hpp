@@ -21,7 +21,7 @@ struct TrialScene {
 
 /// Scenes that need no files: a chain of three links beside a moving ball, with a goal of each
 /// kind.
-[[nodiscard]] std::vector<TrialScene> built_in_scenes(bool follows_targets);
+[[nodiscard]] std::vector<TrialScene> built_in_scenes(const planning::Plugin& plugin);
 
 /// A scene file, whatever planner it names. @throws Error for bad input
 [[nodiscard]] TrialScene read_trial_scene(const std::filesystem::path& file);

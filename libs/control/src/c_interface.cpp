@@ -278,6 +278,27 @@ std::int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller,
   });
 }
 
+std::int32_t hamelin_controller_set_trajectory(hamelin_controller* controller, const double* time_s,
+                                               const double* q, const double* v, const double* a,
+                                               std::size_t points, double tolerance_rad,
+                                               std::uint64_t* number, char* error,
+                                               std::size_t error_size) {
+  return update(number, error, error_size, [&] {
+    const Eigen::Index dof = controller->q.size(), count = static_cast<Eigen::Index>(points);
+    const auto columns = [&](const double* from, const char* name) -> Eigen::MatrixXd {
+      return Eigen::Map<const Eigen::MatrixXd>(required(from, name), dof, count);
+    };
+    scene::JointTrajectory trajectory;
+    trajectory.time_s = Eigen::Map<const Eigen::VectorXd>(required(time_s, "time_s"), count);
+    trajectory.q = columns(q, "q");
+    trajectory.v = columns(v, "v");
+    if (a != nullptr) trajectory.a = columns(a, "a");
+    scene::Goal goal = scene::trajectory_goal(std::move(trajectory));
+    if (tolerance_rad > 0.0) goal.tolerance_rad = tolerance_rad;
+    return controller->controller.set_goal(std::move(goal));
+  });
+}
+
 std::int32_t hamelin_controller_follow(hamelin_controller* controller,
                                        const hamelin_target_stream* stream, std::uint64_t* number,
                                        char* error, std::size_t error_size) {

@@ -29,8 +29,7 @@ constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
 // bounds a little [rad or m]; and as shares of the speed limits, where velocities are exact, which
 // change a little within a step, and where they are not.
-constexpr double planner_reserve = 0.002, exact_speed_reserve = 0.001,
-                 planner_speed_reserve = 0.02;
+constexpr double planner_reserve = 0.002, exact_speed_reserve = 0.001, planner_speed_reserve = 0.02;
 // What the shield keeps from speed limits, as a share, because velocities are not exact; and the
 // share that it leaves in any case.
 constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,

@@ -176,9 +176,8 @@ JointTrajectory read_joint_trajectory(const std::filesystem::path& file) {
 }
 
 Json to_json(const JointTrajectory& trajectory) {
-  Json out{{"schema", "hamelin.trajectory/1"},
-           {"joints", trajectory.joints},
-           {"points", Json::array()}};
+  Json out{
+      {"schema", "hamelin.trajectory/1"}, {"joints", trajectory.joints}, {"points", Json::array()}};
   for (Index i = 0; i < trajectory.points(); ++i) {
     Json point{{"time_s", trajectory.time_s[i]},
                {"q", column_json(trajectory.q, i)},

@@ -309,8 +309,8 @@ void set_trajectory(Goal& goal, JointTrajectory trajectory) {
 void read_trajectory_of(const Reader& in, const std::filesystem::path& folder, Goal& goal) {
   if (in.find("file") == nullptr) {
     in.require("trajectory", "trajectory goal without a file");
-    set_trajectory(goal, joint_trajectory_from_json(*in.find("trajectory"),
-                                                    in.place_of("trajectory")));
+    set_trajectory(goal,
+                   joint_trajectory_from_json(*in.find("trajectory"), in.place_of("trajectory")));
     return;
   }
   in.refuse("trajectory", "trajectory goal with a file");

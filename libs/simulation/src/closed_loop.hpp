@@ -132,8 +132,8 @@ class ClosedLoop {
   std::unique_ptr<TargetFeed> feed_;         ///< only of a streamed target
   std::unique_ptr<TrackingAudit> tracking_;  ///< only with a follow goal
   TrajectoryAudit trajectory_;
-  bool target_lost_ = false;                 ///< at the last tick
-  std::optional<double> ends_by_s_;          ///< once the target is lost in a scene that ends then
+  bool target_lost_ = false;         ///< at the last tick
+  std::optional<double> ends_by_s_;  ///< once the target is lost in a scene that ends then
   const Watch* watch_ = nullptr;
   struct Message {
     bool warning;

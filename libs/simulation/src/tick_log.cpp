@@ -97,9 +97,8 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   if (tracking_ != nullptr && target != nullptr && !target->waiting)
     fields["target"] = target_json(*target, *tracking_);
   if (const control::ReferenceState* const reference = controller_.answer().reference)
-    fields["reference"] = {{"q", to_json(reference->q)},
-                           {"time_s", reference->time_s},
-                           {"rate", reference->rate}};
+    fields["reference"] = {
+        {"q", to_json(reference->q)}, {"time_s", reference->time_s}, {"rate", reference->rate}};
   if (actuation_.limited()) fields["saturated"] = actuation_.saturated();
   if (world_->has_self()) fields["self_clearance_m"] = world_->self_clearance_m();
   if (world_->has_obstacles()) {

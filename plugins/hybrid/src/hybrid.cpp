@@ -62,9 +62,12 @@ constexpr int target_searches = 3;
 // An arm so near to the reference of a trajectory tracks it [rad or m], unless its clock hardly
 // runs: then something holds the arm up, and the trajectory is a path.
 constexpr double track_within = 0.1, track_rate_least = 0.1;
-// It was planned to be clear, so it may come near to obstacles fast: braking [m/s^2] and rate [1/s]
-// as in (10.10), the rate at most this share of one over the horizon.
-constexpr double track_brake = 20.0, track_rate = 100.0, track_rate_share = 0.5;
+// It was planned to be clear, so it may come near to obstacles and joint limits fast: braking
+// [m/s^2] and rate [1/s] as in (10.10).
+constexpr double track_brake = 20.0;
+double track_rate_within(double horizon_s) {
+  return std::min(100.0, 0.5 / horizon_s);
+}
 
 /// The weight of each joint in searches: the largest distance from the joint to any point that it
 /// moves, relative to that of the other joints. Joints that move little of the arm need not vary as
@@ -488,7 +491,7 @@ class Hybrid final : public planning::Planner {
   void add_rows() {
     const double dt = horizon_s_;
     const double brake_max = tracks_ ? track_brake : brake_,
-                 rate = tracks_ ? std::min(track_rate, track_rate_share / dt) : rate_;
+                 rate = tracks_ ? track_rate_within(dt) : rate_;
     for (const auto& point : obstacles_.points()) {
       const bool moves = evader_.moves(point.obstacle);
       if (moves && !evader_.has_rows()) continue;
@@ -519,11 +522,11 @@ class Hybrid final : public planning::Planner {
   [[nodiscard]] double joint_approach(int k, double offset, double side) const {
     const double x = side * offset;
     if (!std::isfinite(x)) return side * std::numeric_limits<double>::infinity();
-    const double brake = 0.5 * acceleration_max_;
+    const double brake = (tracks_ ? 1.0 : 0.5) * acceleration_max_,
+                 rate = tracks_ ? track_rate_within(horizon_s_) : joint_limit_rate;
     if (x <= 0.0) return side * joint_limit_rate * x;
-    if (!ramp_) return side * approach_speed(x, brake, joint_limit_rate);
-    return side *
-           approach_speed(x, brake, joint_limit_rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
+    if (!ramp_) return side * approach_speed(x, brake, rate);
+    return side * approach_speed(x, brake, rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
   }
 
   // An arm that is kept from its target searches a way around while it goes on following. A target

@@ -36,7 +36,7 @@ class Margins {
   [[nodiscard]] double at_goal(const NearPoint& point) const;
 
   MarginParams params_;
-  double smallest_m_;       ///< of a margin at a joint goal
+  double smallest_m_;  ///< of a margin at a joint goal
   double least_m_, least_self_m_;
   Eigen::VectorXd goal_q_;  ///< of a joint goal; sized once, since a tick does not allocate
   bool joint_goal_ = false;

@@ -221,6 +221,17 @@ std::vector<BadCall> bad_calls(const std::string& bad_map) {
          const std::vector<double> q(hamelin_controller_dof(c), 100.0);
          return hamelin_controller_set_joint_goal(c, q.data(), 0.0, number, error, size);
        }});
+  calls.push_back({"time_s: is null", [](auto* c, auto* number, char* error, std::size_t size) {
+                     return hamelin_controller_set_trajectory(c, nullptr, nullptr, nullptr, nullptr,
+                                                              3, 0.0, number, error, size);
+                   }});
+  calls.push_back({"/points: 1 given, expected 2 or more",
+                   [](auto* c, auto* number, char* error, std::size_t size) {
+                     const double zero = 0.0;
+                     const std::vector<double> q(hamelin_controller_dof(c), 0.0);
+                     return hamelin_controller_set_trajectory(c, &zero, q.data(), q.data(), nullptr,
+                                                              1, 0.0, number, error, size);
+                   }});
   calls.push_back({"position_m: is null", [](auto* c, auto* number, char* error, std::size_t size) {
                      return hamelin_controller_set_pose_goal(c, nullptr, nullptr, 0.0, 0.0, number,
                                                              error, size);

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "../program.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/optimal/solve.hpp"
 
 using namespace hamelin;
@@ -38,6 +39,42 @@ TEST_CASE("optimize writes a trajectory that validates, and exports", "[optimize
   CHECK_THAT(sandbox.text("f.csv"), Catch::StartsWith("time_s,q_"));
   CHECK(sandbox.run({"optimize", pillar, "--format", "ros", "-o", "f.json"}).exit_code == 0);
   CHECK(sandbox.json("f.json")["joint_names"].size() == 7);
+}
+
+TEST_CASE("an optimised motion is run in time, logged, replayed and reported", "[optimize]") {
+  Sandbox sandbox;
+  REQUIRE(sandbox
+              .run({"optimize", pillar, "--limit-share", "0.8", "--acceleration", "10", "--margin",
+                    "0.008", "-o", "calm.json"})
+              .exit_code == 0);
+  const auto run = sandbox.run({"run", pillar, "--trajectory", "calm.json", "--log", "run.jsonl",
+                                "--result", "result.json"});
+  CHECK(run.exit_code == 0);
+  CHECK_THAT(run.out, Catch::Contains("trajectory  ") && Catch::Contains("s long, took"));
+  const Json result = sandbox.json("result.json"), file = sandbox.json("calm.json");
+  const Json& followed = result["trajectory"];
+  CHECK(followed["duration_s"] == file["points"].back()["time_s"]);
+  CHECK(followed["time_s"].get<double>() < followed["duration_s"].get<double>() + 0.01);
+  CHECK(followed["error_max"].get<double>() < 0.03);
+  CHECK(result["goal"]["type"] == "trajectory");
+  CHECK(sandbox.run({"validate", "result.json"}).exit_code == 0);
+  CHECK(sandbox.run({"validate", "run.jsonl"}).exit_code == 0);
+  // the log has the motion, so a replay needs no file
+  std::filesystem::remove(sandbox.path("calm.json"));
+  CHECK(sandbox.run({"replay", "run.jsonl"}).exit_code == 0);
+  CHECK(sandbox.run({"report", "run.jsonl", "-o", "run.html"}).exit_code == 0);
+}
+
+TEST_CASE("trajectories that do not fit are refused in one line", "[optimize]") {
+  Sandbox sandbox;
+  write_file_atomically(sandbox.path("motion.json"),
+                        R"({"schema": "hamelin.trajectory/1", "joints": ["a"], "points": [
+                    {"time_s": 0, "q": [0], "v": [0]}, {"time_s": 1, "q": [1], "v": [0]}]})");
+  const auto other = sandbox.run({"run", pillar, "--trajectory", "motion.json"});
+  CHECK(other.exit_code == 2);
+  CHECK_THAT(other.err, Catch::Contains("/goals/0: 1 joints, expected 7 (those of '"));
+  CHECK(std::count(other.err.begin(), other.err.end(), '\n') == 1);
+  CHECK(sandbox.run({"run", pillar, "--trajectory", "none.json"}).exit_code == 2);
 }
 
 TEST_CASE("optimize has exit code 1 where there is no motion, and writes nothing", "[optimize]") {

@@ -160,6 +160,14 @@ int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const d
                                          const double quaternion_wxyz[4], double tolerance_m,
                                          double tolerance_rad, uint64_t* number, char* error,
                                          size_t error_size);
+/* A motion over time: `points` times in s, the first 0, and at each of them dof positions,
+ * velocities and accelerations, point by point; accelerations may be null. The arm must follow it in
+ * time and waits nowhere else than where it is held up. The planner must be one that follows
+ * trajectories, such as hybrid. */
+int32_t hamelin_controller_set_trajectory(hamelin_controller* controller, const double* time_s,
+                                          const double* q, const double* v, const double* a,
+                                          size_t points, double tolerance_rad, uint64_t* number,
+                                          char* error, size_t error_size);
 /* A goal that follows a target, until another goal is set. The planner must be one that follows
  * targets, such as hybrid. stream may be null. */
 int32_t hamelin_controller_follow(hamelin_controller* controller,

@@ -14,7 +14,7 @@ namespace hamelin::scene {
 struct JointTrajectory {
   std::vector<std::string> joints;  ///< names, in the order of the rows; empty: as in the robot
   Eigen::VectorXd time_s;           ///< from 0 on, increasing
-  Eigen::MatrixXd q, v, a;          ///< dof × points [rad or m, and per s and s²]; `a` may be empty
+  Eigen::MatrixXd q, v, a;  ///< dof × points [rad or m, and per s and s²]; `a` may be empty
 
   [[nodiscard]] Eigen::Index points() const noexcept { return time_s.size(); }
   [[nodiscard]] double duration_s() const { return time_s[points() - 1]; }
@@ -27,7 +27,8 @@ struct JointTrajectory {
 };
 
 /// @param where prefix of messages
-/// @throws Error invalid for fewer than two points, times that do not begin at 0 or do not increase,
+/// @throws Error invalid for fewer than two points, times that do not begin at 0 or do not
+/// increase,
 ///         sizes that differ, and numbers that are not finite: "where/points/3/time_s: …"
 void check(const JointTrajectory& trajectory, const std::string& where);
 

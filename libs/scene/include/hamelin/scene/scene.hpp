@@ -82,8 +82,8 @@ struct Goal {
 /// A goal that follows a target that is streamed.
 [[nodiscard]] Goal follow_goal(bool position_only = false, const TargetStream& stream = {});
 
-/// The goal's "type" in a scene file: "path" is a joint goal with way-points, "trajectory" one whose
-/// way-points have times.
+/// The goal's "type" in a scene file: "path" is a joint goal with way-points, "trajectory" one
+/// whose way-points have times.
 [[nodiscard]] std::string_view type_name(const Goal& goal) noexcept;
 
 /// One value per joint.
