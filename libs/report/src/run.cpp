@@ -112,7 +112,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
       plotted_joints_(
           std::min<std::size_t>(static_cast<std::size_t>(world.model.dof()), plotted_joints_max)),
       series_count_(header.value("series", Json::array()).size()),
-      row_(3 * plotted_joints_ + columns + series_count_, unknown),
+      row_(4 * plotted_joints_ + columns + series_count_, unknown),
       bins_(row_.size(), options.plot_points_max),
       sample_(frames_of(options, world.model.dof())),
       stops_(std::clamp<std::size_t>(
@@ -191,6 +191,13 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   add("residual", "solver residual", "1", true, {{"residual", residual}});
   add("tick_us", "time of one tick", "µs", true,
       {{"tick", tick_us}, {"longest since the previous line", tick_us_max}});
+  if (has_trajectory && recorded.scene.model.torque_limits) {
+    // after the series
+    std::size_t share = column + columns + series_count_;
+    plots_.push_back({"tau_share", "torques as shares of their limits" + suffix, "1", {}, false});
+    for (std::size_t i = 0; i < plotted_joints_; ++i)
+      plots_.back().lines.emplace_back(links[i].joint.name, share++);
+  }
   add_series_plots(header, column + columns);
 }
 
@@ -281,7 +288,12 @@ void Run::add_tick(const Json& line, const log::LogReader& reader) {
   };
   joints(0, frame.q);
   joints(1, joint_vector(line, "v", dof, reader));
-  joints(2, joint_vector(line, "tau", dof, reader));
+  const VectorXd tau = joint_vector(line, "tau", dof, reader);
+  joints(2, tau);
+  for (std::size_t i = 0; tau.size() > 0 && i < plotted_joints_; ++i)
+    if (const auto limit = world_.model.robot().links[i].joint.effort_max)
+      row_[3 * plotted_joints_ + columns + series_count_ + i] =
+          tau[static_cast<Eigen::Index>(i)] / *limit;
   double* const row = &row_[3 * plotted_joints_];
   const Json& energy = object_member(line, "energy", reader);
   const Json& solver = object_member(line, "solver", reader);
@@ -467,6 +479,9 @@ Json Run::marks(const Plot& plot) const {
     for (const auto& goal : world_.goals)
       if ((goal.type == scene::GoalType::joint) == of_joints)
         add(of_joints ? goal.tolerance_rad : goal.tolerance_m, "tolerance");
+  } else if (id == "tau_share") {
+    add(1.0, "limit");
+    add(-1.0, "limit");
   } else if (id == "v" || id == "tau") {
     // Joints with the same limit share its line. It is drawn if one of them comes near to it; a
     // limit far away would only compress the scale.
