@@ -172,9 +172,16 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   if (has_joint_goal)
     add(has_tip_goal ? "goal_joint" : "goal", "distance to the joint goal",
         unit(has_revolute, has_prismatic, "rad", "m"), false, {{"largest joint error", goal_rad}});
-  if (has_trajectory)
+  if (has_trajectory) {
     add("trajectory", "distance from the trajectory", unit(has_revolute, has_prismatic, "rad", "m"),
         false, {{"largest joint error", off_trajectory}});
+    if (recorded.scene.model.torque_limits) {
+      std::size_t share = column + columns + series_count_;  // after the series
+      plots_.push_back({"tau_share", "torques as shares of their limits" + suffix, "1", {}, false});
+      for (std::size_t i = 0; i < plotted_joints_; ++i)
+        plots_.back().lines.emplace_back(links[i].joint.name, share++);
+    }
+  }
   add("energy", "energy account", "J", false,
       {{"kinetic", kinetic},
        {"potential", potential},
@@ -191,13 +198,6 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   add("residual", "solver residual", "1", true, {{"residual", residual}});
   add("tick_us", "time of one tick", "µs", true,
       {{"tick", tick_us}, {"longest since the previous line", tick_us_max}});
-  if (has_trajectory && recorded.scene.model.torque_limits) {
-    // after the series
-    std::size_t share = column + columns + series_count_;
-    plots_.push_back({"tau_share", "torques as shares of their limits" + suffix, "1", {}, false});
-    for (std::size_t i = 0; i < plotted_joints_; ++i)
-      plots_.back().lines.emplace_back(links[i].joint.name, share++);
-  }
   add_series_plots(header, column + columns);
 }
 

@@ -422,6 +422,43 @@ TEST_CASE("the target that is followed is that of the ticks", "[report]") {
   CHECK(Decoded(report::make_data({log}).bytes).head["runs"][0]["frames"]["target"].is_null());
 }
 
+TEST_CASE("the distance from a trajectory and the shares of torque limits are those of the ticks",
+          "[report]") {
+  const auto log = test::scratch("trajectory") / "run.jsonl";
+  scene::Scene scene =
+      scene::read_scene(std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/pillar.json");
+  scene::JointTrajectory trajectory;
+  trajectory.time_s = Eigen::Vector2d(0.0, 1.0);
+  trajectory.q = scene.start_q.replicate(1, 2);
+  trajectory.q(0, 1) += 0.4;
+  trajectory.v = Eigen::MatrixXd::Zero(7, 2);
+  scene.goals = {scene::trajectory_goal(trajectory)};
+  scene.duration_s = 0.5;
+  scene.actuation.type = scene::ActuationType::sampled;
+  scene.actuation.control_period_s = scene.step_s;
+  (void)test::log_run(scene, log);
+  const auto ticks = test::ticks_of(log);
+  const Decoded page(report::make_data({log}, {2000, 1500}).bytes);
+  const auto distance = page(page.plot(0, "trajectory")["series"][0]["y"]);
+  const Json& shares = page.plot(0, "tau_share");
+  REQUIRE(shares["series"].size() == 7);
+  CHECK(shares["marks"].size() == 2);
+  const auto second = page(shares["series"][1]["y"]);
+  const model::Model arm = control::load_model(scene);
+  REQUIRE(distance.size() == ticks.size());
+  for (std::size_t f = 0; f < ticks.size(); ++f) {
+    const double expected = (vector_of(ticks[f]["q"]) - vector_of(ticks[f]["reference"]["q"]))
+                                .lpNorm<Eigen::Infinity>();
+    CHECK(distance[f] == Approx(expected).margin(1e-6));
+    CHECK(second[f] ==
+          Approx(ticks[f]["tau"][1].get<double>() / *arm.robot().links[1].joint.effort_max)
+              .margin(1e-3));
+  }
+  (void)test::log_run(test::shelf(0.1), log);
+  const Decoded other(report::make_data({log}).bytes);
+  for (const Json& plot : other.head["runs"][0]["plots"]) CHECK(plot["id"] != "tau_share");
+}
+
 TEST_CASE("the stops are those of the ticks", "[report]") {
   const auto folder = test::scratch("stops");
   scene::Scene scene = test::shelf(4.0);

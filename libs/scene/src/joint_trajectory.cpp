@@ -149,7 +149,8 @@ JointTrajectory joint_trajectory_from_json(const Json& document, const std::stri
   JointTrajectory out;
   out.joints = document["joints"].get<std::vector<std::string>>();
   const auto n = static_cast<Index>(points.size());
-  const auto dof = static_cast<Index>(out.joints.size());
+  const auto dof =
+      static_cast<Index>(out.joints.empty() ? points[0]["q"].size() : out.joints.size());
   const bool accelerations = points[0].contains("a");
   out.time_s.resize(n);
   out.q.resize(dof, n);
