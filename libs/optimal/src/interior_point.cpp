@@ -13,9 +13,12 @@ constexpr double least_shift = 1e-8, largest_shift = 1e12;
 constexpr double gradient_max = 100.0;     // of the scaled cost at the guess
 constexpr double multiplier_range = 1e10;  // of slack · multiplier / μ
 constexpr int backtracks_max = 30;
-constexpr double small_decrease = 0.1;  // of the merit, in μ
-constexpr int small_decreases_max = 4;  // in a row, until the barrier is lowered
-constexpr double least_share = 0.01;    // of a slack or multiplier that a step leaves
+constexpr double small_decrease = 0.1;    // of cost and violation, in μ
+constexpr int small_decreases_max = 4;    // in a row, until the barrier is lowered
+constexpr double least_share = 0.01;      // of a slack or multiplier that a step leaves
+constexpr double gap_share = 0.03;        // of the duality gap: a decrease that is not worth a step
+constexpr double small_violation = 0.01;  // sum over all rows, for which μ may be lowered early
+constexpr double centred = 3.0;  // largest |s λ − μ| for which μ may be lowered early, in μ
 
 }  // namespace
 
@@ -48,9 +51,12 @@ void InteriorPoint::start(VectorXd x) {
       if (!side.bounds(r)) continue;
       side.slack[r] = std::max(first_slack_, side.sign * (program_.values()[r] - side.bound[r]));
       side.multiplier[r] = mu_ / side.slack[r];
+      bounds_ += 1.0;
     }
     find_residuals(side);
   });
+  first_violation_ = std::max(1.0, filter_point().violation);
+  filter_.reset(first_violation_);
 }
 
 void InteriorPoint::find_residuals(Side& side) const {
@@ -81,12 +87,18 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
   return out;
 }
 
-// Where distances have kinks, stationarity may stay large although the merit decreases no more.
+// docs/theory.md (18.13). Where distances have kinks, stationarity may stay large although cost and
+// violation decrease no more.
 void InteriorPoint::lower_barrier() {
   if (!can_lower_barrier()) return;
-  if (small_decreases_ < small_decreases_max && errors(mu_).largest() > 10.0 * mu_) return;
+  const Errors now = errors(mu_);
+  const bool solved = now.largest() <= 10.0 * mu_,
+             early = near_minimum_ && now.complementarity <= centred * mu_;
+  if (!solved && !early && small_decreases_ < small_decreases_max) return;
   small_decreases_ = 0;
+  near_minimum_ = false;
   mu_ = std::max(options_.tolerance / 11.0, std::min(0.2 * mu_, std::pow(mu_, 1.5)));
+  filter_.reset(first_violation_);
 }
 
 // docs/theory.md (18.10), (18.11)
@@ -142,28 +154,29 @@ double InteriorPoint::largest_step(const VectorXd& x, const VectorXd& dx) const 
   return step;
 }
 
-double InteriorPoint::violation_sum() const {
-  return lower_.residual.lpNorm<1>() + upper_.residual.lpNorm<1>();
-}
-
 // docs/theory.md (18.12)
-double InteriorPoint::merit() const {
+Filter::Point InteriorPoint::filter_point() const {
   double barrier = 0.0;
   for_each_side([&](const Side& side) { barrier += side.slack.array().log().sum(); });
-  return scale_ * program_.cost() - mu_ * barrier + penalty_ * violation_sum();
+  return {lower_.residual.lpNorm<1>() + upper_.residual.lpNorm<1>(),
+          scale_ * program_.cost() - mu_ * barrier};
 }
 
-// The slope of the merit along the step, with a penalty for which it is a descent.
-double InteriorPoint::merit_slope() {
+double InteriorPoint::barrier_slope() const {
   double slope = gradient_.dot(dx_);
   for_each_side(
       [&](const Side& side) { slope -= mu_ * side.slack_step.cwiseQuotient(side.slack).sum(); });
-  const double violation = violation_sum();
-  if (violation > 1e-14) {
-    const double needed = slope / (0.5 * violation);
-    if (penalty_ < needed) penalty_ = 2.0 * needed;
-  }
-  return slope - penalty_ * violation;
+  return slope;
+}
+
+// The minimum with the barrier is a number of bounds times μ above that without.
+void InteriorPoint::count_small_decreases(const Filter::Point& before, const Filter::Point& now) {
+  const double decrease = before.cost - now.cost;
+  near_minimum_ = decrease < gap_share * bounds_ * mu_ && now.violation <= before.violation &&
+                  now.violation < small_violation;
+  const bool small = std::abs(decrease) < small_decrease * mu_ &&
+                     before.violation - now.violation < small_decrease * mu_;
+  small_decreases_ = small ? small_decreases_ + 1 : 0;
 }
 
 // Where a row is inside its bound, the slack is its distance from the bound, so that the barrier
@@ -181,7 +194,8 @@ void InteriorPoint::take_slacks(Side& side, const VectorXd& before, double step)
 bool InteriorPoint::take_step() {
   const VectorXd x = x_;
   const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
-  const double slope = merit_slope(), before = merit();
+  const double slope = barrier_slope();
+  const Filter::Point before = filter_point();
   double step = std::min(largest_step(lower_.slack, lower_.slack_step),
                          largest_step(upper_.slack, upper_.slack_step));
   bool accepted = false;
@@ -190,9 +204,9 @@ bool InteriorPoint::take_step() {
     if (!program_.evaluate(x_)) continue;
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
-    const double now = merit();
-    accepted = now <= before + 1e-4 * step * slope + 1e-13 * std::abs(before);
-    if (accepted) small_decreases_ = before - now < small_decrease * mu_ ? small_decreases_ + 1 : 0;
+    const Filter::Point now = filter_point();
+    accepted = filter_.accept(before, now, slope, step);
+    if (accepted) count_small_decreases(before, now);
   }
   for_each_side([&](Side& side) {
     side.multiplier += largest_step(side.multiplier, side.multiplier_step) * side.multiplier_step;

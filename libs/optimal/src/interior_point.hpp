@@ -1,10 +1,11 @@
 #pragma once
+#include "filter.hpp"
 #include "hamelin/optimal/solve.hpp"
 #include "transcription.hpp"
 
 namespace hamelin::optimal {
 
-/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.12).
+/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.13).
 class InteriorPoint {
  public:
   struct Start {
@@ -44,9 +45,9 @@ class InteriorPoint {
   void find_side_steps(Side& side);
   void take_slacks(Side& side, const VectorXd& before, double step) const;
   [[nodiscard]] bool take_step();
-  [[nodiscard]] double merit() const;
-  [[nodiscard]] double merit_slope();
-  [[nodiscard]] double violation_sum() const;
+  [[nodiscard]] Filter::Point filter_point() const;
+  [[nodiscard]] double barrier_slope() const;
+  void count_small_decreases(const Filter::Point& before, const Filter::Point& now);
   [[nodiscard]] double largest_step(const VectorXd& x, const VectorXd& dx) const;
   void keep_multipliers_near(Side& side) const;
   template <class F>
@@ -68,8 +69,11 @@ class InteriorPoint {
   Side lower_, upper_;
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
   double scale_ = 1.0;  ///< of the cost
-  double penalty_ = 1.0;
-  int small_decreases_ = 0;  ///< of the merit, in a row
+  Filter filter_;
+  double first_violation_ = 1.0;  ///< at the guess, at least 1
+  double bounds_ = 0.0;           ///< number of finite ones
+  bool near_minimum_ = false;     ///< whether the last step won little beside what μ leaves open
+  int small_decreases_ = 0;       ///< of cost and violation, in a row
 };
 
 }  // namespace hamelin::optimal

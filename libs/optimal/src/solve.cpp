@@ -40,9 +40,10 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
   Solution out;
   int iterations = 0;
   using Start = InteriorPoint::Start;
-  const std::array<Start, 3> starts =
-      options.near_solution ? std::array{Start{1e-3, 1e-3}, Start{0.1, 1.0}, Start{0.1, 0.01}}
-                            : std::array{Start{0.1, 1.0}, Start{0.1, 0.01}, Start{0.1, 0.1}};
+  const std::array<Start, 4> starts{options.near_solution ? Start{1e-4, 0.01} : Start{0.01, 1.0},
+                                    {0.1, 1.0},
+                                    {0.01, 0.01},
+                                    {0.1, 0.1}};
   for (const Start& start : starts) {
     out = InteriorPoint(program, options, start).solve(guess);
     iterations += out.iterations;

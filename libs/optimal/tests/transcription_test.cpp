@@ -111,18 +111,20 @@ TEST_CASE("both solvers find the same motion", "[optimal]") {
   problem.intervals = 40;
   const MatrixXd guess =
       guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 40);
-  const Solution found = solve(problem, guess);
+  // the cost is flat around its minimum: a barrier of 1e-8 moves control points by 0.01
+  SolveOptions options;
+  options.tolerance = 1e-10;
+  const Solution found = solve(problem, guess, options);
   CAPTURE(found.cause, found.iterations, found.violation, found.stationarity, found.cost);
   CHECK(found.converged);
   CHECK(found.violation == 0.0);
   if (!has_ipopt()) return;
-  SolveOptions options;
   options.solver = Solver::ipopt;
   const Solution reference = solve(problem, guess, options);
   CAPTURE(reference.cause, reference.iterations, reference.cost);
   CHECK(reference.converged);
-  CHECK(found.cost == Approx(reference.cost).epsilon(1e-6));
-  CHECK((found.control - reference.control).norm() <= 1e-2);
+  CHECK(found.cost == Approx(reference.cost).epsilon(1e-9));
+  CHECK((found.control - reference.control).norm() <= 1e-4);
 }
 
 TEST_CASE("a motion keeps its limits at all times and its ends exactly", "[optimal]") {

@@ -30,7 +30,7 @@ struct GoalMotion {
   Optimized found;
   /// Whether it keeps all limits and is proved clear.
   [[nodiscard]] bool valid() const {
-    return found.solution.violation <= 1e-6 && found.proof.certified;
+    return found.solution.violation <= SolveOptions{}.tolerance && found.proof.certified;
   }
 };
 

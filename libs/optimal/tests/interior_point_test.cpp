@@ -1,0 +1,61 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "../src/filter.hpp"
+#include "hamelin/description/robot_io.hpp"
+#include "hamelin/optimal/solve.hpp"
+
+using namespace hamelin;
+using namespace hamelin::optimal;
+
+TEST_CASE("a filter accepts less cost or less violation than all its points have", "[optimal]") {
+  Filter filter;
+  filter.reset(1.0);
+  const Filter::Point now{0.5, 1.0};
+  CHECK(filter.accept(now, {0.4, 3.0}, 1.0, 1.0));  // less violation: `now` enters the filter
+  // more cost and violation than a point of the filter, although less than those of the iterate
+  CHECK_FALSE(filter.accept({0.6, 2.0}, {0.55, 1.5}, 1.0, 1.0));
+  CHECK(filter.accept({0.6, 2.0}, {0.55, 0.9}, 1.0, 1.0));
+  // a little more violation is accepted for less cost; a merit with a penalty of 1 refuses this
+  // step
+  filter.reset(1.0);
+  CHECK(filter.accept({0.0, 1.0}, {1e-3, 1.0 - 1e-4}, -1.5e-4, 1.0));
+  // without violation, the cost must decrease as the slope promises
+  filter.reset(1.0);
+  CHECK_FALSE(filter.accept({0.0, 1.0}, {0.0, 1.0 - 1e-6}, -0.1, 1.0));
+  CHECK(filter.accept({0.0, 1.0}, {0.0, 1.0 - 1e-4}, -0.1, 1.0));
+  // never much more violation than at the guess, nor a cost that is not finite
+  CHECK_FALSE(filter.accept({0.0, 1.0}, {2e4, -1e9}, -0.1, 1.0));
+  CHECK_FALSE(filter.accept({0.0, 1.0}, {0.0, std::nan("")}, -0.1, 1.0));
+}
+
+TEST_CASE("active torque limits do not shorten the steps to the least time of a Panda",
+          "[optimal]") {
+  const int intervals = GENERATE(10, 20, 50, 100);
+  description::RobotOptions options;
+  options.tip = "panda_grasptarget";
+  const auto robots = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
+  const model::Model panda(description::read_robot(robots / "third_party" / "panda.urdf", options));
+  Problem problem;
+  problem.model = &panda;
+  problem.objective = Objective::time;
+  problem.intervals = intervals;
+  problem.duration_s = 0.6;
+  problem.limits = Limits::of(panda);
+  const VectorXd middle = 0.5 * (problem.limits.position_min + problem.limits.position_max);
+  problem.q_start = middle + VectorXd::LinSpaced(7, -0.4, 0.3);
+  problem.q_goal = middle + VectorXd::LinSpaced(7, 0.3, -0.4);
+  problem.v_start = problem.v_goal = VectorXd::Zero(7);
+  const MatrixXd ends = (MatrixXd(7, 2) << problem.q_start, problem.q_goal).finished();
+  const Solution found = solve(problem, guess_along(ends, intervals));
+  CAPTURE(found.cause, found.iterations);
+  CHECK(found.converged);
+  CHECK(found.violation == 0.0);
+  CHECK(found.iterations <= 40);  // 40, 111, 71 and 103 with a merit that adds the violation
+  if (!has_ipopt() || intervals > 20) return;
+  SolveOptions reference;
+  reference.solver = Solver::ipopt;
+  CHECK(found.cost ==
+        Approx(solve(problem, guess_along(ends, intervals), reference).cost).epsilon(1e-6));
+}
