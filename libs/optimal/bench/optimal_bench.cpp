@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "../src/ipopt_solver.hpp"
+#include "execution.hpp"
 #include "hamelin/description/robot_io.hpp"
-#include "hamelin/integration/integrator.hpp"
 #include "hamelin/optimal/optimize.hpp"
 #include "trapezoidal.hpp"
 
@@ -18,23 +18,6 @@ namespace {
 
 using Eigen::Index;
 
-// The largest error of a joint at the end if torques that are linear between the knots move the
-// arm: gauss at 1e-12, with 400 parts of an interval in each of which the torque is its mean.
-// With `held`, each torque is held from half a step before its knot to half a step after it.
-double executed_error(const Problem& problem, const MatrixXd& torque, double h, bool held) {
-  const auto plant = integration::make_integrator("gauss:8", *problem.model);
-  auto state = plant->start(problem.q_start, problem.v_start);
-  const int parts = held ? 10 : 100;
-  integration::Channels channels;
-  for (Index k = 0; k + 1 < torque.cols(); ++k)
-    for (int i = 0; i < parts; ++i) {
-      const double at = (i + 0.5) / parts, s = !held ? at : at < 0.5 ? 0.0 : 1.0;
-      channels.held_torque = (1.0 - s) * torque.col(k) + s * torque.col(k + 1);
-      if (!plant->step(state, channels, h / parts).converged) return 1e9;
-    }
-  return (state.q - problem.q_goal).lpNorm<Eigen::Infinity>();
-}
-
 // The middle of the ranges of the joints, 0 for joints without limits.
 VectorXd middle_of(const model::Model& model) {
   const Limits limits = Limits::of(model);
@@ -43,20 +26,6 @@ VectorXd middle_of(const model::Model& model) {
     if (std::isfinite(limits.position_min[j]) && std::isfinite(limits.position_max[j]))
       out[j] = 0.5 * (limits.position_min[j] + limits.position_max[j]);
   return out;
-}
-
-// The same with the torques along the motion, at 20 points per interval and linear between them.
-double motion_error(const Problem& problem, const Solution& found) {
-  const TimedMotion motion{found.step_s, found.control};
-  constexpr Index parts = 20;
-  dynamics::Workspace ws(*problem.model);
-  MatrixXd torque(problem.q_start.size(), parts * problem.intervals + 1);
-  VectorXd at(problem.q_start.size());
-  for (Index i = 0; i < torque.cols(); ++i) {
-    torque_at(*problem.model, ws, motion, found.step_s * static_cast<double>(i) / parts, at);
-    torque.col(i) = at;
-  }
-  return executed_error(problem, torque, found.step_s / parts, false);
 }
 
 struct Row {
@@ -119,39 +88,53 @@ void print(const char* robot, const Problem& problem, const char* method, const 
       row.milliseconds, row.converged ? "" : "  not converged");
 }
 
+// Across the middle of the ranges, with torques of at most 300 Nm.
+Problem problem_of(const model::Model& model, Objective objective, int intervals) {
+  const Index n = model.dof();
+  Problem problem;
+  problem.model = &model;
+  problem.objective = objective;
+  problem.intervals = intervals;
+  problem.duration_s = 0.6;
+  problem.q_start = middle_of(model) + VectorXd::LinSpaced(n, -0.4, 0.3);
+  problem.q_goal = middle_of(model) + VectorXd::LinSpaced(n, 0.3, -0.4);
+  problem.v_start = problem.v_goal = VectorXd::Zero(n);
+  problem.limits = Limits::of(model);
+  const VectorXd strength = VectorXd::Constant(n, 300.0);
+  problem.limits.torque = problem.limits.torque.cwiseMin(strength);
+  problem.effort_weights = problem.limits.torque.cwiseAbs2().cwiseInverse();
+  return problem;
+}
+
+MatrixXd straight_guess(const Problem& problem) {
+  MatrixXd ends(problem.q_start.size(), 2);
+  ends << problem.q_start, problem.q_goal;
+  return guess_along(ends, problem.intervals);
+}
+
+std::vector<model::Model> robots() {
+  const auto folder = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
+  description::RobotOptions panda;
+  panda.tip = "panda_grasptarget";
+  std::vector<model::Model> out;
+  out.emplace_back(description::read_robot(folder / "planar4.json", {}));
+  out.emplace_back(description::read_robot(folder / "arm7.urdf", {}));
+  out.emplace_back(description::read_robot(folder / "third_party" / "panda.urdf", panda));
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("discrete mechanics beside trapezoidal collocation at equal knots",
           "[!benchmark][optimal]") {
-  const auto robots = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data" / "robots";
   fmt::print("{:<12} {:<7} {:>4} {:<30} {:>13} {:>10} {:>11} {:>11} {:>11} {:>6} {:>9}\n", "robot",
              "least", "N", "method", "cost", "time, s", "error, rad", "held", "along", "iter.",
              "ms");
-  description::RobotOptions robot_options;
-  robot_options.tip = "panda_grasptarget";
-  for (const char* name : {"planar4.json", "arm7.urdf", "third_party/panda.urdf"}) {
-    const model::Model model(
-        description::read_robot(robots / name, std::string(name).find("panda") != std::string::npos
-                                                   ? robot_options
-                                                   : description::RobotOptions{}));
-    const Index n = model.dof();
+  for (const model::Model& model : robots())
     for (const auto objective : {Objective::effort, Objective::time})
-      for (const int intervals : {10, 20, 50, 100}) {
-        Problem problem;
-        problem.model = &model;
-        problem.objective = objective;
-        problem.intervals = intervals;
-        problem.duration_s = 0.6;
-        problem.q_start = middle_of(model) + VectorXd::LinSpaced(n, -0.4, 0.3);
-        problem.q_goal = middle_of(model) + VectorXd::LinSpaced(n, 0.3, -0.4);
-        problem.v_start = problem.v_goal = VectorXd::Zero(n);
-        problem.limits = Limits::of(model);
-        const VectorXd strength = VectorXd::Constant(n, 300.0);
-        problem.limits.torque = problem.limits.torque.cwiseMin(strength);
-        problem.effort_weights = problem.limits.torque.cwiseAbs2().cwiseInverse();
-        MatrixXd ends(n, 2);
-        ends << problem.q_start, problem.q_goal;
-        const MatrixXd guess = guess_along(ends, intervals);
+      for (const int intervals : {10, 20, 50, 100, 200}) {
+        const Problem problem = problem_of(model, objective, intervals);
+        const MatrixXd guess = straight_guess(problem);
         print(model.robot().name.c_str(), problem, "discrete mechanics, banded",
               discrete_mechanics(problem, guess, Solver::banded));
 #ifdef HAMELIN_HAS_IPOPT
@@ -161,5 +144,20 @@ TEST_CASE("discrete mechanics beside trapezoidal collocation at equal knots",
               trapezoidal(problem, guess));
 #endif
       }
+}
+
+TEST_CASE("least times beside those with many knots", "[!benchmark][optimal]") {
+  fmt::print("{:<12} {:>5} {:>10} {:>12}\n", "robot", "N", "time, s", "above finest");
+  for (const model::Model& model : robots()) {
+    const auto least_time = [&](int intervals) {
+      const Problem problem = problem_of(model, Objective::time, intervals);
+      return solve(problem, straight_guess(problem)).step_s * intervals;
+    };
+    constexpr int finest = 800;
+    const double reference = least_time(finest);
+    for (const int intervals : {10, 20, 50, 100, 200})
+      fmt::print("{:<12} {:>5} {:>10.6f} {:>10.3f} %\n", model.robot().name, intervals,
+                 least_time(intervals), 100.0 * (least_time(intervals) / reference - 1.0));
+    fmt::print("{:<12} {:>5} {:>10.6f}\n", model.robot().name, finest, reference);
   }
 }

@@ -7,7 +7,7 @@ namespace hamelin::optimal {
 
 using Eigen::MatrixXd;
 
-// Rows: 2n defects per interval, 4n ends, and 3n bounds per knot.
+// Rows: 2n defects per interval, 4n ends, 3n bounds per knot, and the clearances at inner knots.
 Trapezoidal::Trapezoidal(const Problem& problem)
     : problem_(problem),
       n_(problem.model->dof()),
@@ -18,11 +18,19 @@ Trapezoidal::Trapezoidal(const Problem& problem)
       a_(n_, N_ + 1) {
   constexpr double none = std::numeric_limits<double>::infinity();
   if (problem.effort_weights.size() > 0) weights_ = problem.effort_weights;
-  const Index defects = 2 * n_ * N_, rows = defects + 4 * n_ + 3 * n_ * (N_ + 1);
+  if (problem.clearance != nullptr) {
+    each_ = problem.clearance->rows();
+    distances_ = VectorXd::Zero(each_);
+    gradients_.assign(static_cast<std::size_t>(N_), MatrixXd::Zero(n_, each_));
+  }
+  const Index defects = 2 * n_ * N_, simple = defects + 4 * n_ + 3 * n_ * (N_ + 1),
+              rows = simple + each_ * (N_ - 1);
   lower_ = upper_ = values_ = VectorXd::Zero(rows);
   lower_.segment(defects, 4 * n_) << problem.q_start, problem.v_start, problem.q_goal,
       problem.v_goal;
   upper_.segment(defects, 4 * n_) = lower_.segment(defects, 4 * n_);
+  lower_.tail(each_ * (N_ - 1)).setConstant(distance_scale * problem.margin_m);
+  upper_.tail(each_ * (N_ - 1)).setConstant(none);
   const Limits& limits = problem.limits;
   const auto bound = [&](const VectorXd& x) {
     return x.size() > 0 ? x : VectorXd(VectorXd::Constant(n_, none));
@@ -82,7 +90,12 @@ bool Trapezoidal::evaluate(const VectorXd& x) {
   const Index ends = 2 * n_ * N_;
   values_.segment(ends, 2 * n_) = x.segment(0, 2 * n_);
   values_.segment(ends + 2 * n_, 2 * n_) = x.segment(q_of(N_), 2 * n_);
-  values_.tail(3 * n_ * (N_ + 1)) = x.head(3 * n_ * (N_ + 1));
+  values_.segment(ends + 4 * n_, 3 * n_ * (N_ + 1)) = x.head(3 * n_ * (N_ + 1));
+  for (Index k = 1; each_ > 0 && k < N_; ++k) {
+    problem_.clearance->evaluate(VectorXd(x.segment(q_of(k), n_)), distances_,
+                                 gradients_[static_cast<std::size_t>(k)]);
+    values_.segment(first_distance() + each_ * (k - 1), each_) = distance_scale * distances_;
+  }
   const double T = h_ * static_cast<double>(N_);
   cost_ =
       free_ ? T + problem_.time_effort_weight / static_cast<double>(N_) * effort_ : h_ * effort_;
@@ -127,6 +140,11 @@ void Trapezoidal::for_each_entry(F&& f) const {
     f(ends + 2 * n_ + i, q_of(N_) + i, 1.0);
   }
   for (Index i = 0; i < 3 * n_ * (N_ + 1); ++i) f(ends + 4 * n_ + i, i, 1.0);
+  for (Index k = 1; each_ > 0 && k < N_; ++k)
+    for (Index i = 0; i < each_; ++i)
+      for (Index j = 0; j < n_; ++j)
+        f(first_distance() + each_ * (k - 1) + i, q_of(k) + j,
+          distance_scale * gradients_[static_cast<std::size_t>(k)](j, i));
 }
 
 std::vector<NonlinearProgram::Entry> Trapezoidal::jacobian_entries() const {
@@ -137,6 +155,10 @@ std::vector<NonlinearProgram::Entry> Trapezoidal::jacobian_entries() const {
 
 void Trapezoidal::jacobian(double* values) const {
   for_each_entry([&](Index, Index, double x) { *values++ = x; });
+}
+
+double Trapezoidal::violation() const {
+  return std::max((lower_ - values_).maxCoeff(), (values_ - upper_).maxCoeff());
 }
 
 Eigen::MatrixXd Trapezoidal::torques() const {

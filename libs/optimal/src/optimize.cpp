@@ -36,11 +36,12 @@ Optimized optimize(Problem problem, const MatrixXd& way_points, control::WorldVi
   if (clearance.rows() > 0) problem.clearance = &clearance;
   MatrixXd guess = guess_along(way_points, problem.intervals);
   const VectorXd limits = problem.limits.torque;
-  constexpr int lowered_max = 3;
+  constexpr int lowered_max = 6;
   int lowered = 0;
   Optimized out;
   for (;;) {
     out.solution = solve(problem, guess, options);
+    out.iterations += out.solution.iterations;
     out.motion = {out.solution.step_s, out.solution.control};
     out.proof = prove(out.motion, view);
     out.clearance_points = problem.clearance_points;

@@ -16,9 +16,6 @@ using Eigen::Index;
 
 namespace {
 
-// Larger clearances count as this [m].
-constexpr double influence_m = 0.1;
-
 [[noreturn]] void refuse(const scene::Scene& scene, const std::string& what) {
   throw Error(ErrorCode::invalid, scene.name + ": " + what);
 }
@@ -56,8 +53,10 @@ MatrixXd way_points(const scene::Goal& goal, const VectorXd& from, const MatrixX
   return out;
 }
 
+}  // namespace
+
 // The guess's speed is at most 15/8 of its mean, docs/theory.md (18.14).
-double usual_duration(const MatrixXd& points, const VectorXd& velocity) {
+double slow_duration(const MatrixXd& points, const VectorXd& velocity) {
   VectorXd travel = VectorXd::Zero(points.rows());
   for (Index i = 1; i < points.cols(); ++i)
     travel += (points.col(i) - points.col(i - 1)).cwiseAbs();
@@ -90,8 +89,6 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
   return problem;
 }
 
-}  // namespace
-
 SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
                            const std::vector<MatrixXd>& paths) {
   check_scene(scene, !paths.empty());
@@ -110,7 +107,7 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
     problem.v_start = v;
     problem.q_goal = points.rightCols<1>();
     problem.duration_s =
-        options.duration_s.value_or(usual_duration(points, problem.limits.velocity));
+        options.duration_s.value_or(slow_duration(points, problem.limits.velocity));
     try {
       out.goals.push_back({optimize(problem, points, view, options.solve)});
     } catch (const Error& e) {

@@ -36,14 +36,17 @@ Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) 
 #endif
 
 // From the same guess with other slacks if a minimum of the violation was found that is not zero.
-Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options) {
+// Among obstacles a large μ would centre the motion between kinks of thousands of distances.
+Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options,
+                      bool obstacles) {
   Solution out;
   int iterations = 0;
   using Start = InteriorPoint::Start;
-  const std::array<Start, 4> starts{options.near_solution ? Start{1e-4, 0.01} : Start{0.01, 1.0},
-                                    {0.1, 1.0},
-                                    {0.01, 0.01},
-                                    {0.1, 0.1}};
+  const std::array<Start, 4> starts{
+      options.near_solution ? Start{1e-4, 0.01} : Start{obstacles ? 0.01 : 0.1, 1.0},
+      {obstacles ? 0.1 : 0.01, 1.0},
+      {0.01, 0.01},
+      {0.1, 0.1}};
   for (const Start& start : starts) {
     out = InteriorPoint(program, options, start).solve(guess);
     iterations += out.iterations;
@@ -67,8 +70,9 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
   check(problem);
   Transcription program(problem);
   const VectorXd x = program.variables_of(guess);
-  Solution out = options.solver == Solver::ipopt ? solve_with_ipopt(program, x, options)
-                                                 : solve_banded(program, x, options);
+  Solution out = options.solver == Solver::ipopt
+                     ? solve_with_ipopt(program, x, options)
+                     : solve_banded(program, x, options, problem.clearance != nullptr);
   std::string what;
   out.violation = program.violation(&what);
   if (!out.converged && out.violation > options.tolerance) out.cause += "; violated: " + what;

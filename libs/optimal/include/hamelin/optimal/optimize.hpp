@@ -9,6 +9,7 @@ struct Optimized {
   TimedMotion motion;
   MotionProof proof;         ///< of the motion between the knots
   int clearance_points = 0;  ///< per interval, that the proof needed
+  int iterations = 0;        ///< of all solutions together
   /// Largest torque along the motion as a share of its limit; 0 without limits.
   double torque_share = 0.0;
 };

@@ -55,6 +55,18 @@ struct SceneMotion {
   [[nodiscard]] std::vector<Point> points(std::optional<double> rate_hz = {}) const;
 };
 
+/// Obstacles that are farther away count as being at this distance [m].
+inline constexpr double influence_m = 0.1;
+
+/// The problem of a scene's motions, but for start, goal, duration and clearance. The model must
+/// outlive it.
+[[nodiscard]] Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
+                                 const model::Model& model);
+
+/// The time in which no joint exceeds half of its velocity limit on the way of guess_along() [s];
+/// joints without a limit count as having 2 rad/s or m/s.
+[[nodiscard]] double slow_duration(const MatrixXd& way_points, const VectorXd& velocity_limits);
+
 /// Optimises the motion from the start of a scene to its first goal, and from each goal to the
 /// next, among the obstacles that stand still.
 /// @param paths for each goal way-points from the configuration before it, dof × (2 or more), along
