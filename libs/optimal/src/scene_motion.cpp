@@ -92,14 +92,22 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
 SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
                            const std::vector<MatrixXd>& paths) {
   check_scene(scene, !paths.empty());
-  SceneMotion out{scene.name, {}, {}, control::load_model(scene), {}, scene.goals.size()};
+  const model::Model model = control::load_model(scene);
+  control::WorldView view(scene, model, influence_m);
+  return optimize_scene(scene, options, model, view, paths);
+}
+
+SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
+                           const model::Model& model, control::WorldView& view,
+                           const std::vector<MatrixXd>& paths) {
+  check_scene(scene, !paths.empty());
+  SceneMotion out{scene.name, {}, {}, model, {}, scene.goals.size()};
   out.robot = out.model.robot().name;
   for (const auto& link : out.model.robot().links) out.joints.push_back(link.joint.name);
-  control::WorldView view(scene, out.model, influence_m);
   const VectorXd rest = VectorXd::Zero(out.model.dof());
   VectorXd q = scene.start_q.size() > 0 ? scene.start_q : rest,
            v = scene.start_v.size() > 0 ? scene.start_v : rest;
-  Problem problem = problem_of(scene, options, out.model);
+  Problem problem = problem_of(scene, options, model);
   problem.v_goal = rest;
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);

@@ -79,8 +79,13 @@ Json planned_json(const PlannedGoal& goal) {
 PathPlan plan_paths(const scene::Scene& scene) {
   check(scene);
   const model::Model arm = control::load_model(scene);
-  control::check_numbers(scene, arm);
   control::World world(scene, arm, {});
+  return plan_paths(scene, arm, world);
+}
+
+PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, control::World& world) {
+  check(scene);
+  control::check_numbers(scene, arm);
   const control::WorldView view(scene, arm, world);
   control::GuideQuery query(arm, world, view);
   const Json params = scene.planner ? scene.planner->params : Json::object();

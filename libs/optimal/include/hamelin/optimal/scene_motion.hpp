@@ -76,6 +76,12 @@ inline constexpr double influence_m = 0.1;
 [[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
                                          const SceneMotionOptions& options,
                                          const std::vector<MatrixXd>& paths = {});
+/// The same with the scene's model and a view of all its obstacles that were made before.
+/// @param view finds obstacles up to influence_m
+[[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
+                                         const SceneMotionOptions& options,
+                                         const model::Model& model, control::WorldView& view,
+                                         const std::vector<MatrixXd>& paths = {});
 
 /// As hamelin.trajectory/1, docs/schema/trajectory.schema.json.
 [[nodiscard]] Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,

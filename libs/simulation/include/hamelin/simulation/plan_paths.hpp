@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/control/world.hpp"
 #include "hamelin/guide/guide.hpp"
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -36,6 +37,9 @@ struct PathPlan {
 /// @throws Error io, parse or invalid for bad input, a scene without guide, a goal that follows a
 ///         target, or a build without OMPL
 [[nodiscard]] PathPlan plan_paths(const scene::Scene& scene);
+/// The same with the scene's model and a world that were made before.
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm,
+                                  control::World& world);
 
 /// As hamelin.path/1, docs/schema/path.schema.json.
 [[nodiscard]] Json to_json(const PathPlan& plan);
