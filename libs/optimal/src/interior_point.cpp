@@ -87,7 +87,7 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
   return out;
 }
 
-// docs/theory.md (18.13). Where distances have kinks, stationarity may stay large although cost and
+// docs/theory.md (18.12). Where distances have kinks, stationarity may stay large although cost and
 // violation decrease no more.
 void InteriorPoint::lower_barrier() {
   if (!can_lower_barrier()) return;

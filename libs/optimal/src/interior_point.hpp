@@ -5,7 +5,7 @@
 
 namespace hamelin::optimal {
 
-/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.13).
+/// A primal-dual interior-point method with slacks for all bounds, docs/theory.md (18.9)–(18.12).
 class InteriorPoint {
  public:
   struct Start {

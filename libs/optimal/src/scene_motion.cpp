@@ -55,7 +55,7 @@ MatrixXd way_points(const scene::Goal& goal, const VectorXd& from, const MatrixX
 
 }  // namespace
 
-// The guess's speed is at most 15/8 of its mean, docs/theory.md (18.14).
+// The guess's speed is at most 15/8 of its mean, docs/theory.md (18.13).
 double slow_duration(const MatrixXd& points, const VectorXd& velocity) {
   VectorXd travel = VectorXd::Zero(points.rows());
   for (Index i = 1; i < points.cols(); ++i)

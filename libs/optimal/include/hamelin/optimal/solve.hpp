@@ -6,7 +6,7 @@
 namespace hamelin::optimal {
 
 enum class Solver : std::int32_t {
-  banded,  ///< an interior-point method on the banded equations, docs/theory.md (18.9)–(18.13)
+  banded,  ///< an interior-point method on the banded equations, docs/theory.md (18.9)–(18.12)
   ipopt,   ///< IPOPT, where this build has it
 };
 
