@@ -27,6 +27,7 @@ InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options
     : program_(program),
       options_(options),
       first_slack_(start.slack),
+      by_merit_(start.by_merit),
       mu_(start.mu),
       hessian_(program.hessian_matrix()),
       lower_{1.0, program.lower()},
@@ -93,7 +94,7 @@ void InteriorPoint::lower_barrier() {
   if (!can_lower_barrier()) return;
   const Errors now = errors(mu_);
   const bool solved = now.largest() <= 10.0 * mu_,
-             early = near_minimum_ && now.complementarity <= centred * mu_;
+             early = !by_merit_ && near_minimum_ && now.complementarity <= centred * mu_;
   if (!solved && !early && small_decreases_ < small_decreases_max) return;
   small_decreases_ = 0;
   near_minimum_ = false;
@@ -174,8 +175,9 @@ void InteriorPoint::count_small_decreases(const Filter::Point& before, const Fil
   const double decrease = before.cost - now.cost;
   near_minimum_ = decrease < gap_share * bounds_ * mu_ && now.violation <= before.violation &&
                   now.violation < small_violation;
-  const bool small = std::abs(decrease) < small_decrease * mu_ &&
-                     before.violation - now.violation < small_decrease * mu_;
+  const bool small = by_merit_ ? merit_.of(before) - merit_.of(now) < small_decrease * mu_
+                               : std::abs(decrease) < small_decrease * mu_ &&
+                                     before.violation - now.violation < small_decrease * mu_;
   small_decreases_ = small ? small_decreases_ + 1 : 0;
 }
 
@@ -191,11 +193,17 @@ void InteriorPoint::take_slacks(Side& side, const VectorXd& before, double step)
   find_residuals(side);
 }
 
+bool InteriorPoint::accepts(const Filter::Point& before, const Filter::Point& now, double slope,
+                            double step) {
+  return by_merit_ ? merit_.accept(before, now, step) : filter_.accept(before, now, slope, step);
+}
+
 bool InteriorPoint::take_step() {
   const VectorXd x = x_;
   const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
   const double slope = barrier_slope();
   const Filter::Point before = filter_point();
+  merit_.begin(before, slope);
   double step = std::min(largest_step(lower_.slack, lower_.slack_step),
                          largest_step(upper_.slack, upper_.slack_step));
   bool accepted = false;
@@ -205,7 +213,7 @@ bool InteriorPoint::take_step() {
     take_slacks(lower_, slack_l, step);
     take_slacks(upper_, slack_u, step);
     const Filter::Point now = filter_point();
-    accepted = filter_.accept(before, now, slope, step);
+    accepted = accepts(before, now, slope, step);
     if (accepted) count_small_decreases(before, now);
   }
   for_each_side([&](Side& side) {

@@ -1,6 +1,7 @@
 #pragma once
 #include "filter.hpp"
 #include "hamelin/optimal/solve.hpp"
+#include "merit.hpp"
 #include "transcription.hpp"
 
 namespace hamelin::optimal {
@@ -13,6 +14,9 @@ class InteriorPoint {
     /// Least slack at the guess, as a share of a bound: how far rows near their bounds may move in
     /// the first steps.
     double slack;
+    /// Steps by a merit instead of a filter, and the barrier is lowered only where its problem is
+    /// solved, or hardly any step decreases the merit.
+    bool by_merit = false;
   };
   InteriorPoint(Transcription& program, const SolveOptions& options, const Start& start);
   /// From x; the program is at the last iterate afterwards.
@@ -47,6 +51,8 @@ class InteriorPoint {
   [[nodiscard]] bool take_step();
   [[nodiscard]] Filter::Point filter_point() const;
   [[nodiscard]] double barrier_slope() const;
+  [[nodiscard]] bool accepts(const Filter::Point& before, const Filter::Point& now, double slope,
+                             double step);
   void count_small_decreases(const Filter::Point& before, const Filter::Point& now);
   [[nodiscard]] double largest_step(const VectorXd& x, const VectorXd& dx) const;
   void keep_multipliers_near(Side& side) const;
@@ -64,12 +70,14 @@ class InteriorPoint {
   Transcription& program_;
   SolveOptions options_;
   double first_slack_;
+  bool by_merit_;
   double mu_;  ///< of the barrier
   BandedMatrix hessian_;
   Side lower_, upper_;
   VectorXd x_, dx_, gradient_, right_, row_, weights_, row_step_;
   double scale_ = 1.0;  ///< of the cost
   Filter filter_;
+  Merit merit_;
   double first_violation_ = 1.0;  ///< at the guess, at least 1
   double bounds_ = 0.0;           ///< number of finite ones
   bool near_minimum_ = false;     ///< whether the last step won little beside what μ leaves open

@@ -44,9 +44,9 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
   using Start = InteriorPoint::Start;
   const std::array<Start, 4> starts{
       options.near_solution ? Start{1e-4, 0.01} : Start{obstacles ? 0.01 : 0.1, 1.0},
-      {obstacles ? 0.1 : 0.01, 1.0},
-      {0.01, 0.01},
-      {0.1, 0.1}};
+      {0.1, 1.0, true},
+      {0.1, 0.01, true},
+      {0.1, 0.1, true}};
   for (const Start& start : starts) {
     out = InteriorPoint(program, options, start).solve(guess);
     iterations += out.iterations;
