@@ -1,0 +1,85 @@
+"""hamelin: move robot arms through cluttered 3D maps, and simulate them.
+
+Units are SI, angles are in radians, arrays are float64 in C order. A joint vector has shape (n,),
+N states have shape (N, n), a pose is a homogeneous matrix of shape (4, 4). Bad input raises
+hamelin.Error, which is a ValueError; arguments of a wrong type raise TypeError.
+
+    import hamelin
+    arm = hamelin.load_robot("arm7.urdf")
+    acceleration = arm.aba(q, v, tau)
+    result = hamelin.run("shelf.json", log="shelf.jsonl")
+    hamelin.read_log("shelf.jsonl").plot()
+"""
+
+from ._error import Error
+from ._hamelin import (
+    Answer,
+    Channels,
+    Command,
+    Controller,
+    Environment,
+    Integrator,
+    LogStream,
+    Model,
+    PlannerSetup,
+    Scene,
+    State,
+    StepReport,
+    Tick,
+    World,
+    __version__,
+    check_robot,
+    instruction_set,
+    integrator_names,
+    load_robot,
+    make_chain,
+    plugin_path,
+)
+from ._logs import Log, read_log
+from ._pages import Page, report
+from ._robots import FitResult, fit_robot, robot_info
+from ._runs import Result, Verification, full_config, integrate, load_scene, run, verify
+from ._studies import AccuracyResult, Sweep, accuracy, sweep
+
+__all__ = [
+    "AccuracyResult",
+    "Answer",
+    "Channels",
+    "Command",
+    "Controller",
+    "Environment",
+    "Error",
+    "FitResult",
+    "Integrator",
+    "Log",
+    "LogStream",
+    "Model",
+    "Page",
+    "PlannerSetup",
+    "Result",
+    "Scene",
+    "State",
+    "StepReport",
+    "Sweep",
+    "Tick",
+    "Verification",
+    "World",
+    "__version__",
+    "accuracy",
+    "check_robot",
+    "fit_robot",
+    "full_config",
+    "instruction_set",
+    "integrate",
+    "integrator_names",
+    "load_robot",
+    "load_scene",
+    "make_chain",
+    "plugin_path",
+    "read_log",
+    "report",
+    "robot_info",
+    "run",
+    "sweep",
+    "verify",
+]

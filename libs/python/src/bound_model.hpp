@@ -1,0 +1,23 @@
+#pragma once
+#include <memory>
+#include <utility>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/model/model.hpp"
+
+namespace hamelin::python {
+
+/// hamelin.Model: a model with scratch memory for single calls, which hold Python's lock. Calls
+/// that release the lock use scratch memory of their own.
+struct BoundModel {
+  explicit BoundModel(model::Model given) : model(std::move(given)), ws(model) {}
+  BoundModel(const BoundModel&) = delete;
+  BoundModel& operator=(const BoundModel&) = delete;
+
+  const model::Model model;
+  dynamics::Workspace ws;
+};
+
+using SharedModel = std::shared_ptr<BoundModel>;
+
+}  // namespace hamelin::python
