@@ -41,26 +41,6 @@ namespace {
 // Set by PlannerObjectScope; borrowed.
 thread_local PyObject* planner_object = nullptr;
 
-constexpr const char* schema = R"({
-  "type": "object",
-  "additionalProperties": false,
-  "properties": {
-    "file": {
-      "description": "Python file that defines the class; relative to the working directory",
-      "type": ["string", "null"], "default": null
-    },
-    "class": {"description": "name of the class in it", "type": ["string", "null"], "default": null},
-    "object": {
-      "description": "whether the run was started from Python with an object of the class",
-      "type": "boolean", "default": false
-    },
-    "params": {
-      "description": "keyword arguments of the class, checked against its params_schema",
-      "type": "object", "default": {}
-    }
-  }
-})";
-
 // "ValueError: text (mine.py, line 12)" of an exception.
 std::string describe(py::error_already_set& error) {
   std::string text = fmt::format("{}: {}", py::str(error.type().attr("__name__")).cast<std::string>(),
@@ -743,7 +723,7 @@ void add_planners(py::module_& module) {
   add_setup(module);
   // The plugin python.hamelin.so passes the calls of a host on to these functions.
   static const hamelin_plugin plugin = planning::detail::Glue<PythonPlanner>::plugin(
-      "python", HAMELIN_VERSION, "a planner that is written in Python", schema);
+      "python", HAMELIN_VERSION, "a planner that is written in Python", "{}");
   module.attr("_planner_plugin") = py::capsule(&plugin, "hamelin_plugin");
 }
 
