@@ -6,7 +6,7 @@ import importlib.util
 import inspect
 import os
 import sys
-from typing import Any
+from typing import Any, cast
 
 
 def load_class(file: str, name: str) -> type:
@@ -27,7 +27,7 @@ def load_class(file: str, name: str) -> type:
         found = getattr(found, part)
     if not callable(getattr(found, "tick", None)):
         raise TypeError(f"{name} has no method tick(tick, command)")
-    return found
+    return cast(type, found)
 
 
 def describe(planner: Any) -> dict[str, Any]:

@@ -211,7 +211,7 @@ def run(
         document = _run(
             made,
             plugin_path,
-            None if name is not None else planner,
+            None if isinstance(planner, str) else planner,
             trajectory,
             target,
             _record(log, result, every, bar),

@@ -4,12 +4,13 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/model/model.hpp"
+#include "whole.hpp"
 
 namespace hamelin::python {
 
 /// hamelin.Model: a model with scratch memory for single calls, which hold Python's lock. Calls
 /// that release the lock use scratch memory of their own.
-struct BoundModel {
+struct BoundModel : Whole {
   explicit BoundModel(model::Model given) : model(std::move(given)), ws(model) {}
   BoundModel(const BoundModel&) = delete;
   BoundModel& operator=(const BoundModel&) = delete;

@@ -31,7 +31,7 @@ struct SceneOverrides {
 void apply_overrides(const SceneOverrides& overrides, Json& document);
 
 /// hamelin.Scene: the document of a scene, and what was read from it.
-struct BoundScene {
+struct BoundScene : Whole {
   BoundScene(Json given, std::filesystem::path base_dir, std::string where);
   /// The model of its robot with payload and armature; made once.
   [[nodiscard]] const SharedModel& model();

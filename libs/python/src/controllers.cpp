@@ -34,8 +34,8 @@ const char* name_of(control::ControlState state) {
   return "unknown";
 }
 
-// hamelin.Answer: a copy of what a tick answered.
-struct PyAnswer {
+// What a tick answered.
+struct AnswerCopy {
   control::ControlState state;
   bool saturated, stopping;
   std::uint64_t goals_number, snapshot, load, refused_load;
@@ -44,14 +44,16 @@ struct PyAnswer {
   Eigen::VectorXd torque, q_next, v_next;
 };
 
-PyAnswer copy_of(const control::Answer& a) {
+AnswerCopy copy_of(const control::Answer& a) {
   return {a.state,     a.saturated,        a.stopping,   a.goals_number,
           a.snapshot,  a.load,             a.refused_load, a.goal_index,
           std::string(a.cause), std::string(a.load_refusal), a.torque, a.q_next, a.v_next};
 }
 
+using PyAnswer = Boxed<AnswerCopy>;  // hamelin.Answer
+
 // hamelin.Controller. Ticks hold Python's lock; calls that lock, or take longer, release it.
-struct BoundController {
+struct BoundController : Whole {
   BoundController(SharedScene from, py::object planner, const py::list& plugins,
                   const control::ControllerOptions& options)
       : scene(std::move(from)), object(std::move(planner)) {
@@ -73,7 +75,8 @@ struct BoundController {
 using SharedController = std::shared_ptr<BoundController>;
 
 // hamelin.World: a part of a controller.
-struct BoundWorld {
+struct BoundWorld : Whole {
+  explicit BoundWorld(SharedController controller) : owner(std::move(controller)) {}
   SharedController owner;
   [[nodiscard]] control::World& get() const { return owner->controller->world(); }
 };
@@ -101,7 +104,7 @@ void take_state(BoundController& c, py::handle q, py::handle v) {
   c.v = velocities.vector();
 }
 
-PyAnswer tick(BoundController& c, double time_s, py::handle q, py::handle v) {
+std::shared_ptr<PyAnswer> tick(BoundController& c, double time_s, py::handle q, py::handle v) {
   if (c.busy)
     throw Error(ErrorCode::usage, "Controller: tick() is called by its planner, expected a loop");
   take_state(c, q, v);
@@ -110,11 +113,11 @@ PyAnswer tick(BoundController& c, double time_s, py::handle q, py::handle v) {
     bool& busy;
     ~Done() { busy = false; }
   } done{c.busy};
-  if (c.object.is_none()) return copy_of(c.controller->tick(time_s, c.q, c.v));
+  if (c.object.is_none()) return boxed(copy_of(c.controller->tick(time_s, c.q, c.v)));
   const InterruptScope scope(c.interrupts);
-  const PyAnswer answer = copy_of(c.controller->tick(time_s, c.q, c.v));
+  AnswerCopy answer = copy_of(c.controller->tick(time_s, c.q, c.v));
   c.interrupts.rethrow();
-  return answer;
+  return boxed(std::move(answer));
 }
 
 std::optional<Eigen::Vector3d> optional_vector3(const char* function, const char* argument,
@@ -192,26 +195,26 @@ SharedController make_controller(py::handle scene, py::object planner, py::handl
 }
 
 void add_answer(py::module_& module) {
-  py::class_<PyAnswer>(module, "Answer", "The answer of a tick of a Controller; a copy.")
+  py::class_<PyAnswer, std::shared_ptr<PyAnswer>>(module, "Answer", "The answer of a tick of a Controller; a copy.")
       .def_property_readonly("state", [](const PyAnswer& a) { return name_of(a.state); },
                              "'running', 'reached', 'stalled', 'gave_up' or 'stopping'.")
-      .def_readonly("cause", &PyAnswer::cause, "Why it gave up or stops; one line, or empty.")
+      .def_readonly("cause", &AnswerCopy::cause, "Why it gave up or stops; one line, or empty.")
       .def_property_readonly("torque", [](const PyAnswer& a) { return to_array(a.torque); },
                              "Joint torques to send to the arm, shape (n,) [Nm or N].")
       .def_property_readonly("q_next", [](const PyAnswer& a) { return to_array(a.q_next); },
                              "Joint positions one period ahead, shape (n,), with position=True.")
       .def_property_readonly("v_next", [](const PyAnswer& a) { return to_array(a.v_next); },
                              "Joint velocities one period ahead, shape (n,), with position=True.")
-      .def_readonly("saturated", &PyAnswer::saturated, "Whether a limit reduced the torque.")
-      .def_readonly("stopping", &PyAnswer::stopping,
+      .def_readonly("saturated", &AnswerCopy::saturated, "Whether a limit reduced the torque.")
+      .def_readonly("stopping", &AnswerCopy::stopping,
                     "Whether the shield refused the planner's answer.")
-      .def_readonly("goals_number", &PyAnswer::goals_number,
+      .def_readonly("goals_number", &AnswerCopy::goals_number,
                     "Number of the list of goals: 0 for the scene's, or of set_goals().")
-      .def_readonly("goal_index", &PyAnswer::goal_index, "Index of the current goal in it.")
-      .def_readonly("snapshot", &PyAnswer::snapshot, "Number of the world's snapshot.")
-      .def_readonly("load", &PyAnswer::load, "Number of what the arm carries.")
-      .def_readonly("refused_load", &PyAnswer::refused_load, "Number of the last refused load.")
-      .def_readonly("load_refusal", &PyAnswer::load_refusal, "Why it was refused.")
+      .def_readonly("goal_index", &AnswerCopy::goal_index, "Index of the current goal in it.")
+      .def_readonly("snapshot", &AnswerCopy::snapshot, "Number of the world's snapshot.")
+      .def_readonly("load", &AnswerCopy::load, "Number of what the arm carries.")
+      .def_readonly("refused_load", &AnswerCopy::refused_load, "Number of the last refused load.")
+      .def_readonly("load_refusal", &AnswerCopy::load_refusal, "Why it was refused.")
       .def("__repr__", [](const PyAnswer& a) {
         return fmt::format("<hamelin.Answer {}, goal {}{}>", name_of(a.state), a.goal_index,
                            a.cause.empty() ? "" : ": " + a.cause);
@@ -220,15 +223,16 @@ void add_answer(py::module_& module) {
 
 void add_world(py::module_& module) {
   using py::arg;
-  py::class_<BoundWorld>(module, "World",
+  py::class_<BoundWorld, std::shared_ptr<BoundWorld>>(module, "World",
                          "The surroundings of a controller. Any thread may update them; an update\n"
                          "takes effect at the next tick and returns the number of its snapshot.")
       .def(
           "set_obstacle",
           [](const BoundWorld& w, py::handle obstacle) {
-            const auto read = scene::obstacle_from_json(to_json(obstacle), "obstacle");
+            const auto read =
+                variant(*w.owner->scene, "obstacles", Json::array({to_json(obstacle)})).obstacles;
             const py::gil_scoped_release unlocked;
-            return w.get().set_obstacle(read);
+            return w.get().set_obstacle(read.front());
           },
           arg("obstacle"),
           "Adds an obstacle, a dict as in a scene, or replaces the one of the same name.")
@@ -315,7 +319,7 @@ void add_controller(py::module_& module) {
            "clear. acceleration_max, jerk_max: of the positions, one value or one per joint.")
       .def("tick", &tick, arg("time"), arg("q"), arg("v"),
            "Answers the measured state of the arm: time [s], increasing; q, v of shape (n,).")
-      .def_property_readonly("world", [](const SharedController& c) { return BoundWorld{c}; },
+      .def_property_readonly("world", [](const SharedController& c) { return std::make_shared<BoundWorld>(c); },
                              "The surroundings.")
       .def("set_goals", &set_goals, arg("goals"),
            "Replaces the goals by dicts as in a scene, from the next tick on. Returns the number of\n"

@@ -22,9 +22,13 @@ namespace {
 using integration::Channels;
 using integration::State;
 using integration::StepReport;
+// What Python sees of them.
+using PyChannels = Boxed<Channels>;
+using PyState = Boxed<State>;
+using PyReport = Boxed<StepReport>;
 
 // hamelin.Integrator. It holds Python's lock during a step, whose scratch memory it owns.
-struct BoundIntegrator {
+struct BoundIntegrator : Whole {
   BoundIntegrator(SharedModel given, const std::string& name, const Json& options)
       : model(std::move(given)),
         scheme(integration::make_integrator(
@@ -63,9 +67,9 @@ Json options_of(const py::kwargs& given) {
   return options;
 }
 
-std::unique_ptr<BoundIntegrator> make_bound(const SharedModel& model, const std::string& name,
+std::shared_ptr<BoundIntegrator> make_bound(const SharedModel& model, const std::string& name,
                                             const py::kwargs& options) {
-  return std::make_unique<BoundIntegrator>(model, name, options_of(options));
+  return std::make_shared<BoundIntegrator>(model, name, options_of(options));
 }
 
 Eigen::VectorXd free_vector(const char* argument, py::handle given) {
@@ -87,7 +91,7 @@ std::vector<dynamics::GyroscopicTerm> terms_of(py::handle given) {
   return terms;
 }
 
-Channels make_channels(py::handle damping, py::handle coulomb, double coulomb_speed,
+std::shared_ptr<PyChannels> make_channels(py::handle damping, py::handle coulomb, double coulomb_speed,
                        py::handle gyroscopic, py::handle held_torque) {
   Channels channels;
   channels.damping = free_vector("damping", damping);
@@ -95,12 +99,12 @@ Channels make_channels(py::handle damping, py::handle coulomb, double coulomb_sp
   channels.coulomb_speed = coulomb_speed;
   channels.gyroscopic = terms_of(gyroscopic);
   channels.held_torque = free_vector("held_torque", held_torque);
-  return channels;
+  return boxed(std::move(channels));
 }
 
-const Channels& none() {
-  static const Channels channels;
-  return channels;
+const Channels& given_or_none(const PyChannels* given) {
+  static const Channels none;
+  return given != nullptr ? *given : none;
 }
 
 // The rows of a motion.
@@ -108,11 +112,11 @@ class Motion {
  public:
   explicit Motion(Eigen::Index dof) : dof_(dof) {}
 
-  void add_node(BoundIntegrator& integrator, const State& state) {
+  void add_node(BoundIntegrator& integrator, const State& state, double time_s) {
     Eigen::VectorXd v(dof_);
     integrator.scheme->velocity(state, v);
     const auto energy = integrator.scheme->energy(state, v);
-    time_.push_back(state.time_s);
+    time_.push_back(time_s);
     q_.insert(q_.end(), state.q.data(), state.q.data() + dof_);
     v_.insert(v_.end(), v.data(), v.data() + dof_);
     kinetic_.push_back(energy.kinetic_J);
@@ -192,7 +196,7 @@ void check_steps(const Steps& steps, bool adaptive) {
 bool wants_to_end(const py::object& on_step, const State& state, const StepReport& report) {
   if (on_step.is_none()) return false;
   const py::gil_scoped_acquire locked;
-  const py::object answer = on_step(py::cast(state), py::cast(report));
+  const py::object answer = on_step(boxed(state), boxed(report));
   return answer.ptr() == Py_True;
 }
 
@@ -201,7 +205,7 @@ bool take_steps(BoundIntegrator& integrator, State& state, const Steps& steps, M
   const bool adaptive = integrator.scheme->adaptive();
   const double end = state.time_s + steps.duration_s;
   const long count = adaptive ? 0 : std::lround(steps.duration_s / steps.step_s);
-  motion.add_node(integrator, state);
+  motion.add_node(integrator, state, state.time_s);
   const py::gil_scoped_release unlocked;
   InterruptCheck interrupts;
   for (long i = 1;; ++i) {
@@ -212,10 +216,12 @@ bool take_steps(BoundIntegrator& integrator, State& state, const Steps& steps, M
     if (!report.converged) return false;
     motion.add_report(report);
     // The time that is left of the last step is rounding.
-    const bool last = (adaptive ? end - state.time_s <= 1e-12 * steps.duration_s : i == count) ||
-                      wants_to_end(steps.on_step, state, report);
+    const bool at_end = adaptive ? end - state.time_s <= 1e-12 * steps.duration_s : i == count;
+    const bool last = wants_to_end(steps.on_step, state, report) || at_end;
     if (last || i % steps.every == 0) {
-      motion.add_node(integrator, state);
+      // As in logs, without the rounding of a sum of steps.
+      motion.add_node(integrator, state,
+                      adaptive ? state.time_s : static_cast<double>(i) * steps.step_s);
       motion.end_interval();
     }
     if (last) return true;
@@ -224,13 +230,13 @@ bool take_steps(BoundIntegrator& integrator, State& state, const Steps& steps, M
 }
 
 py::dict simulate(BoundIntegrator& integrator, py::handle q0, py::handle v0, double step,
-                  double duration, const Channels* channels, long every,
+                  double duration, const PyChannels* channels, long every,
                   const py::object& on_step) {
   const Eigen::Index dof = integrator.model->model.dof();
   const Eigen::VectorXd q = vector_of("simulate", "q0", q0, dof);
   const Eigen::VectorXd v =
       v0.is_none() ? Eigen::VectorXd::Zero(dof) : vector_of("simulate", "v0", v0, dof);
-  const Steps steps{step, duration, every, channels != nullptr ? *channels : none(), on_step};
+  const Steps steps{step, duration, every, given_or_none(channels), on_step};
   check_steps(steps, integrator.scheme->adaptive());
   const Use use(integrator);
   State state = integrator.scheme->start(q, v);
@@ -247,28 +253,28 @@ std::string repr(const BoundIntegrator& integrator) {
 }
 
 void add_state(py::module_& module) {
-  py::class_<State>(module, "State",
+  py::class_<PyState, std::shared_ptr<PyState>>(module, "State",
                     "The memory of an integrator between steps. Integrator.start() makes one.")
-      .def_property_readonly("time_s", [](const State& s) { return s.time_s; },
+      .def_property_readonly("time_s", [](const PyState& s) { return s.time_s; },
                              "Time since the start [s].")
-      .def_property_readonly("k", [](const State& s) { return s.k; }, "Number of steps taken.")
-      .def_property_readonly("q", [](const State& s) { return to_array(s.q); },
+      .def_property_readonly("k", [](const PyState& s) { return s.k; }, "Number of steps taken.")
+      .def_property_readonly("q", [](const PyState& s) { return to_array(s.q); },
                              "Joint positions, shape (n,) [rad or m]; a copy.")
-      .def_property_readonly("step_next", [](const State& s) { return s.step_next; },
+      .def_property_readonly("step_next", [](const PyState& s) { return s.step_next; },
                              "Next step under step control [s].")
-      .def("copy", [](const State& s) { return State(s); }, "A copy, to keep and restore.")
-      .def("__copy__", [](const State& s) { return State(s); }, "A copy.")
+      .def("copy", [](const PyState& s) { return boxed<State>(s); }, "A copy, to keep and restore.")
+      .def("__copy__", [](const PyState& s) { return boxed<State>(s); }, "A copy.")
       .def(
-          "__deepcopy__", [](const State& s, const py::dict&) { return State(s); },
+          "__deepcopy__", [](const PyState& s, const py::dict&) { return boxed<State>(s); },
           py::arg("memo"), "A copy.")
-      .def("__repr__", [](const State& s) {
+      .def("__repr__", [](const PyState& s) {
         return fmt::format("<hamelin.State k = {}, time_s = {:.6g}, q = [{:.6g}]>", s.k, s.time_s,
                            fmt::join(s.q.data(), s.q.data() + s.q.size(), ", "));
       });
 }
 
 void add_report(py::module_& module) {
-  py::class_<StepReport>(module, "StepReport", "The outcome and the cost of one step.")
+  py::class_<PyReport, std::shared_ptr<PyReport>>(module, "StepReport", "The outcome and the cost of one step.")
       .def_readonly("converged", &StepReport::converged, "If false, the state is unchanged.")
       .def_readonly("updates", &StepReport::updates, "Corrections of the displacement.")
       .def_readonly("factorizations", &StepReport::factorizations,
@@ -284,7 +290,7 @@ void add_report(py::module_& module) {
       .def_readonly("dissipated_J", &StepReport::dissipated_J,
                     "Work of damping and dry friction [J], positive.")
       .def_readonly("held_work_J", &StepReport::held_work_J, "Work of the held torque [J].")
-      .def("__repr__", [](const StepReport& r) {
+      .def("__repr__", [](const PyReport& r) {
         return fmt::format("<hamelin.StepReport {}, {:.6g} s, {} updates, residual {:.3g}>",
                            r.converged ? "converged" : "not converged", r.step_s, r.updates,
                            r.residual);
@@ -292,7 +298,7 @@ void add_report(py::module_& module) {
 }
 
 void add_channels(py::module_& module) {
-  py::class_<Channels>(module, "Channels",
+  py::class_<PyChannels, std::shared_ptr<PyChannels>>(module, "Channels",
                        "The forces on the arm during a step, besides gravity.")
       .def(py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
            py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
@@ -301,50 +307,51 @@ void add_channels(py::module_& module) {
            "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. gyroscopic: terms (link, point,\n"
            "w), with the point in the link's centre-of-mass frame [m] and w in the world [N s/m].\n"
            "held_torque: shape (n,) [Nm or N].")
-      .def_property_readonly("damping", [](const Channels& c) { return to_array(c.damping); },
+      .def_property_readonly("damping", [](const PyChannels& c) { return to_array(c.damping); },
                              "Viscous damping, shape (n,) or (0,); a copy.")
-      .def_property_readonly("coulomb", [](const Channels& c) { return to_array(c.coulomb); },
+      .def_property_readonly("coulomb", [](const PyChannels& c) { return to_array(c.coulomb); },
                              "Dry friction, shape (n,) or (0,); a copy.")
       .def_readonly("coulomb_speed", &Channels::coulomb_speed,
                     "Speed below which dry friction is viscous [rad/s or m/s].")
       .def_property_readonly("held_torque",
-                             [](const Channels& c) { return to_array(c.held_torque); },
+                             [](const PyChannels& c) { return to_array(c.held_torque); },
                              "Held torque, shape (n,) or (0,); a copy.")
-      .def("__repr__", [](const Channels& c) {
+      .def("__repr__", [](const PyChannels& c) {
         return fmt::format("<hamelin.Channels damping {}, coulomb {}, gyroscopic {}, held_torque {}>",
                            c.damping.size(), c.coulomb.size(), c.gyroscopic.size(),
                            c.held_torque.size());
       });
 }
 
-StepReport step(BoundIntegrator& integrator, State& state, double h, const Channels* channels) {
+std::shared_ptr<PyReport> step(BoundIntegrator& integrator, PyState& state, double h,
+                               const PyChannels* channels) {
   const Use use(integrator);
-  return integrator.scheme->step(state, channels != nullptr ? *channels : none(), h);
+  return boxed(integrator.scheme->step(state, given_or_none(channels), h));
 }
 
-StepReport advance(BoundIntegrator& integrator, State& state, double limit,
-                   const Channels* channels) {
+std::shared_ptr<PyReport> advance(BoundIntegrator& integrator, PyState& state, double limit,
+                                  const PyChannels* channels) {
   const Use use(integrator);
-  return integrator.scheme->advance(state, channels != nullptr ? *channels : none(), limit);
+  return boxed(integrator.scheme->advance(state, given_or_none(channels), limit));
 }
 
-State start(BoundIntegrator& integrator, py::handle q0, py::handle v0) {
+std::shared_ptr<PyState> start(BoundIntegrator& integrator, py::handle q0, py::handle v0) {
   const Eigen::Index dof = integrator.model->model.dof();
   const Eigen::VectorXd q = vector_of("start", "q0", q0, dof);
   const Eigen::VectorXd v =
       v0.is_none() ? Eigen::VectorXd::Zero(dof) : vector_of("start", "v0", v0, dof);
   const Use use(integrator);
-  return integrator.scheme->start(q, v);
+  return boxed(integrator.scheme->start(q, v));
 }
 
-py::array_t<double> velocity(BoundIntegrator& integrator, const State& state) {
+py::array_t<double> velocity(BoundIntegrator& integrator, const PyState& state) {
   const Use use(integrator);
   Eigen::VectorXd v(integrator.model->model.dof());
   integrator.scheme->velocity(state, v);
   return to_array(v);
 }
 
-py::tuple energy(BoundIntegrator& integrator, const State& state) {
+py::tuple energy(BoundIntegrator& integrator, const PyState& state) {
   const Use use(integrator);
   const auto energy = integrator.scheme->energy(state);
   return py::make_tuple(energy.kinetic_J, energy.potential_J);
@@ -352,7 +359,7 @@ py::tuple energy(BoundIntegrator& integrator, const State& state) {
 
 void add_integrator(py::module_& module) {
   using py::arg;
-  py::class_<BoundIntegrator>(
+  py::class_<BoundIntegrator, std::shared_ptr<BoundIntegrator>>(
       module, "Integrator",
       "A one-step scheme for a model. One call at a time may use it; a state may be copied.")
       .def(py::init(&make_bound), arg("model"), arg("name") = "hamel-variational",
@@ -386,7 +393,7 @@ void add_integrator(py::module_& module) {
       .def("energy", &energy, arg("state"), "(kinetic, potential) energy at the node [J].")
       .def(
           "kick",
-          [](BoundIntegrator& i, State& state, py::handle dp) {
+          [](BoundIntegrator& i, PyState& state, py::handle dp) {
             const Eigen::VectorXd impulse = vector_of("kick", "dp", dp, i.model->model.dof());
             const Use use(i);
             i.scheme->kick(state, impulse);
@@ -394,7 +401,7 @@ void add_integrator(py::module_& module) {
           arg("state"), arg("dp"), "Adds an impulse at the node, shape (n,) [Nm s or N s].")
       .def(
           "set_velocity",
-          [](BoundIntegrator& i, State& state, py::handle v) {
+          [](BoundIntegrator& i, PyState& state, py::handle v) {
             const Eigen::VectorXd velocity = vector_of("set_velocity", "v", v, i.model->model.dof());
             const Use use(i);
             i.scheme->set_velocity(state, velocity);

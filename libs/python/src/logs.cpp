@@ -14,6 +14,7 @@
 #include "hamelin/log/read_log.hpp"
 #include "interrupts.hpp"
 #include "module.hpp"
+#include "whole.hpp"
 
 namespace hamelin::python {
 
@@ -270,7 +271,7 @@ class Columns {
 };
 
 // hamelin.LogStream: reads a log in chunks of ticks.
-class LogStream {
+class LogStream : public Whole {
  public:
   explicit LogStream(const std::filesystem::path& file) : file_(file), reader_(file) {
     std::string_view line;
@@ -353,14 +354,14 @@ py::list to_list(const std::vector<Json>& all) {
 }  // namespace
 
 void add_logs(py::module_& module) {
-  py::class_<LogStream>(
+  py::class_<LogStream, std::shared_ptr<LogStream>>(
       module, "LogStream",
       "Reads a log in chunks of ticks, plain or zstd; read_log() reads all at once.\n\n"
       "Iterating gives a dict of arrays per chunk of 1000 ticks. Fields of a tick that are\n"
       "numbers have shape (N,), those that are lists of numbers (N, m); keys of nested objects are\n"
       "joined by dots, as 'energy.kinetic_J'. NaN where a tick does not have the field. Texts and\n"
       "nested lists are left out.")
-      .def(py::init([](py::handle file) { return std::make_unique<LogStream>(path_of(file)); }),
+      .def(py::init([](py::handle file) { return std::make_shared<LogStream>(path_of(file)); }),
            py::arg("file"), "Opens a log and reads its header.")
       .def(
           "read",

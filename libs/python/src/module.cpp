@@ -57,13 +57,15 @@ PYBIND11_MODULE(_hamelin, module) {
   using namespace hamelin;
   namespace py = pybind11;
   module.doc() = "The extension module of hamelin; use the package hamelin.";
-  py::register_exception_translator([](std::exception_ptr error) {
+  py::register_local_exception_translator([](std::exception_ptr error) {
     try {
       if (error) std::rethrow_exception(error);
     } catch (const Error& e) {
       python::raise_error(e);
     } catch (const std::filesystem::filesystem_error& e) {
       python::raise_error(Error(ErrorCode::io, e.what()));
+    } catch (const py::cast_error& e) {
+      PyErr_SetString(PyExc_TypeError, e.what());
     }
   });
   module.attr("__version__") = std::string(version());

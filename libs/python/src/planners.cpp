@@ -14,6 +14,7 @@
 #include "interrupts.hpp"
 #include "module.hpp"
 #include "planner_object.hpp"
+#include "whole.hpp"
 
 namespace hamelin::python {
 
@@ -176,7 +177,7 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
 }
 
 // hamelin.Tick
-struct PyTick {
+struct PyTick : Whole {
   DuringCall<const Tick> tick;
   std::size_t dof = 0;
   std::vector<std::int32_t> links;  // of the shapes
@@ -238,7 +239,7 @@ py::object tick_torque(const PyTick& t) {
 }
 
 // hamelin.Command: arrays that a planner writes, copied to the host after its tick.
-struct PyCommand {
+struct PyCommand : Whole {
   DuringCall<Command> command;
   py::array_t<double> potential_gradient, damping, held_torque;
   std::optional<Eigen::VectorXd> node_velocity;
@@ -263,7 +264,7 @@ void assign(py::array_t<double>& to, const char* name, py::handle from) {
 }
 
 // hamelin.PlannerSetup: what is fixed for a run, and the services of the host.
-struct PySetup {
+struct PySetup : Whole {
   DuringCall<const Host> host;
   DuringCall<Query> query;
   SharedModel model;
@@ -461,7 +462,7 @@ class PythonPlanner final : public planning::Planner {
     guarded(where, [&] {
       const auto dof = static_cast<py::ssize_t>(dof_);
       python_->name = py::str(py::type::of(python_->object).attr("__name__"));
-      python_->tick_object = py::cast(PyTick{});
+      python_->tick_object = py::cast(std::make_shared<PyTick>());
       python_->tick = python_->tick_object.cast<PyTick*>();
       PyTick& t = *python_->tick;
       t.dof = dof_;
@@ -469,12 +470,12 @@ class PythonPlanner final : public planning::Planner {
       t.q = new_array({dof});
       t.v = new_array({dof});
       for (auto* x : {&t.q, &t.v}) x->attr("setflags")(py::arg("write") = false);
-      python_->command_object = py::cast(PyCommand{});
+      python_->command_object = py::cast(std::make_shared<PyCommand>());
       python_->command = python_->command_object.cast<PyCommand*>();
       for (auto* x : {&python_->command->potential_gradient, &python_->command->damping,
                       &python_->command->held_torque})
         *x = new_array({dof});
-      python_->setup_object = py::cast(PySetup{});
+      python_->setup_object = py::cast(std::make_shared<PySetup>());
       python_->setup = python_->setup_object.cast<PySetup*>();
       python_->setup->host.set(&host_);
       python_->setup->query.set(&query_);
@@ -520,7 +521,7 @@ void add_tick(py::module_& module) {
                        obstacle_point_m, direction, obstacle_velocity_m_s);
   PYBIND11_NUMPY_DTYPE(TickSelfContactRow, shape_a, shape_b, distance_m, point_a_m, point_b_m,
                        direction);
-  py::class_<PyTick>(module, "Tick",
+  py::class_<PyTick, std::shared_ptr<PyTick>>(module, "Tick",
                      "The input of one tick of a planner. Valid during the call of tick().")
       .def_property_readonly("k", [](const PyTick& t) { return t.get().k(); }, "Index of the tick.")
       .def_property_readonly("time_s", [](const PyTick& t) { return t.get().time_s(); }, "Time [s].")
@@ -562,14 +563,14 @@ void add_tick(py::module_& module) {
 }
 
 template <py::array_t<double> PyCommand::*member>
-void add_channel(py::class_<PyCommand>& type, const char* name, const char* text) {
+void add_channel(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name, const char* text) {
   type.def_property(
       name, [](const PyCommand& c) -> py::object { return c.*member; },
       [name](PyCommand& c, py::handle x) { assign(c.*member, name, x); }, text);
 }
 
 template <class T, T hamelin_command::*member>
-void add_number(py::class_<PyCommand>& type, const char* name, const char* text) {
+void add_number(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name, const char* text) {
   type.def_property(
       name, [](const PyCommand& c) { return c.get().raw().*member; },
       [](PyCommand& c, T value) { c.get().raw().*member = value; }, text);
@@ -577,7 +578,7 @@ void add_number(py::class_<PyCommand>& type, const char* name, const char* text)
 
 void add_command(py::module_& module) {
   using py::arg;
-  py::class_<PyCommand> type(module, "Command",
+  py::class_<PyCommand, std::shared_ptr<PyCommand>> type(module, "Command",
                              "The answer of one tick of a planner, in channels that are zero at\n"
                              "first. Valid during the call of tick().");
   add_channel<&PyCommand::potential_gradient>(
@@ -638,7 +639,7 @@ void add_command(py::module_& module) {
 
 void add_setup(py::module_& module) {
   using py::arg;
-  py::class_<PySetup>(module, "PlannerSetup",
+  py::class_<PySetup, std::shared_ptr<PySetup>>(module, "PlannerSetup",
                       "What is fixed for a run, and the services of the host. A planner gets it by\n"
                       "start(setup). Limits are None where the scene does not model them. The\n"
                       "services may be used until the run ends.")

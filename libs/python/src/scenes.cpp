@@ -34,7 +34,7 @@ namespace {
 
 // Everything that an arm can hit, with the arm. Queries release Python's lock and have scratch
 // memory of their own.
-struct BoundEnvironment {
+struct BoundEnvironment : Whole {
   BoundEnvironment(SharedModel given, scene::Environment surroundings, double influence)
       : model(std::move(given)),
         environment(std::move(surroundings)),
