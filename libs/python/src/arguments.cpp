@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <cmath>
 #include <cstring>
 
 #include "hamelin/core/error.hpp"
@@ -223,7 +224,12 @@ Json json_of(py::handle object, int depth) {
   if (PyBool_Check(object.ptr()) != 0) return object.ptr() == Py_True;
   if (PyUnicode_Check(object.ptr()) != 0) return text_of(object);
   if (PyLong_Check(object.ptr()) != 0) return integer(object);
-  if (PyFloat_Check(object.ptr()) != 0) return PyFloat_AsDouble(object.ptr());
+  if (PyFloat_Check(object.ptr()) != 0) {
+    const double value = PyFloat_AsDouble(object.ptr());
+    if (!std::isfinite(value))
+      throw Error(ErrorCode::usage, fmt::format("JSON: {}, expected a finite number", value));
+    return value;
+  }
   if (PyDict_Check(object.ptr()) != 0) {
     Json out = Json::object();
     for (const auto& [key, value] : py::reinterpret_borrow<py::dict>(object)) {

@@ -362,7 +362,7 @@ void add_integrator(py::module_& module) {
   py::class_<BoundIntegrator, std::shared_ptr<BoundIntegrator>>(
       module, "Integrator",
       "A one-step scheme for a model. One call at a time may use it; a state may be copied.")
-      .def(py::init(&make_bound), arg("model"), arg("name") = "hamel-variational",
+      .def(py::init(&make_bound), arg("model").none(false), arg("name") = "hamel-variational",
            "name: one of integrator_names(), possibly with an order: 'gauss:8'.\n"
            "Options as those of `hamelin integrate`: order, solver, rtol, atol, alpha, start,\n"
            "tolerance, max_updates, max_halvings, newmark_beta, newmark_gamma. rtol and atol switch\n"

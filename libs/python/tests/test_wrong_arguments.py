@@ -114,7 +114,7 @@ def call(name, owner, function, args, kwargs):
     except (Exception, KeyboardInterrupt) as error:
         expected = (ValueError, TypeError, KeyError, OSError, OverflowError, IndexError,
                     AttributeError, MemoryError, StopIteration, RecursionError, BufferError)  # fmt: skip
-        assert isinstance(error, expected), f"{name}: {type(error).__name__}: {error}"
+        assert isinstance(error, expected), f"{name}{args!r:.400}{kwargs!r:.400}: {error!r}"
         assert "SystemError" not in str(error)
 
 
