@@ -106,9 +106,10 @@ void add_run(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<RunOptions>();
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   command
-      ->add_option("--planner", options->flags.planner,
-                   "planner plugin, by name or path, or python:FILE:CLASS, a class in a Python file "
-                   "(default the scene's)")
+      ->add_option(
+          "--planner", options->flags.planner,
+          "planner plugin, by name or path, or python:FILE:CLASS, a class in a Python file "
+          "(default the scene's)")
       ->type_name("NAME|PATH");
   add_guide_option(*command, options->flags);
   restrict_to_integrators(

@@ -17,8 +17,7 @@ Json planner_entry(const std::string& name) {
   const std::string rest = name.substr(scheme.size());
   const auto colon = rest.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == rest.size())
-    throw Error(ErrorCode::usage,
-                fmt::format("--planner: '{}', expected python:FILE:CLASS", name));
+    throw Error(ErrorCode::usage, fmt::format("--planner: '{}', expected python:FILE:CLASS", name));
   return {{"name", "python"},
           {"params", {{"file", rest.substr(0, colon)}, {"class", rest.substr(colon + 1)}}}};
 }

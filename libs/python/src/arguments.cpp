@@ -18,9 +18,9 @@ constexpr int npy_double = py::detail::npy_api::NPY_DOUBLE_;
 // no size overflows.
 py::array as_array(std::string_view function, std::string_view argument, py::handle given) {
   const auto wrong_type = [&] {
-    return py::type_error(fmt::format("{}: {}: {}, expected an array of real numbers", function,
-                                      argument, py::str(py::type::of(given).attr("__name__"))
-                                                    .cast<std::string>()));
+    return py::type_error(
+        fmt::format("{}: {}: {}, expected an array of real numbers", function, argument,
+                    py::str(py::type::of(given).attr("__name__")).cast<std::string>()));
   };
   if (given.is_none() || PyUnicode_Check(given.ptr()) != 0 || PyBytes_Check(given.ptr()) != 0)
     throw wrong_type();
@@ -104,8 +104,7 @@ Eigen::VectorXd optional_vector(std::string_view function, std::string_view argu
   return vector_of(function, argument, given, size);
 }
 
-Eigen::Vector3d vector3_of(std::string_view function, std::string_view argument,
-                           py::handle given) {
+Eigen::Vector3d vector3_of(std::string_view function, std::string_view argument, py::handle given) {
   return vector_of(function, argument, given, 3);
 }
 
@@ -135,7 +134,8 @@ py::array_t<double> new_array(std::initializer_list<py::ssize_t> shape) {
 py::array_t<double> to_array(const Eigen::VectorXd& x) {
   auto array = new_array({x.size()});
   if (x.size() > 0)
-    std::memcpy(array.mutable_data(), x.data(), sizeof(double) * static_cast<std::size_t>(x.size()));
+    std::memcpy(array.mutable_data(), x.data(),
+                sizeof(double) * static_cast<std::size_t>(x.size()));
   return array;
 }
 
@@ -233,8 +233,7 @@ Json json_of(py::handle object, int depth) {
   if (PyDict_Check(object.ptr()) != 0) {
     Json out = Json::object();
     for (const auto& [key, value] : py::reinterpret_borrow<py::dict>(object)) {
-      if (PyUnicode_Check(key.ptr()) == 0)
-        throw py::type_error("JSON: a key is not a str");
+      if (PyUnicode_Check(key.ptr()) == 0) throw py::type_error("JSON: a key is not a str");
       out[text_of(key)] = json_of(value, depth + 1);
     }
     return out;
@@ -243,14 +242,16 @@ Json json_of(py::handle object, int depth) {
     return sequence(object, depth + 1);
   if (py::hasattr(object, "tolist")) return json_of(object.attr("tolist")(), depth + 1);
   if (py::hasattr(object, "__fspath__")) return text_of(object.attr("__fspath__")());
-  throw py::type_error(fmt::format(
-      "JSON: {}, expected dict, list, str, float, int, bool, None or an array",
-      py::str(py::type::of(object).attr("__name__")).cast<std::string>()));
+  throw py::type_error(
+      fmt::format("JSON: {}, expected dict, list, str, float, int, bool, None or an array",
+                  py::str(py::type::of(object).attr("__name__")).cast<std::string>()));
 }
 
 }  // namespace
 
-Json to_json(py::handle object) { return json_of(object, 0); }
+Json to_json(py::handle object) {
+  return json_of(object, 0);
+}
 
 std::filesystem::path path_of(py::handle given) {
   PyObject* bytes = nullptr;

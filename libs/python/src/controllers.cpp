@@ -45,9 +45,9 @@ struct AnswerCopy {
 };
 
 AnswerCopy copy_of(const control::Answer& a) {
-  return {a.state,     a.saturated,        a.stopping,   a.goals_number,
-          a.snapshot,  a.load,             a.refused_load, a.goal_index,
-          std::string(a.cause), std::string(a.load_refusal), a.torque, a.q_next, a.v_next};
+  return {a.state,  a.saturated,    a.stopping,   a.goals_number,       a.snapshot,
+          a.load,   a.refused_load, a.goal_index, std::string(a.cause), std::string(a.load_refusal),
+          a.torque, a.q_next,       a.v_next};
 }
 
 using PyAnswer = Boxed<AnswerCopy>;  // hamelin.Answer
@@ -195,16 +195,21 @@ SharedController make_controller(py::handle scene, py::object planner, py::handl
 }
 
 void add_answer(py::module_& module) {
-  py::class_<PyAnswer, std::shared_ptr<PyAnswer>>(module, "Answer", "The answer of a tick of a Controller; a copy.")
-      .def_property_readonly("state", [](const PyAnswer& a) { return name_of(a.state); },
-                             "'running', 'reached', 'stalled', 'gave_up' or 'stopping'.")
+  py::class_<PyAnswer, std::shared_ptr<PyAnswer>>(module, "Answer",
+                                                  "The answer of a tick of a Controller; a copy.")
+      .def_property_readonly(
+          "state", [](const PyAnswer& a) { return name_of(a.state); },
+          "'running', 'reached', 'stalled', 'gave_up' or 'stopping'.")
       .def_readonly("cause", &AnswerCopy::cause, "Why it gave up or stops; one line, or empty.")
-      .def_property_readonly("torque", [](const PyAnswer& a) { return to_array(a.torque); },
-                             "Joint torques to send to the arm, shape (n,) [Nm or N].")
-      .def_property_readonly("q_next", [](const PyAnswer& a) { return to_array(a.q_next); },
-                             "Joint positions one period ahead, shape (n,), with position=True.")
-      .def_property_readonly("v_next", [](const PyAnswer& a) { return to_array(a.v_next); },
-                             "Joint velocities one period ahead, shape (n,), with position=True.")
+      .def_property_readonly(
+          "torque", [](const PyAnswer& a) { return to_array(a.torque); },
+          "Joint torques to send to the arm, shape (n,) [Nm or N].")
+      .def_property_readonly(
+          "q_next", [](const PyAnswer& a) { return to_array(a.q_next); },
+          "Joint positions one period ahead, shape (n,), with position=True.")
+      .def_property_readonly(
+          "v_next", [](const PyAnswer& a) { return to_array(a.v_next); },
+          "Joint velocities one period ahead, shape (n,), with position=True.")
       .def_readonly("saturated", &AnswerCopy::saturated, "Whether a limit reduced the torque.")
       .def_readonly("stopping", &AnswerCopy::stopping,
                     "Whether the shield refused the planner's answer.")
@@ -223,9 +228,10 @@ void add_answer(py::module_& module) {
 
 void add_world(py::module_& module) {
   using py::arg;
-  py::class_<BoundWorld, std::shared_ptr<BoundWorld>>(module, "World",
-                         "The surroundings of a controller. Any thread may update them; an update\n"
-                         "takes effect at the next tick and returns the number of its snapshot.")
+  py::class_<BoundWorld, std::shared_ptr<BoundWorld>>(
+      module, "World",
+      "The surroundings of a controller. Any thread may update them; an update\n"
+      "takes effect at the next tick and returns the number of its snapshot.")
       .def(
           "set_obstacle",
           [](const BoundWorld& w, py::handle obstacle) {
@@ -247,7 +253,8 @@ void add_world(py::module_& module) {
             return w.get().move_obstacle(name, at, v, time_s);
           },
           arg("name"), arg("pose"), py::kw_only(), arg("velocity") = py::none(), arg("time"),
-          "Moves an obstacle: at `time` [s] it is at the pose, shape (4, 4), from where it goes on\n"
+          "Moves an obstacle: at `time` [s] it is at the pose, shape (4, 4), from where it goes "
+          "on\n"
           "with the velocity, shape (3,) [m/s].")
       .def(
           "observe_obstacle",
@@ -280,20 +287,21 @@ void add_world(py::module_& module) {
           "set_map",
           [](const BoundWorld& w, py::handle map, py::handle q) {
             const auto read = variant(*w.owner->scene, "map", to_json(map)).map;
-            const Eigen::VectorXd at = optional_vector(
-                "set_map", "q", q, w.owner->controller->model().dof());
+            const Eigen::VectorXd at =
+                optional_vector("set_map", "q", q, w.owner->controller->model().dof());
             const py::gil_scoped_release unlocked;
             return w.get().set_map(read, at);
           },
           arg("map"), arg("q") = py::none(),
           "Replaces the map by that of a dict as in a scene; None removes it. q: configuration in\n"
           "which a self-filter finds the arm, shape (n,); None: the scene's start.")
-      .def_property_readonly("number",
-                             [](const BoundWorld& w) {
-                               const py::gil_scoped_release unlocked;
-                               return w.get().latest()->number;
-                             },
-                             "Number of the newest snapshot.")
+      .def_property_readonly(
+          "number",
+          [](const BoundWorld& w) {
+            const py::gil_scoped_release unlocked;
+            return w.get().latest()->number;
+          },
+          "Number of the newest snapshot.")
       .def("__repr__", [](const BoundWorld& w) {
         const py::gil_scoped_release unlocked;
         const auto latest = w.get().latest();
@@ -304,25 +312,28 @@ void add_world(py::module_& module) {
 
 void add_controller(py::module_& module) {
   using py::arg;
-  py::class_<BoundController, SharedController>(
-      module, "Controller",
-      "The control loop of an arm, without a plant. One thread calls tick(); any thread may update\n"
-      "world, goals and parameters.")
-      .def(py::init(&make_controller), arg("scene"), py::kw_only(), arg("planner") = py::none(),
-           arg("plugin_path") = py::none(), arg("period") = py::none(), arg("torque") = true,
-           arg("position") = false, arg("certify") = true, arg("obstacles_max") = 64,
-           arg("acceleration_max") = std::vector<double>{15.0},
-           arg("jerk_max") = std::vector<double>{5000.0},
-           "scene: a Scene, a dict or a file. planner: a name, an object with tick(tick, command),\n"
-           "or None: the scene's. period: time between two ticks [s]; None: the scene's. torque,\n"
-           "position: what answers contain. certify: prove that the motion since the last tick was\n"
-           "clear. acceleration_max, jerk_max: of the positions, one value or one per joint.")
+  py::class_<BoundController, SharedController>(module, "Controller",
+                                                "The control loop of an arm, without a plant. One "
+                                                "thread calls tick(); any thread may update\n"
+                                                "world, goals and parameters.")
+      .def(
+          py::init(&make_controller), arg("scene"), py::kw_only(), arg("planner") = py::none(),
+          arg("plugin_path") = py::none(), arg("period") = py::none(), arg("torque") = true,
+          arg("position") = false, arg("certify") = true, arg("obstacles_max") = 64,
+          arg("acceleration_max") = std::vector<double>{15.0},
+          arg("jerk_max") = std::vector<double>{5000.0},
+          "scene: a Scene, a dict or a file. planner: a name, an object with tick(tick, command),\n"
+          "or None: the scene's. period: time between two ticks [s]; None: the scene's. torque,\n"
+          "position: what answers contain. certify: prove that the motion since the last tick was\n"
+          "clear. acceleration_max, jerk_max: of the positions, one value or one per joint.")
       .def("tick", &tick, arg("time"), arg("q"), arg("v"),
            "Answers the measured state of the arm: time [s], increasing; q, v of shape (n,).")
-      .def_property_readonly("world", [](const SharedController& c) { return std::make_shared<BoundWorld>(c); },
-                             "The surroundings.")
+      .def_property_readonly(
+          "world", [](const SharedController& c) { return std::make_shared<BoundWorld>(c); },
+          "The surroundings.")
       .def("set_goals", &set_goals, arg("goals"),
-           "Replaces the goals by dicts as in a scene, from the next tick on. Returns the number of\n"
+           "Replaces the goals by dicts as in a scene, from the next tick on. Returns the number "
+           "of\n"
            "the list, see Answer.goals_number.")
       .def(
           "set_target",
@@ -335,7 +346,8 @@ void add_controller(py::module_& module) {
           },
           arg("time"), arg("pose"), py::kw_only(), arg("velocity") = py::none(),
           arg("angular_velocity") = py::none(),
-          "Moves the target of a follow goal to a pose, shape (4, 4). Velocities, shape (3,), that\n"
+          "Moves the target of a follow goal to a pose, shape (4, 4). Velocities, shape (3,), "
+          "that\n"
           "are not given are estimated.")
       .def(
           "set_target_twist",
@@ -390,12 +402,15 @@ void add_controller(py::module_& module) {
       .def_property_readonly("verdict", &verdict,
                              "The proof for the motion between the last two ticks: a dict with\n"
                              "certified, margin_m, contact; None after the first tick.")
-      .def_property_readonly("period_s", [](const BoundController& c) { return c.controller->period_s(); },
-                             "Time between two ticks [s].")
-      .def_property_readonly("dof", [](const BoundController& c) { return c.controller->model().dof(); },
-                             "Number of joints n.")
-      .def_property_readonly("tip", [](const BoundController& c) { return to_array(c.controller->tip()); },
-                             "Pose of the tip at the last tick, shape (4, 4).")
+      .def_property_readonly(
+          "period_s", [](const BoundController& c) { return c.controller->period_s(); },
+          "Time between two ticks [s].")
+      .def_property_readonly(
+          "dof", [](const BoundController& c) { return c.controller->model().dof(); },
+          "Number of joints n.")
+      .def_property_readonly(
+          "tip", [](const BoundController& c) { return to_array(c.controller->tip()); },
+          "Pose of the tip at the last tick, shape (4, 4).")
       .def("__repr__", [](const BoundController& c) {
         return fmt::format("<hamelin.Controller '{}': planner {}, period {:g} s>", c.scene->name,
                            c.controller->plugin().name(), c.controller->period_s());

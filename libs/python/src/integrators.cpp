@@ -91,8 +91,9 @@ std::vector<dynamics::GyroscopicTerm> terms_of(py::handle given) {
   return terms;
 }
 
-std::shared_ptr<PyChannels> make_channels(py::handle damping, py::handle coulomb, double coulomb_speed,
-                       py::handle gyroscopic, py::handle held_torque) {
+std::shared_ptr<PyChannels> make_channels(py::handle damping, py::handle coulomb,
+                                          double coulomb_speed, py::handle gyroscopic,
+                                          py::handle held_torque) {
   Channels channels;
   channels.damping = free_vector("damping", damping);
   channels.coulomb = free_vector("coulomb", coulomb);
@@ -186,11 +187,13 @@ void check_steps(const Steps& steps, bool adaptive) {
   };
   positive("step", steps.step_s);
   positive("duration", steps.duration_s);
-  if (steps.every < 1) refuse("simulate", "every", fmt::format("{}, expected 1 or more", steps.every));
+  if (steps.every < 1)
+    refuse("simulate", "every", fmt::format("{}, expected 1 or more", steps.every));
   const double count = steps.duration_s / steps.step_s;
   if (!adaptive && std::abs(count - std::round(count)) > 1e-9 * std::max(1.0, count))
-    refuse("simulate", "duration", fmt::format("{} s is not an integer multiple of the step {} s",
-                                               steps.duration_s, steps.step_s));
+    refuse("simulate", "duration",
+           fmt::format("{} s is not an integer multiple of the step {} s", steps.duration_s,
+                       steps.step_s));
 }
 
 bool wants_to_end(const py::object& on_step, const State& state, const StepReport& report) {
@@ -210,9 +213,9 @@ bool take_steps(BoundIntegrator& integrator, State& state, const Steps& steps, M
   InterruptCheck interrupts;
   for (long i = 1;; ++i) {
     const double left = end - state.time_s;
-    const StepReport report =
-        adaptive ? integrator.scheme->advance(state, steps.channels, left)
-                 : integrator.scheme->step(state, steps.channels, steps.step_s);
+    const StepReport report = adaptive
+                                  ? integrator.scheme->advance(state, steps.channels, left)
+                                  : integrator.scheme->step(state, steps.channels, steps.step_s);
     if (!report.converged) return false;
     motion.add_report(report);
     // The time that is left of the last step is rounding.
@@ -253,17 +256,22 @@ std::string repr(const BoundIntegrator& integrator) {
 }
 
 void add_state(py::module_& module) {
-  py::class_<PyState, std::shared_ptr<PyState>>(module, "State",
-                    "The memory of an integrator between steps. Integrator.start() makes one.")
-      .def_property_readonly("time_s", [](const PyState& s) { return s.time_s; },
-                             "Time since the start [s].")
-      .def_property_readonly("k", [](const PyState& s) { return s.k; }, "Number of steps taken.")
-      .def_property_readonly("q", [](const PyState& s) { return to_array(s.q); },
-                             "Joint positions, shape (n,) [rad or m]; a copy.")
-      .def_property_readonly("step_next", [](const PyState& s) { return s.step_next; },
-                             "Next step under step control [s].")
-      .def("copy", [](const PyState& s) { return boxed<State>(s); }, "A copy, to keep and restore.")
-      .def("__copy__", [](const PyState& s) { return boxed<State>(s); }, "A copy.")
+  py::class_<PyState, std::shared_ptr<PyState>>(
+      module, "State", "The memory of an integrator between steps. Integrator.start() makes one.")
+      .def_property_readonly(
+          "time_s", [](const PyState& s) { return s.time_s; }, "Time since the start [s].")
+      .def_property_readonly(
+          "k", [](const PyState& s) { return s.k; }, "Number of steps taken.")
+      .def_property_readonly(
+          "q", [](const PyState& s) { return to_array(s.q); },
+          "Joint positions, shape (n,) [rad or m]; a copy.")
+      .def_property_readonly(
+          "step_next", [](const PyState& s) { return s.step_next; },
+          "Next step under step control [s].")
+      .def(
+          "copy", [](const PyState& s) { return boxed<State>(s); }, "A copy, to keep and restore.")
+      .def(
+          "__copy__", [](const PyState& s) { return boxed<State>(s); }, "A copy.")
       .def(
           "__deepcopy__", [](const PyState& s, const py::dict&) { return boxed<State>(s); },
           py::arg("memo"), "A copy.")
@@ -274,7 +282,8 @@ void add_state(py::module_& module) {
 }
 
 void add_report(py::module_& module) {
-  py::class_<PyReport, std::shared_ptr<PyReport>>(module, "StepReport", "The outcome and the cost of one step.")
+  py::class_<PyReport, std::shared_ptr<PyReport>>(module, "StepReport",
+                                                  "The outcome and the cost of one step.")
       .def_readonly("converged", &StepReport::converged, "If false, the state is unchanged.")
       .def_readonly("updates", &StepReport::updates, "Corrections of the displacement.")
       .def_readonly("factorizations", &StepReport::factorizations,
@@ -284,7 +293,8 @@ void add_report(py::module_& module) {
       .def_readonly("halvings", &StepReport::halvings, "How often the step was halved.")
       .def_readonly("rejected", &StepReport::rejected, "Tries that step control rejected.")
       .def_readonly("step_s", &StepReport::step_s, "Time by which the state advanced [s].")
-      .def_readonly("residual", &StepReport::residual, "The value that Integrator.criterion bounds.")
+      .def_readonly("residual", &StepReport::residual,
+                    "The value that Integrator.criterion bounds.")
       .def_readonly("gyroscopic_work_J", &StepReport::gyroscopic_work_J,
                     "Work of gyroscopic terms [J]: rounding.")
       .def_readonly("dissipated_J", &StepReport::dissipated_J,
@@ -298,28 +308,31 @@ void add_report(py::module_& module) {
 }
 
 void add_channels(py::module_& module) {
-  py::class_<PyChannels, std::shared_ptr<PyChannels>>(module, "Channels",
-                       "The forces on the arm during a step, besides gravity.")
-      .def(py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
-           py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
-           py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
-           "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
-           "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. gyroscopic: terms (link, point,\n"
-           "w), with the point in the link's centre-of-mass frame [m] and w in the world [N s/m].\n"
-           "held_torque: shape (n,) [Nm or N].")
-      .def_property_readonly("damping", [](const PyChannels& c) { return to_array(c.damping); },
-                             "Viscous damping, shape (n,) or (0,); a copy.")
-      .def_property_readonly("coulomb", [](const PyChannels& c) { return to_array(c.coulomb); },
-                             "Dry friction, shape (n,) or (0,); a copy.")
+  py::class_<PyChannels, std::shared_ptr<PyChannels>>(
+      module, "Channels", "The forces on the arm during a step, besides gravity.")
+      .def(
+          py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
+          py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
+          py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
+          "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
+          "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. gyroscopic: terms (link, point,\n"
+          "w), with the point in the link's centre-of-mass frame [m] and w in the world [N s/m].\n"
+          "held_torque: shape (n,) [Nm or N].")
+      .def_property_readonly(
+          "damping", [](const PyChannels& c) { return to_array(c.damping); },
+          "Viscous damping, shape (n,) or (0,); a copy.")
+      .def_property_readonly(
+          "coulomb", [](const PyChannels& c) { return to_array(c.coulomb); },
+          "Dry friction, shape (n,) or (0,); a copy.")
       .def_readonly("coulomb_speed", &Channels::coulomb_speed,
                     "Speed below which dry friction is viscous [rad/s or m/s].")
-      .def_property_readonly("held_torque",
-                             [](const PyChannels& c) { return to_array(c.held_torque); },
-                             "Held torque, shape (n,) or (0,); a copy.")
+      .def_property_readonly(
+          "held_torque", [](const PyChannels& c) { return to_array(c.held_torque); },
+          "Held torque, shape (n,) or (0,); a copy.")
       .def("__repr__", [](const PyChannels& c) {
-        return fmt::format("<hamelin.Channels damping {}, coulomb {}, gyroscopic {}, held_torque {}>",
-                           c.damping.size(), c.coulomb.size(), c.gyroscopic.size(),
-                           c.held_torque.size());
+        return fmt::format(
+            "<hamelin.Channels damping {}, coulomb {}, gyroscopic {}, held_torque {}>",
+            c.damping.size(), c.coulomb.size(), c.gyroscopic.size(), c.held_torque.size());
       });
 }
 
@@ -365,22 +378,26 @@ void add_integrator(py::module_& module) {
       .def(py::init(&make_bound), arg("model").none(false), arg("name") = "hamel-variational",
            "name: one of integrator_names(), possibly with an order: 'gauss:8'.\n"
            "Options as those of `hamelin integrate`: order, solver, rtol, atol, alpha, start,\n"
-           "tolerance, max_updates, max_halvings, newmark_beta, newmark_gamma. rtol and atol switch\n"
+           "tolerance, max_updates, max_halvings, newmark_beta, newmark_gamma. rtol and atol "
+           "switch\n"
            "on step control.")
-      .def_property_readonly("name", [](const BoundIntegrator& i) { return i.scheme->name(); },
-                             "Name of the scheme.")
-      .def_property_readonly("model", [](const BoundIntegrator& i) { return i.model; },
-                             "The model that it integrates.")
-      .def_property_readonly("order", [](const BoundIntegrator& i) { return i.scheme->order(); },
-                             "Order of the scheme.")
-      .def_property_readonly("adaptive",
-                             [](const BoundIntegrator& i) { return i.scheme->adaptive(); },
-                             "Whether it is under step control.")
-      .def_property_readonly("criterion",
-                             [](const BoundIntegrator& i) { return i.scheme->criterion(); },
-                             "The condition for StepReport.converged, as text.")
-      .def_property_readonly("mode", [](const BoundIntegrator& i) { return i.scheme->mode(); },
-                             "'structure' or 'accurate', see the C++ documentation.")
+      .def_property_readonly(
+          "name", [](const BoundIntegrator& i) { return i.scheme->name(); }, "Name of the scheme.")
+      .def_property_readonly(
+          "model", [](const BoundIntegrator& i) { return i.model; },
+          "The model that it integrates.")
+      .def_property_readonly(
+          "order", [](const BoundIntegrator& i) { return i.scheme->order(); },
+          "Order of the scheme.")
+      .def_property_readonly(
+          "adaptive", [](const BoundIntegrator& i) { return i.scheme->adaptive(); },
+          "Whether it is under step control.")
+      .def_property_readonly(
+          "criterion", [](const BoundIntegrator& i) { return i.scheme->criterion(); },
+          "The condition for StepReport.converged, as text.")
+      .def_property_readonly(
+          "mode", [](const BoundIntegrator& i) { return i.scheme->mode(); },
+          "'structure' or 'accurate', see the C++ documentation.")
       .def("start", &start, arg("q0"), arg("v0") = py::none(),
            "The state at time 0. q0, v0: shape (n,); v0 None: at rest.")
       .def("step", &step, arg("state"), arg("step"), arg("channels") = py::none(),
@@ -402,22 +419,24 @@ void add_integrator(py::module_& module) {
       .def(
           "set_velocity",
           [](BoundIntegrator& i, PyState& state, py::handle v) {
-            const Eigen::VectorXd velocity = vector_of("set_velocity", "v", v, i.model->model.dof());
+            const Eigen::VectorXd velocity =
+                vector_of("set_velocity", "v", v, i.model->model.dof());
             const Use use(i);
             i.scheme->set_velocity(state, velocity);
           },
           arg("state"), arg("v"), "Sets the velocity at the node, shape (n,).")
-      .def("simulate", &simulate, arg("q0"), arg("v0") = py::none(), py::kw_only(), arg("step"),
-           arg("duration"), arg("channels") = py::none(), arg("every") = 1,
-           arg("on_step") = py::none(),
-           "Integrates the motion from q0, v0 without a loop in Python.\n\n"
-           "step: fixed step [s]; under step control the first one. duration [s]: an integer\n"
-           "multiple of a fixed step. every: steps between stored nodes. on_step(state, report) is\n"
-           "called after each step with a copy of the state; if it returns True, the motion ends.\n"
-           "Returns a dict of arrays: for N nodes 'time_s' (N,), 'q', 'v' (N, n), 'kinetic_J',\n"
-           "'potential_J' (N,); for the intervals between them 'updates', 'evaluations',\n"
-           "'factorizations', 'halvings', 'rejected', 'residual', 'dissipated_J', 'held_work_J'\n"
-           "(N - 1,); and 'completed', false if a step did not converge.")
+      .def(
+          "simulate", &simulate, arg("q0"), arg("v0") = py::none(), py::kw_only(), arg("step"),
+          arg("duration"), arg("channels") = py::none(), arg("every") = 1,
+          arg("on_step") = py::none(),
+          "Integrates the motion from q0, v0 without a loop in Python.\n\n"
+          "step: fixed step [s]; under step control the first one. duration [s]: an integer\n"
+          "multiple of a fixed step. every: steps between stored nodes. on_step(state, report) is\n"
+          "called after each step with a copy of the state; if it returns True, the motion ends.\n"
+          "Returns a dict of arrays: for N nodes 'time_s' (N,), 'q', 'v' (N, n), 'kinetic_J',\n"
+          "'potential_J' (N,); for the intervals between them 'updates', 'evaluations',\n"
+          "'factorizations', 'halvings', 'rejected', 'residual', 'dissipated_J', 'held_work_J'\n"
+          "(N - 1,); and 'completed', false if a step did not converge.")
       .def("__repr__", &repr);
 }
 

@@ -24,12 +24,13 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // The values of one field in all ticks of a chunk.
 struct Column {
-  std::string name;         // the path of its keys, separated by dots
-  std::size_t width = 0;    // numbers per tick; 0: none was seen yet
-  bool vector = false;      // a list of numbers, else a number
-  bool boolean = true;      // only true and false were seen
-  bool missing = false;     // some tick did not have it
-  bool irregular = false;   // lists of different sizes, or a list in one tick and a number in another
+  std::string name;       // the path of its keys, separated by dots
+  std::size_t width = 0;  // numbers per tick; 0: none was seen yet
+  bool vector = false;    // a list of numbers, else a number
+  bool boolean = true;    // only true and false were seen
+  bool missing = false;   // some tick did not have it
+  bool irregular =
+      false;  // lists of different sizes, or a list in one tick and a number in another
   std::vector<double> values;
   std::size_t rows = 0;
 
@@ -124,7 +125,8 @@ class Columns {
     ++at_;
   }
   bool accept(std::string_view word) {
-    if (!std::string_view(at_, static_cast<std::size_t>(end_ - at_)).starts_with(word)) return false;
+    if (!std::string_view(at_, static_cast<std::size_t>(end_ - at_)).starts_with(word))
+      return false;
     at_ += word.size();
     return true;
   }
@@ -280,15 +282,14 @@ class LogStream : public Whole {
                   fmt::format("{}: line 1: is missing, expected a header", file_.string()));
     header_ = parse_json(line, reader_.where());
     if (!header_.is_object() || header_.value("type", Json()) != "header")
-      throw Error(ErrorCode::invalid, fmt::format("{}: is not a header, expected a log of hamelin",
-                                                  reader_.where()));
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: is not a header, expected a log of hamelin", reader_.where()));
   }
 
   // Reads up to so many ticks. @return their columns, or None at the end
   py::object read(std::size_t ticks) {
     if (reading_)
-      throw Error(ErrorCode::usage,
-                  "LogStream: another call uses it, expected one call at a time");
+      throw Error(ErrorCode::usage, "LogStream: another call uses it, expected one call at a time");
     reading_ = true;
     const struct Done {
       bool& reading;
@@ -358,7 +359,8 @@ void add_logs(py::module_& module) {
       module, "LogStream",
       "Reads a log in chunks of ticks, plain or zstd; read_log() reads all at once.\n\n"
       "Iterating gives a dict of arrays per chunk of 1000 ticks. Fields of a tick that are\n"
-      "numbers have shape (N,), those that are lists of numbers (N, m); keys of nested objects are\n"
+      "numbers have shape (N,), those that are lists of numbers (N, m); keys of nested objects "
+      "are\n"
       "joined by dots, as 'energy.kinetic_J'. NaN where a tick does not have the field. Texts and\n"
       "nested lists are left out.")
       .def(py::init([](py::handle file) { return std::make_shared<LogStream>(path_of(file)); }),
@@ -371,7 +373,8 @@ void add_logs(py::module_& module) {
           },
           py::arg("ticks") = py::none(),
           "The next ticks as a dict of arrays; None at the end. ticks None: all that are left.")
-      .def("__iter__", [](py::object self) { return self; }, "The stream itself.")
+      .def(
+          "__iter__", [](py::object self) { return self; }, "The stream itself.")
       .def(
           "__next__",
           [](LogStream& stream) {
@@ -381,17 +384,19 @@ void add_logs(py::module_& module) {
           },
           "The next 1000 ticks.")
       .def_property_readonly("file", &LogStream::file, "The file.")
-      .def_property_readonly("header", [](const LogStream& s) { return to_python(s.header()); },
-                             "The header as a dict.")
-      .def_property_readonly("events", [](const LogStream& s) { return to_list(s.events()); },
-                             "The events that were read so far, as dicts.")
-      .def_property_readonly("result", [](const LogStream& s) { return to_python(s.result()); },
-                             "The result as a dict; None if it was not read (yet).")
+      .def_property_readonly(
+          "header", [](const LogStream& s) { return to_python(s.header()); },
+          "The header as a dict.")
+      .def_property_readonly(
+          "events", [](const LogStream& s) { return to_list(s.events()); },
+          "The events that were read so far, as dicts.")
+      .def_property_readonly(
+          "result", [](const LogStream& s) { return to_python(s.result()); },
+          "The result as a dict; None if it was not read (yet).")
       .def_property_readonly("cut", &LogStream::cut,
                              "Whether the file ended in the middle of a line; known at the end.")
-      .def("__repr__", [](const LogStream& s) {
-        return fmt::format("<hamelin.LogStream '{}'>", s.file());
-      });
+      .def("__repr__",
+           [](const LogStream& s) { return fmt::format("<hamelin.LogStream '{}'>", s.file()); });
 }
 
 }  // namespace hamelin::python

@@ -52,10 +52,11 @@ class States {
     const bool fits = (numbers.dimensions() == 1 || numbers.dimensions() == 2) &&
                       numbers.extent(numbers.dimensions() - 1) == dof_;
     if (!fits)
-      refuse(function_, argument, fmt::format("shape {}, expected ({},) or (N, {})",
-                                              describe_shape(numbers.array()), dof_, dof_));
-    if (count_ > 0 && (numbers.dimensions() != first.dimensions() ||
-                       numbers.extent(0) != first.extent(0)))
+      refuse(function_, argument,
+             fmt::format("shape {}, expected ({},) or (N, {})", describe_shape(numbers.array()),
+                         dof_, dof_));
+    if (count_ > 0 &&
+        (numbers.dimensions() != first.dimensions() || numbers.extent(0) != first.extent(0)))
       refuse(function_, argument,
              fmt::format("shape {}, expected {}, as of the first argument",
                          describe_shape(numbers.array()), describe_shape(first.array())));
@@ -230,20 +231,19 @@ py::array_t<double> crba(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("crba", dof);
   in.add("q", q);
-  return for_each_state(
-      bound, in, {dof, dof},
-      [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-        // Symmetric, so that rows and columns are the same.
-        dynamics::mass_matrix(bound.model, ws, in.row(0, i, x),
-                              Eigen::Map<Eigen::MatrixXd>(y, dof, dof));
-      });
+  return for_each_state(bound, in, {dof, dof},
+                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
+                          // Symmetric, so that rows and columns are the same.
+                          dynamics::mass_matrix(bound.model, ws, in.row(0, i, x),
+                                                Eigen::Map<Eigen::MatrixXd>(y, dof, dof));
+                        });
 }
 
 // Energies of one state are numbers, of many states arrays.
 template <class F>
 py::object energies(BoundModel& bound, const States& in, const F& energy) {
-  const auto out =
-      for_each_state(bound, in, {}, [&](auto& ws, py::ssize_t i, double* y) { *y = energy(ws, i); });
+  const auto out = for_each_state(bound, in, {},
+                                  [&](auto& ws, py::ssize_t i, double* y) { *y = energy(ws, i); });
   if (in.single()) return py::float_(*out.data());
   return out;
 }
@@ -276,25 +276,23 @@ py::array_t<double> forward_kinematics(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("forward_kinematics", dof);
   in.add("q", q);
-  return for_each_state(
-      bound, in, {dof, 4, 4},
-      [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-        dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-        for (int link = 0; link < dof; ++link)
-          write_pose(dynamics::link_pose(bound.model, ws, link), y + 16 * link);
-      });
+  return for_each_state(bound, in, {dof, 4, 4},
+                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
+                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
+                          for (int link = 0; link < dof; ++link)
+                            write_pose(dynamics::link_pose(bound.model, ws, link), y + 16 * link);
+                        });
 }
 
 py::array_t<double> tip_pose(BoundModel& bound, py::handle q) {
   const py::ssize_t dof = bound.model.dof();
   States in("tip_pose", dof);
   in.add("q", q);
-  return for_each_state(
-      bound, in, {4, 4},
-      [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
-        dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-        write_pose(dynamics::tip_pose(bound.model, ws), y);
-      });
+  return for_each_state(bound, in, {4, 4},
+                        [&, x = Eigen::VectorXd(dof)](auto& ws, py::ssize_t i, double* y) mutable {
+                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
+                          write_pose(dynamics::tip_pose(bound.model, ws), y);
+                        });
 }
 
 // None: the tip's link; else an index or a name.
@@ -308,8 +306,9 @@ std::optional<int> link_of(const char* function, const model::Model& model, py::
       if (links[i].name == name) return static_cast<int>(i);
       names.push_back(links[i].name);
     }
-    refuse(function, "link", fmt::format("'{}' is not a moving link, expected one of {}{}", name,
-                                         fmt::join(names, ", "), did_you_mean(name, names)));
+    refuse(function, "link",
+           fmt::format("'{}' is not a moving link, expected one of {}{}", name,
+                       fmt::join(names, ", "), did_you_mean(name, names)));
   }
   if (PyIndex_Check(link.ptr()) == 0)
     throw py::type_error(fmt::format("{}: link: expected a name, an index or None", function));
@@ -320,8 +319,7 @@ std::optional<int> link_of(const char* function, const model::Model& model, py::
   return static_cast<int>(index);
 }
 
-py::array_t<double> jacobian(BoundModel& bound, py::handle q, py::handle link,
-                             py::handle point) {
+py::array_t<double> jacobian(BoundModel& bound, py::handle q, py::handle link, py::handle point) {
   const py::ssize_t dof = bound.model.dof();
   const auto chosen = link_of("jacobian", bound.model, link);
   const int index = chosen.value_or(bound.model.robot().tip.link);
@@ -329,18 +327,17 @@ py::array_t<double> jacobian(BoundModel& bound, py::handle q, py::handle link,
   if (!point.is_none()) in_link = vector3_of("jacobian", "point", point);
   States in("jacobian", dof);
   in.add("q", q);
-  return for_each_state(
-      bound, in, {6, dof},
-      [&, x = Eigen::VectorXd(dof), J = dynamics::Matrix6Xd(6, dof)](auto& ws, py::ssize_t i,
-                                                                    double* y) mutable {
-        dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-        const Eigen::Vector3d at =
-            in_link ? dynamics::point_position(bound.model, ws, index, *in_link)
-            : chosen ? dynamics::link_pose(bound.model, ws, index).p()
-                     : dynamics::tip_pose(bound.model, ws).p();
-        dynamics::frame_jacobian(bound.model, ws, index, at, J);
-        Eigen::Map<RowMatrix>(y, 6, dof) = J;
-      });
+  return for_each_state(bound, in, {6, dof},
+                        [&, x = Eigen::VectorXd(dof), J = dynamics::Matrix6Xd(6, dof)](
+                            auto& ws, py::ssize_t i, double* y) mutable {
+                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
+                          const Eigen::Vector3d at =
+                              in_link  ? dynamics::point_position(bound.model, ws, index, *in_link)
+                              : chosen ? dynamics::link_pose(bound.model, ws, index).p()
+                                       : dynamics::tip_pose(bound.model, ws).p();
+                          dynamics::frame_jacobian(bound.model, ws, index, at, J);
+                          Eigen::Map<RowMatrix>(y, 6, dof) = J;
+                        });
 }
 
 py::array_t<double> shape_centers(BoundModel& bound, py::handle q) {
@@ -348,20 +345,19 @@ py::array_t<double> shape_centers(BoundModel& bound, py::handle q) {
   States in("shape_centers", dof);
   in.add("q", q);
   const auto count = static_cast<py::ssize_t>(bound.model.shapes().size());
-  return for_each_state(
-      bound, in, {count, 3},
-      [&, x = Eigen::VectorXd(dof),
-       centers = std::vector<Eigen::Vector3d>(bound.model.shapes().size())](
-          auto& ws, py::ssize_t i, double* y) mutable {
-        dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
-        dynamics::shape_centers(bound.model, ws, centers);
-        for (std::size_t s = 0; s < centers.size(); ++s)
-          Eigen::Map<Eigen::Vector3d>(y + 3 * s) = centers[s];
-      });
+  return for_each_state(bound, in, {count, 3},
+                        [&, x = Eigen::VectorXd(dof),
+                         centers = std::vector<Eigen::Vector3d>(bound.model.shapes().size())](
+                            auto& ws, py::ssize_t i, double* y) mutable {
+                          dynamics::forward_kinematics(bound.model, ws, in.row(0, i, x));
+                          dynamics::shape_centers(bound.model, ws, centers);
+                          for (std::size_t s = 0; s < centers.size(); ++s)
+                            Eigen::Map<Eigen::Vector3d>(y + 3 * s) = centers[s];
+                        });
 }
 
-py::array_t<double> per_joint(const BoundModel& bound,
-                              std::optional<double> model::Joint::*member, double none) {
+py::array_t<double> per_joint(const BoundModel& bound, std::optional<double> model::Joint::*member,
+                              double none) {
   Eigen::VectorXd x(bound.model.dof());
   for (int i = 0; i < bound.model.dof(); ++i)
     x[i] = (bound.model.robot().links[static_cast<std::size_t>(i)].joint.*member).value_or(none);
@@ -386,7 +382,8 @@ py::dict shapes(const BoundModel& bound) {
   const auto& all = bound.model.shapes();
   const auto count = static_cast<py::ssize_t>(all.size());
   py::array_t<std::int64_t> link(count);
-  auto center = new_array({count, 3}), half_axis = new_array({count, 3}), radius = new_array({count});
+  auto center = new_array({count, 3}), half_axis = new_array({count, 3}),
+       radius = new_array({count});
   for (py::ssize_t i = 0; i < count; ++i) {
     const auto& shape = all[static_cast<std::size_t>(i)];
     link.mutable_data()[i] = shape.link;
@@ -416,9 +413,9 @@ SharedModel make_chain(int links, const std::string& axes, double length_m, doub
                        double radius_m, py::handle base, py::handle gravity) {
   const Eigen::Vector3d g = gravity.is_none() ? Eigen::Vector3d(0.0, 0.0, -9.81)
                                               : vector3_of("make_chain", "gravity", gravity);
-  return std::make_shared<BoundModel>(model::Model(
-      model::make_chain({links, axes, length_m, mass_kg, radius_m}),
-      pose_of("make_chain", "base", base), g));
+  return std::make_shared<BoundModel>(
+      model::Model(model::make_chain({links, axes, length_m, mass_kg, radius_m}),
+                   pose_of("make_chain", "base", base), g));
 }
 
 std::string repr(const BoundModel& bound) {
@@ -447,12 +444,13 @@ SharedModel from_state(const py::tuple& state) {
 void add_properties(py::class_<BoundModel, SharedModel>& type) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   using Joint = model::Joint;
-  type.def_property_readonly("name", [](const BoundModel& m) { return m.model.robot().name; },
-                             "Name of the robot.")
-      .def_property_readonly("dof", [](const BoundModel& m) { return m.model.dof(); },
-                             "Number of joints n.")
-      .def_property_readonly("planar", [](const BoundModel& m) { return m.model.planar(); },
-                             "Whether all joints move in one plane; the algorithms then use SE(2).")
+  type.def_property_readonly(
+          "name", [](const BoundModel& m) { return m.model.robot().name; }, "Name of the robot.")
+      .def_property_readonly(
+          "dof", [](const BoundModel& m) { return m.model.dof(); }, "Number of joints n.")
+      .def_property_readonly(
+          "planar", [](const BoundModel& m) { return m.model.planar(); },
+          "Whether all joints move in one plane; the algorithms then use SE(2).")
       .def_property_readonly(
           "joint_names",
           [](const BoundModel& m) { return names(m, [](const auto& l) { return l.joint.name; }); },
@@ -504,10 +502,12 @@ void add_properties(py::class_<BoundModel, SharedModel>& type) {
             return mass;
           },
           "Mass of all moving links [kg].")
-      .def_property_readonly("reach", [](const BoundModel& m) { return m.model.reach(); },
-                             "Upper bound of the distance from the base to any point [m].")
-      .def_property_readonly("base", [](const BoundModel& m) { return to_array(m.model.base()); },
-                             "Pose of the base in the world, shape (4, 4).")
+      .def_property_readonly(
+          "reach", [](const BoundModel& m) { return m.model.reach(); },
+          "Upper bound of the distance from the base to any point [m].")
+      .def_property_readonly(
+          "base", [](const BoundModel& m) { return to_array(m.model.base()); },
+          "Pose of the base in the world, shape (4, 4).")
       .def_property_readonly(
           "gravity",
           [](const BoundModel& m) { return to_array(Eigen::Vector3d(m.model.gravity())); },
@@ -594,17 +594,19 @@ void add_models(py::module_& module) {
   add_dynamics(type);
   type.def(
           "to_dict",
-          [](const BoundModel& m) { return to_python(description::robot_to_json(m.model.robot())); },
+          [](const BoundModel& m) {
+            return to_python(description::robot_to_json(m.model.robot()));
+          },
           "The robot as a document of schema hamelin.robot/1, without base and gravity.")
       .def("__repr__", &repr)
       .def(py::pickle(&state_of, &from_state));
-  module.def("make_chain", &make_chain, py::kw_only(), py::arg("links") = 7,
-             py::arg("axes") = "x,z,x", py::arg("length_m") = 0.2, py::arg("mass_kg") = 1.0,
-             py::arg("radius_m") = 0.03, py::arg("base") = py::none(),
-             py::arg("gravity") = py::none(),
-             "Makes a chain of equal links along +y.\n\n"
-             "axes: joint axes at q = 0, repeated cyclically. length_m, mass_kg, radius_m: of each\n"
-             "link, a solid cylinder. base, gravity: as for Model.");
+  module.def(
+      "make_chain", &make_chain, py::kw_only(), py::arg("links") = 7, py::arg("axes") = "x,z,x",
+      py::arg("length_m") = 0.2, py::arg("mass_kg") = 1.0, py::arg("radius_m") = 0.03,
+      py::arg("base") = py::none(), py::arg("gravity") = py::none(),
+      "Makes a chain of equal links along +y.\n\n"
+      "axes: joint axes at q = 0, repeated cyclically. length_m, mass_kg, radius_m: of each\n"
+      "link, a solid cylinder. base, gravity: as for Model.");
 }
 
 }  // namespace hamelin::python

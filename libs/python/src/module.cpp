@@ -71,10 +71,12 @@ PYBIND11_MODULE(_hamelin, module) {
   module.attr("__version__") = std::string(version());
   module.def(
       "instruction_set", [] { return std::string(name_of(default_isa())); },
-      "The instruction set of the numerical kernels: 'x86-64' ('generic' elsewhere), 'v3' or 'v4'.\n\n"
+      "The instruction set of the numerical kernels: 'x86-64' ('generic' elsewhere), 'v3' or "
+      "'v4'.\n\n"
       "The environment variable HAMELIN_ISA chooses another one before hamelin is imported.");
   module.def(
-      "plugin_path", [] {
+      "plugin_path",
+      [] {
         py::list out;
         for (const auto& folder : python::plugin_path({})) out.append(folder.string());
         return out;

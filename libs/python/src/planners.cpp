@@ -44,8 +44,9 @@ thread_local PyObject* planner_object = nullptr;
 
 // "ValueError: text (mine.py, line 12)" of an exception.
 std::string describe(py::error_already_set& error) {
-  std::string text = fmt::format("{}: {}", py::str(error.type().attr("__name__")).cast<std::string>(),
-                                 py::str(error.value()).cast<std::string>());
+  std::string text =
+      fmt::format("{}: {}", py::str(error.type().attr("__name__")).cast<std::string>(),
+                  py::str(error.value()).cast<std::string>());
   py::object trace = error.trace() ? py::object(error.trace()) : py::object(py::none());
   if (trace.is_none()) return text;
   while (!trace.attr("tb_next").is_none()) trace = trace.attr("tb_next");
@@ -140,14 +141,17 @@ class DuringCall {
   T* value_ = nullptr;
 };
 
-void copy3(const double (&from)[3], double (&to)[3]) { std::memcpy(to, from, sizeof to); }
+void copy3(const double (&from)[3], double (&to)[3]) {
+  std::memcpy(to, from, sizeof to);
+}
 
 py::array_t<double> array3(const double (&x)[3]) {
   return to_array(Eigen::Vector3d(x[0], x[1], x[2]));
 }
 
 py::array_t<double> vector_of(const double* x, std::size_t n) {
-  return to_array(Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(x, static_cast<Eigen::Index>(n))));
+  return to_array(
+      Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(x, static_cast<Eigen::Index>(n))));
 }
 
 // A goal as a dict.
@@ -162,8 +166,8 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
   if (goal.q != nullptr) {
     out["q"] = vector_of(goal.q, dof);
     if (goal.path_points > 0) {
-      auto path = new_array({static_cast<py::ssize_t>(goal.path_points),
-                             static_cast<py::ssize_t>(dof)});
+      auto path =
+          new_array({static_cast<py::ssize_t>(goal.path_points), static_cast<py::ssize_t>(dof)});
       std::memcpy(path.mutable_data(), goal.path, sizeof(double) * goal.path_points * dof);
       out["path"] = path;
     }
@@ -246,7 +250,8 @@ struct PyCommand : Whole {
 
   void clear() {
     for (auto* array : {&potential_gradient, &damping, &held_torque})
-      std::memset(array->mutable_data(), 0, sizeof(double) * static_cast<std::size_t>(array->size()));
+      std::memset(array->mutable_data(), 0,
+                  sizeof(double) * static_cast<std::size_t>(array->size()));
     node_velocity.reset();
   }
   [[nodiscard]] Command& get() const { return command.get("Command"); }
@@ -362,9 +367,8 @@ py::dict facts_of(const Setup& setup) {
 // lives as long as Python keeps it; after the planner is gone, using it raises hamelin.Error.
 class PythonPlanner final : public planning::Planner {
  public:
-  static constexpr std::uint32_t properties =
-      HAMELIN_TICK_ALLOCATES | HAMELIN_FOLLOWS_TARGETS | HAMELIN_FOLLOWS_PATHS |
-      HAMELIN_FOLLOWS_TRAJECTORIES;
+  static constexpr std::uint32_t properties = HAMELIN_TICK_ALLOCATES | HAMELIN_FOLLOWS_TARGETS |
+                                              HAMELIN_FOLLOWS_PATHS | HAMELIN_FOLLOWS_TRAJECTORIES;
 
   PythonPlanner(const Host& host, const Setup& setup, const Json& params)
       : host_(host), query_(host), dof_(static_cast<std::size_t>(setup.dof())) {
@@ -414,8 +418,8 @@ class PythonPlanner final : public planning::Planner {
       }
       throw Error(ErrorCode::plugin, fmt::format("{}: {}", python_->name, describe(error)));
     }
-    PyCommand::copy("potential_gradient", c.potential_gradient,
-                    command.potential_gradient().data(), dof_);
+    PyCommand::copy("potential_gradient", c.potential_gradient, command.potential_gradient().data(),
+                    dof_);
     PyCommand::copy("damping", c.damping, command.damping().data(), dof_);
     PyCommand::copy("held_torque", c.held_torque, command.held_torque().data(), dof_);
     if (c.node_velocity) command.node_velocity() = *c.node_velocity;
@@ -482,7 +486,8 @@ class PythonPlanner final : public planning::Planner {
       python_->setup->model = std::make_shared<BoundModel>(setup.model());
       python_->setup->facts = facts_of(setup);
       python_->setup->starting = true;
-      if (py::hasattr(python_->object, "start")) python_->object.attr("start")(python_->setup_object);
+      if (py::hasattr(python_->object, "start"))
+        python_->object.attr("start")(python_->setup_object);
       python_->setup->starting = false;
       python_->method = python_->object.attr("tick");
     });
@@ -521,13 +526,16 @@ void add_tick(py::module_& module) {
                        obstacle_point_m, direction, obstacle_velocity_m_s);
   PYBIND11_NUMPY_DTYPE(TickSelfContactRow, shape_a, shape_b, distance_m, point_a_m, point_b_m,
                        direction);
-  py::class_<PyTick, std::shared_ptr<PyTick>>(module, "Tick",
-                     "The input of one tick of a planner. Valid during the call of tick().")
-      .def_property_readonly("k", [](const PyTick& t) { return t.get().k(); }, "Index of the tick.")
-      .def_property_readonly("time_s", [](const PyTick& t) { return t.get().time_s(); }, "Time [s].")
+  py::class_<PyTick, std::shared_ptr<PyTick>>(
+      module, "Tick", "The input of one tick of a planner. Valid during the call of tick().")
+      .def_property_readonly(
+          "k", [](const PyTick& t) { return t.get().k(); }, "Index of the tick.")
+      .def_property_readonly(
+          "time_s", [](const PyTick& t) { return t.get().time_s(); }, "Time [s].")
       .def_property_readonly(
           "q", [](const PyTick& t) -> py::object { return t.q; },
-          "Joint positions, shape (n,) [rad or m]. The same array at each tick, read-only; copy it\n"
+          "Joint positions, shape (n,) [rad or m]. The same array at each tick, read-only; copy "
+          "it\n"
           "to keep it.")
       .def_property_readonly(
           "v", [](const PyTick& t) -> py::object { return t.v; },
@@ -536,10 +544,12 @@ void add_tick(py::module_& module) {
           "goal", [](const PyTick& t) { return goal_dict(t.get().goal(), t.dof); },
           "The current goal as a dict: type, tolerances, and q, path or position_m,\n"
           "quaternion_wxyz, velocity_m_s, angular_velocity_rad_s; a copy.")
-      .def_property_readonly("goal_number", [](const PyTick& t) { return t.get().goal_number(); },
-                             "Another number means another goal.")
-      .def_property_readonly("goal_index", [](const PyTick& t) { return t.get().goal_index(); },
-                             "Index of the goal in its list.")
+      .def_property_readonly(
+          "goal_number", [](const PyTick& t) { return t.get().goal_number(); },
+          "Another number means another goal.")
+      .def_property_readonly(
+          "goal_index", [](const PyTick& t) { return t.get().goal_index(); },
+          "Index of the goal in its list.")
       .def_property_readonly("contacts", &tick_contacts,
                              "Near obstacle points, shape by shape, nearest first: a structured\n"
                              "array with shape, link, obstacle, distance_m, arm_point_m,\n"
@@ -547,30 +557,36 @@ void add_tick(py::module_& module) {
       .def_property_readonly("self_contacts", &tick_self_contacts,
                              "Near pairs of parts of the arm: a structured array with shape_a,\n"
                              "shape_b, distance_m, point_a_m, point_b_m, direction; a copy.")
-      .def_property_readonly("reference", &tick_reference,
-                             "Where the arm should be by the trajectory of its goal: a dict with q,\n"
-                             "v, a, time_s, rate; None without a trajectory.")
+      .def_property_readonly(
+          "reference", &tick_reference,
+          "Where the arm should be by the trajectory of its goal: a dict with q,\n"
+          "v, a, time_s, rate; None without a trajectory.")
       .def_property_readonly("torque", &tick_torque,
                              "Joint torques sent to the arm last, shape (n,); None under ideal\n"
                              "actuation.")
-      .def_property_readonly("world", [](const PyTick& t) { return t.get().world(); },
-                             "Number of the world's snapshot; changes with obstacles and map.")
-      .def_property_readonly("speed_scale", [](const PyTick& t) { return t.get().speed_scale(); },
-                             "1, or less where the scene requires slow motion.")
-      .def_property_readonly("moving_count", [](const PyTick& t) { return t.get().moving_count(); },
-                             "Number of obstacles that move, or may move later.")
+      .def_property_readonly(
+          "world", [](const PyTick& t) { return t.get().world(); },
+          "Number of the world's snapshot; changes with obstacles and map.")
+      .def_property_readonly(
+          "speed_scale", [](const PyTick& t) { return t.get().speed_scale(); },
+          "1, or less where the scene requires slow motion.")
+      .def_property_readonly(
+          "moving_count", [](const PyTick& t) { return t.get().moving_count(); },
+          "Number of obstacles that move, or may move later.")
       .def("__repr__", [](const PyTick&) { return "<hamelin.Tick>"; });
 }
 
 template <py::array_t<double> PyCommand::*member>
-void add_channel(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name, const char* text) {
+void add_channel(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name,
+                 const char* text) {
   type.def_property(
       name, [](const PyCommand& c) -> py::object { return c.*member; },
       [name](PyCommand& c, py::handle x) { assign(c.*member, name, x); }, text);
 }
 
 template <class T, T hamelin_command::*member>
-void add_number(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name, const char* text) {
+void add_number(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const char* name,
+                const char* text) {
   type.def_property(
       name, [](const PyCommand& c) { return c.get().raw().*member; },
       [](PyCommand& c, T value) { c.get().raw().*member = value; }, text);
@@ -578,11 +594,13 @@ void add_number(py::class_<PyCommand, std::shared_ptr<PyCommand>>& type, const c
 
 void add_command(py::module_& module) {
   using py::arg;
-  py::class_<PyCommand, std::shared_ptr<PyCommand>> type(module, "Command",
-                             "The answer of one tick of a planner, in channels that are zero at\n"
-                             "first. Valid during the call of tick().");
+  py::class_<PyCommand, std::shared_ptr<PyCommand>> type(
+      module, "Command",
+      "The answer of one tick of a planner, in channels that are zero at\n"
+      "first. Valid during the call of tick().");
   add_channel<&PyCommand::potential_gradient>(
-      type, "potential_gradient", "Gradient of a potential, shape (n,) [Nm or N]: the arm feels -g.");
+      type, "potential_gradient",
+      "Gradient of a potential, shape (n,) [Nm or N]: the arm feels -g.");
   add_channel<&PyCommand::damping>(type, "damping",
                                    "Coefficients of damping, shape (n,), not negative [Nms/rad].");
   add_channel<&PyCommand::held_torque>(type, "held_torque",
@@ -606,7 +624,8 @@ void add_command(py::module_& module) {
             const Eigen::Vector3d p = vector3_of("Command", "point", point);
             const Eigen::Vector3d axis = vector3_of("Command", "w", w);
             if (link < 0 || link >= c.damping.size())
-              refuse("Command", "link", fmt::format("{}, expected 0 to {}", link, c.damping.size() - 1));
+              refuse("Command", "link",
+                     fmt::format("{}, expected 0 to {}", link, c.damping.size() - 1));
             const hamelin_command& raw = c.get().raw();
             if (raw.gyroscopic_count >= raw.gyroscopic_capacity)
               refuse("Command", "add_gyroscopic",
@@ -614,7 +633,8 @@ void add_command(py::module_& module) {
             c.get().add_gyroscopic(link, p, axis);
           },
           arg("link"), arg("point"), arg("w"),
-          "Adds the force w x (velocity of the point). link: index; point: shape (3,), in the link's\n"
+          "Adds the force w x (velocity of the point). link: index; point: shape (3,), in the "
+          "link's\n"
           "centre-of-mass frame [m]; w: shape (3,), world axes [N s/m].")
       .def(
           "give_up", [](PyCommand& c, const std::string& cause) { c.get().give_up(cause); },
@@ -639,17 +659,19 @@ void add_command(py::module_& module) {
 
 void add_setup(py::module_& module) {
   using py::arg;
-  py::class_<PySetup, std::shared_ptr<PySetup>>(module, "PlannerSetup",
-                      "What is fixed for a run, and the services of the host. A planner gets it by\n"
-                      "start(setup). Limits are None where the scene does not model them. The\n"
-                      "services may be used until the run ends.")
-      .def_property_readonly("model", [](const PySetup& s) { return s.model; },
-                             "The planner's model of the arm.")
-      .def_property_readonly("facts", [](const PySetup& s) { return s.facts; },
-                             "All that is fixed, as a dict: dof, q_lower, q_upper, velocity_max,\n"
-                             "effort_max, effort_rate_max (arrays or None), control_period_s,\n"
-                             "deadline_s, delay_s, sampled, self_collision, influence_m,\n"
-                             "map_resolution_m, shield_margin_m, seed, goals.")
+  py::class_<PySetup, std::shared_ptr<PySetup>>(
+      module, "PlannerSetup",
+      "What is fixed for a run, and the services of the host. A planner gets it by\n"
+      "start(setup). Limits are None where the scene does not model them. The\n"
+      "services may be used until the run ends.")
+      .def_property_readonly(
+          "model", [](const PySetup& s) { return s.model; }, "The planner's model of the arm.")
+      .def_property_readonly(
+          "facts", [](const PySetup& s) { return s.facts; },
+          "All that is fixed, as a dict: dof, q_lower, q_upper, velocity_max,\n"
+          "effort_max, effort_rate_max (arrays or None), control_period_s,\n"
+          "deadline_s, delay_s, sampled, self_collision, influence_m,\n"
+          "map_resolution_m, shield_margin_m, seed, goals.")
       .def(
           "__getattr__",
           [](const PySetup& s, const std::string& name) -> py::object {
@@ -683,15 +705,17 @@ void add_setup(py::module_& module) {
            "Draws a line of points of the world, shape (N, 3) [m], for log and report; in tick().")
       .def("clearance", &setup_clearance, arg("q"), py::kw_only(), arg("time_ahead") = 0.0,
            arg("at_least") = -1.0e9,
-           "Smallest distance at q, shape (n,) or (N, n), from obstacles and of the arm from itself\n"
+           "Smallest distance at q, shape (n,) or (N, n), from obstacles and of the arm from "
+           "itself\n"
            "[m]; exact from `at_least` up to influence_m.")
-      .def("motion_clear", &setup_motion_clear, arg("q0"), arg("q1"),
-           "Whether the straight joint motion from q0 to q1 is proved clear; obstacles stand still.")
+      .def(
+          "motion_clear", &setup_motion_clear, arg("q0"), arg("q1"),
+          "Whether the straight joint motion from q0 to q1 is proved clear; obstacles stand still.")
       .def("distance", &setup_distance, arg("points"), py::kw_only(), arg("time_ahead") = 0.0,
            arg("limit") = 1.0, "Distances of points, shape (3,) or (N, 3), at most `limit` [m].")
-      .def("refresh",
-           [](PySetup& s) { s.query.get("PlannerSetup").refresh(); },
-           "Takes the newest snapshot of the world for clearance(), motion_clear(), distance().")
+      .def(
+          "refresh", [](PySetup& s) { s.query.get("PlannerSetup").refresh(); },
+          "Takes the newest snapshot of the world for clearance(), motion_clear(), distance().")
       .def("__repr__", [](const PySetup& s) {
         return fmt::format("<hamelin.PlannerSetup for '{}'>",
                            s.model ? s.model->model.robot().name : "");

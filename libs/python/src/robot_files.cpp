@@ -217,8 +217,7 @@ py::tuple fit_robot(py::handle file, double excess, const std::optional<int>& to
         "excess up to {:.1f} mm",
         capsules ? "Capsules" : "Spheres", urdf.filename().string(), 1e3 * fitted.gap_bound_m(),
         1e3 * fitted.excess_max_m());
-    sidecar =
-        fit::sidecar_json(fitted, note, disabled_pairs(urdf, fitted, srdf_file, tip, {}));
+    sidecar = fit::sidecar_json(fitted, note, disabled_pairs(urdf, fitted, srdf_file, tip, {}));
     figures = fit::figures_json(fitted);
   }
   return py::make_tuple(to_python(sidecar), to_python(figures));
@@ -228,23 +227,25 @@ py::tuple fit_robot(py::handle file, double excess, const std::optional<int>& to
 
 void add_robot_files(py::module_& module) {
   using py::arg;
-  module.def("load_robot", &load_robot, arg("file"), py::kw_only(), arg("tip") = py::none(),
-             arg("spheres") = py::none(), arg("srdf") = py::none(), arg("strict") = false,
-             arg("base") = py::none(), arg("gravity") = py::none(),
-             "Reads a robot from a .urdf or a .json file.\n\n"
-             "tip: tip link; None: the only leaf of a URDF. spheres: file with collision spheres\n"
-             "or capsules, or its content as a dict. srdf: file with pairs of links that may touch.\n"
-             "strict: refuse inertias that break the triangle inequality. base: pose of the base in\n"
-             "the world, shape (4, 4). gravity: shape (3,) [m/s^2]; None: (0, 0, -9.81).");
+  module.def(
+      "load_robot", &load_robot, arg("file"), py::kw_only(), arg("tip") = py::none(),
+      arg("spheres") = py::none(), arg("srdf") = py::none(), arg("strict") = false,
+      arg("base") = py::none(), arg("gravity") = py::none(),
+      "Reads a robot from a .urdf or a .json file.\n\n"
+      "tip: tip link; None: the only leaf of a URDF. spheres: file with collision spheres\n"
+      "or capsules, or its content as a dict. srdf: file with pairs of links that may touch.\n"
+      "strict: refuse inertias that break the triangle inequality. base: pose of the base in\n"
+      "the world, shape (4, 4). gravity: shape (3,) [m/s^2]; None: (0, 0, -9.81).");
   module.def(
       "_robot_info", [](const BoundModel& m) { return to_python(describe_model(m.model)); },
       arg("model"), "The document of `hamelin robot info --json`, without the name of the file.");
-  module.def("check_robot", &check_robot, arg("file"), py::kw_only(), arg("tip") = py::none(),
-             arg("spheres") = py::none(), arg("srdf") = py::none(), arg("samples") = 10000,
-             arg("seed") = 1, arg("strict") = false,
-             "Checks a robot for self-collision and unusual limits, as `hamelin robot check`.\n\n"
-             "samples: number of random configurations within the limits. Returns the document of\n"
-             "`hamelin robot check --json`; its list 'overlaps_at_rest' is empty for a good robot.");
+  module.def(
+      "check_robot", &check_robot, arg("file"), py::kw_only(), arg("tip") = py::none(),
+      arg("spheres") = py::none(), arg("srdf") = py::none(), arg("samples") = 10000,
+      arg("seed") = 1, arg("strict") = false,
+      "Checks a robot for self-collision and unusual limits, as `hamelin robot check`.\n\n"
+      "samples: number of random configurations within the limits. Returns the document of\n"
+      "`hamelin robot check --json`; its list 'overlaps_at_rest' is empty for a good robot.");
   module.def("_fit_robot", &fit_robot, arg("file"), arg("excess"), arg("total"),
              arg("spheres_per_link"), arg("capsules"), arg("padding"), arg("packages"),
              arg("meshes"), arg("visual"), arg("srdf"), arg("tip"), arg("tolerance"),

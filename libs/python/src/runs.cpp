@@ -65,8 +65,9 @@ Record record_of(const py::dict& given) {
   record.argv = given["argv"].cast<std::vector<std::string>>();
   record.progress = given["progress"];
   if (record.log && record.result && fs::absolute(*record.log) == fs::absolute(*record.result))
-    throw Error(ErrorCode::usage, fmt::format("log and result are both {}, expected different paths",
-                                              record.log->string()));
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("log and result are both {}, expected different paths", record.log->string()));
   return record;
 }
 
@@ -96,8 +97,8 @@ class WatchedRun {
   py::object finish(const log::Result& result) const {
     const Json document = log::to_json(result);
     if (record_.result)
-      write_file_atomically(
-          *record_.result, document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+      write_file_atomically(*record_.result,
+                            document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
     return to_python(document);
   }
 
@@ -158,11 +159,10 @@ scene::Scene motion_scene(py::handle source, const std::optional<std::string>& t
     scene = source.cast<SharedScene>()->scene;
   } else {
     const fs::path file = path_of(source);
-    const bool is_robot =
-        file.extension() == ".urdf" || [&] {
-          const Json document = read_json(file);
-          return document.is_object() && document.value("schema", Json()) == "hamelin.robot/1";
-        }();
+    const bool is_robot = file.extension() == ".urdf" || [&] {
+      const Json document = read_json(file);
+      return document.is_object() && document.value("schema", Json()) == "hamelin.robot/1";
+    }();
     if (is_robot) {
       scene.name = file.string();
       scene.robot.file = file;

@@ -137,19 +137,19 @@ py::object distance(const BoundEnvironment& e, py::handle points, double limit, 
 }
 
 py::object shape_distance(const BoundEnvironment& e, py::handle from, py::handle to,
-                          py::handle radius, double limit, double time_s,
-                          const std::string& view) {
+                          py::handle radius, double limit, double time_s, const std::string& view) {
   const Points a("shape_distance", "start", from);
   const Points b("shape_distance", "end", to.is_none() ? from : to);
   const py::ssize_t count = a.count();
   if (b.count() != count || b.single != a.single)
-    refuse("shape_distance", "end", fmt::format("shape {}, expected {}",
-                                                describe_shape(b.numbers.array()),
-                                                describe_shape(a.numbers.array())));
+    refuse("shape_distance", "end",
+           fmt::format("shape {}, expected {}", describe_shape(b.numbers.array()),
+                       describe_shape(a.numbers.array())));
   const Numbers radii("shape_distance", "radius", radius);
   const bool one = radii.dimensions() == 0;
   if (!one) radii.require_vector(count);
-  for (py::ssize_t i = 0; i < radii.size(); ++i) limit_of("shape_distance", "radius", radii.data()[i]);
+  for (py::ssize_t i = 0; i < radii.size(); ++i)
+    limit_of("shape_distance", "radius", radii.data()[i]);
   limit_of("shape_distance", "limit", limit);
   const scene::Moment moment(time_of("shape_distance", time_s));
   const scene::View seen = view_of("shape_distance", view);
@@ -215,8 +215,9 @@ py::array_t<ContactRow> contacts(const BoundEnvironment& e, py::handle q, double
   const Configurations at("contacts", q, e.model->model.dof());
   if (!at.single) refuse("contacts", "q", "is an array of states, expected one state");
   if (!(influence >= 0.0) || influence > e.influence_m)
-    refuse("contacts", "influence", fmt::format("{}, expected 0 to {}, the environment's influence",
-                                                influence, e.influence_m));
+    refuse(
+        "contacts", "influence",
+        fmt::format("{}, expected 0 to {}, the environment's influence", influence, e.influence_m));
   const scene::Moment moment(time_of("contacts", time_s));
   const scene::View seen = view_of("contacts", view);
   const std::size_t shapes = e.model->model.shapes().size();
@@ -274,7 +275,8 @@ py::tuple boxes(const BoundEnvironment& e) {
   auto low = new_array({count, 3}), high = new_array({count, 3});
   for (py::ssize_t i = 0; i < count; ++i) {
     Eigen::Map<Eigen::Vector3d>(low.mutable_data() + 3 * i) = alive[static_cast<std::size_t>(i)].lo;
-    Eigen::Map<Eigen::Vector3d>(high.mutable_data() + 3 * i) = alive[static_cast<std::size_t>(i)].hi;
+    Eigen::Map<Eigen::Vector3d>(high.mutable_data() + 3 * i) =
+        alive[static_cast<std::size_t>(i)].hi;
   }
   return py::make_tuple(low, high);
 }
@@ -306,8 +308,8 @@ void add_environment(py::module_& module) {
            "Distances of capsules about the segments from start to end, or of spheres if end is\n"
            "None. start, end: shape (3,) or (N, 3), in the world [m]; radius: a number or shape\n"
            "(N,) [m]. Returns a number, or shape (N,).")
-      .def("clearance", &clearance, arg("q"), py::kw_only(), arg("limit") = 1.0,
-           arg("time") = 0.0, arg("view") = "judge",
+      .def("clearance", &clearance, arg("q"), py::kw_only(), arg("limit") = 1.0, arg("time") = 0.0,
+           arg("view") = "judge",
            "Smallest distance of the arm from all obstacles, for q of shape (n,) or (N, n):\n"
            "a number, or shape (N,) [m].")
       .def("self_clearance", &self_clearance, arg("q"), py::kw_only(), arg("limit") = 1.0,
@@ -315,7 +317,8 @@ void add_environment(py::module_& module) {
            "(N, n): a number, or shape (N,) [m].")
       .def("contacts", &contacts, arg("q"), py::kw_only(), arg("influence") = 0.1,
            arg("time") = 0.0, arg("view") = "planner",
-           "Near obstacle points of all shapes of the arm at q, shape (n,): a structured array with\n"
+           "Near obstacle points of all shapes of the arm at q, shape (n,): a structured array "
+           "with\n"
            "shape (index in Model.shapes), obstacle (index; -1: the map, -2: unknown space),\n"
            "distance_m, arm_point_m, obstacle_point_m, direction, obstacle_velocity_m_s; in world\n"
            "axes, shape by shape, nearest first.")
@@ -324,17 +327,17 @@ void add_environment(py::module_& module) {
            "shape (n,): a structured array with pair, shape_a, shape_b, distance_m, point_a_m,\n"
            "point_b_m, direction.")
       .def("boxes", &boxes,
-           "Lower and upper corners of the map's boxes in the map's frame, each of shape (M, 3) [m].")
-      .def_property_readonly("map_pose",
-                             [](const BoundEnvironment& e) {
-                               return to_array(e.environment.map_pose());
-                             },
-                             "Pose of the map's frame in the world, shape (4, 4).")
+           "Lower and upper corners of the map's boxes in the map's frame, each of shape (M, 3) "
+           "[m].")
+      .def_property_readonly(
+          "map_pose", [](const BoundEnvironment& e) { return to_array(e.environment.map_pose()); },
+          "Pose of the map's frame in the world, shape (4, 4).")
       .def_property_readonly("obstacle_names", &obstacle_names, "Names of the obstacles.")
-      .def_property_readonly("influence_m", [](const BoundEnvironment& e) { return e.influence_m; },
-                             "The largest influence of contacts() [m].")
-      .def_property_readonly("model", [](const BoundEnvironment& e) { return e.model; },
-                             "The arm.")
+      .def_property_readonly(
+          "influence_m", [](const BoundEnvironment& e) { return e.influence_m; },
+          "The largest influence of contacts() [m].")
+      .def_property_readonly(
+          "model", [](const BoundEnvironment& e) { return e.model; }, "The arm.")
       .def("__repr__", [](const BoundEnvironment& e) {
         return fmt::format("<hamelin.Environment {} boxes, {} obstacles, for '{}'>",
                            e.environment.summary().boxes, e.environment.obstacles().size(),
@@ -398,46 +401,52 @@ std::string repr(const BoundScene& s) {
 
 void add_scene(py::module_& module) {
   using py::arg;
-  py::class_<BoundScene, SharedScene>(module, "Scene",
-                                      "A scene: robot, map, obstacles, goals, planner, integrator.\n\n"
-                                      "load_scene() reads one from a file. Immutable; pickles.")
+  py::class_<BoundScene, SharedScene>(
+      module, "Scene",
+      "A scene: robot, map, obstacles, goals, planner, integrator.\n\n"
+      "load_scene() reads one from a file. Immutable; pickles.")
       .def(py::init([](py::handle document, py::handle folder, const std::string& name) {
              return std::make_shared<BoundScene>(to_json(document), path_of(folder), name);
            }),
            arg("document"), py::kw_only(), arg("folder") = ".", arg("name") = "scene",
            "Makes a scene from a document of schema hamelin.scene/1.\n\n"
            "folder: that relative paths of the document start from. name: for messages.")
-      .def_property_readonly("name", [](const BoundScene& s) { return s.name; },
-                             "The file that it came from.")
-      .def_property_readonly("document", [](const BoundScene& s) { return to_python(s.document); },
-                             "The document as it was given, as a dict; a copy.")
-      .def("resolved",
-           [](const BoundScene& s) { return to_python(scene::resolved_json(s.scene)); },
-           "The document with all defaults of the scene, as a dict.")
-      .def_property_readonly("model", [](BoundScene& s) { return s.model(); },
-                             "Model of the robot, with the payload of the scene.")
-      .def_property_readonly("step_s", [](const BoundScene& s) { return s.scene.step_s; },
-                             "Time step [s].")
-      .def_property_readonly("duration_s", [](const BoundScene& s) { return s.scene.duration_s; },
-                             "Longest simulated time [s].")
+      .def_property_readonly(
+          "name", [](const BoundScene& s) { return s.name; }, "The file that it came from.")
+      .def_property_readonly(
+          "document", [](const BoundScene& s) { return to_python(s.document); },
+          "The document as it was given, as a dict; a copy.")
+      .def(
+          "resolved", [](const BoundScene& s) { return to_python(scene::resolved_json(s.scene)); },
+          "The document with all defaults of the scene, as a dict.")
+      .def_property_readonly(
+          "model", [](BoundScene& s) { return s.model(); },
+          "Model of the robot, with the payload of the scene.")
+      .def_property_readonly(
+          "step_s", [](const BoundScene& s) { return s.scene.step_s; }, "Time step [s].")
+      .def_property_readonly(
+          "duration_s", [](const BoundScene& s) { return s.scene.duration_s; },
+          "Longest simulated time [s].")
       .def_property_readonly(
           "start_q",
           [](BoundScene& s) {
             const auto dof = s.model()->model.dof();
-            return to_array(s.scene.start_q.size() > 0 ? s.scene.start_q
-                                                       : Eigen::VectorXd(Eigen::VectorXd::Zero(dof)));
+            return to_array(s.scene.start_q.size() > 0
+                                ? s.scene.start_q
+                                : Eigen::VectorXd(Eigen::VectorXd::Zero(dof)));
           },
           "Joint positions at the start, shape (n,) [rad or m].")
       .def("environment", &make_environment, py::kw_only(), arg("influence") = 0.2,
            "Everything that the arm can hit.\n\n"
            "influence: largest distance at which contacts will be asked for [m].")
-      .def("_with",
-           [](const BoundScene& s, const py::dict& given) {
-             Json document = s.document;
-             apply_overrides(checked_overrides(given), document);
-             return std::make_shared<BoundScene>(document, s.folder, s.name);
-           },
-           arg("overrides"), "A copy with other values.")
+      .def(
+          "_with",
+          [](const BoundScene& s, const py::dict& given) {
+            Json document = s.document;
+            apply_overrides(checked_overrides(given), document);
+            return std::make_shared<BoundScene>(document, s.folder, s.name);
+          },
+          arg("overrides"), "A copy with other values.")
       .def("__repr__", &repr)
       .def(py::pickle(
           [](const BoundScene& s) {
@@ -465,8 +474,7 @@ Json planner_entry(const std::string& name) {
   const std::string rest = name.substr(scheme.size());
   const auto colon = rest.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == rest.size())
-    throw Error(ErrorCode::usage,
-                fmt::format("planner: '{}', expected python:FILE:CLASS", name));
+    throw Error(ErrorCode::usage, fmt::format("planner: '{}', expected python:FILE:CLASS", name));
   return {{"name", "python"},
           {"params", {{"file", rest.substr(0, colon)}, {"class", rest.substr(colon + 1)}}}};
 }

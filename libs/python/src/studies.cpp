@@ -40,7 +40,6 @@ class Counter {
   py::object progress_;
 };
 
-
 py::tuple measure(const BoundModel& bound, const std::string& name, py::handle q0, py::handle v0,
                   py::handle damping, double duration, const std::string& integrators,
                   const std::vector<double>& steps, const std::vector<double>& rtols,
@@ -78,10 +77,10 @@ py::tuple measure(const BoundModel& bound, const std::string& name, py::handle q
   return py::make_tuple(to_python(accuracy::to_json(measurement)), accuracy::to_table(measurement));
 }
 
-py::dict plan_sweep(py::handle directory, py::handle scenes, const std::vector<std::string>& planners,
-                    const std::vector<std::string>& set, const std::vector<std::string>& vary,
-                    const std::vector<std::uint64_t>& seeds, const std::optional<double>& duration,
-                    py::handle plugins) {
+py::dict plan_sweep(py::handle directory, py::handle scenes,
+                    const std::vector<std::string>& planners, const std::vector<std::string>& set,
+                    const std::vector<std::string>& vary, const std::vector<std::uint64_t>& seeds,
+                    const std::optional<double>& duration, py::handle plugins) {
   sweep::PlanOptions options;
   options.files = paths_of(scenes);
   options.planners = planners;

@@ -11,8 +11,8 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/io/file.hpp"
-#include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/scene.hpp"
+#include "hamelin/scene/self_collision.hpp"
 
 namespace {
 

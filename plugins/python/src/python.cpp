@@ -41,8 +41,7 @@ struct Functions {
 template <class F>
 void find(F& function, const char* name) {
   void* const symbol = ::dlsym(RTLD_DEFAULT, name);
-  if (symbol == nullptr)
-    throw std::runtime_error(std::string("Python has no function ") + name);
+  if (symbol == nullptr) throw std::runtime_error(std::string("Python has no function ") + name);
   std::memcpy(&function, &symbol, sizeof function);
 }
 

@@ -1,0 +1,39 @@
+"""The examples of the README run."""
+
+import re
+import sys
+
+import matplotlib
+
+
+def test_examples(source, tmp_path, monkeypatch):
+    matplotlib.use("Agg")
+    (tmp_path / "data").symlink_to(source / "data")
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    text = (source / "libs" / "python" / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 3
+    space = {"__name__": "example"}
+    monkeypatch.setattr(sys, "stderr", open(tmp_path / "stderr", "w"))  # the progress line
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), space)
+    assert space["result"].planner == "python"
+    assert (tmp_path / "out" / "shelf.png").stat().st_size > 1000
+    assert space["state"].k == 100
+
+
+def test_the_package_docstring_names_what_exists(source):
+    import hamelin
+
+    for name in re.findall(r"hamelin\.(\w+)", hamelin.__doc__):
+        assert hasattr(hamelin, name), name
+    table = (source / "libs" / "python" / "README.md").read_text(encoding="utf-8")
+    rows = re.search(r"\| you want to \| use \|\n(.*?)\n\n", table, re.DOTALL)[1]
+    owners = [hamelin, hamelin.Model, hamelin.Environment]
+    for code in re.findall(r"`([^`]*)`", rows):
+        first, _, second = code.partition(".")
+        if second:
+            assert hasattr(getattr(hamelin, first), second), code
+        else:
+            assert any(hasattr(owner, first) for owner in owners), code
