@@ -107,6 +107,21 @@ def _digest(content: bytes) -> str:
     return f"sha256={hashed}"
 
 
+def _wheel_file() -> str:
+    return f"Wheel-Version: 1.0\nGenerator: hamelin\nRoot-Is-Purelib: false\nTag: {_tag()}\n"
+
+
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """Writes the metadata of the wheel, without building it, and returns the folder's name."""
+    project = _project()
+    name = f"{project['name']}-{project['version']}.dist-info"
+    folder = pathlib.Path(metadata_directory) / name
+    folder.mkdir()
+    (folder / "METADATA").write_text(_metadata(project), encoding="utf-8")
+    (folder / "WHEEL").write_text(_wheel_file(), encoding="utf-8")
+    return name
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     """Builds the wheel and returns its name."""
     project = _project()
@@ -130,11 +145,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
             for name, file in _files(stage, f"{base}.data").items():
                 add(name, file.read_bytes(), file.stat().st_mode & 0o777)
             add(f"{base}.dist-info/METADATA", _metadata(project).encode())
-            add(
-                f"{base}.dist-info/WHEEL",
-                f"Wheel-Version: 1.0\nGenerator: hamelin\nRoot-Is-Purelib: false\nTag: {_tag()}\n"
-                .encode(),
-            )
+            add(f"{base}.dist-info/WHEEL", _wheel_file().encode())
             add(f"{base}.dist-info/LICENSE", (ROOT / "LICENSE").read_bytes())
             record = f"{base}.dist-info/RECORD"
             out.writestr(record, "\n".join([*records, f"{record},,"]) + "\n")
