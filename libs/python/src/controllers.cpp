@@ -157,8 +157,15 @@ std::uint64_t detach(BoundController& c, const std::string& name, py::handle q) 
   return c.controller->detach(name, at);
 }
 
+// Refuses calls for the thread of tick() while a planner in Python answers one.
+Controller& idle(const BoundController& c) {
+  if (c.busy)
+    throw Error(ErrorCode::usage, "Controller: a tick uses it, expected a call between two ticks");
+  return *c.controller;
+}
+
 py::object verdict(const BoundController& c) {
-  const auto& verdict = c.controller->verdict();
+  const auto& verdict = idle(c).verdict();
   if (!verdict) return py::none();
   py::dict out;
   out["certified"] = verdict->certified;
@@ -394,10 +401,10 @@ void add_controller(py::module_& module) {
           },
           "Names of what is attached.")
       .def(
-          "reset", [](BoundController& c) { c.controller->reset(); },
+          "reset", [](BoundController& c) { idle(c).reset(); },
           "Forgets goals that were reached and the last motion, for a new start.")
       .def(
-          "run_guide", [](BoundController& c) { c.controller->run_guide(); },
+          "run_guide", [](BoundController& c) { idle(c).run_guide(); },
           "Searches the path that the last tick asked for, where the guide has no thread.")
       .def_property_readonly("verdict", &verdict,
                              "The proof for the motion between the last two ticks: a dict with\n"
@@ -409,7 +416,7 @@ void add_controller(py::module_& module) {
           "dof", [](const BoundController& c) { return c.controller->model().dof(); },
           "Number of joints n.")
       .def_property_readonly(
-          "tip", [](const BoundController& c) { return to_array(c.controller->tip()); },
+          "tip", [](const BoundController& c) { return to_array(idle(c).tip()); },
           "Pose of the tip at the last tick, shape (4, 4).")
       .def("__repr__", [](const BoundController& c) {
         return fmt::format("<hamelin.Controller '{}': planner {}, period {:g} s>", c.scene->name,

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <memory>
+#include <thread>
 
 #include "arguments.hpp"
 #include "bound_model.hpp"
@@ -270,11 +271,21 @@ void assign(py::array_t<double>& to, const char* name, py::handle from) {
 
 // hamelin.PlannerSetup: what is fixed for a run, and the services of the host.
 struct PySetup : Whole {
-  DuringCall<const Host> host;
+  const Host* host = nullptr;  // during a call of the planner
+  std::thread::id thread;      // of that call
   DuringCall<Query> query;
   SharedModel model;
   py::dict facts;
   bool starting = false;  // during start()
+
+  // Services of the host, which belong to the thread of the planner's calls.
+  [[nodiscard]] const Host& services() const {
+    if (host == nullptr || thread != std::this_thread::get_id())
+      throw Error(ErrorCode::usage,
+                  "PlannerSetup: log(), warn(), declare_series() and draw_path() are used outside "
+                  "of the planner's calls, expected in start() or tick()");
+    return *host;
+  }
 };
 
 py::object number_or_array(bool single, const py::array_t<double>& out) {
@@ -331,7 +342,7 @@ void setup_draw_path(PySetup& s, py::handle points) {
   std::vector<Eigen::Vector3d> path;
   for (py::ssize_t i = 0; i < numbers.extent(0); ++i)
     path.emplace_back(Eigen::Map<const Eigen::Vector3d>(numbers.data() + 3 * i));
-  s.host.get("PlannerSetup").draw_path(path);
+  s.services().draw_path(path);
 }
 
 py::object optional_limit(const std::optional<planning::ConstVectorMap>& limit) {
@@ -407,7 +418,7 @@ class PythonPlanner final : public planning::Planner {
     std::memcpy(const_cast<double*>(t.q.data()), tick.q().data(), sizeof(double) * dof_);
     std::memcpy(const_cast<double*>(t.v.data()), tick.v().data(), sizeof(double) * dof_);
     c.clear();
-    const DuringTick during(t, tick, c, command);
+    const DuringTick during(t, tick, c, command, *python_->setup, host_);
     try {
       python_->method(python_->tick_object, python_->command_object);
     } catch (py::error_already_set& error) {
@@ -442,9 +453,25 @@ class PythonPlanner final : public planning::Planner {
     PySetup* setup = nullptr;
     std::string name;
   };
+  // Lets the object use the host's services.
+  class DuringServices {
+   public:
+    DuringServices(PySetup& setup, const Host& host) : setup_(setup) {
+      setup.host = &host;
+      setup.thread = std::this_thread::get_id();
+    }
+    DuringServices(const DuringServices&) = delete;
+    DuringServices& operator=(const DuringServices&) = delete;
+    ~DuringServices() { setup_.host = nullptr; }
+
+   private:
+    PySetup& setup_;
+  };
   class DuringTick {
    public:
-    DuringTick(PyTick& t, const Tick& tick, PyCommand& c, Command& command) : t_(t), c_(c) {
+    DuringTick(PyTick& t, const Tick& tick, PyCommand& c, Command& command, PySetup& setup,
+               const Host& host)
+        : t_(t), c_(c), services_(setup, host) {
       t.tick.set(&tick);
       c.command.set(&command);
     }
@@ -458,6 +485,7 @@ class PythonPlanner final : public planning::Planner {
    private:
     PyTick& t_;
     PyCommand& c_;
+    DuringServices services_;
   };
 
   void start(const Setup& setup, const Json& params) {
@@ -481,10 +509,10 @@ class PythonPlanner final : public planning::Planner {
         *x = new_array({dof});
       python_->setup_object = py::cast(std::make_shared<PySetup>());
       python_->setup = python_->setup_object.cast<PySetup*>();
-      python_->setup->host.set(&host_);
       python_->setup->query.set(&query_);
       python_->setup->model = std::make_shared<BoundModel>(setup.model());
       python_->setup->facts = facts_of(setup);
+      const DuringServices services(*python_->setup, host_);
       python_->setup->starting = true;
       if (py::hasattr(python_->object, "start"))
         python_->object.attr("start")(python_->setup_object);
@@ -495,7 +523,6 @@ class PythonPlanner final : public planning::Planner {
   void disconnect() noexcept {
     if (!python_) return;
     if (python_->setup != nullptr) {
-      python_->setup->host.set(nullptr);
       python_->setup->query.set(nullptr);
     }
     python_.reset();
@@ -506,6 +533,7 @@ class PythonPlanner final : public planning::Planner {
     try {
       const py::gil_scoped_acquire locked;
       try {
+        const DuringServices services(*python_->setup, host_);
         if (py::hasattr(python_->object, name)) f(python_->object.attr(name));
       } catch (py::error_already_set& error) {
         host_.warning(one_line(fmt::format("{}.{}: {}", python_->name, name, describe(error))));
@@ -663,7 +691,8 @@ void add_setup(py::module_& module) {
       module, "PlannerSetup",
       "What is fixed for a run, and the services of the host. A planner gets it by\n"
       "start(setup). Limits are None where the scene does not model them. The\n"
-      "services may be used until the run ends.")
+      "queries may be used until the run ends; log(), warn(), declare_series() and draw_path() in\n"
+      "calls of the planner.")
       .def_property_readonly(
           "model", [](const PySetup& s) { return s.model; }, "The planner's model of the arm.")
       .def_property_readonly(
@@ -681,22 +710,18 @@ void add_setup(py::module_& module) {
           arg("name"), "One of the facts.")
       .def(
           "log",
-          [](const PySetup& s, const std::string& text) {
-            s.host.get("PlannerSetup").info(one_line(text));
-          },
+          [](const PySetup& s, const std::string& text) { s.services().info(one_line(text)); },
           arg("text"), "Writes a line to the log.")
       .def(
           "warn",
-          [](const PySetup& s, const std::string& text) {
-            s.host.get("PlannerSetup").warning(one_line(text));
-          },
+          [](const PySetup& s, const std::string& text) { s.services().warning(one_line(text)); },
           arg("text"), "Writes a warning to the log.")
       .def(
           "declare_series",
           [](const PySetup& s, const std::string& name, const std::string& unit) {
             if (!s.starting)
               refuse("PlannerSetup", "declare_series", "called after start(), expected in start()");
-            return s.host.get("PlannerSetup").declare_series(name, unit);
+            return s.services().declare_series(name, unit);
           },
           arg("name"), arg("unit") = "",
           "Declares a series of numbers for log and report; in start() only. Returns its number,\n"

@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import threading
 
 import hamelin
 import numpy as np
@@ -218,6 +219,30 @@ def test_views_outlive_their_calls(free_scene):
             use()
     with pytest.raises(ValueError):
         q[0] = 1.0
+
+
+def test_services_belong_to_the_thread_of_a_call(free_scene):
+    refused = []
+
+    class Mine:
+        def start(self, setup):
+            self.setup = setup
+
+        def tick(self, tick, command):
+            def other():
+                for call in (self.setup.log, self.setup.warn, self.setup.declare_series):
+                    try:
+                        call("x")
+                    except hamelin.Error:
+                        refused.append(call)
+
+            thread = threading.Thread(target=other)
+            thread.start()
+            thread.join()
+            self.setup.log("here")
+
+    hamelin.run(free_scene, planner=Mine(), duration=0.001)
+    assert len(refused) == 6
 
 
 def test_services_of_the_host(scenes, tmp_path):
