@@ -242,7 +242,7 @@ def test_services_belong_to_the_thread_of_a_call(free_scene):
             self.setup.log("here")
 
     hamelin.run(free_scene, planner=Mine(), duration=0.001)
-    assert len(refused) == 6
+    assert len(refused) == 3
 
 
 def test_services_of_the_host(scenes, tmp_path):
