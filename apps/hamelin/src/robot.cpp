@@ -11,7 +11,7 @@
 #include "hamelin/log/run_log.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/model/model.hpp"
-#include "hamelin/scene/self_collision.hpp"
+#include "hamelin/scene/robot_info.hpp"
 #include "robot_commands.hpp"
 #include "robot_notes.hpp"
 #include "terminal.hpp"
@@ -26,65 +26,6 @@ struct RobotInfoOptions {
   std::optional<std::filesystem::path> spheres, srdf;
   bool strict = false, json = false;
 };
-
-Json optional(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-std::size_t capsules_of(const model::Link& link) {
-  return static_cast<std::size_t>(
-      std::count_if(link.segments.begin(), link.segments.end(),
-                    [](const model::Segment& segment) { return segment.is_capsule(); }));
-}
-
-std::size_t count_shapes(const model::Model& model, bool capsules) {
-  return static_cast<std::size_t>(std::count_if(
-      model.shapes().begin(), model.shapes().end(),
-      [capsules](const model::Model::Shape& shape) { return shape.is_capsule == capsules; }));
-}
-
-Json describe(const model::Model& model, const std::filesystem::path& file) {
-  const auto& robot = model.robot();
-  Json links = Json::array();
-  double mass = 0.0;
-  for (const auto& link : robot.links) {
-    mass += link.mass_kg;
-    links.push_back(
-        {{"name", link.name},
-         {"joint", link.joint.name},
-         {"type", link.joint.type == model::JointType::revolute ? "revolute" : "prismatic"},
-         {"lower", optional(link.joint.lower)},
-         {"upper", optional(link.joint.upper)},
-         {"velocity_max", optional(link.joint.velocity_max)},
-         {"effort_max", optional(link.joint.effort_max)},
-         {"damping", link.joint.damping},
-         {"mass_kg", link.mass_kg},
-         {"spheres", link.spheres.size()},
-         {"capsules", capsules_of(link)},
-         {"lines", link.segments.size() - capsules_of(link)}});
-  }
-  const scene::SelfField self(model);
-  Json notes = robot.notes;
-  if (!self.note().empty()) notes.push_back(self.note());
-  return {{"file", file.string()},
-          {"name", robot.name},
-          {"dof", robot.dof()},
-          {"planar", model.planar()},
-          {"tip", robot.tip.name},
-          {"tip_link", robot.links[static_cast<std::size_t>(robot.tip.link)].name},
-          {"mass_kg", mass},
-          {"reach_m", model.reach()},
-          {"spheres", count_shapes(model, false)},
-          {"capsules", count_shapes(model, true)},
-          {"base_spheres", robot.base_spheres.size()},
-          {"base_capsules", robot.base_segments.size()},
-          {"self_collision_disabled", robot.self_collision_disabled.size()},
-          {"self_collision_parts", self.parts().size()},
-          {"self_collision_pairs", self.pairs().size()},
-          {"links", links},
-          {"notes", notes},
-          {"warnings", model::warnings(robot)}};
-}
 
 std::string cell(const Json& value) {
   return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>());
@@ -125,7 +66,8 @@ void print_table(const Json& robot) {
 void print_robot_info(const RobotInfoOptions& options) {
   const model::Model model(description::read_robot(
       options.file, {options.tip, options.spheres, options.srdf, options.strict}));
-  const Json robot = describe(model, options.file);
+  Json robot{{"file", options.file.string()}};
+  robot.update(scene::robot_info(model));
   if (options.json)
     print_json(robot);
   else

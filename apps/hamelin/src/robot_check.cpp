@@ -35,30 +35,6 @@ std::string contact_frequency(const fit::PartPair& pair, int samples) {
   return fmt::format("in contact in {:.3g} %", 100.0 * pair.contacts / samples);
 }
 
-Json describe(const fit::SelfCheck& check, const model::Robot& robot) {
-  Json pairs = Json::array();
-  for (const auto& pair : check.pairs)
-    pairs.push_back({{"parts", {pair.part_a, pair.part_b}},
-                     {"checked", pair.checked},
-                     {"reason", pair.checked ? Json(nullptr) : Json(pair.reason)},
-                     {"neighbours", pair.neighbours},
-                     {"rest_m", pair.rest_m},
-                     {"least_m", pair.least_m},
-                     {"contacts", pair.contacts}});
-  Json faults = Json::array();
-  for (const auto& pair : check.contacts_at_rest())
-    faults.push_back({{"parts", {pair.part_a, pair.part_b}}, {"rest_m", pair.rest_m}});
-  return {{"name", robot.name},
-          {"rest_q", check.rest_q},
-          {"samples", check.samples},
-          {"overlaps_at_rest", faults},
-          {"pairs", pairs},
-          {"links_without_shapes", check.links_without_shapes},
-          {"odd_limits", check.suspicious_limits},
-          {"notes", robot.notes},
-          {"warnings", model::warnings(robot)}};
-}
-
 void print(const fit::SelfCheck& check, const model::Robot& robot,
            const std::filesystem::path& file) {
   std::string text =
@@ -143,7 +119,7 @@ int run(const RobotCheckFlags& flags) {
   const fit::SelfCheck check = fit::check_self(robot, listed, flags.check);
   if (flags.output) write_file_atomically(target, list_text(flags, check, robot));
   if (flags.json)
-    print_json(describe(check, robot));
+    print_json(fit::to_json(check, robot));
   else
     print(check, robot, flags.file);
   return check.contacts_at_rest().empty() ? 0 : 1;

@@ -82,28 +82,6 @@ void print_table(const fit::RobotFit& fit, const std::string& title) {
   report(text);
 }
 
-// The pairs of the SRDF, then the pairs that the shapes require, each once.
-fit::SelfPairs find_pairs(const RobotFitFlags& flags, const fit::RobotFit& fitted) {
-  const Phase phase("searching for pairs that always touch");
-  fit::SelfPairs out;
-  if (flags.srdf) {
-    std::vector<std::string> links;
-    for (const auto& link : description::read_urdf_geometry(flags.file)) links.push_back(link.name);
-    out.pairs = description::read_srdf(*flags.srdf, links);
-    for (auto& pair : out.pairs) pair.reason = "SRDF";
-  }
-  const fit::SelfPairs needed =
-      fit::pairs_to_disable(flags.file, fit::sidecar_json(fitted, "", {}), flags.tip, flags.check);
-  for (const auto& pair : needed.pairs) {
-    const bool listed = std::any_of(out.pairs.begin(), out.pairs.end(), [&](const auto& old) {
-      return std::minmax(old.link_a, old.link_b) == std::minmax(pair.link_a, pair.link_b);
-    });
-    if (!listed) out.pairs.push_back(pair);
-  }
-  out.notes = needed.notes;
-  return out;
-}
-
 std::string describe(const fit::SelfPairs& self, int samples) {
   const auto count = [&](const char* reason) {
     return std::count_if(self.pairs.begin(), self.pairs.end(),
@@ -144,15 +122,12 @@ void make_sidecar(const RobotFitFlags& flags, const std::filesystem::path& targe
     const Phase phase("fitting");
     return fit::fit_robot(flags.file, flags.fit);
   }();
-  const fit::SelfPairs self = find_pairs(flags, fitted);
-  std::vector<std::pair<std::string, std::string>> disabled;
-  for (const auto& pair : self.pairs) disabled.emplace_back(pair.link_a, pair.link_b);
-  const std::string note = fmt::format(
-      "{} that cover the collision geometry of {} [m, link frames]: coverage gap {:.3g} mm, excess "
-      "up to {:.1f} mm",
-      flags.fit.cover.capsules ? "Capsules" : "Spheres", flags.file.filename().string(),
-      1e3 * fitted.gap_bound_m(), 1e3 * fitted.excess_max_m());
-  write_file_atomically(target, fit::sidecar_json(fitted, note, disabled).dump(1) + "\n");
+  const fit::SelfPairs self = [&] {
+    const Phase phase("searching for pairs that always touch");
+    return fit::sidecar_pairs(flags.file, fitted, flags.srdf, flags.tip, flags.check);
+  }();
+  const std::string note = fit::sidecar_note(fitted, flags.file, flags.fit.cover.capsules);
+  write_file_atomically(target, fit::sidecar_json(fitted, note, self.names()).dump(1) + "\n");
   if (flags.json) {
     out["file"] = flags.output->string();
     out["fit"] = fit::figures_json(fitted);

@@ -57,30 +57,11 @@ void note_unmodelled(const scene::Scene& scene, const model::Robot& robot) {
                      fmt::join(unused, ", ")));
 }
 
-// Lets the last goal follow the targets of a file; standard input is read by the run itself.
-void follow_file(scene::Scene& scene, const std::optional<std::string>& target) {
-  if (!target || *target == "-") return;
-  if (scene.goals.empty() || scene.goals.back().type != scene::GoalType::follow ||
-      scene.goals.back().motion)
-    throw Error(ErrorCode::usage,
-                fmt::format("--target {}: no goal of {} follows a streamed target, expected a last "
-                            "goal of type follow without a motion",
-                            *target, scene.name));
-  scene.goals.back().stream.file = *target;
-}
-
-// Replaces the goals by the motion of a file.
-void follow_trajectory(scene::Scene& scene, const std::optional<std::filesystem::path>& file) {
-  if (!file) return;
-  scene::Goal goal = scene::trajectory_goal(scene::read_joint_trajectory(*file));
-  goal.path_file = *file;
-  scene.goals = {std::move(goal)};
-}
-
 int run(const RunOptions& options) {
   scene::Scene scene = read_scene(options.file, options.flags);
-  follow_trajectory(scene, options.trajectory);
-  follow_file(scene, options.target);
+  if (options.trajectory) scene.goals = {scene::trajectory_goal(*options.trajectory)};
+  if (options.target && *options.target != "-")  // the run itself reads standard input
+    scene::set_target_file(scene, *options.target, "--target " + *options.target);
   if (options.print_config) {
     print_json(simulation::full_config(scene, plugin_path(options.plugin_path)));
     return 0;

@@ -1,11 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "hamelin/scene/scene.hpp"
+#include "hamelin/scene/overrides.hpp"
 
 namespace CLI {
 class App;
@@ -14,12 +12,7 @@ class App;
 namespace hamelin::app {
 
 /// Values of a scene file that the command line overrides.
-struct SceneFlags {
-  std::optional<std::string> planner, guide, integrator, plant;
-  std::optional<double> step_s, duration_s;
-  std::optional<std::uint64_t> seed;
-  std::vector<std::string> set;  ///< "/json/pointer=VALUE", applied last
-};
+using SceneFlags = scene::Overrides;
 
 /// Reads a scene after writing the flags into its JSON document, whose checks then cover them.
 /// @throws Error like scene::scene_from_json, and for a file that is not a scene

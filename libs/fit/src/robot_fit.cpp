@@ -390,4 +390,12 @@ Json figures_json(const RobotFit& fit) {
           {"notes", fit.notes}};
 }
 
+std::string sidecar_note(const RobotFit& fit, const std::filesystem::path& urdf, bool capsules) {
+  return fmt::format(
+      "{} that cover the collision geometry of {} [m, link frames]: coverage gap {:.3g} mm, excess "
+      "up to {:.1f} mm",
+      capsules ? "Capsules" : "Spheres", urdf.filename().string(), 1e3 * fit.gap_bound_m(),
+      1e3 * fit.excess_max_m());
+}
+
 }  // namespace hamelin::fit

@@ -293,4 +293,28 @@ std::string srdf_text(const std::string& robot,
   return text + "</robot>\n";
 }
 
+Json to_json(const SelfCheck& check, const model::Robot& robot) {
+  Json pairs = Json::array();
+  for (const auto& pair : check.pairs)
+    pairs.push_back({{"parts", {pair.part_a, pair.part_b}},
+                     {"checked", pair.checked},
+                     {"reason", pair.checked ? Json(nullptr) : Json(pair.reason)},
+                     {"neighbours", pair.neighbours},
+                     {"rest_m", pair.rest_m},
+                     {"least_m", pair.least_m},
+                     {"contacts", pair.contacts}});
+  Json faults = Json::array();
+  for (const auto& pair : check.contacts_at_rest())
+    faults.push_back({{"parts", {pair.part_a, pair.part_b}}, {"rest_m", pair.rest_m}});
+  return {{"name", robot.name},
+          {"rest_q", check.rest_q},
+          {"samples", check.samples},
+          {"overlaps_at_rest", faults},
+          {"pairs", pairs},
+          {"links_without_shapes", check.links_without_shapes},
+          {"odd_limits", check.suspicious_limits},
+          {"notes", robot.notes},
+          {"warnings", model::warnings(robot)}};
+}
+
 }  // namespace hamelin::fit

@@ -116,4 +116,31 @@ SelfPairs pairs_to_disable(const std::filesystem::path& urdf, const Json& sideca
   return out;
 }
 
+std::vector<std::pair<std::string, std::string>> SelfPairs::names() const {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const auto& pair : pairs) out.emplace_back(pair.link_a, pair.link_b);
+  return out;
+}
+
+SelfPairs sidecar_pairs(const std::filesystem::path& urdf, const RobotFit& fitted,
+                        const std::optional<std::filesystem::path>& srdf,
+                        const std::optional<std::string>& tip, const SelfCheckOptions& options) {
+  SelfPairs out;
+  if (srdf) {
+    std::vector<std::string> links;
+    for (const auto& link : description::read_urdf_geometry(urdf)) links.push_back(link.name);
+    out.pairs = description::read_srdf(*srdf, links);
+    for (auto& pair : out.pairs) pair.reason = "SRDF";
+  }
+  const SelfPairs needed = pairs_to_disable(urdf, sidecar_json(fitted, "", {}), tip, options);
+  for (const auto& pair : needed.pairs) {
+    const bool listed = std::any_of(out.pairs.begin(), out.pairs.end(), [&](const auto& old) {
+      return std::minmax(old.link_a, old.link_b) == std::minmax(pair.link_a, pair.link_b);
+    });
+    if (!listed) out.pairs.push_back(pair);
+  }
+  out.notes = needed.notes;
+  return out;
+}
+
 }  // namespace hamelin::fit

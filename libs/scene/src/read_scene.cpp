@@ -682,6 +682,12 @@ Goal trajectory_goal(JointTrajectory trajectory) {
   return goal;
 }
 
+Goal trajectory_goal(const std::filesystem::path& file) {
+  Goal goal = trajectory_goal(read_joint_trajectory(file));
+  goal.path_file = file;
+  return goal;
+}
+
 Goal position_goal(const Eigen::Vector3d& position_m) {
   Goal goal = default_goal(GoalType::position);
   goal.pose = {Eigen::Matrix3d::Identity(), position_m};

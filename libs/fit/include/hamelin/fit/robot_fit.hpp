@@ -81,4 +81,9 @@ struct RobotFit {
 /// Figures per link and in total, for --json.
 [[nodiscard]] Json figures_json(const RobotFit& fit);
 
+/// One line for the note of a sidecar: what was covered, the coverage gap and the excess.
+/// @param capsules whether capsules were allowed
+[[nodiscard]] std::string sidecar_note(const RobotFit& fit, const std::filesystem::path& urdf,
+                                       bool capsules);
+
 }  // namespace hamelin::fit

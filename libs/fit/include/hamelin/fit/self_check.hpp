@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hamelin/description/srdf.hpp"
+#include "hamelin/io/json.hpp"
 #include "hamelin/model/robot.hpp"
 
 namespace hamelin::fit {
@@ -62,5 +63,8 @@ inline constexpr double always_share_min = 0.95;
 /// The text of an SRDF file that lists these pairs.
 [[nodiscard]] std::string srdf_text(const std::string& robot,
                                     const std::vector<description::DisabledPair>& pairs);
+
+/// What `hamelin robot check --json` prints.
+[[nodiscard]] Json to_json(const SelfCheck& check, const model::Robot& robot);
 
 }  // namespace hamelin::fit

@@ -2,8 +2,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "hamelin/fit/robot_fit.hpp"
 #include "hamelin/fit/self_check.hpp"
 #include "hamelin/io/json.hpp"
 
@@ -13,6 +15,8 @@ namespace hamelin::fit {
 struct SelfPairs {
   std::vector<description::DisabledPair> pairs;  ///< with reasons, in the file's order of links
   std::vector<std::string> notes;
+  /// The names of the links alone, as sidecar_json() takes them.
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> names() const;
 };
 
 /// The pairs that the sidecar of a URDF should list as disabled, by the rules of MoveIt's setup
@@ -29,5 +33,13 @@ struct SelfPairs {
 [[nodiscard]] SelfPairs pairs_to_disable(const std::filesystem::path& urdf, const Json& sidecar,
                                          const std::optional<std::string>& tip,
                                          const SelfCheckOptions& options);
+
+/// The pairs that the sidecar of a fit lists: those of an SRDF with the reason "SRDF", then those
+/// of pairs_to_disable(), each once. @param srdf none: only the latter
+/// @throws Error as pairs_to_disable() and read_srdf() do
+[[nodiscard]] SelfPairs sidecar_pairs(const std::filesystem::path& urdf, const RobotFit& fit,
+                                      const std::optional<std::filesystem::path>& srdf,
+                                      const std::optional<std::string>& tip,
+                                      const SelfCheckOptions& options);
 
 }  // namespace hamelin::fit

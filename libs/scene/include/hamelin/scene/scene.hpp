@@ -76,6 +76,8 @@ struct Goal {
 [[nodiscard]] Goal joint_goal(Eigen::VectorXd q);
 /// @throws Error invalid as check(trajectory) does
 [[nodiscard]] Goal trajectory_goal(JointTrajectory trajectory);
+/// @throws Error as read_joint_trajectory() does
+[[nodiscard]] Goal trajectory_goal(const std::filesystem::path& file);
 [[nodiscard]] Goal position_goal(const Eigen::Vector3d& position_m);
 [[nodiscard]] Goal pose_goal(const geometry::SE3& pose);
 
