@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -126,6 +127,18 @@ std::size_t longest_list(const nlohmann::json& document) {
   return longest;
 }
 
+// JSON has no such numbers, but a document that a program made may hold them.
+void check_finite(const Json& document, const Json::json_pointer& at, const std::string& where) {
+  if (document.is_number_float() && !std::isfinite(document.get<double>()))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: {}: {}, expected a finite number", where,
+                            at.empty() ? "/" : at.to_string(), document.get<double>()));
+  if (document.is_array())
+    for (std::size_t i = 0; i < document.size(); ++i) check_finite(document[i], at / i, where);
+  if (document.is_object())
+    for (const auto& [key, value] : document.items()) check_finite(value, at / key, where);
+}
+
 bool valid(const valijson::Schema& schema, const nlohmann::json& document,
            valijson::ValidationResults* results) {
   valijson::Validator validator(valijson::Validator::kStrongTypes);
@@ -154,7 +167,9 @@ Schema::Schema(const Json& schema, const std::string& where) {
 }
 
 void Schema::check(const Json& document, const std::string& where) const {
-  const nlohmann::json plain = nlohmann::json::parse(document.dump());
+  check_finite(document, Json::json_pointer(), where);
+  const nlohmann::json plain =
+      nlohmann::json::parse(document.dump(-1, ' ', false, Json::error_handler_t::replace));
   if (valid(compiled_->schema, plain, nullptr)) return;
   // valijson collects all violations, each many times larger than the value concerned. To save
   // time, long lists are shortened to a beginning that contains the first violation.
