@@ -5,12 +5,9 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "hamelin/control/preparation.hpp"
-#include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/trajectory.hpp"
 #include "hamelin/optimal/scene_motion.hpp"
-#include "hamelin/simulation/plan_paths.hpp"
 #include "output.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
@@ -71,33 +68,6 @@ std::string file_text(const OptimizeOptions& options, const optimal::SceneMotion
   return optimal::to_json(motion, options.motion, options.rate_hz).dump(1) + "\n";
 }
 
-// The paths of the scene's guide, along which the guesses go.
-std::vector<Eigen::MatrixXd> guide_paths(const scene::Scene& scene, const model::Model& arm,
-                                         control::World& world) {
-  std::vector<Eigen::MatrixXd> paths;
-  const simulation::PathPlan plan = simulation::plan_paths(scene, arm, world);
-  if (!plan.found())
-    throw Error(ErrorCode::invalid,
-                fmt::format("{}: /goals/{}: {} found no path: {}", scene.name,
-                            plan.goals.size() - 1, plan.guide, plan.goals.back().path.cause));
-  for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
-  return paths;
-}
-
-// With a guide, robot and map are read once for both.
-optimal::SceneMotion motion_of(const scene::Scene& scene,
-                               const optimal::SceneMotionOptions& options) {
-  if (scene.guide.type == scene::GuideType::none) return optimal::optimize_scene(scene, options);
-  const model::Model arm = control::load_model(scene);
-  control::World::Options near;
-  near.influence_m = optimal::influence_m;
-  control::World world(scene, arm, near);
-  const std::vector<Eigen::MatrixXd> paths = guide_paths(scene, arm, world);
-  const control::WorldView shown(scene, arm, world);
-  control::WorldView all(scene, arm, shown);
-  return optimal::optimize_scene(scene, options, arm, all, paths);
-}
-
 int optimize(OptimizeOptions options) {
   options.motion.objective =
       options.minimize == "time" ? optimal::Objective::time : optimal::Objective::effort;
@@ -106,7 +76,7 @@ int optimize(OptimizeOptions options) {
   const scene::Scene scene = read_scene(options.file, options.flags);
   std::optional<std::filesystem::path> target;
   if (options.output) target = output_target(*options.output, files_of(scene));
-  const optimal::SceneMotion motion = motion_of(scene, options.motion);
+  const optimal::SceneMotion motion = optimal::optimize_scene(scene, options.motion);
   if (target && motion.valid()) write_file_atomically(*target, file_text(options, motion));
   if (options.json) {
     print_json(optimal::to_json(motion, options.motion, options.rate_hz));

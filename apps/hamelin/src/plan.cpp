@@ -5,8 +5,8 @@
 
 #include "command_line.hpp"
 #include "commands.hpp"
+#include "hamelin/control/plan_paths.hpp"
 #include "hamelin/io/file.hpp"
-#include "hamelin/simulation/plan_paths.hpp"
 #include "output.hpp"
 #include "scene_flags.hpp"
 #include "terminal.hpp"
@@ -23,7 +23,7 @@ struct PlanOptions {
   bool json = false;
 };
 
-std::string plan_text(const simulation::PlannedGoal& goal, std::size_t index) {
+std::string plan_text(const control::PlannedGoal& goal, std::size_t index) {
   const guide::Path& path = goal.path;
   const std::string name = fmt::format("goal {}", index + 1);
   if (!path.found())
@@ -45,8 +45,8 @@ int plan(PlanOptions options) {
   const scene::Scene scene = read_scene(options.file, options.flags);
   std::optional<std::filesystem::path> target;
   if (options.output) target = output_target(*options.output, files_of(scene));
-  const simulation::PathPlan plan = simulation::plan_paths(scene);
-  const Json document = simulation::to_json(plan);
+  const control::PathPlan plan = control::plan_paths(scene);
+  const Json document = control::to_json(plan);
   if (target) write_file_atomically(*target, document.dump(1) + "\n");
   if (options.json) {
     print_json(document);

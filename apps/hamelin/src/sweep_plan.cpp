@@ -27,19 +27,6 @@ struct PlanFlags {
   bool json = false;
 };
 
-scene::GoalType goal_from(const std::string& name) {
-  for (const auto type : {scene::GoalType::joint, scene::GoalType::position})
-    if (name == scene::to_string(type)) return type;
-  return scene::GoalType::pose;
-}
-
-scene::Prediction prediction_from(const std::string& name) {
-  for (const auto prediction : {scene::Prediction::path, scene::Prediction::constant_velocity,
-                                scene::Prediction::speed_bound})
-    if (name == scene::to_string(prediction)) return prediction;
-  return scene::Prediction::constant_acceleration;
-}
-
 void set_swing(const PlanFlags& flags, sweep::SphereOnPath& sphere) {
   const auto numbers = number_list("--swing", flags.swing, 2);
   for (const double x : numbers)
@@ -48,12 +35,13 @@ void set_swing(const PlanFlags& flags, sweep::SphereOnPath& sphere) {
                   fmt::format("--swing {}: {}, expected two numbers above 0", flags.swing, x));
   sphere.swing_m = numbers[0];
   sphere.swing_period_s = numbers[1];
-  sphere.prediction = prediction_from(flags.prediction);
+  sphere.prediction = sweep::prediction_from(flags.prediction, "--prediction");
 }
 
 int sweep_plan(const PlanFlags& flags) {
   sweep::PlanOptions options = flags.plan;
-  for (const auto& goal : flags.goals) options.goals.push_back(goal_from(goal));
+  for (const auto& goal : flags.goals)
+    options.goals.push_back(sweep::goal_type_from(goal, "--goal"));
   options.problem.mark = scene::mark_from(flags.mark);
   scene::Clutter& clutter = options.clutter.clutter;
   clutter.count = flags.primitives;
@@ -158,8 +146,8 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       ->type_name("DIR");
   command
       ->add_option("--planner", plan.planners,
-                   "planner, with parameters as in hybrid:escape=tree,margin_m=0.01; may be "
-                   "repeated (default the scene's)")
+                   "planner, with parameters as in hybrid:escape=tree,margin_m=0.01, or "
+                   "python:FILE:CLASS; may be repeated (default the scene's)")
       ->type_name("NAME")
       ->allow_extra_args(false);
   add_set_option(*command, plan.set,

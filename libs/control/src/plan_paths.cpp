@@ -1,4 +1,4 @@
-#include "hamelin/simulation/plan_paths.hpp"
+#include "hamelin/control/plan_paths.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 
-namespace hamelin::simulation {
+namespace hamelin::control {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -36,8 +36,8 @@ void check(const scene::Scene& scene) {
 }
 
 // What a shield of the scene keeps while the arm moves slowly.
-control::LimitReserve reserve_of(const scene::Scene& scene) {
-  control::LimitReserve reserve;
+LimitReserve reserve_of(const scene::Scene& scene) {
+  LimitReserve reserve;
   if (scene.safety.type == scene::SafetyType::shield)
     reserve.obstacles_m = reserve.self_m = scene.safety.margin_m;
   return reserve;
@@ -78,19 +78,18 @@ Json planned_json(const PlannedGoal& goal) {
 
 PathPlan plan_paths(const scene::Scene& scene) {
   check(scene);
-  const model::Model arm = control::load_model(scene);
-  control::World world(scene, arm, {});
+  const model::Model arm = load_model(scene);
+  World world(scene, arm, {});
   return plan_paths(scene, arm, world);
 }
 
-PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, control::World& world) {
+PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world) {
   check(scene);
-  control::check_numbers(scene, arm);
-  const control::WorldView view(scene, arm, world);
-  control::GuideQuery query(arm, world, view);
+  check_numbers(scene, arm);
+  const WorldView view(scene, arm, world);
+  GuideQuery query(arm, world, view);
   const Json params = scene.planner ? scene.planner->params : Json::object();
-  const guide::Guide guide(arm,
-                           control::guide_settings(scene, arm, view, reserve_of(scene), params));
+  const guide::Guide guide(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
   PathPlan plan;
   plan.scene = scene.name;
   plan.robot = arm.robot().name;
@@ -123,4 +122,4 @@ Json to_json(const PathPlan& plan) {
   return out;
 }
 
-}  // namespace hamelin::simulation
+}  // namespace hamelin::control

@@ -243,6 +243,10 @@ Solution InteriorPoint::solve(VectorXd x) {
       out.cause = fmt::format("no solution within {} iterations", options_.iterations_max);
       break;
     }
+    if (options_.stop && options_.stop()) {
+      out.cause = "stopped";
+      break;
+    }
     if (find_direction() && take_step() && !(small_decreases_ > small_decreases_max)) continue;
     if (can_lower_barrier()) {
       small_decreases_ = small_decreases_max;

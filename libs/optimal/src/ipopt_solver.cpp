@@ -20,8 +20,9 @@ Eigen::Map<const Eigen::VectorXd> map(const Number* x, Index n) {
 
 class Adapter final : public Ipopt::TNLP {
  public:
-  Adapter(NonlinearProgram& program, const Eigen::VectorXd& guess)
+  Adapter(NonlinearProgram& program, const Eigen::VectorXd& guess, std::function<bool()> stop)
       : program_(program),
+        stop_(std::move(stop)),
         jacobian_(program.jacobian_entries()),
         hessian_(program.hessian_entries()) {
     result.x = guess;
@@ -94,7 +95,7 @@ class Adapter final : public Ipopt::TNLP {
                              Ipopt::IpoptCalculatedQuantities*) override {
     result.iterations = iteration;
     result.stationarity = dual;
-    return true;
+    return !(stop_ && stop_());
   }
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*,
                          const Number*, Index, const Number*, const Number*, Number,
@@ -119,6 +120,7 @@ class Adapter final : public Ipopt::TNLP {
   }
 
   NonlinearProgram& program_;
+  std::function<bool()> stop_;
   Entries jacobian_, hessian_;
   bool evaluated_ = false, finite_ = false;
 };
@@ -127,7 +129,7 @@ class Adapter final : public Ipopt::TNLP {
 
 IpoptResult solve_by_ipopt(NonlinearProgram& program, const Eigen::VectorXd& guess,
                            const SolveOptions& options) {
-  const Ipopt::SmartPtr<Adapter> adapter = new Adapter(program, guess);
+  const Ipopt::SmartPtr<Adapter> adapter = new Adapter(program, guess, options.stop);
   const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);
   auto& settings = *application->Options();
   settings.SetNumericValue("tol", options.tolerance);

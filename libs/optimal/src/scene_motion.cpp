@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/control/plan_paths.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
@@ -89,18 +90,25 @@ Problem problem_of(const scene::Scene& scene, const SceneMotionOptions& options,
   return problem;
 }
 
-SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
-                           const std::vector<MatrixXd>& paths) {
-  check_scene(scene, !paths.empty());
-  const model::Model model = control::load_model(scene);
-  control::WorldView view(scene, model, influence_m);
-  return optimize_scene(scene, options, model, view, paths);
+namespace {
+
+// The paths of the scene's guide, along which the guesses go.
+std::vector<MatrixXd> guide_paths(const scene::Scene& scene, const model::Model& arm,
+                                  control::World& world) {
+  const control::PathPlan plan = control::plan_paths(scene, arm, world);
+  if (!plan.found())
+    refuse(scene, fmt::format("/goals/{}: {} found no path: {}", plan.goals.size() - 1, plan.guide,
+                              plan.goals.back().path.cause));
+  std::vector<MatrixXd> paths;
+  for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
+  return paths;
 }
 
-SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options,
+// `paths`: for each goal way-points from the configuration before it, or empty: along the goals'
+// own paths, or straight.
+SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& options,
                            const model::Model& model, control::WorldView& view,
                            const std::vector<MatrixXd>& paths) {
-  check_scene(scene, !paths.empty());
   SceneMotion out{scene.name, {}, {}, model, {}, scene.goals.size()};
   out.robot = out.model.robot().name;
   for (const auto& link : out.model.robot().links) out.joints.push_back(link.joint.name);
@@ -127,6 +135,26 @@ SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& 
     if (!out.goals.back().valid()) break;
   }
   return out;
+}
+
+}  // namespace
+
+SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options) {
+  const bool guided = scene.guide.type != scene::GuideType::none;
+  check_scene(scene, guided);
+  const model::Model model = control::load_model(scene);
+  if (!guided) {
+    control::WorldView view(scene, model, influence_m);
+    return optimize_along(scene, options, model, view, {});
+  }
+  // Guide and optimisation use the same world, so that the map is read once.
+  control::World::Options near;
+  near.influence_m = influence_m;
+  control::World world(scene, model, near);
+  const std::vector<MatrixXd> paths = guide_paths(scene, model, world);
+  const control::WorldView shown(scene, model, world);
+  control::WorldView all(scene, model, shown);
+  return optimize_along(scene, options, model, all, paths);
 }
 
 double SceneMotion::duration_s() const {

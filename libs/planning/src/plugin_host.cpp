@@ -290,6 +290,14 @@ const Json& Plugin::params_schema() const noexcept {
   return library_->params_schema;
 }
 
+std::vector<std::string> Plugin::file_params() const {
+  std::vector<std::string> names;
+  const Json properties = params_schema().value("properties", Json::object());
+  for (const auto& [name, rule] : properties.items())
+    if (rule.is_object() && rule.value("input_file", Json()) == true) names.push_back(name);
+  return names;
+}
+
 bool Plugin::tick_allocates() const noexcept {
   return (library_->raw->properties & HAMELIN_TICK_ALLOCATES) != 0;
 }

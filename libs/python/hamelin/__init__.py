@@ -11,6 +11,8 @@ hamelin.Error, which is a ValueError; arguments of a wrong type raise TypeError.
     hamelin.read_log("shelf.jsonl").plot()
 """
 
+from ._accuracy import AccuracyResult, accuracy
+from ._data import data_path
 from ._error import Error
 from ._hamelin import (
     Answer,
@@ -36,10 +38,11 @@ from ._hamelin import (
     plugin_path,
 )
 from ._logs import Log, read_log
+from ._motions import Explanation, Motion, PathPlan, explain, optimize, plan
 from ._pages import Page, report
 from ._robots import FitResult, fit_robot, robot_info
 from ._runs import Result, Verification, full_config, integrate, load_scene, run, verify
-from ._studies import AccuracyResult, Sweep, accuracy, sweep
+from ._sweeps import Sweep, plan_sweep, sweep
 
 __all__ = [
     "AccuracyResult",
@@ -49,12 +52,15 @@ __all__ = [
     "Controller",
     "Environment",
     "Error",
+    "Explanation",
     "FitResult",
     "Integrator",
     "Log",
     "LogStream",
     "Model",
+    "Motion",
     "Page",
+    "PathPlan",
     "PlannerSetup",
     "Result",
     "Scene",
@@ -67,6 +73,8 @@ __all__ = [
     "__version__",
     "accuracy",
     "check_robot",
+    "data_path",
+    "explain",
     "fit_robot",
     "full_config",
     "instruction_set",
@@ -75,6 +83,9 @@ __all__ = [
     "load_robot",
     "load_scene",
     "make_chain",
+    "optimize",
+    "plan",
+    "plan_sweep",
     "plugin_path",
     "read_log",
     "report",

@@ -486,6 +486,13 @@ def _fit_robot(
     tolerance: float,
 ) -> tuple[Document, Document]: ...
 
+def _explain(
+    log: PathLike,
+    motions: int,
+    seed: int,
+    progress: Callable[[float, float], Any] | None,
+) -> tuple[Document, str]: ...
+
 def _full_config(scene: Scene, plugin_path: Paths) -> Document: ...
 
 def _integrate(
@@ -523,15 +530,14 @@ def _measure(
 
 def _merge_sweeps(directories: Paths, by: list[str]) -> tuple[Document, str]: ...
 
+def _optimize(scene: Scene, options: Document) -> tuple[Document, bool]: ...
+
+def _plan(scene: Scene) -> Document: ...
+
 def _plan_sweep(
     directory: PathLike,
-    scenes: Paths,
-    planners: list[str],
-    set: list[str],
-    vary: list[str],
-    seeds: list[int],
-    duration: float | None,
-    plugin_path: Paths,
+    options: Document,
+    progress: Callable[[float, float], Any] | None,
 ) -> Document: ...
 
 def _prefix() -> str: ...

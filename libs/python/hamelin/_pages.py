@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import os
 
+from ._files import write_text
 from ._hamelin import _make_report
 from ._runs import Result
 from ._types import Document, PathLike
@@ -19,10 +20,7 @@ class Page:
 
     def save(self, file: PathLike) -> None:
         """Writes the page to a file."""
-        temporary = f"{os.fspath(file)}.tmp"
-        with open(temporary, "w", encoding="utf-8") as out:
-            out.write(self.text)
-        os.replace(temporary, file)
+        write_text(file, self.text)
 
     def _repr_html_(self) -> str:
         """The page in a frame, for notebooks."""

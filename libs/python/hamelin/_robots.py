@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from typing import Mapping
 
+from ._files import write_document
 from ._hamelin import Model, _fit_robot, _robot_info, load_robot
 from ._types import Document, PathLike, Paths
 
@@ -33,11 +33,7 @@ class FitResult:
 
     def save(self, file: PathLike) -> None:
         """Writes the sidecar to a file."""
-        text = json.dumps(self.sidecar, indent=1, ensure_ascii=False) + "\n"
-        temporary = f"{os.fspath(file)}.tmp"
-        with open(temporary, "w", encoding="utf-8") as out:
-            out.write(text)
-        os.replace(temporary, file)
+        write_document(file, self.sidecar)
 
     def __repr__(self) -> str:
         links = self.sidecar.get("links", {})

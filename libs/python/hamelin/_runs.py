@@ -5,34 +5,25 @@ from __future__ import annotations
 import html
 import os
 import sys
-from typing import Any, Iterator, Mapping, Sequence, Union
+from typing import Any, Sequence, Union
 
 from ._hamelin import Scene, _full_config, _integrate, _load_scene, _run, _verify
 from ._logs import Log, read_log
 from ._progress import Bar
-from ._types import Document, Numbers, PathLike, Paths, Planner, Progress
+from ._types import Document, DocumentMapping, Numbers, PathLike, Paths, Planner, Progress
 
 SceneLike = Union[Scene, Document, PathLike]
 
 
-class Result(Mapping[str, Any]):
+class Result(DocumentMapping):
     """The result of a run: a mapping of the document hamelin.result/1, also as attributes.
 
     log: the file of the run's log, or None.
     """
 
     def __init__(self, document: Document, log: PathLike | None = None) -> None:
-        self._document = document
+        super().__init__(document)
         self.log = None if log is None else os.fspath(log)
-
-    def __getitem__(self, key: str) -> Any:
-        return self._document[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._document)
-
-    def __len__(self) -> int:
-        return len(self._document)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -87,23 +78,11 @@ class Result(Mapping[str, Any]):
         return f"<table>{rows}</table>"
 
 
-class Verification(Mapping[str, Any]):
+class Verification(DocumentMapping):
     """The comparison of a repeated run with its log.
 
     equal, to_the_bit, tolerance, finished, lines, ticks, largest, first_difference, other_build.
     """
-
-    def __init__(self, document: Document) -> None:
-        self._document = document
-
-    def __getitem__(self, key: str) -> Any:
-        return self._document[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._document)
-
-    def __len__(self) -> int:
-        return len(self._document)
 
     def __bool__(self) -> bool:
         return bool(self._document["equal"])
@@ -124,7 +103,7 @@ def _record(log: PathLike | None, result: PathLike | None, every: int, bar: Bar)
     }
 
 
-def _overrides(
+def overrides_of(
     planner: str | None = None,
     guide: str | None = None,
     integrator: str | None = None,
@@ -134,6 +113,7 @@ def _overrides(
     seed: int | None = None,
     set: str | Sequence[str] | None = None,  # noqa: A002 (the program's name)
 ) -> Document:
+    """Values that replace those of a scene, as the extension module takes them."""
     return {
         "planner": planner,
         "guide": guide,
@@ -163,11 +143,12 @@ def load_scene(
     step, duration: [s]. set: values such as "/planner/params/gain=2".
     """
     return _load_scene(
-        file, _overrides(planner, guide, integrator, plant, step, duration, seed, set)
+        file, overrides_of(planner, guide, integrator, plant, step, duration, seed, set)
     )
 
 
-def _scene(scene: SceneLike, overrides: Document) -> Scene:
+def as_scene(scene: SceneLike, overrides: Document) -> Scene:
+    """The scene of an argument, with values replaced."""
     if isinstance(scene, Scene):
         changed = any(value is not None for value in overrides.values())
         return scene._with(overrides) if changed else scene
@@ -206,7 +187,7 @@ def run(
     KeyboardInterrupt is raised.
     """
     name = planner if isinstance(planner, str) else None
-    made = _scene(scene, _overrides(name, guide, integrator, plant, step, duration, seed, set))
+    made = as_scene(scene, overrides_of(name, guide, integrator, plant, step, duration, seed, set))
     with Bar(progress, "running") as bar:
         document = _run(
             made,
@@ -221,7 +202,7 @@ def run(
 
 def full_config(scene: SceneLike, *, plugin_path: Paths = None) -> Document:
     """The scene with all defaults, also of planner and integrator: `hamelin run --print-config`."""
-    return _full_config(_scene(scene, {}), plugin_path)
+    return _full_config(as_scene(scene, {}), plugin_path)
 
 
 def integrate(

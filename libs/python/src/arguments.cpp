@@ -156,6 +156,11 @@ py::array_t<double> to_array(const geometry::SE3& pose) {
   return to_array(Eigen::MatrixXd(pose.matrix()));
 }
 
+py::object number_or_array(bool single, const py::array_t<double>& numbers) {
+  if (single) return py::float_(*numbers.data());
+  return numbers;
+}
+
 py::object to_python(const Json& json) {
   switch (json.type()) {
     case Json::value_t::object: {

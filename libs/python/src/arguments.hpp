@@ -86,6 +86,9 @@ class Numbers {
 [[nodiscard]] py::array_t<double> to_array(const Eigen::MatrixXd& x);
 [[nodiscard]] py::array_t<double> to_array(const geometry::SE3& pose);
 
+/// The only number of an array if a single one was asked for, else the array.
+[[nodiscard]] py::object number_or_array(bool single, const py::array_t<double>& numbers);
+
 /// Python's dict, list, str, int, float, bool and None from JSON, and back. Numbers that are not
 /// finite have no JSON, and arrays and numbers of numpy are accepted.
 [[nodiscard]] py::object to_python(const Json& json);

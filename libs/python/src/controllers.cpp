@@ -147,12 +147,14 @@ std::uint64_t attach(BoundController& c, py::handle payload, py::handle q) {
   model["payload"] = to_json(payload);
   const scene::Scene read = variant(*c.scene, "model", model);
   if (!read.model.payload) refuse("attach", "payload", "is null, expected a payload");
+  const PlannerObjectScope scope(c.object);
   const py::gil_scoped_release unlocked;
   return c.controller->attach(*read.model.payload, at);
 }
 
 std::uint64_t detach(BoundController& c, const std::string& name, py::handle q) {
   const Eigen::VectorXd at = vector_of("detach", "q", q, c.controller->model().dof());
+  const PlannerObjectScope scope(c.object);
   const py::gil_scoped_release unlocked;
   return c.controller->detach(name, at);
 }
@@ -179,7 +181,7 @@ SharedController make_controller(py::handle scene, py::object planner, py::handl
                                  bool certify, std::size_t obstacles_max,
                                  const std::vector<double>& acceleration_max,
                                  const std::vector<double>& jerk_max) {
-  SceneOverrides overrides;
+  scene::Overrides overrides;
   py::object object = py::none();
   if (PyUnicode_Check(planner.ptr()) != 0)
     overrides.planner = planner.cast<std::string>();

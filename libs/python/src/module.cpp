@@ -93,7 +93,9 @@ PYBIND11_MODULE(_hamelin, module) {
   python::add_scenes(module);
   python::add_runs(module);
   python::add_logs(module);
-  python::add_studies(module);
+  python::add_accuracy(module);
+  python::add_sweeps(module);
+  python::add_motions(module);
   python::add_controllers(module);
   python::add_planners(module);
 }

@@ -15,7 +15,9 @@ void add_integrators(py::module_& module);
 void add_scenes(py::module_& module);
 void add_runs(py::module_& module);
 void add_logs(py::module_& module);
-void add_studies(py::module_& module);
+void add_accuracy(py::module_& module);
+void add_sweeps(py::module_& module);
+void add_motions(py::module_& module);
 void add_controllers(py::module_& module);
 void add_planners(py::module_& module);
 

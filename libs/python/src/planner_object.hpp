@@ -14,11 +14,15 @@ class PlannerObjectScope {
  public:
   /// @param object None: the scene's own planner @throws py::type_error if it has no tick()
   PlannerObjectScope(py::handle object, scene::Scene& scene);
+  /// Makes a shallow copy of the object the planner, as its scene already names it.
+  explicit PlannerObjectScope(const py::object& object);
   PlannerObjectScope(const PlannerObjectScope&) = delete;
   PlannerObjectScope& operator=(const PlannerObjectScope&) = delete;
   ~PlannerObjectScope();
 
  private:
+  void use(py::object object);
+
   bool set_ = false;
   py::object object_;
   PyObject* before_ = nullptr;

@@ -150,7 +150,7 @@ py::array_t<double> array3(const double (&x)[3]) {
   return to_array(Eigen::Vector3d(x[0], x[1], x[2]));
 }
 
-py::array_t<double> vector_of(const double* x, std::size_t n) {
+py::array_t<double> numbers_at(const double* x, std::size_t n) {
   return to_array(
       Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(x, static_cast<Eigen::Index>(n))));
 }
@@ -165,7 +165,7 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
   out["tolerance_rad"] = goal.tolerance_rad;
   out["speed_max"] = goal.speed_max;
   if (goal.q != nullptr) {
-    out["q"] = vector_of(goal.q, dof);
+    out["q"] = numbers_at(goal.q, dof);
     if (goal.path_points > 0) {
       auto path =
           new_array({static_cast<py::ssize_t>(goal.path_points), static_cast<py::ssize_t>(dof)});
@@ -174,7 +174,7 @@ py::dict goal_dict(const hamelin_goal& goal, std::size_t dof) {
     }
   } else {
     out["position_m"] = array3(goal.position_world_m);
-    out["quaternion_wxyz"] = vector_of(&goal.quaternion_wxyz[0], 4);
+    out["quaternion_wxyz"] = numbers_at(&goal.quaternion_wxyz[0], 4);
     out["velocity_m_s"] = array3(goal.velocity_world_m_s);
     out["angular_velocity_rad_s"] = array3(goal.angular_velocity_world_rad_s);
   }
@@ -287,11 +287,6 @@ struct PySetup : Whole {
     return *host;
   }
 };
-
-py::object number_or_array(bool single, const py::array_t<double>& out) {
-  if (single) return py::float_(*out.data());
-  return out;
-}
 
 py::object setup_clearance(PySetup& s, py::handle q, double time_ahead, double at_least) {
   const Numbers numbers("clearance", "q", q);
@@ -751,13 +746,21 @@ void add_setup(py::module_& module) {
 
 PlannerObjectScope::PlannerObjectScope(py::handle object, scene::Scene& scene) {
   if (object.is_none()) return;
-  object_ = py::reinterpret_borrow<py::object>(object);
-  if (!py::hasattr(object_, "tick") || PyType_Check(object_.ptr()) != 0)
+  if (!py::hasattr(object, "tick") || PyType_Check(object.ptr()) != 0)
     throw py::type_error(
         "planner: expected a name, or an object of a class with the method tick(tick, command)");
   const py::dict description =
-      py::module_::import("hamelin._planner_files").attr("describe")(object_);
+      py::module_::import("hamelin._planner_files").attr("describe")(object);
   scene.planner = scene::Choice{"python", to_json(description)};
+  use(py::reinterpret_borrow<py::object>(object));
+}
+
+PlannerObjectScope::PlannerObjectScope(const py::object& object) {
+  if (!object.is_none()) use(py::module_::import("copy").attr("copy")(object));
+}
+
+void PlannerObjectScope::use(py::object object) {
+  object_ = std::move(object);
   before_ = planner_object;
   planner_object = object_.ptr();
   set_ = true;

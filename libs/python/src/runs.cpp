@@ -124,20 +124,8 @@ py::object run(const BoundScene& scene, py::handle plugins, py::handle planner,
                py::handle trajectory, py::handle target, const py::dict& files) {
   const Record record = record_of(files);
   scene::Scene chosen = scene.scene;
-  if (const auto file = optional_path(trajectory)) {
-    scene::Goal goal = scene::trajectory_goal(scene::read_joint_trajectory(*file));
-    goal.path_file = *file;
-    chosen.goals = {std::move(goal)};
-  }
-  if (const auto file = optional_path(target)) {
-    if (chosen.goals.empty() || chosen.goals.back().type != scene::GoalType::follow ||
-        chosen.goals.back().motion)
-      throw Error(ErrorCode::usage,
-                  fmt::format("run: target: no goal of {} follows a streamed target, expected a "
-                              "last goal of type follow without a motion",
-                              chosen.name));
-    chosen.goals.back().stream.file = *file;
-  }
+  if (const auto file = optional_path(trajectory)) chosen.goals = {scene::trajectory_goal(*file)};
+  if (const auto file = optional_path(target)) scene::set_target_file(chosen, *file, "run: target");
   check_output(record.log, chosen);
   check_output(record.result, chosen);
   const auto folders = plugin_path(paths_of(plugins));

@@ -112,11 +112,6 @@ struct Configurations {
   py::ssize_t dof_;
 };
 
-py::object number_or_array(bool single, const py::array_t<double>& out) {
-  if (single) return py::float_(*out.data());
-  return out;
-}
-
 py::object distance(const BoundEnvironment& e, py::handle points, double limit, double time_s,
                     const std::string& view) {
   const Points at("distance", "points", points);
@@ -354,8 +349,8 @@ SharedEnvironment make_environment(BoundScene& scene, double influence) {
       model, scene::make_environment(scene.scene, model->model, influence), influence);
 }
 
-SceneOverrides overrides_of(const py::dict& given) {
-  SceneOverrides o;
+scene::Overrides overrides_of(const py::dict& given) {
+  scene::Overrides o;
   for (const auto& [key_object, value] : given) {
     const auto key = key_object.cast<std::string>();
     if (value.is_none()) continue;
@@ -382,7 +377,7 @@ SceneOverrides overrides_of(const py::dict& given) {
 }
 
 // py::cast_error is a RuntimeError; a wrong argument is a TypeError.
-SceneOverrides checked_overrides(const py::dict& given) {
+scene::Overrides checked_overrides(const py::dict& given) {
   try {
     return overrides_of(given);
   } catch (const py::cast_error&) {
@@ -443,7 +438,7 @@ void add_scene(py::module_& module) {
           "_with",
           [](const BoundScene& s, const py::dict& given) {
             Json document = s.document;
-            apply_overrides(checked_overrides(given), document);
+            scene::apply(checked_overrides(given), "planner", document);
             return std::make_shared<BoundScene>(document, s.folder, s.name);
           },
           arg("overrides"), "A copy with other values.")
@@ -468,40 +463,6 @@ void add_scene(py::module_& module) {
 
 }  // namespace
 
-Json planner_entry(const std::string& name) {
-  constexpr std::string_view scheme = "python:";
-  if (!name.starts_with(scheme)) return {{"name", name}};
-  const std::string rest = name.substr(scheme.size());
-  const auto colon = rest.rfind(':');
-  if (colon == std::string::npos || colon == 0 || colon + 1 == rest.size())
-    throw Error(ErrorCode::usage, fmt::format("planner: '{}', expected python:FILE:CLASS", name));
-  return {{"name", "python"},
-          {"params", {{"file", rest.substr(0, colon)}, {"class", rest.substr(colon + 1)}}}};
-}
-
-// As the program's options of the same names. The scene's parameters belong to the scene's planner
-// or integrator only.
-void apply_overrides(const SceneOverrides& o, Json& document) {
-  if (!document.is_object()) return;  // the reader says what is wrong
-  const auto choose = [&](const char* key, const Json& entry) {
-    if (entry.contains("params") || !document.contains(key) || !document[key].is_object() ||
-        document[key].value("name", Json()) != entry["name"])
-      document[key] = entry;
-  };
-  if (o.planner) choose("planner", planner_entry(*o.planner));
-  if (o.guide) {
-    if (!document.contains("planner") || !document["planner"].is_object())
-      document["planner"] = {{"name", "hybrid"}};
-    document["planner"]["guide"] = *o.guide;
-  }
-  if (o.integrator) choose("integrator", {{"name", *o.integrator}});
-  if (o.plant) document["plant"] = {{"type", *o.plant}};
-  if (o.step_s) document["step_s"] = *o.step_s;
-  if (o.duration_s) document["duration_s"] = *o.duration_s;
-  if (o.seed) document["seed"] = *o.seed;
-  for (const auto& assignment : o.set) scene::set_pointer(document, assignment);
-}
-
 BoundScene::BoundScene(Json given, fs::path base_dir, std::string where)
     : document(std::move(given)),
       folder(std::move(base_dir)),
@@ -513,22 +474,22 @@ const SharedModel& BoundScene::model() {
   return model_;
 }
 
-SharedScene read_scene(const fs::path& file, const SceneOverrides& overrides) {
+SharedScene read_scene(const fs::path& file, const scene::Overrides& overrides) {
   Json document = read_json(file);
-  apply_overrides(overrides, document);
+  scene::apply(overrides, "planner", document);
   return std::make_shared<BoundScene>(std::move(document), file.parent_path(), file.string());
 }
 
-SharedScene scene_of(py::handle given, const SceneOverrides& overrides) {
+SharedScene scene_of(py::handle given, const scene::Overrides& overrides) {
   if (py::isinstance<BoundScene>(given)) {
     const auto scene = given.cast<SharedScene>();
     Json document = scene->document;
-    apply_overrides(overrides, document);
+    scene::apply(overrides, "planner", document);
     return std::make_shared<BoundScene>(std::move(document), scene->folder, scene->name);
   }
   if (PyDict_Check(given.ptr()) != 0) {
     Json document = to_json(given);
-    apply_overrides(overrides, document);
+    scene::apply(overrides, "planner", document);
     return std::make_shared<BoundScene>(std::move(document), ".", "scene");
   }
   return read_scene(path_of(given), overrides);

@@ -1,5 +1,6 @@
 """Planners in Python, and the control loop."""
 
+import hashlib
 import json
 import os
 import subprocess
@@ -63,6 +64,12 @@ def load(planner_file):
     return space["Spring"]
 
 
+def write(folder, scene):
+    file = folder / "scene.json"
+    file.write_text(json.dumps(scene))
+    return file
+
+
 def test_three_ways_to_the_same_run(program, planner_file, free_scene, tmp_path):
     scene_file = tmp_path / "scene.json"
     scene_file.write_text(json.dumps(free_scene))
@@ -90,6 +97,23 @@ def test_three_ways_to_the_same_run(program, planner_file, free_scene, tmp_path)
     given = np.isfinite(read[0].series[:, 0])
     assert given.sum() > 100
     np.testing.assert_array_equal(read[0].series[given, 0], offset[given])
+
+
+def test_the_log_knows_whether_the_file_has_changed(program, planner_file, free_scene, tmp_path):
+    file, log = tmp_path / "mine.py", tmp_path / "log.jsonl"
+    file.write_text(planner_file.read_text())
+    hamelin.run(free_scene, planner=f"python:{file}:Spring", duration=0.05, log=log)
+    inputs = {i["role"]: i for i in hamelin.read_log(log).header["provenance"]["inputs"]}
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert inputs["planner_file"]["sha256"] == digest
+    moved = tmp_path / "other" / "log.jsonl"  # replayed beside the file, wherever it is
+    moved.parent.mkdir()
+    log.rename(moved)
+    file.rename(moved.parent / "mine.py")
+    assert hamelin.verify(moved, tolerance=0)["to_the_bit"]
+    (moved.parent / "mine.py").write_text(planner_file.read_text() + "\n# changed\n")
+    with pytest.raises(hamelin.Error, match="mine.py: has changed since the log was written"):
+        hamelin.verify(moved)
 
 
 def test_an_object_of_an_interpreter_replays_with_an_object(free_scene, tmp_path):
@@ -403,6 +427,29 @@ def test_a_planner_of_python_in_a_control_loop(sampled_scene, planner_file):
     controller = hamelin.Controller(scene, planner=nested)
     answer = controller.tick(0.0, scene.start_q, np.zeros(7))
     assert answer.state == "stopping" and "expected a loop" in answer.cause
+
+
+def test_a_planner_of_python_with_a_load(sampled_scene, planner_file, tmp_path):
+    """attach() makes the planner again: of an object a copy, of a file a new object."""
+    scene = hamelin.Scene(sampled_scene)
+    name = hamelin.load_scene(write(tmp_path, sampled_scene), planner=f"python:{planner_file}:Spring")
+    for controller in (
+        hamelin.Controller(scene, planner=load(planner_file)()),
+        hamelin.Controller(name),
+    ):
+        q, v = scene.start_q, np.zeros(7)
+        a = 30.0 * (np.array(sampled_scene["goals"][0]["q"]) - q)
+        before = controller.tick(0.0, q, v).torque
+        np.testing.assert_allclose(before, scene.model.rnea(q, v, a), atol=1e-9)
+        load_number = controller.attach({"mass_kg": 1.0, "name": "cup"}, q)
+        answer = controller.tick(controller.period_s, q, v)
+        assert answer.load == load_number and answer.state == "running"
+        heavier = hamelin.Scene({**sampled_scene, "model": {"payload": {"mass_kg": 1.0}}}).model
+        np.testing.assert_allclose(answer.torque, heavier.rnea(q, v, a), atol=1e-9)
+        assert np.abs(answer.torque - before).max() > 1.0
+        controller.detach("cup", q)
+        answer = controller.tick(2 * controller.period_s, q, v)
+        np.testing.assert_allclose(answer.torque, before, atol=1e-9)
 
 
 def test_environment_variables_are_left_alone():

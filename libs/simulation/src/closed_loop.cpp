@@ -33,7 +33,8 @@ auto in_scene(const scene::Scene& scene, const char* place, F&& f) {
   }
 }
 
-std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Plugin& plugin) {
+std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Plugin& plugin,
+                                   const Json& params) {
   std::vector<log::Input> inputs = inputs_of(scene);
   if (scene.map) {
     inputs.push_back({"map", scene.map->file});
@@ -51,6 +52,10 @@ std::vector<log::Input> all_inputs(const scene::Scene& scene, const planning::Pl
     if (const auto file = scene::target_file(scene.goals[i]); !file.empty())
       inputs.push_back({fmt::format("target_{}", i), file});
   inputs.push_back({"plugin", plugin.file()});
+  for (const auto& name : plugin.file_params())
+    if (params[name].is_string())
+      inputs.push_back(
+          {fmt::format("{}{}", planner_file_role, name), params[name].get<std::string>()});
   return inputs;
 }
 
@@ -171,7 +176,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   if (judge_->has_self() && !judge_->self_field()->note().empty())
     result_.warnings.push_back(judge_->self_field()->note());
   actuation_->reserve(controller_->view().contacts_max());
-  inputs_ = all_inputs(scene, plugin);
+  inputs_ = all_inputs(scene, plugin, planner_params_);
 }
 
 void ClosedLoop::make_plant(const PlantFactory& factory) {

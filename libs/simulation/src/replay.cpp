@@ -13,6 +13,7 @@
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "scene_values.hpp"
 
 namespace hamelin::simulation {
 
@@ -79,7 +80,8 @@ std::vector<std::string> build_differences(const Json& then) {
 }
 
 // Roles of a run's input files, and the pointers at which its configuration names them.
-std::vector<std::pair<std::string, std::string>> file_pointers(const Json& config) {
+std::vector<std::pair<std::string, std::string>> file_pointers(const Json& header) {
+  const Json& config = header["config"];
   std::vector<std::pair<std::string, std::string>> places{{"robot", "/robot/file"},
                                                           {"spheres", "/robot/spheres"},
                                                           {"srdf", "/robot/srdf"},
@@ -98,13 +100,19 @@ std::vector<std::pair<std::string, std::string>> file_pointers(const Json& confi
   for (std::size_t i = 0; config.contains(goals) && i < config[goals].size(); ++i)
     for (const char* place : {"motion", "stream"})
       places.emplace_back(fmt::format("target_{}", i), fmt::format("/goals/{}/{}/file", i, place));
+  const Json::json_pointer inputs("/provenance/inputs");
+  for (std::size_t i = 0; header.contains(inputs) && i < header[inputs].size(); ++i)
+    if (const std::string role =
+            text_at(header, fmt::format("/provenance/inputs/{}/role", i).c_str());
+        role.starts_with(planner_file_role))
+      places.emplace_back(role, "/planner/params/" + role.substr(planner_file_role.size()));
   return places;
 }
 
 // Removes the paths of input files: these may differ, as their contents are checked by hash.
 void remove_paths(Json& header) {
   if (!header.contains("config")) return;
-  for (const auto& place : file_pointers(header["config"]))
+  for (const auto& place : file_pointers(header))
     if (const Json::json_pointer at(place.second); header["config"].contains(at))
       header["config"][at] = nullptr;
 }
@@ -143,8 +151,8 @@ class Comparison final : public log::LineSink {
     }
     for (Json* line : {&logged, &replayed}) {
       line->erase("timing");
-      line->erase("provenance");
       if (line->value("type", Json()) == "header") remove_paths(*line);
+      line->erase("provenance");
     }
     compare("", logged, replayed, logged);
     if (enough_) return;
@@ -252,7 +260,7 @@ Recorded read_header(const Json& header, const fs::path& log) {
 
   Json config = header["config"];
   const fs::path cwd = text_at(provenance, "/cwd");
-  for (const auto& [role, pointer] : file_pointers(config)) {
+  for (const auto& [role, pointer] : file_pointers(header)) {
     const Json::json_pointer at(pointer);
     if (!config.contains(at) || !config[at].is_string()) continue;
     const std::string sha256 = logged_hash(header, role);

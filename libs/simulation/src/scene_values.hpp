@@ -24,6 +24,9 @@ namespace hamelin::simulation {
                                            const std::vector<double>& values, const char* key,
                                            int dof);
 
+/// What the role of an input begins with that a parameter of the planner names: this, its name.
+inline constexpr std::string_view planner_file_role = "planner_";
+
 /// The files of scene, robot and spheres.
 [[nodiscard]] std::vector<log::Input> inputs_of(const scene::Scene& scene);
 

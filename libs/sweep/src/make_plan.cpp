@@ -13,6 +13,7 @@
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/overrides.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/judge.hpp"
 #include "sphere_on_path.hpp"
@@ -64,7 +65,11 @@ std::vector<std::string> split_values(const std::string& text) {
   return parts;
 }
 
-Variant parse_variant(const std::string& text) {
+Variant parse_variant(const std::string& text, const fs::path& directory) {
+  if (auto python = scene::python_planner(text, "--planner")) {
+    python->file = fs::proximate(python->file, directory).generic_string();
+    return {text, python->text(), {}};
+  }
   const auto colon = text.find(':');
   Variant variant{text, text.substr(0, colon), {}};
   if (variant.planner->empty())
@@ -83,12 +88,25 @@ Variant parse_variant(const std::string& text) {
 }
 
 std::vector<Variant> parse_variants(const PlanOptions& options,
-                                    const std::vector<std::string>& defaults) {
+                                    const std::vector<std::string>& defaults,
+                                    const fs::path& directory) {
   std::vector<Variant> variants;
   for (const auto& text : options.planners.empty() ? defaults : options.planners)
-    variants.push_back(parse_variant(text));
+    variants.push_back(parse_variant(text, directory));
   if (variants.empty()) variants.push_back({"", std::nullopt, {}});
   return variants;
+}
+
+// The one of these values that has this name.
+template <class T>
+T one_of(std::initializer_list<T> values, std::string_view name, std::string_view option) {
+  std::vector<std::string_view> names;
+  for (const T value : values) {
+    if (scene::to_string(value) == name) return value;
+    names.push_back(scene::to_string(value));
+  }
+  throw Error(ErrorCode::usage,
+              fmt::format("{}: '{}', expected one of {}", option, name, fmt::join(names, ", ")));
 }
 
 /// All combinations of the varied values.
@@ -408,8 +426,8 @@ class PlanBuilder {
   }
 
   void add_runs(Plan& plan) const {
-    const auto variants = parse_variants(options_, {}),
-               gain_variants = parse_variants(options_, {"apf", "gyro", "hybrid"});
+    const auto variants = parse_variants(options_, {}, directory_),
+               gain_variants = parse_variants(options_, {"apf", "gyro", "hybrid"}, directory_);
     const auto varied = combinations(options_.vary);
     const auto sets = draw_gains(options_.gains.sets, options_.gains.seed);
     for (const auto& entry : entries_) {
@@ -421,7 +439,7 @@ class PlanBuilder {
       for (std::size_t i = 0; i < sets.size(); ++i) {
         const std::string name = fmt::format("gains{:04}", i + 1);
         for (const auto& variant :
-             entry.reference ? std::vector{parse_variant("apf")} : gain_variants)
+             entry.reference ? std::vector{parse_variant("apf", directory_)} : gain_variants)
           for (const auto& values : varied)
             add_run_per_seed(plan, entry, variant, values, sets[i], name);
       }
@@ -494,6 +512,9 @@ class PlanBuilder {
       const scene::Scene scene = read_scene(run, directory_);
       for (const auto& file : scene::input_files(scene))
         files.insert(fs::proximate(file, directory_));
+      if (run.planner)
+        if (const auto python = scene::python_planner(*run.planner, "--planner"))
+          files.insert(python->file);
       if (scene.planner) planners.insert(scene.planner->name);
     }
     for (const auto& file : files)
@@ -542,6 +563,16 @@ class PlanBuilder {
 }  // namespace
 
 // docs/theory.md (13.24)
+scene::GoalType goal_type_from(std::string_view name, std::string_view option) {
+  return one_of({scene::GoalType::joint, scene::GoalType::position, scene::GoalType::pose}, name,
+                option);
+}
+
+scene::Prediction prediction_from(std::string_view name, std::string_view option) {
+  using enum scene::Prediction;
+  return one_of({path, constant_acceleration, constant_velocity, speed_bound}, name, option);
+}
+
 std::vector<Gains> draw_gains(std::size_t count, std::uint64_t seed) {
   Rng rng(seed);
   const auto power = [&](double low, double high) {

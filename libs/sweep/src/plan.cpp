@@ -7,6 +7,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "hamelin/scene/overrides.hpp"
 
 namespace hamelin::sweep {
 
@@ -139,15 +140,27 @@ Plan read_plan_file(const fs::path& file) {
   return plan;
 }
 
+namespace {
+
+// The planner as a run in any working directory is given it.
+std::optional<std::string> planner_from(const PlannedRun& run, const fs::path& directory) {
+  if (!run.planner) return {};
+  auto python = scene::python_planner(*run.planner, run.id);
+  if (!python) return run.planner;
+  python->file = resolve_path(directory, python->file).string();
+  return python->text();
+}
+
+}  // namespace
+
 scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   const fs::path file = resolve_path(directory, run.scene);
   Json document = read_json(file);
-  // the parameters of the scene's planner are not valid for another planner
-  if (run.planner && (!document.contains("planner") || !document["planner"].is_object() ||
-                      document["planner"].value("name", Json()) != *run.planner))
-    document["planner"] = {{"name", *run.planner}};
-  document["seed"] = run.seed;
-  for (const auto& assignment : run.set) scene::set_pointer(document, assignment);
+  scene::Overrides overrides;
+  overrides.planner = planner_from(run, directory);
+  overrides.seed = run.seed;
+  overrides.set = run.set;
+  scene::apply(overrides, "--planner", document);
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
@@ -206,7 +219,7 @@ std::vector<std::string> run_arguments(const PlannedRun& run, const fs::path& di
     arguments.emplace_back(option);
     arguments.push_back(value);
   };
-  if (run.planner) add("--planner", *run.planner);
+  if (const auto planner = planner_from(run, directory)) add("--planner", *planner);
   for (const auto& assignment : run.set) add("--set", assignment);
   add("--seed", fmt::format("{}", run.seed));
   return arguments;

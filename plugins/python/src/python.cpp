@@ -171,7 +171,7 @@ constexpr const char* schema = R"({
   "properties": {
     "file": {
       "description": "Python file that defines the class; relative to the working directory",
-      "type": ["string", "null"], "default": null
+      "type": ["string", "null"], "default": null, "input_file": true
     },
     "class": {"description": "name of the class in it", "type": ["string", "null"], "default": null},
     "object": {

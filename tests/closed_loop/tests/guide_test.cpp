@@ -1,10 +1,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "hamelin/control/plan_paths.hpp"
 #include "hamelin/guide/guide.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/read_log.hpp"
-#include "hamelin/simulation/plan_paths.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/temporary.hpp"
@@ -93,7 +93,7 @@ TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
 TEST_CASE("a guided run whose map changes in its way searches again", "[closed_loop][guide]") {
   if (!guide::available()) return;
   const scene::Scene scene = shelf({connect});
-  const simulation::PathPlan plan = simulation::plan_paths(scene);
+  const control::PathPlan plan = control::plan_paths(scene);
   REQUIRE(plan.found());
   CHECK(plan.goals.size() == 5);
   // A change far away from the arm: the paths stay clear.
@@ -108,8 +108,8 @@ TEST_CASE("a guided run whose map changes in its way searches again", "[closed_l
 TEST_CASE("plans have a certificate for each line and chain from goal to goal",
           "[closed_loop][guide]") {
   if (!guide::available()) return;
-  const simulation::PathPlan plan = simulation::plan_paths(shelf({connect}));
-  const Json document = simulation::to_json(plan);
+  const control::PathPlan plan = control::plan_paths(shelf({connect}));
+  const Json document = control::to_json(plan);
   check_shipped_schema(document, "path", "plan");
   for (std::size_t i = 0; i < plan.goals.size(); ++i) {
     const Eigen::MatrixXd& points = plan.goals[i].path.points;
@@ -117,9 +117,9 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
     for (const double clearance : plan.goals[i].clearance_m) CHECK(clearance > 0.0);
     if (i > 0) CHECK(points.col(0) == plan.goals[i - 1].path.points.rightCols(1));
   }
-  const Json again = simulation::to_json(simulation::plan_paths(shelf({connect})));
+  const Json again = control::to_json(control::plan_paths(shelf({connect})));
   CHECK(again["paths"][0]["q"] == document["paths"][0]["q"]);
-  CHECK(test::error_of([] { (void)simulation::plan_paths(shelf({})); })
+  CHECK(test::error_of([] { (void)control::plan_paths(shelf({})); })
             .ends_with("shelf.json: /planner/guide: is none, expected a guide such as "
                        "rrt-connect"));
 }

@@ -8,7 +8,7 @@
 #include "hamelin/io/json.hpp"
 #include "hamelin/scene/scene.hpp"
 
-namespace hamelin::simulation {
+namespace hamelin::control {
 
 /// The path to one goal of a scene, with its certificate.
 struct PlannedGoal {
@@ -38,10 +38,9 @@ struct PathPlan {
 ///         target, or a build without OMPL
 [[nodiscard]] PathPlan plan_paths(const scene::Scene& scene);
 /// The same with the scene's model and a world that were made before.
-[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm,
-                                  control::World& world);
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world);
 
 /// As hamelin.path/1, docs/schema/path.schema.json.
 [[nodiscard]] Json to_json(const PathPlan& plan);
 
-}  // namespace hamelin::simulation
+}  // namespace hamelin::control

@@ -68,20 +68,12 @@ inline constexpr double influence_m = 0.1;
 [[nodiscard]] double slow_duration(const MatrixXd& way_points, const VectorXd& velocity_limits);
 
 /// Optimises the motion from the start of a scene to its first goal, and from each goal to the
-/// next, among the obstacles that stand still.
-/// @param paths for each goal way-points from the configuration before it, dof × (2 or more), along
-///        which the guess goes; empty: along the goals' own paths, or straight
+/// next, among the obstacles that stand still. The first guess goes along the paths of the scene's
+/// guide; without a guide along the goals' own paths, or straight.
 /// @throws Error io, parse or invalid for bad input, a scene with damping or friction, goals of the
-///         tip without a path, or goals that follow a target
+///         tip without a guide, goals that follow a target, or if the guide finds no path
 [[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
-                                         const SceneMotionOptions& options,
-                                         const std::vector<MatrixXd>& paths = {});
-/// The same with the scene's model and a view of all its obstacles that were made before.
-/// @param view finds obstacles up to influence_m
-[[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
-                                         const SceneMotionOptions& options,
-                                         const model::Model& model, control::WorldView& view,
-                                         const std::vector<MatrixXd>& paths = {});
+                                         const SceneMotionOptions& options);
 
 /// As hamelin.trajectory/1, docs/schema/trajectory.schema.json.
 [[nodiscard]] Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <string>
 
 #include "hamelin/optimal/problem.hpp"
@@ -20,6 +21,8 @@ struct SolveOptions {
   double tolerance = 1e-8;
   /// Whether the guess is the solution of a similar problem. Used by Solver::banded.
   bool near_solution = false;
+  /// Asked before each iteration; true ends the solution. Optional.
+  std::function<bool()> stop;
 };
 
 /// What a solver found.

@@ -220,6 +220,8 @@ class Plugin {
   /// The JSON Schema of its parameters. Unknown keys are errors even if the plugin's text does not
   /// forbid them.
   [[nodiscard]] const Json& params_schema() const noexcept;
+  /// Names of the parameters that the schema marks as files by "input_file": true.
+  [[nodiscard]] std::vector<std::string> file_params() const;
 
   /// Whether its tick may use the heap, and whether it starts threads, by its own declaration.
   [[nodiscard]] bool tick_allocates() const noexcept;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hamelin/scene/make.hpp"
@@ -65,6 +66,13 @@ struct PlanOptions {
   /// makes the paths on which spheres are placed.
   std::vector<std::filesystem::path> plugin_directories;
 };
+
+/// The kind of goal that problems get: joint, position or pose.
+/// @param option what the caller calls it, for messages @throws Error usage for another one
+[[nodiscard]] scene::GoalType goal_type_from(std::string_view name, std::string_view option);
+/// What is known of a sphere that swings: path, constant-acceleration, constant-velocity or
+/// speed-bound. @throws Error usage for another one
+[[nodiscard]] scene::Prediction prediction_from(std::string_view name, std::string_view option);
 
 /// A gain set for example 5.2 of the paper. U(a, b) is uniform in [a, b].
 struct Gains {

@@ -42,6 +42,7 @@ struct PlannedScene {
 struct PlannedRun {
   std::string id;     ///< unique in the plan
   std::string scene;  ///< PlannedScene::file
+  /// A name, or "python:FILE:CLASS" with a file relative to the plan; none: the scene's.
   std::optional<std::string> planner;
   std::vector<std::string> set;  ///< "/json/pointer=VALUE", applied in this order after the planner
   std::uint64_t seed = 1;

@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "arguments.hpp"
+#include "bound_scene.hpp"
+#include "hamelin/control/plan_paths.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/optimal/scene_motion.hpp"
+#include "hamelin/simulation/explain.hpp"
+#include "interrupts.hpp"
+#include "module.hpp"
+
+namespace hamelin::python {
+
+namespace {
+
+py::object plan(const BoundScene& scene) {
+  control::PathPlan found;
+  {
+    const py::gil_scoped_release unlocked;
+    found = control::plan_paths(scene.scene);
+  }
+  return to_python(control::to_json(found));
+}
+
+// The value of an option, within what `hamelin optimize` accepts.
+template <class T>
+T within(const char* argument, T value, T least, T most) {
+  if (!(value >= least && value <= most))
+    refuse("optimize", argument, fmt::format("{}, expected {} to {}", value, least, most));
+  return value;
+}
+
+std::optional<double> positive(const char* argument, const std::optional<double>& value) {
+  return value ? std::optional(within(argument, *value, 1e-9, 1e12)) : value;
+}
+
+template <class T>
+T one_of(const char* argument, const std::string& given, const char* first, T a, const char* second,
+         T b) {
+  if (given == first) return a;
+  if (given == second) return b;
+  refuse("optimize", argument, fmt::format("'{}', expected {} or {}", given, first, second));
+}
+
+optimal::SceneMotionOptions options_of(const py::dict& given) {
+  const auto number = [&](const char* key) {
+    return positive(key, given[key].cast<std::optional<double>>());
+  };
+  optimal::SceneMotionOptions options;
+  options.objective = one_of("minimize", given["minimize"].cast<std::string>(), "effort",
+                             optimal::Objective::effort, "time", optimal::Objective::time);
+  options.solve.solver = one_of("solver", given["solver"].cast<std::string>(), "banded",
+                                optimal::Solver::banded, "ipopt", optimal::Solver::ipopt);
+  options.intervals = within("intervals", given["intervals"].cast<int>(), optimal::least_intervals,
+                             optimal::most_intervals);
+  options.margin_m = within("margin", given["margin"].cast<double>(), 0.0, 0.1);
+  options.limit_share = within("limit_share", given["limit_share"].cast<double>(), 0.01, 1.0);
+  options.duration_s = number("duration");
+  options.acceleration = number("acceleration");
+  options.jerk = number("jerk");
+  return options;
+}
+
+py::tuple optimize(const BoundScene& scene, const py::dict& given) {
+  optimal::SceneMotionOptions options = options_of(given);
+  const auto rate = positive("rate", given["rate"].cast<std::optional<double>>());
+  InterruptCheck interrupts;
+  options.solve.stop = [&interrupts] { return interrupts.check(); };
+  Json document;
+  bool valid = false;
+  {
+    const py::gil_scoped_release unlocked;
+    const optimal::SceneMotion motion = optimal::optimize_scene(scene.scene, options);
+    valid = motion.valid();
+    document = optimal::to_json(motion, options, rate);
+  }
+  interrupts.rethrow();
+  return py::make_tuple(to_python(document), valid);
+}
+
+py::tuple explain(py::handle log, int motions, std::uint64_t seed, const py::object& progress) {
+  if (motions < 1 || motions > 1'000'000)
+    refuse("explain", "motions", fmt::format("{}, expected 1 to 1000000", motions));
+  InterruptCheck interrupts;
+  simulation::ExplainOptions options;
+  options.motions = motions;
+  options.seed = seed;
+  options.progress = [&](double done, double all) {
+    interrupts.raise();
+    if (progress.is_none()) return;
+    const py::gil_scoped_acquire locked;
+    progress(done, all);
+  };
+  const auto file = path_of(log);
+  Json document;
+  std::string nothing;
+  {
+    const py::gil_scoped_release unlocked;
+    const simulation::Explanation explanation = simulation::explain(file, options);
+    nothing = explanation.nothing;
+    document = simulation::to_json(explanation);
+  }
+  return py::make_tuple(to_python(document), nothing);
+}
+
+}  // namespace
+
+void add_motions(py::module_& module) {
+  using py::arg;
+  module.def("_plan", &plan, arg("scene"), "The document of `hamelin plan`.");
+  module.def("_optimize", &optimize, arg("scene"), arg("options"),
+             "The document of `hamelin optimize`, and whether the motion is valid.");
+  module.def("_explain", &explain, arg("log"), arg("motions"), arg("seed"), arg("progress"),
+             "The document of `hamelin explain`, and why there is nothing to explain.");
+}
+
+}  // namespace hamelin::python

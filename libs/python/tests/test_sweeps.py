@@ -1,0 +1,94 @@
+"""Plans of many runs, as the program makes them."""
+
+import json
+import subprocess
+
+import hamelin
+import pytest
+
+
+def plan_by_program(program, folder, *arguments):
+    done = subprocess.run(
+        [program, "sweep", "plan", *map(str, arguments), "-o", folder, "--json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_clutter_is_planned_as_by_the_program(program, scenes, tmp_path):
+    plan = hamelin.plan_sweep(
+        tmp_path / "python", base=scenes / "clutter.json", clutter=2, pairs=2, primitives=12,
+        keep_out=[[0, 0, 0.2, 0.4], [0, 0, 0.6, 0.2]], draw_seed=7, seeds=[1, 2], planner="hybrid",
+        sizes=(0.05, 0.15),
+    )  # fmt: skip
+    expected = plan_by_program(
+        program, tmp_path / "program", "--base", scenes / "clutter.json", "--clutter", 2,
+        "--pairs", 2, "--primitives", 12, "--keep-out", "0,0,0.2,0.4", "--keep-out", "0,0,0.6,0.2",
+        "--draw-seed", 7, "--seeds", "1,2", "--planner", "hybrid", "--sizes", "0.05,0.15",
+    )  # fmt: skip
+    for key in ("scenes", "feasible", "runs", "sha256"):
+        assert plan[key] == expected[key]
+    assert plan["runs"] == 8
+
+
+def test_gain_sets(program, scenes, tmp_path):
+    plan = hamelin.plan_sweep(
+        tmp_path / "gains", base=scenes / "paper_52_apf.json", gain_sets=2, duration=0.04
+    )
+    expected = plan_by_program(
+        program, tmp_path / "other", "--base", scenes / "paper_52_apf.json", "--gain-sets", 2,
+        "--duration", 0.04,
+    )  # fmt: skip
+    assert plan["sha256"] == expected["sha256"]
+    swept = hamelin.sweep(tmp_path / "gains", limit=2)
+    assert swept.run["run"] == 2
+
+
+def test_a_planner_of_python_in_a_sweep(program, scenes, tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n"
+        "    def __init__(self, k=1.0):\n        self.params = {'k': k}\n"
+        "    def tick(self, tick, command):\n"
+        "        command.held_torque = self.params['k'] * tick.v\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    plan = hamelin.plan_sweep(
+        "tries", scenes / "pillar.json", planner=["python:mine.py:Mine", "apf"], duration=0.02,
+        vary="/seed=1",
+    )  # fmt: skip
+    assert plan["runs"] == 2
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")  # the plan knows where the planner is
+    swept = hamelin.sweep("../tries")
+    assert swept.run["run"] == 2 and swept.run["crashed"] == 0
+    assert {record["outcome"] for record in swept.records()} == {"timeout"}
+    (tmp_path / "mine.py").write_text("class Mine:\n    pass\n")
+    with pytest.raises(hamelin.Error, match="mine.py: has changed since the sweep was planned"):
+        hamelin.sweep("../tries", fresh=True)
+
+
+@pytest.mark.parametrize(
+    "wrong, text",
+    [
+        ({"goal": "far"}, "goal: 'far', expected one of joint, position, pose"),
+        ({"pairs": 0}, "pairs: 0, expected 1"),
+        ({"sizes": [1.0]}, "sizes"),
+        ({"keep_out": [1.0, 2.0]}, "keep_out"),
+        ({"mark": "all"}, "mark|all"),
+        ({"planner": "python:mine.py"}, "expected python:FILE:CLASS"),
+        ({"sphere_on_path": 0.05, "swing": [0.1, -1.0]}, "swing"),
+        ({"sphere_on_path": 0.05, "prediction": "magic"}, "prediction: 'magic'"),
+    ],
+)
+def test_wrong_plans(scenes, tmp_path, wrong, text):
+    with pytest.raises(hamelin.Error, match=text):
+        hamelin.plan_sweep(tmp_path / "tries", scenes / "pillar.json", **wrong)
+    with pytest.raises(TypeError):
+        hamelin.plan_sweep(tmp_path / "tries", scenes / "pillar.json", clutter="many")
+
+
+def test_the_data_that_ships():
+    assert hamelin.load_scene(hamelin.data_path("scenes/shelf.json")).model.dof == 7
+    with pytest.raises(hamelin.Error, match="does not exist, expected one of"):
+        hamelin.data_path("scenes/missing.json")
