@@ -115,7 +115,7 @@ def test_explain(program, robots, tmp_path):
     explanation = hamelin.explain(log, motions=50, seed=2)
     assert dict(explanation) == documents(program, "explain", log, "--motions", 50, "--seed", 2)
     assert explanation and explanation["verdict"] in repr(explanation)
-    assert explanation["contact"]["obstacle"] == "ball"
+    assert explanation["mover_contact"]["obstacle"] == "ball"
     with pytest.raises(hamelin.Error, match="motions"):
         hamelin.explain(log, motions=0)
     hamelin.run(scene, log=log, set='/obstacles=[]', duration=0.1)
