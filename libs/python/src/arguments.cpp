@@ -216,10 +216,27 @@ Json integer(py::handle object) {
   return Json(large);
 }
 
+// A value without JSON; its place is completed on the way up.
+struct NoJson {
+  bool wrong_type;
+  std::string text, place;
+};
+
+// Calls f, whose exceptions get the place `key`.
+template <class F>
+Json at_place(const F& f, const std::string& key) {
+  try {
+    return f();
+  } catch (NoJson& e) {
+    e.place.insert(0, "/" + key);
+    throw;
+  }
+}
+
 Json sequence(py::handle object, int depth) {
   Json out = Json::array();
   for (const auto& item : py::reinterpret_borrow<py::object>(object))
-    out.push_back(json_of(item, depth));
+    out.push_back(at_place([&] { return json_of(item, depth); }, fmt::format("{}", out.size())));
   return out;
 }
 
@@ -232,14 +249,15 @@ Json json_of(py::handle object, int depth) {
   if (PyFloat_Check(object.ptr()) != 0) {
     const double value = PyFloat_AsDouble(object.ptr());
     if (!std::isfinite(value))
-      throw Error(ErrorCode::usage, fmt::format("JSON: {}, expected a finite number", value));
+      throw NoJson{false, fmt::format("{}, expected a finite number", value), ""};
     return value;
   }
   if (PyDict_Check(object.ptr()) != 0) {
     Json out = Json::object();
     for (const auto& [key, value] : py::reinterpret_borrow<py::dict>(object)) {
       if (PyUnicode_Check(key.ptr()) == 0) throw py::type_error("JSON: a key is not a str");
-      out[text_of(key)] = json_of(value, depth + 1);
+      const std::string name = text_of(key);
+      out[name] = at_place([&, &member = value] { return json_of(member, depth + 1); }, name);
     }
     return out;
   }
@@ -247,15 +265,22 @@ Json json_of(py::handle object, int depth) {
     return sequence(object, depth + 1);
   if (py::hasattr(object, "tolist")) return json_of(object.attr("tolist")(), depth + 1);
   if (py::hasattr(object, "__fspath__")) return text_of(object.attr("__fspath__")());
-  throw py::type_error(
-      fmt::format("JSON: {}, expected dict, list, str, float, int, bool, None or an array",
-                  py::str(py::type::of(object).attr("__name__")).cast<std::string>()));
+  throw NoJson{true,
+               fmt::format("{}, expected dict, list, str, float, int, bool, None or an array",
+                           py::str(py::type::of(object).attr("__name__")).cast<std::string>()),
+               ""};
 }
 
 }  // namespace
 
 Json to_json(py::handle object) {
-  return json_of(object, 0);
+  try {
+    return json_of(object, 0);
+  } catch (const NoJson& e) {
+    const std::string text = fmt::format("{}: {}", e.place.empty() ? "/" : e.place, e.text);
+    if (e.wrong_type) throw py::type_error(text);
+    throw Error(ErrorCode::usage, text);
+  }
 }
 
 std::filesystem::path path_of(py::handle given) {

@@ -215,6 +215,15 @@ def test_scenes(program, scenes, tmp_path):
     assert raised.value.place == "/step_s" and raised.value.code == "invalid"
 
 
+def test_values_without_json_are_named(scenes):
+    document = hamelin.load_scene(scenes / "pillar.json").document
+    goals = [{"type": "joint", "q": [0.0, np.inf]}]
+    with pytest.raises(hamelin.Error, match="^/goals/0/q/1: inf, expected a finite number"):
+        hamelin.run({**document, "goals": goals})
+    with pytest.raises(TypeError, match="^/planner/params: set, expected dict"):
+        hamelin.run({**document, "planner": {"name": "apf", "params": {1}}})
+
+
 def test_outputs_do_not_replace_inputs(scenes):
     with pytest.raises(hamelin.Error, match="is an input of the run"):
         hamelin.run(scenes / "shelf.json", log=scenes / "shelf.json")
