@@ -1,8 +1,9 @@
 # %% [markdown]
-# # Following a moving target
+# # Following a target that moves
 #
-# A `Controller` is the control loop of a robot. The program tells it where the target is, and each
-# tick turns the measured state of the arm into torques. Here an integrator is in place of the robot.
+# `Controller` is hamelin's control loop without a simulation: each tick takes the measured state
+# and answers with torques. The script moves a target along a figure of eight, and an integrator
+# takes the place of the robot. The plots show the path of the tip and its distance from the target.
 
 # %%
 import matplotlib.pyplot as plt
@@ -10,37 +11,63 @@ import numpy as np
 
 import hamelin
 
-scene = hamelin.load_scene(hamelin.data_path("scenes/pillar.json"), set='/goals=[{"type":"follow"}]')
+# %% [markdown]
+# ## The controller
+# A goal of the type "follow" without a motion waits for targets that the program streams.
+
+# %%
+file = hamelin.data_path("scenes/follow.json")
+document = hamelin.load_scene(file).document
+document["goals"] = [{"type": "follow"}]
+scene = hamelin.Scene(document, folder=file.parent)
 controller = hamelin.Controller(scene)
-arm = scene.model
-integrator = hamelin.Integrator(arm)
-state = integrator.start(scene.start_q)
-
-# %%
-h = controller.period_s
+arm, period_s = scene.model, controller.period_s
 start = arm.tip_pose(scene.start_q)
-steps, radius, rate = 6000, 0.1, 1.0
-tip, target = np.empty((steps, 3)), np.empty((steps, 3))
-for k in range(steps):
-    phase = rate * k * h
+
+
+def target_pose(time_s: float) -> np.ndarray:
+    """The target's pose: it starts at rest at the tip and then moves along a figure of eight."""
+    phase = 0.25 * 2.0 * np.pi * (time_s - 1.0 + np.exp(-time_s))
     pose = start.copy()
-    pose[:3, 3] += radius * np.array([0.0, np.sin(phase), 1.0 - np.cos(phase)])
-    velocity = radius * rate * np.array([0.0, np.cos(phase), np.sin(phase)])
-    controller.set_target(k * h, pose, velocity=velocity)
-    answer = controller.tick(k * h, state.q, integrator.velocity(state))
-    integrator.step(state, h, hamelin.Channels(held_torque=answer.torque))
-    tip[k], target[k] = arm.tip_pose(state.q)[:3, 3], pose[:3, 3]
+    pose[1, 3] += 0.20 * np.sin(phase)
+    pose[2, 3] += 0.08 * np.sin(2.0 * phase)
+    return pose
+
+
+# %% [markdown]
+# ## The loop
+# The target's velocity is not given, so the controller estimates it from the poses. At `jump_s` the
+# target jumps upwards by `jump_m`, and the arm catches up.
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4), layout="constrained")
-left.plot(target[:, 1], target[:, 2], "--", color="0.4", label="target")
-left.plot(tip[:, 1], tip[:, 2], label="tip")
-left.set_xlabel("y [m]")
-left.set_ylabel("z [m]")
-left.set_aspect("equal")
-left.legend(loc="center")
-right.semilogy(h * np.arange(steps), 1e3 * np.linalg.norm(tip - target, axis=1))
-right.set_xlabel("time [s]")
-right.set_ylabel("distance of the tip from the target [mm]")
-right.grid(True, alpha=0.3)
+robot = hamelin.Integrator(arm, "rk4")
+state = robot.start(scene.start_q)
+duration_s, jump_s, jump_m = 12.0, 8.0, 0.05
+times_s = np.arange(round(duration_s / period_s)) * period_s
+targets, tips = [], []
+for time_s in times_s:
+    target = target_pose(time_s)
+    if time_s >= jump_s:
+        target[2, 3] += jump_m
+    controller.set_target(time_s, target)
+    answer = controller.tick(time_s, state.q, robot.velocity(state))
+    targets.append(target[:3, 3])
+    tips.append(arm.tip_pose(state.q)[:3, 3])
+    report = robot.step(state, period_s, hamelin.Channels(held_torque=answer.torque))
+    assert report.converged
+print(f"controller at the end: {answer.state}")
+
+# %%
+target_m, tip_m = np.array(targets), np.array(tips)
+error_mm = 1e3 * np.linalg.norm(tip_m - target_m, axis=1)
+figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+axes[0].plot(*target_m[:, 1:].T, ".", markersize=2, color="#E69F00", label="target")
+axes[0].plot(*tip_m[:, 1:].T, color="#0072B2", linewidth=1.0, label="tip")
+axes[0].set(xlabel="y [m]", ylabel="z [m]", ylim=(0.36, 0.66), aspect="equal", title="seen along x")
+axes[0].legend(loc="lower center", ncols=2, markerscale=4)
+axes[1].semilogy(times_s, np.maximum(error_mm, 1e-3), color="#0072B2")
+axes[1].axvline(jump_s, color="gray", linestyle=":", label="jump of the target")
+axes[1].set(xlabel="time [s]", ylabel="distance of tip and target [mm]", title="tracking error")
+axes[1].grid(True, alpha=0.3)
+axes[1].legend(loc="upper left")
 plt.show()
