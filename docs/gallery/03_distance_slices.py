@@ -30,7 +30,7 @@ resolution_m = 0.005
 
 
 def distances(normal: str, value: float) -> tuple[list[str], list[np.ndarray], np.ndarray, float]:
-    """The distance on a plane: names and values of its axes, the field, and the time of the call."""
+    """The distance on a plane: names and values of its axes, the field, the time of the call."""
     names = [name for name in "xyz" if name != normal]
     lines = [np.arange(*ranges[name], resolution_m) for name in names]
     first, second = np.meshgrid(*lines)

@@ -15,7 +15,8 @@ import hamelin
 # ## The class
 # `params_schema` gives defaults and bounds of the parameters. `influence_m` is the distance up to
 # which `tick.contacts` lists obstacle points. The planner asks for accelerations and converts them
-# to torques by inverse dynamics.
+# to torques by inverse dynamics. Only the nearest obstacle point pushes, through the Jacobian of the
+# arm's point that is nearest to it.
 
 
 # %%
@@ -44,8 +45,11 @@ class Push:
             near = min(tick.contacts, key=lambda contact: contact["distance_m"])
             away = near["arm_point_m"] - near["obstacle_point_m"]
             away /= max(np.linalg.norm(away), 1e-9)
+            link = int(near["link"])
+            pose = self.arm.forward_kinematics(tick.q)[link]
+            point = pose[:3, :3].T @ (near["arm_point_m"] - pose[:3, 3])  # in the link's frame
+            jacobian = self.arm.jacobian(tick.q, link, point)[3:]
             closeness = 1.0 - near["distance_m"] / self.influence_m
-            jacobian = self.arm.jacobian(tick.q)[3:]  # of the tip, which is close to the contacts
             a += self.params["push"] * closeness * (jacobian.T @ away)
         command.held_torque = self.arm.rnea(tick.q, tick.v, a)
 
@@ -67,7 +71,8 @@ logs = {}
 for name, planner in planners.items():
     result = hamelin.run(scene, planner=planner, duration=6.0, log="own.jsonl")
     logs[name] = result.read_log()
-    print(f"{name}: {result.outcome} after {result.time_s:.3f} s, {result.shield['stops']} stops")
+    causes = result.shield["causes"]
+    print(f"{name}: {result.outcome} after {result.time_s:.3f} s, stops of the shield: {causes}")
 
 # %%
 colors = ["#000000", "#D55E00", "#009E73", "#0072B2"]
@@ -80,7 +85,8 @@ for (name, log), color in zip(logs.items(), colors):
     axes[1].plot(log.time_s, deviation, color=color, label=f"{name}: {log.result['outcome']}")
 obstacle = scene.document["obstacles"][0]
 axes[0].add_patch(plt.Circle(obstacle["position_m"][:2], obstacle["radius_m"], color="#bbbbbb"))
-axes[0].set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(0.35, 0.75), title="tip from above")
+axes[0].set(xlabel="x [m]", ylabel="y [m]", xlim=(0.35, 0.75), title="tip from above")
+axes[0].set_aspect("equal")
 axes[1].set(xlabel="time [s]", ylabel="largest joint deviation [rad]", title="distance to the goal")
 axes[1].grid(True, alpha=0.3)
 axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 0.2))

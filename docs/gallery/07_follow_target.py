@@ -65,6 +65,7 @@ axes[0].plot(*target_m[:, 1:].T, ".", markersize=2, color="#E69F00", label="targ
 axes[0].plot(*tip_m[:, 1:].T, color="#0072B2", linewidth=1.0, label="tip")
 axes[0].set(xlabel="y [m]", ylabel="z [m]", ylim=(0.36, 0.66), aspect="equal", title="seen along x")
 axes[0].legend(loc="lower center", ncols=2, markerscale=4)
+# The error at the start is zero, which has no logarithm, so the plot begins at 1e-3 mm.
 axes[1].semilogy(times_s, np.maximum(error_mm, 1e-3), color="#0072B2")
 axes[1].axvline(jump_s, color="gray", linestyle=":", label="jump of the target")
 axes[1].set(xlabel="time [s]", ylabel="distance of tip and target [mm]", title="tracking error")

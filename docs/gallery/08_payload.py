@@ -22,7 +22,7 @@ motion_s = 2.0
 
 
 def motion(time_s: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, velocity and acceleration at a time, a polynomial of order five from rest to rest."""
+    """Position, velocity and acceleration of a polynomial of order five from rest to rest."""
     s = np.clip(np.asarray(time_s) / motion_s, 0.0, 1.0)[..., None]
     way = goal - start
     velocity = way * 30.0 * s**2 * (1.0 - s) ** 2 / motion_s
@@ -78,8 +78,10 @@ for name, (scene, model, color) in runs.items():
     print(f"{name}: tip at most {error_mm.max():.2g} mm from its motion")
     axes[0].plot(log.time_s, log.tau[:, 1], color=color, label=name)
     axes[1].plot(log.time_s, log.tau[:, 3], color=color)
+    # The error at the start is zero, which has no logarithm, so the plot begins at 1e-4 mm.
     axes[2].semilogy(log.time_s, np.maximum(error_mm, 1e-4), color=color)
-for axis, label in zip(axes, ["torque of joint 2 [Nm]", "torque of joint 4 [Nm]", "tip error [mm]"]):
+labels = ["torque of joint 2 [Nm]", "torque of joint 4 [Nm]", "tip error [mm]"]
+for axis, label in zip(axes, labels):
     axis.set_ylabel(label)
     axis.grid(True, alpha=0.3)
 axes[0].legend()

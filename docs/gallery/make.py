@@ -21,7 +21,7 @@ BYTES_MAX = 90_000
 INTRODUCTION = """# Gallery
 
 Ten short scripts that show what hamelin does from Python, with pictures. Copy from them what you
-need. Each script needs hamelin, numpy and matplotlib, one of them pandas, and opens as a notebook
+need. Each script needs hamelin, numpy and matplotlib, two need pandas, and each opens as a notebook
 in Jupyter (with Jupytext), VS Code and Spyder. [libs/python](../../libs/python/README.md) describes
 the package and how to install it. To run a script from the root of the repository:
 
@@ -77,7 +77,7 @@ def parse_cells(script: Path) -> list[tuple[str, str]]:
 def read_summary(script: Path) -> tuple[str, str]:
     """Title and first paragraph of a script."""
     cells = parse_cells(script)
-    match = re.match(r"# (.+)\n\n(.+?)(?:\n\n|$)", cells[0][1], re.DOTALL) if cells else None
+    match = re.match(r"# ([^\n]+)\n\n(.+?)(?:\n\n|$)", cells[0][1], re.DOTALL) if cells else None
     if not match or cells[0][0] != "markdown":
         raise GalleryError(f"{script.name}: first cell: no title, expected '# Title' and a text")
     return match[1], match[2]
@@ -185,7 +185,7 @@ def compare_names(expected: set[str], present: set[str]) -> None:
     for name in sorted(expected - present):
         raise GalleryError(f"images/{name}: missing, expected the picture that its script makes")
     for name in sorted(present - expected):
-        raise GalleryError(f"images/{name}: its script makes no such picture, expected no such file")
+        raise GalleryError(f"images/{name}: not made by its script, expected no such file")
 
 
 def write_notebook(script: Path, folder: Path) -> None:
@@ -208,7 +208,7 @@ def main() -> int:
     """Reads the arguments and does what they ask for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scripts", nargs="*", help="name scripts to run (default: all)")
-    parser.add_argument("--check", action="store_true", help="check scripts, pictures and README.md")
+    parser.add_argument("--check", action="store_true", help="check scripts, pictures, README.md")
     parser.add_argument("--notebooks", metavar="DIR", help="write the scripts as notebooks to DIR")
     parser.add_argument("--run-one", nargs=2, help=argparse.SUPPRESS)
     given = parser.parse_args()
