@@ -153,7 +153,7 @@ def main() -> int:
     if missing := missing_tools(options.package):
         print(f"skipped: {missing}")
         return 77
-    version = subprocess.run([options.program, "--version"], check=True, capture_output=True, text=True).stdout.split()[1]
+    version = subprocess.run([options.program, "--version"], check=True, capture_output=True, text=True).stdout.strip()
     out = options.out.resolve()
     with tempfile.TemporaryDirectory() as scratch:
         work = Path(scratch)

@@ -287,7 +287,7 @@ def template(node: xml.Element) -> str:
 def tidy(text: str) -> str:
     """`const Model& model` as the sources write it, instead of `const Model & model`."""
     text = re.sub(r"< ", "<", re.sub(r" >", ">", text))
-    return re.sub(r" ([&*]+)", r"\1", text)
+    return re.sub(r" ([&*]+)(?=\w)", r"\1 ", re.sub(r" ([&*]+)(?!\w)", r"\1", text))
 
 
 def declared(node: xml.Element) -> list[str]:

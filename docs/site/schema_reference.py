@@ -65,7 +65,9 @@ def table(schema: dict) -> list[str]:
         if bounds := bounds_of(child):
             values += f", {bounds}"
         default = f"`{json.dumps(child['default'])}`" if "default" in child else "required" if required else ""
-        lines.append(f"| `{key}` | {cell(values)} | {cell(default)} | {cell(child.get('description', ''))} |")
+        name = key.replace(".", ".<wbr>")
+        lines.append(f'| <code class="literal key">{name}</code> |'
+                     f" {cell(values)} | {cell(default)} | {cell(child.get('description', ''))} |")
     return lines if len(lines) > 2 else []
 
 

@@ -82,7 +82,8 @@ class Stage:
         """Stages a page with its links."""
         out = []
         for code, part in split_code(text):
-            out.append(part if code else LINK.sub(
+            # Pygments takes lines without a prompt for output in blocks of the language console.
+            out.append(part.replace("```console", "```sh", 1) if code else LINK.sub(
                 lambda match: match[1] + self.resolve(page, match[2], match[1].startswith("!")) + match[3], part))
         self.write(page, "".join(out) + extra)
 
@@ -122,11 +123,12 @@ def toctree(folder: str, pages: list[str] | dict[str, str], caption: str = "", h
 
 
 def linked_pages(stage: Stage, page: str, text: str) -> dict[str, str]:
-    """The pages that a page links to, in order, as names below the top, with the texts of the links."""
+    """The pages that a page links to, in order, as names below the top, with the texts of the links. Links to a place
+    in a page do not count."""
     found: dict[str, str] = {}
     for code, part in split_code(text):
         for match in [] if code else LINK.finditer(part):
-            link = stage.resolve(page, match[2], match[1].startswith("!")).split("#")[0]
+            link = stage.resolve(page, match[2], match[1].startswith("!"))
             if link.endswith(".md") and "://" not in link:
                 name = os.path.normpath(os.path.join(os.path.dirname(page), link))
                 title = " ".join(match[1].strip("![](").split())
