@@ -24,19 +24,19 @@ picture() {
   local name=$1 time=$2 size=$3
   shift 3
   "$program" --quiet report "${@/#/$work/}" -o "$work/$name.html"
-  node tests/report/shot.mjs "$work/$name.html" "docs/images/$name.jpg" --time "$time" --size "$size" --scale 1.6
+  node tests/report/shot.mjs "$work/$name.html" "docs/images/$name.jpg" --time "$time" --size "$size" --scale 1.3333
 }
 
 for name in "${names[@]}"; do
   case $name in
-    shelf) run data/scenes/shelf.json shelf.jsonl --every 4 && picture shelf 6.2 1200x806 shelf.jsonl ;;
+    shelf) run data/scenes/shelf.json shelf.jsonl && picture shelf 6.2 1440x968 shelf.jsonl ;;
     paper_52)
-      for planner in apf gyro hybrid; do run "data/scenes/paper_52_$planner.json" "$planner.jsonl" --every 4; done
-      picture paper_52 8 1200x806 apf.jsonl gyro.jsonl hybrid.jsonl
+      for planner in apf gyro hybrid; do run "data/scenes/paper_52_$planner.json" "$planner.jsonl"; done
+      picture paper_52 8 1440x968 apf.jsonl gyro.jsonl hybrid.jsonl
       ;;
-    shelf_person) run data/scenes/shelf_person.json person.jsonl --every 4 && picture shelf_person 7.3 1000x672 person.jsonl ;;
-    carry) run data/scenes/shelf_carry.json carry.jsonl --every 4 && picture carry 5 1000x672 carry.jsonl ;;
-    follow) run data/scenes/follow_shelf.json follow.jsonl --every 10 && picture follow 6 1000x672 follow.jsonl ;;
+    shelf_person) run data/scenes/shelf_person.json person.jsonl && picture shelf_person 7.3 1200x806 person.jsonl ;;
+    carry) run data/scenes/shelf_carry.json carry.jsonl && picture carry 5 1200x806 carry.jsonl ;;
+    follow) run data/scenes/follow_shelf.json follow.jsonl && picture follow 6 1200x806 follow.jsonl ;;
     tutorial)
       # The files of the tutorial, as its pages say to save them.
       for page in docs/tutorial/*.md; do
@@ -45,8 +45,8 @@ for name in "${names[@]}"; do
       done
       "$program" --quiet robot fit "$work/my_arm.urdf" -o "$work/my_arm.spheres.json"
       "$program" --quiet scene make --primitives "$work/my_cell.primitives.json" -o "$work/my_cell.bt"
-      run "$work/my_first_scene.json" mine.jsonl --every 4
-      picture tutorial 1.5 1000x672 mine.jsonl
+      run "$work/my_first_scene.json" mine.jsonl
+      picture tutorial 1.5 1200x806 mine.jsonl
       ;;
     *)
       echo "make_images.sh: '$name': there is no such picture" >&2

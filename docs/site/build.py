@@ -74,7 +74,8 @@ def add_commands(stage: Stage, program: Path) -> None:
         children = [f"{folder}/{name}.md" for name in rest if name.startswith(f"{parent}-")]
         if children:
             page = stage.target / folder / f"{parent}.md"
-            page.write_text(page.read_text(encoding="utf-8") + toctree(folder, children, hidden=False), encoding="utf-8")
+            text = page.read_text(encoding="utf-8") + toctree(folder, children, hidden=False)
+            page.write_text(text, encoding="utf-8")
     overview = (stage.target / folder / f"{top}.md").read_text(encoding="utf-8")
     (stage.target / folder / f"{top}.md").unlink()
     overview = re.sub(r"^# .*", "# Command line", overview)

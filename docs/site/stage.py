@@ -20,8 +20,8 @@ LANGUAGES = {".py": "python", ".cpp": "cpp", ".hpp": "cpp", ".h": "cpp", ".c": "
 
 
 def tracked(source: Path, *patterns: str) -> list[str]:
-    names = subprocess.run(["git", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard", *patterns],
-                           check=True, capture_output=True, text=True)
+    command = ["git", "-c", "safe.directory=*", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.run([*command, *patterns], check=True, capture_output=True, text=True)
     return sorted(set(filter(None, names.stdout.split("\0"))))
 
 

@@ -238,8 +238,8 @@ class Runner:
 
 
 def tracked(source: Path, *patterns: str) -> list[str]:
-    done = subprocess.run(["git", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard", *patterns],
-                          check=True, capture_output=True, text=True)
+    command = ["git", "-c", "safe.directory=*", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    done = subprocess.run([*command, *patterns], check=True, capture_output=True, text=True)
     return sorted(name for name in done.stdout.split("\0") if name and (source / name).is_file())
 
 
