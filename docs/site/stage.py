@@ -20,9 +20,10 @@ LANGUAGES = {".py": "python", ".cpp": "cpp", ".hpp": "cpp", ".h": "cpp", ".c": "
 
 
 def tracked(source: Path, *patterns: str) -> list[str]:
+    """The files of the checkout, also new ones, that match the patterns."""
     command = ["git", "-c", "safe.directory=*", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run([*command, *patterns], check=True, capture_output=True, text=True)
-    return sorted(set(filter(None, names.stdout.split("\0"))))
+    names = subprocess.run([*command, *patterns], check=True, capture_output=True, text=True).stdout.split("\0")
+    return sorted({name for name in names if name and (source / name).is_file()})
 
 
 def split_code(text: str):

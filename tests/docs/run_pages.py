@@ -30,6 +30,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "site"))
+
+from stage import tracked  # noqa: E402
+
 SHELL = ("console", "sh")
 EXEMPT = re.compile(r"<!-- not run: (.+?) -->", re.DOTALL)
 SAVED = re.compile(r"Save .* as\s+`([^`]+)`:$", re.DOTALL)
@@ -235,12 +239,6 @@ class Runner:
         print(f"{sum(self.exempt.values())} blocks are exempt:")
         for reason, number in self.exempt.most_common():
             print(f"  {number:3}  {reason}")
-
-
-def tracked(source: Path, *patterns: str) -> list[str]:
-    command = ["git", "-c", "safe.directory=*", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    done = subprocess.run([*command, *patterns], check=True, capture_output=True, text=True)
-    return sorted(name for name in done.stdout.split("\0") if name and (source / name).is_file())
 
 
 def main() -> int:
