@@ -185,10 +185,10 @@ class Runner:
                                  f"{done.stderr.strip()}")
 
     def run_python(self, script: str, place: str, folder: Path) -> None:
-        self.counts["blocks of Python"] += 1
         if self.package is None:
             print(f"skipped {place} (the Python package was not built)")
             return
+        self.counts["blocks of Python"] += 1
         # The blocks before it run again, so that each failure has its place.
         done = subprocess.run([sys.executable, "-c", script], cwd=folder, env=self.environment, text=True,
                               stdin=subprocess.DEVNULL, capture_output=True)
