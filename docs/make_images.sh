@@ -34,9 +34,9 @@ for name in "${names[@]}"; do
       for planner in apf gyro hybrid; do run "data/scenes/paper_52_$planner.json" "$planner.jsonl"; done
       picture paper_52 8 1440x968 apf.jsonl gyro.jsonl hybrid.jsonl
       ;;
-    shelf_person) run data/scenes/shelf_person.json person.jsonl && picture shelf_person 7.3 1200x806 person.jsonl ;;
-    carry) run data/scenes/shelf_carry.json carry.jsonl && picture carry 5 1200x806 carry.jsonl ;;
-    follow) run data/scenes/follow_shelf.json follow.jsonl && picture follow 6 1200x806 follow.jsonl ;;
+    shelf_person) run data/scenes/shelf_person.json person.jsonl && picture shelf_person 9.7 1200x806 person.jsonl ;;
+    carry) run data/scenes/shelf_carry.json carry.jsonl && picture carry 9.5 1200x806 carry.jsonl ;;
+    follow) run data/scenes/follow_shelf.json follow.jsonl && picture follow 20 1200x806 follow.jsonl ;;
     tutorial)
       # The files of the tutorial, as its pages say to save them.
       for page in docs/tutorial/*.md; do
