@@ -23,7 +23,7 @@ start() {
 # A command as it is run, wrapped at 100 columns between its arguments; a list beyond 150 characters is cut.
 shown() {
   local word line='hamelin accuracy'
-  printf '```console\n'
+  printf '<!-- not run: measured by ./dev accuracy -->\n```console\n'
   for word in "$@"; do
     if ((${#word} > 150)); then word="${word:0:34},…"; fi
     if ((${#line} + ${#word} > 97 && ${#line} > 1)); then
@@ -87,6 +87,7 @@ expensive row is used. The same command makes plots of all rows, \`out/accuracy.
 All chains start at rest from q = 0.3, −0.25, 0.4, −0.15, 0.5, −0.05, 0.6 rad, repeated along longer
 chains; planar3 starts from q = 0. Chains have links of 0.2 m and 1 kg about x, z, x:
 
+<!-- not run: measured by ./dev accuracy -->
 \`\`\`console
 hamelin robot make-chain --links N --axes x,z,x --length 0.2 --mass 1 --radius 0.03 -o chainN.json
 \`\`\`

@@ -25,6 +25,7 @@ need. Each script needs hamelin, numpy and matplotlib, two need pandas, and each
 in Jupyter (with Jupytext), VS Code and Spyder. [libs/python](../../libs/python/README.md) describes
 the package and how to install it. To run a script from the root of the repository:
 
+<!-- not run: the test "python: gallery" runs all scripts -->
 ```sh
 python3 docs/gallery/01_energy.py
 ```

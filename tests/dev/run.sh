@@ -52,7 +52,7 @@ no_package_task() { # NAME COMMAND_THAT_INSTALLS ARGUMENT...
 stub dpkg-query 1
 stub apt-get 0
 stub sudo 0
-for task in build check tsan tidy cover bench accuracy fuzz; do no_package_task "$task" './dev setup' "$task"; done
+for task in build check tsan tidy cover bench docs accuracy fuzz; do no_package_task "$task" './dev setup' "$task"; done
 no_package_task format './dev setup --all' format
 installs() { ((code == 0)) && called '(apt-get|sudo .*apt-get) install .*libeigen3-dev' && ! called 'clang-tidy'; }
 run setup

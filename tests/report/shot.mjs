@@ -27,7 +27,8 @@ try {
   if (values.run) await page.evaluate(values.run);
   // Plots and picture are updated within two frames.
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
-  await page.screenshot({ path: out, fullPage: values.full ?? false });
+  // Software rendering on a busy machine takes long.
+  await page.screenshot({ path: out, fullPage: values.full ?? false, timeout: 180000 });
 } finally {
   await browser.close();
 }

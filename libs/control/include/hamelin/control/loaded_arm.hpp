@@ -64,7 +64,7 @@ struct LoadedArm {
 
 /// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is
 /// attached may go on to touch it.
-/// @param bare the arm without them @param touching how near counts as touching [m]
+/// @param bare the arm without them @param touching_m how near counts as touching [m]
 /// @param self_collision whether it is modelled
 /// @param q configuration in which the last of them is attached; dof numbers
 /// @throws Error invalid for a name that a link or part of the robot has already

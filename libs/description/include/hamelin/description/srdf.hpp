@@ -5,7 +5,7 @@
 
 namespace hamelin::description {
 
-/// <disable_collisions link1 link2 reason>: two links that never count as colliding.
+/// `<disable_collisions link1 link2 reason>`: two links that never count as colliding.
 struct DisabledPair {
   std::string link_a, link_b;
   std::string reason;  ///< as the file gives it ("Adjacent", "Never", ...); may be empty
@@ -16,7 +16,7 @@ struct DisabledPair {
 /// accompanies a URDF, as written by MoveIt's setup assistant. Its groups, states and other
 /// elements are skipped.
 /// @throws Error io, parse or invalid: "file: line N: what is wrong, what was expected"; also for
-/// <disable_default_collisions>, which disables pairs that the file does not list
+/// `<disable_default_collisions>`, which disables pairs that the file does not list
 [[nodiscard]] std::vector<DisabledPair> read_srdf(const std::filesystem::path& file);
 
 /// As above, and checks that the links exist.

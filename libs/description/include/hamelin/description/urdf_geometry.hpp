@@ -8,7 +8,7 @@
 
 namespace hamelin::description {
 
-/// One <collision> or <visual> of a URDF link: a shape and its pose in the link's frame.
+/// One `<collision>` or `<visual>` of a URDF link: a shape and its pose in the link's frame.
 struct LinkShape {
   enum class Kind { sphere, box, cylinder, mesh };
   Kind kind = Kind::sphere;

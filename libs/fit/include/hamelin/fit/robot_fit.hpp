@@ -36,7 +36,7 @@ struct FitOptions {
   CoverOptions cover;
   std::optional<int> total;  ///< most shapes of all links together; the excess is then minimized
   double padding_m = 0.0;    ///< added to all radii after fitting
-  bool visual = false;       ///< use <visual> where a link has no <collision>
+  bool visual = false;       ///< use `<visual>` where a link has no `<collision>`
   MeshPlaces meshes;
   double tolerance_m = 1e-4;  ///< of the bound of the coverage gap
 };
