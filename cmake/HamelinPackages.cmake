@@ -89,37 +89,37 @@ function(hamelin_debian_packages)
   hamelin_debian_package(libhamelin0 SECTION libs
     RECOMMENDS hamelin-plugins CONTROL "${folder}/shlibs" "${folder}/symbols" "${folder}/triggers"
     SUMMARY "control loop for robot arms among obstacles, C library"
-    DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything.
- .
- This library is its control loop for programs in C and other languages. Each
- tick takes joint positions and velocities, calls a planner and returns
- torques or the next position, and whether the motion was proved clear.")
+    DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything.
+
+This library is its control loop for programs in C and other languages. Each
+tick takes joint positions and velocities, calls a planner and returns
+torques or the next position, and whether the motion was proved clear.")
   hamelin_debian_development_packages(development)
   hamelin_debian_package(libhamelin-dev SECTION libdevel SIBLINGS libhamelin0 DEPENDS ${development}
     SUGGESTS hamelin-doc hamelin pkg-config cmake
     SUMMARY "control loop for robot arms among obstacles, development files"
-    DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything.
- .
- This package has what programs in C need to link the control loop, and the
- static C++ libraries with their headers and CMake package: robots, rigid-body
- dynamics, variational integrators, OctoMap scenes with exact distances, the
- interface of planner plugins, optimal motions, simulation and logs. Planners
- are built against it; a template and examples are included.")
+    DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything.
+
+This package has what programs in C need to link the control loop, and the
+static C++ libraries with their headers and CMake package: robots, rigid-body
+dynamics, variational integrators, OctoMap scenes with exact distances, the
+interface of planner plugins, optimal motions, simulation and logs. Planners
+are built against it; a template and examples are included.")
   hamelin_debian_package(hamelin-plugins SECTION science SUGGESTS hamelin
     SUMMARY "planners for robot arms among obstacles"
-    DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything.
- .
- This package has its planners as plugins: hybrid, which is the one to use,
- mppi, which samples motions, the potential field apf, gyro, and a template.")
+    DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything.
+
+This package has its planners as plugins: hybrid, which is the one to use,
+mppi, which samples motions, the potential field apf, gyro, and a template.")
   hamelin_debian_package(hamelin SECTION science SIBLINGS hamelin-plugins SUGGESTS python3-hamelin hamelin-doc
     SUMMARY "motions of robot arms in 3D maps, simulated and proved clear"
-    DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything,
- and simulates them with integrators whose errors are measured.
- .
- It reads URDF robots and OctoMap maps, runs a reactive planner in closed loop
- at 1 kHz, proves for each step that the motion stayed clear, and writes logs,
- HTML reports and a replay that is equal to the bit. It also computes optimal
- motions, and sweeps over many scenes in parallel.")
+    DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything,
+and simulates them with integrators whose errors are measured.
+
+It reads URDF robots and OctoMap maps, runs a reactive planner in closed loop
+at 1 kHz, proves for each step that the motion stayed clear, and writes logs,
+HTML reports and a replay that is equal to the bit. It also computes optimal
+motions, and sweeps over many scenes in parallel.")
   if(TARGET hamelin_python)
     get_property(python GLOBAL PROPERTY HAMELIN_PYTHON_LIBRARY)
     string(REGEX MATCH "3[.]([0-9]+)" python "${python}")
@@ -129,20 +129,20 @@ function(hamelin_debian_packages)
       RECOMMENDS python3-pandas python3-matplotlib SUGGESTS hamelin-doc
       CONTROL "${folder}/postinst" "${folder}/prerm"
       SUMMARY "motions of robot arms in 3D maps, for Python"
-      DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything,
- and simulates them with integrators whose errors are measured.
- .
- This package is its interface for Python with numpy: robots and dynamics of
- single and many states, integrators, distances, runs, sweeps, optimal
- motions, the control loop and logs, and planners written in Python.")
+      DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything,
+and simulates them with integrators whose errors are measured.
+
+This package is its interface for Python with numpy: robots and dynamics of
+single and many states, integrators, distances, runs, sweeps, optimal
+motions, the control loop and logs, and planners written in Python.")
   endif()
   hamelin_debian_package(hamelin-doc SECTION doc
     SUMMARY "motions of robot arms in 3D maps, documentation"
-    DESCRIPTION " hamelin moves robot arms through cluttered 3D maps without touching anything,
- and simulates them with integrators whose errors are measured.
- .
- This package has its guides, the theory with every equation that the code
- cites, formats of files, a gallery of programs in Python, and figures.")
+    DESCRIPTION "hamelin moves robot arms through cluttered 3D maps without touching anything,
+and simulates them with integrators whose errors are measured.
+
+This package has its guides, the theory with every equation that the code
+cites, formats of files, a gallery of programs in Python, and figures.")
   hamelin_install_debian_extras()
 
   set(CPACK_GENERATOR DEB)
