@@ -43,6 +43,10 @@ apt_get() { in_root apt-get -qq -o Dpkg::Use-Pty=0 --no-install-recommends -y "$
   cat "$root/apt.log"
   return 1
 }; }
+debs() { # NAME...: the files of these packages
+  local name
+  for name in "$@"; do (cd "$root" && echo /packages/"$(basename packages/"$name"_*.deb)"); done
+}
 as_user() { in_root runuser -l user -c "PATH=/usr/bin:/bin bash /packages/use.sh $1"; }
 mine() { # the files of root whose path names hamelin
   in_root find / -xdev \( -path /proc -o -path /home -o -path /packages -o -path /var/log -o -path /tmp \) -prune -o -path '*hamelin*' -print
@@ -53,15 +57,15 @@ mine >"$root/before"
 [[ ! -s "$root/before" ]]
 
 echo "== The program and its planners, with nothing but their dependencies"
-apt_get install /packages/hamelin_*.deb /packages/hamelin-plugins_*.deb
+apt_get install $(debs hamelin hamelin-plugins)
 as_user program
 
 echo "== The Python package"
-apt_get install /packages/python3-hamelin_*.deb
+apt_get install $(debs python3-hamelin)
 as_user python
 
 echo "== The development files and documents"
-apt_get install /packages/*.deb g++ cmake make pkg-config man-db bash-completion
+apt_get install $(debs libhamelin0 libhamelin-dev hamelin-doc) g++ cmake make pkg-config man-db bash-completion
 as_user development
 
 echo "== The packages are removed"
