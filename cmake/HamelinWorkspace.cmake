@@ -222,7 +222,8 @@ function(hamelin_install_package)
   endforeach()
   set(dest "${CMAKE_INSTALL_LIBDIR}/cmake/hamelin")
   foreach(lib IN LISTS HAMELIN_LIBS)
-    install(EXPORT hamelin_${lib} FILE hamelin_${lib}.cmake NAMESPACE hamelin:: DESTINATION ${dest})
+    install(EXPORT hamelin_${lib} FILE hamelin_${lib}.cmake NAMESPACE hamelin:: DESTINATION ${dest}
+      COMPONENT libhamelin-dev)
   endforeach()
   configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/hamelinConfig.cmake.in" hamelinConfig.cmake
     INSTALL_DESTINATION ${dest} PATH_VARS HAMELIN_PLUGIN_DIR)
@@ -231,9 +232,9 @@ function(hamelin_install_package)
     "${CMAKE_CURRENT_BINARY_DIR}/hamelinConfigVersion.cmake"
     "${PROJECT_SOURCE_DIR}/cmake/HamelinPlugin.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindMuJoCo.cmake"
     "${PROJECT_SOURCE_DIR}/cmake/FindOMPL.cmake"
-    DESTINATION ${dest})
-  install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
-  install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs/schema" DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin")
+    DESTINATION ${dest} COMPONENT libhamelin-dev)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/data/" "${PROJECT_SOURCE_DIR}/docs/schema"
+    DESTINATION "${CMAKE_INSTALL_DATADIR}/hamelin" COMPONENT hamelin)
 endfunction()
 
 include(HamelinPlugin)

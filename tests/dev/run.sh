@@ -52,17 +52,17 @@ no_package_task() { # NAME COMMAND_THAT_INSTALLS ARGUMENT...
 stub dpkg-query 1
 stub apt-get 0
 stub sudo 0
-for task in build check tsan tidy cover bench docs accuracy fuzz; do no_package_task "$task" './dev setup' "$task"; done
+for task in build check tsan tidy cover bench docs accuracy fuzz packages; do no_package_task "$task" './dev setup' "$task"; done
 no_package_task format './dev setup --all' format
 installs() { ((code == 0)) && called '(apt-get|sudo .*apt-get) install .*libeigen3-dev' && ! called 'clang-tidy'; }
 run setup
 expect "setup installs what builds and tests need" installs
 installs_all() {
   ((code == 0)) && called 'install .*libeigen3-dev' &&
-    called 'install .*clang-format.*clang-tidy.*gcovr.*libclang-rt-dev'
+    called 'install .*clang-format.*clang-tidy.*gcovr.*libclang-rt-dev.*lintian.*mmdebstrap'
 }
 run setup --all
-expect "setup --all installs what check, cover and fuzz need as well" installs_all
+expect "setup --all installs what check, cover, fuzz and packages need as well" installs_all
 
 # ---- Everything is installed; the stubbed build provides the program of BUILD ----
 for tool in g++ cmake ninja ccache pkg-config git node npm clang man chromium; do stub "$tool" 0; done

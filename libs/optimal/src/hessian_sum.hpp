@@ -8,6 +8,11 @@ namespace hamelin::optimal {
 
 /// Adds second derivatives by control points and step to a matrix over the variables.
 class HessianSum {
+  // Clang needs its type before it is used.
+  auto border(const Layout::Source& s) {
+    return out_.border().segment(s.block * layout_.joints(), layout_.joints());
+  }
+
  public:
   HessianSum(const Layout& layout, BandedMatrix& out) : layout_(layout), out_(out) {}
 
@@ -55,9 +60,6 @@ class HessianSum {
   }
   [[nodiscard]] VectorXd rate(const Layout::Source& s) const {
     return s.steps * layout_.h_ref() * layout_.velocity(s);
-  }
-  auto border(const Layout::Source& s) {
-    return out_.border().segment(s.block * layout_.joints(), layout_.joints());
   }
 
   const Layout& layout_;
