@@ -90,9 +90,10 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
           "of varied values, and all runs")
       ->type_name("PAGE.html");
   command
-      ->add_option("--replay", options->replay,
-                   "with --page: repeat the first N failed runs of each class of failures, and "
-                   "link their replayed scenes, in the folder PAGE-runs")
+      ->add_option(
+          "--replay", options->replay,
+          "with --page: repeat the first N failed runs of each class of failures and planner, and "
+          "link their replayed scenes, in the folder PAGE-runs")
       ->type_name("N")
       ->check(CLI::Range(1L, 1000L));
   command->add_option("--csv", options->csv, "write one line per run as CSV")

@@ -39,15 +39,17 @@ class TemporaryLog {
   fs::path file_;
 };
 
-/// The first runs of each class, in the order of the plans.
+/// The first runs of each class and planner, in the order of the plans.
 std::vector<std::size_t> runs_to_replay(const sweep::Merged& merged, std::size_t per_class) {
-  std::map<std::string, std::size_t> chosen;
+  std::map<std::pair<std::string, std::string>, std::size_t> chosen;
   std::vector<std::size_t> runs;
   for (std::size_t i = 0; i < merged.runs.size(); ++i) {
     const Json& record = merged.runs[i].record;
     const std::string failure = sweep::failure_class(record);
-    if (failure.empty() || record["outcome"] == "crashed" || chosen[failure] >= per_class) continue;
-    ++chosen[failure];
+    if (failure.empty() || record["outcome"] == "crashed") continue;
+    std::size_t& taken = chosen[{failure, merged.runs[i].run.labels.at("planner")}];
+    if (taken >= per_class) continue;
+    ++taken;
     runs.push_back(i);
   }
   return runs;

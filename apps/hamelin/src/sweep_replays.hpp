@@ -10,12 +10,12 @@
 namespace hamelin::app {
 
 struct ReplayRequest {
-  std::size_t per_class = 0;   ///< failed runs to replay, of each class of failures
+  std::size_t per_class = 0;   ///< failed runs to replay, of each class and planner
   std::filesystem::path page;  ///< page of the study; the others go into a folder beside it
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// Repeats the first failed runs of each class and writes a page of each, as `hamelin report` does.
+/// Repeats the first failed runs of each class and planner, and writes a page of each, as `hamelin report` does.
 /// The judge's contact becomes an event of the page. Runs that crashed are not repeated.
 /// @return links by the index of the run
 /// @throws Error as sweep::read_scene, simulation::run and report::make_data

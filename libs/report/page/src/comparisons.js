@@ -1,7 +1,7 @@
 // Paired comparisons: success with McNemar's test, arrival times with Wilcoxon's.
 import { section } from './document.js';
 import { h } from './dom.js';
-import { fixed, number } from './format.js';
+import { fixed } from './format.js';
 import { intervalRow, RowAxis } from './rows.js';
 import { table } from './tables.js';
 
@@ -47,8 +47,8 @@ function comparisonTable({ title, items }) {
         ['pairs that', 'both reach'], ['later by', '[s]'], '95 % interval', ...(times ? [{ content: times.head(), class: 'text' }] : []), ['Wilcoxon', 'p'], ['rank-', 'biserial']],
       rows: items.map((item) => ({ cells: cells(item, axis, times) })),
     }),
-    left > 0 && h('p', {}, `${number(left, 6)} runs are left out, since they have no recorded, feasible partner.`),
-    other > 0 && h('p', {}, `The scene files of ${number(other, 6)} pairs differ.`),
+    left > 0 && h('p', {}, `${left} runs are left out, since they have no recorded, feasible partner.`),
+    other > 0 && h('p', {}, `The scene files of ${other} pairs differ.`),
   ];
 }
 

@@ -23,17 +23,20 @@ const SPOTS = {
 };
 const spotOf = (outcome) => (outcome in SPOTS ? outcome : ['collision', 'refused'].includes(outcome) ? 'contact' : 'other');
 
-/** What varies: {name, number(i) | null, values, at(i)}. */
+/**
+ * What varies, by name: {name, few, known(i), text(i), number}. `number` gives the value of a run, and
+ * is null if the values are no numbers; `few` means that they make rows or columns of cells.
+ */
 function dimensions(runs) {
   const all = new Map();
   for (const [name, column] of runs.gains) {
-    if (column.some((value) => value !== null)) all.set(name, { name, number: (i) => column[i], values: new Set(column), text: (i) => String(column[i]) });
+    if (column.some((value) => value !== null)) all.set(name, { name, few: false, known: (i) => column[i] !== null, number: (i) => column[i], text: (i) => String(column[i]) });
   }
   for (const [name, column] of runs.groupable()) {
     if (name === 'planner' || name === 'values' || name === 'gains' || column.values.length < 2) continue;
     const numbers = column.values.map(Number);
     const numeric = column.values.every((value, k) => value !== '' && Number.isFinite(numbers[k]));
-    all.set(name, { name, number: numeric ? (i) => numbers[column.index[i]] ?? null : null, values: new Set(column.values), text: (i) => column.at(i) });
+    all.set(name, { name, few: column.values.length <= CELLS_MOST, known: (i) => column.index[i] >= 0, number: numeric ? (i) => numbers[column.index[i]] : null, text: (i) => column.at(i) });
   }
   return all;
 }
@@ -42,7 +45,7 @@ const hint = (runs, i) => `${runs.ids[i]}: ${runs.text('outcome', i)}${runs.text
 
 /** One mark per run; of many runs, evenly spaced ones. */
 function scatter(runs, planner, members, x, y) {
-  const known = members.filter((i) => Number.isFinite(x.number(i)) && Number.isFinite(y.number(i)) && x.number(i) !== null && y.number(i) !== null);
+  const known = members.filter((i) => x.known(i) && y.known(i));
   if (!known.length) return null;
   const every = Math.ceil(known.length / MARKS_MOST);
   const shown = known.filter((_, k) => k % every === 0);
@@ -59,7 +62,9 @@ function scatter(runs, planner, members, x, y) {
 const inOrder = (texts) => [...texts].sort(naturally);
 
 /** One cell per pair of values, with the share that reached, or the median arrival time. */
-function heatMap(runs, planner, members, x, y, shown) {
+function heatMap(runs, planner, all, x, y, shown) {
+  const members = all.filter((i) => x.known(i) && y.known(i));
+  if (!members.length) return null;
   const cells = new Map();
   for (const i of members) {
     const key = `${x.text(i)} ${y.text(i)}`;
@@ -101,10 +106,9 @@ export function mapSection(runs) {
   const planners = runs.group([runs.labels.get('planner')], members).map(({ key, members: list }) => ({ planner: key[0], list })).sort((a, b) => naturally(a.planner, b.planner)).slice(0, PANELS_MOST);
   const state = { ...start(all), shown: 'share' };
   const drawing = h('div', {});
-  const few = (name) => all.get(name).values.size <= CELLS_MOST;
   const draw = () => {
     const [x, y] = [all.get(state.x), all.get(state.y)];
-    const cells = few(state.x) && few(state.y);
+    const cells = x.few && y.few;
     measure.hidden = !cells;
     if (!cells && (!x.number || !y.number)) {
       drawing.replaceChildren(h('p', { role: 'status' }, 'One of these has many values that are no numbers; choose another.'));
@@ -113,7 +117,7 @@ export function mapSection(runs) {
     // apf has no k_obs, and the others no η.
     const own = (axis, planner) => (runs.gains.has('eta') && ['eta', 'k_obs'].includes(axis.name) ? all.get(planner.startsWith('apf') ? 'eta' : 'k_obs') ?? axis : axis);
     drawing.replaceChildren(...(cells
-      ? planners.map(({ planner, list }) => heatMap(runs, planner, list, x, y, state.shown))
+      ? planners.map(({ planner, list }) => heatMap(runs, planner, list, x, y, state.shown)).filter(Boolean)
       : [h('div', { class: 'legend' }, Object.entries(SPOTS).map(([spot, kind]) => h('span', {}, legendMark(kind), ` ${spot}`))),
         h('div', { class: 'figure-row' }, planners.map(({ planner, list }) => scatter(runs, planner, list, own(x, planner), own(y, planner))).filter(Boolean))]));
   };
@@ -123,7 +127,7 @@ export function mapSection(runs) {
     select('Across', names, state.x, (value) => { state.x = value; draw(); }), select('Up', names, state.y, (value) => { state.y = value; draw(); }), measure);
   draw();
   return section('Maps of what varies',
-    h('p', {}, `Up to ${CELLS_MOST} values per axis give one cell for each pair of values, more values one mark per run. ${runs.gains.size ? 'The gains are those of the random sets of example 5.2; apf is shown over η [m⁴/s²], the others over k_obs [m/s], and k_p is in 1/s². ' : ''}Point at a mark or a cell to see more.`),
+    h('p', {}, `Up to ${CELLS_MOST} values per axis give one cell for each pair of values; gains, and more values, give one mark per run. ${runs.gains.size ? 'The gains are those of the random sets of example 5.2; apf is shown over η [m⁴/s²], the others over k_obs [m/s], and k_p is in 1/s². ' : ''}Point at a mark or a cell to see more.`),
     controls, drawing);
 }
 

@@ -42,7 +42,7 @@ export class RowAxis {
 
   /** The head of a column: the numbers of the axis. */
   head(scale = 1) {
-    return svg('svg', { width: this.width, height: 16, 'aria-hidden': 'true' }, this.ticks().map((tick) => {
+    return svg('svg', { width: this.width, height: 16, role: 'img', 'aria-label': `axis from ${number(scale * this.low, 3)} to ${number(scale * this.high, 3)}` }, this.ticks().map((tick) => {
       const anchor = this.at(tick) < 20 ? 'start' : this.at(tick) > this.width - 20 ? 'end' : 'middle';
       const x = anchor === 'start' ? Math.max(0, this.at(tick) - 4) : anchor === 'end' ? Math.min(this.width, this.at(tick) + 8) : this.at(tick);
       return svg('text', { class: 'tick', x: x.toFixed(1), y: 12, 'text-anchor': anchor }, number(scale * tick, 2));
