@@ -7,6 +7,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/sweep/page.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 #include "output.hpp"
 #include "page.hpp"
 #include "sweep.hpp"

@@ -13,6 +13,7 @@
 #include "hamelin/sweep/judge.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/merge.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "module.hpp"
 #ifdef HAMELIN_WITH_MUJOCO

@@ -64,13 +64,9 @@ class Pairing {
       return;
     }
     ++out_.pairs;
-    const RunFacts left = facts_of(a.record), right = facts_of(b.record);
-    if (left.reached() && right.reached()) {
-      ++out_.both;
-      if (left.time_s && right.time_s) times_.push_back(*left.time_s - *right.time_s);
-    } else {
-      ++(left.reached() ? out_.only_a : right.reached() ? out_.only_b : out_.neither);
-    }
+    const bool left = reached(a), right = reached(b);
+    ++(left && right ? out_.both : left ? out_.only_a : right ? out_.only_b : out_.neither);
+    if (left && right) times_.push_back(time_s(a) - time_s(b));
   }
   void alone(const MergedRun& r) { out_.without += r.record.is_null() ? 0U : 1U; }
   void finish() {
@@ -81,6 +77,9 @@ class Pairing {
   }
 
  private:
+  static bool reached(const MergedRun& r) { return r.record["outcome"] == "reached"; }
+  static double time_s(const MergedRun& r) { return r.record["result"].value("time_s", 0.0); }
+
   Comparison& out_;
   std::vector<double> times_;
 };

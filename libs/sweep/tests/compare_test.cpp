@@ -6,6 +6,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/sweep/page.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;

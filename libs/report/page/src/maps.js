@@ -68,7 +68,9 @@ function heatMap(runs, planner, all, x, y, shown) {
   const cells = new Map();
   for (const i of members) {
     const key = `${x.text(i)} ${y.text(i)}`;
-    cells.set(key, [...(cells.get(key) ?? []), i]);
+    const found = cells.get(key);
+    if (found) found.push(i);
+    else cells.set(key, [i]);
   }
   const [columns, rows] = [inOrder(new Set(members.map(x.text))), inOrder(new Set(members.map(y.text)))];
   const results = new Map([...cells].map(([key, list]) => [key, {

@@ -74,5 +74,10 @@ export class Runs {
   }
 }
 
-/** Compares texts so that numbers in them are in their order. */
-export const naturally = new Intl.Collator('en', { numeric: true }).compare;
+const collate = new Intl.Collator('en', { numeric: true }).compare;
+
+/** Compares texts so that numbers, and whole numbers within names, are in their order. */
+export function naturally(a, b) {
+  const [x, y] = [Number(a), Number(b)];
+  return Number.isNaN(x) || Number.isNaN(y) || a === '' || b === '' ? collate(a, b) : x - y;
+}

@@ -6,7 +6,6 @@
 
 #include "hamelin/sweep/merge.hpp"
 #include "hamelin/sweep/paired_tests.hpp"
-#include "hamelin/sweep/run_facts.hpp"
 
 namespace hamelin::sweep {
 
