@@ -86,7 +86,7 @@ export function groupSection(runs, by) {
       distributionTable(runs, shown, heads),
     ].filter(Boolean));
   };
-  const start = names[0];
+  const start = names[0].includes(', ') || !choices.has('planner') ? names[0] : 'planner';
   draw(start);
   return section('Success',
     h('p', {}, 'A run is feasible if start and goal are free of the map, obstacles and self-contact. “Reached” counts arrivals without contact that the judge saw. The percentage, and Wilson’s 95 % interval, are of the feasible runs; the last column counts all runs.'),

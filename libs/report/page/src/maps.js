@@ -11,6 +11,7 @@ import { table } from './tables.js';
 const CELLS_MOST = 30;
 const MARKS_MOST = 4000;
 const PANELS_MOST = 6;
+const LABELS = { eta: 'η [m⁴/s²]', k_obs: 'k_obs [m/s]', k_p: 'k_p [1/s²]', k_v: 'k_v [1/s]' };
 const NO_OBSTACLE = 'no obstacle';
 
 // Marks of the outcomes, with different shapes and colours.
@@ -54,7 +55,7 @@ function scatter(runs, planner, members, x, y) {
   return axisPlot({
     title: planner, detail: `${reached} of ${known.length} reached${every > 1 ? `; one mark per ${every} runs` : ''}`,
     label: `Map of ${planner}: ${counts.map(([spot, count]) => `${count} ${spot}`).join(', ')}`,
-    xLabel: x.name, yLabel: y.name, width: 420, height: 340,
+    xLabel: LABELS[x.name] ?? x.name, yLabel: LABELS[y.name] ?? y.name, width: 420, height: 340,
     series: [{ name: planner, lines: [shown.map((i) => ({ x: x.number(i), y: y.number(i), kind: SPOTS[spotOf(runs.text('outcome', i))], hint: hint(runs, i) }))] }],
   });
 }
@@ -119,7 +120,7 @@ export function mapSection(runs) {
     // apf has no k_obs, and the others no η.
     const own = (axis, planner) => (runs.gains.has('eta') && ['eta', 'k_obs'].includes(axis.name) ? all.get(planner.startsWith('apf') ? 'eta' : 'k_obs') ?? axis : axis);
     drawing.replaceChildren(...(cells
-      ? planners.map(({ planner, list }) => heatMap(runs, planner, list, x, y, state.shown)).filter(Boolean)
+      ? [h('div', { class: 'figure-row' }, planners.map(({ planner, list }) => heatMap(runs, planner, list, x, y, state.shown)).filter(Boolean))]
       : [h('div', { class: 'legend' }, Object.entries(SPOTS).map(([spot, kind]) => h('span', {}, legendMark(kind), ` ${spot}`))),
         h('div', { class: 'figure-row' }, planners.map(({ planner, list }) => scatter(runs, planner, list, own(x, planner), own(y, planner))).filter(Boolean))]));
   };

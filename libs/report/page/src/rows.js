@@ -4,6 +4,9 @@ import { number } from './format.js';
 
 const PAD = 8;
 
+/** Round numbers have few digits: 12.5, not 13 or 12.50000001. */
+const tickText = (value) => String(Number(value.toPrecision(6))).replace('-', '\u2212');
+
 /** A linear axis for drawings of a given width. */
 export class RowAxis {
   constructor(low, high, width = 220) {
@@ -45,7 +48,7 @@ export class RowAxis {
     return svg('svg', { width: this.width, height: 16, role: 'img', 'aria-label': `axis from ${number(scale * this.low, 3)} to ${number(scale * this.high, 3)}` }, this.ticks().map((tick) => {
       const anchor = this.at(tick) < 20 ? 'start' : this.at(tick) > this.width - 20 ? 'end' : 'middle';
       const x = anchor === 'start' ? Math.max(0, this.at(tick) - 4) : anchor === 'end' ? Math.min(this.width, this.at(tick) + 8) : this.at(tick);
-      return svg('text', { class: 'tick', x: x.toFixed(1), y: 12, 'text-anchor': anchor }, number(scale * tick, 2));
+      return svg('text', { class: 'tick', x: x.toFixed(1), y: 12, 'text-anchor': anchor }, tickText(scale * tick));
     }));
   }
 }

@@ -19,7 +19,7 @@ struct Options {
   std::size_t frames_max = 2000;       ///< poses of the arm per run, at least 2
   std::size_t plot_points_max = 1500;  ///< points per plotted line, at least 4
   /// Shown with each run, as notes and as events.
-  std::vector<Remark> remarks;
+  std::vector<Remark> remarks = {};
 };
 
 /// Summary of a run in the page.
