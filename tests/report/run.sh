@@ -37,14 +37,22 @@ run data/scenes/follow_shelf.json hybrid follow.jsonl.zst --set /duration_s=10 -
 "$program" report "$work/person.jsonl.zst" -o "$work/person.html"
 "$program" report "$work"/shelf-{apf,gyro,hybrid}.jsonl.zst -o "$work/shelf.html"
 "$program" report "$work"/paper_52-{apf,gyro,hybrid}.jsonl -o "$work/paper_52.html"
-"$program" sweep plan data/scenes/paper_52_gyro.json data/scenes/paper_52_apf.json -o "$work/tries"
+"$program" sweep plan data/scenes/paper_52_gyro.json data/scenes/paper_52_apf.json --vary /duration_s=2,20 \
+  --vary /step_s=0.001,0.002 -o "$work/tries"
 "$program" sweep run "$work/tries"
-"$program" sweep merge "$work/tries" --page "$work/tries.html"
+"$program" sweep merge "$work/tries" --page "$work/tries.html" --replay 1
+"$program" sweep plan --gain-sets 4 --base data/scenes/paper_52_apf.json -o "$work/gains"
+"$program" sweep run "$work/gains"
+"$program" sweep merge "$work/gains" --page "$work/gains.html"
+# A thousand made-up runs, half of them also as a second sweep.
+node "$here/make_study.mjs" 1000 "$work/study"
+node "$here/make_study.mjs" 500 "$work/half"
+"$program" sweep compare "$work/study" "$work/half" --page "$work/study.html"
 "$program" accuracy data/robots/planar3.json --integrators hamel-variational,gauss:8,gauss:12,rk4,dop853 \
   --steps 0.1,0.05,0.02 --rtol 1e-4,1e-8 --duration 1 --page "$work/accuracy.html"
 
 export NODE_MODULES=$modules HAMELIN_TEMPLATES=$templates
-HAMELIN_SWEEP_PAGE="$work/tries.html" HAMELIN_ACCURACY_PAGE="$work/accuracy.html" node --test "$here/documents.test.mjs"
+HAMELIN_SWEEP_PAGES="$work/tries.html:$work/gains.html:$work/study.html" HAMELIN_ACCURACY_PAGE="$work/accuracy.html" node --test "$here/documents.test.mjs"
 # Real runs. page.test.mjs adds made-up runs with what no scene in data/ has: obstacles that appear
 # later, a prismatic joint.
 HAMELIN_PAGES="$work/shelf.html:$work/paper_52.html:$work/person.html:$work/carry.html:$work/follow.html" HAMELIN_TEMPLATE=$templates/page.html node --test "$here/page.test.mjs"

@@ -41,6 +41,8 @@ std::string_view to_string(Kind kind) noexcept {
       return "file of sweep records";
     case Kind::summary:
       return "sweep summary";
+    case Kind::comparison:
+      return "sweep comparison";
     case Kind::accuracy:
       return "measurement of accuracy";
   }
@@ -91,6 +93,7 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.primitives/1") return Kind::primitives;
   if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema == "hamelin.summary/1") return Kind::summary;
+  if (schema == "hamelin.comparison/1") return Kind::comparison;
   if (schema == "hamelin.accuracy/1") return Kind::accuracy;
   if (schema.is_null() && document.contains("links") && document["links"].is_object())
     return Kind::spheres;
@@ -100,7 +103,7 @@ Kind recognise(const std::filesystem::path& file) {
       fmt::format(
           "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
           "hamelin.explanation/1, hamelin.path/1, hamelin.trajectory/1, hamelin.primitives/1, "
-          "hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
+          "hamelin.sweep/1, hamelin.summary/1, hamelin.comparison/1 or hamelin.accuracy/1",
           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

@@ -23,6 +23,7 @@ enum class Kind {
   sweep,
   records,
   summary,
+  comparison,
   accuracy
 };
 

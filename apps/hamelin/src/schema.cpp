@@ -12,7 +12,7 @@ namespace {
 
 const std::vector<std::string> names = {
     "robot", "scene",      "primitives", "integrator", "run",     "result",  "explanation",
-    "path",  "trajectory", "sweep",      "record",     "summary", "accuracy"};
+    "path",  "trajectory", "sweep",      "record",     "summary", "comparison", "accuracy"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

@@ -3,12 +3,15 @@
 #include <memory>
 
 #include "command_line.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/report/report.hpp"
-#include "hamelin/sweep/merge.hpp"
+#include "hamelin/sweep/page.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 #include "output.hpp"
 #include "page.hpp"
 #include "sweep.hpp"
+#include "sweep_replays.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -20,7 +23,9 @@ namespace fs = std::filesystem;
 struct MergeOptions {
   std::vector<fs::path> directories;
   std::vector<std::string> by{"goal", "planner"};
-  std::optional<fs::path> output, page;
+  std::optional<fs::path> output, page, csv;
+  std::size_t replay = 0;
+  std::vector<fs::path> plugin_path;
   bool json = false;
 };
 
@@ -30,14 +35,23 @@ int sweep_merge(const MergeOptions& options) {
     inputs.push_back(sweep::plan_file(directory));
     inputs.push_back(sweep::records_file(directory));
   }
-  std::optional<fs::path> output, page, template_file;
+  if (options.replay > 0 && !options.page)
+    throw Error(ErrorCode::usage, "--replay: has no effect without --page");
+  std::optional<fs::path> output, page, csv, template_file;
   if (options.output) output = output_target(*options.output, inputs);
   if (options.page) page = output_target(*options.page, inputs);
+  if (options.csv) csv = output_target(*options.csv, inputs);
   if (page) template_file = page_template("sweep");
   const sweep::Merged merged = sweep::merge(options.directories, options.by);
   const Json summary = sweep::to_json(merged);
   if (output) write_file_atomically(*output, summary.dump(2) + "\n");
-  if (page) write_page(*template_file, report::pack(sweep::page_json(merged)), *page);
+  if (csv) write_file_atomically(*csv, sweep::to_csv(merged));
+  if (page) {
+    sweep::PageExtras extras;
+    extras.replays = write_replays(merged, {options.replay, *page, options.plugin_path});
+    extras.comparisons = sweep::comparisons_of_page(merged.runs);
+    write_page(*template_file, report::pack(sweep::page_json(merged, extras)), *page);
+  }
   for (const auto& text : merged.notes) note(text);
   if (options.json)
     print_json(summary);
@@ -54,7 +68,7 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
                   "Summarise the records of sweeps: success with 95 % intervals, contacts, times",
                   "hamelin sweep merge tries\n"
                   "hamelin sweep merge tries more --by family,goal,planner -o summary.json\n"
-                  "hamelin sweep merge tries --page tries.html --json");
+                  "hamelin sweep merge tries --page tries.html --replay 2 --csv tries.csv");
   const auto options = std::make_shared<MergeOptions>();
   command
       ->add_option("directories", options->directories, "sweep directories, with plan and records")
@@ -71,9 +85,25 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
   command->add_option("-o,--output", options->output, "write the summary as JSON")
       ->type_name("SUMMARY.json");
   command
-      ->add_option("--page", options->page,
-                   "write an HTML page with table, gain map and all failed runs")
+      ->add_option(
+          "--page", options->page,
+          "write an HTML page with success, times, failures, comparisons of planners, maps "
+          "of varied values, and all runs")
       ->type_name("PAGE.html");
+  command
+      ->add_option(
+          "--replay", options->replay,
+          "with --page: repeat the first N failed runs of each class of failures and planner, and "
+          "link their replayed scenes, in the folder PAGE-runs")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 1000L));
+  command->add_option("--csv", options->csv, "write one line per run as CSV")
+      ->type_name("RUNS.csv");
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "with --replay: directory to search first for planners; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
   command->add_flag("--json", options->json, "print the summary as JSON");
   command->callback([options, &exit_code] { exit_code = sweep_merge(*options); });
 }

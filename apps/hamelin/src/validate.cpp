@@ -114,6 +114,9 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
     case Kind::summary:
       check_shipped_schema(read_json(file), "summary", file.string());
       return "sweep summary";
+    case Kind::comparison:
+      check_shipped_schema(read_json(file), "comparison", file.string());
+      return "sweep comparison";
     case Kind::accuracy:
       return fmt::format(
           "measurement of accuracy, {} rows",

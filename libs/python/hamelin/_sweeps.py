@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
-from typing import Sequence
+from typing import Any, Sequence
 
 import numpy as np
 
-from ._hamelin import _merge_sweeps, _plan_sweep, _run_sweep
+from ._hamelin import _compare_sweeps, _merge_sweeps, _plan_sweep, _run_sweep, _sweep_csv
 from ._progress import Bar
 from ._types import Document, DocumentMapping, Numbers, PathLike, Paths, Progress
 
@@ -30,6 +31,26 @@ class Sweep(DocumentMapping):
         """One record per run (hamelin.record/1), in the order in which the runs ended."""
         with open(os.path.join(self.directory, "records.jsonl"), encoding="utf-8") as lines:
             return [json.loads(line) for line in lines]
+
+    def compare(
+        self, other: Sweep | PathLike | None = None, *, label: str = "planner",
+        ignore: str | Sequence[str] = (),
+    ) -> Document:  # fmt: skip
+        """Paired tests of this sweep and another (hamelin.comparison/1), as `sweep compare`.
+
+        other: another sweep or its folder; none: the values of `label` in this one. ignore: labels
+        in which the runs of a pair may differ.
+        """
+        folders: list[PathLike] = [self.directory]
+        if other is not None:
+            folders.append(other.directory if isinstance(other, Sweep) else other)
+        return _compare_sweeps(folders, label, _texts(ignore))
+
+    def to_pandas(self) -> Any:
+        """A pandas DataFrame with a row per run, the columns of `hamelin sweep merge --csv`."""
+        import pandas
+
+        return pandas.read_csv(io.StringIO(_sweep_csv(self.directory)))
 
     def __repr__(self) -> str:
         return self.table

@@ -2,15 +2,18 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "arguments.hpp"
 #include "bound_scene.hpp"
 #include "counter.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "hamelin/sweep/compare.hpp"
 #include "hamelin/sweep/judge.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/merge.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "module.hpp"
 #ifdef HAMELIN_WITH_MUJOCO
@@ -171,6 +174,30 @@ py::tuple merge_sweeps(py::handle directories, const std::vector<std::string>& b
   return py::make_tuple(to_python(sweep::to_json(merged)), sweep::to_table(merged));
 }
 
+py::object compare_sweeps(py::handle directories, const std::string& label,
+                          const std::vector<std::string>& ignore) {
+  const auto folders = paths_of(directories);
+  std::vector<sweep::Comparison> comparisons;
+  {
+    const py::gil_scoped_release unlocked;
+    const auto runs = sweep::read_sweeps(folders);
+    if (folders.size() == 1)
+      comparisons =
+          sweep::compare_values(runs, {label, ignore}, std::numeric_limits<std::size_t>::max());
+    else
+      comparisons = {sweep::compare_sweeps(runs, folders[0], folders[1], {label, ignore})};
+  }
+  return to_python(sweep::to_json(comparisons));
+}
+
+std::string sweep_csv(py::handle directories) {
+  const auto folders = paths_of(directories);
+  const py::gil_scoped_release unlocked;
+  sweep::Merged merged;
+  merged.runs = sweep::read_sweeps(folders);
+  return sweep::to_csv(merged);
+}
+
 // One run of a sweep under its judge, as the program's `sweep one`.
 std::string sweep_one(const BoundScene& scene, py::handle plugins,
                       const std::vector<std::string>& argv) {
@@ -211,6 +238,9 @@ void add_sweeps(py::module_& module) {
              "Executes the plan of a sweep.");
   module.def("_merge_sweeps", &merge_sweeps, arg("directories"), arg("by"),
              "Document and table of `hamelin sweep merge`.");
+  module.def("_compare_sweeps", &compare_sweeps, arg("directories"), arg("label"), arg("ignore"),
+             "Document of `hamelin sweep compare`.");
+  module.def("_sweep_csv", &sweep_csv, arg("directories"), "CSV of `hamelin sweep merge --csv`.");
   module.def("_sweep_one", &sweep_one, arg("scene"), arg("plugin_path"), arg("argv"),
              "One run of a sweep under its judge, as a line of JSON.");
 }

@@ -92,3 +92,35 @@ def test_the_data_that_ships():
     assert hamelin.load_scene(hamelin.data_path("scenes/shelf.json")).model.dof == 7
     with pytest.raises(hamelin.Error, match="does not exist, expected one of"):
         hamelin.data_path("scenes/missing.json")
+
+
+def test_planners_are_compared_and_runs_are_a_table(program, scenes, tmp_path):
+    for folder in ("tries", "again"):
+        hamelin.plan_sweep(
+            tmp_path / folder, scenes / "pillar.json", planner=["apf", "hybrid"], duration=0.04,
+            seeds=[1, 2],
+        )  # fmt: skip
+    swept = hamelin.sweep(tmp_path / "tries")
+    again = hamelin.sweep(tmp_path / "again")
+
+    def of_program(*arguments):
+        done = subprocess.run([program, "sweep", *arguments], stdout=subprocess.PIPE, check=True)
+        return done.stdout.decode()
+
+    compared = json.loads(of_program("compare", tmp_path / "tries", "--json"))
+    assert swept.compare() == compared
+    assert compared["comparisons"][0]["pairs"] == 2
+    both = json.loads(of_program("compare", tmp_path / "tries", tmp_path / "again", "--json"))
+    assert swept.compare(again) == swept.compare(tmp_path / "again") == both
+    assert both["comparisons"][0]["pairs"] == 4
+    by_seed = swept.compare(label="seed", ignore="goal")["comparisons"]
+    assert [(one["a"], one["b"]) for one in by_seed] == [("1", "2")]
+    with pytest.raises(hamelin.Error, match="--label colour: no run has that label"):
+        swept.compare(label="colour")
+
+    pandas = pytest.importorskip("pandas")
+    table = swept.to_pandas()
+    of_program("merge", tmp_path / "tries", "--csv", tmp_path / "tries.csv")
+    pandas.testing.assert_frame_equal(table, pandas.read_csv(tmp_path / "tries.csv"))
+    assert sorted(table.planner) == ["apf", "apf", "hybrid", "hybrid"]
+    assert (table.outcome == "timeout").all()

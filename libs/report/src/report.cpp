@@ -101,6 +101,10 @@ Data make_data(const std::vector<std::filesystem::path>& logs, const Options& op
     summary.log = file;
     Json named{{"name", ""}, {"world", world - worlds.begin()}};
     named.update(run.finish(reader, container, summary));
+    for (const Remark& remark : options.remarks) {
+      named["notes"].push_back(remark.text);
+      named["events"].push_back({{"t", remark.time_s}, {"text", remark.text}});
+    }
     runs.push_back(std::move(named));
     data.runs.push_back(std::move(summary));
     std::string scene = std::filesystem::path(recorded.scene.name).filename().string();

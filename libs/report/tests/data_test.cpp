@@ -137,6 +137,19 @@ TEST_CASE("the kinematics of the page put spheres, tip and skeleton where the mo
   }
 }
 
+TEST_CASE("remarks are notes and events of the page", "[report]") {
+  const auto log = test::scratch("remarks") / "run.jsonl";
+  (void)test::log_run(test::shelf(0.05), log);
+  report::Options options;
+  options.remarks = {{0.02, "the judge saw <hand> touch it"}};
+  const Json plain = Decoded(report::make_data({log}).bytes).head["runs"][0];
+  const Json run = Decoded(report::make_data({log}, options).bytes).head["runs"][0];
+  REQUIRE(run["events"].size() == plain["events"].size() + 1);
+  CHECK(run["events"].back() == Json{{"t", 0.02}, {"text", "the judge saw <hand> touch it"}});
+  CHECK(run["notes"].size() == plain["notes"].size() + 1);
+  CHECK(run["notes"].back() == "the judge saw <hand> touch it");
+}
+
 TEST_CASE("skeletons follow the links of their arms", "[report]") {
   const auto folder = test::scratch("skeleton");
   scene::Scene scene = scene::read_scene(test::checkout("data/scenes/paper_52_hybrid.json"));

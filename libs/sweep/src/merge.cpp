@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/sweep/failure_class.hpp"
 #include "statistics.hpp"
 
 namespace hamelin::sweep {
@@ -34,26 +34,6 @@ std::string text_at(const Json& object, const char* key) {
   return object.is_object() && object.contains(key) && object[key].is_string()
              ? object[key].get<std::string>()
              : "";
-}
-
-// Replaces numbers in a cause, such as a depth or a time, by N: they differ from run to run.
-std::string without_numbers(const std::string& cause) {
-  std::string out;
-  bool word = false;
-  const char* const end = cause.data() + cause.size();
-  for (const char* at = cause.data(); at != end;) {
-    double number = 0.0;
-    const bool digit = *at >= '0' && *at <= '9';
-    if (digit && !word) {
-      at = std::from_chars(at, end, number).ptr;
-      out += 'N';
-      continue;
-    }
-    word =
-        (*at >= 'a' && *at <= 'z') || (*at >= 'A' && *at <= 'Z') || *at == '_' || (word && digit);
-    out += *at++;
-  }
-  return out;
 }
 
 bool contact_seen(const Json& record) {
@@ -97,13 +77,7 @@ void add_run(GroupData& data, const MergedRun& merged) {
   if (result.is_object() && result.contains("escape") && result["escape"].is_object())
     for (const auto& [name, value] : result["escape"].items())
       if (value.is_number()) g.escapes[name] += value.get<double>();
-  if (!reached) {
-    const std::string cause = text_at(record, "cause");
-    const bool keep_numbers = outcome == "crashed" || outcome == "timeout";
-    ++g.causes[cause.empty()
-                   ? outcome
-                   : fmt::format("{}: {}", outcome, keep_numbers ? cause : without_numbers(cause))];
-  }
+  if (!reached) ++g.causes[failure_class(record)];
 }
 
 // The builds that made a result: (name, build) of the program and of its planner.

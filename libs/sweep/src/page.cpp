@@ -1,10 +1,15 @@
+#include "hamelin/sweep/page.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string_view>
+#include <unordered_map>
 
-#include "hamelin/sweep/merge.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 
 namespace hamelin::sweep {
 
@@ -25,72 +30,158 @@ std::string quoted(const std::string& word) {
   return out + '\'';
 }
 
-std::string command_of(const MergedRun& merged) {
-  std::string command = "hamelin run";
-  for (const auto& word : run_arguments(merged.run, merged.directory))
-    command += fmt::format(" {}", quoted(word));
-  return command;
-}
-
-/// Why a run did not reach its goal: its own cause, contact that the judge saw, and infeasibility.
-std::string cause_of(const MergedRun& merged) {
-  const Json& record = merged.record;
-  std::string cause = record["cause"].is_string() ? record["cause"].get<std::string>() : "";
-  const auto add = [&cause](const std::string& text) {
-    cause += fmt::format("{}{}", cause.empty() ? "" : "; ", text);
-  };
-  for (const char* kind : {"obstacles", "self"}) {
-    const Json closest = record["judge"].is_object() ? record["judge"].at(kind) : Json();
-    if (closest.is_object() && closest.value("clearance_m", 1.0) <= 0.0)
-      add(fmt::format("the judge saw {} touch {} at {:.3f} s", closest.value("sphere", "?"),
-                      closest.value("other", "?"), closest.value("time_s", 0.0)));
+/// Values as indices into a list of the different ones, in the order of their first run; -1 means
+/// that there is no value.
+class TextColumn {
+ public:
+  void add(const std::string& value) {
+    if (value.empty()) return add_none();
+    const auto [at, added] = known_.emplace(value, values_.size());
+    if (added) values_.push_back(value);
+    index_.push_back(at->second);
   }
-  if (!merged.feasible) add(fmt::format("not feasible ({})", merged.reason));
-  return cause;
-}
-
-Json failures(const Merged& merged) {
-  Json all = Json::array();
-  for (const auto& r : merged.runs)
-    if (!r.record.is_null() && r.record["outcome"] != "reached")
-      all.push_back({{"run", r.run.id},
-                     {"outcome", r.record["outcome"]},
-                     {"cause", cause_of(r)},
-                     {"command", command_of(r)}});
-  return all;
-}
-
-Json gain_sets(const Merged& merged) {
-  Json all = Json::array();
-  for (const auto& r : merged.runs) {
-    if (r.run.gains.empty() || r.record.is_null() || r.run.labels.at("problem") == no_obstacle)
-      continue;
-    Json gains = Json::object();
-    for (const auto& [name, value] : r.run.gains) gains[name] = value;
-    all.push_back({{"planner", r.run.labels.at("planner")},
-                   {"run", r.run.id},
-                   {"outcome", r.record["outcome"]},
-                   {"cause", r.record["cause"]},
-                   {"gains", std::move(gains)}});
+  void add_none() { index_.push_back(-1); }
+  [[nodiscard]] std::size_t size() const { return index_.size(); }
+  [[nodiscard]] Json json() && {
+    return {{"values", std::move(values_)}, {"index", std::move(index_)}};
   }
-  return all;
+
+ private:
+  std::unordered_map<std::string, std::size_t> known_;
+  Json values_ = Json::array(), index_ = Json::array();
+};
+
+/// A number with six significant digits, which is more than the page shows.
+Json rounded(const std::optional<double>& value) {
+  if (!value || !std::isfinite(*value)) return nullptr;
+  return std::stod(fmt::format("{:.6g}", *value));
 }
+
+/// Columns by name, of which a run need not have each.
+template <class Column>
+class NamedColumns {
+ public:
+  /// The column of that name, filled up to run `i`.
+  Column& at(const std::string& name, std::size_t i) {
+    Column& column = columns_[name];
+    fill(column, i);
+    return column;
+  }
+  template <class Finish>
+  [[nodiscard]] Json json(std::size_t count, Finish finish) && {
+    Json all = Json::object();
+    for (auto& [name, column] : columns_) {
+      fill(column, count);
+      all[name] = finish(std::move(column));
+    }
+    return all;
+  }
+
+ private:
+  static void fill(Json& column, std::size_t count) {
+    if (column.is_null()) column = Json::array();
+    while (column.size() < count) column.push_back(nullptr);
+  }
+  static void fill(TextColumn& column, std::size_t count) {
+    while (column.size() < count) column.add_none();
+  }
+  std::map<std::string, Column> columns_;
+};
+
+/// The arguments after the scene, as they are typed.
+std::string arguments_of(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 1; i < words.size(); ++i)
+    text += fmt::format("{}{}", text.empty() ? "" : " ", quoted(words[i]));
+  return text;
+}
+
+/// All runs in columns: 10⁵ runs stay below 20 MB, and the page reads them at once.
+class Columns {
+ public:
+  void add(const MergedRun& merged) {
+    const RunFacts facts = facts_of(merged.record);
+    ids_.push_back(merged.run.id);
+    feasible_.push_back(merged.feasible ? 1 : 0);
+    const auto words = run_arguments(merged.run, merged.directory);
+    const std::map<std::string, std::string> texts{{"directory", merged.directory.string()},
+                                                   {"scene", quoted(words.front())},
+                                                   {"arguments", arguments_of(words)},
+                                                   {"outcome", facts.outcome},
+                                                   {"failure", facts.failure},
+                                                   {"cause", facts.cause},
+                                                   {"contact", facts.contact},
+                                                   {"reason", merged.reason}};
+    for (const auto& [name, text] : texts) texts_.at(name, count_).add(text);
+    for (const auto& [name, text] : merged.run.labels) labels_.at(name, count_).add(text);
+    for (const auto& [pointer, text] : varied_values(merged.run))
+      varied_.at(pointer, count_).add(text);
+    for (const auto& [name, value] : merged.run.gains)
+      gains_.at(name, count_).push_back(rounded(value));
+    const std::map<std::string, std::optional<double>> figures{
+        {"time_s", facts.time_s},
+        {"clearance_m", facts.clearance_m},
+        {"self_clearance_m", facts.self_clearance_m},
+        {"certified_share", facts.certified_share},
+        {"tick_us_p50", facts.tick_us_p50},
+        {"tick_us_p99", facts.tick_us_p99}};
+    for (const auto& [name, value] : figures) figures_.at(name, count_).push_back(rounded(value));
+    ++count_;
+  }
+
+  [[nodiscard]] Json json() && {
+    const auto text = [](TextColumn&& column) { return std::move(column).json(); };
+    const auto number = [](Json&& column) { return std::move(column); };
+    return {{"count", count_},
+            {"id", std::move(ids_)},
+            {"feasible", std::move(feasible_)},
+            {"texts", std::move(texts_).json(count_, text)},
+            {"labels", std::move(labels_).json(count_, text)},
+            {"varied", std::move(varied_).json(count_, text)},
+            {"gains", std::move(gains_).json(count_, number)},
+            {"figures", std::move(figures_).json(count_, number)}};
+  }
+
+ private:
+  std::size_t count_ = 0;
+  Json ids_ = Json::array(), feasible_ = Json::array();
+  NamedColumns<TextColumn> texts_, labels_, varied_;
+  NamedColumns<Json> gains_, figures_;
+};
 
 }  // namespace
 
-Json page_json(const Merged& merged) {
+std::vector<std::pair<std::string, std::vector<Comparison>>> comparisons_of_page(
+    const std::vector<MergedRun>& runs) {
+  auto planners = compare_values(runs);
+  if (planners.empty()) return {};
+  return {{"Planners", std::move(planners)}};
+}
+
+Json page_json(const Merged& merged, const PageExtras& extras) {
   std::set<std::string> directories;
-  for (const auto& r : merged.runs) directories.insert(r.directory.string());
-  const auto recorded = std::count_if(merged.runs.begin(), merged.runs.end(),
-                                      [](const MergedRun& r) { return !r.record.is_null(); });
-  return {{"format", "hamelin.sweep-page/1"},
+  Columns columns;
+  std::size_t recorded = 0;
+  for (const auto& r : merged.runs) {
+    directories.insert(r.directory.string());
+    recorded += r.record.is_null() ? 0U : 1U;
+    columns.add(r);
+  }
+  Json replays = Json::object();
+  for (const auto& [run, link] : extras.replays)
+    replays[std::to_string(run)] = {{"file", link.file}, {"time_s", link.time_s}};
+  Json comparisons = Json::array();
+  for (const auto& [title, all] : extras.comparisons)
+    comparisons.push_back({{"title", title}, {"items", to_json(all)["comparisons"]}});
+  return {{"format", "hamelin.sweep-page/2"},
           {"generator", fmt::format("hamelin {}", version())},
           {"directories", directories},
           {"planned", merged.runs.size()},
           {"recorded", recorded},
           {"summary", to_json(merged)},
-          {"gain_sets", gain_sets(merged)},
-          {"failures", failures(merged)}};
+          {"runs", std::move(columns).json()},
+          {"replays", std::move(replays)},
+          {"comparisons", std::move(comparisons)}};
 }
 
 }  // namespace hamelin::sweep

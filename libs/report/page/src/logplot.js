@@ -1,4 +1,4 @@
-// Plots with two logarithmic axes: marks of several shapes, and lines between them.
+// Plots with two axes, logarithmic or linear: marks of several shapes, and lines between them.
 import { h, svg } from './dom.js';
 import { number } from './format.js';
 
@@ -40,8 +40,35 @@ class LogAxis {
   }
 }
 
+/** A linear axis with some room at its ends. */
+class LinearAxis {
+  constructor(values, from, to) {
+    const [low, high] = [Math.min(...values), Math.max(...values)];
+    const room = 0.04 * (high - low || Math.abs(low) || 1);
+    Object.assign(this, { low: low - room, high: high + room, from, to });
+  }
+
+  at(value) {
+    return this.from + ((value - this.low) / (this.high - this.low)) * (this.to - this.from);
+  }
+
+  /** Round numbers, about `most`. */
+  ticks(most) {
+    const rough = (this.high - this.low) / most;
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * [1, 2, 5, 10].find((digit) => digit * power >= rough);
+    const all = [];
+    for (let n = Math.ceil(this.low / step); n * step <= this.high; ++n) all.push(Number((n * step).toPrecision(6)));
+    return all;
+  }
+}
+
+/** Values of one sign that cover more than a factor of this get a logarithmic axis. */
+const WIDE = 20;
+const isWide = (values) => Math.min(...values) > 0 && Math.max(...values) > WIDE * Math.min(...values);
+
 /** 1e−4 rather than 0.0001, which would overlap the label of the axis. */
-const tickText = (value) => (value < 0.0099 || value > 99999 ? number(value, 1) : String(value));
+const tickText = (value) => (value !== 0 && (Math.abs(value) < 0.0099 || Math.abs(value) > 99999) ? number(value, 1) : String(value).replace('-', '\u2212'));
 
 const polygon = (x, y, points) => `M${points.map(([dx, dy]) => `${(x + dx).toFixed(1)} ${(y + dy).toFixed(1)}`).join('L')}Z`;
 
@@ -86,8 +113,15 @@ function axes(x, y, { width, height, xLabel, yLabel }) {
   ];
 }
 
+/** As logPlot, with linear axes for values that are not positive or cover little. */
+export function axisPlot(plot) {
+  const points = plot.series.flatMap((series) => series.lines.flat());
+  const axis = (key) => (isWide(points.map((point) => point[key])) ? LogAxis : LinearAxis);
+  return points.length ? logPlot({ ...plot, axes: { x: axis('x'), y: axis('y') } }) : null;
+}
+
 /**
- * A figure of points on two logarithmic axes.
+ * A figure of points on two logarithmic axes, or on `axes`.
  * @typedef {{x: number, y: number, hint: string, kind: object}} Point
  * @typedef {{name: string, line?: string, style?: string, lines: Point[][]}} Series
  * @param {{title: string, detail?: string, label: string, xLabel: string, yLabel: string,
@@ -97,11 +131,11 @@ function axes(x, y, { width, height, xLabel, yLabel }) {
  * @returns {HTMLElement | null} null if there are no points
  */
 export function logPlot(plot) {
-  const { width = 448, height = 372, floor } = plot;
+  const { width = 448, height = 372, floor, axes: { x: XAxis, y: YAxis } = { x: LogAxis, y: LogAxis } } = plot;
   const points = plot.series.flatMap((series) => series.lines.flat());
   if (!points.length) return null;
-  const x = new LogAxis(points.map((point) => point.x), MARGIN.left + PADDING, width - MARGIN.right - PADDING);
-  const y = new LogAxis(points.map((point) => point.y), height - MARGIN.bottom - PADDING, MARGIN.top + PADDING);
+  const x = new XAxis(points.map((point) => point.x), MARGIN.left + PADDING, width - MARGIN.right - PADDING);
+  const y = new YAxis(points.map((point) => point.y), height - MARGIN.bottom - PADDING, MARGIN.top + PADDING);
   const drawing = svg('svg', { viewBox: `0 0 ${width} ${height}`, width, height, role: 'img', 'aria-label': plot.label },
     axes(x, y, { width, height, ...plot }));
   const floorAt = floor && y.at(floor.y);

@@ -147,7 +147,8 @@ async function start() {
   }
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
   repaint();
-  setTime(0);
+  // A link may open the page at a time: page.html#t=1.5
+  setTime(Number(/^#t=([\d.]+)$/.exec(location.hash)?.[1] ?? 0));
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 
   Object.assign(window.hamelin, {

@@ -7,15 +7,16 @@ const parts = (cell) => (cell !== null && typeof cell === 'object' && !Array.isA
 /**
  * @param {{caption: string, shown?: boolean, head: Cell[], words?: number,
  *   rows: {cells: Cell[], class?: string}[]}} table
- *   A Cell is a string, a node, a list of lines, or {content, class} with one of these. The first
+ *   A Cell is a string, a node, a list of lines, or {content, class, style} with one of these. The first
  *   `words` columns contain text and the others numbers, unless a cell has its own class. The first
  *   cell of a row is its header. `shown`: the caption is visible and not only for screen readers.
  */
 export function table({ caption, shown = false, head, words = 1, rows }) {
   const lines = (content) => (Array.isArray(content) ? content.flatMap((line, i) => (i ? [h('br'), line] : [line])) : content);
   const cells = (list, tag) => list.map((cell, i) => {
-    const { content, class: kind = i < words ? 'text' : null } = parts(cell);
-    return h(...tag(i, kind), lines(content));
+    const { content, class: kind = i < words ? 'text' : null, style } = parts(cell);
+    const [name, props] = tag(i, kind);
+    return h(name, { ...props, style }, lines(content));
   });
   return h('div', { class: 'table-box', tabIndex: 0, role: 'region', 'aria-label': caption },
     h('table', { class: 'figures' },

@@ -9,9 +9,17 @@
 
 namespace hamelin::report {
 
+/// Something that others found about a run, such as a judge's contact.
+struct Remark {
+  double time_s = 0.0;  ///< an event of the page at this time
+  std::string text;
+};
+
 struct Options {
   std::size_t frames_max = 2000;       ///< poses of the arm per run, at least 2
   std::size_t plot_points_max = 1500;  ///< points per plotted line, at least 4
+  /// Shown with each run, as notes and as events.
+  std::vector<Remark> remarks = {};
 };
 
 /// Summary of a run in the page.

@@ -58,8 +58,9 @@ struct Group {
   std::optional<double> tick_us_p50_median, tick_us_p99_median;
   double filter_work_J_max = 0.0;  ///< largest over the runs; positive only by rounding errors
   std::optional<double> recovery_work_J_median;
-  std::map<std::string, double> escapes;      ///< sums of the numbers in the results' "escape"
-  std::map<std::string, std::size_t> causes;  ///< of runs that did not reach their goal
+  std::map<std::string, double> escapes;  ///< sums of the numbers in the results' "escape"
+  /// Runs that did not reach their goal, by failure_class().
+  std::map<std::string, std::size_t> causes;
 };
 
 /// Groups runs by labels, sorted by their values; the value of a missing label is "".
@@ -103,10 +104,5 @@ struct Merged {
 /// The summary as a plain-text table, followed by the causes of the runs that did not reach their
 /// goal.
 [[nodiscard]] std::string to_table(const Merged& merged);
-
-/// Data of the page of a sweep, hamelin.sweep-page/1: the summary, the gain sets, and each run that
-/// did not reach its goal, with its cause and the command that repeats it. The README describes the
-/// format.
-[[nodiscard]] Json page_json(const Merged& merged);
 
 }  // namespace hamelin::sweep
