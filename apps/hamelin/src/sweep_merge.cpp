@@ -6,6 +6,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/report/report.hpp"
 #include "hamelin/sweep/merge.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "output.hpp"
 #include "page.hpp"
 #include "sweep.hpp"
@@ -20,23 +21,27 @@ namespace fs = std::filesystem;
 struct MergeOptions {
   std::vector<fs::path> directories;
   std::vector<std::string> by{"goal", "planner"};
-  std::optional<fs::path> output, page;
-  bool json = false;
+  std::optional<fs::path> output, page, records;
+  bool json = false, without_timing = false;
 };
 
 int sweep_merge(const MergeOptions& options) {
   std::vector<fs::path> inputs;
   for (const auto& directory : options.directories) {
     inputs.push_back(sweep::plan_file(directory));
-    inputs.push_back(sweep::records_file(directory));
+    for (auto& file : sweep::record_files(directory)) inputs.push_back(std::move(file));
   }
-  std::optional<fs::path> output, page, template_file;
+  std::optional<fs::path> output, page, records, template_file;
   if (options.output) output = output_target(*options.output, inputs);
   if (options.page) page = output_target(*options.page, inputs);
   if (page) template_file = page_template("sweep");
-  const sweep::Merged merged = sweep::merge(options.directories, options.by);
+  if (options.records) records = output_target(*options.records, inputs);
+  const bool timing = !options.without_timing;
+  const sweep::Merged merged =
+      sweep::merge(sweep::read_sweeps(options.directories, timing), options.by);
   const Json summary = sweep::to_json(merged);
   if (output) write_file_atomically(*output, summary.dump(2) + "\n");
+  if (records) sweep::write_records(merged.sweeps, *records, timing);
   if (page) write_page(*template_file, report::pack(sweep::page_json(merged)), *page);
   for (const auto& text : merged.notes) note(text);
   if (options.json)
@@ -51,10 +56,12 @@ int sweep_merge(const MergeOptions& options) {
 void add_sweep_merge(CLI::App& sweep, int& exit_code) {
   auto* command =
       add_command(sweep, "merge",
-                  "Summarise the records of sweeps: success with 95 % intervals, contacts, times",
+                  "Summarise the records of sweeps, of all shards: success with 95 % intervals, "
+                  "contacts, times",
                   "hamelin sweep merge tries\n"
                   "hamelin sweep merge tries more --by family,goal,planner -o summary.json\n"
-                  "hamelin sweep merge tries --page tries.html --json");
+                  "hamelin sweep merge tries --page tries.html --json\n"
+                  "hamelin sweep merge tries --without-timing --records tries.jsonl");
   const auto options = std::make_shared<MergeOptions>();
   command
       ->add_option("directories", options->directories, "sweep directories, with plan and records")
@@ -74,6 +81,13 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
       ->add_option("--page", options->page,
                    "write an HTML page with table, gain map and all failed runs")
       ->type_name("PAGE.html");
+  command
+      ->add_option("--records", options->records,
+                   "write the records in the order of the plan; the bytes do not depend on shards")
+      ->type_name("RECORDS.jsonl");
+  command->add_flag("--without-timing", options->without_timing,
+                    "leave out what depends on the machine, so that repeated studies give equal "
+                    "bytes");
   command->add_flag("--json", options->json, "print the summary as JSON");
   command->callback([options, &exit_code] { exit_code = sweep_merge(*options); });
 }

@@ -166,7 +166,7 @@ py::tuple merge_sweeps(py::handle directories, const std::vector<std::string>& b
   sweep::Merged merged;
   {
     const py::gil_scoped_release unlocked;
-    merged = sweep::merge(folders, by);
+    merged = sweep::merge(sweep::read_sweeps(folders), by);
   }
   return py::make_tuple(to_python(sweep::to_json(merged)), sweep::to_table(merged));
 }

@@ -2,33 +2,18 @@
 
 #include <algorithm>
 #include <set>
-#include <string_view>
 
 #include "hamelin/sweep/merge.hpp"
+#include "shell.hpp"
 
 namespace hamelin::sweep {
 
 namespace {
 
-/// A word, quoted for a shell if necessary.
-std::string quoted(const std::string& word) {
-  const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           std::string_view("/._-=+:,@%").find(c) != std::string_view::npos;
-  };
-  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
-  std::string out(1, '\'');
-  for (const char c : word) {
-    if (c == '\'') out += "'\\'";  // gives '\'', which closes the quotes, adds one and reopens them
-    out += c;
-  }
-  return out + '\'';
-}
-
 std::string command_of(const MergedRun& merged) {
   std::string command = "hamelin run";
   for (const auto& word : run_arguments(merged.run, merged.directory))
-    command += fmt::format(" {}", quoted(word));
+    command += fmt::format(" {}", shell_word(word));
   return command;
 }
 
@@ -51,7 +36,7 @@ std::string cause_of(const MergedRun& merged) {
 
 Json failures(const Merged& merged) {
   Json all = Json::array();
-  for (const auto& r : merged.runs)
+  for (const auto& r : merged.sweeps.runs)
     if (!r.record.is_null() && r.record["outcome"] != "reached")
       all.push_back({{"run", r.run.id},
                      {"outcome", r.record["outcome"]},
@@ -62,7 +47,7 @@ Json failures(const Merged& merged) {
 
 Json gain_sets(const Merged& merged) {
   Json all = Json::array();
-  for (const auto& r : merged.runs) {
+  for (const auto& r : merged.sweeps.runs) {
     if (r.run.gains.empty() || r.record.is_null() || r.run.labels.at("problem") == no_obstacle)
       continue;
     Json gains = Json::object();
@@ -80,13 +65,13 @@ Json gain_sets(const Merged& merged) {
 
 Json page_json(const Merged& merged) {
   std::set<std::string> directories;
-  for (const auto& r : merged.runs) directories.insert(r.directory.string());
-  const auto recorded = std::count_if(merged.runs.begin(), merged.runs.end(),
+  for (const auto& r : merged.sweeps.runs) directories.insert(r.directory.string());
+  const auto recorded = std::count_if(merged.sweeps.runs.begin(), merged.sweeps.runs.end(),
                                       [](const MergedRun& r) { return !r.record.is_null(); });
   return {{"format", "hamelin.sweep-page/1"},
           {"generator", fmt::format("hamelin {}", version())},
           {"directories", directories},
-          {"planned", merged.runs.size()},
+          {"planned", merged.sweeps.runs.size()},
           {"recorded", recorded},
           {"summary", to_json(merged)},
           {"gain_sets", gain_sets(merged)},

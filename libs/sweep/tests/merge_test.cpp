@@ -9,6 +9,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -228,9 +229,9 @@ TEST_CASE(
     "the page's JSON has the summary, and each run that did not reach with its cause and its "
     "command",
     "[sweep][unit]") {
-  Merged merged{hand_made(), {"goal", "planner"}, {}, {}, {"a <note>"}};
-  merged.runs[3].run.set = {"/planner/params/escape=it's"};
-  merged.groups = group(merged.runs, merged.by);
+  Merged merged{{hand_made(), {}, {}, 0, {}}, {"goal", "planner"}, {}, {}, {"a <note>"}};
+  merged.sweeps.runs[3].run.set = {"/planner/params/escape=it's"};
+  merged.groups = group(merged.sweeps.runs, merged.by);
   const Json page = page_json(merged);
   CHECK(page["format"] == "hamelin.sweep-page/1");
   CHECK(page["directories"] == Json{"sweep"});
@@ -261,7 +262,7 @@ TEST_CASE(
   set.run.gains = free.run.gains = {{"k_p", 2.0}, {"eta", 3.0}, {"k_obs", 4.0}};
   set.run.labels["gains"] = free.run.labels["gains"] = "g1";
   free.run.labels["problem"] = no_obstacle;
-  const Json page = page_json({{set, free}, {"planner"}, {}, {}, {}});
+  const Json page = page_json({{{set, free}, {}, {}, 0, {}}, {"planner"}, {}, {}, {}});
   REQUIRE(page["gain_sets"].size() == 1);
   CHECK(page["gain_sets"][0] == Json{{"planner", "apf"},
                                      {"run", "g1"},
@@ -295,7 +296,7 @@ TEST_CASE("a merge reports missing runs and records from several builds", "[swee
     out << line.dump() << "\n";
   }
   out.close();
-  const Merged merged = merge({directory}, {"planner"});
+  const Merged merged = merge(read_sweeps({directory}), {"planner"});
   CHECK(merged.groups.at(0).planned == 3);
   CHECK(merged.groups.at(0).reached == 2);
   CHECK(merged.notes == std::vector<std::string>{"1 of 3 runs have no record yet",
@@ -303,8 +304,8 @@ TEST_CASE("a merge reports missing runs and records from several builds", "[swee
 }
 
 TEST_CASE("the summary's JSON has the values of the groups", "[sweep][unit]") {
-  Merged merged{hand_made(), {"planner"}, {}, {}, {}};
-  merged.groups = group(merged.runs, merged.by);
+  Merged merged{{hand_made(), {}, {}, 0, {}}, {"planner"}, {}, {}, {}};
+  merged.groups = group(merged.sweeps.runs, merged.by);
   const Json summary = to_json(merged);
   CHECK(summary["groups"][1]["labels"] == Json{{"planner", "hybrid"}});
   CHECK(summary["groups"][1]["reached"] == 2);
