@@ -99,7 +99,7 @@ def over_ssh(study):
                 study.program, "sweep", "emit", directory, "--parallel", "--shards", 7,
                 "--sshlogin", login, "--program", study.program, *options, "-o", script,
             )  # fmt: skip
-            text = str(directory) if mode == "shared" else "sweep/ssh-transfer"
+            text = str(directory) if mode == "shared" else "sweep/ssh-transfer\0--shard"
             killed = run_with_kills(script, text, 3)
             left += set(pathlib.Path.home().glob("hamelin-*")) - before
             study.compare(f"parallel over ssh, {mode}, {killed} processes killed", directory)

@@ -36,13 +36,10 @@ std::optional<sweep::Hosts> hosts_of(const EmitOptions& options) {
   if (!options.logins) return {};
   sweep::Hosts hosts;
   hosts.logins = *options.logins;
-  if (!options.transfer) return hosts;
-  if (!options.output)
-    throw Error(ErrorCode::usage,
-                "--transfer: expected -o too, beside which the archive is written");
-  hosts.archive = options.output->string() + ".tar.zst";
-  hosts.archived_directory =
-      sweep::pack(options.script.directory, output_target(*hosts.archive, {})).directory.string();
+  if (options.transfer)
+    hosts.archived_directory =
+        sweep::pack(options.script.directory, options.script.directory / sweep::archive_name)
+            .directory;
   return hosts;
 }
 

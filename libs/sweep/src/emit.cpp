@@ -86,36 +86,34 @@ trap 'kill -TERM "$run"; wait "$run"; scontrol requeue "${SLURM_JOB_ID:?}"; exit
 }
 
 std::string parallel_script(const ScriptOptions& options, const std::optional<Hosts>& hosts) {
-  const bool transfer = hosts && hosts->archive;
   const std::string directory = fs::absolute(options.directory).lexically_normal().string();
-  std::string script = fmt::format(
-      R"(#!/bin/bash
-# Executes a sweep of hamelin in {} shards with GNU parallel. Repeating it is safe, because runs
-# that have a record are skipped. Afterwards: hamelin sweep merge DIR
-set -euo pipefail
-)",
-      options.shards);
   std::string words = "parallel --will-cite --line-buffer --tagstring 'shard {}'";
-  const double share = 100.0 / static_cast<double>(options.jobs);
-  words += fmt::format(" --jobs {:.0f}%", std::max(1.0, share));
+  words += fmt::format(" --jobs {}%", std::max<std::size_t>(1, 100 / options.jobs));
   if (hosts) words += fmt::format(" --sshlogin {}", shell_word(hosts->logins));
   std::string command;
-  if (transfer) {
-    // The records come back into the directory of the sweep, to which relative names refer.
-    script += fmt::format("cd {}\n", shell_word(directory));
+  if (hosts && hosts->archived_directory) {
+    // Hosts keep the folder: what they have recorded is not lost if the connection is.
     const std::string work =
         "hamelin-" + sha256_of_file(plan_file(options.directory)).substr(0, 16);
-    const std::string archive = hosts->archive->filename().string();
-    words += fmt::format(" --workdir {} --basefile {} --return {}/./records-{{}}-of-{}.jsonl", work,
-                         shell_word(fs::proximate(*hosts->archive, options.directory).string()),
-                         shell_word("sweep/" + hosts->archived_directory), options.shards);
-    command = fmt::format("{} --quiet sweep unpack {} -o sweep && ", shell_word(options.program),
-                          shell_word(archive)) +
-              shard_command(options, shell_word("sweep/" + hosts->archived_directory), "{}");
+    const std::string records = fmt::format("records-{{}}-of-{}.jsonl", options.shards);
+    const std::string there = shell_word(("sweep" / *hosts->archived_directory).string());
+    words += fmt::format(" --workdir {} --basefile {} --return {}", work, archive_name, records);
+    command = fmt::format(
+        "{0} --quiet sweep unpack {1} -o sweep && {{ {2}; code=$?; cp {3}/{4} .; exit $code; }}",
+        shell_word(options.program), archive_name, shard_command(options, there, "{}"), there,
+        records);
   } else {
     command = shard_command(options, shell_word(directory), "{}");
   }
-  return script + fmt::format("seq {} | {} {}\n", options.shards, words, shell_word(command));
+  return fmt::format(
+      R"(#!/bin/bash
+# Executes a sweep of hamelin in {0} shards with GNU parallel. Repeating it is safe, because runs
+# that have a record are skipped. Afterwards: hamelin sweep merge DIR
+set -euo pipefail
+cd {1}
+seq {0} | {2} {3}
+)",
+      options.shards, shell_word(directory), words, shell_word(command));
 }
 
 }  // namespace hamelin::sweep

@@ -25,12 +25,14 @@ struct ScriptOptions {
 
 /// Where GNU parallel executes shards, if not on the own machine only.
 struct Hosts {
-  std::string logins;  ///< as `--sshlogin` takes them: "8/node1,node2,:"
-  /// The archive of the sweep, which is then sent to each host, unpacked there, and the records
-  /// brought back; none: the hosts share the directory.
-  std::optional<std::filesystem::path> archive;
-  std::string archived_directory;  ///< of the sweep in the archive
+  std::string logins;  ///< as `--sshlogin` takes them: "8/node1,node2"
+  /// The directory of the sweep in `archive_name`, which is then sent to each host and unpacked
+  /// there, and the records are brought back; none: the hosts share the directory.
+  std::optional<std::filesystem::path> archived_directory;
 };
+
+/// The archive that is sent to hosts, in the directory of the sweep.
+inline constexpr const char* archive_name = "sweep.tar.zst";
 
 /// A shell script that executes the shards by GNU parallel, as many at a time as there are cores
 /// over `jobs`.
