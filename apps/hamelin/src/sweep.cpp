@@ -16,6 +16,9 @@ void add_sweep(CLI::App& app, int& exit_code) {
   add_sweep_run(*sweep, exit_code);
   add_sweep_merge(*sweep, exit_code);
   add_sweep_compare(*sweep, exit_code);
+  add_sweep_emit(*sweep, exit_code);
+  add_sweep_pack(*sweep, exit_code);
+  add_sweep_unpack(*sweep, exit_code);
   add_sweep_pairs(*sweep, exit_code);
   add_sweep_one(*sweep, exit_code);
 }

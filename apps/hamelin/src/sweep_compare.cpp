@@ -9,6 +9,7 @@
 #include "hamelin/report/report.hpp"
 #include "hamelin/sweep/compare.hpp"
 #include "hamelin/sweep/page.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "output.hpp"
 #include "page.hpp"
 #include "sweep.hpp"
@@ -47,20 +48,20 @@ int sweep_compare(const CompareCommand& options) {
   std::vector<fs::path> inputs;
   for (const auto& directory : directories) {
     inputs.push_back(sweep::plan_file(directory));
-    inputs.push_back(sweep::records_file(directory));
+    for (auto& file : sweep::record_files(directory)) inputs.push_back(std::move(file));
   }
   std::optional<fs::path> output, page, template_file;
   if (options.output) output = output_target(*options.output, inputs);
   if (options.page) page = output_target(*options.page, inputs);
   if (page) template_file = page_template("sweep");
-  const sweep::Merged merged = sweep::merge(directories, {"planner"});
-  const auto comparisons = comparisons_of(options, merged.runs);
+  const sweep::Merged merged = sweep::merge(sweep::read_sweeps_apart(directories), {"planner"});
+  const auto comparisons = comparisons_of(options, merged.sweeps.runs);
   const Json document = sweep::to_json(comparisons);
   if (output) write_file_atomically(*output, document.dump(2) + "\n");
   if (page) {
     sweep::PageExtras extras;
     if (directories.size() > 1) extras.comparisons.emplace_back("Sweeps", comparisons);
-    for (auto& more : sweep::comparisons_of_page(merged.runs))
+    for (auto& more : sweep::comparisons_of_page(merged.sweeps.runs))
       extras.comparisons.push_back(std::move(more));
     write_page(*template_file, report::pack(sweep::page_json(merged, extras)), *page);
   }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command_line.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "scene_flags.hpp"
 #include "sweep.hpp"

@@ -43,11 +43,11 @@ class TemporaryLog {
 std::vector<std::size_t> runs_to_replay(const sweep::Merged& merged, std::size_t per_class) {
   std::map<std::pair<std::string, std::string>, std::size_t> chosen;
   std::vector<std::size_t> runs;
-  for (std::size_t i = 0; i < merged.runs.size(); ++i) {
-    const Json& record = merged.runs[i].record;
+  for (std::size_t i = 0; i < merged.sweeps.runs.size(); ++i) {
+    const Json& record = merged.sweeps.runs[i].record;
     const std::string failure = sweep::failure_class(record);
     if (failure.empty() || record["outcome"] == "crashed") continue;
-    std::size_t& taken = chosen[{failure, merged.runs[i].run.labels.at("planner")}];
+    std::size_t& taken = chosen[{failure, merged.sweeps.runs[i].run.labels.at("planner")}];
     if (taken >= per_class) continue;
     ++taken;
     runs.push_back(i);
@@ -128,7 +128,7 @@ std::map<std::size_t, sweep::ReplayLink> write_replays(const sweep::Merged& merg
   std::set<std::string> taken;
   for (const std::size_t i : runs) {
     if (stop_on_signals()) break;
-    const sweep::MergedRun& run = merged.runs[i];
+    const sweep::MergedRun& run = merged.sweeps.runs[i];
     const std::string name = file_name(run.run.id, taken) + ".html";
     write_replay(run, path / name, request);
     links[i] = {fmt::format("{}/{}", folder, name), sweep::judged_contact_time(run.record)};

@@ -8,7 +8,7 @@
 #include "command_line.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/judge.hpp"
-#include "hamelin/sweep/plan.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "plants.hpp"
 #include "scene_flags.hpp"
@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 struct SweepRunOptions {
   fs::path directory;
   sweep::RunOptions sweep;
+  std::string shard;
   std::vector<fs::path> plugin_path;
 };
 
@@ -42,6 +43,7 @@ int sweep_run(const SweepRunOptions& options) {
     sweep.command.push_back(directory.string());
   }
   sweep.plugin_directories = plugin_path(options.plugin_path);
+  if (!options.shard.empty()) sweep.shard = sweep::parse_shard(options.shard, "--shard");
   sweep.stop = &stop_on_signals();
   sweep::RunOutcome outcome;
   {
@@ -54,7 +56,9 @@ int sweep_run(const SweepRunOptions& options) {
   }
   if (outcome.dropped_truncated_line)
     note(fmt::format("{}: the last line was cut; its run is repeated",
-                     sweep::records_file(options.directory).string()));
+                     (sweep.shard ? sweep::records_file(options.directory, *sweep.shard)
+                                  : sweep::records_file(options.directory))
+                         .string()));
   const std::size_t left = outcome.planned - outcome.recorded - outcome.run;
   report(fmt::format(
       "{}: {} runs recorded now, {} before, {} left{}\n", options.directory.string(), outcome.run,
@@ -86,7 +90,8 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
       "Execute the plan of a sweep, one process per run, and record the results. Resumes where "
       "it stopped if it was interrupted or killed",
       "hamelin sweep run tries\n"
-      "hamelin sweep run tries --only hybrid --limit 10 --jobs 1");
+      "hamelin sweep run tries --only hybrid --limit 10 --jobs 1\n"
+      "hamelin sweep run tries --shard 3/40");
   const auto options = std::make_shared<SweepRunOptions>();
   options->sweep.timeout_s = 600.0;
   options->sweep.jobs = std::max(1U, std::thread::hardware_concurrency());
@@ -101,6 +106,12 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
   command
       ->add_option("--only", options->sweep.only, "execute only runs whose id contains this text")
       ->type_name("TEXT");
+  command
+      ->add_option(
+          "--shard", options->shard,
+          "execute only part I of N parts of the plan, and record it in a file of its own; "
+          "parts may run at the same time on machines that share the directory")
+      ->type_name("I/N");
   command->add_option("--limit", options->sweep.limit, "largest number of runs to execute now")
       ->type_name("N")
       ->check(unsigned_range());
@@ -110,7 +121,8 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
       ->type_name("SECONDS")
       ->default_str("600")
       ->check(CLI::PositiveNumber);
-  command->add_flag("--fresh", options->sweep.fresh, "delete the existing records and start again");
+  command->add_flag("--fresh", options->sweep.fresh, "delete the existing records and start again")
+      ->excludes("--shard");
   command
       ->add_option("--plugin-path", options->plugin_path,
                    "directory to search first for planners; may be repeated")

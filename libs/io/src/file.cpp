@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -129,29 +128,6 @@ std::filesystem::path resolve_path(const std::filesystem::path& base,
       resolved /= part;
   }
   return resolved.empty() ? std::filesystem::path(".") : resolved;
-}
-
-void write_file_atomically(const std::filesystem::path& file, std::string_view content) {
-  std::string temporary = file.string() + ".XXXXXX";
-  const int fd = ::mkstemp(temporary.data());
-  const auto fail = [&](const char* problem) {
-    const int reason = errno;
-    if (fd >= 0) {
-      ::close(fd);
-      ::unlink(temporary.c_str());
-    }
-    throw Error(ErrorCode::io,
-                fmt::format("{}: {}: {}", file.string(), problem, std::strerror(reason)));
-  };
-  if (fd < 0) fail("cannot be written");
-  for (std::size_t done = 0; done < content.size();) {
-    const ::ssize_t n = ::write(fd, content.data() + done, content.size() - done);
-    if (n < 0 && errno != EINTR) fail("cannot be written");
-    if (n > 0) done += static_cast<std::size_t>(n);
-  }
-  if (::fchmod(fd, 0644) != 0 || ::fsync(fd) != 0) fail("cannot be written");
-  if (std::rename(temporary.c_str(), file.c_str()) != 0) fail("cannot be replaced");
-  ::close(fd);
 }
 
 std::string sha256_hex(std::string_view bytes) {

@@ -560,6 +560,7 @@ def _run_sweep(
     command: list[str],
     jobs: int,
     only: str,
+    shard: str | None,
     limit: int | None,
     fresh: bool,
     timeout: float | None,
@@ -570,6 +571,8 @@ def _run_sweep(
 def _sweep_csv(directories: Paths) -> str: ...
 
 def _sweep_one(scene: Scene, plugin_path: Paths, argv: list[str]) -> str: ...
+
+def _write_records(directories: Paths, file: PathLike) -> None: ...
 
 def _verify(
     log: PathLike,

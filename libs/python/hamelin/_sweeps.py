@@ -6,11 +6,19 @@ import io
 import json
 import os
 import sys
+import tempfile
 from typing import Any, Sequence
 
 import numpy as np
 
-from ._hamelin import _compare_sweeps, _merge_sweeps, _plan_sweep, _run_sweep, _sweep_csv
+from ._hamelin import (
+    _compare_sweeps,
+    _merge_sweeps,
+    _plan_sweep,
+    _run_sweep,
+    _sweep_csv,
+    _write_records,
+)
 from ._progress import Bar
 from ._types import Document, DocumentMapping, Numbers, PathLike, Paths, Progress
 
@@ -28,9 +36,12 @@ class Sweep(DocumentMapping):
         super().__init__(document)
 
     def records(self) -> list[Document]:
-        """One record per run (hamelin.record/1), in the order in which the runs ended."""
-        with open(os.path.join(self.directory, "records.jsonl"), encoding="utf-8") as lines:
-            return [json.loads(line) for line in lines]
+        """One record per run (hamelin.record/1), in the order of the plan, of all shards."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "records.jsonl")
+            _write_records(self.directory, file)
+            with open(file, encoding="utf-8") as lines:
+                return [json.loads(line) for line in lines]
 
     def compare(
         self, other: Sweep | PathLike | None = None, *, label: str = "planner",
@@ -162,6 +173,7 @@ def sweep(
     duration: float | None = None,
     jobs: int | None = None,
     only: str = "",
+    shard: str | None = None,
     limit: int | None = None,
     fresh: bool = False,
     timeout: float | None = 600.0,
@@ -172,12 +184,14 @@ def sweep(
     """Executes many runs, one process per run, and sums them up, as `hamelin sweep`.
 
     directory: folder of the sweep. scenes: scene files, planned with the arguments up to duration;
-    None: execute the plan that the folder has, of plan_sweep(). planner: names, each for all scenes. set: values for all runs, such as
-    "/planner/params/gain=2". vary: values such as "/planner/params/gain=1,2", one run per
-    combination. seeds: one run each. duration: longest simulated time [s]. jobs: number of parallel
-    processes; None: one per core. only: execute only runs whose id contains this text. limit:
-    largest number of runs to execute now. fresh: drop existing records. timeout: wall-clock time
-    after which a run is killed [s]. by: labels that the summary groups by.
+    None: execute the plan that the folder has, of plan_sweep(). planner: names, each for all
+    scenes. set: values for all runs, such as "/planner/params/gain=2". vary: values such as
+    "/planner/params/gain=1,2", one run per combination. seeds: one run each. duration: longest
+    simulated time [s]. jobs: number of parallel processes; None: one per core. only: execute only
+    runs whose id contains this text. shard: execute only this part of the plan, such as "3/40",
+    also at the same time as other parts. limit: largest number of runs to execute now. fresh: drop
+    existing records. timeout: wall-clock time after which a run is killed [s]. by: labels that the
+    summary groups by.
     """
     folder = os.fspath(directory)
     if scenes is not None:
@@ -208,6 +222,7 @@ def sweep(
                 command,
                 (os.cpu_count() or 1) if jobs is None else jobs,
                 only,
+                shard,
                 limit,
                 fresh,
                 timeout,

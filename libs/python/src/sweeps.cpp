@@ -133,7 +133,8 @@ py::dict plan_sweep(py::handle directory, const py::dict& given, const py::objec
 }
 
 py::dict run_sweep(py::handle directory, const std::vector<std::string>& command, std::size_t jobs,
-                   const std::string& only, const std::optional<std::size_t>& limit, bool fresh,
+                   const std::string& only, const std::optional<std::string>& shard,
+                   const std::optional<std::size_t>& limit, bool fresh,
                    const std::optional<double>& timeout, py::handle plugins,
                    const py::object& progress) {
   if (jobs > 1024) refuse("sweep", "jobs", fmt::format("{}, expected 1 to 1024", jobs));
@@ -141,6 +142,7 @@ py::dict run_sweep(py::handle directory, const std::vector<std::string>& command
   options.command = command;
   options.jobs = jobs;
   options.only = only;
+  if (shard) options.shard = sweep::parse_shard(*shard, "sweep: shard");
   options.limit = limit;
   options.fresh = fresh;
   options.timeout_s = timeout;
@@ -169,7 +171,7 @@ py::tuple merge_sweeps(py::handle directories, const std::vector<std::string>& b
   sweep::Merged merged;
   {
     const py::gil_scoped_release unlocked;
-    merged = sweep::merge(folders, by);
+    merged = sweep::merge(sweep::read_sweeps(folders), by);
   }
   return py::make_tuple(to_python(sweep::to_json(merged)), sweep::to_table(merged));
 }
@@ -180,7 +182,7 @@ py::object compare_sweeps(py::handle directories, const std::string& label,
   std::vector<sweep::Comparison> comparisons;
   {
     const py::gil_scoped_release unlocked;
-    const auto runs = sweep::read_sweeps(folders);
+    const auto runs = sweep::read_sweeps_apart(folders).runs;
     if (folders.size() == 1)
       comparisons =
           sweep::compare_values(runs, {label, ignore}, std::numeric_limits<std::size_t>::max());
@@ -194,8 +196,15 @@ std::string sweep_csv(py::handle directories) {
   const auto folders = paths_of(directories);
   const py::gil_scoped_release unlocked;
   sweep::Merged merged;
-  merged.runs = sweep::read_sweeps(folders);
+  merged.sweeps = sweep::read_sweeps(folders);
   return sweep::to_csv(merged);
+}
+
+void write_records(py::handle directories, py::handle file) {
+  const auto folders = paths_of(directories);
+  const auto to = path_of(file);
+  const py::gil_scoped_release unlocked;
+  sweep::write_records(sweep::read_sweeps(folders), to, true);
 }
 
 // One run of a sweep under its judge, as the program's `sweep one`.
@@ -234,13 +243,15 @@ void add_sweeps(py::module_& module) {
   module.def("_plan_sweep", &plan_sweep, arg("directory"), arg("options"), arg("progress"),
              "Writes the plan of a sweep; returns a summary.");
   module.def("_run_sweep", &run_sweep, arg("directory"), arg("command"), arg("jobs"), arg("only"),
-             arg("limit"), arg("fresh"), arg("timeout"), arg("plugin_path"), arg("progress"),
+             arg("shard"), arg("limit"), arg("fresh"), arg("timeout"), arg("plugin_path"), arg("progress"),
              "Executes the plan of a sweep.");
   module.def("_merge_sweeps", &merge_sweeps, arg("directories"), arg("by"),
              "Document and table of `hamelin sweep merge`.");
   module.def("_compare_sweeps", &compare_sweeps, arg("directories"), arg("label"), arg("ignore"),
              "Document of `hamelin sweep compare`.");
   module.def("_sweep_csv", &sweep_csv, arg("directories"), "CSV of `hamelin sweep merge --csv`.");
+  module.def("_write_records", &write_records, arg("directories"), arg("file"),
+             "Writes the records of all runs in the order of the plans.");
   module.def("_sweep_one", &sweep_one, arg("scene"), arg("plugin_path"), arg("argv"),
              "One run of a sweep under its judge, as a line of JSON.");
 }

@@ -124,3 +124,15 @@ def test_planners_are_compared_and_runs_are_a_table(program, scenes, tmp_path):
     pandas.testing.assert_frame_equal(table, pandas.read_csv(tmp_path / "tries.csv"))
     assert sorted(table.planner) == ["apf", "apf", "hybrid", "hybrid"]
     assert (table.outcome == "timeout").all()
+
+
+def test_shards_give_the_records_of_the_whole(scenes, tmp_path):
+    arguments = {"scenes": scenes / "pillar.json", "planner": ["hybrid", "apf"], "duration": 0.05}
+    whole = hamelin.sweep(tmp_path / "whole", seeds=range(1, 4), jobs=1, **arguments)
+    for index in (2, 1):
+        parts = hamelin.sweep(tmp_path / "parts", seeds=range(1, 4), shard=f"{index}/2", **arguments)
+    assert len(list((tmp_path / "parts").glob("records-*-of-2.jsonl"))) == 2
+    names = [[record["id"] for record in sweep.records()] for sweep in (whole, parts)]
+    assert len(names[0]) == 6 and names[0] == names[1]
+    with pytest.raises(hamelin.Error, match="'3/2' is not a shard"):
+        hamelin.sweep(tmp_path / "parts", shard="3/2")

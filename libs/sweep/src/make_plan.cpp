@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "directory_lock.hpp"
+#include "file_lock.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"

@@ -80,20 +80,6 @@ void add_run(GroupData& data, const MergedRun& merged) {
   if (!reached) ++g.causes[failure_class(record)];
 }
 
-// The builds that made a result: (name, build) of the program and of its planner.
-std::vector<std::pair<std::string, std::string>> builds_of(const Json& result) {
-  const Json provenance = result.value("provenance", Json::object());
-  std::vector<std::pair<std::string, std::string>> builds;
-  if (provenance.contains("build"))
-    builds.emplace_back("the program", provenance["build"].value("id", Json()).dump());
-  if (provenance.contains("inputs"))
-    for (const Json& input : provenance["inputs"])
-      if (input.value("role", Json()) == "plugin")
-        builds.emplace_back(fmt::format("planner {}", text_at(result, "planner")),
-                            input["sha256"].dump());
-  return builds;
-}
-
 Group make_group(GroupData&& data) {
   Group g = std::move(data.group);
   g.reached_interval = wilson_interval(g.reached, g.feasible);
@@ -120,27 +106,6 @@ Interval wilson_interval(std::size_t successes, std::size_t trials) {
   const double center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
   const double half = z / (1.0 + z2 / n) * std::sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n));
   return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
-}
-
-std::vector<MergedRun> read_sweeps(const std::vector<std::filesystem::path>& directories) {
-  std::vector<MergedRun> runs;
-  for (const auto& directory : directories) {
-    const Plan plan = read_plan(directory);
-    std::map<std::string, Json> records;
-    for (auto& line : read_records(directory, plan).lines) {
-      const std::string id = line["id"];
-      records[id] = std::move(line);
-    }
-    std::map<std::string, const PlannedScene*> scenes;
-    for (const auto& scene : plan.scenes) scenes[scene.file] = &scene;
-    for (const auto& run : plan.runs) {
-      const PlannedScene& scene = *scenes.at(run.scene);
-      const auto record = records.find(run.id);
-      runs.push_back({run, directory, scene.feasible, scene.reason,
-                      record == records.end() ? Json() : record->second});
-    }
-  }
-  return runs;
 }
 
 std::vector<Group> group(const std::vector<MergedRun>& runs, const std::vector<std::string>& by) {
@@ -212,25 +177,25 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
   return all;
 }
 
-Merged merge(const std::vector<std::filesystem::path>& directories,
-             const std::vector<std::string>& by) {
-  Merged merged{read_sweeps(directories), by, {}, {}, {}};
-  merged.groups = group(merged.runs, by);
-  merged.gains = group_gains(merged.runs);
-  std::map<std::string, std::set<std::string>> builds;
-  std::size_t missing = 0;
-  for (const auto& r : merged.runs) {
-    if (r.record.is_null()) ++missing;
-    if (r.record.is_null() || r.record["result"].is_null()) continue;
-    for (const auto& [name, build] : builds_of(r.record["result"])) builds[name].insert(build);
-  }
+Merged merge(Sweeps&& sweeps, const std::vector<std::string>& by) {
+  Merged merged{std::move(sweeps), by, {}, {}, {}};
+  const Sweeps& from = merged.sweeps;
+  merged.groups = group(from.runs, by);
+  merged.gains = group_gains(from.runs);
+  const auto missing = std::count_if(from.runs.begin(), from.runs.end(),
+                                     [](const MergedRun& r) { return r.record.is_null(); });
   if (missing > 0)
     merged.notes.push_back(
-        fmt::format("{} of {} runs have no record yet", missing, merged.runs.size()));
-  for (const auto& [name, all] : builds)
+        fmt::format("{} of {} runs have no record yet", missing, from.runs.size()));
+  for (const auto& [name, all] : from.builds)
     if (all.size() > 1)
       merged.notes.push_back(
           fmt::format("the records come from {} builds of {}", all.size(), name));
+  if (!from.different.empty())
+    merged.notes.push_back(fmt::format(
+        "{} runs have different records in several files, the first of them is '{}'; the first "
+        "record of each is used",
+        from.different.size(), from.different.front()));
   return merged;
 }
 

@@ -5,30 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <string_view>
 #include <unordered_map>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/sweep/run_facts.hpp"
+#include "shell.hpp"
 
 namespace hamelin::sweep {
 
 namespace {
-
-/// A word, quoted for a shell if necessary.
-std::string quoted(const std::string& word) {
-  const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           std::string_view("/._-=+:,@%").find(c) != std::string_view::npos;
-  };
-  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
-  std::string out(1, '\'');
-  for (const char c : word) {
-    if (c == '\'') out += "'\\'";  // gives '\'', which closes the quotes, adds one and reopens them
-    out += c;
-  }
-  return out + '\'';
-}
 
 /// Values as indices into a list of the different ones, in the order of their first run; -1 means
 /// that there is no value.
@@ -92,7 +77,7 @@ class NamedColumns {
 std::string arguments_of(const std::vector<std::string>& words) {
   std::string text;
   for (std::size_t i = 1; i < words.size(); ++i)
-    text += fmt::format("{}{}", text.empty() ? "" : " ", quoted(words[i]));
+    text += fmt::format("{}{}", text.empty() ? "" : " ", shell_word(words[i]));
   return text;
 }
 
@@ -105,7 +90,7 @@ class Columns {
     feasible_.push_back(merged.feasible ? 1 : 0);
     const auto words = run_arguments(merged.run, merged.directory);
     const std::map<std::string, std::string> texts{{"directory", merged.directory.string()},
-                                                   {"scene", quoted(words.front())},
+                                                   {"scene", shell_word(words.front())},
                                                    {"arguments", arguments_of(words)},
                                                    {"outcome", facts.outcome},
                                                    {"failure", facts.failure},
@@ -162,7 +147,7 @@ Json page_json(const Merged& merged, const PageExtras& extras) {
   std::set<std::string> directories;
   Columns columns;
   std::size_t recorded = 0;
-  for (const auto& r : merged.runs) {
+  for (const auto& r : merged.sweeps.runs) {
     directories.insert(r.directory.string());
     recorded += r.record.is_null() ? 0U : 1U;
     columns.add(r);
@@ -176,7 +161,7 @@ Json page_json(const Merged& merged, const PageExtras& extras) {
   return {{"format", "hamelin.sweep-page/2"},
           {"generator", fmt::format("hamelin {}", version())},
           {"directories", directories},
-          {"planned", merged.runs.size()},
+          {"planned", merged.sweeps.runs.size()},
           {"recorded", recorded},
           {"summary", to_json(merged)},
           {"runs", std::move(columns).json()},

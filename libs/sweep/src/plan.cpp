@@ -8,6 +8,7 @@
 #include "hamelin/io/file.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/overrides.hpp"
+#include "hamelin/sweep/records.hpp"
 
 namespace hamelin::sweep {
 
@@ -15,10 +16,6 @@ namespace fs = std::filesystem;
 
 fs::path plan_file(const fs::path& directory) {
   return directory / "plan.json";
-}
-
-fs::path records_file(const fs::path& directory) {
-  return directory / "records.jsonl";
 }
 
 Json to_json(const Plan& plan) {
@@ -54,36 +51,17 @@ Json to_json(const Plan& plan) {
 
 void write_plan(Plan& plan, const fs::path& directory) {
   const std::string text = to_json(plan).dump(1) + "\n";
-  const fs::path file = plan_file(directory), records = records_file(directory);
+  const fs::path file = plan_file(directory);
   std::error_code ec;
-  if (fs::exists(records, ec) && fs::file_size(records, ec) > 0 &&
-      (!fs::exists(file, ec) || read_file(file) != text))
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{}: holds records of another plan, expected a directory without records",
-                    records.string()));
+  for (const auto& records : record_files(directory))
+    if (fs::file_size(records, ec) > 0 && (!fs::exists(file, ec) || read_file(file) != text))
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: holds records of another plan, expected a directory without records",
+                      records.string()));
   write_file_atomically(file, text);
   plan.sha256 = sha256_hex(text);
 }
-
-namespace {
-
-// Whether a line has the members that the code in this library reads; `hamelin validate` checks the
-// whole schema.
-bool is_record(const Json& line) {
-  const auto has = [&](const char* key) { return line.contains(key); };
-  const auto text = [&](const char* key) { return has(key) && line[key].is_string(); };
-  const auto object_or_null = [&](const char* key) {
-    return has(key) && (line[key].is_object() || line[key].is_null());
-  };
-  return line.is_object() && line.value("schema", Json()) == "hamelin.record/1" && text("plan") &&
-         text("id") && text("outcome") && has("cause") && object_or_null("result") &&
-         object_or_null("judge") &&
-         (line["judge"].is_null() ||
-          (line["judge"].contains("obstacles") && line["judge"].contains("self")));
-}
-
-}  // namespace
 
 Plan read_plan(const fs::path& directory) {
   std::error_code ec;
@@ -164,53 +142,31 @@ scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
-void check_unchanged(const Plan& plan, const fs::path& directory,
-                     const std::vector<fs::path>& plugin_directories) {
-  const auto check = [&](const fs::path& file, const std::string& planned) {
-    if (const std::string now = sha256_of_file(file); now != planned)
-      throw Error(ErrorCode::invalid, fmt::format("{}: has changed since the sweep was planned: "
-                                                  "SHA-256 {}, expected {}; plan it again, in a "
-                                                  "new directory if there are records",
-                                                  file.string(), now, planned));
-  };
-  for (const auto& scene : plan.scenes) check(resolve_path(directory, scene.file), scene.sha256);
-  for (const auto& input : plan.inputs) check(resolve_path(directory, input.file), input.sha256);
-  for (const auto& plugin : plan.plugins)
-    check(planning::find_plugin_file(plugin.name, plugin_directories), plugin.sha256);
+namespace {
+
+void check_hash(const fs::path& file, const std::string& planned) {
+  if (const std::string now = sha256_of_file(file); now != planned)
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: has changed since the sweep was planned: SHA-256 {}, expected {}; "
+                            "plan it again, in a new directory if there are records",
+                            file.string(), now, planned));
 }
 
-Records read_records(const fs::path& directory, const Plan& plan) {
-  const fs::path file = records_file(directory);
-  Records records;
-  std::error_code ec;
-  if (!fs::exists(file, ec)) return records;
-  const std::string text = read_file(file);
-  std::set<std::string> planned, seen;
-  for (const auto& run : plan.runs) planned.insert(run.id);
-  while (records.complete_bytes < text.size()) {
-    const auto end = text.find('\n', records.complete_bytes);
-    if (end == std::string::npos) break;
-    const std::string where = fmt::format("{}: line {}", file.string(), records.lines.size() + 1);
-    Json record =
-        parse_json(text.substr(records.complete_bytes, end - records.complete_bytes), where);
-    if (!is_record(record))
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: is not a record, expected hamelin.record/1", where));
-    if (record["plan"] != plan.sha256)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: belongs to another plan, expected records of the current {}",
-                              where, plan_file(directory).string()));
-    const std::string id = record["id"];
-    if (!planned.contains(id) || !seen.insert(id).second)
-      throw Error(ErrorCode::invalid,
-                  fmt::format("{}: run '{}' is {}", where, id,
-                              planned.contains(id) ? "recorded twice, expected once"
-                                                   : "not in the plan, expected a planned run"));
-    records.lines.push_back(std::move(record));
-    records.complete_bytes = end + 1;
-  }
-  records.truncated = records.complete_bytes < text.size();
-  return records;
+}  // namespace
+
+void check_files(const Plan& plan, const fs::path& directory,
+                 const std::vector<const PlannedRun*>& runs) {
+  std::set<std::string_view> scenes;
+  for (const PlannedRun* run : runs) scenes.insert(run->scene);
+  for (const auto& scene : plan.scenes)
+    if (scenes.contains(scene.file)) check_hash(resolve_path(directory, scene.file), scene.sha256);
+  for (const auto& input : plan.inputs)
+    check_hash(resolve_path(directory, input.file), input.sha256);
+}
+
+void check_planners(const Plan& plan, const std::vector<fs::path>& plugin_directories) {
+  for (const auto& plugin : plan.plugins)
+    check_hash(planning::find_plugin_file(plugin.name, plugin_directories), plugin.sha256);
 }
 
 std::vector<std::string> run_arguments(const PlannedRun& run, const fs::path& directory) {

@@ -127,7 +127,7 @@ std::vector<std::pair<std::string, std::string>> varied_values(const PlannedRun&
 }
 
 std::string to_csv(const Merged& merged) {
-  const ColumnNames columns = columns_of(merged.runs);
+  const ColumnNames columns = columns_of(merged.sweeps.runs);
   CsvWriter csv;
   for (const char* name : {"id", "directory"}) csv.add(name);
   for (const auto* names : {&columns.labels, &columns.varied, &columns.gains})
@@ -137,7 +137,7 @@ std::string to_csv(const Merged& merged) {
         "self_clearance_m", "certified_share", "tick_us_p50", "tick_us_p99", "judge"})
     csv.add(name);
   csv.end_line();
-  for (const auto& r : merged.runs) write_run(csv, r, columns);
+  for (const auto& r : merged.sweeps.runs) write_run(csv, r, columns);
   return csv.take();
 }
 

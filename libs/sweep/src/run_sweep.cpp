@@ -12,12 +12,16 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <numeric>
 #include <set>
 
-#include "directory_lock.hpp"
+#include "file_lock.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
 #include "hamelin/sweep/plan.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
+#include "hamelin/sweep/shard.hpp"
 
 namespace hamelin::sweep {
 
@@ -141,28 +145,37 @@ void spawn(Child& child, const std::vector<std::string>& arguments) {
   child.err.close_writer();
 }
 
-/// The file of records, to which one sweep at a time appends line by line.
+/// The file to which one process at a time appends records line by line.
 class RecordFile {
  public:
-  explicit RecordFile(const fs::path& directory) : lock_(directory) {}
+  RecordFile(const fs::path& directory, const std::optional<Shard>& shard)
+      : directory_(directory, shard ? FileLock::Mode::shared : FileLock::Mode::exclusive) {
+    if (shard) shard_.emplace(records_file(directory, *shard), FileLock::Mode::exclusive, "shard");
+  }
 
   /// Truncates the file to its first `bytes`; records are appended after them.
   void truncate(std::size_t bytes) {
-    if (::ftruncate(lock_.descriptor(), static_cast<off_t>(bytes)) != 0 ||
-        ::lseek(lock_.descriptor(), 0, SEEK_END) < 0)
-      lock_.fail();
+    if (::ftruncate(file().descriptor(), static_cast<off_t>(bytes)) != 0 ||
+        ::lseek(file().descriptor(), 0, SEEK_END) < 0)
+      file().fail();
   }
   void append(const Json& record) {
     const std::string line = record.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     for (std::size_t done = 0; done < line.size();) {
-      const auto count = ::write(lock_.descriptor(), line.data() + done, line.size() - done);
-      if (count < 0 && errno != EINTR) lock_.fail();
+      const auto count = ::write(file().descriptor(), line.data() + done, line.size() - done);
+      if (count < 0 && errno != EINTR) file().fail();
       if (count > 0) done += static_cast<std::size_t>(count);
     }
   }
 
+  [[nodiscard]] fs::path path() const { return file().name(); }
+
  private:
-  DirectoryLock lock_;
+  [[nodiscard]] const FileLock& file() const {
+    return shard_ ? *shard_ : static_cast<const FileLock&>(directory_);
+  }
+  DirectoryLock directory_;
+  std::optional<FileLock> shard_;
 };
 
 std::string last_line(std::string text) {
@@ -178,8 +191,12 @@ std::string last_line(std::string text) {
 class Sweep {
  public:
   Sweep(const fs::path& directory, const RunOptions& options)
-      : directory_(directory), options_(options), plan_(read_plan(directory)), file_(directory) {
-    plan_ = read_plan(directory);  // again, because it may have changed before the lock was held
+      : directory_(directory),
+        options_(options),
+        plan_(read_plan(directory)),
+        file_(directory, options.shard) {
+    // It may have changed before the lock was held.
+    if (sha256_of_file(plan_file(directory)) != plan_.sha256) plan_ = read_plan(directory);
   }
 
   RunOutcome run() {
@@ -211,28 +228,48 @@ class Sweep {
   [[nodiscard]] bool stopping() const { return options_.stop != nullptr && options_.stop->load(); }
 
   void select_runs() {
-    std::set<std::string> done;
-    if (!options_.fresh) {
-      const Records records = read_records(directory_, plan_);
-      for (const auto& record : records.lines) done.insert(record["id"].get<std::string>());
-      complete_bytes_ = records.complete_bytes;
-      outcome_.dropped_truncated_line = records.truncated;
-    }
-    for (const auto& run : plan_.runs) {
+    const std::vector<bool> done = recorded_runs();
+    std::vector<std::size_t> mine(plan_.runs.size());
+    std::iota(mine.begin(), mine.end(), std::size_t{0});
+    if (options_.shard) mine = runs_of_shard(plan_, *options_.shard);
+    for (const std::size_t i : mine) {
+      const PlannedRun& run = plan_.runs[i];
       if (!options_.only.empty() && run.id.find(options_.only) == std::string::npos) continue;
       ++outcome_.planned;
-      if (done.contains(run.id)) {
+      if (done[i]) {
         ++outcome_.recorded;
       } else if (!options_.limit || pending_.size() < *options_.limit) {
         pending_.push_back(&run);
       }
     }
-    if (outcome_.planned == 0)
+    selected_ = pending_.size();
+    if (outcome_.planned == 0 && !options_.only.empty())
       throw Error(ErrorCode::usage,
                   fmt::format("{}: no run id contains '{}', expected a part of an id such as '{}'",
                               plan_file(directory_).string(), options_.only,
                               plan_.runs.empty() ? "" : plan_.runs.front().id));
-    if (!pending_.empty()) check_unchanged(plan_, directory_, options_.plugin_directories);
+    if (pending_.empty()) return;
+    check_files(plan_, directory_, pending_);
+    check_planners(plan_, options_.plugin_directories);
+  }
+
+  // Which runs have a record, in any file of the directory. With `fresh` all records are dropped.
+  std::vector<bool> recorded_runs() {
+    std::vector<bool> done(plan_.runs.size(), false);
+    const RunIndex index(plan_);
+    for (const auto& file : record_files(directory_)) {
+      if (options_.fresh) {
+        if (file != file_.path()) fs::remove(file);
+      } else if (file == file_.path()) {
+        const RecordsEnd end =
+            read_records(file, index, [&](PlacedRecord&& record) { done[record.run] = true; });
+        complete_bytes_ = end.complete_bytes;
+        outcome_.dropped_truncated_line = end.truncated;
+      } else {
+        read_recorded_runs(file, index, [&](std::size_t run) { done[run] = true; });
+      }
+    }
+    return done;
   }
 
   void start_next() {
@@ -291,9 +328,14 @@ class Sweep {
     const int status = child.reap();
     if (stopping()) return;  // the child was terminated
     Json output = Json::parse(child.out.text, nullptr, false);
-    const bool complete = WIFEXITED(status) && output.is_object() && output.contains("result") &&
-                          output.contains("judge") && output["result"].is_object() &&
-                          output["result"].value("outcome", Json()) != "interrupted";
+    const bool returned = WIFEXITED(status) && output.is_object() && output.contains("result") &&
+                          output.contains("judge") && output["result"].is_object();
+    const bool interrupted = returned && output["result"].value("outcome", Json()) == "interrupted";
+    if ((interrupted || killed_from_outside(child, status)) && repeated_.insert(child.run).second) {
+      pending_.push_back(child.run);
+      return;
+    }
+    const bool complete = returned && !interrupted;
     if (WIFEXITED(status) && WEXITSTATUS(status) == bad_input && !complete) {
       if (!failure_)
         failure_.emplace(ErrorCode::invalid,
@@ -307,7 +349,16 @@ class Sweep {
       set_crash(record, child, status);
     file_.append(record);
     ++outcome_.run;
-    if (options_.on_done) options_.on_done(outcome_.run, pending_.size());
+    if (options_.on_done) options_.on_done(outcome_.run, selected_);
+  }
+
+  // Whether another process killed it, as a job scheduler does that ends a whole job: such a death
+  // says nothing about the run, which is repeated once. Who kills the children of this process
+  // often kills this process next.
+  static bool killed_from_outside(const Child& child, int status) {
+    if (!WIFSIGNALED(status) || child.timed_out) return false;
+    const int signal = WTERMSIG(status);
+    return signal == SIGKILL || signal == SIGTERM || signal == SIGINT || signal == SIGHUP;
   }
 
   [[nodiscard]] Json empty_record(const PlannedRun& run) const {
@@ -350,7 +401,8 @@ class Sweep {
   Plan plan_;
   RecordFile file_;
   std::vector<const PlannedRun*> pending_;
-  std::size_t next_ = 0, complete_bytes_ = 0;
+  std::set<const PlannedRun*> repeated_;  ///< after they were killed from outside
+  std::size_t next_ = 0, selected_ = 0, complete_bytes_ = 0;
   std::vector<Child> children_;
   std::optional<Error> failure_;
   RunOutcome outcome_;
@@ -361,6 +413,9 @@ class Sweep {
 
 RunOutcome run_sweep(const fs::path& directory, const RunOptions& options) {
   if (options.jobs == 0) throw Error(ErrorCode::usage, "0 jobs, expected at least 1");
+  if (options.fresh && options.shard)
+    throw Error(ErrorCode::usage,
+                "a shard cannot drop the records of all shards, expected a run without a shard");
   return Sweep(directory, options).run();
 }
 

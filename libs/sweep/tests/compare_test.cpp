@@ -140,13 +140,13 @@ TEST_CASE("two sweeps are compared run by run, also under different planners", "
 
 TEST_CASE("the CSV has a line per run, with quoted fields", "[sweep][unit]") {
   Merged merged;
-  merged.runs.push_back(made("a dir", "s0", "p", record("stalled", 2.5)));
-  merged.runs.push_back(made("a dir", "s1", "p", Json(), false));
-  merged.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1", "/planner/params/name=a, b"};
-  merged.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
-  merged.runs[0].run.gains = {{"k_p", 0.25}};
-  merged.runs[0].record["cause"] = "ran into \"it\",\ntwice";
-  merged.runs[1].reason = "start in the map";
+  merged.sweeps.runs.push_back(made("a dir", "s0", "p", record("stalled", 2.5)));
+  merged.sweeps.runs.push_back(made("a dir", "s1", "p", Json(), false));
+  merged.sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1", "/planner/params/name=a, b"};
+  merged.sweeps.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
+  merged.sweeps.runs[0].run.gains = {{"k_p", 0.25}};
+  merged.sweeps.runs[0].record["cause"] = "ran into \"it\",\ntwice";
+  merged.sweeps.runs[1].reason = "start in the map";
   CHECK(
       to_csv(merged) ==
       "id,directory,planner,problem,seed,values,/planner/params/name,/planner/params/x,k_p,"
@@ -171,15 +171,15 @@ TEST_CASE("varied values are those of the label, and none if they do not end the
 }
 
 TEST_CASE("the page's JSON has all runs in columns", "[sweep][unit]") {
-  Merged merged{study(), {"planner"}, {}, {}, {"a <note>"}};
-  merged.groups = group(merged.runs, merged.by);
-  merged.runs[2].run.gains = {{"k_p", 0.123456789}};
-  merged.runs[3].run.set = {"/planner/params/escape=it's"};
-  merged.runs[3].run.labels["values"] = "/planner/params/escape=it's";
-  merged.runs[4].record = nullptr;
+  Merged merged{{study(), {}, {}, 0, {}}, {"planner"}, {}, {}, {"a <note>"}};
+  merged.groups = group(merged.sweeps.runs, merged.by);
+  merged.sweeps.runs[2].run.gains = {{"k_p", 0.123456789}};
+  merged.sweeps.runs[3].run.set = {"/planner/params/escape=it's"};
+  merged.sweeps.runs[3].run.labels["values"] = "/planner/params/escape=it's";
+  merged.sweeps.runs[4].record = nullptr;
   PageExtras extras;
   extras.replays[1] = {"pages/x.html", 1.5};
-  extras.comparisons = comparisons_of_page(merged.runs);
+  extras.comparisons = comparisons_of_page(merged.sweeps.runs);
   const Json page = page_json(merged, extras);
   CHECK(page["format"] == "hamelin.sweep-page/2");
   CHECK(page["directories"] == Json{"d"});

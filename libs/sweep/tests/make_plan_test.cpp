@@ -177,16 +177,19 @@ TEST_CASE("a plan has the SHA-256 of each file and planner that its runs will re
     CHECK(plugins.at(name) ==
           sha256_of_file(fs::path(HAMELIN_TEST_PLUGIN_DIR) / (std::string(name) + ".hamelin.so")));
   CHECK(plugins.size() == 2);
-  CHECK_NOTHROW(check_unchanged(plan, bench.dir("a"), plugin_directories));
+  std::vector<const PlannedRun*> runs;
+  for (const auto& run : plan.runs) runs.push_back(&run);
+  CHECK_NOTHROW(check_files(plan, bench.dir("a"), runs));
+  CHECK_NOTHROW(check_planners(plan, plugin_directories));
   for (const char* name : {"arm7.spheres.json", "arm7.urdf", "clutter.bt", "shelf.bt"}) {
     const std::string bytes = read_file(work / name);
     std::ofstream(work / name, std::ios::app) << " ";
-    CHECK_THROWS_WITH(check_unchanged(plan, bench.dir("a"), plugin_directories),
+    CHECK_THROWS_WITH(check_files(plan, bench.dir("a"), runs),
                       Catch::Contains(std::string("inputs/") + name +
                                       ": has changed since the sweep was planned"));
     std::ofstream(work / name, std::ios::binary) << bytes;
   }
-  CHECK_THROWS_WITH(check_unchanged(plan, bench.dir("a"), {bench.dir("a")}),
+  CHECK_THROWS_WITH(check_planners(plan, {bench.dir("a")}),
                     Catch::Contains("planner 'apf': not found"));
 }
 
@@ -210,7 +213,7 @@ TEST_CASE("a plan in a symbolically linked folder names the scenes by paths that
   const Plan plan = make_plan(bench.dir("link"), options);
   const fs::path scene = run_arguments(plan.runs.at(0), bench.dir("link")).at(0);
   CHECK(fs::equivalent(scene, options.files[0]));
-  CHECK_NOTHROW(check_unchanged(plan, bench.dir("link"), plugin_directories));
+  CHECK_NOTHROW(check_files(plan, bench.dir("link"), {&plan.runs.at(0)}));
 }
 
 TEST_CASE(

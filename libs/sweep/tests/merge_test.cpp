@@ -9,6 +9,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
+#include "hamelin/sweep/records.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -248,7 +249,7 @@ TEST_CASE("a merge reports missing runs and records from several builds", "[swee
     out << line.dump() << "\n";
   }
   out.close();
-  const Merged merged = merge({directory}, {"planner"});
+  const Merged merged = merge(read_sweeps({directory}), {"planner"});
   CHECK(merged.groups.at(0).planned == 3);
   CHECK(merged.groups.at(0).reached == 2);
   CHECK(merged.notes == std::vector<std::string>{"1 of 3 runs have no record yet",
@@ -256,8 +257,8 @@ TEST_CASE("a merge reports missing runs and records from several builds", "[swee
 }
 
 TEST_CASE("the summary's JSON has the values of the groups", "[sweep][unit]") {
-  Merged merged{hand_made(), {"planner"}, {}, {}, {}};
-  merged.groups = group(merged.runs, merged.by);
+  Merged merged{{hand_made(), {}, {}, 0, {}}, {"planner"}, {}, {}, {}};
+  merged.groups = group(merged.sweeps.runs, merged.by);
   const Json summary = to_json(merged);
   CHECK(summary["groups"][1]["labels"] == Json{{"planner", "hybrid"}});
   CHECK(summary["groups"][1]["reached"] == 2);

@@ -12,105 +12,42 @@
 #include <string>
 #include <vector>
 
-#include "../src/directory_lock.hpp"
+#include "../src/file_lock.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/merge.hpp"
 #include "hamelin/sweep/plan.hpp"
-#include "hamelin/test/temporary.hpp"
+#include "hamelin/sweep/records.hpp"
+#include "scripted_sweep.hpp"
 
 using namespace hamelin;
 using namespace hamelin::sweep;
 
-namespace {
-
 namespace fs = std::filesystem;
 
-/// A sweep of runs r0, r1, … of one scene, in a temporary directory. A shell script takes the place
-/// of the program.
-class Bench {
- public:
-  explicit Bench(std::size_t runs) {
-    fs::create_directory(root_ / "scenes");
-    put("scenes/a.json", "a scene");
-    plan.scenes.push_back({"scenes/a.json", sha256_hex("a scene"), true, ""});
-    for (std::size_t i = 0; i < runs; ++i) {
-      PlannedRun run;
-      run.id = "r" + std::to_string(i);
-      run.scene = "scenes/a.json";
-      run.planner = "p" + std::to_string(i);
-      run.set = {"/step_s=0.002"};
-      run.seed = i;
-      run.labels = {{"planner", "p"}, {"goal", "joint"}};
-      plan.runs.push_back(run);
-    }
-    write_plan(plan, root_);
-    script("");
-  }
-  /// Sets the commands that a run executes before it prints its line. $3 is the planner's name.
-  /// Each call of the script appends a line to the file "calls".
-  void script(const std::string& body) {
-    put("program.sh",
-        "echo \"$*\" >> '" + (root_ / "calls").string() + "'\n" + body +
-            "\necho '{\"result\": {\"outcome\": \"reached\", \"cause\": null, \"time_s\": 2.5}, "
-            "\"judge\": "
-            "{\"contact\": false, \"obstacles\": null, \"self\": null, \"configurations\": 3}}'\n");
-  }
-  void put(const fs::path& file, const std::string& text) const { folder_.put(file, text); }
-  [[nodiscard]] RunOptions options() const {
-    RunOptions options;
-    options.command = {"/bin/sh", (root_ / "program.sh").string()};
-    options.jobs = 2;
-    return options;
-  }
-  [[nodiscard]] const fs::path& root() const { return root_; }
-  [[nodiscard]] std::vector<std::string> lines(const fs::path& file) const {
-    std::ifstream in(root_ / file);
-    std::vector<std::string> all;
-    for (std::string line; std::getline(in, line);) all.push_back(line);
-    return all;
-  }
-  [[nodiscard]] std::string message(const RunOptions& with) const {
-    try {
-      (void)run_sweep(root_, with);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  }
-
-  Plan plan;
-
- private:
-  test::TemporaryFolder folder_;
-  fs::path root_ = folder_.path();
-};
-
-}  // namespace
-
 TEST_CASE("a plan reads back as it was written", "[sweep][unit]") {
-  Bench bench(3);
-  const Plan read = read_plan(bench.root());
-  CHECK(to_json(read) == to_json(bench.plan));
-  CHECK(read.sha256 == bench.plan.sha256);
+  ScriptedSweep sweep(3);
+  const Plan read = read_plan(sweep.root());
+  CHECK(to_json(read) == to_json(sweep.plan));
+  CHECK(read.sha256 == sweep.plan.sha256);
   CHECK(run_arguments(read.runs[2], "dir") ==
         std::vector<std::string>{"dir/scenes/a.json", "--planner", "p2", "--set", "/step_s=0.002",
                                  "--seed", "2"});
 }
 
 TEST_CASE("an invalid plan is refused with file and place", "[sweep][unit]") {
-  Bench bench(2);
+  ScriptedSweep sweep(2);
   const auto message = [&](const Json& document) {
-    bench.put("plan.json", document.dump());
+    sweep.put("plan.json", document.dump());
     try {
-      (void)read_plan(bench.root());
+      (void)read_plan(sweep.root());
     } catch (const Error& error) {
       return std::string(error.what());
     }
     return std::string();
   };
-  const Json good = to_json(bench.plan);
+  const Json good = to_json(sweep.plan);
   Json doubled = good, elsewhere = good, unfinished = good;
   doubled["runs"][1]["id"] = "r0";
   elsewhere["runs"][0]["scene"] = "scenes/b.json";
@@ -126,20 +63,20 @@ TEST_CASE("an invalid plan is refused with file and place", "[sweep][unit]") {
 
 TEST_CASE("each run of a plan is recorded once, and a second call has nothing to do",
           "[sweep][unit]") {
-  Bench bench(7);
+  ScriptedSweep sweep(7);
   std::size_t reported = 0;
-  RunOptions options = bench.options();
+  RunOptions options = sweep.options();
   options.on_done = [&](std::size_t done, std::size_t all) {
     CHECK(done == ++reported);
     CHECK(all == 7);
   };
-  const auto outcome = run_sweep(bench.root(), options);
+  const auto outcome = run_sweep(sweep.root(), options);
   CHECK(outcome.run == 7);
   CHECK(reported == 7);
-  const Records records = read_records(bench.root(), bench.plan);
-  REQUIRE(records.lines.size() == 7);
+  const std::vector<Json> records = sweep.records();
+  REQUIRE(records.size() == 7);
   std::set<std::string> ids;
-  for (const auto& line : records.lines) {
+  for (const auto& line : records) {
     check_shipped_schema(line, "record", "record");
     ids.insert(line["id"]);
     CHECK(line["outcome"] == "reached");
@@ -147,43 +84,42 @@ TEST_CASE("each run of a plan is recorded once, and a second call has nothing to
     CHECK(line["labels"] == Json{{"goal", "joint"}, {"planner", "p"}});
   }
   CHECK(ids.size() == 7);
-  const auto again = run_sweep(bench.root(), bench.options());
+  const auto again = run_sweep(sweep.root(), sweep.options());
   CHECK(again.run == 0);
   CHECK(again.recorded == 7);
-  CHECK(bench.lines("calls").size() == 7);
+  CHECK(sweep.lines("calls").size() == 7);
 }
 
 TEST_CASE("only the run of a truncated last line is repeated", "[sweep][unit]") {
-  Bench bench(6);
-  RunOptions some = bench.options();
+  ScriptedSweep sweep(6);
+  RunOptions some = sweep.options();
   some.limit = 4;
   some.jobs = 1;
-  CHECK(run_sweep(bench.root(), some).run == 4);
-  const fs::path file = records_file(bench.root());
+  CHECK(run_sweep(sweep.root(), some).run == 4);
+  const fs::path file = records_file(sweep.root());
   const std::string text = read_file(file);
   fs::resize_file(file, text.size() - 40);
-  CHECK(read_records(bench.root(), bench.plan).truncated);
-  const auto outcome = run_sweep(bench.root(), bench.options());
+  CHECK(sweep.truncated());
+  const auto outcome = run_sweep(sweep.root(), sweep.options());
   CHECK(outcome.dropped_truncated_line);
   CHECK(outcome.recorded == 3);
   CHECK(outcome.run == 3);
-  const Records records = read_records(bench.root(), bench.plan);
-  CHECK_FALSE(records.truncated);
-  CHECK(records.lines.size() == 6);
-  CHECK(bench.lines("calls").size() == 7);
+  CHECK_FALSE(sweep.truncated());
+  CHECK(sweep.records().size() == 6);
+  CHECK(sweep.lines("calls").size() == 7);
   CHECK(read_file(file).substr(0, text.size() / 2) == text.substr(0, text.size() / 2));
 }
 
 TEST_CASE("a run that crashes is recorded with its signal or exit code, and the others continue",
           "[sweep][unit]") {
-  Bench bench(4);
-  bench.script(
+  ScriptedSweep sweep(4);
+  sweep.script(
       "case \"$3\" in p1) echo torn >&2; kill -SEGV $$;; p2) echo 'hamelin: internal error: oh' "
       ">&2; exit 3;; esac");
-  const auto outcome = run_sweep(bench.root(), bench.options());
+  const auto outcome = run_sweep(sweep.root(), sweep.options());
   CHECK(outcome.run == 4);
   CHECK(outcome.crashed == 2);
-  for (const auto& line : read_records(bench.root(), bench.plan).lines) {
+  for (const auto& line : sweep.records()) {
     check_shipped_schema(line, "record", "record");
     const std::string id = line["id"];
     CHECK(line["outcome"] == (id == "r1" || id == "r2" ? "crashed" : "reached"));
@@ -195,57 +131,57 @@ TEST_CASE("a run that crashes is recorded with its signal or exit code, and the 
 }
 
 TEST_CASE("bad input that a run finds ends the sweep and is not recorded", "[sweep][unit]") {
-  Bench bench(5);
-  bench.script(
+  ScriptedSweep sweep(5);
+  sweep.script(
       "if [ \"$3\" = p2 ]; then echo 'hamelin: note: x' >&2; echo 'hamelin: a.json: /q: is bad' "
       ">&2; exit 2; fi");
-  RunOptions options = bench.options();
+  RunOptions options = sweep.options();
   options.jobs = 1;
-  CHECK(bench.message(options) == "run 'r2': a.json: /q: is bad");
-  CHECK(read_records(bench.root(), bench.plan).lines.size() == 2);
-  CHECK(bench.lines("calls").size() == 3);
+  CHECK(sweep.message(options) == "run 'r2': a.json: /q: is bad");
+  CHECK(sweep.records().size() == 2);
+  CHECK(sweep.lines("calls").size() == 3);
 }
 
 TEST_CASE("contact that the judge saw turns the outcome reached into collision", "[sweep][unit]") {
-  Bench bench(1);
-  bench.put("program.sh",
+  ScriptedSweep sweep(1);
+  sweep.put("program.sh",
             "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": "
             "{\"contact\": true, \"obstacles\": "
             "{\"clearance_m\": -0.01, \"time_s\": 1, \"sphere\": \"a/0\", \"other\": \"b\"}, "
             "\"self\": null, "
             "\"configurations\": 3}}'\n");
-  (void)run_sweep(bench.root(), bench.options());
-  const Json record = read_records(bench.root(), bench.plan).lines.at(0);
+  (void)run_sweep(sweep.root(), sweep.options());
+  const Json record = sweep.records().at(0);
   CHECK(record["outcome"] == "collision");
   CHECK(record["result"]["outcome"] == "reached");
 }
 
 TEST_CASE("a stopped sweep terminates its children, does not record them, and can be resumed",
           "[sweep][unit]") {
-  Bench bench(4);
-  bench.script("if [ \"$3\" != p0 ]; then exec sleep 60; fi");
+  ScriptedSweep sweep(4);
+  sweep.script("if [ \"$3\" != p0 ]; then exec sleep 60; fi");
   std::atomic<bool> stop{false};
-  RunOptions options = bench.options();
+  RunOptions options = sweep.options();
   options.stop = &stop;
   options.on_done = [&](std::size_t, std::size_t) { stop = true; };
-  const auto outcome = run_sweep(bench.root(), options);
+  const auto outcome = run_sweep(sweep.root(), options);
   CHECK(outcome.stopped);
   CHECK(outcome.run == 1);
-  CHECK(read_records(bench.root(), bench.plan).lines.size() == 1);
-  bench.script("");
-  CHECK(run_sweep(bench.root(), bench.options()).run == 3);
+  CHECK(sweep.records().size() == 1);
+  sweep.script("");
+  CHECK(run_sweep(sweep.root(), sweep.options()).run == 3);
 }
 
 TEST_CASE("a run that takes too long is killed and recorded, and the others continue",
           "[sweep][unit]") {
-  Bench bench(3);
-  bench.script("if [ \"$3\" = p1 ]; then exec sleep 600; fi");
-  RunOptions options = bench.options();
+  ScriptedSweep sweep(3);
+  sweep.script("if [ \"$3\" = p1 ]; then exec sleep 600; fi");
+  RunOptions options = sweep.options();
   options.timeout_s = 0.5;
-  const RunOutcome outcome = run_sweep(bench.root(), options);
+  const RunOutcome outcome = run_sweep(sweep.root(), options);
   CHECK(outcome.run == 3);
   CHECK(outcome.crashed == 1);
-  for (const Json& record : read_records(bench.root(), bench.plan).lines) {
+  for (const Json& record : sweep.records()) {
     CHECK(record["outcome"] == (record["id"] == "r1" ? "crashed" : "reached"));
     if (record["id"] != "r1") continue;
     CHECK(record["cause"] == "killed after 0.5 s");
@@ -255,15 +191,15 @@ TEST_CASE("a run that takes too long is killed and recorded, and the others cont
 
 TEST_CASE("a process that a run leaves behind does not delay the sweep, and is killed",
           "[sweep][unit]") {
-  Bench bench(2);
+  ScriptedSweep sweep(2);
   // it keeps standard output and error open, as a process forked by a plugin would
-  bench.script("sleep 600 & echo $! >> '" + (bench.root() / "left").string() + "'");
+  sweep.script("sleep 600 & echo $! >> '" + (sweep.root() / "left").string() + "'");
   const auto begin = std::chrono::steady_clock::now();
-  const RunOutcome outcome = run_sweep(bench.root(), bench.options());
+  const RunOutcome outcome = run_sweep(sweep.root(), sweep.options());
   CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(300));
   CHECK(outcome.run == 2);
   CHECK(outcome.crashed == 0);
-  const auto left = bench.lines("left");
+  const auto left = sweep.lines("left");
   REQUIRE(left.size() == 2);
   for (const auto& pid : left) {
     // the killed process may not have been reaped yet
@@ -282,121 +218,121 @@ TEST_CASE("a process that a run leaves behind does not delay the sweep, and is k
 
 TEST_CASE("the processes of a run that is killed after its time limit are killed with it",
           "[sweep][unit]") {
-  Bench bench(1);
-  bench.script("sleep 600 & sleep 600");
-  RunOptions options = bench.options();
+  ScriptedSweep sweep(1);
+  sweep.script("sleep 600 & sleep 600");
+  RunOptions options = sweep.options();
   options.timeout_s = 0.3;
-  CHECK(run_sweep(bench.root(), options).crashed == 1);
-  CHECK(read_records(bench.root(), bench.plan).lines.at(0)["cause"] == "killed after 0.3 s");
+  CHECK(run_sweep(sweep.root(), options).crashed == 1);
+  CHECK(sweep.records().at(0)["cause"] == "killed after 0.3 s");
 }
 
 TEST_CASE("everything that a run writes before it ends is read", "[sweep][unit]") {
-  Bench bench(3);
+  ScriptedSweep sweep(3);
   // more than a pipe holds, with the line of JSON at the end
-  bench.put("program.sh",
+  sweep.put("program.sh",
             "head -c 200000 /dev/zero | tr '\\0' ' '\n"
             "echo '{\"result\": {\"outcome\": \"reached\", \"cause\": null}, \"judge\": null}'\n");
-  CHECK(run_sweep(bench.root(), bench.options()).crashed == 0);
+  CHECK(run_sweep(sweep.root(), sweep.options()).crashed == 0);
 }
 
 TEST_CASE("a plan is not made while a sweep runs in its directory", "[sweep][unit]") {
-  Bench bench(1);
+  ScriptedSweep sweep(1);
   PlanOptions options;
   options.files = {std::filesystem::path(HAMELIN_SOURCE_DIR) / "data/scenes/paper_52_apf.json"};
   options.plugin_directories = {HAMELIN_TEST_PLUGIN_DIR};
-  const std::string before = read_file(plan_file(bench.root()));
-  const DirectoryLock lock(bench.root());
-  CHECK_THROWS_WITH(make_plan(bench.root(), options),
+  const std::string before = read_file(plan_file(sweep.root()));
+  const DirectoryLock lock(sweep.root());
+  CHECK_THROWS_WITH(make_plan(sweep.root(), options),
                     Catch::Contains("another sweep command is using it"));
-  CHECK(read_file(plan_file(bench.root())) == before);
+  CHECK(read_file(plan_file(sweep.root())) == before);
 }
 
 TEST_CASE("two sweeps at a time in one directory are refused", "[sweep][unit]") {
-  Bench bench(2);
-  RunOptions options = bench.options();
+  ScriptedSweep sweep(2);
+  RunOptions options = sweep.options();
   options.jobs = 1;
   std::string second;
-  options.on_done = [&](std::size_t, std::size_t) { second = bench.message(bench.options()); };
-  CHECK(run_sweep(bench.root(), options).run == 2);
+  options.on_done = [&](std::size_t, std::size_t) { second = sweep.message(sweep.options()); };
+  CHECK(run_sweep(sweep.root(), options).run == 2);
   CHECK_THAT(second, Catch::EndsWith("records.jsonl: another sweep command is using it, expected "
                                      "one at a time per directory"));
 }
 
 TEST_CASE("runs are selected by a part of their id", "[sweep][unit]") {
-  Bench bench(12);
-  RunOptions options = bench.options();
+  ScriptedSweep sweep(12);
+  RunOptions options = sweep.options();
   options.only = "r1";
-  CHECK(run_sweep(bench.root(), options).run == 3);  // r1, r10, r11
+  CHECK(run_sweep(sweep.root(), options).run == 3);  // r1, r10, r11
   options.only = "r99";
-  CHECK_THAT(bench.message(options), Catch::Contains("no run id contains 'r99'"));
+  CHECK_THAT(sweep.message(options), Catch::Contains("no run id contains 'r99'"));
 }
 
 TEST_CASE(
     "records of another plan, duplicate or broken records, and changed scenes are refused with the "
     "reason",
     "[sweep][unit]") {
-  Bench bench(3);
-  (void)run_sweep(bench.root(), bench.options());
-  const auto message = [&] { return bench.message(bench.options()); };
-  const std::string text = read_file(records_file(bench.root()));
-  bench.put("records.jsonl", text + text.substr(0, text.find('\n') + 1));
+  ScriptedSweep sweep(3);
+  (void)run_sweep(sweep.root(), sweep.options());
+  const auto message = [&] { return sweep.message(sweep.options()); };
+  const std::string text = read_file(records_file(sweep.root()));
+  sweep.put("records.jsonl", text + text.substr(0, text.find('\n') + 1));
   CHECK_THAT(message(),
              Catch::Contains("records.jsonl: line 4: run 'r") && Catch::Contains("recorded twice"));
-  bench.put("records.jsonl", "{\"schema\": \"hamelin.record/1\"}\n" + text);
+  sweep.put("records.jsonl", "{\"schema\": \"hamelin.record/1\"}\n" + text);
   CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: is not a record"));
-  bench.put("records.jsonl", "{\n" + text);
+  sweep.put("records.jsonl", "{\n" + text);
   CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1"));
-  bench.put("records.jsonl", text);
-  Plan other = bench.plan;
+  sweep.put("records.jsonl", text);
+  Plan other = sweep.plan;
   other.runs.pop_back();
-  CHECK_THROWS_WITH(write_plan(other, bench.root()),
+  CHECK_THROWS_WITH(write_plan(other, sweep.root()),
                     Catch::Contains("records.jsonl: holds records of another plan"));
-  bench.put("plan.json", to_json(other).dump());
+  sweep.put("plan.json", to_json(other).dump());
   CHECK_THAT(message(), Catch::Contains("records.jsonl: line 1: belongs to another plan"));
-  RunOptions fresh = bench.options();
+  RunOptions fresh = sweep.options();
   fresh.fresh = true;
-  CHECK(run_sweep(bench.root(), fresh).run == 2);
-  bench.put("scenes/a.json", "another scene");
-  CHECK_THAT(bench.message(fresh),
+  CHECK(run_sweep(sweep.root(), fresh).run == 2);
+  sweep.put("scenes/a.json", "another scene");
+  CHECK_THAT(sweep.message(fresh),
              Catch::Contains("a.json: has changed since the sweep was planned: SHA-256 "));
 }
 
 TEST_CASE("a sweep is not resumed with inputs or planners that have changed", "[sweep][unit]") {
-  Bench bench(3);
-  bench.put("map.bt", "a map");
-  bench.put("quick.hamelin.so", "a planner");
-  const std::string planner = (bench.root() / "quick.hamelin.so").string();
-  bench.plan.inputs = {{"map.bt", sha256_hex("a map")}};
-  bench.plan.plugins = {{planner, sha256_hex("a planner")}};
-  write_plan(bench.plan, bench.root());
-  CHECK(to_json(read_plan(bench.root())) == to_json(bench.plan));
-  RunOptions some = bench.options();
+  ScriptedSweep sweep(3);
+  sweep.put("map.bt", "a map");
+  sweep.put("quick.hamelin.so", "a planner");
+  const std::string planner = (sweep.root() / "quick.hamelin.so").string();
+  sweep.plan.inputs = {{"map.bt", sha256_hex("a map")}};
+  sweep.plan.plugins = {{planner, sha256_hex("a planner")}};
+  write_plan(sweep.plan, sweep.root());
+  CHECK(to_json(read_plan(sweep.root())) == to_json(sweep.plan));
+  RunOptions some = sweep.options();
   some.limit = 1;
-  CHECK(run_sweep(bench.root(), some).run == 1);
-  bench.put("map.bt", "another map");
-  CHECK(bench.message(bench.options()) ==
-        (bench.root() / "map.bt").string() + ": has changed since the sweep was planned: SHA-256 " +
+  CHECK(run_sweep(sweep.root(), some).run == 1);
+  sweep.put("map.bt", "another map");
+  CHECK(sweep.message(sweep.options()) ==
+        (sweep.root() / "map.bt").string() + ": has changed since the sweep was planned: SHA-256 " +
             sha256_hex("another map") + ", expected " + sha256_hex("a map") +
             "; plan it again, in a new directory if there are records");
-  bench.put("map.bt", "a map");
-  bench.put("quick.hamelin.so", "another planner");
-  CHECK_THAT(bench.message(bench.options()),
+  sweep.put("map.bt", "a map");
+  sweep.put("quick.hamelin.so", "another planner");
+  CHECK_THAT(sweep.message(sweep.options()),
              Catch::StartsWith(planner + ": has changed since the sweep was planned"));
-  bench.plan.plugins = {{"gone", sha256_hex("a planner")}};
-  bench.put("quick.hamelin.so", "a planner");
-  CHECK(run_sweep(bench.root(), bench.options()).run == 2);
+  sweep.plan.plugins = {{"gone", sha256_hex("a planner")}};
+  sweep.put("quick.hamelin.so", "a planner");
+  CHECK(run_sweep(sweep.root(), sweep.options()).run == 2);
 }
 
 TEST_CASE("the same plan gives the same records in any order, independent of the number of jobs",
           "[sweep][unit]") {
   std::vector<std::multiset<std::string>> found;
   for (const std::size_t jobs : {1U, 4U}) {
-    Bench bench(9);
-    bench.script("case \"$3\" in p[0-3]) sleep 0.05;; esac");
-    RunOptions options = bench.options();
+    ScriptedSweep sweep(9);
+    sweep.script("case \"$3\" in p[0-3]) sleep 0.05;; esac");
+    RunOptions options = sweep.options();
     options.jobs = jobs;
-    (void)run_sweep(bench.root(), options);
-    const auto lines = bench.lines("records.jsonl");
+    (void)run_sweep(sweep.root(), options);
+    const auto lines = sweep.lines("records.jsonl");
     found.emplace_back(lines.begin(), lines.end());
   }
   CHECK(found[0].size() == 9);

@@ -1,8 +1,10 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,19 +22,55 @@ struct Interval {
 /// shares p that a normal test does not reject, |p̂ − p| ≤ z √(p(1 − p)/n). [0, 1] for 0 trials.
 [[nodiscard]] Interval wilson_interval(std::size_t successes, std::size_t trials);
 
+/// Where the line of a record is.
+struct RecordPlace {
+  std::size_t file = 0;                 ///< index into Sweeps::files
+  std::uint64_t offset = 0, bytes = 0;  ///< without the end of the line
+};
+
 /// A planned run, and its record if there is one.
 struct MergedRun {
   PlannedRun run;
   std::filesystem::path directory;  ///< of its plan
   bool feasible = true;
   std::string reason;  ///< why it is not feasible
-  Json record;         ///< null: not run yet
+  /// What summaries use of its record, see facts(); null: not run yet.
+  Json record;
+  RecordPlace place;
 };
 
-/// Plans and records of several directories, in the order given.
+/// The members of a record that summaries and pages use. Of the result these are a dozen numbers:
+/// a study of 10⁵ runs fits into memory.
+/// @param timing whether to keep what depends on the machine
+[[nodiscard]] Json facts(const Json& record, bool timing);
+
+/// Plans and records of several directories.
+struct Sweeps {
+  std::vector<MergedRun> runs;               ///< in the order of directories and plans
+  std::vector<std::filesystem::path> files;  ///< of records
+  /// Builds that made the records, of the program and of each planner.
+  std::map<std::string, std::set<std::string>> builds;
+  std::size_t repeated = 0;            ///< runs with equal records in several files
+  std::vector<std::string> different;  ///< ids of runs whose records differ between files
+};
+
+/// Reads plans and records. Directories with the same plan are copies of one sweep: their records
+/// are joined. A run that several files record counts once, with its first record that is not a
+/// crash, in the order of directories and names of files.
+/// @param timing as in facts()
 /// @throws Error as read_plan and read_records
-[[nodiscard]] std::vector<MergedRun> read_sweeps(
-    const std::vector<std::filesystem::path>& directories);
+[[nodiscard]] Sweeps read_sweeps(const std::vector<std::filesystem::path>& directories,
+                                 bool timing = true);
+
+/// The same, but directories with the same plan stay apart: for comparing two executions of a plan.
+[[nodiscard]] Sweeps read_sweeps_apart(const std::vector<std::filesystem::path>& directories);
+
+/// Writes the records of all runs in the order of the plans, as a file of records. The bytes do not
+/// depend on the number of shards, or on the order in which runs ended.
+/// @param timing whether to keep what depends on machine and time; without it, repeated studies of
+///        one build give equal bytes
+/// @throws Error io
+void write_records(const Sweeps& sweeps, const std::filesystem::path& file, bool timing);
 
 /// Summary of the runs with the same labels. Outcomes include the judge: contact that it saw is a
 /// collision. The median of an even number of values is the lower of the two in the middle.
@@ -88,15 +126,14 @@ struct GainGroup {
 
 /// Result of a merge.
 struct Merged {
-  std::vector<MergedRun> runs;
+  Sweeps sweeps;
   std::vector<std::string> by;  ///< labels
   std::vector<Group> groups;
   std::vector<GainGroup> gains;
   std::vector<std::string> notes;  ///< remarks, such as that records come from several builds
 };
-/// Reads, groups and summarizes sweeps. @throws Error as read_sweeps and group
-[[nodiscard]] Merged merge(const std::vector<std::filesystem::path>& directories,
-                           const std::vector<std::string>& by);
+/// Groups and summarizes sweeps. @throws Error as group
+[[nodiscard]] Merged merge(Sweeps&& sweeps, const std::vector<std::string>& by);
 
 /// The summary as JSON.
 [[nodiscard]] Json to_json(const Merged& merged);

@@ -11,8 +11,8 @@
 #include "hamelin/scene/scene.hpp"
 
 /// A sweep is a directory with `plan.json` (hamelin.sweep/1), the scenes made for the plan
-/// (`scenes/`), and `records.jsonl` (hamelin.record/1) with one line per run, in the order in which
-/// the runs ended.
+/// (`scenes/`), and files of records (records.hpp) with one line per run, in the order in which the
+/// runs ended.
 namespace hamelin::sweep {
 
 /// The "problem" label of runs of gain sets without the obstacle.
@@ -69,28 +69,19 @@ void write_plan(Plan& plan, const std::filesystem::path& directory);
 [[nodiscard]] Plan read_plan_file(const std::filesystem::path& file);
 
 [[nodiscard]] std::filesystem::path plan_file(const std::filesystem::path& directory);
-[[nodiscard]] std::filesystem::path records_file(const std::filesystem::path& directory);
 
 /// Reads the scene of a run and sets its planner, values and seed.
 /// @throws Error io, parse, invalid or usage as scene::read_scene and scene::set_pointer
 [[nodiscard]] scene::Scene read_scene(const PlannedRun& run,
                                       const std::filesystem::path& directory);
 
-/// Checks that scenes, inputs and planners have not changed since they were planned.
-/// @param plugin_directories where the runs search for planners
-/// @throws Error invalid with the name of the first file that has changed; io or plugin for a
-///         missing one
-void check_unchanged(const Plan& plan, const std::filesystem::path& directory,
-                     const std::vector<std::filesystem::path>& plugin_directories);
-
-/// The records of a plan that exist so far.
-struct Records {
-  std::vector<Json> lines;
-  std::size_t complete_bytes = 0;  ///< size of the file up to the end of its last complete line
-  bool truncated = false;          ///< whether an incomplete line follows
-};
-/// @throws Error parse or invalid, with file and line, for a line that is not a record of this plan
-[[nodiscard]] Records read_records(const std::filesystem::path& directory, const Plan& plan);
+/// Checks that the scenes of these runs, and all inputs, have not changed since they were planned.
+/// @throws Error invalid with the name of the first file that has changed; io for a missing one
+void check_files(const Plan& plan, const std::filesystem::path& directory,
+                 const std::vector<const PlannedRun*>& runs);
+/// The same of the planners. @param plugin_directories where the runs search for planners
+/// @throws Error as check_files(); plugin for a missing planner
+void check_planners(const Plan& plan, const std::vector<std::filesystem::path>& plugin_directories);
 
 /// The arguments of one run after `hamelin sweep one` (which a sweep starts) or `hamelin run`.
 [[nodiscard]] std::vector<std::string> run_arguments(const PlannedRun& run,

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/sweep/shard.hpp"
+
 namespace hamelin::sweep {
 
 /// Options for executing a plan.
@@ -14,8 +16,9 @@ struct RunOptions {
   std::vector<std::string> command;  ///< program and first arguments, followed by run_arguments()
   std::size_t jobs = 1;              ///< number of concurrent processes
   std::string only;                  ///< runs whose id contains this text; empty: all
+  std::optional<Shard> shard;  ///< execute only the runs of this shard, into a file of its own
   std::optional<std::size_t> limit;  ///< largest number of runs to execute now
-  bool fresh = false;                ///< drop existing records
+  bool fresh = false;                ///< drop existing records, also those of shards
   std::optional<double> timeout_s;   ///< wall-clock time after which a run is killed
   std::vector<std::filesystem::path> plugin_directories;  ///< where the runs search for planners
   const std::atomic<bool>* stop = nullptr;                ///< once set, the children are terminated
@@ -24,7 +27,7 @@ struct RunOptions {
 };
 
 struct RunOutcome {
-  std::size_t planned = 0;   ///< selected by `only`
+  std::size_t planned = 0;   ///< selected by `only` and `shard`
   std::size_t recorded = 0;  ///< of `planned`: recorded earlier
   std::size_t run = 0;       ///< of `planned`: executed now
   std::size_t crashed = 0;   ///< of `run`
@@ -36,11 +39,13 @@ struct RunOutcome {
 /// appends a record for each, flushed. A run ends when its process ends; processes that it left
 /// running are killed. A run that crashes is recorded as `crashed`, with its signal or exit code
 /// and its last line of standard error. The same holds for a run that is killed after `timeout_s`.
+/// A run that another process interrupts or kills (SIGINT, SIGTERM, SIGHUP, SIGKILL) is repeated
+/// once. Shards of one directory may run at the same time, on any number of machines.
 /// A child prints one line of JSON, {"result": …, "judge": …}, or exits with code 2 and one line
 /// that says what is wrong with its input; in that case no other run is started.
 /// @throws Error io, parse or invalid (also for scenes, inputs or planners that have changed since
-///         the plan); usage for 0 jobs; invalid, with the id of the run, for bad input found by a
-///         child
+///         the plan); usage for 0 jobs, or a shard with `fresh`; invalid, with the id of the run,
+///         for bad input found by a child
 RunOutcome run_sweep(const std::filesystem::path& directory, const RunOptions& options);
 
 }  // namespace hamelin::sweep

@@ -1,0 +1,106 @@
+#include "tar.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <vector>
+
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::sweep {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t block_size = std::size_t{1} << 16;
+
+TarWriter::TarWriter(const fs::path& file)
+    : name_(file.string()), archive_(archive_write_new(), &archive_write_free) {
+  check(archive_write_set_format_pax_restricted(archive_.get()));
+  check(archive_write_add_filter_zstd(archive_.get()));
+  check(archive_write_open_filename(archive_.get(), file.c_str()));
+}
+
+void TarWriter::add(const std::string& name, std::string_view bytes) {
+  const std::unique_ptr<archive_entry, decltype(&archive_entry_free)> entry(archive_entry_new(),
+                                                                            &archive_entry_free);
+  archive_entry_set_pathname(entry.get(), name.c_str());
+  archive_entry_set_size(entry.get(), static_cast<la_int64_t>(bytes.size()));
+  archive_entry_set_filetype(entry.get(), AE_IFREG);
+  archive_entry_set_perm(entry.get(), 0644);
+  archive_entry_set_mtime(entry.get(), 0, 0);
+  check(archive_write_header(archive_.get(), entry.get()));
+  if (archive_write_data(archive_.get(), bytes.data(), bytes.size()) !=
+      static_cast<la_ssize_t>(bytes.size()))
+    check(ARCHIVE_FATAL);
+}
+
+void TarWriter::close() {
+  check(archive_write_close(archive_.get()));
+}
+
+void TarWriter::check(int result) const {
+  if (result != ARCHIVE_OK)
+    throw Error(ErrorCode::io, fmt::format("{}: cannot be written: {}", name_,
+                                           archive_error_string(archive_.get())));
+}
+
+TarReader::TarReader(const fs::path& file)
+    : file_(file), archive_(archive_read_new(), &archive_read_free) {
+  std::error_code ec;
+  if (!fs::is_regular_file(file, ec))
+    throw Error(ErrorCode::io,
+                fmt::format("{}: is not a file, expected an archive of `hamelin sweep pack`",
+                            file.string()));
+  archive_read_support_format_tar(archive_.get());
+  archive_read_support_filter_zstd(archive_.get());
+  if (archive_read_open_filename(archive_.get(), file.c_str(), block_size) != ARCHIVE_OK) fail();
+}
+
+bool TarReader::next() {
+  const int result = archive_read_next_header(archive_.get(), &entry_);
+  if (result == ARCHIVE_EOF) return false;
+  if (result != ARCHIVE_OK) fail();
+  const char* name = archive_entry_pathname(entry_);
+  name_ = name == nullptr ? "" : name;
+  if (archive_entry_filetype(entry_) != AE_IFREG || archive_entry_hardlink(entry_) != nullptr)
+    refuse(fmt::format("'{}' is not a file, expected files only", name_));
+  return true;
+}
+
+std::string TarReader::read_all(std::size_t most) {
+  std::string bytes;
+  std::vector<char> block(block_size);
+  while (const std::size_t count = read(block.data(), block.size())) {
+    bytes.append(block.data(), count);
+    if (bytes.size() > most)
+      refuse(fmt::format("'{}' has more than {} bytes, expected fewer", name_, most));
+  }
+  return bytes;
+}
+
+void TarReader::extract(const fs::path& to) {
+  std::ofstream out(to, std::ios::binary);
+  std::vector<char> block(block_size);
+  while (const std::size_t count = read(block.data(), block.size()))
+    out.write(block.data(), static_cast<std::streamsize>(count));
+  out.close();
+  if (!out) throw Error(ErrorCode::io, fmt::format("{}: cannot be written", to.string()));
+}
+
+std::size_t TarReader::read(char* to, std::size_t most) {
+  const auto count = archive_read_data(archive_.get(), to, most);
+  if (count < 0) fail();
+  return static_cast<std::size_t>(count);
+}
+
+void TarReader::refuse(const std::string& problem) const {
+  throw Error(ErrorCode::invalid, fmt::format("{}: {}", file_.string(), problem));
+}
+
+void TarReader::fail() const {
+  const char* text = archive_error_string(archive_.get());
+  refuse(fmt::format("is not an archive of `hamelin sweep pack`, or is damaged: {}",
+                     text == nullptr ? "unknown error" : text));
+}
+
+}  // namespace hamelin::sweep

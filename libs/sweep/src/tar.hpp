@@ -1,0 +1,53 @@
+#pragma once
+#include <archive.h>
+#include <archive_entry.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace hamelin::sweep {
+
+/// The file that describes an archive, and is its first entry.
+inline constexpr const char* manifest_name = "hamelin-archive.json";
+
+/// Writes a tar archive compressed by zstd. The same files give the same bytes: entries have no
+/// owner and no time. @throws Error io, as all functions of this class
+class TarWriter {
+ public:
+  explicit TarWriter(const std::filesystem::path& file);
+  void add(const std::string& name, std::string_view bytes);
+  void close();
+
+ private:
+  void check(int result) const;
+  std::string name_;
+  std::unique_ptr<archive, decltype(&archive_write_free)> archive_;
+};
+
+/// Reads an archive file by file. @throws Error invalid, as all functions of this class, if it is
+/// damaged or has entries other than files
+class TarReader {
+ public:
+  explicit TarReader(const std::filesystem::path& file);
+  /// Goes to the next file; false at the end.
+  [[nodiscard]] bool next();
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  /// The bytes of the file, of which there must be at most `most`.
+  [[nodiscard]] std::string read_all(std::size_t most);
+  void extract(const std::filesystem::path& to);
+
+ private:
+  std::size_t read(char* to, std::size_t most);
+  [[noreturn]] void refuse(const std::string& problem) const;
+  [[noreturn]] void fail() const;
+
+  std::filesystem::path file_;
+  std::unique_ptr<archive, decltype(&archive_read_free)> archive_;
+  archive_entry* entry_ = nullptr;
+  std::string name_;
+};
+
+}  // namespace hamelin::sweep
