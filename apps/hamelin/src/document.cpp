@@ -43,6 +43,10 @@ std::string_view to_string(Kind kind) noexcept {
       return "sweep summary";
     case Kind::accuracy:
       return "measurement of accuracy";
+    case Kind::problems:
+      return "problem set";
+    case Kind::benchmark:
+      return "file of benchmark results";
   }
   return "unknown";
 }
@@ -92,6 +96,8 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.sweep/1") return Kind::sweep;
   if (schema == "hamelin.summary/1") return Kind::summary;
   if (schema == "hamelin.accuracy/1") return Kind::accuracy;
+  if (schema == "hamelin.problems/1") return Kind::problems;
+  if (schema == "hamelin.benchmark/1") return Kind::benchmark;
   if (schema.is_null() && document.contains("links") && document["links"].is_object())
     return Kind::spheres;
   if (schema.is_null() && document.contains("waypoints")) return Kind::waypoints;
@@ -100,7 +106,8 @@ Kind recognise(const std::filesystem::path& file) {
       fmt::format(
           "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
           "hamelin.explanation/1, hamelin.path/1, hamelin.trajectory/1, hamelin.primitives/1, "
-          "hamelin.sweep/1, hamelin.summary/1 or hamelin.accuracy/1",
+          "hamelin.sweep/1, hamelin.summary/1, hamelin.accuracy/1, hamelin.problems/1 or "
+          "hamelin.benchmark/1",
           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

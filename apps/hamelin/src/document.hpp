@@ -23,7 +23,9 @@ enum class Kind {
   sweep,
   records,
   summary,
-  accuracy
+  accuracy,
+  problems,
+  benchmark
 };
 
 [[nodiscard]] std::string_view to_string(Kind kind) noexcept;

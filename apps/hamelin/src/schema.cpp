@@ -10,9 +10,10 @@ namespace hamelin::app {
 
 namespace {
 
-const std::vector<std::string> names = {
-    "robot", "scene",      "primitives", "integrator", "run",     "result",  "explanation",
-    "path",  "trajectory", "sweep",      "record",     "summary", "accuracy"};
+const std::vector<std::string> names = {"robot",      "scene",    "primitives",  "integrator",
+                                        "run",        "result",   "explanation", "path",
+                                        "trajectory", "sweep",    "record",      "summary",
+                                        "accuracy",   "problems", "benchmark"};
 
 void print_schema(const std::string& name, bool json) {
   if (!name.empty())

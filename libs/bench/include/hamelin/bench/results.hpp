@@ -1,0 +1,33 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "hamelin/bench/problem_set.hpp"
+#include "hamelin/sweep/merge.hpp"
+
+namespace hamelin::bench {
+
+/// The results of planners with the problems of a set.
+struct Results {
+  std::string set_name, set_sha256;
+  std::vector<std::string> problems;  ///< names
+  std::vector<std::string> planners;  ///< in the order of the plan
+  sweep::Merged by_family;            ///< grouped by family and planner
+  std::vector<sweep::Group> by_planner;
+};
+
+/// @param directory of the sweep
+/// @param problems those that it was planned with
+/// @throws Error as sweep::merge
+[[nodiscard]] Results read_results(const std::filesystem::path& directory, const ProblemSet& set,
+                                   const std::vector<Problem>& problems);
+
+/// As hamelin.benchmark/1, docs/schema/benchmark.schema.json.
+[[nodiscard]] Json to_json(const Results& results);
+
+/// Two tables: how many problems of each family each planner solves, and each planner with all
+/// problems.
+/// @param markdown tables of Markdown instead of aligned columns
+[[nodiscard]] std::string to_table(const Results& results, bool markdown);
+
+}  // namespace hamelin::bench
