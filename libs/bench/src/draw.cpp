@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "hamelin/bench/families.hpp"
-#include "hamelin/control/guide_query.hpp"
 #include "hamelin/control/plan_paths.hpp"
 #include "hamelin/control/preparation.hpp"
+#include "hamelin/control/world_view.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"
@@ -46,18 +46,22 @@ class Sampler {
       : model_(model), ws_(model), options_(options), rng_(seed) {}
 
   /// None if `max_draws` were not enough.
-  std::optional<VectorXd> draw(const Room& room, control::GuideQuery& query) {
+  std::optional<VectorXd> draw(const Room& room, control::WorldView& view) {
     for (std::size_t i = 0; i < options_.max_draws; ++i) {
       const VectorXd q = draw_uniform();
       dynamics::forward_kinematics(model_, ws_, q);
-      if (room.contains(dynamics::tip_pose(model_, ws_).p()) &&
-          query.clearance(q, options_.clearance_m) >= options_.clearance_m)
-        return q;
+      if (room.contains(dynamics::tip_pose(model_, ws_).p()) && is_clear(q, view)) return q;
     }
     return std::nullopt;
   }
 
  private:
+  [[nodiscard]] bool is_clear(const VectorXd& q, control::WorldView& view) const {
+    view.look(q, 0.0);
+    return view.clearance_m() >= options_.clearance_m &&
+           view.self_clearance_m() >= options_.self_clearance_m;
+  }
+
   VectorXd draw_uniform() {
     VectorXd q(model_.dof());
     for (Eigen::Index i = 0; i < q.size(); ++i) {
@@ -146,13 +150,11 @@ class Drawer {
   [[nodiscard]] std::optional<MatrixXd> draw_ends(const scene::Scene& scene,
                                                   const model::Model& arm, const Layout& layout,
                                                   std::uint64_t seed) const {
-    control::World world(scene, arm, {});
-    const control::WorldView view(scene, arm, world);
-    control::GuideQuery query(arm, world, view);
+    control::WorldView view(scene, arm, 2.0 * options_.clearance_m);
     Sampler sampler(arm, options_, seed);
-    const auto start = sampler.draw(layout.start, query);
+    const auto start = sampler.draw(layout.start, view);
     if (!start) return std::nullopt;
-    const auto goal = sampler.draw(layout.goal, query);
+    const auto goal = sampler.draw(layout.goal, view);
     if (!goal || (*goal - *start).norm() < options_.min_distance_rad) return std::nullopt;
     MatrixXd ends(arm.dof(), 2);
     ends << *start, *goal;
@@ -186,6 +188,7 @@ ProblemSet draw_problem_set(const DrawOptions& options) {
   set.robot = options.robot;
   set.resolution_m = options.resolution_m;
   set.clearance_m = options.clearance_m;
+  set.self_clearance_m = options.self_clearance_m;
   const auto names = options.families.empty() ? families() : options.families;
   Drawer drawer(options);
   for (const auto& family : names)
@@ -194,10 +197,13 @@ ProblemSet draw_problem_set(const DrawOptions& options) {
       for (std::size_t i = 0; !found && i < options.max_candidates; ++i)
         found = drawer.candidate(family, options.seed * 1'000'000 + 1000 * k + i, set.drawn);
       if (!found)
-        throw Error(ErrorCode::invalid,
-                    fmt::format("family '{}': none of {} candidates is a problem with a start, a "
-                                "goal and a path, expected one",
-                                family, options.max_candidates));
+        throw Error(
+            ErrorCode::invalid,
+            fmt::format("family '{}': none of {} candidates is a problem: {} have no start or "
+                        "goal, {} a free straight motion, {} no path that was found; "
+                        "expected one",
+                        family, options.max_candidates, set.drawn.no_start_or_goal,
+                        set.drawn.straight_is_free, set.drawn.path_unknown));
       found->name = fmt::format("{}-{:02}", family, k + 1);
       set.problems.push_back(std::move(*found));
       if (options.on_problem)

@@ -85,6 +85,7 @@ std::string to_text(const ProblemSet& set, const fs::path& directory) {
                   {"robot", std::move(robot)},
                   {"resolution_m", set.resolution_m},
                   {"clearance_m", set.clearance_m},
+                  {"self_clearance_m", set.self_clearance_m},
                   {"drawn",
                    {{"candidates", drawn.candidates},
                     {"no_start_or_goal", drawn.no_start_or_goal},
@@ -112,6 +113,7 @@ ProblemSet read_problem_set(const fs::path& file) {
   set.robot.tip = robot.value("tip", "");
   set.resolution_m = document["resolution_m"];
   set.clearance_m = document["clearance_m"];
+  set.self_clearance_m = document["self_clearance_m"];
   const Json& drawn = document["drawn"];
   set.drawn = {drawn["candidates"], drawn["no_start_or_goal"], drawn["straight_is_free"],
                drawn["path_unknown"]};

@@ -116,10 +116,11 @@ TEST_CASE("by the judge, start and goal keep the stated clearance from the map",
     CHECK(sha256_of_file(scene.map->file) == problem.map_sha256);
     CHECK(map_clearance(scene, problem.path.leftCols(1)) >= set().clearance_m - 1e-9);
     CHECK(map_clearance(scene, problem.path.rightCols(1)) >= set().clearance_m - 1e-9);
-    for (const auto* ends : {&problem.path}) {
-      const sweep::Verdict self = judge(scene, ends->leftCols(1));
-      REQUIRE(self.self);
-      CHECK(self.self->clearance_m >= set().clearance_m - 1e-9);
+    for (const Eigen::MatrixXd& end :
+         {Eigen::MatrixXd(problem.path.leftCols(1)), Eigen::MatrixXd(problem.path.rightCols(1))}) {
+      const sweep::Verdict verdict = judge(scene, end);
+      REQUIRE(verdict.self);
+      CHECK(verdict.self->clearance_m >= set().self_clearance_m - 1e-9);
     }
   }
 }

@@ -15,7 +15,9 @@ struct DrawOptions {
   std::vector<std::string> families;  ///< empty: all
   std::size_t per_family = 10;
   std::uint64_t seed = 1;
-  double resolution_m = 0.01, clearance_m = 0.02;
+  double resolution_m = 0.01;
+  double clearance_m = 0.02;          ///< of start and goal from the map, at least
+  double self_clearance_m = 0.01;     ///< of the arm from itself at start and goal, at least
   double joint_margin_rad = 0.05;     ///< of start and goal from the limits of the joints
   double min_distance_rad = 1.0;      ///< Euclidean distance of start and goal
   std::size_t max_draws = 2'000'000;  ///< configurations per start or goal

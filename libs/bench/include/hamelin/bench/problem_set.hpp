@@ -39,8 +39,9 @@ struct DrawCounts {
 struct ProblemSet {
   std::string name;
   RobotFiles robot;
-  double resolution_m = 0.01;  ///< of the maps
-  double clearance_m = 0.02;   ///< of start and goal, from the map and of the arm from itself
+  double resolution_m = 0.01;      ///< of the maps
+  double clearance_m = 0.02;       ///< of start and goal from the map, at least
+  double self_clearance_m = 0.01;  ///< of the arm from itself at start and goal, at least
   DrawCounts drawn;
   std::vector<Problem> problems;
   std::string sha256;  ///< of the set's file, which holds the hashes of all other files
