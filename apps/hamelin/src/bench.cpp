@@ -40,14 +40,20 @@ struct RunOptions : SetOptions {
   std::vector<fs::path> plugin_path;
 };
 
+struct TableOptions {
+  std::optional<fs::path> set;
+  fs::path directory;
+  bool markdown = false, json = false;
+};
+
 struct DrawFlags {
   bench::DrawOptions draw;
   fs::path output;
 };
 
 // The set that ships, or the one given.
-fs::path set_file(const SetOptions& options) {
-  if (options.set) return *options.set;
+fs::path set_file(const std::optional<fs::path>& given) {
+  if (given) return *given;
   return prefix().value_or("/") / "share" / "hamelin" / "bench" / "v1.json";
 }
 
@@ -57,7 +63,7 @@ std::string describe(const bench::ProblemSet& set, std::size_t count) {
 }
 
 int bench_make(const SetOptions& options) {
-  const fs::path file = set_file(options);
+  const fs::path file = set_file(options.set);
   const bench::ProblemSet set = bench::read_problem_set(file);
   const auto problems = bench::select(set, options.selection);
   (void)bench::write_problems(problems, options.output, file.string());
@@ -109,22 +115,33 @@ sweep::RunOutcome run_benchmark(const RunOptions& options) {
   return sweep::run_sweep(options.output, sweep);
 }
 
+void write_results(const fs::path& directory, const bench::ProblemSet& set, bool markdown,
+                   bool json) {
+  const bench::Results results = bench::read_results(directory, set);
+  const Json document = bench::to_json(results);
+  const fs::path target = directory / "benchmark.json";
+  write_file_atomically(target, document.dump(2) + "\n");
+  for (const auto& text : results.by_family.notes) note(text);
+  if (json)
+    print_json(document);
+  else
+    report(fmt::format("{}\n{}: {}\n", bench::to_table(results, markdown), target.string(),
+                       describe(set, results.problems.size())));
+}
+
+int bench_table(const TableOptions& options) {
+  write_results(options.directory, bench::read_problem_set(set_file(options.set)), options.markdown,
+                options.json);
+  return 0;
+}
+
 int bench_run(const RunOptions& options) {
-  const fs::path file = set_file(options);
+  const fs::path file = set_file(options.set);
   const bench::ProblemSet set = bench::read_problem_set(file);
   const auto problems = bench::select(set, options.selection);
   plan_benchmark(options, file, set, problems);
   const sweep::RunOutcome outcome = run_benchmark(options);
-  const bench::Results results = bench::read_results(options.output, set, problems);
-  const Json document = bench::to_json(results);
-  const fs::path target = options.output / "benchmark.json";
-  write_file_atomically(target, document.dump(2) + "\n");
-  for (const auto& text : results.by_family.notes) note(text);
-  if (options.json)
-    print_json(document);
-  else
-    report(fmt::format("{}\n{}: {}\n", bench::to_table(results, options.markdown), target.string(),
-                       describe(set, problems.size())));
+  write_results(options.output, set, options.markdown, options.json);
   return outcome.stopped ? log::exit_code(log::Outcome::interrupted) : 0;
 }
 
@@ -262,6 +279,23 @@ void add_run_command(CLI::App& parent, int& exit_code) {
   command->callback([options, &exit_code] { exit_code = bench_run(*options); });
 }
 
+void add_table(CLI::App& parent, int& exit_code) {
+  auto* command = add_command(
+      parent, "table",
+      "Print the tables of a benchmark that `hamelin bench run` or `hamelin sweep run` executed, "
+      "and write its results to DIR/benchmark.json",
+      "hamelin bench table results\n"
+      "hamelin bench table results --markdown");
+  const auto options = std::make_shared<TableOptions>();
+  command->add_option("directory", options->directory, "directory of the benchmark")
+      ->required()
+      ->type_name("DIR");
+  add_set_option(*command, options->set);
+  command->add_flag("--markdown", options->markdown, "print the tables in Markdown");
+  command->add_flag("--json", options->json, "print the results as JSON");
+  command->callback([options, &exit_code] { exit_code = bench_table(*options); });
+}
+
 void add_draw(CLI::App& parent, int& exit_code) {
   auto* command = add_command(
       parent, "draw",
@@ -332,6 +366,7 @@ void add_bench(CLI::App& app, int& exit_code) {
                             "hamelin bench make -o problems");
   bench->require_subcommand(1);
   add_run_command(*bench, exit_code);
+  add_table(*bench, exit_code);
   add_make(*bench, exit_code);
   add_list(*bench, exit_code);
   add_draw(*bench, exit_code);

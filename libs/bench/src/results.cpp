@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "hamelin/bench/families.hpp"
+#include "hamelin/core/error.hpp"
 
 namespace hamelin::bench {
 
@@ -23,7 +25,7 @@ std::string shown(const std::optional<double>& value, int digits) {
 }
 
 std::string reached(const sweep::Group& g) {
-  return fmt::format("{}/{}", g.reached, g.feasible);
+  return g.runs == 0 ? "-" : fmt::format("{}/{}", g.reached, g.feasible);
 }
 
 std::vector<Row> family_rows(const Results& results) {
@@ -102,13 +104,26 @@ Json machine_of(const std::vector<sweep::MergedRun>& runs) {
   return nullptr;
 }
 
+// The problems of the set that the plan has.
+std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet& set,
+                                      const std::string& where) {
+  std::set<std::string> names;
+  for (const auto& run : plan.runs) names.insert(run.labels.at("problem"));
+  std::vector<Problem> problems;
+  for (const auto& problem : set.problems)
+    if (names.erase(problem.name) > 0) problems.push_back(problem);
+  if (!names.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: problem '{}' is not in the set {}, expected a plan of that set",
+                            where, *names.begin(), set.name));
+  return problems;
+}
+
 }  // namespace
 
-Results read_results(const std::filesystem::path& directory, const ProblemSet& set,
-                     const std::vector<Problem>& problems) {
+Results read_results(const std::filesystem::path& directory, const ProblemSet& set) {
   Results results{set.name, set.sha256, {}, {}, sweep::merge({directory}, {"family", "planner"}),
                   {}};
-  for (const auto& problem : problems) results.problems.push_back(problem.name);
   for (const auto& run : results.by_family.runs) {
     const std::string& planner = run.run.labels.at("planner");
     if (std::find(results.planners.begin(), results.planners.end(), planner) ==
@@ -116,6 +131,10 @@ Results read_results(const std::filesystem::path& directory, const ProblemSet& s
       results.planners.push_back(planner);
   }
   results.by_planner = sweep::group(results.by_family.runs, {"planner"});
+  const sweep::Plan plan = sweep::read_plan(directory);
+  const auto problems = planned_problems(plan, set, sweep::plan_file(directory).string());
+  check_maps(problems, plan, sweep::plan_file(directory).string());
+  for (const auto& problem : problems) results.problems.push_back(problem.name);
   return results;
 }
 

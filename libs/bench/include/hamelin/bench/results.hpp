@@ -16,11 +16,9 @@ struct Results {
   std::vector<sweep::Group> by_planner;
 };
 
-/// @param directory of the sweep
-/// @param problems those that it was planned with
-/// @throws Error as sweep::merge
-[[nodiscard]] Results read_results(const std::filesystem::path& directory, const ProblemSet& set,
-                                   const std::vector<Problem>& problems);
+/// @param directory of a sweep with problems of the set
+/// @throws Error as sweep::merge; invalid if it has other problems or other maps
+[[nodiscard]] Results read_results(const std::filesystem::path& directory, const ProblemSet& set);
 
 /// As hamelin.benchmark/1, docs/schema/benchmark.schema.json.
 [[nodiscard]] Json to_json(const Results& results);
