@@ -198,9 +198,13 @@ void add_families(CLI::App& command, std::vector<std::string>& chosen) {
       ->allow_extra_args(false);
 }
 
-void add_set_options(CLI::App& command, SetOptions& options) {
-  command.add_option("--problems", options.set, "problem set (default the one that ships, v1)")
+void add_problems_option(CLI::App& command, std::optional<fs::path>& set) {
+  command.add_option("--problems", set, "problem set (default the one that ships, v1)")
       ->type_name("SET.json");
+}
+
+void add_set_options(CLI::App& command, SetOptions& options) {
+  add_problems_option(command, options.set);
   add_families(command, options.selection.families);
   command
       .add_option("--per-family", options.selection.per_family,
@@ -290,7 +294,7 @@ void add_table(CLI::App& parent, int& exit_code) {
   command->add_option("directory", options->directory, "directory of the benchmark")
       ->required()
       ->type_name("DIR");
-  add_set_option(*command, options->set);
+  add_problems_option(*command, options->set);
   command->add_flag("--markdown", options->markdown, "print the tables in Markdown");
   command->add_flag("--json", options->json, "print the results as JSON");
   command->callback([options, &exit_code] { exit_code = bench_table(*options); });
