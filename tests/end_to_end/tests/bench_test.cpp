@@ -96,7 +96,7 @@ TEST_CASE("wrong command lines and changed sets of the benchmark end with one li
     std::string message;
   };
   const std::vector<Wrong> all{
-      {{"bench"}, "subcommand"},
+      {{"bench"}, "a command is missing"},
       {{"bench", "make"}, "--output"},
       {{"bench", "make", "-o", "out", "--family", "shlef"}, "'shelf'?"},
       {{"bench", "make", "-o", "out", "--per-family", "0"}, "--per-family"},
