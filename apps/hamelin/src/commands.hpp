@@ -17,6 +17,7 @@ void add_report(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);
 void add_scene(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);
+void add_bench(CLI::App& app, int& exit_code);
 void add_plugins(CLI::App& app, int& exit_code);
 void add_validate(CLI::App& app, int& exit_code);
 void add_schema(CLI::App& app, int& exit_code);

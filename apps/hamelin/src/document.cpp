@@ -45,6 +45,12 @@ std::string_view to_string(Kind kind) noexcept {
       return "sweep comparison";
     case Kind::accuracy:
       return "measurement of accuracy";
+    case Kind::problems:
+      return "problem set";
+    case Kind::benchmark:
+      return "file of benchmark results";
+    case Kind::archive:
+      return "description of a sweep archive";
   }
   return "unknown";
 }
@@ -95,6 +101,9 @@ Kind recognise(const std::filesystem::path& file) {
   if (schema == "hamelin.summary/1") return Kind::summary;
   if (schema == "hamelin.comparison/1") return Kind::comparison;
   if (schema == "hamelin.accuracy/1") return Kind::accuracy;
+  if (schema == "hamelin.problems/1") return Kind::problems;
+  if (schema == "hamelin.benchmark/1") return Kind::benchmark;
+  if (schema == "hamelin.archive/1") return Kind::archive;
   if (schema.is_null() && document.contains("links") && document["links"].is_object())
     return Kind::spheres;
   if (schema.is_null() && document.contains("waypoints")) return Kind::waypoints;
@@ -103,7 +112,8 @@ Kind recognise(const std::filesystem::path& file) {
       fmt::format(
           "{}: /schema: is {}, expected hamelin.robot/1, hamelin.scene/1, hamelin.result/1, "
           "hamelin.explanation/1, hamelin.path/1, hamelin.trajectory/1, hamelin.primitives/1, "
-          "hamelin.sweep/1, hamelin.summary/1, hamelin.comparison/1 or hamelin.accuracy/1",
+          "hamelin.sweep/1, hamelin.summary/1, hamelin.comparison/1, hamelin.accuracy/1, "
+          "hamelin.problems/1, hamelin.benchmark/1 or hamelin.archive/1",
           file.string(), schema.is_null() ? "missing" : schema.dump()));
 }
 

@@ -24,7 +24,10 @@ enum class Kind {
   records,
   summary,
   comparison,
-  accuracy
+  accuracy,
+  problems,
+  benchmark,
+  archive
 };
 
 [[nodiscard]] std::string_view to_string(Kind kind) noexcept;

@@ -26,7 +26,8 @@ struct CommandGroup {
 const std::vector<CommandGroup>& command_groups() {
   static const std::vector<CommandGroup> all{
       {"Run",
-       {add_run, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep}},
+       {add_run, add_plan, add_optimize, add_integrate, add_accuracy, add_replay, add_sweep,
+        add_bench}},
       {"Inspect", {add_report, add_explain, add_robot, add_scene, add_plugins}},
       {"Files", {add_export, add_validate, add_schema}},
       {"Help", {add_help, add_completion}},

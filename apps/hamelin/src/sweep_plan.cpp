@@ -146,9 +146,10 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
       ->required()
       ->type_name("DIR");
   command
-      ->add_option("--planner", plan.planners,
-                   "planner, with parameters as in hybrid:escape=tree,margin_m=0.01, or "
-                   "python:FILE:CLASS; may be repeated (default the scene's)")
+      ->add_option(
+          "--planner", plan.planners,
+          "planner, with parameters as in hybrid:escape=tree,margin_m=0.01, with a guide as "
+          "in hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default the scene's)")
       ->type_name("NAME")
       ->allow_extra_args(false);
   add_set_option(*command, plan.set,

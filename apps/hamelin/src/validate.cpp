@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "document.hpp"
 #include "hamelin/accuracy/accuracy.hpp"
+#include "hamelin/bench/problem_set.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
@@ -121,6 +122,19 @@ std::string check_file(const std::filesystem::path& file, const ValidateOptions&
       return fmt::format(
           "measurement of accuracy, {} rows",
           accuracy::measurement_from_json(read_json(file), file.string()).rows.size());
+    case Kind::problems:
+      return fmt::format("problem set, {} problems", bench::read_problem_set(file).problems.size());
+    case Kind::benchmark: {
+      const Json document = read_json(file);
+      check_shipped_schema(document, "benchmark", file.string());
+      check_shipped_schema(document["summary"], "summary", file.string() + ": /summary");
+      return "benchmark results";
+    }
+    case Kind::archive: {
+      const Json document = read_json(file);
+      check_shipped_schema(document, "archive", file.string());
+      return fmt::format("description of a sweep archive, {} files", document["files"].size());
+    }
     case Kind::log: {
       const auto log = log::check_log(file);
       return fmt::format("log, {} ticks, {} events{}{}", log.ticks, log.events,

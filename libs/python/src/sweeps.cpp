@@ -243,8 +243,8 @@ void add_sweeps(py::module_& module) {
   module.def("_plan_sweep", &plan_sweep, arg("directory"), arg("options"), arg("progress"),
              "Writes the plan of a sweep; returns a summary.");
   module.def("_run_sweep", &run_sweep, arg("directory"), arg("command"), arg("jobs"), arg("only"),
-             arg("shard"), arg("limit"), arg("fresh"), arg("timeout"), arg("plugin_path"), arg("progress"),
-             "Executes the plan of a sweep.");
+             arg("shard"), arg("limit"), arg("fresh"), arg("timeout"), arg("plugin_path"),
+             arg("progress"), "Executes the plan of a sweep.");
   module.def("_merge_sweeps", &merge_sweeps, arg("directories"), arg("by"),
              "Document and table of `hamelin sweep merge`.");
   module.def("_compare_sweeps", &compare_sweeps, arg("directories"), arg("label"), arg("ignore"),

@@ -75,6 +75,14 @@ Variant parse_variant(const std::string& text, const fs::path& directory) {
   if (variant.planner->empty())
     throw Error(ErrorCode::usage,
                 fmt::format("--planner {}: no name, expected NAME or NAME:key=value,...", text));
+  // "NAME+GUIDE": a guide searches paths for the planner.
+  if (const auto plus = variant.planner->rfind('+'); plus != std::string::npos) {
+    const std::string guide = variant.planner->substr(plus + 1);
+    if (scene::guide_type(guide)) {
+      variant.planner->resize(plus);
+      variant.set.push_back("/planner/guide=" + guide);
+    }
+  }
   if (colon == std::string::npos) return variant;
   for (const auto& part : split_values(text.substr(colon + 1))) {
     const auto equals = part.find('=');

@@ -122,8 +122,9 @@ class Join {
 Json facts(const Json& record, bool timing) {
   const Json &result = record["result"], &judge = record["judge"];
   Json out = selected(record, {"outcome", "cause"});
-  out["result"] = selected(result, {"outcome", "planner", "time_s", "certified_share", "min_clearance_m",
-                                    "recovery_work_J", "filter_work_J", "escape"});
+  out["result"] =
+      selected(result, {"outcome", "planner", "time_s", "certified_share", "min_clearance_m",
+                        "recovery_work_J", "filter_work_J", "escape"});
   if (result.is_object()) {
     for (const auto& [name, key] :
          {std::pair{"plant", "contacts"}, std::pair{"torque_change", "mean"}})

@@ -142,7 +142,8 @@ TEST_CASE("the CSV has a line per run, with quoted fields", "[sweep][unit]") {
   Merged merged;
   merged.sweeps.runs.push_back(made("a dir", "s0", "p", record("stalled", 2.5)));
   merged.sweeps.runs.push_back(made("a dir", "s1", "p", Json(), false));
-  merged.sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1", "/planner/params/name=a, b"};
+  merged.sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1",
+                                   "/planner/params/name=a, b"};
   merged.sweeps.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
   merged.sweeps.runs[0].run.gains = {{"k_p", 0.25}};
   merged.sweeps.runs[0].record["cause"] = "ran into \"it\",\ntwice";

@@ -1,0 +1,379 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <memory>
+#include <thread>
+
+#include "command_line.hpp"
+#include "commands.hpp"
+#include "hamelin/bench/draw.hpp"
+#include "hamelin/bench/families.hpp"
+#include "hamelin/bench/results.hpp"
+#include "hamelin/core/error.hpp"
+#include "hamelin/io/file.hpp"
+#include "hamelin/log/result.hpp"
+#include "hamelin/sweep/make_plan.hpp"
+#include "hamelin/sweep/run_sweep.hpp"
+#include "output.hpp"
+#include "terminal.hpp"
+
+namespace hamelin::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SetOptions {
+  std::optional<fs::path> set;
+  bench::Selection selection;
+  fs::path output;
+  bool json = false;
+};
+
+struct RunOptions : SetOptions {
+  std::vector<std::string> planners, assignments;
+  std::string goal = "joint";
+  double duration_s = 20.0;
+  std::size_t jobs = 1;
+  double timeout_s = 600.0;
+  bool markdown = false;
+  std::vector<fs::path> plugin_path;
+};
+
+struct TableOptions {
+  std::optional<fs::path> set;
+  fs::path directory;
+  bool markdown = false, json = false;
+};
+
+struct DrawFlags {
+  bench::DrawOptions draw;
+  fs::path output;
+};
+
+// The set that ships, or the one given.
+fs::path set_file(const std::optional<fs::path>& given) {
+  if (given) return *given;
+  return prefix().value_or("/") / "share" / "hamelin" / "bench" / "v1.json";
+}
+
+std::string describe(const bench::ProblemSet& set, std::size_t count) {
+  return fmt::format("{}, {} of {} problems, SHA-256 {}", set.name, count, set.problems.size(),
+                     set.sha256);
+}
+
+int bench_make(const SetOptions& options) {
+  const fs::path file = set_file(options.set);
+  const bench::ProblemSet set = bench::read_problem_set(file);
+  const auto problems = bench::select(set, options.selection);
+  (void)bench::write_problems(problems, options.output, file.string());
+  if (options.json)
+    print_json({{"directory", options.output.string()},
+                {"set", set.name},
+                {"sha256", set.sha256},
+                {"problems", problems.size()}});
+  else
+    report(fmt::format("{}: {}\n", options.output.string(), describe(set, problems.size())));
+  return 0;
+}
+
+void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
+                    const std::vector<bench::Problem>& problems) {
+  sweep::PlanOptions plan;
+  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
+  plan.problem.robot = set.robot.robot;
+  plan.problem.spheres = set.robot.spheres;
+  plan.problem.tip = set.robot.tip;
+  plan.problem.resolution_m = set.resolution_m;
+  plan.goals = {sweep::goal_type_from(options.goal, "--goal")};
+  plan.planners = options.planners;
+  plan.set = options.assignments;
+  plan.duration_s = options.duration_s;
+  plan.plugin_directories = plugin_path(options.plugin_path);
+  Progress progress("problems made");
+  plan.on_scene = [&progress](std::size_t done, std::size_t all) {
+    progress.show(static_cast<double>(done), static_cast<double>(all));
+  };
+  bench::check_maps(problems, sweep::make_plan(options.output, plan), file.string());
+}
+
+sweep::RunOutcome run_benchmark(const RunOptions& options) {
+  sweep::RunOptions sweep;
+  sweep.command = {"/proc/self/exe", "sweep", "one"};
+  for (const auto& directory : options.plugin_path) {
+    sweep.command.emplace_back("--plugin-path");
+    sweep.command.push_back(directory.string());
+  }
+  sweep.plugin_directories = plugin_path(options.plugin_path);
+  sweep.jobs = options.jobs;
+  sweep.timeout_s = options.timeout_s;
+  sweep.stop = &stop_on_signals();
+  Progress progress("runs");
+  sweep.on_done = [&progress](std::size_t done, std::size_t all) {
+    progress.show(static_cast<double>(done), static_cast<double>(all));
+  };
+  return sweep::run_sweep(options.output, sweep);
+}
+
+void write_results(const fs::path& directory, const bench::ProblemSet& set, bool markdown,
+                   bool json) {
+  const bench::Results results = bench::read_results(directory, set);
+  const Json document = bench::to_json(results);
+  const fs::path target = directory / "benchmark.json";
+  write_file_atomically(target, document.dump(2) + "\n");
+  for (const auto& text : results.by_family.notes) note(text);
+  if (json)
+    print_json(document);
+  else
+    report(fmt::format("{}\n{}: {}\n", bench::to_table(results, markdown), target.string(),
+                       describe(set, results.problems.size())));
+}
+
+int bench_table(const TableOptions& options) {
+  write_results(options.directory, bench::read_problem_set(set_file(options.set)), options.markdown,
+                options.json);
+  return 0;
+}
+
+int bench_run(const RunOptions& options) {
+  const fs::path file = set_file(options.set);
+  const bench::ProblemSet set = bench::read_problem_set(file);
+  const auto problems = bench::select(set, options.selection);
+  plan_benchmark(options, file, set, problems);
+  const sweep::RunOutcome outcome = run_benchmark(options);
+  write_results(options.output, set, options.markdown, options.json);
+  return outcome.stopped ? log::exit_code(log::Outcome::interrupted) : 0;
+}
+
+/// A directory for temporary files, removed at the end.
+class ScratchDirectory {
+ public:
+  ScratchDirectory() {
+    std::string path = (fs::temp_directory_path() / "hamelin-bench-XXXXXX").string();
+    if (::mkdtemp(path.data()) == nullptr)
+      throw Error(ErrorCode::io, fmt::format("{}: cannot be created", path));
+    path_ = path;
+  }
+  ~ScratchDirectory() {
+    std::error_code ec;
+    fs::remove_all(path_, ec);
+  }
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+int bench_draw(const DrawFlags& flags) {
+  bench::DrawOptions options = flags.draw;
+  const fs::path target = output_target(flags.output, {options.robot.robot, options.robot.spheres});
+  const ScratchDirectory scratch;
+  options.scratch = scratch.path();
+  bench::ProblemSet set;
+  {
+    Progress progress("problems drawn");
+    options.on_problem = [&progress](std::size_t done, std::size_t all) {
+      progress.show(static_cast<double>(done), static_cast<double>(all));
+    };
+    set = bench::draw_problem_set(options);
+  }
+  const std::string text = bench::to_text(set, target.parent_path());
+  write_file_atomically(target, text);
+  const bench::DrawCounts& drawn = set.drawn;
+  report(fmt::format(
+      "{}: {} problems of {} candidates; {} had no start or goal, {} a free straight motion, "
+      "{} no path that was found\nSHA-256 {}\n",
+      target.string(), set.problems.size(), drawn.candidates, drawn.no_start_or_goal,
+      drawn.straight_is_free, drawn.path_unknown, sha256_hex(text)));
+  return 0;
+}
+
+void add_families(CLI::App& command, std::vector<std::string>& chosen) {
+  restrict_values(command.add_option("--family", chosen, "families to use (default all)"),
+                  bench::families())
+      ->type_name("NAME,NAME")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+}
+
+void add_problems_option(CLI::App& command, std::optional<fs::path>& set) {
+  command.add_option("--problems", set, "problem set (default the one that ships, v1)")
+      ->type_name("SET.json");
+}
+
+void add_set_options(CLI::App& command, SetOptions& options) {
+  add_problems_option(command, options.set);
+  add_families(command, options.selection.families);
+  command
+      .add_option("--per-family", options.selection.per_family,
+                  "use only the first N problems of each family (default all)")
+      ->type_name("N")
+      ->default_str("")
+      ->check(CLI::Range(1L, 100'000L));
+  command.add_flag("--json", options.json, "print the result as JSON");
+}
+
+void add_make(CLI::App& parent, int& exit_code) {
+  auto* command = add_command(
+      parent, "make",
+      "Write the problems of a set as files: start, goal and primitives. They are the same to the "
+      "byte on every machine, which is checked",
+      "hamelin bench make -o problems\n"
+      "hamelin bench make --family shelf,cage --per-family 2 -o problems");
+  const auto options = std::make_shared<SetOptions>();
+  command->add_option("-o,--output", options->output, "directory to write the problems to")
+      ->required()
+      ->type_name("DIR");
+  add_set_options(*command, *options);
+  command->callback([options, &exit_code] { exit_code = bench_make(*options); });
+}
+
+void add_run_command(CLI::App& parent, int& exit_code) {
+  auto* command = add_command(
+      parent, "run",
+      "Run planners with the problems of a set, print a table of the results and write them to "
+      "DIR/benchmark.json. Resumes where it stopped if it was interrupted",
+      "hamelin bench run --planner hybrid --planner apf --per-family 1 -o quick\n"
+      "hamelin bench run --planner hybrid+rrt-connect --planner ./libmine.so -o full\n"
+      "hamelin bench run --planner python:mine.py:Mine -o mine --markdown");
+  const auto options = std::make_shared<RunOptions>();
+  command->add_option("-o,--output", options->output, "directory to write problems and records to")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--planner", options->planners,
+                   "planner, with parameters as in hybrid:escape=tree, with a guide as in "
+                   "hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default hybrid)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--set", options->assignments,
+                   "set one value of all scenes, e.g. /step_s=0.002; may be repeated")
+      ->type_name("/json/pointer=VALUE")
+      ->allow_extra_args(false);
+  restrict_values(
+      command->add_option("--goal", options->goal, "kind of goal that the problems get"),
+      {"joint", "position", "pose"})
+      ->type_name("KIND")
+      ->capture_default_str();
+  command->add_option("--duration", options->duration_s, "longest simulated time of a run [s]")
+      ->type_name("T")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  options->jobs = std::max(1U, std::thread::hardware_concurrency());
+  command
+      ->add_option("--jobs", options->jobs, "number of parallel processes (default one per core)")
+      ->type_name("N")
+      ->check(CLI::Range(1L, 1024L));
+  command
+      ->add_option("--timeout", options->timeout_s,
+                   "wall-clock time after which a run is killed and recorded as crashed [s]")
+      ->type_name("SECONDS")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--markdown", options->markdown, "print the tables in Markdown");
+  add_set_options(*command, *options);
+  command
+      ->add_option("--plugin-path", options->plugin_path,
+                   "directory to search first for planners; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  command->callback([options, &exit_code] { exit_code = bench_run(*options); });
+}
+
+void add_table(CLI::App& parent, int& exit_code) {
+  auto* command = add_command(
+      parent, "table",
+      "Print the tables of a benchmark that `hamelin bench run` or `hamelin sweep run` executed, "
+      "and write its results to DIR/benchmark.json",
+      "hamelin bench table results\n"
+      "hamelin bench table results --markdown");
+  const auto options = std::make_shared<TableOptions>();
+  command->add_option("directory", options->directory, "directory of the benchmark")
+      ->required()
+      ->type_name("DIR");
+  add_problems_option(*command, options->set);
+  command->add_flag("--markdown", options->markdown, "print the tables in Markdown");
+  command->add_flag("--json", options->json, "print the results as JSON");
+  command->callback([options, &exit_code] { exit_code = bench_table(*options); });
+}
+
+void add_draw(CLI::App& parent, int& exit_code) {
+  auto* command = add_command(
+      parent, "draw",
+      "Draw a new set of problems with other seeds or for another arm. Takes a problem only if a "
+      "guide finds a path, so hamelin must be built with OMPL",
+      "hamelin bench draw --name mine-1 --robot data/robots/arm7.urdf --spheres "
+      "data/robots/arm7.spheres.json --tip flange --draw-seed 7 -o mine.json\n"
+      "hamelin bench run --problems mine.json --planner hybrid -o tries");
+  const auto flags = std::make_shared<DrawFlags>();
+  auto& draw = flags->draw;
+  command->add_option("-o,--output", flags->output, "file to write the set to")
+      ->required()
+      ->type_name("SET.json");
+  command->add_option("--name", draw.name, "name of the set")->required()->type_name("NAME");
+  command->add_option("--robot", draw.robot.robot, "robot file")->required()->type_name("FILE");
+  command->add_option("--spheres", draw.robot.spheres, "collision spheres of the robot")
+      ->type_name("FILE.json");
+  command->add_option("--tip", draw.robot.tip, "tip link of the robot")->type_name("LINK");
+  add_families(*command, draw.families);
+  command->add_option("--per-family", draw.per_family, "number of problems per family")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1L, 1000L));
+  command->add_option("--draw-seed", draw.seed, "seed of the set")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(CLI::Range(0L, 1'000'000'000L));
+  command->add_option("--resolution", draw.resolution_m, "edge of a voxel of the maps [m]")
+      ->type_name("R")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--min-clearance", draw.clearance_m, "smallest clearance of start and goal [m]")
+      ->type_name("D")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command->callback([flags, &exit_code] { exit_code = bench_draw(*flags); });
+}
+
+void add_list(CLI::App& parent, int& exit_code) {
+  auto* command =
+      add_command(parent, "families", "List the families of clutter", "hamelin bench families");
+  const auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "print the list as JSON");
+  command->callback([json, &exit_code] {
+    Json all = Json::object();
+    std::string text;
+    for (const auto& family : bench::families()) {
+      all[family] = bench::describe(family);
+      text += fmt::format("{:<12} {}\n", family, bench::describe(family));
+    }
+    if (*json)
+      print_json(all);
+    else
+      report(text);
+    exit_code = 0;
+  });
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, int& exit_code) {
+  auto* bench = add_command(app, "bench",
+                            "Compare planners on a published set of problems with ten families of "
+                            "clutter",
+                            "hamelin bench run --planner hybrid --planner apf -o results\n"
+                            "hamelin bench families\n"
+                            "hamelin bench make -o problems");
+  bench->require_subcommand(1);
+  add_run_command(*bench, exit_code);
+  add_table(*bench, exit_code);
+  add_make(*bench, exit_code);
+  add_list(*bench, exit_code);
+  add_draw(*bench, exit_code);
+}
+
+}  // namespace hamelin::app

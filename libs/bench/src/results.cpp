@@ -1,0 +1,155 @@
+#include "hamelin/bench/results.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "hamelin/bench/families.hpp"
+#include "hamelin/core/error.hpp"
+
+namespace hamelin::bench {
+
+namespace {
+
+using Row = std::vector<std::string>;
+
+const sweep::Group* find(const std::vector<sweep::Group>& groups, const Row& key) {
+  const auto found =
+      std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.key == key; });
+  return found == groups.end() ? nullptr : &*found;
+}
+
+std::string shown(const std::optional<double>& value, int digits) {
+  return value ? fmt::format("{:.{}f}", *value, digits) : std::string("-");
+}
+
+std::string reached(const sweep::Group& g) {
+  return g.runs == 0 ? "-" : fmt::format("{}/{}", g.reached, g.feasible);
+}
+
+std::vector<Row> family_rows(const Results& results) {
+  std::vector<Row> rows{{"family"}};
+  rows.front().insert(rows.front().end(), results.planners.begin(), results.planners.end());
+  for (const auto& family : families()) {
+    Row row{family};
+    bool any = false;
+    for (const auto& planner : results.planners) {
+      const sweep::Group* g = find(results.by_family.groups, {family, planner});
+      any = any || g != nullptr;
+      row.push_back(g != nullptr ? reached(*g) : "-");
+    }
+    if (any) rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::vector<Row> planner_rows(const Results& results) {
+  std::vector<Row> rows{{"planner", "reached", "%", "95 %", "stalled", "time out", "collided",
+                         "other", "contacts", "arrival s", "tick us p50", "p99"}};
+  for (const auto& planner : results.planners) {
+    const sweep::Group& g = *find(results.by_planner, {planner});
+    const auto count = [&](const char* outcome) {
+      const auto found = g.outcomes.find(outcome);
+      return found == g.outcomes.end() ? std::size_t{0} : found->second;
+    };
+    const std::size_t stalled = count("stalled"), timeout = count("timeout"),
+                      collided = count("collision");
+    rows.push_back({planner, reached(g),
+                    g.feasible > 0 ? fmt::format("{:.0f}", 100.0 * static_cast<double>(g.reached) /
+                                                               static_cast<double>(g.feasible))
+                                   : "-",
+                    fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low,
+                                100.0 * g.reached_interval.high),
+                    fmt::format("{}", stalled), fmt::format("{}", timeout),
+                    fmt::format("{}", collided),
+                    fmt::format("{}", g.runs - g.reached_all - stalled - timeout - collided),
+                    fmt::format("{}", g.contacts), shown(g.reached_time_s_median, 2),
+                    shown(g.tick_us_p50_median, 1), shown(g.tick_us_p99_median, 1)});
+  }
+  return rows;
+}
+
+std::string markdown_table(const std::vector<Row>& rows) {
+  std::string text = fmt::format("| {} |\n|---|", fmt::join(rows.front(), " | "));
+  for (std::size_t i = 1; i < rows.front().size(); ++i) text += "---:|";
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    text += fmt::format("\n| {} |", fmt::join(rows[i], " | "));
+  return text + "\n";
+}
+
+std::string aligned_table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const auto& row : rows) {
+    text += fmt::format("{:<{}}", row[0], widths[0]);
+    for (std::size_t i = 1; i < row.size(); ++i) text += fmt::format("  {:>{}}", row[i], widths[i]);
+    text += "\n";
+  }
+  return text;
+}
+
+// CPU and instruction set of the first record that names them.
+Json machine_of(const std::vector<sweep::MergedRun>& runs) {
+  for (const auto& run : runs) {
+    if (!run.record.is_object() || !run.record["result"].is_object()) continue;
+    const Json provenance = run.record["result"].value("provenance", Json::object());
+    if (provenance.contains("host") || provenance.contains("isa"))
+      return {{"host", provenance.value("host", Json(nullptr))},
+              {"isa", provenance.value("isa", Json(nullptr))},
+              {"build", provenance.value("build", Json(nullptr))}};
+  }
+  return nullptr;
+}
+
+// The problems of the set that the plan has.
+std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet& set,
+                                      const std::string& where) {
+  std::set<std::string> names;
+  for (const auto& run : plan.runs) names.insert(run.labels.at("problem"));
+  std::vector<Problem> problems;
+  for (const auto& problem : set.problems)
+    if (names.erase(problem.name) > 0) problems.push_back(problem);
+  if (!names.empty())
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: problem '{}' is not in the set {}, expected a plan of that set",
+                            where, *names.begin(), set.name));
+  return problems;
+}
+
+}  // namespace
+
+Results read_results(const std::filesystem::path& directory, const ProblemSet& set) {
+  Results results{set.name, set.sha256, {}, {}, sweep::merge({directory}, {"family", "planner"}),
+                  {}};
+  for (const auto& run : results.by_family.runs) {
+    const std::string& planner = run.run.labels.at("planner");
+    if (std::find(results.planners.begin(), results.planners.end(), planner) ==
+        results.planners.end())
+      results.planners.push_back(planner);
+  }
+  results.by_planner = sweep::group(results.by_family.runs, {"planner"});
+  const sweep::Plan plan = sweep::read_plan(directory);
+  const auto problems = planned_problems(plan, set, sweep::plan_file(directory).string());
+  check_maps(problems, plan, sweep::plan_file(directory).string());
+  for (const auto& problem : problems) results.problems.push_back(problem.name);
+  return results;
+}
+
+Json to_json(const Results& results) {
+  return {{"schema", "hamelin.benchmark/1"},
+          {"set", {{"name", results.set_name}, {"sha256", results.set_sha256}}},
+          {"problems", results.problems},
+          {"planners", results.planners},
+          {"machine", machine_of(results.by_family.runs)},
+          {"summary", sweep::to_json(results.by_family)}};
+}
+
+std::string to_table(const Results& results, bool markdown) {
+  const auto table = markdown ? &markdown_table : &aligned_table;
+  return table(family_rows(results)) + "\n" + table(planner_rows(results));
+}
+
+}  // namespace hamelin::bench

@@ -1,0 +1,156 @@
+// The benchmark: its problems, runs of planners with them, tables and results.
+#include "../program.hpp"
+#include "hamelin/core/isa.hpp"
+
+using namespace hamelin;
+using test::lines_of;
+using test::Sandbox;
+
+namespace {
+
+using Strings = std::vector<std::string>;
+
+// The line of a table that begins with this word.
+std::string line_of(const std::string& text, const std::string& word) {
+  for (const auto& line : lines_of(text))
+    if (line.starts_with(word + " ")) return line;
+  return "no line";
+}
+
+}  // namespace
+
+TEST_CASE("the problems of the benchmark have the same bytes with every instruction set",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const Json made = test::run_json(sandbox, {"bench", "make", "-o", "problems"});
+  CHECK(made["problems"] == 100);
+  CHECK(sandbox.files().size() == 102);  // with `data` and `problems`
+  const Json set = sandbox.json("data/bench/v1.json");
+  for (const auto& problem : set["problems"])
+    CHECK(sha256_of_file(sandbox.path("problems/" + problem["name"].get<std::string>() +
+                                      ".json")) == problem["sha256"]);
+  // The program itself checks problems and maps against the hashes of the set.
+  for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4}) {
+    if (!is_available(isa)) continue;
+    const test::EnvironmentVariable variable("HAMELIN_ISA", std::string(name_of(isa)));
+    const std::string folder = "with_" + std::string(name_of(isa));
+    const auto output = sandbox.run({"bench", "run", "--per-family", "1", "--planner", "template",
+                                     "--duration", "0.01", "-o", folder});
+    CAPTURE(folder, output.err);
+    CHECK(output.exit_code == 0);
+    CHECK(sandbox.text(folder + "/problems/cage-01.json") == sandbox.text("problems/cage-01.json"));
+  }
+}
+
+TEST_CASE("planners run with the benchmark, and its results fit their schema", "[end_to_end]") {
+  Sandbox sandbox;
+  const Strings command{"bench",      "run",       "--family", "shelf,pillars", "--per-family",
+                        "2",          "--planner", "gyro",     "--planner",     "template",
+                        "--duration", "2",         "-o",       "results"};
+  const auto output = sandbox.run(command);
+  CAPTURE(output.err);
+  REQUIRE(output.exit_code == 0);
+  CHECK_THAT(line_of(output.out, "family"), Catch::EndsWith("gyro  template"));
+  CHECK_THAT(line_of(output.out, "pillars"), Catch::EndsWith("/2"));
+  CHECK_THAT(line_of(output.out, "template"), Catch::Contains("/4"));
+  CHECK_THAT(lines_of(output.out).back(),
+             Catch::StartsWith("results/benchmark.json: hamelin-bench-1, 4 of 100 problems, "
+                               "SHA-256 "));
+  const auto checked = sandbox.run({"validate", "results/benchmark.json", "data/bench/v1.json",
+                                    "results/plan.json", "results/records.jsonl"});
+  CAPTURE(checked.err);
+  CHECK(checked.exit_code == 0);
+  const Json results = sandbox.json("results/benchmark.json");
+  CHECK(results["problems"] == Json{"shelf-01", "shelf-02", "pillars-01", "pillars-02"});
+  CHECK(results["planners"] == Json{"gyro", "template"});
+  CHECK(results["summary"]["groups"].size() == 4);
+  for (const auto& group : results["summary"]["groups"]) {
+    CHECK(group["runs"] == 2);
+    CHECK(group["feasible"] == 2);
+  }
+  CHECK(results["machine"]["isa"].is_string());
+  // a second call runs nothing again, and prints the same
+  const std::string records = sandbox.text("results/records.jsonl");
+  const auto again = sandbox.run(command);
+  CHECK(again.exit_code == 0);
+  CHECK(again.out == output.out);
+  CHECK(sandbox.text("results/records.jsonl") == records);
+  CHECK(sandbox.run({"bench", "table", "results"}).out == output.out);
+  CHECK_THAT(sandbox.run({"bench", "table", "results", "--markdown"}).out,
+             Catch::StartsWith("| family | gyro | template |\n"
+                               "|---|---:|---:|\n| shelf | "));
+}
+
+TEST_CASE("wrong command lines and changed sets of the benchmark end with one line",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  std::string text = sandbox.text("data/bench/v1.json");
+  const auto seed = text.find("\"seed\":1");
+  REQUIRE(seed != std::string::npos);
+  text.replace(seed, 8, "\"seed\":2");
+  for (const char* file : {"robots/arm7.urdf", "robots/arm7.spheres.json"})
+    sandbox.put(file, sandbox.text("data/" + std::string(file)));
+  sandbox.put("bench/changed.json", text);
+  struct Wrong {
+    Strings arguments;
+    std::string message;
+  };
+  const std::vector<Wrong> all{
+      {{"bench"}, "a command is missing"},
+      {{"bench", "make"}, "--output"},
+      {{"bench", "make", "-o", "out", "--family", "shlef"}, "'shelf'?"},
+      {{"bench", "make", "-o", "out", "--per-family", "0"}, "--per-family"},
+      {{"bench", "make", "-o", "out", "--problems", "absent.json"}, "absent.json"},
+      {{"bench", "make", "-o", "out", "--problems", "data/scenes/shelf.json"},
+       "data/scenes/shelf.json: "},
+      {{"bench", "make", "-o", "out", "--problems", "bench/changed.json"},
+       "bench/changed.json: problem 'shelf-01': this build makes it with SHA-256"},
+      {{"bench", "run", "-o", "out", "--problems", "bench/changed.json"},
+       "bench/changed.json: problem 'shelf-01'"},
+      {{"bench", "run", "-o", "out", "--planner", "absent", "--per-family", "1", "--family",
+        "shelf"},
+       "absent"},
+      {{"bench", "run", "-o", "out", "--goal", "jonit"}, "'joint'?"},
+      {{"bench", "table", "data"}, "data/plan.json"},
+      {{"bench", "draw", "-o", "set.json", "--name", "x", "--robot", "absent.urdf"},
+       "absent.urdf"}};
+  for (const auto& wrong : all) {
+    CAPTURE(wrong.arguments);
+    const auto output = sandbox.run(wrong.arguments);
+    CAPTURE(output.err);
+    CHECK(output.exit_code == 2);
+    CHECK(lines_of(output.err).size() == 1);
+    CHECK_THAT(output.err, Catch::Contains(wrong.message));
+    CHECK_FALSE(sandbox.has("set.json"));
+  }
+}
+
+TEST_CASE("a set is drawn again with the same bytes, and its problems are solved by their paths",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  const Strings command{"bench",        "draw",
+                        "--name",       "small",
+                        "--family",     "pillars",
+                        "--per-family", "1",
+                        "--robot",      "data/robots/arm7.urdf",
+                        "--spheres",    "data/robots/arm7.spheres.json",
+                        "--tip",        "flange",
+                        "--draw-seed",  "3",
+                        "-o",           "one.json"};
+  const auto output = sandbox.run(command);
+  if (output.exit_code == 2 && output.err.find("OMPL") != std::string::npos) {
+    WARN("skipped: hamelin was built without OMPL");
+    return;
+  }
+  CAPTURE(output.err);
+  REQUIRE(output.exit_code == 0);
+  Strings again = command;
+  again.back() = "two.json";
+  CHECK(sandbox.run(again).exit_code == 0);
+  CHECK(sandbox.text("one.json") == sandbox.text("two.json"));
+  CHECK(sandbox.run({"validate", "one.json"}).out == "one.json: ok (problem set, 1 problems)\n");
+  CHECK(sandbox
+            .run({"bench", "run", "--problems", "one.json", "--planner", "template", "--duration",
+                  "0.01", "-o", "tries"})
+            .exit_code == 0);
+}
