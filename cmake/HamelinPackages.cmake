@@ -51,6 +51,7 @@ endfunction()
 # Sets `out` to the development packages that a program needs which links the static libraries.
 function(hamelin_debian_development_packages out)
   set(debian_Eigen3 libeigen3-dev)
+  set(debian_LibArchive libarchive-dev)
   set(debian_MuJoCo libmujoco-dev)
   set(debian_OMPL libompl-dev)
   set(debian_OpenSSL libssl-dev)

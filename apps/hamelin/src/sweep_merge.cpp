@@ -111,8 +111,9 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
                    "with --replay: directory to search first for planners; may be repeated")
       ->type_name("DIR")
       ->allow_extra_args(false);
-  ->add_option("--records", options->records,
-               "write the records in the order of the plan; the bytes do not depend on shards")
+  command
+      ->add_option("--records", options->records,
+                   "write the records in the order of the plan; the bytes do not depend on shards")
       ->type_name("RECORDS.jsonl");
   command->add_flag("--without-timing", options->without_timing,
                     "leave out what depends on the machine, so that repeated studies give equal "

@@ -91,19 +91,6 @@ std::string aligned_table(const std::vector<Row>& rows) {
   return text;
 }
 
-// CPU and instruction set of the first record that names them.
-Json machine_of(const std::vector<sweep::MergedRun>& runs) {
-  for (const auto& run : runs) {
-    if (!run.record.is_object() || !run.record["result"].is_object()) continue;
-    const Json provenance = run.record["result"].value("provenance", Json::object());
-    if (provenance.contains("host") || provenance.contains("isa"))
-      return {{"host", provenance.value("host", Json(nullptr))},
-              {"isa", provenance.value("isa", Json(nullptr))},
-              {"build", provenance.value("build", Json(nullptr))}};
-  }
-  return nullptr;
-}
-
 // The problems of the set that the plan has.
 std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet& set,
                                       const std::string& where) {
@@ -122,15 +109,19 @@ std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet&
 }  // namespace
 
 Results read_results(const std::filesystem::path& directory, const ProblemSet& set) {
-  Results results{set.name, set.sha256, {}, {}, sweep::merge({directory}, {"family", "planner"}),
+  Results results{set.name,
+                  set.sha256,
+                  {},
+                  {},
+                  sweep::merge(sweep::read_sweeps({directory}), {"family", "planner"}),
                   {}};
-  for (const auto& run : results.by_family.runs) {
+  for (const auto& run : results.by_family.sweeps.runs) {
     const std::string& planner = run.run.labels.at("planner");
     if (std::find(results.planners.begin(), results.planners.end(), planner) ==
         results.planners.end())
       results.planners.push_back(planner);
   }
-  results.by_planner = sweep::group(results.by_family.runs, {"planner"});
+  results.by_planner = sweep::group(results.by_family.sweeps.runs, {"planner"});
   const sweep::Plan plan = sweep::read_plan(directory);
   const auto problems = planned_problems(plan, set, sweep::plan_file(directory).string());
   check_maps(problems, plan, sweep::plan_file(directory).string());
@@ -143,7 +134,7 @@ Json to_json(const Results& results) {
           {"set", {{"name", results.set_name}, {"sha256", results.set_sha256}}},
           {"problems", results.problems},
           {"planners", results.planners},
-          {"machine", machine_of(results.by_family.runs)},
+          {"machine", results.by_family.sweeps.machine},
           {"summary", sweep::to_json(results.by_family)}};
 }
 

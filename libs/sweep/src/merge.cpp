@@ -30,12 +30,6 @@ void append(std::vector<double>& values, const std::optional<double>& value) {
   if (value) values.push_back(*value);
 }
 
-std::string text_at(const Json& object, const char* key) {
-  return object.is_object() && object.contains(key) && object[key].is_string()
-             ? object[key].get<std::string>()
-             : "";
-}
-
 bool contact_seen(const Json& record) {
   return record["judge"].is_object() && record["judge"].value("contact", false);
 }

@@ -42,6 +42,15 @@ std::vector<std::pair<std::string, std::string>> builds_of(const Json& result) {
   return builds;
 }
 
+// CPU, instruction set and build of a result; null if it does not name them.
+Json machine_of(const Json& result) {
+  const Json provenance = result.value("provenance", Json::object());
+  if (!provenance.contains("host") && !provenance.contains("isa")) return nullptr;
+  return {{"host", provenance.value("host", Json(nullptr))},
+          {"isa", provenance.value("isa", Json(nullptr))},
+          {"build", provenance.value("build", Json(nullptr))}};
+}
+
 /// Reads lines again by their places, and keeps the last file open.
 class LineReader {
  public:
@@ -95,9 +104,11 @@ class Join {
 
  private:
   void add(Json&& record, MergedRun& run, const RecordPlace& place) {
-    if (record["result"].is_object())
+    if (record["result"].is_object()) {
       for (const auto& [name, build] : builds_of(record["result"]))
         sweeps_.builds[name].insert(build);
+      if (sweeps_.machine.is_null()) sweeps_.machine = machine_of(record["result"]);
+    }
     if (!run.record.is_null()) {
       const Json before = Json::parse(lines_.read(run.place));
       if (repeatable_text(before) == repeatable_text(record))

@@ -172,7 +172,7 @@ TEST_CASE("varied values are those of the label, and none if they do not end the
 }
 
 TEST_CASE("the page's JSON has all runs in columns", "[sweep][unit]") {
-  Merged merged{{study(), {}, {}, 0, {}}, {"planner"}, {}, {}, {"a <note>"}};
+  Merged merged{{study(), {}, {}, {}, 0, {}}, {"planner"}, {}, {}, {"a <note>"}};
   merged.groups = group(merged.sweeps.runs, merged.by);
   merged.sweeps.runs[2].run.gains = {{"k_p", 0.123456789}};
   merged.sweeps.runs[3].run.set = {"/planner/params/escape=it's"};

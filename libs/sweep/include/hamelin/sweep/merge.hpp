@@ -50,6 +50,7 @@ struct Sweeps {
   std::vector<std::filesystem::path> files;  ///< of records
   /// Builds that made the records, of the program and of each planner.
   std::map<std::string, std::set<std::string>> builds;
+  Json machine;  ///< host, isa and build of the first record that names them; null if none does
   std::size_t repeated = 0;            ///< runs with equal records in several files
   std::vector<std::string> different;  ///< ids of runs whose records differ between files
 };
