@@ -46,7 +46,8 @@ class Cluster:
         cores = os.cpu_count() or 1
         (root / "munge.key").write_bytes(os.urandom(1024))
         (root / "munge.key").chmod(0o400)
-        root.chmod(0o755)
+        for folder in (root, root.parent):  # other users must reach the socket of munge
+            folder.chmod(0o755)
         self.config = root / "slurm.conf"
         self.config.write_text(
             f"""ClusterName=hamelin
@@ -69,7 +70,6 @@ SelectTypeParameters=CR_Core
 ReturnToService=2
 KillWait=5
 SchedulerParameters=sched_interval=1,batch_sched_delay=0
-RequeueExit=
 NodeName=localhost NodeAddr=127.0.0.1 CPUs={cores} State=UNKNOWN
 PartitionName=main Nodes=localhost Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
 """
@@ -79,9 +79,8 @@ PartitionName=main Nodes=localhost Default=YES MaxTime=INFINITE State=UP OverSub
 
     def start(self):
         """Whether all daemons run and the node is idle."""
-        munge = [f"--{name}={self.root}/munge.{name.split('-')[0]}" for name in ("socket",)]
         commands = (
-            [find("munged"), "--foreground", "--force", *munge, f"--key-file={self.root}/munge.key",
+            [find("munged"), "--foreground", "--force", f"--socket={self.root}/munge.socket", f"--key-file={self.root}/munge.key",
              f"--pid-file={self.root}/munged.pid", f"--log-file={self.root}/munged.log",
              f"--seed-file={self.root}/munge.seed"],
             [find("slurmctld"), "-D", "-f", self.config],

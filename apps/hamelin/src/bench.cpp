@@ -305,9 +305,8 @@ void add_draw(CLI::App& parent, int& exit_code) {
       parent, "draw",
       "Draw a new set of problems with other seeds or for another arm. Takes a problem only if a "
       "guide finds a path, so hamelin must be built with OMPL",
-      "hamelin bench draw --name mine-1 --robot data/robots/arm7.urdf --spheres "
-      "data/robots/arm7.spheres.json --tip flange --draw-seed 7 -o mine.json\n"
-      "hamelin bench run --problems mine.json --planner hybrid -o tries");
+      "hamelin bench draw --name mine-1 --robot arm.urdf --draw-seed 7 -o mine.json\n"
+      "hamelin bench draw --name mine-2 --robot arm.urdf --family shelf,cage -o mine.json");
   const auto flags = std::make_shared<DrawFlags>();
   auto& draw = flags->draw;
   command->add_option("-o,--output", flags->output, "file to write the set to")
@@ -340,8 +339,8 @@ void add_draw(CLI::App& parent, int& exit_code) {
 }
 
 void add_list(CLI::App& parent, int& exit_code) {
-  auto* command =
-      add_command(parent, "families", "List the families of clutter", "hamelin bench families");
+  auto* command = add_command(parent, "families", "List the families of clutter",
+                              "hamelin bench families\nhamelin bench families --json");
   const auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "print the list as JSON");
   command->callback([json, &exit_code] {
@@ -362,9 +361,7 @@ void add_list(CLI::App& parent, int& exit_code) {
 }  // namespace
 
 void add_bench(CLI::App& app, int& exit_code) {
-  auto* bench = add_command(app, "bench",
-                            "Compare planners on a published set of problems with ten families of "
-                            "clutter",
+  auto* bench = add_command(app, "bench", "Compare planners on a published set of problems",
                             "hamelin bench run --planner hybrid --planner apf -o results\n"
                             "hamelin bench families\n"
                             "hamelin bench make -o problems");

@@ -61,12 +61,12 @@ int plan(PlanOptions options) {
 }  // namespace
 
 void add_plan(CLI::App& app, int& exit_code) {
-  auto* command = add_command(
-      app, "plan",
-      "Search a collision-free joint path to each goal of a scene, prove it clear, and write it. "
-      "The exit code is 1 if there is a goal to which no path was found",
-      "hamelin plan data/scenes/shelf.json --guide rrt-connect -o path.json\n"
-      "hamelin plan data/scenes/shelf.json --guide bit-star --checks 100000 --json");
+  auto* command =
+      add_command(app, "plan",
+                  "Search a proved collision-free joint path to each goal of a scene. "
+                  "The exit code is 1 if there is a goal to which no path was found",
+                  "hamelin plan data/scenes/shelf.json --guide rrt-connect -o path.json\n"
+                  "hamelin plan data/scenes/shelf.json --guide bit-star --checks 100000 --json");
   const auto options = std::make_shared<PlanOptions>();
   command->add_option("scene", options->file, "scene file")->required()->type_name("SCENE.json");
   add_guide_option(*command, options->flags);

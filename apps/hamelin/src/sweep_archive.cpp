@@ -53,7 +53,8 @@ void add_sweep_pack(CLI::App& sweep, int& exit_code) {
       sweep, "pack",
       "Write a planned sweep and all files that its runs read into one archive, with hashes, for "
       "machines that do not share a file system",
-      "hamelin sweep pack tries -o tries.tar.zst");
+      "hamelin sweep pack tries -o tries.tar.zst\n"
+      "hamelin sweep pack tries -o tries.tar.zst --json");
   const auto options = std::make_shared<ArchiveOptions>();
   command->add_option("directory", options->input, "directory written by `hamelin sweep plan`")
       ->required()
@@ -68,7 +69,8 @@ void add_sweep_pack(CLI::App& sweep, int& exit_code) {
 void add_sweep_unpack(CLI::App& sweep, int& exit_code) {
   auto* command = add_command(
       sweep, "unpack", "Unpack an archive of `hamelin sweep pack` into a new folder, and check it",
-      "hamelin sweep unpack tries.tar.zst -o work");
+      "hamelin sweep unpack tries.tar.zst -o work\n"
+      "hamelin sweep unpack tries.tar.zst -o work --json");
   const auto options = std::make_shared<ArchiveOptions>();
   command->add_option("archive", options->input, "archive written by `hamelin sweep pack`")
       ->required()

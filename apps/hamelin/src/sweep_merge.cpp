@@ -72,7 +72,6 @@ void add_sweep_merge(CLI::App& sweep, int& exit_code) {
       add_command(sweep, "merge",
                   "Summarise the records of sweeps, of all shards: success with 95 % intervals, "
                   "contacts, times",
-                  "hamelin sweep merge tries\n"
                   "hamelin sweep merge tries more --by family,goal,planner -o summary.json\n"
                   "hamelin sweep merge tries --page tries.html --replay 2 --csv tries.csv\n"
                   "hamelin sweep merge tries --without-timing --records tries.jsonl");
