@@ -1,7 +1,6 @@
 """Time and memory of plan, shard start, merge and page for studies of growing size.
 
-large.py PROGRAM SOURCE_DIR [RUNS...]: prints a table. A study of RUNS runs has one scene and RUNS
-seeds. With --execute, all runs are executed in four shards; else one run is, and its record
+large.py PROGRAM SOURCE_DIR [RUNS...]: prints a table. RUNS is a multiple of 500. With --execute, all runs are executed in four shards; else one run is, and its record
 is repeated for all ids, because the time of merge and page does not depend on who made the records.
 """
 
@@ -42,9 +41,12 @@ def repeat_record(directory, runs):
 def study(program, source, runs, execute, folder):
     directory = folder / f"study-{runs}"
     scene = source / "data/scenes/pillar.json"
+    # 500 seeds, and as many lengths of the runs as needed; a plain list of seeds would be too long
+    # for a command line.
+    lengths = ",".join(f"{0.02 + 0.001 * i:.3f}" for i in range(runs // 500))
     rows = [("plan", measured(
-        program, "sweep", "plan", scene, "--planner", "hybrid", "--duration", "0.02", "--seeds",
-        ",".join(map(str, range(1, runs + 1))), "-o", directory,
+        program, "sweep", "plan", scene, "--planner", "hybrid", "--vary", f"/duration_s={lengths}",
+        "--seeds", ",".join(map(str, range(1, 501))), "-o", directory,
     ))]  # fmt: skip
     if execute:
         for shard in range(1, 5):

@@ -14,11 +14,13 @@ import time
 from study import Study, call, kill_some, processes_with, skip
 
 
-def run_with_kills(script, directory, seed):
+def run_with_kills(script, text, seed):
     """Executes a script while its shards are killed, then again until it succeeds."""
     begun = subprocess.Popen(["bash", script], stderr=subprocess.DEVNULL)
-    killed = kill_some(str(directory), seed, 1.5, 0.1, lambda: begun.poll() is None)
+    killed = kill_some(text, seed, 1.5, 0.1, lambda: begun.poll() is None)
     begun.wait()
+    while processes_with(text):  # shards whose script was killed go on
+        time.sleep(0.1)
     for _ in range(3):
         if subprocess.run(["bash", script]).returncode == 0:
             return killed
@@ -30,7 +32,7 @@ def local(study):
         directory = study.plan(f"parallel-{shards}")
         script = study.root / f"parallel-{shards}.sh"
         call(study.program, "sweep", "emit", directory, "--parallel", "--shards", shards, "-o", script)
-        killed = run_with_kills(script, directory, shards)
+        killed = run_with_kills(script, str(directory), shards)
         study.compare(f"parallel, {shards} shards, {killed} processes killed", directory)
         call("bash", script)
         study.compare(f"parallel, {shards} shards, repeated", directory)
@@ -99,7 +101,7 @@ def over_ssh(study):
                 study.program, "sweep", "emit", directory, "--parallel", "--shards", 7,
                 "--sshlogin", login, "--program", study.program, *options, "-o", script,
             )  # fmt: skip
-            text = str(directory) if mode == "shared" else "sweep/ssh-transfer\0--shard"
+            text = str(directory) if mode == "shared" else "ssh-transfer\0--shard"
             killed = run_with_kills(script, text, 3)
             left += set(pathlib.Path.home().glob("hamelin-*")) - before
             study.compare(f"parallel over ssh, {mode}, {killed} processes killed", directory)

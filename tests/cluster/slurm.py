@@ -186,6 +186,7 @@ def time_limit(study):
         if any(state == "RUNNING" for _, state in tasks(job)):
             break
         time.sleep(0.1)
+    time.sleep(0.5)  # until the script has begun
     call("scancel", "--batch", "--signal=USR1", f"{job}_1")  # what Slurm sends before the limit
     time.sleep(2)
     state = call("scontrol", "show", "job", f"{job}_1")

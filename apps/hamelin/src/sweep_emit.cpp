@@ -65,7 +65,7 @@ int sweep_emit(EmitOptions options) {
   fs::permissions(*options.output,
                   fs::perms::owner_exec | fs::perms::group_exec | fs::perms::others_exec,
                   fs::perm_options::add);
-  note(fmt::format("{}: {} runs in {} shards; execute it with `{}`, then `hamelin sweep merge {}`",
+  note(fmt::format("{}: {} runs, {} shards; execute it with `{}`, then `hamelin sweep merge {}`",
                    options.output->string(), plan.runs.size(), options.script.shards,
                    (options.slurm ? "sbatch " : "bash ") + options.output->string(),
                    options.script.directory.string()));

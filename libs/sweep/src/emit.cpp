@@ -71,17 +71,18 @@ std::string slurm_script(const ScriptOptions& options,
   if (time_limit)
     script +=
         fmt::format("#SBATCH --time={}\n#SBATCH --signal=B:USR1@{}\n", *time_limit, warning_s);
+  if (time_limit)
+    script += R"(
+# Slurm sends SIGUSR1 before the time limit: end the runs, and queue this task again.
+run=
+trap '[ -z "$run" ] || { kill -TERM "$run"; wait "$run"; }; scontrol requeue "$SLURM_JOB_ID"; exit 130' USR1
+)";
   script += fmt::format(R"(
 {} &
 run=$!
 )",
                         shard_command(options, shell_word(directory),
                                       "\"${SLURM_ARRAY_TASK_ID:?is not set, expected sbatch}\""));
-  if (time_limit)
-    script +=
-        R"(# Slurm sends SIGUSR1 before the time limit: end the runs, and queue this task again.
-trap 'kill -TERM "$run"; wait "$run"; scontrol requeue "${SLURM_JOB_ID:?}"; exit 130' USR1
-)";
   return script + "wait \"$run\"\n";
 }
 

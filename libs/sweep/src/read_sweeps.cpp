@@ -111,7 +111,7 @@ class Join {
     }
     if (!run.record.is_null()) {
       const Json before = Json::parse(lines_.read(run.place));
-      if (repeatable_text(before) == repeatable_text(record))
+      if (repeatable_text(before, run.run) == repeatable_text(record, run.run))
         ++sweeps_.repeated;
       else
         sweeps_.different.push_back(run.run.id);
@@ -186,7 +186,7 @@ void write_records(const Sweeps& sweeps, const fs::path& file, bool timing) {
   for (const auto& run : sweeps.runs) {
     if (run.record.is_null()) continue;
     const std::string line = lines.read(run.place);
-    out.append(timing ? line : repeatable_text(Json::parse(line)));
+    out.append(timing ? line : repeatable_text(Json::parse(line), run.run));
     out.append("\n");
   }
   out.commit();

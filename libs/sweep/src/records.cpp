@@ -166,9 +166,12 @@ void read_recorded_runs(const fs::path& file, const RunIndex& runs,
   });
 }
 
-std::string repeatable_text(Json record) {
-  if (record["result"].is_object())
-    for (const char* key : {"timing", "provenance"}) record["result"].erase(key);
+std::string repeatable_text(Json record, const PlannedRun& run) {
+  if (Json& result = record["result"]; result.is_object()) {
+    for (const char* key : {"timing", "provenance"})
+      if (result.contains(key)) result[key] = nullptr;
+    if (result.contains("scene")) result["scene"] = run.scene;
+  }
   return record.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -62,8 +62,9 @@ RecordsEnd read_records(const std::filesystem::path& file, const RunIndex& runs,
 void read_recorded_runs(const std::filesystem::path& file, const RunIndex& runs,
                         const std::function<void(std::size_t run)>& visit);
 
-/// The line of a record without what depends on machine and time: `timing` and `provenance` of the
-/// result. Repeated runs of one build give the same text.
-[[nodiscard]] std::string repeatable_text(Json record);
+/// The line of a record without what depends on machine, time and place: `timing` and `provenance`
+/// of the result are null, and its scene is named as in the plan. Repeated runs of one build give
+/// the same text.
+[[nodiscard]] std::string repeatable_text(Json record, const PlannedRun& run);
 
 }  // namespace hamelin::sweep
