@@ -1,7 +1,8 @@
 """Time and memory of plan, shard start, merge and page for studies of growing size.
 
-large.py PROGRAM SOURCE_DIR [RUNS...]: prints a table. RUNS is a multiple of 500. With --execute, all runs are executed in four shards; else one run is, and its record
-is repeated for all ids, because the time of merge and page does not depend on who made the records.
+large.py PROGRAM SOURCE_DIR [RUNS...] [--execute]: prints a table. RUNS is a multiple of 500. With --execute,
+all runs are executed in four shards; else one run is, and its record
+is repeated for all ids, because the times of merge and page do not depend on who made the records.
 """
 
 import json
