@@ -171,8 +171,6 @@ def execute(study, shards):
     study.compare(
         f"Slurm, {shards} shards, {killed} tasks killed, {requeued} requeued, submitted twice", directory
     )
-    wait_for(submit(script), "a third time")
-    study.compare(f"Slurm, {shards} shards, with nothing left to do", directory)
 
 
 def time_limit(study):

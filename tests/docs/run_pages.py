@@ -36,7 +36,7 @@ from stage import tracked  # noqa: E402
 
 SHELL = ("console", "sh")
 EXEMPT = re.compile(r"<!-- not run: (.+?) -->", re.DOTALL)
-SAVED = re.compile(r"Save .* as\s+`([^`]+)`:$", re.DOTALL)
+SAVED = re.compile(r"Save .*\sas\s+`([^`]+)`:$", re.DOTALL)
 SHOWN = re.compile(r"^(outcome .*|goal .* reached)", re.MULTILINE)
 
 

@@ -84,16 +84,25 @@ def _install(stage: pathlib.Path, settings: dict) -> None:
     subprocess.run(["cmake", "--install", build, "--prefix", stage], check=True)
 
 
+def _only_folder(stage: pathlib.Path, pattern: str, what: str) -> pathlib.Path:
+    """The folder of an installation, whose place depends on the options of the build."""
+    found = [folder for folder in sorted(stage.glob(pattern)) if folder.is_dir()]
+    if len(found) != 1:
+        raise RuntimeError(f"{stage}/{pattern}: {len(found)} folders, expected one with {what}")
+    return found[0]
+
+
 def _files(stage: pathlib.Path, data: str) -> dict[str, pathlib.Path]:
     """Names in the wheel, and the files: the package, the program, planners and shared data."""
     found = {}
-    package = stage / _package_folder() / "hamelin"
-    if not package.is_dir():
-        raise RuntimeError(f"{package}: is missing, expected a build with HAMELIN_BUILD_PYTHON=ON")
+    package = _only_folder(
+        stage, "lib/python*/*-packages/hamelin", "the package (HAMELIN_BUILD_PYTHON=ON)"
+    )
+    plugins = _only_folder(stage, "lib/**/hamelin/plugins", "the planners")
     for folder, name in (
         (package, "hamelin"),
         (stage / "bin", f"{data}/scripts"),
-        (stage / "lib" / "hamelin" / "plugins", f"{data}/data/lib/hamelin/plugins"),
+        (plugins, f"{data}/data/{plugins.relative_to(stage).as_posix()}"),
         (stage / "share", f"{data}/data/share"),
     ):
         for file in sorted(folder.rglob("*")):

@@ -50,7 +50,7 @@ MINE = "class Mine:\n    def tick(self, tick, command):\n        pass\n"
 
 def test_cmake_install(build, source, version, tmp_path):
     run(["cmake", "--install", build, "--prefix", tmp_path / "prefix"])
-    package = next((tmp_path / "prefix").glob("lib/python3*/site-packages"))
+    package = next((tmp_path / "prefix").glob("lib/python3*/*-packages"))
     out = run(
         [sys.executable, "-c", CODE, source], {"PYTHONPATH": str(package)}, cwd=tmp_path
     )
@@ -89,6 +89,4 @@ def test_pip_install(build, source, version, tmp_path):
     )  # fmt: skip
     assert done.returncode == 1 and "planner python" in done.stdout, done.stdout
     run([venv / "bin" / "python", "-m", "pip", "uninstall", "-y", "hamelin"], cwd=tmp_path)
-    assert not (venv / "lib" / "hamelin").exists() or not list(
-        (venv / "lib" / "hamelin").rglob("*.so")
-    )
+    assert not list(venv.glob("lib/**/hamelin/plugins/*.so"))

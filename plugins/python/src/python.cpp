@@ -70,16 +70,17 @@ Functions find_functions() {
   return f;
 }
 
-// The folder of the package `hamelin`, from the file of this plugin: below the same prefix, which is
-// some folders above PREFIX/lib/hamelin/plugins or PREFIX/lib/x86_64-linux-gnu/hamelin/plugins, or in
-// the same build folder. Empty if it is not there; then Python searches for it.
+// The folder of the package `hamelin`, from the file of this plugin: below the same prefix, which
+// is some folders above PREFIX/lib/hamelin/plugins or PREFIX/lib/x86_64-linux-gnu/hamelin/plugins,
+// or in the same build folder. A wheel may hold a build that was made for another folder than
+// site-packages. Empty if it is not there; then Python searches for it.
 fs::path package_folder() {
   Dl_info info{};
   if (::dladdr(reinterpret_cast<const void*>(&package_folder), &info) == 0) return {};
   std::error_code ec;
   const fs::path file = fs::canonical(info.dli_fname, ec);
   for (fs::path at = file.parent_path(); at.has_relative_path(); at = at.parent_path())
-    for (const char* folder : {"lib/python", HAMELIN_PYTHON_DIR})
+    for (const char* folder : {"lib/python", HAMELIN_PYTHON_DIR, HAMELIN_PYTHON_SITE})
       if (fs::is_regular_file(at / folder / "hamelin" / "__init__.py", ec)) return at / folder;
   return {};
 }
