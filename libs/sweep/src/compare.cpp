@@ -7,6 +7,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/sweep/failure_class.hpp"
 #include "statistics.hpp"
 
 namespace hamelin::sweep {
@@ -77,7 +78,9 @@ class Pairing {
   }
 
  private:
-  static bool reached(const MergedRun& r) { return r.record["outcome"] == "reached"; }
+  static bool reached(const MergedRun& r) {
+    return is_success(r.record["outcome"].get_ref<const std::string&>());
+  }
   static double time_s(const MergedRun& r) { return r.record["result"].value("time_s", 0.0); }
 
   Comparison& out_;

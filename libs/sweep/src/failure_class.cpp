@@ -137,6 +137,10 @@ void for_each_contact(const Json& record, Visit visit) {
 
 }  // namespace
 
+bool is_success(std::string_view outcome) noexcept {
+  return outcome == "reached" || outcome == "followed";
+}
+
 std::string normalised_cause(const std::string& cause) {
   std::string text = Normaliser(without_remarks(cause)).run();
   join_parts_of_links(text);
@@ -144,9 +148,10 @@ std::string normalised_cause(const std::string& cause) {
 }
 
 std::string failure_class(const Json& record) {
-  if (record.is_null() || record["outcome"] == "reached") return "";
+  if (record.is_null()) return "";
   const std::string outcome = record["outcome"],
                     cause = record["cause"].is_string() ? record["cause"].get<std::string>() : "";
+  if (is_success(outcome)) return "";
   if (outcome == "crashed") return fmt::format("crashed: {}", crash_class(cause));
   const Json& result = record["result"];
   const std::string own = result.is_object() ? result.value("outcome", outcome) : outcome;

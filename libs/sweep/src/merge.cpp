@@ -40,7 +40,7 @@ void add_run(GroupData& data, const MergedRun& merged) {
   if (merged.record.is_null()) return;
   const Json &record = merged.record, &result = record["result"], &judge = record["judge"];
   const std::string outcome = record["outcome"];
-  const bool reached = outcome == "reached";
+  const bool reached = is_success(outcome);
   ++g.runs;
   ++g.outcomes[outcome];
   g.feasible += merged.feasible ? 1U : 0U;

@@ -179,6 +179,15 @@ TEST_CASE("made-up records are grouped and counted", "[sweep][unit]") {
   CHECK_FALSE(apf.reached_time_s_median.has_value());
 }
 
+TEST_CASE("a target that was followed to the end is a success, and one that was lost is not",
+          "[sweep][unit]") {
+  const std::vector<MergedRun> runs{made("1", "p", record("followed", 0.02, 30.0, 5.0)),
+                                    made("2", "p", record("target_lost", 0.02, 9.0, 5.0))};
+  const Group all = group(runs, {"planner"}).at(0);
+  CHECK(all.reached == 1);
+  CHECK(all.causes == std::map<std::string, std::size_t>{{"target_lost", 1}});
+}
+
 TEST_CASE("grouping by a label that no run has is refused with the list of labels",
           "[sweep][unit]") {
   CHECK_THROWS_WITH(

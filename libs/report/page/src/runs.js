@@ -33,8 +33,8 @@ export class Runs {
     this.figures = runs.figures;
     this.replays = replays;
     const outcome = this.texts.get('outcome');
-    const reached = outcome?.find('reached') ?? -2;
-    this.reached = Uint8Array.from({ length: this.count }, (_, i) => (outcome.index[i] === reached ? 1 : 0));
+    const successes = ['reached', 'followed'].map((name) => outcome?.find(name) ?? -1).filter((index) => index >= 0);
+    this.reached = Uint8Array.from({ length: this.count }, (_, i) => (successes.includes(outcome.index[i]) ? 1 : 0));
     this.all = Array.from({ length: this.count }, (_, i) => i);
     this.recorded = this.all.filter((i) => outcome.index[i] >= 0);
     this.failed = this.recorded.filter((i) => !this.reached[i]);

@@ -1,9 +1,13 @@
 #pragma once
 #include <string>
+#include <string_view>
 
 #include "hamelin/io/json.hpp"
 
 namespace hamelin::sweep {
+
+/// Whether an outcome is a success: the goal was reached, or the target was followed to the end.
+[[nodiscard]] bool is_success(std::string_view outcome) noexcept;
 
 /// A cause without what differs from run to run, so that equal failures have equal texts: numbers
 /// with their signs become N, quoted names become '*', a sphere or capsule becomes the link that it
@@ -14,7 +18,7 @@ namespace hamelin::sweep {
 
 /// The class of a record that did not reach its goal, "outcome: normalised cause". Contact that
 /// only the judge saw is a class of its own. Signals and exit codes of crashes are kept.
-/// @return empty for a record that is null, or whose run reached its goal
+/// @return empty for a record that is null, or whose run was a success
 [[nodiscard]] std::string failure_class(const Json& record);
 
 /// What the judge saw touch, with its time and depth; empty without contact.

@@ -19,8 +19,6 @@ struct RunFacts {
   std::string contact;         ///< judged_contact()
   std::optional<double> time_s, clearance_m, self_clearance_m, certified_share;
   std::optional<double> tick_us_p50, tick_us_p99;
-
-  [[nodiscard]] bool reached() const { return outcome == "reached"; }
 };
 
 /// The facts of a record, hamelin.record/1 or null.
