@@ -4,11 +4,12 @@
 
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/io/atomic_file.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/report/report.hpp"
+#include "hamelin/sweep/csv.hpp"
 #include "hamelin/sweep/page.hpp"
 #include "hamelin/sweep/records.hpp"
-#include "hamelin/sweep/run_facts.hpp"
 #include "output.hpp"
 #include "page.hpp"
 #include "sweep.hpp"
@@ -49,7 +50,11 @@ int sweep_merge(const MergeOptions& options) {
       sweep::merge(sweep::read_sweeps(options.directories, timing), options.by);
   const Json summary = sweep::to_json(merged);
   if (output) write_file_atomically(*output, summary.dump(2) + "\n");
-  if (csv) write_file_atomically(*csv, sweep::to_csv(merged));
+  if (csv) {
+    AtomicFile out(*csv);
+    sweep::write_csv(merged.sweeps, [&out](std::string_view line) { out.append(line); });
+    out.commit();
+  }
   if (page) {
     sweep::PageExtras extras;
     extras.replays = write_replays(merged, {options.replay, *page, options.plugin_path});

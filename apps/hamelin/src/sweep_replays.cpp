@@ -9,9 +9,8 @@
 #include "command_line.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/report/report.hpp"
-#include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/failure_class.hpp"
-#include "hamelin/sweep/judge.hpp"
+#include "hamelin/sweep/judged_run.hpp"
 #include "hamelin/sweep/plan.hpp"
 #include "page.hpp"
 #include "plants.hpp"
@@ -44,10 +43,9 @@ std::vector<std::size_t> runs_to_replay(const sweep::Merged& merged, std::size_t
   std::map<std::pair<std::string, std::string>, std::size_t> chosen;
   std::vector<std::size_t> runs;
   for (std::size_t i = 0; i < merged.sweeps.runs.size(); ++i) {
-    const Json& record = merged.sweeps.runs[i].record;
-    const std::string failure = sweep::failure_class(record);
-    if (failure.empty() || record["outcome"] == "crashed") continue;
-    std::size_t& taken = chosen[{failure, merged.sweeps.runs[i].run.labels.at("planner")}];
+    const sweep::RunFacts& facts = merged.sweeps.runs[i].facts;
+    if (facts.failure.empty() || facts.outcome == "crashed") continue;
+    std::size_t& taken = chosen[{facts.failure, merged.sweeps.runs[i].run.labels.at("planner")}];
     if (taken >= per_class) continue;
     ++taken;
     runs.push_back(i);
@@ -67,19 +65,18 @@ std::string file_name(const std::string& id, std::set<std::string>& taken) {
   return unique;
 }
 
-std::vector<report::Remark> remarks_of(const sweep::MergedRun& run, const log::Result& result,
-                                       const Json& judge) {
+std::vector<report::Remark> remarks_of(const sweep::MergedRun& run, const sweep::JudgedRun& now) {
   std::vector<report::Remark> remarks;
-  const Json replayed{{"judge", judge}};
+  const Json replayed{{"judge", sweep::to_json(now.verdict)}};
   if (const std::string contact = sweep::judged_contact(replayed); !contact.empty())
     remarks.push_back({sweep::judged_contact_time(replayed), contact});
-  const std::string recorded = run.record["result"].value("outcome", "none"),
-                    now(log::to_string(result.outcome));
-  if (recorded != now)
-    remarks.push_back(
-        {result.time_s, fmt::format("the record of the sweep has the outcome {}; this repeated run "
-                                    "has {}: another build or machine",
-                                    recorded, now)});
+  const std::string& recorded = run.facts.own_outcome;
+  const std::string outcome(log::to_string(now.result.outcome));
+  if (recorded != outcome)
+    remarks.push_back({now.result.time_s,
+                       fmt::format("the record of the sweep has the outcome {}; this repeated run "
+                                   "has {}: another build or machine",
+                                   recorded, outcome)});
   return remarks;
 }
 
@@ -88,22 +85,18 @@ void write_replay(const sweep::MergedRun& run, const fs::path& target,
                   const ReplayRequest& request) {
   const TemporaryLog temporary(fs::path(target).replace_extension(".jsonl.zst"));
   const scene::Scene scene = sweep::read_scene(run.run, run.directory);
-  sweep::Judge judge(scene);
-  log::Result result;
+  sweep::JudgedRun now;
   {
     log::RunLog log(temporary.file());
     simulation::Watch watch;
     watch.log = &log;
     watch.argv = command_line();
     watch.stop = &stop_on_signals();
-    watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) {
-      judge.add_node(time_s, q);
-    };
-    result = simulation::run(scene, plugin_path(request.plugin_path), watch, plant_factory());
+    now = sweep::run_under_judge(scene, plugin_path(request.plugin_path), watch, plant_factory());
     log.flush();
   }
   report::Options options;
-  options.remarks = remarks_of(run, result, sweep::to_json(judge.verdict()));
+  options.remarks = remarks_of(run, now);
   const report::Data data = report::make_data({temporary.file()}, options);
   write_page(page_template("page"), data.bytes, target);
   for (const auto& remark : options.remarks) detail(fmt::format("{}: {}", run.run.id, remark.text));
@@ -131,7 +124,7 @@ std::map<std::size_t, sweep::ReplayLink> write_replays(const sweep::Merged& merg
     const sweep::MergedRun& run = merged.sweeps.runs[i];
     const std::string name = file_name(run.run.id, taken) + ".html";
     write_replay(run, path / name, request);
-    links[i] = {fmt::format("{}/{}", folder, name), sweep::judged_contact_time(run.record)};
+    links[i] = {fmt::format("{}/{}", folder, name), run.facts.contact_time_s};
     progress.show(static_cast<double>(links.size()), static_cast<double>(runs.size()));
   }
   return links;

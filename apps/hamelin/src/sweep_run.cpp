@@ -6,8 +6,7 @@
 #include <thread>
 
 #include "command_line.hpp"
-#include "hamelin/simulation/run.hpp"
-#include "hamelin/sweep/judge.hpp"
+#include "hamelin/sweep/judged_run.hpp"
 #include "hamelin/sweep/records.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "plants.hpp"
@@ -70,15 +69,11 @@ int sweep_run(const SweepRunOptions& options) {
 int sweep_one(const OneOptions& options) {
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // if the sweep is killed, its runs end too
   const scene::Scene scene = read_scene(options.file, options.flags);
-  sweep::Judge judge(scene);
   simulation::Watch watch;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
-  watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.add_node(time_s, q); };
-  const log::Result result =
-      simulation::run(scene, plugin_path(options.plugin_path), watch, plant_factory());
-  const Json line{{"result", log::to_json(result)}, {"judge", sweep::to_json(judge.verdict())}};
-  fmt::print("{}\n", line.dump(-1, ' ', false, Json::error_handler_t::replace));
+  fmt::print("{}\n", sweep::to_line(sweep::run_under_judge(
+                         scene, plugin_path(options.plugin_path), watch, plant_factory())));
   return 0;
 }
 

@@ -94,37 +94,6 @@ std::set<std::size_t> compared_rows(const Measurement& measurement) {
   return rows;
 }
 
-std::string markdown(const Table& table) {
-  const auto line = [](const std::vector<std::string>& cells) {
-    return fmt::format("| {} |\n", fmt::join(cells, " | "));
-  };
-  std::vector<std::string> rule;
-  for (std::size_t i = 0; i < table.head.size(); ++i)
-    rule.emplace_back(i < table.text_columns ? "---" : "--:");
-  std::string text = line(table.head) + line(rule);
-  for (const auto& row : table.rows) text += line(row);
-  return text;
-}
-
-std::string plain(const Table& table) {
-  std::vector<std::size_t> widths;
-  for (const auto& cell : table.head) widths.push_back(cell.size());
-  for (const auto& row : table.rows)
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  std::string text;
-  const auto add = [&](const std::vector<std::string>& row) {
-    std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)
-      line += i < table.text_columns ? fmt::format("{:<{}}  ", row[i], widths[i])
-                                     : fmt::format("{:>{}}  ", row[i], widths[i]);
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  };
-  add(table.head);
-  for (const auto& row : table.rows) add(row);
-  return text;
-}
-
 }  // namespace
 
 std::string Row::label() const {
@@ -276,8 +245,8 @@ std::string cheaper_peers(const Measurement& measurement) {
 
 std::string to_table(const Measurement& measurement) {
   std::string text = fmt::format("{}: {}\n\n{}", measurement.name, about(measurement),
-                                 plain(rows_table(measurement, ascii)));
-  if (measurement.reference) text += fmt::format("\n{}", plain(cheapest_table(measurement, ascii)));
+                                 to_text(rows_table(measurement, ascii)));
+  if (measurement.reference) text += fmt::format("\n{}", to_text(cheapest_table(measurement, ascii)));
   if (const auto sentence = cheaper_peers(measurement); !sentence.empty())
     text += fmt::format("\n{}\n", sentence);
   for (const auto& row : measurement.rows)
@@ -288,8 +257,8 @@ std::string to_table(const Measurement& measurement) {
 std::string to_markdown(const Measurement& measurement) {
   std::string text = fmt::format("{}: {}\n", measurement.name, about(measurement));
   if (!measurement.reference)
-    return text + fmt::format("\n{}", markdown(rows_table(measurement, typographic)));
-  text += fmt::format("\n{}", markdown(cheapest_table(measurement, typographic)));
+    return text + fmt::format("\n{}", hamelin::to_markdown(rows_table(measurement, typographic)));
+  text += fmt::format("\n{}", hamelin::to_markdown(cheapest_table(measurement, typographic)));
   if (const auto sentence = cheaper_peers(measurement); !sentence.empty())
     text += fmt::format("\n{}\n", sentence);
   const auto compared = compared_rows(measurement);
@@ -301,7 +270,7 @@ std::string to_markdown(const Measurement& measurement) {
                     "of {} rows "
                     "measured</summary>\n\n{}\n</details>\n",
                     best.rows.size(), measurement.rows.size(),
-                    markdown(rows_table(best, typographic)));
+                    hamelin::to_markdown(rows_table(best, typographic)));
 }
 
 }  // namespace hamelin::accuracy

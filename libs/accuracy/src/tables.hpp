@@ -3,15 +3,12 @@
 #include <vector>
 
 #include "hamelin/accuracy/accuracy.hpp"
+#include "hamelin/io/text_table.hpp"
 
 namespace hamelin::accuracy {
 
-/// A table as text, independent of the output format. The first `text_columns` columns are text,
-/// the others numbers.
-struct Table {
-  std::vector<std::string> head;
-  std::vector<std::vector<std::string>> rows;
-  std::size_t text_columns = 1;
+/// A table, independent of the output format.
+struct Table : TextTable {
   std::size_t comparisons_from = std::string::npos;  ///< rows from this one on compare with peers
 };
 

@@ -7,6 +7,7 @@
 
 #include "hamelin/bench/families.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/io/text_table.hpp"
 
 namespace hamelin::bench {
 
@@ -28,9 +29,9 @@ std::string reached(const sweep::Group& g) {
   return g.runs == 0 ? "-" : fmt::format("{}/{}", g.reached, g.feasible);
 }
 
-std::vector<Row> family_rows(const Results& results) {
-  std::vector<Row> rows{{"family"}};
-  rows.front().insert(rows.front().end(), results.planners.begin(), results.planners.end());
+TextTable family_table(const Results& results) {
+  TextTable table{{"family"}, {}};
+  table.head.insert(table.head.end(), results.planners.begin(), results.planners.end());
   for (const auto& family : families()) {
     Row row{family};
     bool any = false;
@@ -39,56 +40,31 @@ std::vector<Row> family_rows(const Results& results) {
       any = any || g != nullptr;
       row.push_back(g != nullptr ? reached(*g) : "-");
     }
-    if (any) rows.push_back(std::move(row));
+    if (any) table.rows.push_back(std::move(row));
   }
-  return rows;
+  return table;
 }
 
-std::vector<Row> planner_rows(const Results& results) {
-  std::vector<Row> rows{{"planner", "reached", "%", "95 %", "stalled", "time out", "collided",
-                         "other", "contacts", "arrival s", "tick us p50", "p99"}};
+TextTable planner_table(const Results& results) {
+  TextTable table{{"planner", "reached", "%", "95 %", "stalled", "time out", "collided", "other",
+                   "contacts", "arrival s", "tick us p50", "p99"},
+                  {}};
   for (const auto& planner : results.planners) {
     const sweep::Group& g = *find(results.by_planner, {planner});
-    const auto count = [&](const char* outcome) {
-      const auto found = g.outcomes.find(outcome);
-      return found == g.outcomes.end() ? std::size_t{0} : found->second;
-    };
-    const std::size_t stalled = count("stalled"), timeout = count("timeout"),
-                      collided = count("collision");
-    rows.push_back({planner, reached(g),
-                    g.feasible > 0 ? fmt::format("{:.0f}", 100.0 * static_cast<double>(g.reached) /
-                                                               static_cast<double>(g.feasible))
-                                   : "-",
-                    fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low,
-                                100.0 * g.reached_interval.high),
-                    fmt::format("{}", stalled), fmt::format("{}", timeout),
-                    fmt::format("{}", collided),
-                    fmt::format("{}", g.runs - g.reached_all - stalled - timeout - collided),
-                    fmt::format("{}", g.contacts), shown(g.reached_time_s_median, 2),
-                    shown(g.tick_us_p50_median, 1), shown(g.tick_us_p99_median, 1)});
+    Row row{planner, reached(g),
+            g.feasible > 0 ? fmt::format("{:.0f}", 100.0 * static_cast<double>(g.reached) /
+                                                       static_cast<double>(g.feasible))
+                           : "-",
+            fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low,
+                        100.0 * g.reached_interval.high)};
+    for (const std::size_t runs : sweep::failures_by_end(g)) row.push_back(fmt::format("{}", runs));
+    row.push_back(fmt::format("{}", g.contacts));
+    row.push_back(shown(g.reached_time_s_median, 2));
+    row.push_back(shown(g.tick_us_p50_median, 1));
+    row.push_back(shown(g.tick_us_p99_median, 1));
+    table.rows.push_back(std::move(row));
   }
-  return rows;
-}
-
-std::string markdown_table(const std::vector<Row>& rows) {
-  std::string text = fmt::format("| {} |\n|---|", fmt::join(rows.front(), " | "));
-  for (std::size_t i = 1; i < rows.front().size(); ++i) text += "---:|";
-  for (std::size_t i = 1; i < rows.size(); ++i)
-    text += fmt::format("\n| {} |", fmt::join(rows[i], " | "));
-  return text + "\n";
-}
-
-std::string aligned_table(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths(rows.front().size(), 0);
-  for (const auto& row : rows)
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  std::string text;
-  for (const auto& row : rows) {
-    text += fmt::format("{:<{}}", row[0], widths[0]);
-    for (std::size_t i = 1; i < row.size(); ++i) text += fmt::format("  {:>{}}", row[i], widths[i]);
-    text += "\n";
-  }
-  return text;
+  return table;
 }
 
 // The problems of the set that the plan has.
@@ -139,8 +115,10 @@ Json to_json(const Results& results) {
 }
 
 std::string to_table(const Results& results, bool markdown) {
-  const auto table = markdown ? &markdown_table : &aligned_table;
-  return table(family_rows(results)) + "\n" + table(planner_rows(results));
+  const auto text = [markdown](const TextTable& table) {
+    return markdown ? to_markdown(table) : hamelin::to_text(table);
+  };
+  return text(family_table(results)) + "\n" + text(planner_table(results));
 }
 
 }  // namespace hamelin::bench

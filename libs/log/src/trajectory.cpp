@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/io/csv.hpp"
 #include "hamelin/log/read_log.hpp"
 
 namespace hamelin::log {
@@ -21,15 +22,6 @@ VectorXd vector_of(const Json& numbers) {
     x[static_cast<Eigen::Index>(i)] =
         numbers[i].is_null() ? std::numeric_limits<double>::quiet_NaN() : numbers[i].get<double>();
   return x;
-}
-
-// A CSV field, quoted if it must be.
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted(1, '"');
-  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
-  quoted += '"';
-  return quoted;
 }
 
 void append_numbers(std::string& row, const VectorXd& x) {
@@ -136,7 +128,7 @@ std::string to_csv(const Trajectory& trajectory) {
   for (const char* kind : {"q_", "v_", "tau_"}) {
     if (!torques && kind[0] == 't') continue;
     for (const auto& joint : trajectory.joints)
-      text += fmt::format(",{}", field(fmt::format("{}{}", kind, joint)));
+      text += fmt::format(",{}", csv_field(fmt::format("{}{}", kind, joint)));
   }
   text += '\n';
   for (const auto& point : trajectory.points) {

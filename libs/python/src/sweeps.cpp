@@ -8,12 +8,11 @@
 #include "bound_scene.hpp"
 #include "counter.hpp"
 #include "hamelin/core/error.hpp"
-#include "hamelin/simulation/run.hpp"
 #include "hamelin/sweep/compare.hpp"
-#include "hamelin/sweep/judge.hpp"
+#include "hamelin/sweep/csv.hpp"
+#include "hamelin/sweep/judged_run.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/merge.hpp"
-#include "hamelin/sweep/run_facts.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "module.hpp"
 #ifdef HAMELIN_WITH_MUJOCO
@@ -195,9 +194,10 @@ py::object compare_sweeps(py::handle directories, const std::string& label,
 std::string sweep_csv(py::handle directories) {
   const auto folders = paths_of(directories);
   const py::gil_scoped_release unlocked;
-  sweep::Merged merged;
-  merged.sweeps = sweep::read_sweeps(folders);
-  return sweep::to_csv(merged);
+  std::string text;
+  sweep::write_csv(sweep::read_sweeps(folders),
+                   [&text](std::string_view line) { text += line; });
+  return text;
 }
 
 void write_records(py::handle directories, py::handle file) {
@@ -210,13 +210,11 @@ void write_records(py::handle directories, py::handle file) {
 // One run of a sweep under its judge, as the program's `sweep one`.
 std::string sweep_one(const BoundScene& scene, py::handle plugins,
                       const std::vector<std::string>& argv) {
-  sweep::Judge judge(scene.scene);
   InterruptCheck interrupts;
   simulation::Watch watch;
   watch.argv = argv;
   watch.stop = &interrupts.stop;
   watch.progress = [&interrupts](double, double) { interrupts.check(); };
-  watch.at_node = [&judge](double time_s, const Eigen::VectorXd& q) { judge.add_node(time_s, q); };
   const auto folders = plugin_path(paths_of(plugins));
 #ifdef HAMELIN_WITH_MUJOCO
   const simulation::PlantFactory plants = mujoco::make_plant;
@@ -227,10 +225,7 @@ std::string sweep_one(const BoundScene& scene, py::handle plugins,
   {
     const InterruptScope scope(interrupts);
     const py::gil_scoped_release unlocked;
-    const log::Result result = simulation::run(scene.scene, folders, watch, plants);
-    const Json document{{"result", log::to_json(result)},
-                        {"judge", sweep::to_json(judge.verdict())}};
-    line = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+    line = sweep::to_line(sweep::run_under_judge(scene.scene, folders, watch, plants));
   }
   interrupts.rethrow();
   return line;

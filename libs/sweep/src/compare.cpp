@@ -7,7 +7,6 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/sweep/failure_class.hpp"
 #include "statistics.hpp"
 
 namespace hamelin::sweep {
@@ -60,16 +59,17 @@ class Pairing {
   explicit Pairing(Comparison& out) : out_(out) {}
 
   void add(const MergedRun& a, const MergedRun& b) {
-    if (a.record.is_null() || b.record.is_null() || !a.feasible || !b.feasible) {
-      out_.without += (a.record.is_null() ? 0U : 1U) + (b.record.is_null() ? 0U : 1U);
+    if (!a.facts.recorded || !b.facts.recorded || !a.feasible || !b.feasible) {
+      out_.without += (a.facts.recorded ? 1U : 0U) + (b.facts.recorded ? 1U : 0U);
       return;
     }
     ++out_.pairs;
-    const bool left = reached(a), right = reached(b);
+    const bool left = a.facts.success, right = b.facts.success;
     ++(left && right ? out_.both : left ? out_.only_a : right ? out_.only_b : out_.neither);
-    if (left && right) times_.push_back(time_s(a) - time_s(b));
+    if (left && right)
+      times_.push_back(a.facts.time_s.value_or(0.0) - b.facts.time_s.value_or(0.0));
   }
-  void alone(const MergedRun& r) { out_.without += r.record.is_null() ? 0U : 1U; }
+  void alone(const MergedRun& r) { out_.without += r.facts.recorded ? 1U : 0U; }
   void finish() {
     out_.difference_interval = tango_interval(out_.pairs, out_.only_a, out_.only_b);
     out_.reached_p = mcnemar_p(out_.only_a, out_.only_b);
@@ -78,11 +78,6 @@ class Pairing {
   }
 
  private:
-  static bool reached(const MergedRun& r) {
-    return is_success(r.record["outcome"].get_ref<const std::string&>());
-  }
-  static double time_s(const MergedRun& r) { return r.record["result"].value("time_s", 0.0); }
-
   Comparison& out_;
   std::vector<double> times_;
 };

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/sweep/failure_class.hpp"
+#include "hamelin/io/text_table.hpp"
 #include "statistics.hpp"
 
 namespace hamelin::sweep {
@@ -21,57 +21,39 @@ struct GroupData {
       recovery, filter;
 };
 
-std::optional<double> number_at(const Json& object, const char* key) {
-  if (!object.is_object() || !object.contains(key) || !object[key].is_number()) return std::nullopt;
-  return object[key].get<double>();
-}
-
 void append(std::vector<double>& values, const std::optional<double>& value) {
   if (value) values.push_back(*value);
-}
-
-bool contact_seen(const Json& record) {
-  return record["judge"].is_object() && record["judge"].value("contact", false);
 }
 
 void add_run(GroupData& data, const MergedRun& merged) {
   Group& g = data.group;
   ++g.planned;
-  if (merged.record.is_null()) return;
-  const Json &record = merged.record, &result = record["result"], &judge = record["judge"];
-  const std::string outcome = record["outcome"];
-  const bool reached = is_success(outcome);
+  const RunFacts& facts = merged.facts;
+  if (!facts.recorded) return;
   ++g.runs;
-  ++g.outcomes[outcome];
+  ++g.outcomes[facts.outcome];
   g.feasible += merged.feasible ? 1U : 0U;
-  g.reached += merged.feasible && reached ? 1U : 0U;
-  g.reached_all += reached ? 1U : 0U;
-  g.contacts += contact_seen(record) ? 1U : 0U;
-  if (judge.is_object()) {
-    append(data.clearances, number_at(judge.value("obstacles", Json()), "clearance_m"));
-    append(data.self_clearances, number_at(judge.value("self", Json()), "clearance_m"));
-    g.judged += judge["obstacles"].is_object() || judge["self"].is_object() ? 1U : 0U;
-  }
-  if (const Json plant = result.is_object() ? result.value("plant", Json()) : Json();
-      plant.is_object()) {
+  g.reached += merged.feasible && facts.success ? 1U : 0U;
+  g.reached_all += facts.success ? 1U : 0U;
+  g.contacts += facts.judge_saw_contact ? 1U : 0U;
+  g.judged += facts.judged ? 1U : 0U;
+  if (facts.plant_contacts) {
     ++g.plant_runs;
-    g.plant_contacts += number_at(plant, "contacts").value_or(0.0) > 0.0 ? 1U : 0U;
+    g.plant_contacts += *facts.plant_contacts > 0.0 ? 1U : 0U;
   }
-  append(data.shares, number_at(result, "certified_share"));
-  if (result.is_object())
-    append(data.torque_changes, number_at(result.value("torque_change", Json()), "mean"));
-  append(data.recovery, number_at(result, "recovery_work_J"));
-  append(data.filter, number_at(result, "filter_work_J"));
-  if (reached) append(data.times, number_at(result, "time_s"));
-  if (result.is_object() && result.contains("timing")) {
-    const Json tick = result["timing"].value("tick_us", Json());
-    append(data.p50, number_at(tick, "p50"));
-    append(data.p99, number_at(tick, "p99"));
-  }
-  if (result.is_object() && result.contains("escape") && result["escape"].is_object())
-    for (const auto& [name, value] : result["escape"].items())
-      if (value.is_number()) g.escapes[name] += value.get<double>();
-  if (!reached) ++g.causes[failure_class(record)];
+  append(data.clearances, facts.clearance_m);
+  append(data.self_clearances, facts.self_clearance_m);
+  append(data.shares, facts.certified_share);
+  append(data.torque_changes, facts.torque_change_mean);
+  append(data.recovery, facts.recovery_work_J);
+  append(data.filter, facts.filter_work_J);
+  append(data.p50, facts.tick_us_p50);
+  append(data.p99, facts.tick_us_p99);
+  for (const auto& [name, value] : facts.escape) g.escapes[name] += value;
+  if (facts.success)
+    append(data.times, facts.time_s);
+  else
+    ++g.causes[facts.failure];
 }
 
 Group make_group(GroupData&& data) {
@@ -139,24 +121,24 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
   };
   std::set<std::vector<std::string>> references, stalled;
   for (const auto& r : runs) {
-    if (r.run.gains.empty() || r.record.is_null()) continue;
+    if (r.run.gains.empty() || !r.facts.recorded) continue;
     if (is_reference(r)) {
-      if (r.record["outcome"] == "reached") references.insert(set_of(r));
-    } else if (r.run.labels.at("planner") == "apf" && r.record["outcome"] == "stalled") {
+      if (r.facts.outcome == "reached") references.insert(set_of(r));
+    } else if (r.run.labels.at("planner") == "apf" && r.facts.outcome == "stalled") {
       stalled.insert(set_of(r));
     }
   }
   std::map<std::string, GainGroup> groups;
   for (const auto& r : runs) {
-    if (r.run.gains.empty() || r.record.is_null() || is_reference(r)) continue;
+    if (r.run.gains.empty() || !r.facts.recorded || is_reference(r)) continue;
     GainGroup& g = groups[r.run.labels.at("planner")];
     g.planner = r.run.labels.at("planner");
-    const bool reached = r.record["outcome"] == "reached",
+    const bool reached = r.facts.outcome == "reached",
                reference = references.contains(set_of(r)),
                apf_stalled = stalled.contains(set_of(r));
     ++g.sets;
     g.reached += reached ? 1U : 0U;
-    g.contacts += contact_seen(r.record) ? 1U : 0U;
+    g.contacts += r.facts.judge_saw_contact ? 1U : 0U;
     g.reference += reference ? 1U : 0U;
     g.reached_of_reference += reference && reached ? 1U : 0U;
     g.apf_stalled += apf_stalled ? 1U : 0U;
@@ -171,13 +153,23 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
   return all;
 }
 
+std::array<std::size_t, 4> failures_by_end(const Group& g) {
+  const auto count = [&](const char* outcome) {
+    const auto found = g.outcomes.find(outcome);
+    return found == g.outcomes.end() ? std::size_t{0} : found->second;
+  };
+  const std::size_t stalled = count("stalled"), timeout = count("timeout"),
+                    collided = count("collision");
+  return {stalled, timeout, collided, g.runs - g.reached_all - stalled - timeout - collided};
+}
+
 Merged merge(Sweeps&& sweeps, const std::vector<std::string>& by) {
   Merged merged{std::move(sweeps), by, {}, {}, {}};
   const Sweeps& from = merged.sweeps;
   merged.groups = group(from.runs, by);
   merged.gains = group_gains(from.runs);
   const auto missing = std::count_if(from.runs.begin(), from.runs.end(),
-                                     [](const MergedRun& r) { return r.record.is_null(); });
+                                     [](const MergedRun& r) { return !r.facts.recorded; });
   if (missing > 0)
     merged.notes.push_back(
         fmt::format("{} of {} runs have no record yet", missing, from.runs.size()));
@@ -253,12 +245,6 @@ std::vector<std::string> table_row(const Group& g) {
   const auto shown = [](const std::optional<double>& value, double scale, int digits) {
     return value ? fmt::format("{:.{}f}", scale * *value, digits) : std::string("-");
   };
-  const auto count = [&](const char* name) {
-    const auto found = g.outcomes.find(name);
-    return found == g.outcomes.end() ? std::size_t{0} : found->second;
-  };
-  const std::size_t stalled = count("stalled"), timeout = count("timeout"),
-                    collided = count("collision");
   std::vector<std::string> row = g.key;
   row.push_back(g.runs == g.planned ? fmt::format("{}", g.runs)
                                     : fmt::format("{}/{}", g.runs, g.planned));
@@ -270,9 +256,8 @@ std::vector<std::string> table_row(const Group& g) {
   row.push_back(g.feasible > 0 ? fmt::format("{:.0f}-{:.0f}", 100.0 * g.reached_interval.low,
                                              100.0 * g.reached_interval.high)
                                : "-");
-  for (const std::size_t runs : {stalled, timeout, collided,
-                                 g.runs - g.reached_all - stalled - timeout - collided, g.contacts})
-    row.push_back(fmt::format("{}", runs));
+  for (const std::size_t runs : failures_by_end(g)) row.push_back(fmt::format("{}", runs));
+  row.push_back(fmt::format("{}", g.contacts));
   row.push_back(shown(g.min_clearance_m, 1e3, 2));
   row.push_back(shown(g.min_self_clearance_m, 1e3, 2));
   row.push_back(shown(g.certified_share_mean, 100.0, 3));
@@ -282,23 +267,6 @@ std::vector<std::string> table_row(const Group& g) {
   row.push_back(shown(g.tick_us_p50_median, 1.0, 1));
   row.push_back(shown(g.tick_us_p99_median, 1.0, 1));
   return row;
-}
-
-/// Rows as aligned columns: the first `text_columns` columns to the left, the others to the right.
-std::string aligned(const std::vector<std::vector<std::string>>& rows, std::size_t text_columns) {
-  std::vector<std::size_t> widths(rows.front().size(), 0);
-  for (const auto& row : rows)
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  std::string text;
-  for (const auto& row : rows) {
-    std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)
-      line += i < text_columns ? fmt::format("{:<{}}  ", row[i], widths[i])
-                               : fmt::format("{:>{}}  ", row[i], widths[i]);
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  }
-  return text;
 }
 
 std::string causes_text(const Group& g) {
@@ -314,13 +282,13 @@ std::string causes_text(const Group& g) {
 }  // namespace
 
 std::string to_table(const Merged& merged) {
-  std::vector<std::vector<std::string>> rows(1, merged.by);
+  TextTable table{merged.by, {}, merged.by.size()};
   for (const char* head :
        {"runs", "feas.", "reached", "95 %", "stall", "time", "coll.", "other", "contacts", "min mm",
         "self mm", "cert. % mean", "min", "arrive s", "dtau", "tick us p50", "p99"})
-    rows.front().emplace_back(head);
-  for (const auto& g : merged.groups) rows.push_back(table_row(g));
-  std::string text = aligned(rows, merged.by.size());
+    table.head.emplace_back(head);
+  for (const auto& g : merged.groups) table.rows.push_back(table_row(g));
+  std::string text = to_text(table);
   for (const auto& g : merged.groups)
     if (g.plant_runs > 0)
       text +=

@@ -53,55 +53,57 @@ void refuse_what_stays_here(const Plan& plan, const fs::path& directory) {
   }
 }
 
-/// The files of an archive, by their paths in it, and where they are.
+/// A file of an archive: where it is, and its SHA-256 in the plan.
+struct Content {
+  fs::path place;
+  std::string sha256;
+};
+
+/// The files of an archive, by their paths in it.
 struct Contents {
   fs::path plan;
-  std::map<std::string, fs::path> files;
+  std::map<std::string, Content> files;
 };
 
 Contents contents_of(const Plan& plan, const fs::path& directory) {
   // The system resolves ".." of a relative path from the real place of the directory.
   const fs::path base = fs::canonical(directory);
-  std::set<fs::path> files{plan_file(base)};
-  for (const auto& scene : plan.scenes) files.insert((base / scene.file).lexically_normal());
-  for (const auto& input : plan.inputs) files.insert((base / input.file).lexically_normal());
+  std::map<fs::path, std::string> files{{plan_file(base), plan.sha256}};
+  for (const auto& scene : plan.scenes)
+    files.emplace((base / scene.file).lexically_normal(), scene.sha256);
+  for (const auto& input : plan.inputs)
+    files.emplace((base / input.file).lexically_normal(), input.sha256);
   fs::path common = base;
-  for (const auto& file : files)
+  for (const auto& [file, sha256] : files)
     while (file.lexically_relative(common).native().starts_with(".."))
       common = common.parent_path();
   Contents contents{plan_file(base).lexically_relative(common), {}};
-  for (const auto& file : files)
-    contents.files[file.lexically_relative(common).generic_string()] = file;
+  for (const auto& [file, sha256] : files)
+    contents.files[file.lexically_relative(common).generic_string()] = {file, sha256};
   return contents;
+}
+
+Json manifest_of(const Contents& contents) {
+  Json files = Json::array();
+  for (const auto& [name, file] : contents.files)
+    files.push_back(
+        {{"file", name}, {"sha256", file.sha256}, {"bytes", fs::file_size(file.place)}});
+  return {{"schema", "hamelin.archive/1"},
+          {"plan", contents.plan.generic_string()},
+          {"files", std::move(files)}};
 }
 
 }  // namespace
 
 Archived pack(const fs::path& directory, const fs::path& file) {
   const Plan plan = read_plan(directory);
-  std::vector<const PlannedRun*> runs;
-  for (const auto& run : plan.runs) runs.push_back(&run);
-  check_files(plan, directory, runs);
   refuse_what_stays_here(plan, directory);
   const Contents contents = contents_of(plan, directory);
-  Json manifest{{"schema", "hamelin.archive/1"},
-                {"plan", contents.plan.generic_string()},
-                {"files", Json::array()}};
-  for (const auto& [name, place] : contents.files)
-    manifest["files"].push_back(
-        {{"file", name}, {"sha256", sha256_of_file(place)}, {"bytes", fs::file_size(place)}});
-  const fs::path temporary = file.string() + ".part";
-  try {
-    TarWriter out(temporary);
-    out.add(manifest_name, manifest.dump(1) + "\n");
-    for (const auto& [name, place] : contents.files) out.add(name, read_file(place));
-    out.close();
-    fs::rename(temporary, file);
-  } catch (...) {
-    std::error_code ec;
-    fs::remove(temporary, ec);
-    throw;
-  }
+  TarWriter out(file);
+  out.add(manifest_name, manifest_of(contents).dump(1) + "\n");
+  for (const auto& [name, content] : contents.files)
+    out.add(name, read_planned_file(content.place, content.sha256));
+  out.commit();
   return {contents.plan.parent_path(), contents.files.size()};
 }
 

@@ -8,7 +8,6 @@
 #include <unordered_map>
 
 #include "hamelin/core/error.hpp"
-#include "hamelin/sweep/run_facts.hpp"
 #include "shell.hpp"
 
 namespace hamelin::sweep {
@@ -85,7 +84,7 @@ std::string arguments_of(const std::vector<std::string>& words) {
 class Columns {
  public:
   void add(const MergedRun& merged) {
-    const RunFacts facts = facts_of(merged.record);
+    const RunFacts& facts = merged.facts;
     ids_.push_back(merged.run.id);
     feasible_.push_back(merged.feasible ? 1 : 0);
     const auto words = run_arguments(merged.run, merged.directory);
@@ -149,7 +148,7 @@ Json page_json(const Merged& merged, const PageExtras& extras) {
   std::size_t recorded = 0;
   for (const auto& r : merged.sweeps.runs) {
     directories.insert(r.directory.string());
-    recorded += r.record.is_null() ? 0U : 1U;
+    recorded += r.facts.recorded ? 1U : 0U;
     columns.add(r);
   }
   Json replays = Json::object();

@@ -142,31 +142,31 @@ scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
-namespace {
-
-void check_hash(const fs::path& file, const std::string& planned) {
-  if (const std::string now = sha256_of_file(file); now != planned)
+std::string read_planned_file(const fs::path& file, const std::string& sha256) {
+  std::string content = read_file(file);
+  if (const std::string now = sha256_hex(content); now != sha256)
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: has changed since the sweep was planned: SHA-256 {}, expected {}; "
                             "plan it again, in a new directory if there are records",
-                            file.string(), now, planned));
+                            file.string(), now, sha256));
+  return content;
 }
-
-}  // namespace
 
 void check_files(const Plan& plan, const fs::path& directory,
                  const std::vector<const PlannedRun*>& runs) {
   std::set<std::string_view> scenes;
   for (const PlannedRun* run : runs) scenes.insert(run->scene);
   for (const auto& scene : plan.scenes)
-    if (scenes.contains(scene.file)) check_hash(resolve_path(directory, scene.file), scene.sha256);
+    if (scenes.contains(scene.file))
+      (void)read_planned_file(resolve_path(directory, scene.file), scene.sha256);
   for (const auto& input : plan.inputs)
-    check_hash(resolve_path(directory, input.file), input.sha256);
+    (void)read_planned_file(resolve_path(directory, input.file), input.sha256);
 }
 
 void check_planners(const Plan& plan, const std::vector<fs::path>& plugin_directories) {
   for (const auto& plugin : plan.plugins)
-    check_hash(planning::find_plugin_file(plugin.name, plugin_directories), plugin.sha256);
+    (void)read_planned_file(planning::find_plugin_file(plugin.name, plugin_directories),
+                            plugin.sha256);
 }
 
 std::vector<std::string> run_arguments(const PlannedRun& run, const fs::path& directory) {
@@ -179,6 +179,22 @@ std::vector<std::string> run_arguments(const PlannedRun& run, const fs::path& di
   for (const auto& assignment : run.set) add("--set", assignment);
   add("--seed", fmt::format("{}", run.seed));
   return arguments;
+}
+
+std::vector<std::pair<std::string, std::string>> varied_values(const PlannedRun& run) {
+  std::vector<std::pair<std::string, std::string>> values;
+  const auto label = run.labels.find("values");
+  if (label == run.labels.end()) return values;
+  // The varied values are the last of `set`, joined by blanks in the label.
+  std::string joined;
+  for (auto at = run.set.rbegin(); at != run.set.rend() && joined != label->second; ++at) {
+    joined = joined.empty() ? *at : fmt::format("{} {}", *at, joined);
+    const auto equal = at->find('=');
+    values.insert(values.begin(),
+                  {at->substr(0, equal), equal == std::string::npos ? "" : at->substr(equal + 1)});
+  }
+  if (joined != label->second) values.clear();
+  return values;
 }
 
 }  // namespace hamelin::sweep

@@ -15,15 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Copies the members of these names that an object has.
-Json selected(const Json& from, std::initializer_list<const char*> names) {
-  if (!from.is_object()) return nullptr;
-  Json out = Json::object();
-  for (const char* name : names)
-    if (const auto found = from.find(name); found != from.end()) out[name] = *found;
-  return out;
-}
-
 std::string text_of(const Json& value) {
   return value.is_string() ? value.get<std::string>() : "";
 }
@@ -109,15 +100,15 @@ class Join {
         sweeps_.builds[name].insert(build);
       if (sweeps_.machine.is_null()) sweeps_.machine = machine_of(record["result"]);
     }
-    if (!run.record.is_null()) {
+    if (run.facts.recorded) {
       const Json before = Json::parse(lines_.read(run.place));
       if (repeatable_text(before, run.run) == repeatable_text(record, run.run))
         ++sweeps_.repeated;
       else
         sweeps_.different.push_back(run.run.id);
-      if (run.record["outcome"] != "crashed" || record["outcome"] == "crashed") return;
+      if (run.facts.outcome != "crashed" || record["outcome"] == "crashed") return;
     }
-    run.record = facts(record, timing_);
+    run.facts = facts_of(record, timing_);
     run.place = place;
   }
 
@@ -130,24 +121,6 @@ class Join {
 
 }  // namespace
 
-Json facts(const Json& record, bool timing) {
-  const Json &result = record["result"], &judge = record["judge"];
-  Json out = selected(record, {"outcome", "cause"});
-  out["result"] =
-      selected(result, {"outcome", "planner", "time_s", "certified_share", "min_clearance_m",
-                        "recovery_work_J", "filter_work_J", "escape"});
-  if (result.is_object()) {
-    for (const auto& [name, key] :
-         {std::pair{"plant", "contacts"}, std::pair{"torque_change", "mean"}})
-      if (result.contains(name)) out["result"][name] = selected(result[name], {key});
-    if (timing && result.contains("timing") && result["timing"].is_object())
-      out["result"]["timing"]["tick_us"] =
-          selected(result["timing"].value("tick_us", Json()), {"p50", "p99"});
-  }
-  out["judge"] = selected(judge, {"contact", "obstacles", "self"});
-  return out;
-}
-
 Sweeps read_sweeps(const std::vector<fs::path>& directories, bool timing) {
   Sweeps sweeps;
   std::vector<Plan> plans;
@@ -157,10 +130,10 @@ Sweeps read_sweeps(const std::vector<fs::path>& directories, bool timing) {
     Plan plan = read_plan(directory);
     auto& same = copies[plan.sha256];
     std::error_code ec;
+    if (same.empty()) plans.push_back(std::move(plan));
     if (std::none_of(same.begin(), same.end(),
                      [&](const fs::path& other) { return fs::equivalent(directory, other, ec); }))
       same.push_back(directory);
-    if (same.size() == 1 && same.front() == directory) plans.push_back(std::move(plan));
   }
   for (const Plan& plan : plans) {
     Join join(sweeps, plan, copies[plan.sha256].front(), timing);
@@ -184,7 +157,7 @@ void write_records(const Sweeps& sweeps, const fs::path& file, bool timing) {
   AtomicFile out(file);
   LineReader lines(sweeps);
   for (const auto& run : sweeps.runs) {
-    if (run.record.is_null()) continue;
+    if (!run.facts.recorded) continue;
     const std::string line = lines.read(run.place);
     out.append(timing ? line : repeatable_text(Json::parse(line), run.run));
     out.append("\n");

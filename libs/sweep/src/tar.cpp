@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "hamelin/core/error.hpp"
@@ -13,11 +14,23 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t block_size = std::size_t{1} << 16;
 
+la_ssize_t TarWriter::write_block(archive*, void* writer, const void* bytes, std::size_t size) {
+  auto& to = *static_cast<TarWriter*>(writer);
+  try {
+    to.out_.append({static_cast<const char*>(bytes), size});
+    return static_cast<la_ssize_t>(size);
+  } catch (...) {
+    to.failure_ = std::current_exception();
+    return -1;
+  }
+}
+
 TarWriter::TarWriter(const fs::path& file)
-    : name_(file.string()), archive_(archive_write_new(), &archive_write_free) {
+    : name_(file.string()), out_(file), archive_(archive_write_new(), &archive_write_free) {
   check(archive_write_set_format_pax_restricted(archive_.get()));
   check(archive_write_add_filter_zstd(archive_.get()));
-  check(archive_write_open_filename(archive_.get(), file.c_str()));
+  check(archive_write_set_bytes_in_last_block(archive_.get(), 1));  // no padding after the end
+  check(archive_write_open(archive_.get(), this, nullptr, &TarWriter::write_block, nullptr));
 }
 
 void TarWriter::add(const std::string& name, std::string_view bytes) {
@@ -34,11 +47,13 @@ void TarWriter::add(const std::string& name, std::string_view bytes) {
     check(ARCHIVE_FATAL);
 }
 
-void TarWriter::close() {
+void TarWriter::commit() {
   check(archive_write_close(archive_.get()));
+  out_.commit();
 }
 
-void TarWriter::check(int result) const {
+void TarWriter::check(int result) {
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
   if (result != ARCHIVE_OK)
     throw Error(ErrorCode::io, fmt::format("{}: cannot be written: {}", name_,
                                            archive_error_string(archive_.get())));

@@ -2,28 +2,34 @@
 #include <archive.h>
 #include <archive_entry.h>
 
-#include <cstdint>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
+
+#include "hamelin/io/atomic_file.hpp"
 
 namespace hamelin::sweep {
 
 /// The file that describes an archive, and is its first entry.
 inline constexpr const char* manifest_name = "hamelin-archive.json";
 
-/// Writes a tar archive compressed by zstd. The same files give the same bytes: entries have no
-/// owner and no time. @throws Error io, as all functions of this class
+/// Writes a tar archive compressed by zstd, as an AtomicFile. The same files give the same bytes:
+/// entries have no owner and no time. @throws Error io, as all functions of this class
 class TarWriter {
  public:
   explicit TarWriter(const std::filesystem::path& file);
   void add(const std::string& name, std::string_view bytes);
-  void close();
+  /// Ends the archive; the file then has its name.
+  void commit();
 
  private:
-  void check(int result) const;
+  static la_ssize_t write_block(archive*, void* writer, const void* bytes, std::size_t size);
+  void check(int result);
   std::string name_;
+  AtomicFile out_;
+  std::exception_ptr failure_;  ///< of writing, which cannot pass through the library in C
   std::unique_ptr<archive, decltype(&archive_write_free)> archive_;
 };
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/sweep/csv.hpp"
 #include "hamelin/sweep/page.hpp"
-#include "hamelin/sweep/run_facts.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -38,7 +38,7 @@ MergedRun made(const std::string& directory, const std::string& problem, const s
   merged.run.labels = {{"planner", planner}, {"problem", problem}, {"seed", "1"}};
   merged.directory = directory;
   merged.feasible = feasible;
-  merged.record = record;
+  merged.facts = facts_of(record);
   return merged;
 }
 
@@ -139,17 +139,20 @@ TEST_CASE("two sweeps are compared run by run, also under different planners", "
 }
 
 TEST_CASE("the CSV has a line per run, with quoted fields", "[sweep][unit]") {
-  Merged merged;
-  merged.sweeps.runs.push_back(made("a dir", "s0", "p", record("stalled", 2.5)));
-  merged.sweeps.runs.push_back(made("a dir", "s1", "p", Json(), false));
-  merged.sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1",
+  Sweeps sweeps;
+  Json stalled = record("stalled", 2.5);
+  stalled["cause"] = "ran into \"it\",\ntwice";
+  sweeps.runs.push_back(made("a dir", "s0", "p", stalled));
+  sweeps.runs.push_back(made("a dir", "s1", "p", Json(), false));
+  sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1",
                                    "/planner/params/name=a, b"};
-  merged.sweeps.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
-  merged.sweeps.runs[0].run.gains = {{"k_p", 0.25}};
-  merged.sweeps.runs[0].record["cause"] = "ran into \"it\",\ntwice";
-  merged.sweeps.runs[1].reason = "start in the map";
+  sweeps.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
+  sweeps.runs[0].run.gains = {{"k_p", 0.25}};
+  sweeps.runs[1].reason = "start in the map";
+  std::string csv;
+  write_csv(sweeps, [&csv](std::string_view line) { csv += line; });
   CHECK(
-      to_csv(merged) ==
+      csv ==
       "id,directory,planner,problem,seed,values,/planner/params/name,/planner/params/x,k_p,"
       "feasible,reason,outcome,failure,cause,time_s,clearance_m,self_clearance_m,"
       "certified_share,tick_us_p50,tick_us_p99,judge\n"
@@ -177,7 +180,7 @@ TEST_CASE("the page's JSON has all runs in columns", "[sweep][unit]") {
   merged.sweeps.runs[2].run.gains = {{"k_p", 0.123456789}};
   merged.sweeps.runs[3].run.set = {"/planner/params/escape=it's"};
   merged.sweeps.runs[3].run.labels["values"] = "/planner/params/escape=it's";
-  merged.sweeps.runs[4].record = nullptr;
+  merged.sweeps.runs[4].facts = {};
   PageExtras extras;
   extras.replays[1] = {"pages/x.html", 1.5};
   extras.comparisons = comparisons_of_page(merged.sweeps.runs);

@@ -28,7 +28,7 @@ MergedRun made(const std::string& id, const std::string& planner, const Json& re
   merged.directory = "sweep";
   merged.feasible = feasible;
   if (!feasible) merged.reason = "goal 0: hand/1 in the map, 0.0010 m deep";
-  merged.record = record;
+  merged.facts = facts_of(record);
   return merged;
 }
 
@@ -109,9 +109,7 @@ TEST_CASE("Wilson's interval solves its defining inequality and agrees with publ
 TEST_CASE("contacts that a plant counts itself are counted apart from the judge's",
           "[sweep][unit]") {
   auto runs = hand_made();
-  for (std::size_t i = 0; i < 3; ++i)
-    runs[i].record["result"]["plant"] = {{"type", "mujoco"}, {"contacts", i == 1 ? 1 : 0}};
-  runs[3].record["result"]["plant"] = nullptr;
+  for (std::size_t i = 0; i < 3; ++i) runs[i].facts.plant_contacts = i == 1 ? 1.0 : 0.0;
   Merged merged;
   merged.by = {"planner"};
   merged.groups = group(runs, merged.by);
@@ -132,8 +130,8 @@ TEST_CASE("contacts that a plant counts itself are counted apart from the judge'
 
 TEST_CASE("changes of the torque are averaged where torques are sampled", "[sweep][unit]") {
   auto runs = hand_made();
-  runs[0].record["result"]["torque_change"] = {{"mean", 0.25}, {"max", 3.0}};
-  runs[1].record["result"]["torque_change"] = {{"mean", 0.5}, {"max", 1.0}};
+  runs[0].facts.torque_change_mean = 0.25;
+  runs[1].facts.torque_change_mean = 0.5;
   Merged merged;
   merged.by = {"planner"};
   merged.groups = group(runs, merged.by);

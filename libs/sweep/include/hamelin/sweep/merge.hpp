@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 #include "hamelin/io/json.hpp"
 #include "hamelin/sweep/plan.hpp"
+#include "hamelin/sweep/run_facts.hpp"
 
 namespace hamelin::sweep {
 
@@ -34,15 +36,9 @@ struct MergedRun {
   std::filesystem::path directory;  ///< of its plan
   bool feasible = true;
   std::string reason;  ///< why it is not feasible
-  /// What summaries use of its record, see facts(); null: not run yet.
-  Json record;
+  RunFacts facts;      ///< of its record; facts.recorded is false if it has not run yet
   RecordPlace place;
 };
-
-/// The members of a record that summaries and pages use. Of the result these are a dozen numbers:
-/// a study of 10⁵ runs fits into memory.
-/// @param timing whether to keep what depends on the machine
-[[nodiscard]] Json facts(const Json& record, bool timing);
 
 /// Plans and records of several directories.
 struct Sweeps {
@@ -58,7 +54,7 @@ struct Sweeps {
 /// Reads plans and records. Directories with the same plan are copies of one sweep: their records
 /// are joined. A run that several files record counts once, with its first record that is not a
 /// crash, in the order of directories and names of files.
-/// @param timing as in facts()
+/// @param timing as in facts_of()
 /// @throws Error as read_plan and read_records
 [[nodiscard]] Sweeps read_sweeps(const std::vector<std::filesystem::path>& directories,
                                  bool timing = true);
@@ -106,6 +102,9 @@ struct Group {
 /// @throws Error usage for a label that no run has
 [[nodiscard]] std::vector<Group> group(const std::vector<MergedRun>& runs,
                                        const std::vector<std::string>& by);
+
+/// Runs of a group that failed: stalled, timeout, collision, and by any other outcome.
+[[nodiscard]] std::array<std::size_t, 4> failures_by_end(const Group& group);
 
 /// Results of one planner with the gain sets, compared with the runs without the obstacle and with
 /// plain apf.

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hamelin/io/json.hpp"
@@ -75,6 +76,10 @@ void write_plan(Plan& plan, const std::filesystem::path& directory);
 [[nodiscard]] scene::Scene read_scene(const PlannedRun& run,
                                       const std::filesystem::path& directory);
 
+/// The content of a file of a plan. @param sha256 the hash that the plan has
+/// @throws Error io; invalid if the file has changed since it was planned
+[[nodiscard]] std::string read_planned_file(const std::filesystem::path& file,
+                                            const std::string& sha256);
 /// Checks that the scenes of these runs, and all inputs, have not changed since they were planned.
 /// @throws Error invalid with the name of the first file that has changed; io for a missing one
 void check_files(const Plan& plan, const std::filesystem::path& directory,
@@ -86,5 +91,9 @@ void check_planners(const Plan& plan, const std::vector<std::filesystem::path>& 
 /// The arguments of one run after `hamelin sweep one` (which a sweep starts) or `hamelin run`.
 [[nodiscard]] std::vector<std::string> run_arguments(const PlannedRun& run,
                                                      const std::filesystem::path& directory);
+
+/// The values that vary within a sweep: (JSON pointer, value) for each "/pointer=VALUE" of the
+/// run's label "values".
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> varied_values(const PlannedRun& run);
 
 }  // namespace hamelin::sweep
