@@ -8,6 +8,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
+#include "poll.hpp"
 
 namespace hamelin::accuracy {
 
@@ -132,11 +133,14 @@ std::vector<Job> make_jobs(const model::Model& model, const Options& options) {
 
 template <class AfterStep>
 std::optional<std::string> integrate(Integrator& integrator, integration::State& state,
-                                     const integration::Channels& channels, double duration_s,
-                                     long steps, const AfterStep& after) {
+                                     const Options& options, long steps,
+                                     const AfterStep& after) {
+  const integration::Channels& channels = options.channels;
+  const double duration_s = options.duration_s;
   if (steps > 0) {
     const double h = duration_s / static_cast<double>(steps);
     for (long k = 0; k < steps; ++k) {
+      poll(options, k);
       const auto report = integrator.advance(state, channels, h);
       after(report, k + 1 == steps);
       if (!report.converged) return fmt::format("step {} of {} s found no solution", k + 1, h);
@@ -147,6 +151,7 @@ std::optional<std::string> integrate(Integrator& integrator, integration::State&
     for (long k = 0; left > 0.0; ++k) {
       if (k == controlled_steps_max)
         return fmt::format("took more than {} steps", controlled_steps_max);
+      poll(options, k);
       const auto report = integrator.advance(state, channels, left);
       left = report.step_s == left ? 0.0 : left - report.step_s;
       after(report, left == 0.0);
@@ -177,7 +182,7 @@ void observe(Job& job, const Options& options, const std::optional<Reference>& r
   drift.add(0.0, 0.0);
   double largest = 0.0, dissipated = 0.0;
   const auto cause = integrate(
-      integrator, state, options.channels, options.duration_s, job.steps,
+      integrator, state, options, job.steps,
       [&](const integration::StepReport& report, bool last) {
         row.evaluations += report.evaluations;
         row.factorizations += report.factorizations;
@@ -218,7 +223,7 @@ void time(Job& job, const Options& options) {
   for (int repeat = 0; repeat < repeats_max; ++repeat) {
     const double begin_s = thread_cpu_s();
     integration::State state = job.integrator->start(options.q0, options.v0);
-    (void)integrate(*job.integrator, state, options.channels, options.duration_s, job.steps,
+    (void)integrate(*job.integrator, state, options, job.steps,
                     [](const integration::StepReport&, bool) {});
     const double took_s = thread_cpu_s() - begin_s;
     least_s = repeat == 0 ? took_s : std::min(least_s, took_s);

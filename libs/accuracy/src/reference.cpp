@@ -6,6 +6,7 @@
 
 #include "hamelin/accuracy/accuracy.hpp"
 #include "hamelin/core/error.hpp"
+#include "poll.hpp"
 
 namespace hamelin::accuracy {
 
@@ -96,6 +97,7 @@ class Refinement {
     last_ = 0;
     state.step_next = std::min(1e-3, left);
     for (long k = 0; left > 0.0; ++k) {
+      poll(options_, k);
       const auto report = integrator->advance(state, options_.channels, steps > 0 ? h : left);
       last_ += report.evaluations;
       // A step that was halved to find a root is already a step of the next run, so the two runs

@@ -37,6 +37,7 @@ std::uint64_t GuideQuery::refresh(double time_s) {
 }
 
 double GuideQuery::clearance(const VectorXd& q, double at_least_m) {
+  poll();
   ++clearances_;
   return query_.clearance(q.data(), time_s_, at_least_m);
 }

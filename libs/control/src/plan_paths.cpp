@@ -76,18 +76,20 @@ Json planned_json(const PlannedGoal& goal) {
 
 }  // namespace
 
-PathPlan plan_paths(const scene::Scene& scene) {
+PathPlan plan_paths(const scene::Scene& scene, const std::function<void()>& poll) {
   check(scene);
   const model::Model arm = load_model(scene);
   World world(scene, arm, {});
-  return plan_paths(scene, arm, world);
+  return plan_paths(scene, arm, world, poll);
 }
 
-PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world) {
+PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world,
+                    const std::function<void()>& poll) {
   check(scene);
   check_numbers(scene, arm);
   const WorldView view(scene, arm, world);
   GuideQuery query(arm, world, view);
+  query.set_poll(poll);
   const Json params = scene.planner ? scene.planner->params : Json::object();
   const guide::Guide guide(arm, guide_settings(scene, arm, view, reserve_of(scene), params));
   PathPlan plan;

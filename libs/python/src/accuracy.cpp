@@ -34,7 +34,7 @@ py::tuple measure(const BoundModel& bound, const std::string& name, py::handle q
   options.every = every;
   options.reference = reference;
   Counter counter(progress);
-  // A row cannot be interrupted, but the next one is not begun.
+  options.poll = [&counter] { counter.interrupts.raise(); };
   options.progress = [&counter](std::size_t done, std::size_t all) {
     counter.show(done, all);
     if (counter.interrupts.stop) counter.interrupts.raise();

@@ -88,9 +88,10 @@ class States {
         std::copy_n(x.data() + j * count() + first, states, out.data() + j * block_states);
       return;
     }
-    for (py::ssize_t i = 0; i < states; ++i) {
-      const double* const from = x.data() + (first + i) * dof_;
-      for (py::ssize_t j = 0; j < dof_; ++j) out.data()[j * block_states + i] = from[j];
+    for (py::ssize_t j = 0; j < dof_; ++j) {
+      const double* const from = x.data() + first * dof_ + j;
+      double* const to = out.data() + j * block_states;
+      for (py::ssize_t i = 0; i < states; ++i) to[i] = from[i * dof_];
     }
   }
 
@@ -139,9 +140,11 @@ py::array_t<double> call_in_lanes(BoundModel& bound, const States& in, const Sin
     for (std::size_t i = 0; i < 3; ++i) in.gather(i, first, states, block[i]);
     many(ws, block[0].leftCols(states), block[1].leftCols(states), block[2].leftCols(states),
          block[3].leftCols(states));
-    for (py::ssize_t i = 0; i < states; ++i)
-      for (py::ssize_t j = 0; j < dof; ++j)
-        y[(first + i) * dof + j] = block[3].data()[j * block_states + i];
+    for (py::ssize_t j = 0; j < dof; ++j) {
+      const double* const from = block[3].data() + j * block_states;
+      double* const to = y + first * dof + j;
+      for (py::ssize_t i = 0; i < states; ++i) to[i * dof] = from[i];
+    }
   }
   return out;
 }

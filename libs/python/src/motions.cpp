@@ -16,9 +16,10 @@ namespace {
 
 py::object plan(const BoundScene& scene) {
   control::PathPlan found;
+  InterruptCheck interrupts;
   {
     const py::gil_scoped_release unlocked;
-    found = control::plan_paths(scene.scene);
+    found = control::plan_paths(scene.scene, [&interrupts] { interrupts.raise(); });
   }
   return to_python(control::to_json(found));
 }

@@ -94,6 +94,30 @@ def test_interrupt_ends_an_optimization(scenes):
     assert time.monotonic() - begun < 60.0
 
 
+def search_for_long(scenes, robots):
+    hamelin.plan(
+        scenes / "shelf.json",
+        guide="rrt-star",
+        checks=1_000_000_000,
+        set="/planner/guide_options/improve_checks=1000000000",
+    )
+
+
+def measure_for_long(scenes, robots):
+    hamelin.accuracy(
+        robots / "arm7.urdf", integrators=["rk4"], steps=[1e-6], duration=100.0, reference=False
+    )
+
+
+@pytest.mark.parametrize("call", [search_for_long, measure_for_long])
+def test_interrupt_ends_a_search_and_a_measurement(scenes, robots, call):
+    begun = time.monotonic()
+    threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        call(scenes, robots)
+    assert time.monotonic() - begun < 60.0
+
+
 def test_explain(program, robots, tmp_path):
     log = tmp_path / "log.jsonl"
     scene = {

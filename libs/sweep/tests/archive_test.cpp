@@ -69,7 +69,7 @@ void write_archive(const fs::path& file, const std::string& manifest,
   TarWriter out(file);
   out.add(manifest_name, manifest);
   for (const auto& [name, bytes] : files) out.add(name, bytes);
-  out.close();
+  out.commit();
 }
 
 std::string manifest(const std::vector<std::pair<std::string, std::string>>& files) {

@@ -188,7 +188,7 @@ TEST_CASE("records of copies of a sweep are joined, and differing ones are named
   b.put(name, text.replace(text.find(time), time.size(), "\"time_s\":99"));
   const Merged merged = merge(read_sweeps({a.root(), b.root()}), {"planner"});
   CHECK(merged.sweeps.different == std::vector{b.plan.runs[run].id});
-  CHECK(merged.sweeps.runs[run].record["result"]["time_s"] == static_cast<double>(run) + 0.5);
+  CHECK(merged.sweeps.runs[run].facts.time_s == static_cast<double>(run) + 0.5);
   CHECK(merged.notes.back() ==
         fmt::format("1 runs have different records in several files, the first of them is '{}'; "
                     "the first record of each is used",
@@ -202,7 +202,7 @@ TEST_CASE("a record of a crash gives way to one of a run that ended", "[sweep][u
   run_shards(b, 1);
   for (const auto& order : {std::vector{a.root(), b.root()}, std::vector{b.root(), a.root()}}) {
     const Sweeps joined = read_sweeps(order);
-    CHECK(joined.runs[1].record["outcome"] == "reached");
+    CHECK(joined.runs[1].facts.outcome == "reached");
     CHECK(joined.different == std::vector<std::string>{"r1"});
   }
 }

@@ -39,6 +39,7 @@ struct Options {
   double reference_work = 1e8;     ///< limit of each reference scheme: evaluations times joints
   double timing_s = 0.03;          ///< total time of the timing passes; twice at least if below 1 s
   std::function<void(std::size_t done, std::size_t all)> progress;  ///< called after each row
+  std::function<void()> poll;  ///< called every 1000 steps; may throw to end the measurement
 };
 
 /// The end of the reference motion, docs/theory.md (13.4).

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,9 +37,12 @@ struct PathPlan {
 /// the world as it is at time 0.
 /// @throws Error io, parse or invalid for bad input, a scene without guide, a goal that follows a
 ///         target, or a build without OMPL
-[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene);
+/// @param poll called now and then during searches; it may throw to end them
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene,
+                                  const std::function<void()>& poll = {});
 /// The same with the scene's model and a world that were made before.
-[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world);
+[[nodiscard]] PathPlan plan_paths(const scene::Scene& scene, const model::Model& arm, World& world,
+                                  const std::function<void()>& poll = {});
 
 /// As hamelin.path/1, docs/schema/path.schema.json.
 [[nodiscard]] Json to_json(const PathPlan& plan);
