@@ -411,9 +411,17 @@ void ClosedLoop::check_outcome() {
   else if (node.k == steps_ && controller_->goals().follows())
     finish(log::Outcome::followed, "");
   else if (node.k == steps_)
-    finish(log::Outcome::timeout, fmt::format("goal not reached within {} s", scene_.duration_s));
+    finish(log::Outcome::timeout, timeout_cause());
   else if (recorder_->stopped(node.k))
     finish(log::Outcome::interrupted, "stopped from outside");
+}
+
+std::string ClosedLoop::timeout_cause() const {
+  const std::string cause = fmt::format("goal not reached within {} s", scene_.duration_s);
+  const control::Shield* const shield = controller_->shield();
+  if (shield == nullptr || !shield->stopping() || !shield->at_rest()) return cause;
+  return fmt::format("{}; the shield has held the arm since {:.3f} s: {}", cause, stopped_at_s_,
+                     shield->describe(controller_->view().environment()));
 }
 
 bool ClosedLoop::rests() const {

@@ -67,6 +67,8 @@ class ClosedLoop {
   void note_refused_load(const scene::Event& event);
   /// Ends the run at this node if an outcome applies.
   void check_outcome();
+  /// Says as well what a shield holds the arm for.
+  [[nodiscard]] std::string timeout_cause() const;
   /// Whether the shield's stop has brought the arm to rest.
   [[nodiscard]] bool rests() const;
   /// Whether the arm itself is at the last goal, when its set point is.

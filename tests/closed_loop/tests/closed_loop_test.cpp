@@ -132,6 +132,23 @@ TEST_CASE("too little time ends as timeout at the last step", "[simulation][outc
   CHECK_FALSE(result.min_clearance_m.has_value());
 }
 
+TEST_CASE("a timeout says if the shield holds the arm, and for what", "[simulation][outcome]") {
+  const TemporaryFolder folder;
+  Json scene = scene_52();
+  scene["robot"]["file"] = HAMELIN_SOURCE_DIR "/data/robots/arm7.urdf";
+  scene["start"] = {{"q", {0.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7}}};
+  scene["goals"] = {{{"type", "joint"}, {"q", {1.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7}}}};
+  scene["model"] = {{"joint_limits", true}, {"velocity_limits", true}, {"torque_limits", true}};
+  scene["planner"] = {{"name", "apf"}, {"params", {{"k_p", 1e6}}}};
+  scene["step_s"] = 0.004;
+  scene["duration_s"] = 0.04;
+  const auto result = run_scene(folder, scene);
+  CHECK(result.outcome == Outcome::timeout);
+  CHECK(result.cause ==
+        "goal not reached within 0.04 s; the shield has held the arm since 0.000 s: joint 'joint7' "
+        "would pass its velocity limit");
+}
+
 TEST_CASE("a planner that throws or answers NaN ends the run as a defect that names the step",
           "[simulation][outcome]") {
   const TemporaryFolder folder;
