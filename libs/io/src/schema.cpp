@@ -108,6 +108,17 @@ std::string violation(const nlohmann::json& schema, const nlohmann::json& docume
   return fmt::format("{}: {}", at, error.description);
 }
 
+// Refuses a file of another kind as such: what it lacks or has in addition does not matter then.
+void refuse_other_format(const nlohmann::json& schema, const nlohmann::json& document,
+                         const std::string& where) {
+  const nlohmann::json::json_pointer place("/properties/schema/const");
+  if (!document.is_object() || !document.contains("schema") || !schema.contains(place)) return;
+  if (document["schema"] == schema[place]) return;
+  throw Error(ErrorCode::invalid,
+              fmt::format("{}: /schema: {} is not allowed, expected exactly {}", where,
+                          abbreviated(document["schema"]), schema[place].get<std::string>()));
+}
+
 // A copy with only the first items of each list.
 nlohmann::json shortened(const nlohmann::json& document, std::size_t items) {
   if (!document.is_structured()) return document;
@@ -171,6 +182,7 @@ void Schema::check(const Json& document, const std::string& where) const {
   const nlohmann::json plain =
       nlohmann::json::parse(document.dump(-1, ' ', false, Json::error_handler_t::replace));
   if (valid(compiled_->schema, plain, nullptr)) return;
+  refuse_other_format(compiled_->text, plain, where);
   // valijson collects all violations, each many times larger than the value concerned. To save
   // time, long lists are shortened to a beginning that contains the first violation.
   nlohmann::json part = plain;

@@ -115,6 +115,14 @@ TEST_CASE("a schema compiled once checks many documents", "[io][unit]") {
                     Catch::StartsWith("s.json: its JSON Schema"));
 }
 
+TEST_CASE("a file of another kind is refused as such, whatever else is wrong", "[io][unit]") {
+  CHECK_THROWS_WITH(
+      check_shipped_schema({{"schema", "hamelin.scene/1"}, {"robot", {{"file", "a.urdf"}}}},
+                           "problems", "shelf.json"),
+      "shelf.json: /schema: \"hamelin.scene/1\" is not allowed, expected exactly "
+      "hamelin.problems/1");
+}
+
 TEST_CASE("a long value is cut and one with line breaks stays on one line", "[io][unit]") {
   const std::string text = refusal(
       Json{{"name", Json::array({std::string(500, 'x') + "\n"})}, {"arm", {{"file", "f"}}}}.dump());

@@ -22,7 +22,7 @@ struct Following {
   double speed_share;  // of the speed limits
   double ahead;        // distance of the carrot [rad or m]
 };
-constexpr std::array<Following, 5> followings{
+constexpr std::array<Following, 5> following_ways{
     {{1.0, 0.3}, {1.0, 0.1}, {0.6, 0.1}, {0.3, 0.05}, {0.12, 0.03}}};
 constexpr Following slowest{0.2, 0.02}, fastest{1.0, 0.4};
 constexpr double path_step = 0.02;  // of the search for the carrot [rad or m]
@@ -124,8 +124,8 @@ void Sampler::propose(const Task& task, Rollouts& out) {
   out.set_lane(proposal_best, points_);
   brake(task.limits, points_);
   out.set_lane(proposal_brake, points_);
-  for (std::size_t k = 0; k < followings.size(); ++k) {
-    follow(task, followings[k].speed_share, followings[k].ahead);
+  for (std::size_t k = 0; k < following_ways.size(); ++k) {
+    follow(task, following_ways[k].speed_share, following_ways[k].ahead);
     out.set_lane(proposal_follow + static_cast<Index>(k), points_);
   }
 }
