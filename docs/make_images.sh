@@ -2,13 +2,12 @@
 # make_images.sh BUILD [NAME...]: makes the pictures of docs/images that show a report page (all, or those of the given
 # names): runs the scenes with BUILD/bin/hamelin, makes their pages, and takes screenshots in a headless Chromium.
 # BUILD is a build folder with pages, such as build/ci. tests/report/shot.mjs takes the pictures.
-# gain_map.png is a picture of the page of `hamelin sweep merge gain_map`, see docs/gain_map.md.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 build=$(realpath "$1")
 shift
 names=("$@")
-((${#names[@]})) || names=(shelf paper_52 shelf_person carry follow tutorial)
+((${#names[@]})) || names=(shelf paper_52 shelf_person carry follow tutorial gain_map)
 program=$build/bin/hamelin
 export NODE_MODULES=$build/npm/node_modules
 work=$(mktemp -d)
@@ -25,6 +24,13 @@ picture() {
   shift 3
   "$program" --quiet report "${@/#/$work/}" -o "$work/$name.html"
   node tests/report/shot.mjs "$work/$name.html" "docs/images/$name.jpg" --time "$time" --size "$size" --scale 1.3333
+}
+
+# picture_of_maps DIR: a picture of the maps of a sweep's page
+picture_of_maps() {
+  "$program" --quiet sweep merge "$1" --page "$1.html" >/dev/null
+  node tests/report/shot.mjs "$1.html" docs/images/gain_map.jpg --size 1010x955 --scale 1.3333 --run \
+    "[...document.querySelectorAll('h2')].find((title) => title.textContent === 'Maps of what varies').scrollIntoView()"
 }
 
 for name in "${names[@]}"; do
@@ -47,6 +53,13 @@ for name in "${names[@]}"; do
       "$program" --quiet scene make --primitives "$work/my_cell.primitives.json" -o "$work/my_cell.bt"
       run "$work/my_first_scene.json" mine.jsonl
       picture tutorial 1.5 1200x806 mine.jsonl
+      ;;
+    gain_map) # as docs/gain_map.md says; takes minutes
+      "$program" --quiet sweep plan --gain-sets 700 --base data/scenes/paper_52_apf.json --set /safety/type=none \
+        --planner apf --planner gyro:variant=published --planner gyro:variant=energy-neutral \
+        --planner hybrid:contact_radius_m=0.5 -o "$work/gain_map"
+      "$program" --quiet sweep run "$work/gain_map"
+      picture_of_maps "$work/gain_map"
       ;;
     *)
       echo "make_images.sh: '$name': there is no such picture" >&2
