@@ -46,7 +46,7 @@ for name in "${names[@]}"; do
     tutorial)
       # The files of the tutorial, as its pages say to save them.
       for page in docs/tutorial/*.md; do
-        awk -v folder="$work" '/[Ss]ave (it|this) as|^`[^`]+`:$/ && match($0, /`[^`]+`:$/) {file = folder "/" substr($0, RSTART + 1, RLENGTH - 3)}
+        awk -v folder="$work" '/(^|as )`[^`]+`:$/ && match($0, /`[^`]+`:$/) {file = folder "/" substr($0, RSTART + 1, RLENGTH - 3)}
           /^```/ {saved = ($0 != "```" && file != ""); if ($0 == "```") file = ""; next} saved {print > file}' "$page"
       done
       "$program" --quiet robot fit "$work/my_arm.urdf" -o "$work/my_arm.spheres.json"

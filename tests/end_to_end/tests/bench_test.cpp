@@ -78,7 +78,7 @@ TEST_CASE("planners run with the benchmark, and its results fit their schema", "
   CHECK(sandbox.run({"bench", "table", "results"}).out == output.out);
   CHECK_THAT(sandbox.run({"bench", "table", "results", "--markdown"}).out,
              Catch::StartsWith("| family | gyro | template |\n"
-                               "|---|---:|---:|\n| shelf | "));
+                               "| --- | --: | --: |\n| shelf | "));
 }
 
 TEST_CASE("wrong command lines and changed sets of the benchmark end with one line",
