@@ -72,8 +72,8 @@ int sweep_one(const OneOptions& options) {
   simulation::Watch watch;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
-  fmt::print("{}\n", sweep::to_line(sweep::run_under_judge(
-                         scene, plugin_path(options.plugin_path), watch, plant_factory())));
+  fmt::print("{}\n", sweep::to_line(sweep::run_under_judge(scene, plugin_path(options.plugin_path),
+                                                           watch, plant_factory())));
   return 0;
 }
 

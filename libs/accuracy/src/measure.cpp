@@ -133,8 +133,7 @@ std::vector<Job> make_jobs(const model::Model& model, const Options& options) {
 
 template <class AfterStep>
 std::optional<std::string> integrate(Integrator& integrator, integration::State& state,
-                                     const Options& options, long steps,
-                                     const AfterStep& after) {
+                                     const Options& options, long steps, const AfterStep& after) {
   const integration::Channels& channels = options.channels;
   const double duration_s = options.duration_s;
   if (steps > 0) {
@@ -182,8 +181,7 @@ void observe(Job& job, const Options& options, const std::optional<Reference>& r
   drift.add(0.0, 0.0);
   double largest = 0.0, dissipated = 0.0;
   const auto cause = integrate(
-      integrator, state, options, job.steps,
-      [&](const integration::StepReport& report, bool last) {
+      integrator, state, options, job.steps, [&](const integration::StepReport& report, bool last) {
         row.evaluations += report.evaluations;
         row.factorizations += report.factorizations;
         row.rejected += report.rejected;

@@ -246,7 +246,8 @@ std::string cheaper_peers(const Measurement& measurement) {
 std::string to_table(const Measurement& measurement) {
   std::string text = fmt::format("{}: {}\n\n{}", measurement.name, about(measurement),
                                  to_text(rows_table(measurement, ascii)));
-  if (measurement.reference) text += fmt::format("\n{}", to_text(cheapest_table(measurement, ascii)));
+  if (measurement.reference)
+    text += fmt::format("\n{}", to_text(cheapest_table(measurement, ascii)));
   if (const auto sentence = cheaper_peers(measurement); !sentence.empty())
     text += fmt::format("\n{}\n", sentence);
   for (const auto& row : measurement.rows)

@@ -195,8 +195,7 @@ std::string sweep_csv(py::handle directories) {
   const auto folders = paths_of(directories);
   const py::gil_scoped_release unlocked;
   std::string text;
-  sweep::write_csv(sweep::read_sweeps(folders),
-                   [&text](std::string_view line) { text += line; });
+  sweep::write_csv(sweep::read_sweeps(folders), [&text](std::string_view line) { text += line; });
   return text;
 }
 

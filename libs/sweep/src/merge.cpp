@@ -133,8 +133,7 @@ std::vector<GainGroup> group_gains(const std::vector<MergedRun>& runs) {
     if (r.run.gains.empty() || !r.facts.recorded || is_reference(r)) continue;
     GainGroup& g = groups[r.run.labels.at("planner")];
     g.planner = r.run.labels.at("planner");
-    const bool reached = r.facts.outcome == "reached",
-               reference = references.contains(set_of(r)),
+    const bool reached = r.facts.outcome == "reached", reference = references.contains(set_of(r)),
                apf_stalled = stalled.contains(set_of(r));
     ++g.sets;
     g.reached += reached ? 1U : 0U;

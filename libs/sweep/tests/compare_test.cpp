@@ -144,8 +144,7 @@ TEST_CASE("the CSV has a line per run, with quoted fields", "[sweep][unit]") {
   stalled["cause"] = "ran into \"it\",\ntwice";
   sweeps.runs.push_back(made("a dir", "s0", "p", stalled));
   sweeps.runs.push_back(made("a dir", "s1", "p", Json(), false));
-  sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1",
-                                   "/planner/params/name=a, b"};
+  sweeps.runs[0].run.set = {"/duration_s=9", "/planner/params/x=1", "/planner/params/name=a, b"};
   sweeps.runs[0].run.labels["values"] = "/planner/params/x=1 /planner/params/name=a, b";
   sweeps.runs[0].run.gains = {{"k_p", 0.25}};
   sweeps.runs[1].reason = "start in the map";

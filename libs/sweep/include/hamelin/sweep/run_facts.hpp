@@ -11,11 +11,11 @@ namespace hamelin::sweep {
 /// memory. Without a record nothing is set.
 struct RunFacts {
   bool recorded = false;
-  std::string outcome, cause;  ///< with the judge: contact that it saw is a collision
-  std::string own_outcome;     ///< of the run itself; empty if it crashed
-  bool success = false;        ///< is_success() of `outcome`
-  std::string failure;         ///< failure_class()
-  std::string contact;         ///< judged_contact()
+  std::string outcome, cause;   ///< with the judge: contact that it saw is a collision
+  std::string own_outcome;      ///< of the run itself; empty if it crashed
+  bool success = false;         ///< is_success() of `outcome`
+  std::string failure;          ///< failure_class()
+  std::string contact;          ///< judged_contact()
   double contact_time_s = 0.0;  ///< judged_contact_time()
   bool judge_saw_contact = false;
   bool judged = false;  ///< whether the judge measured a distance
