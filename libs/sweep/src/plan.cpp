@@ -142,13 +142,26 @@ scene::Scene read_scene(const PlannedRun& run, const fs::path& directory) {
   return scene::scene_from_json(document, file.parent_path(), file.string());
 }
 
-std::string read_planned_file(const fs::path& file, const std::string& sha256) {
-  std::string content = read_file(file);
-  if (const std::string now = sha256_hex(content); now != sha256)
+namespace {
+
+void compare_hashes(const fs::path& file, const std::string& now, const std::string& planned) {
+  if (now != planned)
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: has changed since the sweep was planned: SHA-256 {}, expected {}; "
                             "plan it again, in a new directory if there are records",
-                            file.string(), now, sha256));
+                            file.string(), now, planned));
+}
+
+// Needs no memory for the file.
+void check_hash(const fs::path& file, const std::string& planned) {
+  compare_hashes(file, sha256_of_file(file), planned);
+}
+
+}  // namespace
+
+std::string read_planned_file(const fs::path& file, const std::string& sha256) {
+  std::string content = read_file(file);
+  compare_hashes(file, sha256_hex(content), sha256);
   return content;
 }
 
@@ -157,16 +170,14 @@ void check_files(const Plan& plan, const fs::path& directory,
   std::set<std::string_view> scenes;
   for (const PlannedRun* run : runs) scenes.insert(run->scene);
   for (const auto& scene : plan.scenes)
-    if (scenes.contains(scene.file))
-      (void)read_planned_file(resolve_path(directory, scene.file), scene.sha256);
+    if (scenes.contains(scene.file)) check_hash(resolve_path(directory, scene.file), scene.sha256);
   for (const auto& input : plan.inputs)
-    (void)read_planned_file(resolve_path(directory, input.file), input.sha256);
+    check_hash(resolve_path(directory, input.file), input.sha256);
 }
 
 void check_planners(const Plan& plan, const std::vector<fs::path>& plugin_directories) {
   for (const auto& plugin : plan.plugins)
-    (void)read_planned_file(planning::find_plugin_file(plugin.name, plugin_directories),
-                            plugin.sha256);
+    check_hash(planning::find_plugin_file(plugin.name, plugin_directories), plugin.sha256);
 }
 
 std::vector<std::string> run_arguments(const PlannedRun& run, const fs::path& directory) {
