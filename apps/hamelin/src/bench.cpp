@@ -15,6 +15,7 @@
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "output.hpp"
+#include "sweep.hpp"
 #include "terminal.hpp"
 
 namespace hamelin::app {
@@ -99,12 +100,7 @@ void plan_benchmark(const RunOptions& options, const fs::path& file, const bench
 
 sweep::RunOutcome run_benchmark(const RunOptions& options) {
   sweep::RunOptions sweep;
-  sweep.command = {"/proc/self/exe", "sweep", "one"};
-  for (const auto& directory : options.plugin_path) {
-    sweep.command.emplace_back("--plugin-path");
-    sweep.command.push_back(directory.string());
-  }
-  sweep.plugin_directories = plugin_path(options.plugin_path);
+  run_in_forks(sweep, options.plugin_path);
   sweep.jobs = options.jobs;
   sweep.timeout_s = options.timeout_s;
   sweep.stop = &stop_on_signals();

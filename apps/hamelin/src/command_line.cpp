@@ -167,8 +167,29 @@ std::vector<std::string> command_line() {
   return stored_command_line();
 }
 
-void set_command_line(int argc, char** argv) {
-  stored_command_line().assign(argv, argv + argc);
+void set_command_line(std::vector<std::string> words) {
+  stored_command_line() = std::move(words);
+}
+
+int guarded(const std::function<int()>& action) {
+  int exit_code = defect;
+  try {
+    exit_code = action();
+  } catch (const Error& error) {
+    error_line(error.what());
+    return bad_input;
+  } catch (const std::bad_alloc&) {
+    error_line("out of memory");
+    return bad_input;
+  } catch (const std::exception& error) {
+    error_line(fmt::format("internal error: {}", error.what()));
+    return defect;
+  }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    error_line("stdout: cannot be written");
+    return bad_input;
+  }
+  return exit_code;
 }
 
 std::optional<std::filesystem::path> prefix() {

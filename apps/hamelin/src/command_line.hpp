@@ -1,6 +1,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,13 @@ CLI::Option* restrict_values(CLI::Option* option, const std::vector<std::string>
 /// Makes the option refuse all but names of integrators, which may carry an order ("gauss:8").
 /// Returns the option.
 CLI::Option* restrict_to_integrators(CLI::Option* option);
+
+/// Exit codes besides 0 and those of a run's outcomes.
+inline constexpr int bad_input = 2, defect = 3;
+
+/// Performs an action of the program; an error becomes one line on stderr.
+/// @return the exit code of the action, or that of the error
+[[nodiscard]] int guarded(const std::function<int()>& action);
 
 /// "hamelin scene info"
 [[nodiscard]] std::string full_name(const CLI::App& command);
@@ -49,7 +57,7 @@ void print_json(const Json& document);
 
 /// The command line as given, for logs.
 [[nodiscard]] std::vector<std::string> command_line();
-void set_command_line(int argc, char** argv);
+void set_command_line(std::vector<std::string> words);
 
 /// The installation prefix, which holds this program's bin/; none if the system does not reveal it.
 [[nodiscard]] std::optional<std::filesystem::path> prefix();

@@ -13,8 +13,6 @@
 
 namespace {
 
-constexpr int bad_input = 2, defect = 3;
-
 using namespace hamelin::app;
 
 // A group of commands, in the order in which help shows them.
@@ -62,7 +60,7 @@ void apply_environment() {
 
 int run_command_line(int argc, char** argv) {
   apply_environment();
-  set_command_line(argc, argv);
+  set_command_line({argv, argv + argc});
   const Phase phase("total");
   int exit_code = 0;
   CLI::App app("Move robot arms through cluttered OctoMap scenes and integrate their motion",
@@ -97,22 +95,5 @@ int run_command_line(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  int exit_code = defect;
-  try {
-    exit_code = run_command_line(argc, argv);
-  } catch (const hamelin::Error& error) {
-    error_line(error.what());
-    return bad_input;
-  } catch (const std::bad_alloc&) {
-    error_line("out of memory");
-    return bad_input;
-  } catch (const std::exception& error) {
-    error_line(fmt::format("internal error: {}", error.what()));
-    return defect;
-  }
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-    error_line("stdout: cannot be written");
-    return bad_input;
-  }
-  return exit_code;
+  return guarded([&] { return run_command_line(argc, argv); });
 }

@@ -1,5 +1,9 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <filesystem>
+#include <vector>
+
+#include "hamelin/sweep/run_sweep.hpp"
 
 /// The subcommands of `hamelin sweep`.
 namespace hamelin::app {
@@ -12,7 +16,14 @@ void add_sweep_emit(CLI::App& sweep, int& exit_code);
 void add_sweep_pack(CLI::App& sweep, int& exit_code);
 void add_sweep_unpack(CLI::App& sweep, int& exit_code);
 void add_sweep_pairs(CLI::App& sweep, int& exit_code);
-/// Hidden from help: one run under the judge, printed as a line of JSON. `sweep run` starts it.
+/// Hidden from help: one run under the judge, printed as a line of JSON. Sweeps and benchmarks call
+/// it.
 void add_sweep_one(CLI::App& sweep, int& exit_code);
+
+/// Makes the runs of a sweep calls of `hamelin sweep one` in forks of this process: nothing is
+/// loaded again, and it does not matter if the program has been rebuilt since it was started.
+/// @param plugin_directories  to be searched first for planners
+void run_in_forks(sweep::RunOptions& options,
+                  const std::vector<std::filesystem::path>& plugin_directories);
 
 }  // namespace hamelin::app

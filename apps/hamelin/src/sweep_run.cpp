@@ -35,13 +35,7 @@ struct OneOptions {
 
 int sweep_run(const SweepRunOptions& options) {
   sweep::RunOptions sweep = options.sweep;
-  // The running program itself, even if its file has been rebuilt since it was started.
-  sweep.command = {"/proc/self/exe", "sweep", "one"};
-  for (const auto& directory : options.plugin_path) {
-    sweep.command.emplace_back("--plugin-path");
-    sweep.command.push_back(directory.string());
-  }
-  sweep.plugin_directories = plugin_path(options.plugin_path);
+  run_in_forks(sweep, options.plugin_path);
   if (!options.shard.empty()) sweep.shard = sweep::parse_shard(options.shard, "--shard");
   sweep.stop = &stop_on_signals();
   sweep::RunOutcome outcome;
@@ -77,7 +71,32 @@ int sweep_one(const OneOptions& options) {
   return 0;
 }
 
+// Executes the command line `hamelin sweep one …`. Only this command is set up for it, which is
+// faster than to set up all.
+int call_sweep_one(const std::vector<std::string>& command) {
+  set_command_line(command);
+  CLI::App sweep;
+  int exit_code = 0;
+  add_sweep_one(sweep, exit_code);
+  std::vector<std::string> words(command.rbegin(), command.rend() - 2);  // the last first
+  sweep.parse(std::move(words));
+  return exit_code;
+}
+
 }  // namespace
+
+void run_in_forks(sweep::RunOptions& options, const std::vector<fs::path>& plugin_directories) {
+  options.command = {"hamelin", "sweep", "one"};
+  for (const auto& directory : plugin_directories) {
+    options.command.emplace_back("--plugin-path");
+    options.command.push_back(directory.string());
+  }
+  options.main = [](const std::vector<std::string>& command) {
+    set_verbosity(Verbosity::normal);
+    return guarded([&command] { return call_sweep_one(command); });
+  };
+  options.plugin_directories = plugin_path(plugin_directories);
+}
 
 void add_sweep_run(CLI::App& sweep, int& exit_code) {
   auto* command = add_command(

@@ -34,7 +34,7 @@ TEST_CASE("there are ten families, each with its own clutter for each seed", "[b
   std::set<std::string> texts;
   for (const auto& family : families()) {
     CHECK_FALSE(describe(family).empty());
-    for (const std::uint64_t seed : {1, 2, 3}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
       CHECK(text_of(family, seed) == text_of(family, seed));
       texts.insert(text_of(family, seed));
     }

@@ -103,7 +103,7 @@ TEST_CASE("the guess continues polynomials through the steps before exactly",
           "[integration][gauss]") {
   for (const double ratio : {1.0, 0.3, 2.5}) {
     for (const double ratio_before : {0.0, 1.0, 0.4}) {  // 0: no step before that
-      const std::size_t s = GENERATE(2, 4, 8);
+      const std::size_t s = GENERATE(2U, 4U, 8U);
       CAPTURE(s, ratio, ratio_before);
       const auto t = gauss_tableau(s);
       const double older_at = ratio_before > 0.0 ? (t.c[s - 1] - 1.0) / ratio_before : 0.0;

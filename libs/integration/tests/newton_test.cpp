@@ -31,9 +31,10 @@ void check(const Chain& chain, int n, std::uint64_t seed, bool spins) {
       terms.push_back({static_cast<std::size_t>(i),
                        {rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2)},
                        {rng.uniform(-20, 20), rng.uniform(-20, 20), rng.uniform(-20, 20)}});
+  const integration::kernel::Forces forces{damping.data(), coulomb.data(), nullptr, 0.5,
+                                           terms.data(),   terms.size()};
   const integration::kernel::VariationalCall<Chain> call{
-      chain,          h,       q.data(), p.data(),     delta.data(), next.data(), damping.data(),
-      coulomb.data(), nullptr, 0.5,      terms.data(), terms.size(), 1e-12,       false};
+      chain, h, q.data(), p.data(), delta.data(), next.data(), forces, 1e-12, false};
   dynamics::AlignedBuffer memory(Kernel::bytes(static_cast<std::size_t>(n)));
   const auto residual = [&](const VectorXd& at) -> VectorXd {
     delta = at;

@@ -55,8 +55,10 @@ TEST_CASE("a full result fits its schema", "[log][unit]") {
   result.certified_share = 1.0;
   result.tightest_step_m = 0.004;
   result.tick_us = log::Result::TickTime{1.0, 2.0, 3.0};
-  result.following.emplace().free = {9.0, 0.001, 0.002, 0.01, 0.02};
-  result.following->resume_max_s = 0.5;
+  log::Result::Following following;
+  following.free = {9.0, 0.001, 0.002, 0.01, 0.02};
+  following.resume_max_s = 0.5;
+  result.following = following;
   const Json document = log::to_json(result);
   CHECK_NOTHROW(check_shipped_schema(document, "result", "result"));
   CHECK(document["goal"]["error_rad"] == 0.2);

@@ -344,7 +344,7 @@ TEST_CASE("what MuJoCo cannot simulate is refused, and a state that it rejects e
   CHECK_THROWS_WITH(
       longer.make(),
       "long.json: /plant/type: 'random' has 91 joints, expected at most 90 for MuJoCo");
-  Rig small(model::Model(test::planar4()));
+  Rig small{model::Model(test::planar4())};
   simulation::Plant& plant = small.rest_at(VectorXd::Zero(4));
   const VectorXd before = plant.node().q;
   VectorXd torque = VectorXd::Zero(4);

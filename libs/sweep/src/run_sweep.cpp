@@ -1,9 +1,5 @@
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,6 +11,7 @@
 #include <numeric>
 #include <set>
 
+#include "child.hpp"
 #include "file_lock.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
@@ -36,114 +33,6 @@ constexpr int poll_ms = 100, poll_closed_ms = 1;
 constexpr int bad_input = 2;
 // Length to which the last line of a child's standard error is truncated.
 constexpr std::size_t line_max = 2000;
-
-std::string errno_text() {
-  return std::strerror(errno);
-}
-
-/// A pipe whose writing end goes to a child.
-class Pipe {
- public:
-  Pipe() {
-    // reading must not block: a process that the run left behind may keep the other end open
-    if (::pipe2(ends_.data(), O_CLOEXEC) != 0 || ::fcntl(ends_[0], F_SETFL, O_NONBLOCK) != 0)
-      throw Error(ErrorCode::io, fmt::format("cannot create a pipe: {}", errno_text()));
-  }
-  ~Pipe() {
-    close(0);
-    close(1);
-  }
-  Pipe(Pipe&& other) noexcept : ends_(other.ends_), text(std::move(other.text)) {
-    other.ends_ = {-1, -1};
-  }
-  Pipe& operator=(Pipe&&) = delete;
-
-  [[nodiscard]] int reader() const noexcept { return ends_[0]; }
-  [[nodiscard]] int writer() const noexcept { return ends_[1]; }
-  void close_writer() noexcept { close(1); }
-  [[nodiscard]] bool open() const noexcept { return ends_[0] >= 0; }
-  /// Reads the available data, at least as much as a pipe holds; closes the pipe at the end of the
-  /// data.
-  void read() {
-    std::array<char, 16384> buffer{};
-    for (int i = 0; i < 8 && open(); ++i) {
-      const auto count = ::read(ends_[0], buffer.data(), buffer.size());
-      if (count > 0)
-        text.append(buffer.data(), static_cast<std::size_t>(count));
-      else if (count == 0 || (errno != EINTR && errno != EAGAIN))
-        close(0);
-      else if (errno == EAGAIN)
-        return;
-    }
-  }
-
- private:
-  void close(std::size_t end) noexcept {
-    if (ends_[end] >= 0) ::close(ends_[end]);
-    ends_[end] = -1;
-  }
-  std::array<int, 2> ends_{-1, -1};
-
- public:
-  std::string text;
-};
-
-/// A run in progress, in a process group of its own.
-struct Child {
-  const PlannedRun* run;
-  pid_t pid = -1;
-  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
-  bool timed_out = false;  ///< and was killed for it
-  Pipe out, err;
-
-  explicit Child(const PlannedRun& of) : run(&of) {}
-  [[nodiscard]] bool closed() const noexcept { return !out.open() && !err.open(); }
-  /// Signals the process and all processes that it started and that stayed in its group.
-  void signal_group(int signal) const noexcept { ::kill(-pid, signal); }
-  /// Whether the process has ended. It remains a zombie, which keeps its id reserved until reap().
-  [[nodiscard]] bool ended(bool wait) const noexcept {
-    siginfo_t about{};
-    const int options = WEXITED | WNOWAIT | (wait ? 0 : WNOHANG);
-    int failed = 0;
-    while ((failed = ::waitid(P_PID, static_cast<id_t>(pid), &about, options)) != 0 &&
-           errno == EINTR) {
-    }
-    return failed != 0 || about.si_pid == pid;
-  }
-  /// Kills the processes that the process left running and returns its status. To be called after
-  /// ended().
-  [[nodiscard]] int reap() const noexcept {
-    signal_group(SIGKILL);
-    int status = 0;
-    while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-    }
-    return status;
-  }
-};
-
-void spawn(Child& child, const std::vector<std::string>& arguments) {
-  std::vector<char*> argv;
-  argv.reserve(arguments.size() + 1);
-  for (const auto& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, child.out.writer(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, child.err.writer(), STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);  // the default group 0: a new group
-  const int failed =
-      ::posix_spawn(&child.pid, argv[0], &actions, &attributes, argv.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0)
-    throw Error(ErrorCode::io,
-                fmt::format("{}: cannot be started: {}", arguments.front(), std::strerror(failed)));
-  child.out.close_writer();
-  child.err.close_writer();
-}
 
 /// The file to which one process at a time appends records line by line.
 class RecordFile {
@@ -277,9 +166,7 @@ class Sweep {
     std::vector<std::string> arguments = options_.command;
     const auto more = run_arguments(run, directory_);
     arguments.insert(arguments.end(), more.begin(), more.end());
-    Child child(run);
-    spawn(child, arguments);
-    children_.push_back(std::move(child));
+    children_.emplace_back(run, arguments, options_.main);
   }
 
   void terminate_children() {
@@ -298,7 +185,7 @@ class Sweep {
     }
     if (::poll(ends.data(), ends.size(), any_closed ? poll_closed_ms : poll_ms) < 0 &&
         errno != EINTR)
-      throw Error(ErrorCode::io, fmt::format("cannot wait for runs: {}", errno_text()));
+      throw Error(ErrorCode::io, fmt::format("cannot wait for runs: {}", std::strerror(errno)));
     if (options_.timeout_s) kill_timed_out();
     std::vector<Child> running;
     for (auto& child : children_) {
@@ -327,7 +214,7 @@ class Sweep {
   void finish(const Child& child) {
     const int status = child.reap();
     if (stopping()) return;  // the child was terminated
-    Json output = Json::parse(child.out.text, nullptr, false);
+    Json output = Json::parse(child.out.text(), nullptr, false);
     const bool returned = WIFEXITED(status) && output.is_object() && output.contains("result") &&
                           output.contains("judge") && output["result"].is_object();
     const bool interrupted = returned && output["result"].value("outcome", Json()) == "interrupted";
@@ -339,7 +226,7 @@ class Sweep {
     if (WIFEXITED(status) && WEXITSTATUS(status) == bad_input && !complete) {
       if (!failure_)
         failure_.emplace(ErrorCode::invalid,
-                         fmt::format("run '{}': {}", child.run->id, last_line(child.err.text)));
+                         fmt::format("run '{}': {}", child.run->id, last_line(child.err.text())));
       return;
     }
     Json record = empty_record(*child.run);
@@ -389,7 +276,7 @@ class Sweep {
         child.timed_out && killed ? fmt::format("killed after {} s", *options_.timeout_s)
         : killed ? fmt::format("signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)))
                  : fmt::format("exit code {}", WEXITSTATUS(status));
-    const std::string line = last_line(child.err.text);
+    const std::string line = last_line(child.err.text());
     record["cause"] = line.empty() ? cause : fmt::format("{}: {}", cause, line);
     record["crash"] = {{"signal", killed ? Json(WTERMSIG(status)) : Json(nullptr)},
                        {"exit_code", killed ? Json(nullptr) : Json(WEXITSTATUS(status))}};

@@ -1,14 +1,17 @@
 #include "hamelin/sweep/run_sweep.hpp"
 
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -88,6 +91,44 @@ TEST_CASE("each run of a plan is recorded once, and a second call has nothing to
   CHECK(again.run == 0);
   CHECK(again.recorded == 7);
   CHECK(sweep.lines("calls").size() == 7);
+}
+
+TEST_CASE("runs in forks have a process, a group, outputs and files of their own",
+          "[sweep][unit]") {
+  ScriptedSweep sweep(5);
+  const pid_t parent = ::getpid();
+  std::printf("buffered before the forks ");  // would be in the output of each run
+  RunOptions options = sweep.options();
+  options.main = [parent](const std::vector<std::string>& command) {
+    const std::string& planner = command.at(4);
+    const bool own = ::getpid() != parent && ::getpgrp() == ::getpid();
+    const bool inherits = ::fcntl(STDERR_FILENO + 1, F_GETFD) >= 0;  // for example the lock
+    if (planner == "p1") ::raise(SIGSEGV);
+    if (planner == "p2") {
+      std::fprintf(stderr, "no such joint\n");
+      return 3;
+    }
+    if (planner == "p3") throw std::runtime_error("unexpected");
+    std::printf(
+        R"({"result": {"outcome": "reached", "cause": null, "time_s": %d}, )"
+        R"("judge": {"contact": false, "obstacles": null, "self": null, "configurations": 3}})",
+        own && !inherits ? 1 : 0);
+    return 0;
+  };
+  const auto outcome = run_sweep(sweep.root(), options);
+  CHECK(outcome.run == 5);
+  CHECK(outcome.crashed == 3);
+  CHECK(sweep.lines("calls").empty());  // no program was started
+  for (const auto& line : sweep.records()) {
+    const std::string id = line["id"];
+    if (id == "r0" || id == "r4") {
+      CHECK(line["outcome"] == "reached");
+      CHECK(line["result"]["time_s"] == 1);
+    }
+    if (id == "r1") CHECK(line["crash"] == Json{{"signal", SIGSEGV}, {"exit_code", nullptr}});
+    if (id == "r2") CHECK(line["cause"] == "exit code 3: no such joint");
+    if (id == "r3") CHECK(line["cause"] == "exit code 3");
+  }
 }
 
 TEST_CASE("only the run of a truncated last line is repeated", "[sweep][unit]") {

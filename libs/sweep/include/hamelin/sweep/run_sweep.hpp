@@ -14,8 +14,11 @@ namespace hamelin::sweep {
 /// Options for executing a plan.
 struct RunOptions {
   std::vector<std::string> command;  ///< program and first arguments, followed by run_arguments()
-  std::size_t jobs = 1;              ///< number of concurrent processes
-  std::string only;                  ///< runs whose id contains this text; empty: all
+  /// If given, a run does not start the program: it is a fork of this process that calls this with
+  /// the whole command and ends with the exit code that it returns. For processes of one thread.
+  std::function<int(const std::vector<std::string>& command)> main;
+  std::size_t jobs = 1;        ///< number of concurrent processes
+  std::string only;            ///< runs whose id contains this text; empty: all
   std::optional<Shard> shard;  ///< execute only the runs of this shard, into a file of its own
   std::optional<std::size_t> limit;  ///< largest number of runs to execute now
   bool fresh = false;                ///< drop existing records, also those of shards
