@@ -12,7 +12,7 @@ pages=(README.md CONTRIBUTING.md CHANGELOG.md data/README.md docs/**/*.md libs/*
 prose() { awk '/^ *```/ {code = !code; next} !code' "$1"; }
 
 # The anchors that a page's headings have when it is rendered: lower case, no punctuation, hyphens for spaces.
-anchors() { prose "$1" | sed -nE 's/^#+ +//p' | sed -E 's/[^[:alnum:] _-]//g; s/ /-/g; s/.*/\L&/'; }
+anchors() { prose "$1" | sed -nE '/^#+ +/{s///; s/[^[:alnum:] _-]//g; s/ /-/g; s/.*/\L&/; p}'; }
 
 checked=0
 broken=0
@@ -21,13 +21,14 @@ complain() {
   broken=$((broken + 1))
 }
 for page in "${pages[@]}"; do
+  [[ $page == */* ]] || page=./$page
   while IFS= read -r link; do
     link=${link%% *}
     case $link in *://* | mailto:*) continue ;; esac
     checked=$((checked + 1))
     path=${link%%#*}
     target=$page
-    [ -z "$path" ] || target=$(dirname "$page")/$path
+    [ -z "$path" ] || target=${page%/*}/$path
     if [ ! -e "$target" ]; then
       complain "$page: no '$path'"
     elif [[ $link == *#* ]] && ! anchors "$target" | grep -qxF -- "${link#*#}"; then

@@ -36,30 +36,37 @@ cited_in() {
 expand() {
   while IFS= read -r item; do
     if [[ $item =~ ^\(([0-9]+)\.([0-9]+)\)–\(([0-9]+)\.([0-9]+)\)$ ]]; then
-      for ((k = BASH_REMATCH[2]; k <= BASH_REMATCH[4]; ++k)); do echo "${BASH_REMATCH[1]}.$k"; done
+      for ((k = BASH_REMATCH[2]; k <= BASH_REMATCH[4]; ++k)); do echo "$1 ${BASH_REMATCH[1]}.$k"; done
     else
-      tr -d '()' <<<"$item"
+      echo "$1 ${item//[()]/}"
     fi
   done
 }
-while IFS= read -r file; do
-  cited_in "$file" | expand | sed "s|^|$file |"
-done < <(grep -rlE 'theory\.md' libs plugins apps tests --include='*.cpp' --include='*.hpp' --include='*.h') >"$work/citations"
-while IFS= read -r file; do
-  cited_in "$file" | expand | sed "s|^|$file |"
-done < <(grep -rlE 'theory\.md' README.md docs libs plugins tests --include='*.md') >>"$work/referred"
+cited_in_files() {
+  while IFS= read -r file; do
+    cited_in "$file" | expand "$file"
+  done
+}
+grep -rlF 'theory.md' libs plugins apps tests --include='*.cpp' --include='*.hpp' --include='*.h' |
+  cited_in_files >"$work/citations"
+grep -rlF 'theory.md' README.md docs libs plugins tests --include='*.md' | cited_in_files >>"$work/referred"
 
-while read -r file n; do
-  grep -qxF -- "$n" "$work/defined" || complain "$file: ($n) is not in docs/theory"
-done < <(sort -u "$work/citations" "$work/referred")
+# complain_of FILE MESSAGE: about each number in the file.
+complain_of() {
+  while read -r n; do complain "${2//@/($n)}"; done <"$1"
+}
+for list in defined background; do sort -u -o "$work/$list.sorted" "$work/$list"; done
 cut -d' ' -f2 "$work/citations" | sort -u >"$work/cited"
+cut -d' ' -f2 "$work/citations" "$work/referred" | sort -u | comm -23 - "$work/defined.sorted" >"$work/unknown"
 while read -r n; do
-  if grep -qxF -- "$n" "$work/background"; then
-    grep -qxF -- "$n" "$work/cited" && complain "docs/theory: ($n) is listed as background, but code cites it"
-  elif ! grep -qxF -- "$n" "$work/cited"; then
-    complain "docs/theory: ($n) is neither cited by code nor listed as background"
-  fi
-done < <(sort -u "$work/defined")
+  grep -hF " $n" "$work/citations" "$work/referred" | grep -E " ${n//./\\.}\$" | sort -u | cut -d' ' -f1 |
+    while read -r file; do echo "$file: ($n) is not in docs/theory"; done
+  failed=1
+done <"$work/unknown"
+comm -12 "$work/background.sorted" "$work/cited" >"$work/needless"
+complain_of "$work/needless" "docs/theory: @ is listed as background, but code cites it"
+sort -u "$work/background.sorted" "$work/cited" | comm -23 "$work/defined.sorted" - >"$work/forgotten"
+complain_of "$work/forgotten" "docs/theory: @ is neither cited by code nor listed as background"
 
 echo "$(wc -l <"$work/defined") equations, $(wc -l <"$work/cited") cited by code in $(cut -d' ' -f1 "$work/citations" | sort -u | wc -l) files," \
   "$(sort -u "$work/background" | wc -l) background"

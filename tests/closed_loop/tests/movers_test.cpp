@@ -199,8 +199,9 @@ TEST_CASE("runs among moving obstacles repeat, however the looks ahead are split
   for (const auto& [name, obstacles] : all_movers()) {
     for (const int budget : {60, 200}) {
       CAPTURE(name, budget);
+      const Json scene = scene_with(obstacles);
       const auto run = [&](int steps) {
-        Json document = scene_with(obstacles);
+        Json document = scene;
         document["planner"]["params"] = {{"look_budget", budget}, {"look_steps", steps}};
         document["duration_s"] = 5.0;
         return logged_run(document);
