@@ -1,8 +1,8 @@
 """Time and memory of plan, shard start, merge and page for studies of growing size.
 
 large.py PROGRAM SOURCE_DIR [RUNS...] [--execute]: prints a table. RUNS is a multiple of 500. With --execute,
-all runs are executed in four shards; else one run is, and its record
-is repeated for all ids, because the times of merge and page do not depend on who made the records.
+all runs are executed in four shards, with the simplest planner and without the shield; else one run is, and its
+record is repeated for all ids, because the times of merge and page do not depend on who made the records.
 """
 
 import json
@@ -45,8 +45,9 @@ def study(program, source, runs, execute, folder):
     # 500 seeds, and as many lengths of the runs as needed; a plain list of seeds would be too long
     # for a command line.
     lengths = ",".join(f"{0.02 + 0.001 * i:.3f}" for i in range(runs // 500))
+    planner = ("template", "--set", "/safety/type=none") if execute else ("hybrid",)
     rows = [("plan", measured(
-        program, "sweep", "plan", scene, "--planner", "hybrid", "--vary", f"/duration_s={lengths}",
+        program, "sweep", "plan", scene, "--planner", *planner, "--vary", f"/duration_s={lengths}",
         "--seeds", ",".join(map(str, range(1, 501))), "-o", directory,
     ))]  # fmt: skip
     if execute:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace hamelin::control {
 
@@ -24,11 +25,18 @@ MoverCheck::MoverCheck(const model::Model& model, const Levers& levers)
       dq_(VectorXd::Zero(model.dof())),
       nodes_(intervals + 1),
       between_(depth_max),
+      places_(std::make_unique_for_overwrite<Place[]>(2 * (nodes_.size() + between_.size()) *
+                                                      movers_max)),
       arm_(model),
       distances_(model.shapes().size() * movers_max) {
   movers_.reserve(movers_max);
+  Place* next = places_.get();
   for (auto* nodes : {&nodes_, &between_})
-    for (Node& node : *nodes) node.q = node.v = node.known_q = VectorXd::Zero(model.dof());
+    for (Node& node : *nodes) {
+      node.q = node.v = node.known_q = VectorXd::Zero(model.dof());
+      node.places = std::exchange(next, next + movers_max);
+      node.known_places = std::exchange(next, next + movers_max);
+    }
   threat_.q = VectorXd::Zero(model.dof());
 }
 
@@ -76,7 +84,7 @@ void MoverCheck::evaluate(Node& node, const World& world, dynamics::Workspace& w
   node.exact = true;
   node.known = node.distance;
   node.known_q = node.q;
-  std::copy_n(node.places.begin(), world.movers.size(), node.known_places.begin());
+  std::copy_n(node.places, world.movers.size(), node.known_places);
   if (node.distance >= worst_) return;
   worst_ = node.distance;
   threat_.ahead_s = node.ahead_s;

@@ -375,7 +375,9 @@ class Coverer {
     const double first_step =
         options_.capsules ? 0.5 * options_.excess_m : 0.25 * options_.excess_m;
     for (double step = std::max(first_step, 4e-4); step > 1e-4;) {
-      const Vector3d u = Vector3d(rng_.normal(), rng_.normal(), rng_.normal()).normalized();
+      // one after another: the order in which arguments are evaluated depends on the compiler
+      const double z = rng_.normal(), y = rng_.normal(), x = rng_.normal();
+      const Vector3d u = Vector3d(x, y, z).normalized();
       const Vector3d v = u.unitOrthogonal(), w = u.cross(v);
       bool moved = false;
       const auto attempt = [&](const Vector3d& from, const Vector3d& to) {

@@ -638,7 +638,7 @@ TEST_CASE("the acts are those of the planner's series", "[report]") {
     for (Json line : log::read_log(folder / "plain.jsonl").lines) {
       if (line["type"] == "header") line["series"] = Json::array({{{"name", name}, {"unit", ""}}});
       if (line["type"] == "tick" && line.contains("channels"))
-        line["series"] = {ticks < numbers.size() ? numbers[ticks++] : Json(0.0)};
+        line["series"] = Json::array({ticks < numbers.size() ? numbers[ticks++] : Json(0.0)});
       text += line.dump() + "\n";
     }
     write_file_atomically(folder / "acts.jsonl", text);

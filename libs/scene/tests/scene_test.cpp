@@ -402,7 +402,7 @@ TEST_CASE("a path is a joint goal with way-points, and reads back as one", "[sce
   CHECK(resolved_json(scene_from_json(resolved, ".", "x.json")) == resolved);
 
   const auto refusal = [&](const Json& changed_goal) -> std::string {
-    document["goals"] = {changed_goal};
+    document["goals"] = Json::array({changed_goal});
     try {
       (void)scene_from_json(document, ".", "x.json");
     } catch (const Error& e) {

@@ -97,7 +97,9 @@ Vector3d swing_direction(const JudgedArm& arm, const std::vector<VectorXd>& path
   Vector3d best = way.unitOrthogonal();
   double most = -infinity;
   for (int draw = 0; draw < draws && most < room_m; ++draw) {
-    Vector3d direction(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0));
+    // one after another: the order in which arguments are evaluated depends on the compiler
+    const double z = rng.uniform(-1.0, 1.0), y = rng.uniform(-1.0, 1.0), x = rng.uniform(-1.0, 1.0);
+    Vector3d direction(x, y, z);
     direction -= direction.dot(way) / std::max(way.squaredNorm(), 1e-12) * way;
     if (direction.norm() < 0.1) continue;
     direction.normalize();

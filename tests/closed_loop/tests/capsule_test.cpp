@@ -60,7 +60,7 @@ TEST_CASE(
   Json scene = scene_52();
   // The arm lies along x. Its second link's capsule has a radius of 20 mm.
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
-  scene["obstacles"] = {ball("post", 1.5, 0.11, 0.1)};
+  scene["obstacles"] = Json::array({ball("post", 1.5, 0.11, 0.1)});
   const auto refused = run_scene(folder, scene, {}, capsule_arm());
   CHECK(refused.outcome == Outcome::refused);
   CHECK(refused.cause ==
@@ -98,7 +98,7 @@ TEST_CASE("the log's closest shape is counted link by link, spheres before capsu
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["start"] = {{"q", {0.0, 0.0, 0.0, 0.0}}};
-  scene["obstacles"] = {ball("post", 1.5, 0.2, 0.1)};
+  scene["obstacles"] = Json::array({ball("post", 1.5, 0.2, 0.1)});
   scene["duration_s"] = 0.004;
   model::Robot robot = capsule_arm();
   robot.links[0].spheres = {{{-0.4, 0.0, 0.0}, 0.01}, {{-0.3, 0.0, 0.0}, 0.01}};

@@ -100,7 +100,7 @@ TEST_CASE(
 TEST_CASE("a start in contact is refused before the first step", "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
-  scene["obstacles"] = {ball("post", 2.5, 0.1, 0.2)};
+  scene["obstacles"] = Json::array({ball("post", 2.5, 0.1, 0.2)});
   const auto result = run_scene(folder, scene);
   CHECK(result.outcome == Outcome::refused);
   CHECK(result.steps == 0);
@@ -110,7 +110,7 @@ TEST_CASE("a start in contact is refused before the first step", "[simulation][o
 TEST_CASE("a goal inside an obstacle is never reached and never touched", "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
-  scene["obstacles"] = {ball("over the goal", 2.0, 3.0, 0.3)};
+  scene["obstacles"] = Json::array({ball("over the goal", 2.0, 3.0, 0.3)});
   scene["stall"] = Json::object();
   scene["planner"]["params"]["eta"] = 1.84;
   const auto result = run_scene(folder, scene);
@@ -173,7 +173,7 @@ TEST_CASE("an obstacle that appears on the arm is a collision that names both",
   const TemporaryFolder folder;
   Json scene = scene_52();
   scene["planner"] = {{"name", "breaking"}};  // the arm rests
-  scene["obstacles"] = {ball("ghost", 3.5, 0.05, 0.2)};
+  scene["obstacles"] = Json::array({ball("ghost", 3.5, 0.05, 0.2)});
   scene["obstacles"][0]["appears_s"] = 1.0;
   const auto result = run_scene(folder, scene);
   CAPTURE(result.cause, result.time_s);
@@ -210,12 +210,12 @@ TEST_CASE("goals of every type have their own error measure", "[simulation][goal
       goal["quaternion_wxyz"] = {std::cos(0.5 * angle), 0.0, 0.0, std::sin(0.5 * angle)};
       return goal;
     };
-    scene["goals"] = {pose(turn + 0.1)};
+    scene["goals"] = Json::array({pose(turn + 0.1)});
     const auto met = run_scene(folder, scene);
     CHECK(met.outcome == Outcome::reached);
     CHECK(*met.goal->error_m < 0.01);
     CHECK(*met.goal->error_rad == Approx(0.1).margin(0.1));
-    scene["goals"] = {pose(turn + 3.0)};
+    scene["goals"] = Json::array({pose(turn + 3.0)});
     scene["duration_s"] = 10.0;
     const auto missed = run_scene(folder, scene);
     CHECK(missed.outcome == Outcome::timeout);
@@ -267,7 +267,7 @@ TEST_CASE("the same seed gives the same bytes except for clock and machine, anot
           "[simulation][determinism]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
-  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
+  scene["obstacles"] = Json::array({ball("obstacle", 2.4, 2.2, 0.25)});
   scene["actuation"] = {{"type", "sampled"},
                         {"control_period_s", 0.008},
                         {"delay_s", 0.008},
@@ -293,7 +293,7 @@ TEST_CASE("the same seed gives the same bytes except for clock and machine, anot
 TEST_CASE("every line of a run's log fits its schema", "[simulation][log]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
-  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
+  scene["obstacles"] = Json::array({ball("obstacle", 2.4, 2.2, 0.25)});
   scene["duration_s"] = 0.4;
   log::RunLog log(folder.path() / "run.jsonl");
   simulation::Watch watch;

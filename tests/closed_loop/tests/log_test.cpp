@@ -16,7 +16,7 @@ namespace {
 
 Json logged_scene(const Json& planner) {
   Json scene = scene_52();
-  scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25)};
+  scene["obstacles"] = Json::array({ball("obstacle", 2.4, 2.2, 0.25)});
   scene["planner"] = planner;
   scene["step_s"] = 0.001;
   scene["duration_s"] = 2.5;

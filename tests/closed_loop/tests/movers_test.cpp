@@ -268,7 +268,7 @@ TEST_CASE("search_steps shortens the time for which the arm waits for a search",
     Json document = test::scene_52();
     document["start"] = {{"q", {-0.9, 0.0, 0.0, 0.0}}};
     document["goals"] = {{{"type", "joint"}, {"q", {0.9, 0.0, 0.0, 0.0}}}};
-    document["obstacles"] = {test::ball("between", 3.0, 0.0, 0.4)};
+    document["obstacles"] = Json::array({test::ball("between", 3.0, 0.0, 0.4)});
     document["planner"] = {{"name", "hybrid"}, {"params", {{"search_steps", steps}}}};
     const auto result = test::run_scene(folder, document);
     REQUIRE(result.outcome == Outcome::reached);

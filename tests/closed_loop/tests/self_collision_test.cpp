@@ -121,7 +121,7 @@ TEST_CASE("clearances from obstacles and from the arm itself are reported separa
   const TemporaryFolder folder;
   Json scene = closing_square(0.5);
   scene["duration_s"] = 0.5;
-  scene["obstacles"] = {ball("post", 0.5, -0.2, 0.1)};
+  scene["obstacles"] = Json::array({ball("post", 0.5, -0.2, 0.1)});
   const auto result = run_scene(folder, scene);
   CAPTURE(result.cause);
   CHECK(result.outcome == Outcome::timeout);

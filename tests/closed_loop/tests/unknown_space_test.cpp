@@ -32,7 +32,7 @@ std::vector<std::string> events_of(const TemporaryFolder& folder, const std::str
   make_map(folder.path() / "map.bt");
   Json document = scene_52();
   document["map"] = {{"file", "map.bt"}, {"unknown", unknown}, {"keep_out_radius_m", 1.0}};
-  document["obstacles"] = {test::ball("ball", 3.0, -0.8, 0.2)};
+  document["obstacles"] = Json::array({test::ball("ball", 3.0, -0.8, 0.2)});
   document["planner"] = {{"name", "probe"}, {"params", {{"influence_m", 0.9}}}};
   document["duration_s"] = 0.04;
   log::RunLog log(folder.path() / "run.jsonl");

@@ -32,7 +32,7 @@ bool has(const std::vector<std::string>& events, const std::string& text) {
 // The straight arm turns about its base by 2 rad in 2 s. A post at 0.5 rad is visible within 0.1 m.
 Json turning_past_a_post() {
   Json scene = scene_52();
-  scene["obstacles"] = {ball("post", 4.25 * std::cos(0.5), 4.25 * std::sin(0.5), 0.2)};
+  scene["obstacles"] = Json::array({ball("post", 4.25 * std::cos(0.5), 4.25 * std::sin(0.5), 0.2)});
   scene["obstacles"][0]["known"] = false;
   scene["obstacles"][0]["visible_within_m"] = 0.1;
   scene["planner"] = {{"name", "probe"},

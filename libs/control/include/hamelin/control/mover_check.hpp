@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -67,22 +68,21 @@ class MoverCheck {
 
  private:
   struct Place {
-    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d p = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
-    double nearer_m = 0.0;
+    Eigen::Matrix3d R;
+    Eigen::Vector3d p, velocity;
+    double nearer_m;
   };
-  using Places = std::array<Place, movers_max>;
   /// The arm and the obstacles at a time.
   struct Node {
     double ahead_s = 0.0;
     Eigen::VectorXd q, v;
-    Places places;
-    double distance = 0.0;  ///< a lower bound, or exact
+    Place* places = nullptr;  ///< movers_max of them, one per obstacle
+    double distance = 0.0;    ///< a lower bound, or exact
     bool exact = false;
     // what the distance was last computed for; negative: nothing
     double known = -1.0;
     Eigen::VectorXd known_q;
-    Places known_places;
+    Place* known_places = nullptr;
   };
   static constexpr int intervals = 20, depth_max = 3;
 
@@ -103,6 +103,8 @@ class MoverCheck {
   std::array<double, movers_max> balls_{};  ///< bounding radii of the obstacles [m]
   std::vector<int> movers_;                 ///< of the last check
   std::vector<Node> nodes_, between_;
+  /// Of all nodes. Unset at first, so that a scene without moving obstacles does not touch it.
+  std::unique_ptr<Place[]> places_;
   scene::PlacedShapes arm_;
   std::vector<double> distances_;  ///< per shape and obstacle, of retreats()
   Threat threat_;

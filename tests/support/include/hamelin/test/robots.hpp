@@ -13,6 +13,12 @@ inline Eigen::Vector3d random_vector(Rng& rng, double size = 1.0) {
   return {x, y, rng.uniform(-size, size)};
 }
 
+/// By at most 3 rad.
+inline Eigen::Matrix3d random_rotation(Rng& rng) {
+  const Eigen::Vector3d axis = random_vector(rng).normalized();
+  return Eigen::AngleAxisd(rng.uniform(0.0, 3.0), axis).toRotationMatrix();
+}
+
 inline Eigen::VectorXd random_joints(Rng& rng, int n, double size = 1.0) {
   Eigen::VectorXd x(n);
   for (int i = 0; i < n; ++i) x[i] = rng.uniform(-size, size);
@@ -32,8 +38,7 @@ inline Eigen::VectorXd random_within_limits(const model::Model& model, Rng& rng)
 inline Eigen::Matrix3d random_inertia(Rng& rng) {
   // A rotated random box, whose inertia is positive and satisfies the triangle inequality.
   const Eigen::Vector3d d = (random_vector(rng).cwiseAbs().array() + 0.1).square();
-  const Eigen::Matrix3d R =
-      Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d R = random_rotation(rng);
   const Eigen::Matrix3d inertia =
       (d.sum() * Eigen::Matrix3d::Identity() - Eigen::Matrix3d(d.asDiagonal())) * 0.1;
   const Eigen::Matrix3d turned = R * inertia * R.transpose();
@@ -65,10 +70,7 @@ inline model::Robot random_robot(std::uint64_t seed, int n, int prismatic_every 
       link.joint.screw << axis, -axis.cross(at);
     }
     const Eigen::Vector3d com = at + random_vector(rng, 0.3);
-    const Eigen::Matrix3d R =
-        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), random_vector(rng).normalized())
-            .toRotationMatrix();
-    link.com = geometry::SE3{R, com};
+    link.com = geometry::SE3{random_rotation(rng), com};
     link.mass_kg = rng.uniform(0.2, 3.0);
     link.inertia_kg_m2 = random_inertia(rng);
     link.spheres.push_back({random_vector(rng, 0.1), 0.05});
