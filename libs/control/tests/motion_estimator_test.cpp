@@ -115,7 +115,7 @@ TEST_CASE("angular velocities follow a constant turn at irregular times, despite
     return Matrix3d(geometry::SO3::exp(noise_rad * noise).R() *
                     geometry::SO3::exp(time_s * rate).R());
   };
-  MotionEstimator estimator({}, time_s, {rotation(), {}});
+  MotionEstimator estimator({}, time_s, {rotation(), Vector3d::Zero()});
   int count = 0;
   for (int k = 0; k < 2000; ++k) {
     time_s += rng.uniform(0.01, 0.03);
