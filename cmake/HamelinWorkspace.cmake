@@ -38,7 +38,8 @@ target_compile_options(hamelin_options INTERFACE
   # Results are the same with and without FMA hardware; kernels enable contraction one by one.
   -ffp-contract=off
   $<$<BOOL:${HAMELIN_WERROR}>:-Werror>
-  $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
+  # Threads share the counters of lines; without atomic updates some become negative, which gcovr refuses.
+  $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage> $<$<BOOL:${HAMELIN_COVERAGE}>:-fprofile-update=atomic>)
 # A replay recognises the same build by the build-id of the program.
 target_link_options(hamelin_options INTERFACE LINKER:--build-id=sha1 $<$<BOOL:${HAMELIN_COVERAGE}>:--coverage>)
 if(HAMELIN_SANITIZE)
