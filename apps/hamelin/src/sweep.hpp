@@ -20,9 +20,9 @@ void add_sweep_pairs(CLI::App& sweep, int& exit_code);
 /// it.
 void add_sweep_one(CLI::App& sweep, int& exit_code);
 
-/// Makes the runs of a sweep calls of `hamelin sweep one` in forks of this process: nothing is
-/// loaded again, and it does not matter if the program has been rebuilt since it was started.
-/// @param plugin_directories  to be searched first for planners
+/// Sets the options so that each run calls `hamelin sweep one` in a fork of this process. The
+/// program is not loaded again, and may have been rebuilt since it was started.
+/// @param plugin_directories  directories to search first for planners
 void run_in_forks(sweep::RunOptions& options,
                   const std::vector<std::filesystem::path>& plugin_directories);
 

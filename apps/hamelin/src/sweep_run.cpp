@@ -71,8 +71,8 @@ int sweep_one(const OneOptions& options) {
   return 0;
 }
 
-// Executes the command line `hamelin sweep one …`. Only this command is set up for it, which is
-// faster than to set up all.
+// Executes the command line `hamelin sweep one …`. It defines no other command, because each run
+// would spend time on that.
 int call_sweep_one(const std::vector<std::string>& command) {
   set_command_line(command);
   CLI::App sweep;

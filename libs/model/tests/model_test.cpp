@@ -161,9 +161,7 @@ TEST_CASE("inertias that are asymmetric by rounding only are accepted, others ar
   int rounded = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Rng rng(seed);
-    const Eigen::Matrix3d R =
-        Eigen::AngleAxisd(rng.uniform(0.0, 3.0), test::random_vector(rng).normalized())
-            .toRotationMatrix();
+    const Eigen::Matrix3d R = test::random_rotation(rng);
     model::Robot robot = test::random_robot(seed, 3);
     Eigen::Matrix3d& inertia = robot.links[1].inertia_kg_m2;
     inertia = R * moments.asDiagonal() * R.transpose();
