@@ -15,8 +15,9 @@ struct ReplayRequest {
   std::vector<std::filesystem::path> plugin_path;
 };
 
-/// Repeats the first failed runs of each class and planner, and writes a page of each, as `hamelin report` does.
-/// The judge's contact becomes an event of the page. Runs that crashed are not repeated.
+/// Repeats the first failed runs of each class and planner, and writes a page of each, as `hamelin
+/// report` does. The judge's contact becomes an event of the page. Runs that crashed are not
+/// repeated.
 /// @return links by the index of the run
 /// @throws Error as sweep::read_scene, simulation::run and report::make_data
 [[nodiscard]] std::map<std::size_t, sweep::ReplayLink> write_replays(const sweep::Merged& merged,
