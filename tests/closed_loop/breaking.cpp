@@ -14,7 +14,7 @@ constexpr const char* schema = R"({
   "additionalProperties": false,
   "properties": {
     "at_tick": {"type": "integer", "minimum": 0, "default": 0},
-    "how": {"type": "string", "enum": ["throw", "nan", "give up", "never"], "default": "never"}
+    "how": {"type": "string", "enum": ["throw", "nan", "huge", "huge velocity", "give up", "never"], "default": "never"}
   }
 })";
 
@@ -28,6 +28,11 @@ class Breaking : public Planner {
     if (tick.k() != at_tick_) return;
     if (how_ == "throw") throw std::runtime_error("out of ideas");
     if (how_ == "nan") command.held_torque()[0] = std::numeric_limits<double>::quiet_NaN();
+    if (how_ == "huge") {  // both are finite, their sum is not
+      command.held_torque().setConstant(1.7e308);
+      command.potential_gradient().setConstant(-1.7e308);
+    }
+    if (how_ == "huge velocity") command.node_velocity().setConstant(1.7e308);
     if (how_ == "give up") command.give_up("no path to the goal");
   }
 

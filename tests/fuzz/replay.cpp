@@ -36,7 +36,8 @@ const std::map<std::string, void (*)(std::string_view)> targets{
     {"log", hamelin::fuzz::log},
     {"primitives", hamelin::fuzz::primitives},
     {"waypoints", hamelin::fuzz::waypoints},
-    {"target_line", hamelin::fuzz::target_line}};
+    {"target_line", hamelin::fuzz::target_line},
+    {"c_interface", hamelin::fuzz::c_interface}};
 
 // Sanitizers slow the program down and need shadow memory.
 #ifdef HAMELIN_SANITIZED

@@ -5,7 +5,7 @@ source=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
 target=${1:-all}
 executions=${2:-500000}
 build=${3:-$source/build/fuzz}
-targets=(maps scene robot spheres urdf srdf log primitives waypoints target_line)
+targets=(maps scene robot spheres urdf srdf log primitives waypoints target_line c_interface)
 [[ $target == all ]] || targets=("$target")
 
 export CC=clang CXX=clang++

@@ -21,6 +21,10 @@ void log(std::string_view bytes);
 void primitives(std::string_view bytes);
 void waypoints(std::string_view bytes);
 void target_line(std::string_view bytes);
+void c_interface(std::string_view bytes);
+
+/// c_interface(). @return the number of calls that the bytes stand for
+long count_c_calls(std::string_view bytes);
 
 /// Aborts unless `holds`, and prints the condition.
 void require(bool holds, const std::string& condition);

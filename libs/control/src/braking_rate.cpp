@@ -16,6 +16,9 @@ namespace {
 // A rate that is tried is below the largest one that the last line allowed by this factor.
 constexpr double below_largest = 0.97;
 constexpr int tries_max = 8;
+// By how much a torque may rise between two points, as a share of its largest second difference: an
+// eighth for a parabola, docs/theory.md (14.12).
+constexpr double between_points = 0.15;
 // Slower motion is at rest for the torques [rad/s or m/s].
 constexpr double resting_speed = 1e-9;
 
@@ -30,6 +33,7 @@ BrakingRate::BrakingRate(const model::Model& model, VectorXd effort_max, VectorX
       last_(rate_max),
       ws_(model) {
   for (auto* x : {&q_, &v_, &a_, &with_rate_, &without_}) x->setZero(model.dof(), points);
+  rise_ = VectorXd::Zero(model.dof());
 }
 
 double BrakingRate::upper_rate(const VectorXd& w) const {
@@ -55,8 +59,15 @@ double BrakingRate::evaluate(const VectorXd& q, const VectorXd& w, double rate) 
   a_.col(points - 1).setZero();
   dynamics::inverse_dynamics(model_, ws_, q_, v_, a_, with_rate_);
   utilisation_ = 0.0;
-  for (Index j = 0; j < effort_max_.size(); ++j)
-    utilisation_ = std::max(utilisation_, with_rate_.row(j).cwiseAbs().maxCoeff() / effort_max_[j]);
+  for (Index j = 0; j < effort_max_.size(); ++j) {
+    const auto torque = with_rate_.row(j);
+    double bend = 0.0;
+    for (Index k = 1; k + 2 < points; ++k)
+      bend = std::max(bend, std::abs(torque[k - 1] - 2.0 * torque[k] + torque[k + 1]));
+    rise_[j] = between_points * bend;
+    utilisation_ =
+        std::max(utilisation_, (torque.cwiseAbs().maxCoeff() + rise_[j]) / effort_max_[j]);
+  }
   return utilisation_;
 }
 
@@ -66,7 +77,7 @@ std::pair<double, double> BrakingRate::allowed_rates(double rate) {
   dynamics::inverse_dynamics(model_, ws_, q_, v_, a_, without_);
   double low = 0.0, high = infinity;
   for (Index j = 0; j < effort_max_.size(); ++j) {
-    const double limit = effort_max_[j];
+    const double limit = effort_max_[j] - rise_[j];
     for (Index k = 0; k < points - 1; ++k) {
       const double rest = without_(j, k), slope = (rest - with_rate_(j, k)) / rate;  // M w
       if (slope == 0.0) continue;

@@ -12,6 +12,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
+#include "line_buffer.hpp"
 
 namespace hamelin::control {
 
@@ -28,10 +29,38 @@ constexpr double brake_time_s = 0.05, brake_periods = 10.0;
 constexpr std::size_t default_path_points = 256;
 // The longest path of a guide.
 constexpr std::size_t guide_path_points = 256;
+// The longest time between two ticks: an arm that is told less often is not controlled [s].
+constexpr double period_max_s = 1.0;
+// Larger numbers are neither positions nor velocities of a joint [rad or m, rad/s or m/s], or
+// neither torques nor accelerations [Nm or N, rad/s² or m/s²]: what follows from them may overflow.
+constexpr double measured_max = 1e6, commanded_max = 1e12;
 
-double period_of(const scene::Scene& scene) {
-  return scene.actuation.type == scene::ActuationType::ideal ? scene.step_s
-                                                             : scene.actuation.control_period_s;
+// Also false for numbers that are not finite.
+bool within(const VectorXd& x, double bound) {
+  return (x.array().abs() <= bound).all();
+}
+
+double period_of(const scene::Scene& scene, const ControllerOptions& options) {
+  const double period = options.period_s.value_or(
+      scene.actuation.type == scene::ActuationType::ideal ? scene.step_s
+                                                          : scene.actuation.control_period_s);
+  if (!(period > 0.0 && period <= period_max_s))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: period_s: {}, expected more than 0 and at most {} s", scene.name,
+                            period, period_max_s));
+  return period;
+}
+
+// A shield is chosen, and its bounds are, by what the controller drives and what its world may come
+// to contain, not by what the scene was written for.
+scene::Scene in_force(scene::Scene scene, const ControllerOptions& options) {
+  if (options.position)
+    scene.actuation.type = scene::ActuationType::position;
+  else if (options.torque && scene.actuation.type == scene::ActuationType::ideal)
+    scene.actuation.type = scene::ActuationType::sampled;
+  if (!scene.safety.type)
+    scene.safety.type = options.fixed_world ? scene::safety_type(scene) : scene::SafetyType::shield;
+  return scene;
 }
 
 // One positive number for all joints, or one per joint.
@@ -97,9 +126,9 @@ Controller::Controller(const scene::Scene& scene, const model::Model& arm,
 
 Controller::Controller(const scene::Scene& given, const model::Model& arm,
                        const planning::Plugin& plugin, const Json& params, Options options)
-    : scene_(given),
-      options_(std::move(options)),
-      period_s_(options_.period_s.value_or(period_of(scene_))),
+    : options_(std::move(options)),
+      scene_(in_force(given, options_)),
+      period_s_(period_of(scene_, options_)),
       deadline_s_(scene_.actuation.deadline_s.value_or(period_s_)),
       path_points_max_(std::max(
           {longest_path(scene_.goals), options_.path_points_max.value_or(default_path_points),
@@ -127,13 +156,18 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
   answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
-  if (arm_->guide)
-    guidance_.emplace(scene_.guide, nominal_.dof(), static_cast<Eigen::Index>(path_points_max_),
-                      plugin.follows_paths(), !options_.guide_thread);
+  make_guidance();
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
   issued_.assign(delay_periods(scene_, period_s_) + 1, zero);
+}
+
+void Controller::make_guidance() {
+  guidance_number_ = 0;
+  if (arm_->guide)
+    guidance_.emplace(scene_.guide, nominal_.dof(), static_cast<Eigen::Index>(path_points_max_),
+                      plugin_.follows_paths(), !options_.guide_thread);
 }
 
 LoadedArm::Common Controller::common() noexcept {
@@ -162,15 +196,28 @@ double steady_clock_s() {
 }
 
 void Controller::reset() {
+  const std::lock_guard load_lock(load_mutex_);
+  const std::lock_guard goals_lock(goals_mutex_);
   k_ = 0;
-  reset_ = true;
+  shielded_ = false;
   late_answers_ = 0;
+  answer_.overruns = 0;
+  answer_.saturated = answer_.stopping = false;
+  answer_.state = ControlState::running;
+  answer_.cause = lost_ = {};
+  verdict_.reset();
   goals_.restart();
+  expect_target(newest_goals_);
   target_.stop();
   reference_.stop();
-  verdict_.reset();
-  answer_.state = ControlState::running;
-  answer_.cause = {};
+  make_guidance();
+  scene::Scene scene = scene_;
+  scene.goals = newest_goals_;
+  reset_ = !arm_->restart(std::move(scene), params_, common());
+  if (reset_) return;
+  used_params_ = params_number_;
+  goal_ = {};
+  listed_ = nullptr;
 }
 
 const Answer& Controller::tick(double time_s, const VectorXd& q, const VectorXd& v) {
@@ -181,16 +228,15 @@ const Answer& Controller::tick(double time_s, const VectorXd& q, const VectorXd&
 
 void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   const bool first = k_ == 0;
-  measure(q, v);
-  time_s_ = time_s;
+  measure(time_s, q, v);
   verdict_.reset();
   if (options_.certify && !first) {  // against the world in which the arm moved
-    arm_->view.look(q_, time_s);
+    arm_->view.look(q_, time_s_);
     verdict_ = arm_->view.certify(q_, v_);
-    if (arm_->view.take_newest()) arm_->view.look(q_, time_s);
+    if (arm_->view.take_newest()) arm_->view.look(q_, time_s_);
   } else {
     (void)arm_->view.take_newest();
-    arm_->view.look(q_, time_s);
+    arm_->view.look(q_, time_s_);
   }
   take_load();
   answer_.snapshot = arm_->view.snapshot();
@@ -214,9 +260,19 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   }
 }
 
-void Controller::measure(const VectorXd& q, const VectorXd& v) {
-  measured_ = q.allFinite() && (estimator_ || v.allFinite());
-  if (!measured_) return take_braking_state();
+void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
+  const Eigen::Index dof = nominal_.dof();
+  if (q.size() != dof || (!estimator_ && v.size() != dof))
+    throw Error(ErrorCode::invalid,
+                fmt::format("the measured q and v: {} and {} values given, expected {} each (one "
+                            "per joint of '{}')",
+                            q.size(), v.size(), dof, nominal_.robot().name));
+  const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s > time_s_),
+             usable = within(q, measured_max) && (estimator_ || within(v, measured_max));
+  if (!in_order || !usable) lose_measurement(time_s, in_order);
+  // what moves goes on as predicted while the clock cannot be used
+  time_s_ = in_order ? time_s : time_s_ + period_s_;
+  if (!usable) return take_braking_state();
   if (!estimator_) {
     q_ = q_measured_ = q;
     v_ = v;
@@ -238,10 +294,27 @@ void Controller::measure(const VectorXd& q, const VectorXd& v) {
   q_measured_ = q;
 }
 
+// The first line stays: it says why the arm stops.
+void Controller::lose_measurement(double time_s, bool in_order) {
+  if (!lost_.empty()) return;
+  LineBuffer& line = lost_line_;
+  line.clear();
+  if (in_order)
+    append(line,
+           "the measured q or v is not finite, or beyond {} rad or m, expected what the joints "
+           "have measured",
+           measured_max);
+  else if (std::isfinite(time_s))
+    append(line, "time_s: {} is not after that of the last tick, {}, expected times that increase",
+           time_s, time_s_.load());
+  else
+    append(line, "time_s: is not finite, expected the time of the measurement");
+  if (k_ == 0) throw Error(ErrorCode::invalid, std::string(line.view()));
+  lost_ = line.view();
+}
+
 // Without a measurement the arm is where braking was to bring it.
 void Controller::take_braking_state() {
-  if (k_ == 0)
-    throw Error(ErrorCode::invalid, "the first measured q or v is not finite, expected numbers");
   if (answer_.state != ControlState::stopping) return;
   q_ = q_measured_ = brake_q_;
   v_ = brake_v_;
@@ -260,8 +333,7 @@ void Controller::start_outputs() {
   dynamics::gravity_torque(arm_->model, arm_->ws, q_, answer_.torque);
   arm_->limits.start_from(answer_.torque);
   if (arm_->pipeline) arm_->pipeline->start_from(answer_.torque);
-  if (!options_.position)
-    for (auto& torque : issued_) torque = answer_.torque;
+  for (auto& issued : issued_) issued = options_.position ? command_rate_ : answer_.torque;
 }
 
 void Controller::decide() {
@@ -271,8 +343,8 @@ void Controller::decide() {
     shielded_ = true;
   }
   if (answer_.state != ControlState::stopping) {
-    if (!measured_) {
-      start_braking("the measured q or v is not finite, expected numbers");
+    if (!lost_.empty()) {
+      start_braking(lost_);
     } else if (!ask_planner()) {
       start_braking(failure_);
     } else if (arm_->planner.gave_up() && !(guidance_ && guidance_->stalled())) {
@@ -280,10 +352,13 @@ void Controller::decide() {
       answer_.cause = arm_->planner.command().raw().cause;
     }
   }
-  answer_.channels = answer_.state == ControlState::stopping ? nullptr : &arm_->planner.command();
   answer_.series = arm_->planner.command().series();
-  if (forms_torque()) form_torque();
-  if (options_.position) form_position();
+  if (!form_outputs()) {
+    start_braking(
+        "the sum of the planner's channels is no torque or acceleration of an arm, expected finite "
+        "numbers below 1e12");
+    (void)form_outputs();
+  }
   answer_.stopping = false;
   if (arm_->shield && options_.position)
     shield_position();
@@ -323,26 +398,23 @@ bool Controller::in_time(double planner_s) {
   late_answers_ = planner_s > deadline_s_ ? late_answers_ + 1 : 0;
   if (late_answers_ > 0 && ++answer_.overruns == 1) log_first_overrun();
   if (options_.late_answers_max == 0 || late_answers_ < options_.late_answers_max) return true;
-  const auto end =
-      fmt::format_to_n(late_line_.data(), late_line_.size(),
-                       "the last {} answers were late, expected answers within {} s; the last one "
-                       "took {:.3g} s",
-                       late_answers_, deadline_s_, planner_s);
-  failure_ = {late_line_.data(), std::min(late_line_.size(), static_cast<std::size_t>(end.size))};
+  late_line_.clear();
+  append(late_line_,
+         "the last {} answers were late, expected answers within {} s; the last one took {:.3g} s",
+         late_answers_, deadline_s_, planner_s);
+  failure_ = late_line_.view();
   return false;
 }
 
 // Later ones are counted only: an arm that is always late would fill a log.
 void Controller::log_first_overrun() {
   if (!options_.log || !options_.log_overrun) return;
-  std::array<char, 256> line{};  // not a string, which would be allocated
-  const auto end =
-      fmt::format_to_n(line.data(), line.size(),
-                       "planner '{}' took {:.3g} s in the tick at {} s, expected at "
-                       "most its deadline of {} s; later overruns are only counted",
-                       plugin().name(), answer_.planner_s, time_s_.load(), deadline_s_);
-  options_.log(HAMELIN_LOG_WARNING,
-               {line.data(), std::min(line.size(), static_cast<std::size_t>(end.size))});
+  LineBuffer line;
+  append(line,
+         "planner '{}' took {:.3g} s in the tick at {} s, expected at most its deadline of {} s; "
+         "later overruns are only counted",
+         plugin().name(), answer_.planner_s, time_s_.load(), deadline_s_);
+  options_.log(HAMELIN_LOG_WARNING, line.view());
 }
 
 double Controller::braking_time_s() const {
@@ -356,12 +428,19 @@ void Controller::start_braking(std::string_view cause) {
   brake_v_ = v_;
 }
 
-void Controller::form_torque() {
+bool Controller::form_outputs() {
+  answer_.channels = answer_.state == ControlState::stopping ? nullptr : &arm_->planner.command();
+  return (!forms_torque() || form_torque()) && (!options_.position || form_position());
+}
+
+bool Controller::form_torque() {
   if (answer_.channels == nullptr)
     brake();
   else
     arm_->sum.sum(arm_->ws, *answer_.channels, q_, v_, q_, period_s_, 1.0, answer_.torque);
+  if (!within(answer_.torque, commanded_max)) return false;
   answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
+  return true;
 }
 
 void Controller::shield_torque() {
@@ -420,7 +499,7 @@ void Controller::brake() {
 
 // The velocity goes to zero if the planner failed. Otherwise it follows the planner's, or the one
 // that the torque causes, within bounds of acceleration and jerk; the position integrates it.
-void Controller::form_position() {
+bool Controller::form_position() {
   const double T = period_s_;
   if (answer_.channels == nullptr) {
     rate_ = -answer_.v_next / braking_time_s();
@@ -429,6 +508,7 @@ void Controller::form_position() {
   } else {
     dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, answer_.torque, rate_);
   }
+  if (!within(rate_, commanded_max)) return false;
   for (Eigen::Index i = 0; i < rate_.size(); ++i) {
     const double step = jerk_max_[i] * T;
     const double bounded = std::clamp(rate_[i], -acceleration_max_[i], acceleration_max_[i]);
@@ -436,6 +516,7 @@ void Controller::form_position() {
   }
   answer_.v_next += T * command_rate_;
   answer_.q_next += T * answer_.v_next;
+  return true;
 }
 
 }  // namespace hamelin::control

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "hamelin/control/controller.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/text.hpp"
+#include "line_buffer.hpp"
 
 namespace hamelin::control {
 
@@ -156,15 +156,20 @@ std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const Ve
   return ++load_number_;
 }
 
-std::string Controller::load_defect(LoadedArm& fresh) {
+std::string_view Controller::load_defect(LoadedArm& fresh) {
   (void)fresh.view.take_newest();
   fresh.view.look(q_, time_s_);
-  if (!fresh.shield) return fresh.view.touching() ? fresh.view.describe_contact() : std::string();
+  load_refusal_.clear();
+  if (!fresh.shield) {
+    if (fresh.view.touching()) fresh.view.describe_contact(load_refusal_);
+    return load_refusal_.view();
+  }
   const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
   const Shield::Node now =
       options_.position ? Shield::Node{point_q_, point_v_} : Shield::Node{q_, v_};
   if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, now)) return {};
-  return fresh.shield->describe(world.environment);
+  fresh.shield->describe(world.environment, load_refusal_);
+  return load_refusal_.view();
 }
 
 // Takes over what the arm is doing, so that its torque goes on from the last one.
@@ -172,9 +177,9 @@ void Controller::take_load() {
   NewLoad& newest = new_load_.take();
   if (newest.number == answer_.load || newest.number == answer_.refused_load) return;
   LoadedArm& fresh = *newest.arm;
-  if (load_refusal_ = load_defect(fresh); !load_refusal_.empty()) {
+  if (const std::string_view defect = load_defect(fresh); !defect.empty()) {
     answer_.refused_load = newest.number;
-    answer_.load_refusal = load_refusal_;
+    answer_.load_refusal = defect;
     refused_load_.store(newest.number);
     return;
   }
@@ -182,7 +187,7 @@ void Controller::take_load() {
   if (fresh.pipeline) fresh.pipeline->continue_from(*arm_->pipeline);
   std::swap(arm_, newest.arm);
   goals_.set_model(arm_->model);
-  used_params_ = std::max(used_params_, newest.params_number);
+  used_params_ = newest.params_number;  // newer ones are applied to this arm's planner, too
   answer_.load = newest.number;
   used_load_.store(newest.number);
   if (goal_.goal != nullptr) ++goal_.number;
@@ -239,14 +244,12 @@ void Controller::update_guidance() {
     ++goal_.number;
   }
   if (news == Guidance::News::none || !options_.log) return;
-  std::array<char, 256> line{};  // not a string, which would be allocated
-  const auto end =
-      news == Guidance::News::path
-          ? fmt::format_to_n(line.data(), line.size(), "guide: a path of length {:.4g}",
-                             guidance_->figures().length)
-          : fmt::format_to_n(line.data(), line.size(), "guide: {}", guidance_->cause());
-  options_.log(HAMELIN_LOG_INFO,
-               {line.data(), std::min(line.size(), static_cast<std::size_t>(end.size))});
+  LineBuffer line;
+  if (news == Guidance::News::path)
+    append(line, "guide: a path of length {:.4g}", guidance_->figures().length);
+  else
+    append(line, "guide: {}", guidance_->cause());
+  options_.log(HAMELIN_LOG_INFO, line.view());
 }
 
 void Controller::take_params() {

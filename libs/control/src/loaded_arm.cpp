@@ -75,23 +75,40 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
                      const Common& common)
     : model(std::move(nominal)),
       view(scene, model, common.world),
-      shield(scene.safety.type == scene::SafetyType::shield
-                 ? std::make_unique<Shield>(scene, model, view.self_field(), common.period_s,
-                                            common.drive)
-                 : nullptr),
+      shield(make_shield(scene, common)),
       planner(common.plugin, make_setup(scene, common), params, model, common.world, view,
               common.log, common.now_s),
       limits(model, modelled_limits(scene, model.robot()).effort_max,
              scene.actuation.torque_rate_max_Nm_s),
       sum(model, view.contacts_max()),
-      ws(model) {
+      ws(model),
+      guide(make_guide(scene, params, common)),
+      start_q_(scene.start_q) {
   if (shield && common.sends_torque) pipeline.emplace(model, common.delay_periods, common.period_s);
-  if (scene.guide.type != scene::GuideType::none)
-    guide = std::make_unique<GuideSearch>(
-        model, common.world, view,
-        guide_settings(scene, model, view, shield ? shield->limit_reserve() : LimitReserve{},
-                       params),
-        static_cast<Eigen::Index>(common.path_points_max), common.guide_thread);
+}
+
+bool LoadedArm::restart(scene::Scene scene, const Json& params, const Common& common) {
+  scene.start_q = start_q_;
+  shield = make_shield(scene, common);
+  guide = make_guide(scene, params, common);
+  if (common.plugin.can_reset()) return false;
+  planner.restart(make_setup(scene, common), params);
+  return true;
+}
+
+std::unique_ptr<Shield> LoadedArm::make_shield(const scene::Scene& scene,
+                                               const Common& common) const {
+  if (scene::safety_type(scene) != scene::SafetyType::shield) return nullptr;
+  return std::make_unique<Shield>(scene, model, view.self_field(), common.period_s, common.drive);
+}
+
+std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
+                                                   const Common& common) {
+  if (scene.guide.type == scene::GuideType::none) return nullptr;
+  return std::make_unique<GuideSearch>(
+      model, common.world, view,
+      guide_settings(scene, model, view, shield ? shield->limit_reserve() : LimitReserve{}, params),
+      static_cast<Eigen::Index>(common.path_points_max), common.guide_thread);
 }
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const Common& common) {

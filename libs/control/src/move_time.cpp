@@ -11,6 +11,20 @@ namespace hamelin::control {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+// By how much a torque may rise between the points of a move, from its second differences: twice
+// what a parabola rises.
+template <class Row>
+double rise(const Row& torque) {
+  double bend = 0.0;
+  for (Index k = 1; k + 1 < torque.size(); ++k)
+    bend = std::max(bend, std::abs(torque[k - 1] - 2.0 * torque[k] + torque[k + 1]));
+  return 0.25 * bend;
+}
+
+}  // namespace
+
 MoveTime::MoveTime(const model::Model& model, Limits limits)
     : model_(model),
       limits_(std::move(limits)),
@@ -54,13 +68,18 @@ std::optional<double> MoveTime::find(const VectorXd& q, const VectorXd& way) {
   }
   dynamics::inverse_dynamics(model_, batch_, q_, v_, a_, torque_);
   double least = time * time;
-  for (Index k = 0; k < points; ++k)
-    for (Index j = 0; j < q.size(); ++j) {
-      const double moving = torque_(j, k) - gravity_(j, k);
-      const double left = limits_.effort_max[j] - (moving > 0.0 ? gravity_(j, k) : -gravity_(j, k));
+  for (Index j = 0; j < q.size(); ++j) {
+    const double moving_rise = rise(torque_.row(j) - gravity_.row(j)),
+                 gravity_rise = rise(gravity_.row(j));
+    for (Index k = 0; k < points; ++k) {
+      const double difference = torque_(j, k) - gravity_(j, k),
+                   moving = difference + std::copysign(moving_rise, difference);
+      const double left =
+          limits_.effort_max[j] - gravity_rise - (moving > 0.0 ? gravity_(j, k) : -gravity_(j, k));
       if (left <= 0.0) return std::nullopt;
       least = std::max(least, std::abs(moving) / left);
     }
+  }
   return std::sqrt(least);
 }
 

@@ -38,7 +38,7 @@ void check(const scene::Scene& scene) {
 // What a shield of the scene keeps while the arm moves slowly.
 LimitReserve reserve_of(const scene::Scene& scene) {
   LimitReserve reserve;
-  if (scene.safety.type == scene::SafetyType::shield)
+  if (scene::safety_type(scene) == scene::SafetyType::shield)
     reserve.obstacles_m = reserve.self_m = scene.safety.margin_m;
   return reserve;
 }

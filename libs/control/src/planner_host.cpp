@@ -93,6 +93,12 @@ PlannerHost::PlannerHost(const planning::Plugin& plugin, planning::SetupData set
       command_(static_cast<std::size_t>(nominal.dof()), view.contacts_max(),
                planner_.series().size()) {}
 
+void PlannerHost::restart(planning::SetupData setup, const Json& params) {
+  const planning::Plugin plugin = planner_.plugin();
+  world_number_ = view_.snapshot();
+  planner_ = plugin.create(std::move(setup), *this, params);
+}
+
 bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                        const PlannerGoal& goal, const Eigen::VectorXd* torque) {
   time_s_ = time_s;

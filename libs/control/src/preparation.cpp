@@ -58,7 +58,36 @@ model::Model scaled_masses(const model::Model& arm, double scale) {
   return model::Model(std::move(robot), arm.base(), arm.gravity());
 }
 
+namespace {
+
+// What a file's schema checks, of scenes that a program has made or changed.
+void check_bounds(const scene::Scene& scene) {
+  const auto within = [&](double x, double least, double most, const char* place) {
+    if (!(x >= least && x <= most))
+      throw Error(ErrorCode::invalid,
+                  fmt::format("{}: {}: {}, expected {} to {}", scene.name, place, x, least, most));
+  };
+  constexpr double large = 1e9, tiny = 1e-9;
+  const scene::SafetyBounds safety = scene::safety_bounds(scene);
+  within(safety.margin_m, 0.0, large, "/safety/margin_m");
+  within(safety.torque_share, tiny, 1.0, "/safety/torque_share");
+  within(safety.tracking_rad, 0.0, large, "/safety/tracking_rad");
+  within(safety.mass_error, 0.0, 1.0, "/safety/mass_error");
+  within(safety.friction_share, 0.0, 1.0, "/safety/friction_share");
+  within(safety.joint_noise_rad, 0.0, large, "/safety/joint_noise_rad");
+  const scene::Actuation& actuation = scene.actuation;
+  within(actuation.delay_s, 0.0, 1.0, "/actuation/delay_s");
+  within(actuation.estimator_bandwidth, tiny, large, "/actuation/estimator_bandwidth");
+  within(actuation.planner_mass_scale, tiny, large, "/actuation/planner_mass_scale");
+  within(actuation.torque_rate_max_Nm_s.value_or(1.0), tiny, large,
+         "/actuation/torque_rate_max_Nm_s");
+  within(actuation.deadline_s.value_or(1.0), 0.0, large, "/actuation/deadline_s");
+}
+
+}  // namespace
+
 void check_numbers(const scene::Scene& scene, const model::Model& model) {
+  check_bounds(scene);
   const auto sized = [&](const VectorXd& x, const std::string& place) {
     if (x.size() != model.dof())
       throw Error(ErrorCode::invalid,

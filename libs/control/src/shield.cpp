@@ -11,6 +11,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
+#include "line_buffer.hpp"
 
 namespace hamelin::control {
 
@@ -49,7 +50,7 @@ double smallest_rest_time(const scene::Scene& scene, double period_s) {
 
 MoveTime::Limits move_limits(const scene::Scene& scene, const ModelledLimits& limits,
                              const Shield::Drive& drive, double period_s) {
-  MoveTime::Limits out{scene.safety.torque_share * limits.effort_max,
+  MoveTime::Limits out{scene::safety_bounds(scene).torque_share * limits.effort_max,
                        limits.velocity_max,
                        drive.acceleration_max,
                        drive.jerk_max,
@@ -106,7 +107,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       friction_(joint_numbers(scene, scene.model.friction, "friction", model.robot(),
                               &model::Joint::friction)),
       friction_speed_(scene.model.friction_speed),
-      torque_share_(scene.safety.torque_share),
+      torque_share_(scene::safety_bounds(scene).torque_share),
       levers_(model, self),
       drive_(drive),
       straying_(scene, model, levers_, period_s, feedback_rate_, drive.torque_rate),
@@ -133,11 +134,15 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       bounded_check_(model, levers_) {
   const Index n = model.dof();
   set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
+  stop_bounds_ = straying_.bounds();
   for (auto* x : {&stop_stray_, &line_stray_, &integral_, &zero_, &w_, &reference_q_, &reference_v_,
                   &q_, &v_, &rate_, &hold_, &acceleration_})
     x->setZero(n);
   aside_ = zero_;
   asides_.emplace(model, limits_, reserve_.position, scene.seed);
+  for (const auto& shape : model.shapes()) shape_names_.push_back(model.describe(shape));
+  for (std::size_t k = 0; self != nullptr && k < self->pairs().size(); ++k)
+    pair_names_.push_back(self->describe(static_cast<int>(k)));
   predicted_.reserve(MoverCheck::movers_max);
   bounded_.reserve(MoverCheck::movers_max);
 }
@@ -221,11 +226,14 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
 
 void Shield::take_tried() {
   std::swap(stop_, tried_);
-  stop_stray_ = straying_.tracking() + straying_.errors();
+  stop_bounds_ = straying_.bounds();
+  stop_stray_ = stop_bounds_.tracking + stop_bounds_.errors;
   stop_time_ = 0.0;
   stopping_ = changed_ = false;
   run_ = 0;
   largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
+  if (stop_.stop().braking().ramp_s > 0.0)
+    largest_margin_ = std::max(largest_margin_, ramp_line_.largest_stray_m());
 }
 
 bool Shield::accept(const Surroundings& world, const Step& step) {
@@ -293,18 +301,21 @@ bool Shield::within_velocity(const VectorXd& from, const VectorXd& to) {
 }
 
 // An arm that is beyond a limit may come back. Within 0.3 of what is kept from a limit it may
-// move; beyond that it must come back by more than noise can pretend.
-bool Shield::within_joint_limits(const VectorXd& from, const VectorXd& to) {
+// move; beyond that it must come back by more than noise can pretend. The step itself strays from
+// the line between its ends by as much as (12.2) says.
+bool Shield::within_joint_limits(const Step& step) {
   for (Index j = 0; j < limits_.q_lower.size(); ++j) {
     const double reserve = straying_.tracking()[j] + straying_.errors()[j];
-    const auto beyond = [&](const VectorXd& q) {
+    const auto beyond = [&](double least, double largest) {
       return std::max(
-          {q[j] - (limits_.q_upper[j] - reserve), limits_.q_lower[j] + reserve - q[j], 0.0});
+          {largest - (limits_.q_upper[j] - reserve), limits_.q_lower[j] + reserve - least, 0.0});
     };
-    const double now = beyond(from);
+    const double bend = 0.25 * period_s_ * std::abs(step.to.v[j] - step.departure[j]);
+    const double now = beyond(step.from.q[j], step.from.q[j]);
     const double allowed = now > 0.0 ? std::max(0.3 * reserve, now - 2.0 * straying_.noise()) : 0.0;
-    if (beyond(to) <= allowed && beyond(tried_.stop().line_start()) <= allowed &&
-        beyond(tried_.end()) <= allowed)
+    const StopMotion::Range stop = tried_.stop().range(j);
+    if (beyond(step.to.q[j] - bend, step.to.q[j] + bend) <= allowed + (now > 0.0 ? bend : 0.0) &&
+        beyond(stop.least, stop.largest) <= allowed)
       continue;
     refusal_ = {StopCause::joint_limit, {}, static_cast<int>(j)};
     return false;
@@ -347,7 +358,7 @@ bool Shield::verify(const Surroundings& world, const Step& step) {
 
 bool Shield::stop_is_safe(const Surroundings& world, const Step& step) {
   if (!within_velocity(step.from.v, tried_.stop().line_velocity())) return false;
-  if (!within_joint_limits(step.from.q, step.to.q)) return false;
+  if (!within_joint_limits(step)) return false;
   if (!world.environment.has_obstacles() && self_ == nullptr) return true;
   levers_.extend_travel(step.to.q, straying_.tracking());
   levers_.extend_travel(tried_.end(), straying_.tracking());
@@ -520,6 +531,7 @@ void Shield::begin_again(const Node& node, const VectorXd& disturbance, const Ve
     for (Index j = 0; j < node.q.size(); ++j)
       note_straying(j, std::abs(tried_.end()[j] - stop_.end()[j]));
     std::swap(stop_, tried_);
+    stop_bounds_ = straying_.bounds();
     stop_time_ = 0.0;
   }
   refusal_ = refusal;
@@ -530,30 +542,36 @@ void Shield::stop_point(VectorXd& q, VectorXd& v) {
   stop_.at(stop_time_, q, v);
 }
 
-std::string Shield::describe(const scene::Environment& environment) const {
+void Shield::describe(const scene::Environment& environment, LineBuffer& line) const {
   const auto joint = [&] {
     return refusal_.joint < 0
-               ? std::string()
+               ? std::string_view()
                : model_.robot().links[static_cast<std::size_t>(refusal_.joint)].joint.name;
   };
   const LineCheck::Blocker& blocker = refusal_.blocker;
   switch (refusal_.cause) {
     case StopCause::joint_limit:
-      return fmt::format("joint '{}' would pass its position limit", joint());
+      return append(line, "joint '{}' would pass its position limit", joint());
     case StopCause::velocity_limit:
-      return fmt::format("joint '{}' would pass its velocity limit", joint());
+      return append(line, "joint '{}' would pass its velocity limit", joint());
     case StopCause::torque:
-      return "no stop within the torque limits would remain";
+      return append(line, "no stop within the torque limits would remain");
     case StopCause::answer:
-      return "there is no usable answer";
+      return append(line, "there is no usable answer");
     case StopCause::self:
-      return fmt::format("{} would come too near each other", self_->describe(blocker.pair));
+      return append(line, "{} would come too near each other",
+                    pair_names_[static_cast<std::size_t>(blocker.pair)]);
     default:
       break;
   }
-  return fmt::format("{} would come too near {}",
-                     model_.describe(model_.shapes()[static_cast<std::size_t>(blocker.shape)]),
-                     environment.describe(blocker.obstacle));
+  append(line, "{} would come too near ", shape_names_[static_cast<std::size_t>(blocker.shape)]);
+  append_obstacle(line, environment, blocker.obstacle);
+}
+
+std::string Shield::describe(const scene::Environment& environment) const {
+  LineBuffer line;
+  describe(environment, line);
+  return std::string(line.view());
 }
 
 }  // namespace hamelin::control

@@ -75,7 +75,7 @@ void Shield::note_proof() {
 }
 
 Shield::Foresight Shield::prove_stop_in_force(const Surroundings& world) {
-  const Foresight in_force = prove(force_check_, world, stop_, stop_time_, lead_s_);
+  const Foresight in_force = prove(force_check_, world, {stop_, stop_bounds_, stop_time_, lead_s_});
   proof_ = in_force.proof;
   return in_force;
 }
@@ -95,7 +95,8 @@ void Shield::go_on_among_movers(const Surroundings& world) {
   const Foresight evasion = find_evasion(world, force_check_, from_s, zero_);
   if (evasion.proof == MoverProof::none) return;
   std::swap(stop_, tried_);
-  stop_stray_ = stop_stray_.cwiseMax(straying_.tracking() + straying_.errors());
+  stop_bounds_.include(straying_.bounds());
+  stop_stray_ = stop_bounds_.tracking + stop_bounds_.errors;
   stop_time_ = from_s;
   ++counts_.evasions;
   proof_ = evasion.proof;
@@ -124,12 +125,12 @@ void Shield::blame(const Surroundings& world) {
   refusal_ = {StopCause::obstacle, {threat.shape, threat.obstacle, -1, 0.0}, -1};
 }
 
-Shield::Foresight Shield::prove(MoverCheck& check, const Surroundings& world,
-                                const FailSafe& motion, double from_s, double lead_s) {
+Shield::Foresight Shield::prove(MoverCheck& check, const Surroundings& world, const Examined& of) {
+  const auto& [motion, stray, from_s, lead_s] = of;
   double margin = margin_m_;
-  for (Index j = 0; j < line_stray_.size(); ++j)
-    margin += levers_.shapes().col(j).maxCoeff() * straying_.tracking()[j];
-  if (straying_.shapes().size() > 0) margin += straying_.shapes().maxCoeff();
+  for (Index j = 0; j < stray.tracking.size(); ++j)
+    margin += levers_.shapes().col(j).maxCoeff() * stray.tracking[j];
+  if (stray.shapes.size() > 0) margin += stray.shapes.maxCoeff();
   margin = std::max(margin, mover_margin_m);
   Foresight found{MoverProof::none, 0.0, MoverCheck::far_m};
   if (!all_listed_) return found;
@@ -157,7 +158,8 @@ Shield::Foresight Shield::prove(MoverCheck& check, const Surroundings& world,
 
 // docs/theory.md (14.29)
 Shield::Foresight Shield::find_fail_safe(const Surroundings& world, const Step& step) {
-  const Foresight stop = prove(stop_check_, world, tried_, 0.0, lead_s_ + period_s_);
+  const Foresight stop =
+      prove(stop_check_, world, {tried_, straying_.bounds(), 0.0, lead_s_ + period_s_});
   if (predicted_.empty() || stop.least_m > comfortable_m) {
     has_aside_ = false;
     return stop;
@@ -200,7 +202,7 @@ Shield::Foresight Shield::try_move(LineCheck& line, MoverCheck& check, const Sur
   line_stray_ = straying_.tracking();
   Foresight found = none;
   if (keeps_limits(target) && line_is_clear(line, world, place(from, arm_end_), target))
-    found = prove(check, world, tried_, from_s, lead_s_ + period_s_);
+    found = prove(check, world, {tried_, straying_.bounds(), from_s, lead_s_ + period_s_});
   if (found.proof != MoverProof::none) return found;
   tried_.drop_move();
   straying_.bound(tried_.stop());

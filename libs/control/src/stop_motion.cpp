@@ -1,6 +1,7 @@
 #include "hamelin/control/stop_motion.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace hamelin::control {
 
@@ -34,6 +35,24 @@ void StopMotion::set(const VectorXd& q, const VectorXd& v, const VectorXd& a,
   const double sigma = 0.5 * (speed_ + at_fade) * steady_s_ + alpha * fade * fade / 6.0;
   q_end_ = q_line_ + sigma * w_;
   duration_ = ramp + steady_s_ + fade;
+}
+
+// The joint's velocity in the ramp is v + a₀ t − (a₀ + α w) t²/(2 t_r), docs/theory.md (14.1).
+StopMotion::Range StopMotion::range(Eigen::Index j) const {
+  Range out{std::min({q_[j], q_line_[j], q_end_[j]}), std::max({q_[j], q_line_[j], q_end_[j]})};
+  const auto [alpha, ramp, fade] = braking_;
+  if (ramp == 0.0) return out;
+  const double a = a_[j], v = v_[j], bend = -0.5 * (a + alpha * w_[j]) / ramp;
+  const double square = a * a - 4.0 * bend * v;
+  if (square < 0.0) return out;
+  // both roots of bend t² + a t + v, without cancellation; infinite ones lie outside of the ramp
+  const double sum = -0.5 * (a + std::copysign(std::sqrt(square), a));
+  for (const double t : {sum / bend, v / sum}) {
+    if (!(t > 0.0 && t < ramp)) continue;
+    const double q = q_[j] + t * (v + t * (0.5 * a + t * bend / 3.0));
+    out = {std::min(out.least, q), std::max(out.largest, q)};
+  }
+  return out;
 }
 
 void StopMotion::at(double time_s, VectorXd& q, VectorXd& v) const {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "line_buffer.hpp"
 
 namespace hamelin::control {
 
@@ -252,6 +253,15 @@ bool WorldView::deepest_self(const scene::Shapes& shapes, scene::SelfContact& de
       *std::min_element(self_contacts_.begin(), self_contacts_.begin() + static_cast<long>(count),
                         [](const auto& a, const auto& b) { return a.distance < b.distance; });
   return true;
+}
+
+void WorldView::describe_contact(LineBuffer& line) const {
+  append(line, "its shapes are {:.2g} mm inside ",
+         -1e3 * std::min(clearance_now_, self_clearance_now_));
+  if (nearest() != nullptr && clearance_now_ <= 0.0)
+    append_obstacle(line, *environment_, nearest_.obstacle);
+  else
+    append(line, "another part of the arm");
 }
 
 std::string WorldView::describe_contact() const {

@@ -88,17 +88,17 @@ TEST_CASE("the rate of braking is near the largest that the torques allow", "[sh
     return most;
   };
   int found = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     const VectorXd q = test::random_within_limits(model, rng),
-                   w = test::random_joints(rng, model.dof(), 1.5);
+                   w = test::random_joints(rng, model.dof(), i % 2 == 0 ? 1.5 : 3.0);
     BrakingRate braking(model, allowed, VectorXd(), 1000.0);
     const auto rate = braking.find(q, w, BrakingRate::full_utilisation);
     if (!rate) continue;
     ++found;
-    CHECK(used(q, w, *rate) < 1.02);       // between the points, too
+    CHECK(used(q, w, *rate) <= 1.0);       // between the points, too
     CHECK(used(q, w, 1.4 * *rate) > 1.0);  // not much faster
   }
-  CHECK(found > 280);
+  CHECK(found > 1700);
   BrakingRate unlimited(model, VectorXd(), VectorXd(), 100.0);
   CHECK(unlimited.find(test::random_within_limits(model, rng), effort, 0.7) == 100.0);
 }
@@ -326,6 +326,7 @@ TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
   if (!test::counts_allocations()) return;
   scene::Scene scene = shelf();
   scene.model.self_collision = scene.model.torque_limits = scene.model.joint_limits = true;
+  scene.actuation.type = scene::ActuationType::sampled;
   scene.safety.mass_error = 0.1;
   scene.safety.friction_share = 0.05;
   const model::Model model = control::load_model(scene);

@@ -484,26 +484,18 @@ Actuation read_actuation(const Reader& in, double step_s) {
   return actuation;
 }
 
-// What the arm could touch or pass is modelled.
-bool has_hazards(const Scene& scene) {
-  return scene.map || !scene.obstacles.empty() || scene.model.self_collision ||
-         scene.model.joint_limits || scene.model.velocity_limits;
-}
-
-Safety read_safety(const Reader& in, const Scene& scene) {
+Safety read_safety(const Reader& in) {
   Safety safety;
-  const auto type = in.get<std::string>("type", has_hazards(scene) ? "shield" : "none");
-  if (type == "shield") safety.type = SafetyType::shield;
-  if (type == "certificate") safety.type = SafetyType::certificate;
+  if (const auto type = in.maybe<std::string>("type"))
+    safety.type = *type == "shield"        ? SafetyType::shield
+                  : *type == "certificate" ? SafetyType::certificate
+                                           : SafetyType::none;
   safety.margin_m = in.get("margin_m", safety.margin_m);
-  safety.torque_share =
-      in.get("torque_share", scene.actuation.type == ActuationType::ideal ? 0.95 : 0.8);
-  // Torques that act late, and are held, are followed less exactly.
-  safety.tracking_rad =
-      in.get("tracking_rad", scene.actuation.type == ActuationType::ideal ? 1e-5 : 2e-4);
+  safety.torque_share = in.maybe<double>("torque_share");
+  safety.tracking_rad = in.maybe<double>("tracking_rad");
   safety.mass_error = in.get("mass_error", safety.mass_error);
   safety.friction_share = in.get("friction_share", safety.friction_share);
-  safety.joint_noise_rad = in.get("joint_noise_rad", scene.actuation.joint_noise_rad);
+  safety.joint_noise_rad = in.maybe<double>("joint_noise_rad");
   return safety;
 }
 
@@ -645,7 +637,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.seed = in.get<std::uint64_t>("seed", 1);
   scene.actuation = read_actuation(in.child("actuation"), scene.step_s);
   scene.plant = read_plant(in, in.child("plant"), scene.actuation.type);
-  scene.safety = read_safety(in.child("safety"), scene);
+  scene.safety = read_safety(in.child("safety"));
   scene.events = read_events(in, base_dir, scene);
   return scene;
 }

@@ -173,15 +173,17 @@ Json model_json(const ModelFlags& model) {
   return out;
 }
 
-Json safety_json(const Safety& safety) {
-  Json out{{"type", to_string(safety.type)}};
-  if (safety.type != SafetyType::shield) return out;
-  out["margin_m"] = safety.margin_m;
-  out["torque_share"] = safety.torque_share;
-  out["tracking_rad"] = safety.tracking_rad;
-  out["mass_error"] = safety.mass_error;
-  out["friction_share"] = safety.friction_share;
-  out["joint_noise_rad"] = safety.joint_noise_rad;
+Json safety_json(const Scene& scene) {
+  const SafetyType type = safety_type(scene);
+  Json out{{"type", to_string(type)}};
+  if (type != SafetyType::shield) return out;
+  const SafetyBounds bounds = safety_bounds(scene);
+  out["margin_m"] = bounds.margin_m;
+  out["torque_share"] = bounds.torque_share;
+  out["tracking_rad"] = bounds.tracking_rad;
+  out["mass_error"] = bounds.mass_error;
+  out["friction_share"] = bounds.friction_share;
+  out["joint_noise_rad"] = bounds.joint_noise_rad;
   return out;
 }
 
@@ -388,7 +390,7 @@ Json resolved_json(const Scene& scene) {
   out["model"] = model_json(scene.model);
   out["actuation"] = actuation_json(scene.actuation);
   if (scene.plant != PlantType::hamelin) out["plant"] = {{"type", to_string(scene.plant)}};
-  out["safety"] = safety_json(scene.safety);
+  out["safety"] = safety_json(scene);
   out["planner"] = scene.planner ? choice_json(*scene.planner) : Json(nullptr);
   if (scene.planner && scene.guide.type != GuideType::none) add_guide(scene.guide, out["planner"]);
   out["integrator"] = choice_json(scene.integrator);

@@ -149,6 +149,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   control::Controller::Options options;
   options.obstacles_max = 0;  // no more than the scene's
   options.prepare_maps = false;
+  options.fixed_world = true;
   options.path_points_max = 0;   // no more than the scene's
   options.guide_thread = false;  // results do not depend on the speed of the machine
   options.certify = false;       // the judge does, for every step and with all obstacles
@@ -171,7 +172,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
                                                       std::move(options));
   if (!controller_sees_all(scene))
     own_judge_ = std::make_unique<control::WorldView>(scene, model_, controller_->view());
-  certifies_ = scene.safety.type != scene::SafetyType::none;
+  certifies_ = scene::safety_type(scene) != scene::SafetyType::none;
   judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
   if (judge_->has_self() && !judge_->self_field()->note().empty())
     result_.warnings.push_back(judge_->self_field()->note());

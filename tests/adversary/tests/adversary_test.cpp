@@ -105,7 +105,7 @@ TEST_CASE("estimated velocities keep their limits, also where friction and masse
       scene.actuation.planner_mass_scale = 0.9;
       scene.safety.mass_error = 0.1;
       scene.actuation.estimates_velocity = true;
-      scene.actuation.joint_noise_rad = scene.safety.joint_noise_rad = 1e-4;
+      scene.safety.joint_noise_rad = scene.actuation.joint_noise_rad = 1e-4;
       const log::Result result = simulation::run(scene, plugins, {});
       check_safe(scene, result);
       CHECK(result.speed_excess == 0.0);

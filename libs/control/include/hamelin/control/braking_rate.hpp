@@ -25,8 +25,8 @@ class BrakingRate {
   [[nodiscard]] std::optional<double> find(const Eigen::VectorXd& q, const Eigen::VectorXd& w,
                                            double least_utilisation);
   static constexpr double usual_utilisation = 0.7, full_utilisation = 0.95;
-  /// The largest |torque| that the motion of the last call of find() requires at the rate that was
-  /// tried last, as a share of what is allowed.
+  /// A bound of the largest |torque| that the motion of the last call of find() requires at the
+  /// rate that was tried last, between the points of the line, too, as a share of what is allowed.
   [[nodiscard]] double utilisation() const noexcept { return utilisation_; }
 
  private:
@@ -44,6 +44,7 @@ class BrakingRate {
   double utilisation_ = 0.0;
   dynamics::BatchWorkspace ws_;
   dynamics::StatesXd q_, v_, a_, with_rate_, without_;
+  Eigen::VectorXd rise_;  ///< of each torque between the points [Nm or N]
 };
 
 }  // namespace hamelin::control

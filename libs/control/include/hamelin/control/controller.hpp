@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/control/goal_tracker.hpp"
 #include "hamelin/control/guidance.hpp"
+#include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/control/loaded_arm.hpp"
@@ -28,10 +28,12 @@ namespace hamelin::control {
 
 /// Where a control loop is. running: towards a goal. reached: all goals met; the planner holds the
 /// last one. stalled: by the scene's stall rule. gave_up: by the planner's own judgement. stopping:
-/// the planner failed, and the arm is brought to rest.
+/// the planner failed, or a measurement or its time cannot be used, and the arm is brought to rest
+/// and held until reset().
 enum class ControlState : std::int32_t { running, reached, stalled, gave_up, stopping };
 
-/// The answer of a tick. References stay valid until the next tick.
+/// The answer of a tick; its torques, positions and velocities are always finite. References stay
+/// valid until the next tick.
 struct Answer {
   ControlState state = ControlState::running;
   std::string_view cause;  ///< why it gave up or stops: one line, or empty
@@ -74,9 +76,10 @@ struct ControllerOptions {
   ObservationOptions observations{};  ///< see World::Options
   /// Prove that the motion since the last tick was clear, see Certificate; certify() has it.
   bool certify = true;
-  std::optional<double> period_s;  ///< time between two ticks; none: that of the scene
-  bool torque = true;              ///< fill Answer::torque
-  bool position = false;           ///< fill Answer::q_next and v_next, and Answer::torque
+  /// Time between two ticks [s], at most 1; none: that of the scene.
+  std::optional<double> period_s;
+  bool torque = true;     ///< fill Answer::torque
+  bool position = false;  ///< fill Answer::q_next and v_next, and Answer::torque
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³]:
   /// one value, or one per joint.
   std::vector<double> acceleration_max{15.0}, jerk_max{5000.0};
@@ -102,6 +105,9 @@ struct ControllerOptions {
   /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
   /// measured time, so it differs from run to run.
   bool log_overrun = true;
+  /// Nothing will be added to the world, so that a scene in which the arm can hit or pass nothing
+  /// needs no shield. Else a controller has a shield unless its scene refuses one (safety.type).
+  bool fixed_world = false;
 };
 
 /// The control loop of an arm: the world that it sees, its planner, goals and limits, without a
@@ -113,6 +119,8 @@ class Controller {
   using Options = ControllerOptions;
 
   /// A controller for a scene file: robot, map, obstacles, goals, limits, planner, control period.
+  /// The outputs that are asked for decide which bounds of safety hold, not the actuation that the
+  /// scene was written for: torques are sent sampled, and positions to servos.
   /// @param plugin_directories where the planner is searched for, in order
   /// @throws Error for bad input: files, goals that do not fit the robot, parameters, a planner
   /// that
@@ -178,11 +186,13 @@ class Controller {
   [[nodiscard]] Json planner_params() const;
 
   /// observe() and decide().
-  /// @param time_s of the measurement; must increase from tick to tick
+  /// @param time_s of the measurement; must increase from tick to tick. If it does not, or is not
+  ///        finite, the arm is brought to rest.
   /// @param q, v measured joint positions and velocities; dof numbers each. v is not used if the
-  ///        scene lets the controller estimate velocities. If they are not finite, the arm is
-  ///        brought to rest.
-  /// @throws Error invalid if those of the first tick are not finite
+  ///        scene lets the controller estimate velocities. If one of them is not finite or beyond
+  ///        1e6, the arm is brought to rest.
+  /// @throws Error invalid for arrays of another size, or if the time, q or v of the first tick
+  ///         cannot be used
   const Answer& tick(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
 
   /// The first half of a tick: takes the newest snapshot, finds near obstacles, checks goals and
@@ -212,11 +222,15 @@ class Controller {
   [[nodiscard]] const std::optional<Certificate::Verdict>& verdict() const noexcept {
     return verdict_;
   }
-  /// Forgets goals that were reached, the last motion and limits' history, for a new start; so does
-  /// the planner at the next tick, if it can. For the thread of tick().
+  /// A new start, for instance after the arm was guided by hand: the next ticks are those of a
+  /// controller that was just made, with the goals, the parameters, the load and the world that are
+  /// in force. A planner that cannot be told of a new start is made again. For the thread of
+  /// tick(), between two ticks; this takes milliseconds.
+  /// @throws Error plugin if the planner refuses to start again; do not call tick() then
   void reset();
 
-  /// The scene's shield; null if it asks for none.
+  /// The shield; null if the scene refuses one, or needs none, see Options::fixed_world. Another
+  /// object after reset() and whenever the load changes.
   [[nodiscard]] Shield* shield() noexcept { return arm_->shield.get(); }
   /// What the shield keeps the arm from, at the last tick.
   [[nodiscard]] Shield::Surroundings surroundings() const noexcept {
@@ -269,11 +283,14 @@ class Controller {
   /// load_mutex_.
   [[nodiscard]] const std::vector<scene::Payload>& payloads() const;
   void take_load();
-  /// Why the arm cannot begin with the load; empty if it can.
-  [[nodiscard]] std::string load_defect(LoadedArm& fresh);
-  void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// Why the arm cannot begin with the load, in load_refusal_; empty if it can.
+  [[nodiscard]] std::string_view load_defect(LoadedArm& fresh);
+  void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
+  void lose_measurement(double time_s, bool in_order);
   void take_braking_state();
   void start_outputs();
+  void make_guidance();
   void take_goals();
   /// Notes whether these goals follow a streamed target.
   void expect_target(const std::vector<scene::Goal>& goals);
@@ -292,8 +309,10 @@ class Controller {
   void log_first_overrun();
   [[nodiscard]] double braking_time_s() const;
   void start_braking(std::string_view cause);
-  void form_torque();
-  void form_position();
+  /// Sums the planner's channels, or brakes. @return whether the result can be sent
+  [[nodiscard]] bool form_outputs();
+  [[nodiscard]] bool form_torque();
+  [[nodiscard]] bool form_position();
   /// Replaces an output that the shield refuses by that of its stop.
   void shield_torque();
   void shield_position();
@@ -301,8 +320,8 @@ class Controller {
   /// Positions follow from the torque where the planner sets no velocity.
   [[nodiscard]] bool forms_torque() const noexcept { return options_.torque || options_.position; }
 
-  scene::Scene scene_;
   Options options_;
+  scene::Scene scene_;  ///< with the actuation and the safety that are in force
   double period_s_, deadline_s_;
   std::size_t path_points_max_;
   planning::Plugin plugin_;
@@ -345,11 +364,11 @@ class Controller {
   std::optional<Certificate::Verdict> verdict_;
 
   long k_ = 0;
-  bool measured_ = true;  ///< whether the last measurement is finite
+  std::string_view lost_;  ///< why the last measurement cannot be used; empty if it can
   std::string_view failure_;
-  int late_answers_ = 0;             ///< in a row
-  std::array<char, 192> late_line_;  ///< memory of failure_ where answers were late
-  std::string load_refusal_;
+  int late_answers_ = 0;  ///< in a row
+  /// Memory of lost_, of failure_ where answers were late, and of answer_.load_refusal.
+  LineBuffer lost_line_, late_line_, load_refusal_;
   bool reset_ = false;  ///< whether the planner is to be told of a new start
   Eigen::VectorXd q_, v_, rate_, command_rate_;
   Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest

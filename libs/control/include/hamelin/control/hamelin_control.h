@@ -3,9 +3,11 @@
 /*
  * The controller of an arm for programs in C and other languages; controller.hpp and world.hpp
  * describe what it does. Functions that can fail return 0 on success; otherwise they write one
- * line, nul-terminated, to `error` (error_size bytes) and have no effect. Structs begin with their
- * size in bytes, and fields are only appended to them. SI units and radians; poses are in the world
- * frame.
+ * line, nul-terminated, to `error` (error_size bytes; null: not written) and have no effect. A null
+ * pointer where a value is expected is such a failure; no function throws or aborts. Structs begin
+ * with their size in bytes, and fields are only appended to them. Numbers that are optional have a
+ * default, which 0 selects; negative numbers and NaN are refused. SI units and radians; poses are
+ * in the world frame.
  *
  * hamelin_controller_tick is called by one thread. It neither allocates nor locks, unless the
  * planner declares that it does. All functions that change goals, parameters or the world may be
@@ -50,10 +52,12 @@ enum {
   HAMELIN_CONTROL_REACHED = 1, /* all goals were reached; the planner holds the last one */
   HAMELIN_CONTROL_STALLED = 2, /* by the scene's stall rule */
   HAMELIN_CONTROL_GAVE_UP = 3, /* by the planner's own judgement */
-  HAMELIN_CONTROL_STOPPING = 4 /* the planner failed; the arm is brought to rest */
+  /* The planner failed, or a measurement or its time cannot be used: the arm is brought to rest and
+   * held until hamelin_controller_reset. */
+  HAMELIN_CONTROL_STOPPING = 4
 };
 
-/* Arrays have one number per joint and stay valid until the next tick. */
+/* Arrays have one number per joint, all finite, and stay valid until the next tick. */
 typedef struct hamelin_answer {
   uint32_t struct_size;          /* set by the caller */
   int32_t state;                 /* HAMELIN_CONTROL_... */
@@ -131,13 +135,20 @@ typedef struct hamelin_observation {
 /* Returns null on failure. */
 hamelin_controller* hamelin_controller_create(const hamelin_controller_options* options,
                                               char* error, size_t error_size);
-void hamelin_controller_destroy(hamelin_controller* controller); /* null is allowed */
-size_t hamelin_controller_dof(const hamelin_controller* controller);
-double hamelin_controller_period_s(const hamelin_controller* controller);
+void hamelin_controller_destroy(hamelin_controller* controller);          /* null is allowed */
+size_t hamelin_controller_dof(const hamelin_controller* controller);      /* 0 for null */
+double hamelin_controller_period_s(const hamelin_controller* controller); /* 0 for null */
 
-/* q and v: measured joint positions and velocities. */
-void hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
-                             const double* v, hamelin_answer* answer);
+/* q and v: measured joint positions and velocities. Times must increase. Fails if the arm cannot
+ * begin: the first measurement cannot be used, or the arm could not stop where it is. Then the
+ * state is HAMELIN_CONTROL_STOPPING, cause says why, and torque, q_next and v_next are null: send
+ * nothing to the arm. */
+int32_t hamelin_controller_tick(hamelin_controller* controller, double time_s, const double* q,
+                                const double* v, hamelin_answer* answer);
+/* A new start, for instance after the arm was guided by hand: the next ticks are those of a
+ * controller that was just made, with the goals, parameters, load and world that are in force. For
+ * the thread of hamelin_controller_tick; this takes milliseconds. */
+int32_t hamelin_controller_reset(hamelin_controller* controller, char* error, size_t error_size);
 
 /* What is believed of a stream of targets, see scene::TargetStream. 0 selects the default. */
 typedef struct hamelin_target_stream {
@@ -150,8 +161,7 @@ typedef struct hamelin_target_stream {
 } hamelin_target_stream;
 
 /* The goals, replaced by one, from the next tick on; by any thread. *number, unless null, receives
- * what hamelin_answer.goals will be. Tolerances of zero or less select the defaults of scene
- * files. */
+ * what hamelin_answer.goals will be. Tolerances of 0 select the defaults of scene files. */
 int32_t hamelin_controller_set_joint_goal(hamelin_controller* controller, const double* q,
                                           double tolerance_rad, uint64_t* number, char* error,
                                           size_t error_size);
@@ -161,8 +171,8 @@ int32_t hamelin_controller_set_pose_goal(hamelin_controller* controller, const d
                                          double tolerance_rad, uint64_t* number, char* error,
                                          size_t error_size);
 /* A motion over time: `points` times in s, the first 0, and at each of them dof positions,
- * velocities and accelerations, point by point; accelerations may be null. The arm must follow it in
- * time and waits nowhere else than where it is held up. The planner must be one that follows
+ * velocities and accelerations, point by point; accelerations may be null. The arm must follow it
+ * in time and waits nowhere else than where it is held up. The planner must be one that follows
  * trajectories, such as hybrid. */
 int32_t hamelin_controller_set_trajectory(hamelin_controller* controller, const double* time_s,
                                           const double* q, const double* v, const double* a,

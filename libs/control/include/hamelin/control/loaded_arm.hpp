@@ -48,9 +48,13 @@ struct LoadedArm {
   LoadedArm(const LoadedArm&) = delete;
   LoadedArm& operator=(const LoadedArm&) = delete;
 
+  /// Forgets what the arm has done: what it has is made again, but a planner that can be told of a
+  /// new start. @return whether the planner was made again
+  [[nodiscard]] bool restart(scene::Scene scene, const Json& params, const Common& common);
+
   const model::Model model;
   WorldView view;
-  std::unique_ptr<Shield> shield;  ///< null if the scene asks for none
+  std::unique_ptr<Shield> shield;  ///< null if there is none
   PlannerHost planner;
   TorqueLimits limits;
   ChannelSum sum;
@@ -60,6 +64,12 @@ struct LoadedArm {
 
  private:
   [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene, const Common& common);
+  [[nodiscard]] std::unique_ptr<Shield> make_shield(const scene::Scene& scene,
+                                                    const Common& common) const;
+  [[nodiscard]] std::unique_ptr<GuideSearch> make_guide(const scene::Scene& scene,
+                                                        const Json& params, const Common& common);
+
+  Eigen::VectorXd start_q_;  ///< for which it was made
 };
 
 /// A model of the arm that carries payloads. Parts of the arm that a payload touches when it is

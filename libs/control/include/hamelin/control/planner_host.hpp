@@ -45,6 +45,8 @@ class PlannerHost final : private planning::HostServices {
                           const PlannerGoal& goal, const Eigen::VectorXd* torque);
   /// Tells the planner that the next tick is a new start.
   void reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept { planner_.reset(q, v); }
+  /// Makes the planner again. @throws Error as the constructor
+  void restart(planning::SetupData setup, const Json& params);
   /// See LoadedPlanner.
   [[nodiscard]] planning::PreparedParams prepare_params(const Json& checked) const {
     return planner_.prepare_params(checked);

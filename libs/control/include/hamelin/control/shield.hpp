@@ -14,6 +14,7 @@
 #include "hamelin/control/braking_rate.hpp"
 #include "hamelin/control/fail_safe.hpp"
 #include "hamelin/control/levers.hpp"
+#include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/line_check.hpp"
 #include "hamelin/control/move_time.hpp"
 #include "hamelin/control/mover_check.hpp"
@@ -159,6 +160,8 @@ class Shield {
   [[nodiscard]] double largest_margin_m() const { return largest_margin_ + margin_m_; }
   /// Describes what was in the way: "link 'hand' would come too near the map".
   [[nodiscard]] std::string describe(const scene::Environment& environment) const;
+  /// The same at the end of a line, without allocating.
+  void describe(const scene::Environment& environment, LineBuffer& line) const;
 
  private:
   /// Sets what is kept from the limits. @param q where the arm starts
@@ -208,9 +211,14 @@ class Shield {
   void note_proof();
   /// Sets refusal_ to the obstacle that comes nearest.
   void blame(const Surroundings& world);
-  /// @param lead_s time from now to that from which on the motion is examined
-  [[nodiscard]] Foresight prove(MoverCheck& check, const Surroundings& world,
-                                const FailSafe& motion, double from_s, double lead_s);
+  /// A motion among moving obstacles, by how much the arm may stray from it, where the arm is on
+  /// it, and the time from now to then.
+  struct Examined {
+    const FailSafe& motion;
+    const Straying::Bounds& stray;
+    double from_s, lead_s;
+  };
+  [[nodiscard]] Foresight prove(MoverCheck& check, const Surroundings& world, const Examined& of);
   [[nodiscard]] Foresight find_fail_safe(const Surroundings& world, const Step& step);
   /// Adds a move to tried_, one of those that come into question, if it is clear.
   /// @param stopped the check of the stop alone @param from_s where the arm is on it
@@ -225,7 +233,7 @@ class Shield {
   [[nodiscard]] bool line_is_clear(LineCheck& line, const Surroundings& world,
                                    const LineCheck::End& from, const Eigen::VectorXd& to);
   [[nodiscard]] bool within_velocity(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
-  [[nodiscard]] bool within_joint_limits(const Eigen::VectorXd& from, const Eigen::VectorXd& to);
+  [[nodiscard]] bool within_joint_limits(const Step& step);
   [[nodiscard]] bool is_clear(LineCheck& line, const Surroundings& world,
                               const LineCheck::End& from, const LineCheck::End& to,
                               const Eigen::VectorXd& stray, double more_m = 0.0);
@@ -239,7 +247,8 @@ class Shield {
   const model::Model& model_;
   const scene::SelfField* self_;
   std::string scene_name_;
-  bool sampled_;  ///< whether actuation is not ideal
+  std::vector<std::string> shape_names_, pair_names_;  ///< for describe()
+  bool sampled_;                                       ///< whether actuation is not ideal
   double period_s_, margin_m_;
   long dwell_;            ///< steps that a stop lasts at least, unless it ends before
   double feedback_rate_;  ///< ω [1/s]
@@ -256,9 +265,10 @@ class Shield {
   dynamics::Workspace ws_;
   FailSafe stop_, tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
-  Eigen::VectorXd stop_stray_;   ///< by how much joints may stray from stop_ [rad or m]
-  Eigen::VectorXd integral_;     ///< of the deviation from stop_, times ω [rad or m]
-  Eigen::VectorXd no_addition_;  ///< of size zero
+  Straying::Bounds stop_bounds_;  ///< of stop_
+  Eigen::VectorXd stop_stray_;    ///< by how much joints may stray from stop_ [rad or m]
+  Eigen::VectorXd integral_;      ///< of the deviation from stop_, times ω [rad or m]
+  Eigen::VectorXd no_addition_;   ///< of size zero
   double largest_margin_ = 0.0;
   Eigen::VectorXd line_stray_, zero_, w_;
   Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_, acceleration_;

@@ -27,6 +27,12 @@ class StopMotion {
   /// Where the line begins, and where the motion ends.
   [[nodiscard]] const Eigen::VectorXd& line_start() const noexcept { return q_line_; }
   [[nodiscard]] const Eigen::VectorXd& end() const noexcept { return q_end_; }
+  /// The least and the largest position of joint j during the whole motion: within the ramp the
+  /// joint may turn back, and on the line it moves one way.
+  struct Range {
+    double least, largest;
+  };
+  [[nodiscard]] Range range(Eigen::Index j) const;
   /// a₀ [rad/s² or m/s²].
   [[nodiscard]] const Eigen::VectorXd& acceleration() const noexcept { return a_; }
   /// w [rad/s or m/s].

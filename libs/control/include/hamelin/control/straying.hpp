@@ -23,18 +23,27 @@ class Straying {
   Straying(const scene::Scene& scene, const model::Model& model, const Levers& levers,
            double period_s, double feedback_rate, double torque_rate);
 
+  /// By how much the arm may stray from a motion.
+  struct Bounds {
+    Eigen::VectorXd tracking;  ///< what the motion itself causes, of each joint [rad or m]
+    /// What errors of the model and noise cause in addition, of each joint [rad or m].
+    Eigen::VectorXd errors;
+    /// The same of each shape [m], far less than the joints' added up; of size zero: none.
+    Eigen::VectorXd shapes;
+    /// Raises them to others where these are larger.
+    void include(const Bounds& others);
+  };
+
   /// Sets the bounds for a stop.
   void bound(const StopMotion& stop);
   /// Sets the bounds for an arm that rests at q.
   void bound_at_rest(const Eigen::VectorXd& q);
   /// Raises them, where need be, to those of the move of a FailSafe after its stop.
   void include_move(const FailSafe& motion);
-  /// What the motion itself causes, of each joint [rad or m].
-  [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return tracking_; }
-  /// What errors of the model and noise cause in addition, of each joint [rad or m].
-  [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return errors_; }
-  /// The same of each shape [m], far less than the joints' added up; of size zero: none.
-  [[nodiscard]] const Eigen::VectorXd& shapes() const noexcept { return shapes_; }
+  [[nodiscard]] const Bounds& bounds() const noexcept { return bounds_; }
+  [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return bounds_.tracking; }
+  [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return bounds_.errors; }
+  [[nodiscard]] const Eigen::VectorXd& shapes() const noexcept { return bounds_.shapes; }
   /// Bound of the friction that the model does not have, of each joint [Nm or N].
   [[nodiscard]] const Eigen::VectorXd& friction() const noexcept { return friction_; }
   /// Bound of the noise of measured joint positions [rad or m].
@@ -56,13 +65,14 @@ class Straying {
     const Eigen::VectorXd &q, &velocity, &acceleration;
     double duration_s, ramp_s;
   };
-  void bound(const Effort& effort);
-  void add_model_errors(const Effort& effort);
+  void begin(const Eigen::VectorXd& acceleration);
+  /// Raises errors and shapes to what errors of the model cause there.
+  void include_model_errors(const Effort& effort);
   void add_noise();
   /// Sets mass_ and mass_inverse_.
   void invert_mass(const Eigen::VectorXd& q);
-  /// Sets shapes_ for the unexplained torque torque_.
-  void bound_shapes(const Eigen::VectorXd& q, double compliance_s2);
+  /// Raises the shapes' bounds to those for the unexplained torque torque_.
+  void include_shapes(const Eigen::VectorXd& q, double compliance_s2);
 
   const model::Model& model_;
   const Levers& levers_;
@@ -71,11 +81,13 @@ class Straying {
   double mass_error_;         ///< bound of unexplained torques as a share of the model's own
   Eigen::VectorXd friction_;  ///< bound of unexplained friction of each joint [Nm or N]
   double noise_;
-  double compliance_s2_;     ///< by how much a joint strays per unexplained acceleration
+  /// By how much a joint strays per bound of an unexplained acceleration, whatever its course.
+  double compliance_s2_;
+  double estimate_s2_;       ///< the same for wrong estimates of velocity
   double velocity_error_s_;  ///< of a velocity per unexplained acceleration
   Eigen::VectorXd stated_;   ///< safety.tracking_rad
-  Eigen::VectorXd tracking_, errors_, shapes_;
-  Eigen::VectorXd before_tracking_, before_errors_, before_shapes_, velocity_, acceleration_;
+  Bounds bounds_, before_;
+  Eigen::VectorXd q_, velocity_, acceleration_;
   Eigen::MatrixXd mass_, mass_inverse_;
   Eigen::LLT<Eigen::MatrixXd> factors_;
   Eigen::VectorXd torque_, bias_;

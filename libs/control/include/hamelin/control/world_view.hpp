@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hamelin/control/certificate.hpp"
+#include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -108,6 +109,8 @@ class WorldView {
   /// Describes the contact at the last look(): what touches what, how deep, when, and the exit
   /// direction.
   [[nodiscard]] std::string describe_contact() const;
+  /// The contact of a load, in short and without allocating, at the end of a line.
+  void describe_contact(LineBuffer& line) const;
   /// Obstacles that became visible at the last look(), as indices into environment().obstacles().
   [[nodiscard]] std::span<const int> revealed() const noexcept { return revealed_; }
   /// 1, or less if the arm is in unknown space that is to be crossed slowly.

@@ -152,17 +152,24 @@ enum class SafetyType : std::int32_t { shield, certificate, none };
 
 [[nodiscard]] std::string_view to_string(SafetyType type) noexcept;
 
-/// The safety of a run, with bounds of the errors that the shield's margins cover.
+/// The safety of a run, with bounds of the errors that the shield's margins cover. What is not
+/// stated depends on the scene and on the actuation in force: safety_type(), safety_bounds().
 struct Safety {
-  SafetyType type = SafetyType::none;
-  double margin_m = 0.0;       ///< distance kept beyond what the bounds require
-  double torque_share = 0.8;   ///< of the torque limits, that a stop may use
-  double tracking_rad = 1e-5;  ///< by how much a joint strays from the motion of a stop if all is
-                               ///< as modelled [rad or m]
-  double mass_error =
-      0.0;  ///< of the controller's masses and inertias, as a share of the true ones
-  double friction_share = 0.0;   ///< dry friction that is not modelled, of the effort limits
-  double joint_noise_rad = 0.0;  ///< standard deviation of measured joint positions [rad or m]
+  std::optional<SafetyType> type;
+  double margin_m = 0.0;               ///< distance kept beyond what the bounds require
+  std::optional<double> torque_share;  ///< of the torque limits, that a stop may use
+  /// By how much a joint strays from the motion of a stop if all is as modelled [rad or m].
+  std::optional<double> tracking_rad;
+  /// Of the controller's masses and inertias, as a share of the true ones.
+  double mass_error = 0.0;
+  double friction_share = 0.0;  ///< dry friction that is not modelled, of the effort limits
+  /// Standard deviation of measured joint positions [rad or m].
+  std::optional<double> joint_noise_rad;
+};
+
+/// The bounds of Safety, all of them.
+struct SafetyBounds {
+  double margin_m, torque_share, tracking_rad, mass_error, friction_share, joint_noise_rad;
 };
 
 /// What simulates the arm: hamelin's own integrators, or MuJoCo.
@@ -232,6 +239,14 @@ struct Scene {
   double step_s = 0.001, duration_s = 10.0;
   std::uint64_t seed = 1;
 };
+
+/// The bounds that the scene states, and defaults for the type of its actuation where it states
+/// none: torques that act late, and are held for a period, are followed less exactly.
+[[nodiscard]] SafetyBounds safety_bounds(const Scene& scene);
+
+/// How a run of the scene is kept safe, if nothing is added to its world: what it states, else a
+/// shield where the arm could hit or pass anything that is modelled.
+[[nodiscard]] SafetyType safety_type(const Scene& scene);
 
 /// The file of a follow goal's way-points or stream; empty: none.
 [[nodiscard]] std::filesystem::path target_file(const Goal& goal);

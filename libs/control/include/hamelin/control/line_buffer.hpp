@@ -1,0 +1,25 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace hamelin::control {
+
+/// Memory for a line that a tick makes, which must not allocate. What does not fit is cut.
+class LineBuffer {
+ public:
+  static constexpr std::size_t size_max = 512;
+  [[nodiscard]] std::string_view view() const noexcept { return {text_.data(), size_}; }
+  void clear() noexcept { size_ = 0; }
+
+  /// What is free, and that so much of it was written.
+  [[nodiscard]] char* end() noexcept { return text_.data() + size_; }
+  [[nodiscard]] std::size_t room() const noexcept { return size_max - size_; }
+  void extend(std::size_t written) noexcept { size_ += written < room() ? written : room(); }
+
+ private:
+  std::array<char, size_max> text_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace hamelin::control
