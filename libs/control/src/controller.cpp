@@ -267,7 +267,7 @@ void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
                 fmt::format("the measured q and v: {} and {} values given, expected {} each (one "
                             "per joint of '{}')",
                             q.size(), v.size(), dof, nominal_.robot().name));
-  const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s > time_s_),
+  const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s >= time_s_),
              usable = within(q, measured_max) && (estimator_ || within(v, measured_max));
   if (!in_order || !usable) lose_measurement(time_s, in_order);
   // what moves goes on as predicted while the clock cannot be used
@@ -305,7 +305,7 @@ void Controller::lose_measurement(double time_s, bool in_order) {
            "have measured",
            measured_max);
   else if (std::isfinite(time_s))
-    append(line, "time_s: {} is not after that of the last tick, {}, expected times that increase",
+    append(line, "time_s: {} is before that of the last tick, {}, expected times that do not fall",
            time_s, time_s_.load());
   else
     append(line, "time_s: is not finite, expected the time of the measurement");

@@ -262,7 +262,7 @@ TEST_CASE("measurements that are not finite for a while end in rest", "[control]
   const VectorXd nowhere =
       VectorXd::Constant(loop.v.size(), std::numeric_limits<double>::quiet_NaN());
   CHECK_THROWS_WITH(loop.controller.tick(0.0, nowhere, loop.v),
-                    "the first measured q or v is not finite, expected numbers");
+                    Contains("the measured q or v is not finite"));
   for (int k = 0; k < 300; ++k) loop.step(loop.tick().torque);
   REQUIRE(loop.v.norm() > 0.1);
   const int lost = GENERATE(1, 50);
@@ -271,7 +271,7 @@ TEST_CASE("measurements that are not finite for a while end in rest", "[control]
     const control::Answer& answer = loop.controller.tick(
         loop.state.time_s, good ? loop.state.q : nowhere, good ? loop.v : nowhere);
     CHECK(answer.state == control::ControlState::stopping);
-    CHECK(answer.cause == "the measured q or v is not finite, expected numbers");
+    CHECK_THAT(std::string(answer.cause), Contains("the measured q or v is not finite"));
     REQUIRE(answer.torque.allFinite());
     loop.step(answer.torque);
   }

@@ -139,7 +139,7 @@ void hamelin_controller_destroy(hamelin_controller* controller);          /* nul
 size_t hamelin_controller_dof(const hamelin_controller* controller);      /* 0 for null */
 double hamelin_controller_period_s(const hamelin_controller* controller); /* 0 for null */
 
-/* q and v: measured joint positions and velocities. Times must increase. Fails if the arm cannot
+/* q and v: measured joint positions and velocities. Times do not fall. Fails if the arm cannot
  * begin: the first measurement cannot be used, or the arm could not stop where it is. Then the
  * state is HAMELIN_CONTROL_STOPPING, cause says why, and torque, q_next and v_next are null: send
  * nothing to the arm. */
