@@ -3,9 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <optional>
 
+#include "check_pose.hpp"
+#include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 
 namespace hamelin::model {
@@ -211,6 +214,52 @@ double reach_of(const Robot& robot, const std::vector<SE3>& frames) {
   return reach;
 }
 
+// FNV-1a over 64-bit words, with a shift because a product carries nothing to lower bits.
+class Hash {
+ public:
+  Hash& add(std::uint64_t word) {
+    value_ = (value_ ^ word) * 0x100000001b3U;
+    value_ ^= value_ >> 32;
+    return *this;
+  }
+  Hash& add(double number) { return add(std::bit_cast<std::uint64_t>(number + 0.0)); }  // no −0
+  Hash& add(const SE3& pose) {
+    for (const double x : pose.R().reshaped()) add(x);
+    for (const double x : pose.p()) add(x);
+    return *this;
+  }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325U;
+};
+
+void add(Hash& hash, const SpatialChain& chain) {
+  hash.add(chain.gravity.x).add(chain.gravity.y).add(chain.gravity.z);
+  for (const SpatialLink& l : chain.links) {
+    hash.add(std::uint64_t{l.prismatic}).add(l.cos_alpha).add(l.sin_alpha).add(l.offset);
+    hash.add(l.p0.x).add(l.p0.y).add(l.p0.z).add(l.armature).add(l.mass);
+    hash.add(l.moment.x).add(l.moment.y).add(l.moment.z);
+    const auto& I = l.inertia;
+    hash.add(I.xx).add(I.xy).add(I.xz).add(I.yy).add(I.yz).add(I.zz);
+  }
+}
+void add(Hash& hash, const PlanarChain& chain) {
+  hash.add(chain.gravity_x).add(chain.gravity_y);
+  for (const PlanarLink& l : chain.links) {
+    hash.add(std::uint64_t{l.prismatic}).add(l.direction).add(l.offset).add(l.p0x).add(l.p0y);
+    hash.add(l.armature).add(l.mass).add(l.moment_x).add(l.moment_y).add(l.inertia);
+  }
+}
+
+void check_placement(const std::string& robot, const SE3& base, const Vector3d& gravity) {
+  check_pose(base, robot, "the base");
+  if (!gravity.allFinite())
+    throw Error(ErrorCode::invalid,
+                formatted("{}: gravity is ({}, {}, {}), expected finite numbers", robot,
+                          gravity.x(), gravity.y(), gravity.z()));
+}
+
 }  // namespace
 
 Model::Identity::Identity() {
@@ -221,6 +270,7 @@ Model::Identity::Identity() {
 Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
     : robot_(std::move(robot)), base_(base), gravity_(gravity) {
   check(robot_, robot_.name);
+  check_placement(robot_.name, base_, gravity_);
   for (Link& link : robot_.links) link.inertia_kg_m2 = symmetric_part(link.inertia_kg_m2);
   std::vector<SE3> frames;
   if (const auto normal = plane_normal(robot_)) {
@@ -254,11 +304,28 @@ Model::Model(Robot robot, const SE3& base, const Vector3d& gravity)
   }
   tip_in_frame_ = frames[static_cast<std::size_t>(robot_.tip.link) + 1].inverse() * robot_.tip.pose;
   reach_ = reach_of(robot_, frames);
+  Hash hash;
+  hash.add(std::uint64_t{chain_.index()}).add(root_);
+  std::visit(
+      [&](const auto& chain) {
+        hash.add(chain.potential_constant);
+        add(hash, chain);
+      },
+      chain_);
+  for (const SE3& com : com_in_frame_) hash.add(com);
+  fingerprint_ = hash.value();
 }
 
 std::string Model::describe(const Shape& shape) const {
-  const Link& link = robot_.links[static_cast<std::size_t>(shape.link)];
-  const auto index = static_cast<std::size_t>(shape.index_in_link);
+  const auto& links = robot_.links;
+  const auto body = static_cast<std::size_t>(shape.link),
+             index = static_cast<std::size_t>(shape.index_in_link);
+  if (body >= links.size() ||
+      index >= (shape.is_capsule ? links[body].segments.size() : links[body].spheres.size()))
+    throw Error(ErrorCode::usage,
+                formatted("describe: '{}' has no shape {} on link {}, expected one of its shapes",
+                          robot_.name, shape.index_in_link, shape.link));
+  const Link& link = links[body];
   const std::string& part = shape.is_capsule ? link.segments[index].part : link.spheres[index].part;
   return formatted("{} {} of {} '{}'", shape.is_capsule ? "capsule" : "sphere", index,
                    part.empty() ? "link" : "part", part.empty() ? link.name : part);

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "check_pose.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/core/text.hpp"
@@ -53,13 +54,6 @@ void check_length(const Vector3d& p, const std::string& where, const char* what)
   if (!p.allFinite() || p.cwiseAbs().maxCoeff() > length_max_m)
     fail(where, formatted("{} is ({}, {}, {}), expected finite numbers up to {} m", what, p.x(),
                           p.y(), p.z(), length_max_m));
-}
-
-void check_pose(const SE3& g, const std::string& where, const char* what) {
-  check_length(g.p(), where, what);
-  const double off = (g.R() * g.R().transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(off <= unit_tolerance) || g.R().determinant() < 0.0)
-    fail(where, formatted("the rotation of {} is not a rotation matrix", what));
 }
 
 void check_joint(const Joint& joint, const std::string& where) {
@@ -200,6 +194,14 @@ void check_parts(const Robot& robot, const std::string& where) {
 }
 
 }  // namespace
+
+// Eigen's largest entry may drop a NaN, so finiteness is checked by itself.
+void check_pose(const SE3& g, const std::string& where, const char* what) {
+  check_length(g.p(), where, what);
+  const double off = (g.R() * g.R().transpose() - Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!g.R().allFinite() || !(off <= unit_tolerance) || g.R().determinant() < 0.0)
+    fail(where, formatted("the rotation of {} is not a rotation matrix", what));
+}
 
 std::string inertia_fault(const Matrix3d& inertia, bool definite) {
   constexpr double definite_tolerance = 1e-12;

@@ -181,3 +181,82 @@ TEST_CASE("inertias that are asymmetric by rounding only are accepted, others ar
   }
   CHECK(rounded > 10);
 }
+
+TEST_CASE("a base that is no pose and gravity that is no number are refused", "[model][input]") {
+  const auto robot = test::random_robot(5, 3);
+  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), down(0.0, 0.0, -9.81);
+  const double nan = std::nan("");
+  const auto refuses = [&](const Eigen::Matrix3d& R, const Eigen::Vector3d& p,
+                           const Eigen::Vector3d& gravity, const char* message) {
+    CHECK_THROWS_WITH(model::Model(robot, SE3(R, p), gravity), Catch::Contains(message));
+  };
+  refuses(2.0 * identity, zero, down, "random: the rotation of the base is not a rotation matrix");
+  refuses(-identity, zero, down, "random: the rotation of the base");
+  for (int k = 0; k < 9; ++k) {
+    Eigen::Matrix3d R = identity;
+    R.data()[k] = nan;
+    refuses(R, zero, down, "random: the rotation of the base");
+  }
+  for (int k = 0; k < 3; ++k) {
+    refuses(identity, nan * Eigen::Vector3d::Unit(k), down, "random: the base is (");
+    refuses(identity, zero, HUGE_VAL * Eigen::Vector3d::Unit(k), "random: gravity is (");
+  }
+  Rng rng(1);
+  const Eigen::Matrix3d R = test::random_rotation(rng);
+  CHECK_NOTHROW(
+      model::Model(robot, SE3(R * R * R.transpose(), Eigen::Vector3d(1.0, -2.0, 3.0)), zero));
+}
+
+TEST_CASE("models of equal numbers have one fingerprint, others have their own", "[model][unit]") {
+  const bool planar = GENERATE(false, true);
+  const auto robot = test::random_robot(5, 4, 3, planar);
+  const std::uint64_t own = model::Model(robot).fingerprint();
+  CHECK(model::Model(robot).fingerprint() == own);
+  CHECK(model::Model(model::Model(robot)).fingerprint() == own);
+  const Json written = description::robot_to_json(robot);
+  const auto read = [&] {
+    return model::Model(description::robot_from_json(written, "again")).fingerprint();
+  };
+  CHECK(read() == read());
+
+  auto renamed = robot;
+  renamed.name = "other";
+  renamed.links[1].joint.upper = 1.0;
+  renamed.links[2].spheres.clear();
+  CHECK(model::Model(renamed).fingerprint() == own);
+
+  const SE3 base(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix(),
+                 Eigen::Vector3d::Zero());
+  CHECK(model::Model(robot, base).fingerprint() != own);
+  CHECK(model::Model(robot, SE3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, 1e-9)))
+            .fingerprint() != own);
+  CHECK(model::Model(robot, SE3{}, Eigen::Vector3d(0.0, 0.0, -9.8)).fingerprint() != own);
+  const std::vector<std::function<void(model::Link&)>> changes{
+      [](auto& l) { l.mass_kg *= 1.0 + 1e-15; }, [](auto& l) { l.inertia_kg_m2 *= 1.0 + 1e-12; },
+      [](auto& l) { l.joint.armature = 1e-9; },
+      [](auto& l) { l.com = SE3(l.com.R(), l.com.p() + Eigen::Vector3d(1e-9, 1e-9, 1e-9)); }};
+  for (std::size_t link = 0; link < 4; ++link)
+    for (std::size_t change = 0; change < changes.size(); ++change) {
+      CAPTURE(link, change);
+      auto changed = robot;
+      changes[change](changed.links[link]);
+      CHECK(model::Model(changed).fingerprint() != own);
+    }
+}
+
+TEST_CASE("a shape of another model has no description", "[model][unit]") {
+  const model::Model model(test::random_robot(5, 3));
+  model::Model::Shape shape = model.shapes()[1];
+  CHECK(model.describe(shape) == "sphere 0 of link 'link1'");
+  shape.link = 3;
+  CHECK_THROWS_WITH(model.describe(shape), Catch::Contains("has no shape 0 on link 3"));
+  shape.link = -1;
+  CHECK_THROWS_WITH(model.describe(shape), Catch::Contains("link -1"));
+  shape.link = 1;
+  shape.index_in_link = 1;
+  CHECK_THROWS_WITH(model.describe(shape), Catch::Contains("has no shape 1"));
+  shape.is_capsule = true;
+  shape.index_in_link = 0;
+  CHECK_THROWS_WITH(model.describe(shape), Catch::Contains("has no shape 0"));
+}

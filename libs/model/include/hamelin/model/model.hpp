@@ -18,7 +18,8 @@ class Model {
  public:
   /// @param base pose of the robot's base frame in the world
   /// @param gravity acceleration of free fall [m/s²], world frame
-  /// @throws Error invalid, as check(robot) does
+  /// @throws Error invalid as check(robot), for a base that is no pose with finite numbers up to
+  ///         10⁴ m, and for gravity that is not finite
   explicit Model(Robot robot, const geometry::SE3& base = geometry::SE3{},
                  const Eigen::Vector3d& gravity = Eigen::Vector3d{0.0, 0.0, -9.81});
 
@@ -27,6 +28,11 @@ class Model {
   /// that it was made for. An address cannot serve, since a later model may get the same one. Zero
   /// after the model was moved from.
   [[nodiscard]] std::uint64_t id() const noexcept { return identity_.value; }
+  /// A hash of all numbers that the motion of the joints and its energies depend on: the joints,
+  /// frames and inertias of the links, rotors, base and gravity. Equal models have the same, also
+  /// if they were made one by one or read from a file again; names, limits and collision shapes do
+  /// not count. Only for comparisons within one program: it may change between versions.
+  [[nodiscard]] std::uint64_t fingerprint() const noexcept { return fingerprint_; }
   [[nodiscard]] const Robot& robot() const noexcept { return robot_; }
   [[nodiscard]] const geometry::SE3& base() const noexcept { return base_; }
   [[nodiscard]] const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
@@ -41,7 +47,7 @@ class Model {
   /// World pose of the chain's root frame. For a planar chain its z is the plane's normal.
   [[nodiscard]] const geometry::SE3& root() const noexcept { return root_; }
 
-  /// Pose of link i's COM frame in its joint-aligned frame (constant).
+  /// Pose of link i's COM frame in its joint-aligned frame (constant). The index is not checked.
   [[nodiscard]] const geometry::SE3& com_in_frame(int link) const {
     return com_in_frame_[static_cast<std::size_t>(link)];
   }
@@ -64,6 +70,7 @@ class Model {
   [[nodiscard]] bool has_capsules() const noexcept { return has_capsules_; }
   /// A shape's description for messages, for example "sphere 2 of link 'forearm'", or "sphere 2 of
   /// part 'cup'" for what was lumped into a link. The index is that in the link.
+  /// @throws Error usage for a shape that this model does not have
   [[nodiscard]] std::string describe(const Shape& shape) const;
 
   /// An upper bound over all q of the distance from the base to any point of a shape or to the tip
@@ -97,6 +104,7 @@ class Model {
   std::vector<Shape> shapes_;
   bool has_capsules_ = false;
   double reach_ = 0.0;
+  std::uint64_t fingerprint_ = 0;
 };
 
 }  // namespace hamelin::model
