@@ -133,7 +133,7 @@ void inverse_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
                                   MatrixRef dtau_da) {
   const detail::Call call("inverse_dynamics_derivatives", model, ws.ws.owner);
   const Index n = ws.ws.owner.dof;
-  call.joints("v", v).joints("a", a);
+  call.joints("q", q).joints("v", v).joints("a", a);
   check_square(call, n, "dtau_dq (rows)", "dtau_dq (columns)", dtau_dq);
   check_square(call, n, "dtau_dv (rows)", "dtau_dv (columns)", dtau_dv);
   check_square(call, n, "dtau_da (rows)", "dtau_da (columns)", dtau_da);
@@ -151,14 +151,17 @@ void forward_dynamics_derivatives(const Model& model, DerivativesWorkspace& ws,
                                   MatrixRef da_dv, MatrixRef da_dtau) {
   const detail::Call call("forward_dynamics_derivatives", model, ws.ws.owner);
   const Index n = ws.ws.owner.dof;
+  call.joints("q", q).joints("v", v).joints("tau", tau).joints("a", a);
   check_square(call, n, "da_dq (rows)", "da_dq (columns)", da_dq);
   check_square(call, n, "da_dv (rows)", "da_dv (columns)", da_dv);
   check_square(call, n, "da_dtau (rows)", "da_dtau (columns)", da_dtau);
-  forward_dynamics(model, ws.ws, q, v, tau, a);
+  VectorXd& acceleration = ws.ws.column_out;  // a may share memory with q and v
+  detail::forward_dynamics(model, ws.ws, q.data(), v.data(), tau.data(), acceleration.data());
   const Matrices out(ws);
-  compute(model, ws, out, q, v, a);
+  compute(model, ws, out, q, v, acceleration);
   ws.kernels->forward_dynamics(ws.links.size(), out.at(0), out.at(1), out.at(2), out.at(3),
                                out.at(4));
+  a = acceleration;
   out.copy(3, da_dq);
   out.copy(4, da_dv);
   out.copy(2, da_dtau);

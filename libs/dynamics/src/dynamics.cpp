@@ -1,5 +1,8 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
+#include <cstdint>
+#include <cstdlib>
+
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
@@ -23,6 +26,12 @@ std::size_t batch_bytes(const Model& model, const KernelSet& set) {
 
 }  // namespace
 
+WorkspaceOwner::WorkspaceOwner(const Model& model) : id(model.id()), dof(model.dof()) {
+  if (id == 0)
+    throw Error(ErrorCode::usage,
+                "a workspace: the model was moved from, expected a model to make it for");
+}
+
 Workspace::Workspace(const Model& model, Isa isa)
     : owner(model),
       kernels(&dynamics::kernels(isa)),
@@ -39,6 +48,15 @@ BatchWorkspace::BatchWorkspace(const Model& model, Isa isa)
 namespace detail {
 
 void refuse_workspace(const char* function, const Model& model, const WorkspaceOwner& owner) {
+  if (owner.id == WorkspaceOwner::no_model)
+    throw Error(ErrorCode::usage,
+                formatted("{}: the workspace was moved from, expected one made for this '{}'",
+                          function, model.robot().name));
+  if (owner.id == model.id())
+    throw Error(ErrorCode::usage,
+                formatted("{}: the workspace has no poses yet, expected a call of "
+                          "forward_kinematics before",
+                          function));
   throw Error(ErrorCode::usage, formatted("{}: the workspace was made for another model (of {} "
                                           "joints), expected one made for this '{}' "
                                           "(of {} joints) or a copy of it",
@@ -71,6 +89,26 @@ void refuse_count(const char* function, const char* argument, std::size_t given,
   throw Error(ErrorCode::usage,
               formatted("{}: {}: room for {} given, expected {} (one per collision shape)",
                         function, argument, given, expected));
+}
+
+void refuse_overlap(const char* function, const char* result, const char* argument) {
+  throw Error(ErrorCode::usage,
+              formatted("{}: {}: overlaps {} in part, expected the same numbers or none", function,
+                        result, argument));
+}
+
+// Numbers (r, c) of the one and (r', c') of the other are the same if their distance b − a is
+// (r − r') stride + c − c'.
+bool overlap_in_part(const double* a, const double* b, Eigen::Index rows, Eigen::Index cols,
+                     Eigen::Index stride) noexcept {
+  if (a == b || rows == 0 || cols == 0) return false;
+  const auto bytes = static_cast<std::intptr_t>(reinterpret_cast<std::uintptr_t>(b) -
+                                                reinterpret_cast<std::uintptr_t>(a));
+  const Eigen::Index distance = bytes / static_cast<std::intptr_t>(sizeof(double)),
+                     row = distance / stride;
+  for (const Eigen::Index k : {row - 1, row, row + 1})
+    if (std::abs(k) < rows && std::abs(distance - k * stride) < cols) return true;
+  return false;
 }
 
 void inverse_dynamics(const Model& model, Workspace& ws, const double* q, const double* v,

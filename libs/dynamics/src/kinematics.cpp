@@ -49,10 +49,15 @@ bool is_prismatic(const Model& model, int link) {
 }
 
 // Checks a link index that a caller gave.
-void check_link(const char* function, const Model& model, const Workspace& ws, int link) {
-  const detail::Call call(function, model, ws.owner);
+void check_link(const char* function, const Workspace& ws, int link) {
   if (link < 0 || link >= ws.owner.dof) [[unlikely]]
     detail::refuse_link(function, link, ws.owner.dof);
+}
+
+// Of a function that reads the pose of a link.
+void check_posed_link(const char* function, const Model& model, const Workspace& ws, int link) {
+  (void)detail::Call::with_poses(function, model, ws.owner);
+  check_link(function, ws, link);
 }
 
 int parent(const Model& model, int link) {
@@ -61,7 +66,7 @@ int parent(const Model& model, int link) {
 
 void check_shapes(const char* function, const char* argument, const Model& model,
                   const Workspace& ws, std::span<const Vector3d> given) {
-  const detail::Call call(function, model, ws.owner);
+  (void)detail::Call::with_poses(function, model, ws.owner);
   if (given.size() != model.shapes().size())
     detail::refuse_count(function, argument, given.size(), model.shapes().size());
 }
@@ -76,17 +81,17 @@ Vector3d velocity_column(const Model& model, const Workspace& ws, int j, const V
 
 Vector3d point_position(const Model& model, const Workspace& ws, int link,
                         const Vector3d& point_link) {
-  check_link("point_position", model, ws, link);
+  check_posed_link("point_position", model, ws, link);
   return frame(ws, link).p + frame(ws, link).R * (model.com_in_frame(link) * point_link);
 }
 
 geometry::SE3 link_pose(const Model& model, const Workspace& ws, int link) {
-  check_link("link_pose", model, ws, link);
+  check_posed_link("link_pose", model, ws, link);
   return geometry::SE3{frame(ws, link).R, frame(ws, link).p} * model.com_in_frame(link);
 }
 
 geometry::SE3 tip_pose(const Model& model, const Workspace& ws) {
-  const detail::Call call("tip_pose", model, ws.owner);
+  (void)detail::Call::with_poses("tip_pose", model, ws.owner);
   const Frame& f = frame(ws, model.robot().tip.link);
   return geometry::SE3{f.R, f.p} * model.tip_in_frame();
 }
@@ -108,7 +113,7 @@ void shape_half_axes(const Model& model, const Workspace& ws, std::span<Vector3d
 
 void point_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
                     Eigen::Ref<Matrix3Xd> J) {
-  check_link("point_jacobian", model, ws, link);
+  check_posed_link("point_jacobian", model, ws, link);
   detail::Call("point_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
   J.setZero();
   for (int j = link; j >= 0; j = parent(model, j))
@@ -117,7 +122,7 @@ void point_jacobian(const Model& model, const Workspace& ws, int link, const Vec
 
 void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vector3d& point_world,
                     Eigen::Ref<Matrix6Xd> J) {
-  check_link("frame_jacobian", model, ws, link);
+  check_posed_link("frame_jacobian", model, ws, link);
   detail::Call("frame_jacobian", model, ws.owner).size("J (columns)", J.cols(), ws.owner.dof);
   J.setZero();
   for (int j = link; j >= 0; j = parent(model, j)) {
@@ -129,11 +134,12 @@ void frame_jacobian(const Model& model, const Workspace& ws, int link, const Vec
 void point_jacobian_transpose(const Model& model, const Workspace& ws, int link,
                               const Vector3d& point_world, const Vector3d& direction_world,
                               VectorRef row) {
-  check_link("point_jacobian_transpose", model, ws, link);
+  check_posed_link("point_jacobian_transpose", model, ws, link);
   detail::Call("point_jacobian_transpose", model, ws.owner).joints("row", row);
+  const Vector3d point = point_world, direction = direction_world;  // row may be one of them
   row.setZero();
   for (int j = link; j >= 0; j = parent(model, j))
-    row[j] = direction_world.dot(velocity_column(model, ws, j, point_world));
+    row[j] = direction.dot(velocity_column(model, ws, j, point));
 }
 
 namespace detail {
@@ -151,11 +157,12 @@ void forward_kinematics(const Model& model, Workspace& ws, const double* q) {
     place(kernel::Planar<double>{}, *planar);
   else
     place(kernel::Spatial<double>{}, std::get<model::SpatialChain>(model.chain()));
+  ws.owner.posed_id = ws.owner.id;
 }
 
 Vector3d point_velocity(const Model& model, const Workspace& ws, int link,
                         const Vector3d& point_world, const double* v) {
-  check_link("point_velocity", model, ws, link);
+  check_link("point_velocity", ws, link);
   Vector3d velocity = Vector3d::Zero();
   for (int j = link; j >= 0; j = parent(model, j))
     velocity += velocity_column(model, ws, j, point_world) * v[j];
@@ -164,7 +171,7 @@ Vector3d point_velocity(const Model& model, const Workspace& ws, int link,
 
 void gyroscopic_torque(const Model& model, Workspace& ws, const double* q, const double* v,
                        std::span<const GyroscopicTerm> terms, double* tau) {
-  for (const auto& term : terms) check_link("gyroscopic_torque", model, ws, term.link);
+  for (const auto& term : terms) check_link("gyroscopic_torque", ws, term.link);
   forward_kinematics(model, ws, q);
   const int n = model.dof();
   for (int i = 0; i < n; ++i) {

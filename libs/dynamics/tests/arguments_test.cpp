@@ -1,10 +1,12 @@
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
+#include <numbers>
 #include <optional>
 #include <type_traits>
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/dynamics/inverse_kinematics.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
@@ -24,6 +26,10 @@ constexpr bool refused = !std::is_constructible_v<Made, Given...>;
 static_assert(refused<Workspace, Model> && refused<Workspace, const Model> &&
               !refused<Workspace, const Model&>);
 static_assert(refused<BatchWorkspace, Model> && !refused<BatchWorkspace, Model&>);
+static_assert(!refused<InverseKinematics, const Model&, const JointBox&> &&
+              refused<InverseKinematics, Model, const JointBox&> &&
+              refused<InverseKinematics, const Model&, JointBox> &&
+              refused<InverseKinematics, Model, JointBox>);
 // A strided view would be copied silently.
 static_assert(
     refused<ConstVectorRef, decltype(std::declval<const MatrixXd&>().row(0).transpose())>);
@@ -105,6 +111,7 @@ TEST_CASE("a joint vector of another size is refused with the names of function 
     });
     calls.q = VectorXd::Zero(n);
   }
+  forward_kinematics(calls.model, calls.ws, calls.q);
   calls.out.resize(n - 1);
   CHECK_THROWS_WITH(gravity_torque(calls.model, calls.ws, calls.q, calls.out),
                     Contains("gravity_torque: tau: 5 given"));
@@ -166,6 +173,131 @@ TEST_CASE("a workspace of another model is refused, one of a copy is not", "[dyn
   StatesXd x = StatesXd::Zero(n, 4), y(n, 4);
   CHECK_THROWS_WITH(forward_dynamics(calls.model, batch, x, x, x, y),
                     Contains("made for another model"));
+}
+
+TEST_CASE("a workspace that was moved from is refused, and so is one of a model that was",
+          "[dynamics][unit]") {
+  Calls calls;
+  forward_kinematics(calls.model, calls.ws, calls.q);
+  Workspace taken(std::move(calls.ws));
+  const auto check = [&](const std::string& function, auto&& call) {
+    CAPTURE(function);
+    CHECK_THROWS_WITH(call(), function +
+                                  ": the workspace was moved from, expected one made for "
+                                  "this 'random'");
+  };
+  calls.each(check);
+  calls.each_of_poses(0, check);
+  check("tip_pose", [&] { (void)tip_pose(calls.model, calls.ws); });
+  CHECK_NOTHROW(tip_pose(calls.model, taken));
+  calls.ws = std::move(taken);
+  calls.each_of_poses(0, [&](const std::string&, auto&& call) { CHECK_NOTHROW(call()); });
+
+  BatchWorkspace batch(calls.model);
+  const BatchWorkspace other(std::move(batch));
+  StatesXd x = StatesXd::Zero(n, 4), y(n, 4);
+  CHECK_THROWS_WITH(forward_dynamics(calls.model, batch, x, x, x, y), Contains("moved from"));
+
+  // Neither has an id, but that does not make them belong together.
+  Model model(test::random_robot(3, n, 4));
+  Workspace ws(model), ws_taken(std::move(ws));
+  const Model model_taken(std::move(model));
+  CHECK_THROWS_WITH(gravity_torque(model, ws, VectorXd::Zero(n), calls.out),
+                    Contains("moved from"));
+  CHECK_THROWS_WITH(Workspace(model), Contains("the model was moved from"));
+  CHECK_THROWS_WITH(BatchWorkspace(model), Contains("the model was moved from"));
+}
+
+TEST_CASE("poses are refused before forward_kinematics", "[dynamics][unit]") {
+  Calls calls;
+  std::vector<Vector3d> shapes(calls.model.shapes().size());
+  const auto each = [&](auto&& f) {
+    calls.each_of_poses(0, f);
+    f("tip_pose", [&] { (void)tip_pose(calls.model, calls.ws); });
+    f("shape_centers", [&] { shape_centers(calls.model, calls.ws, shapes); });
+    f("shape_half_axes", [&] { shape_half_axes(calls.model, calls.ws, shapes); });
+  };
+  const auto refused = [](const std::string& function, auto&& call) {
+    CAPTURE(function);
+    CHECK_THROWS_WITH(call(), function +
+                                  ": the workspace has no poses yet, expected a call of "
+                                  "forward_kinematics before");
+  };
+  const auto accepted = [](const std::string& function, auto&& call) {
+    CAPTURE(function);
+    CHECK_NOTHROW(call());
+  };
+  each(refused);
+  gravity_torque(calls.model, calls.ws, calls.q, calls.out);
+  each(refused);
+  forward_kinematics(calls.model, calls.ws, calls.q);
+  each(accepted);
+  calls.ws = Workspace(calls.model);
+  each(refused);
+  gyroscopic_torque(calls.model, calls.ws, calls.q, calls.v, calls.terms, calls.out);
+  each(accepted);
+}
+
+TEST_CASE("inverse kinematics refuses targets and starts that are not numbers",
+          "[dynamics][unit]") {
+  const Model model(test::random_robot(3, n, 4));
+  const JointBox box(n, {}, {}, 0.0);
+  InverseKinematics kinematics(model, box);
+  Workspace ws(model);
+  const VectorXd start = VectorXd::Constant(n, 0.2);
+  forward_kinematics(model, ws, VectorXd::Constant(n, 0.3));
+  const auto tip = tip_pose(model, ws);
+  const TipTarget good{tip.p(), tip.R()};
+  VectorXd q = start;
+  CHECK(kinematics.solve(good, q));
+  const auto refuses = [&](const char* message, auto&& spoil) {
+    TipTarget target = good;
+    q = start;
+    spoil(target);
+    const VectorXd before = q;
+    CHECK_THROWS_WITH(kinematics.solve(target, q), Contains(message));
+    CHECK((q.size() != n || !q.allFinite() || q == before));
+  };
+  const double nan = std::nan("");
+  refuses("target: the position", [&](TipTarget& t) { t.position[1] = nan; });
+  refuses("target: the position", [&](TipTarget& t) { t.position[2] = HUGE_VAL; });
+  refuses("not a rotation matrix", [&](TipTarget& t) { t.rotation(2, 2) = nan; });
+  refuses("not a rotation matrix", [&](TipTarget& t) { t.rotation *= 2.0; });
+  refuses("not a rotation matrix", [&](TipTarget& t) { t.rotation.col(0) *= -1.0; });
+  refuses("tolerance_m", [&](TipTarget& t) { t.tolerance_m = nan; });
+  refuses("tolerance_rad", [&](TipTarget& t) { t.tolerance_rad = 0.0; });
+  refuses("q: a number is not finite", [&](TipTarget&) { q[3] = nan; });
+  refuses("q: expected one number per joint", [&](TipTarget&) { q.resize(n - 1); });
+  TipTarget position = good;
+  position.turns = false;
+  position.rotation.setConstant(nan);
+  position.tolerance_rad = nan;  // both have no effect
+  q = start;
+  CHECK(kinematics.solve(position, q));
+  const JointBox other(n + 1, {}, {}, 0.0);
+  CHECK_THROWS_WITH(InverseKinematics(model, other), Contains("box: made for 7 joints"));
+  JointBox own(n, {}, {}, 0.0);
+  InverseKinematics in_own(model, own);
+  CHECK_THROWS_WITH(in_own.solve(good, own.lower), Contains("a vector of the box"));
+}
+
+TEST_CASE("a box of joint vectors has its lower side below its upper side", "[dynamics][unit]") {
+  const auto limits = [](double x) { return VectorXd::Constant(2, x); };
+  const double nan = std::nan(""), infinite = HUGE_VAL;
+  CHECK_THROWS_WITH(JointBox(2, VectorXd::Zero(3), {}, 0.0), Contains("q_lower: 3 given"));
+  CHECK_THROWS_WITH(JointBox(2, {}, limits(nan), 0.0), Contains("q_upper: the one of joint 0"));
+  CHECK_THROWS_WITH(JointBox(2, limits(1.0), limits(-1.0), 0.0), Contains("is above"));
+  CHECK_THROWS_WITH(JointBox(2, {}, {}, nan), Contains("reserve"));
+  CHECK_THROWS_WITH(JointBox(2, {}, {}, -0.1), Contains("reserve"));
+  const auto sides = [](const JointBox& box) { return std::pair(box.lower[1], box.upper[1]); };
+  constexpr double pi = std::numbers::pi;
+  CHECK(sides(JointBox(2, {}, {}, 0.1)) == std::pair(-pi, pi));
+  CHECK(sides(JointBox(2, limits(-infinite), limits(infinite), 0.1)) == std::pair(-pi, pi));
+  CHECK(sides(JointBox(2, limits(-1.0), limits(2.0), 0.25)) == std::pair(-0.75, 1.75));
+  // a range that is narrower than both reserves; only one limit, beyond a half turn
+  CHECK(sides(JointBox(2, limits(1.0), limits(1.5), 0.5)) == std::pair(1.25, 1.25));
+  CHECK(sides(JointBox(2, limits(4.0), {}, 0.0)) == std::pair(4.0, 4.0 + 2.0 * pi));
+  CHECK(sides(JointBox(2, {}, limits(-4.0), 0.0)) == std::pair(-4.0 - 2.0 * pi, -4.0));
 }
 
 TEST_CASE("a new model at the address of a destroyed one is another model", "[dynamics][unit]") {

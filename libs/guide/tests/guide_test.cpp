@@ -193,7 +193,8 @@ TEST_CASE("tight starts and goals are reached with the clearance that they have"
 TEST_CASE("bad settings and problems are refused in one line", "[guide]") {
   if (!guide::available()) {
     CHECK(test::error_of([] {
-            guide::Guide(model::Model(model::make_chain({3})), {});
+            const model::Model arm(model::make_chain({3}));
+            guide::Guide(arm, {});
           }).find("install libompl-dev") != std::string::npos);
     return;
   }

@@ -20,13 +20,20 @@ namespace detail {
 [[noreturn]] void refuse_count(const char* function, const char* argument, std::size_t given,
                                std::size_t expected);
 
+[[noreturn]] void refuse_overlap(const char* function, const char* result, const char* argument);
+/// Whether two blocks of rows × cols numbers with one row stride have some numbers in common, but
+/// not all.
+[[nodiscard]] bool overlap_in_part(const double* a, const double* b, Eigen::Index rows,
+                                   Eigen::Index cols, Eigen::Index stride) noexcept;
+
 /// Checks the arguments of a call. `function` is the name of the public function, for messages.
 class Call {
  public:
   Call(const char* function, const Model& model, const WorkspaceOwner& owner)
-      : function_(function), dof_(owner.dof) {
-    if (model.id() != owner.id) [[unlikely]]
-      refuse_workspace(function, model, owner);
+      : Call(function, model, owner, owner.id) {}
+  /// Of a function that reads the poses of forward_kinematics.
+  static Call with_poses(const char* function, const Model& model, const WorkspaceOwner& owner) {
+    return {function, model, owner, owner.posed_id};
   }
   /// A joint vector.
   template <class Vector>
@@ -47,8 +54,22 @@ class Call {
                     first.outerStride());
     return *this;
   }
+  /// A result of many states and an argument: apart, or the same.
+  template <class Result, class States>
+  const Call& apart(const char* result, const Result& x, const char* argument,
+                    const States& y) const {
+    if (overlap_in_part(x.data(), y.data(), dof_, x.cols(), x.outerStride())) [[unlikely]]
+      refuse_overlap(function_, result, argument);
+    return *this;
+  }
 
  private:
+  Call(const char* function, const Model& model, const WorkspaceOwner& owner, std::uint64_t id)
+      : function_(function), dof_(owner.dof) {
+    if (model.id() != id) [[unlikely]]
+      refuse_workspace(function, model, owner);
+  }
+
   const char* function_;
   Eigen::Index dof_;
 };
@@ -147,7 +168,10 @@ inline void inverse_dynamics(const Model& model, BatchWorkspace& ws, const Const
       .states("q", q, q)
       .states("v", v, q)
       .states("a", a, q)
-      .states("tau", tau, q);
+      .states("tau", tau, q)
+      .apart("tau", tau, "q", q)
+      .apart("tau", tau, "v", v)
+      .apart("tau", tau, "a", a);
   detail::inverse_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), a.data(),
                            tau.data());
 }
@@ -158,7 +182,10 @@ inline void forward_dynamics(const Model& model, BatchWorkspace& ws, const Const
       .states("q", q, q)
       .states("v", v, q)
       .states("tau", tau, q)
-      .states("a", a, q);
+      .states("a", a, q)
+      .apart("a", a, "q", q)
+      .apart("a", a, "v", v)
+      .apart("a", a, "tau", tau);
   detail::forward_dynamics(model, ws, q.cols(), q.outerStride(), q.data(), v.data(), tau.data(),
                            a.data());
 }
@@ -170,7 +197,7 @@ inline void forward_kinematics(const Model& model, Workspace& ws, const ConstVec
 
 inline Eigen::Vector3d point_velocity(const Model& model, const Workspace& ws, int link,
                                       const Eigen::Vector3d& point_world, const ConstVectorRef& v) {
-  detail::Call("point_velocity", model, ws.owner).joints("v", v);
+  detail::Call::with_poses("point_velocity", model, ws.owner).joints("v", v);
   return detail::point_velocity(model, ws, link, point_world, v.data());
 }
 

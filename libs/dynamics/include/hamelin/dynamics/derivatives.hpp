@@ -5,7 +5,8 @@
 #include "hamelin/dynamics/dynamics.hpp"
 
 /// Exact derivatives in O(n²), docs/theory.md (2.24)–(2.32): the first ones of inverse and forward
-/// dynamics, and the first and second ones of the energies.
+/// dynamics, and the first and second ones of the energies. Results may share memory with arguments
+/// in any way, as for the functions of dynamics.hpp.
 namespace hamelin::dynamics {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
@@ -19,7 +20,7 @@ struct DerivativeFrame;
 /// Scratch memory of one thread for derivatives; as Workspace, for one model or its copies.
 class DerivativesWorkspace {
  public:
-  /// @throws Error usage if this machine does not have the instruction set
+  /// @throws Error usage as Workspace
   explicit DerivativesWorkspace(const model::Model& model, Isa isa = default_isa());
   /// Deleted: a temporary model is gone before any call could use the workspace.
   explicit DerivativesWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;

@@ -15,6 +15,9 @@
 /// It throws an Error (usage) that names the function, the argument, what was given and what was
 /// expected. Results are written in place and never resized. Arguments are not checked for NaN or
 /// infinity; an argument that is not finite gives a result that is not finite.
+///
+/// A result may share memory with arguments in any way: a call has read all of its arguments before
+/// it writes the first number. Only the functions of many states (BatchWorkspace) restrict this.
 namespace hamelin::dynamics {
 
 using Eigen::VectorXd;
@@ -38,7 +41,7 @@ void bias_torque(const Model& model, Workspace& ws, const ConstVectorRef& q,
                  const ConstVectorRef& v, VectorRef tau);
 /// ∂U(q): the torque that holds the arm against gravity.
 void gravity_torque(const Model& model, Workspace& ws, const ConstVectorRef& q, VectorRef tau);
-/// x = M(q)⁻¹ y, by one sweep inwards and one outwards. y and x may be the same vector.
+/// x = M(q)⁻¹ y, by one sweep inwards and one outwards.
 void solve_mass(const Model& model, Workspace& ws, const ConstVectorRef& q, const ConstVectorRef& y,
                 VectorRef x);
 /// p = M(q) v, O(n).
@@ -56,13 +59,15 @@ void mass_matrix(const Model& model, Workspace& ws, const ConstVectorRef& q,
 
 /// As above for all columns, with one state per lane of a SIMD register. All matrices are
 /// dof × states with the same row stride: whole matrices, or equal blocks of matrices of one size.
-/// Results equal those of single calls up to rounding.
+/// Results equal those of single calls up to rounding. The result may be the same block as an
+/// argument; one that overlaps an argument in part is refused.
 void inverse_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q,
                       const ConstStatesRef& v, const ConstStatesRef& a, StatesRef tau);
 void forward_dynamics(const Model& model, BatchWorkspace& ws, const ConstStatesRef& q,
                       const ConstStatesRef& v, const ConstStatesRef& tau, StatesRef a);
 
-/// World poses of all links at q, stored in ws until the next call. The functions below read them.
+/// World poses of all links at q, stored in ws until the next call. The functions below that are
+/// called after it read them, and refuse a workspace without poses.
 void forward_kinematics(const Model& model, Workspace& ws, const ConstVectorRef& q);
 /// World position of a point fixed in link i's COM frame, after forward_kinematics.
 [[nodiscard]] Eigen::Vector3d point_position(const Model& model, const Workspace& ws, int link,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <utility>
 #include <vector>
 
 #include "hamelin/core/isa.hpp"
@@ -32,17 +33,34 @@ class AlignedBuffer {
 /// Identifies the model that a workspace was made for. Calls compare it with the model in their
 /// arguments.
 struct WorkspaceOwner {
-  explicit WorkspaceOwner(const model::Model& model) noexcept : id(model.id()), dof(model.dof()) {}
-  std::uint64_t id;  ///< Model::id
+  /// No model has this id.
+  static constexpr std::uint64_t no_model = ~std::uint64_t{0};
+
+  /// @throws Error usage for a model that was moved from
+  explicit WorkspaceOwner(const model::Model& model);
+  WorkspaceOwner(WorkspaceOwner&& other) noexcept { *this = std::move(other); }
+  WorkspaceOwner& operator=(WorkspaceOwner&& other) noexcept {
+    id = std::exchange(other.id, no_model);
+    posed_id = std::exchange(other.posed_id, no_model);
+    dof = other.dof;
+    return *this;
+  }
+  WorkspaceOwner(const WorkspaceOwner&) = delete;
+  WorkspaceOwner& operator=(const WorkspaceOwner&) = delete;
+  ~WorkspaceOwner() = default;
+
+  std::uint64_t id;                   ///< Model::id; no_model after the workspace was moved from
+  std::uint64_t posed_id = no_model;  ///< the same id once the workspace has poses
   Eigen::Index dof;
 };
 
 /// Scratch memory of the algorithms for one model (or its copies) and one thread, and the
 /// instruction set that they use. After its construction no call allocates. It does not keep the
-/// model; calls take both and refuse a workspace that was made for another model.
+/// model; calls take both and refuse a workspace that was made for another model or moved from.
 class Workspace {
  public:
-  /// @throws Error usage if this machine does not have the instruction set
+  /// @throws Error usage if this machine does not have the instruction set, or for a model that was
+  ///         moved from
   explicit Workspace(const model::Model& model, Isa isa = default_isa());
   /// Deleted: a temporary model is gone before any call could use the workspace.
   explicit Workspace(const model::Model&& model, Isa isa = default_isa()) = delete;
@@ -71,7 +89,7 @@ class Workspace {
 /// matrices).
 class BatchWorkspace {
  public:
-  /// @throws Error usage if this machine does not have the instruction set
+  /// @throws Error usage as Workspace
   explicit BatchWorkspace(const model::Model& model, Isa isa = default_isa());
   /// Deleted: a temporary model is gone before any call could use the workspace.
   explicit BatchWorkspace(const model::Model&& model, Isa isa = default_isa()) = delete;

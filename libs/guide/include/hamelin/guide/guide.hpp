@@ -86,6 +86,8 @@ class Guide {
   /// @param model must outlive this
   /// @throws Error invalid if the build has no OMPL, or settings do not fit the model
   Guide(const model::Model& model, Settings settings);
+  /// Deleted: a temporary model is gone before any search could use it.
+  Guide(const model::Model&& model, Settings settings) = delete;
 
   /// @throws Error invalid for a start or goal that does not fit the arm or is not finite
   [[nodiscard]] Path search(const Problem& problem, Query& query) const;

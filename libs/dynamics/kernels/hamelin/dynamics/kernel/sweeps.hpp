@@ -6,7 +6,8 @@
 /// The recursive algorithms as templates over the group (kernel/spatial.hpp, kernel/planar.hpp) and
 /// the scalar. Links are stored from the root on, and each is the parent of the next, so what a
 /// sweep passes from link to link stays in registers. Outwards means from the root to the tip,
-/// inwards the reverse.
+/// inwards the reverse. Each sweep reads all numbers of its arguments before it writes the first
+/// result, so that results may share memory with arguments.
 namespace hamelin::dynamics::kernel {
 inline namespace HAMELIN_ISA_NAMESPACE {
 
@@ -75,7 +76,7 @@ HAMELIN_INLINE void place(const typename Space::Chain& chain, const Scratch<Spac
 }
 
 /// Newton–Euler outwards, docs/theory.md (2.10), (2.11): force[i] is the wrench that moves link i
-/// alone. v and a may be null, which means zero.
+/// alone. v and a may be null, which means zero. Keeps a in u[] for gather_forces.
 template <class Space>
 HAMELIN_INLINE void inertial_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
                                     const typename Space::Scalar* v,
@@ -86,16 +87,18 @@ HAMELIN_INLINE void inertial_forces(const typename Space::Chain& chain, const Sc
   for (std::size_t i = 0; i < count<Space>(chain); ++i) {
     flow = Space::advance(links[i], k[i].x, flow, v == nullptr ? S(0.0) : v[i],
                           a == nullptr ? S(0.0) : a[i]);
+    if constexpr (Space::has_prismatic_or_rotor)
+      if (a != nullptr) k[i].u = a[i];
     k[i].force = Space::inertial_force(links[i], k[i].x, flow);
   }
 }
 
-/// Sums force[] from the tip inwards, sets tau[i] = A_i · f_i and adds the rotors' part,
-/// armature · a: docs/theory.md (2.9).
+/// Sums force[] from the tip inwards, sets tau[i] = A_i · f_i and, if `rotors`, adds their part,
+/// armature · u[]: docs/theory.md (2.9). The rates are read from u[] because tau may have taken the
+/// place of the argument that they came from.
 template <class Space>
 HAMELIN_INLINE void gather_forces(const typename Space::Chain& chain, const Scratch<Space>& k,
-                                  const typename Space::Scalar* a,
-                                  typename Space::Scalar* tau) noexcept {
+                                  bool rotors, typename Space::Scalar* tau) noexcept {
   const auto* const links = links_of<Space>(chain);
   auto carried = Space::zero_force();
   for (std::size_t i = count<Space>(chain); i-- > 0;) {
@@ -103,7 +106,7 @@ HAMELIN_INLINE void gather_forces(const typename Space::Chain& chain, const Scra
     const auto f = Space::sum(k[i].force, carried);
     tau[i] = Space::along_axis(l, f);
     if constexpr (Space::has_prismatic_or_rotor)
-      if (a != nullptr) tau[i] += a[i] * l.armature;
+      if (rotors) tau[i] += k[i].u * l.armature;
     if (i > 0) carried = Space::to_parent(l, k[i].x, f);
   }
 }
@@ -114,7 +117,7 @@ void inverse_dynamics(const typename Space::Chain& chain, const Scratch<Space>& 
                       const typename Space::Scalar* a, typename Space::Scalar* tau) noexcept {
   place(chain, k, q);
   inertial_forces(chain, k, v, a);
-  gather_forces(chain, k, a, tau);
+  gather_forces(chain, k, a != nullptr, tau);
 }
 
 /// One link of the articulated-body recursion, docs/theory.md (2.12), (2.13). On entry P is the
@@ -289,7 +292,7 @@ HAMELIN_INLINE void gyroscopic_torque(const typename Space::Chain& chain, const 
     total =
         Space::sum(total, Space::spin_force(w, k[spin.link].x, spin.point, k[spin.link].motion));
   }
-  gather_forces(chain, k, static_cast<const typename Space::Scalar*>(nullptr), tau);
+  gather_forces(chain, k, false, tau);
 }
 
 /// ∂U(q), docs/theory.md (2.7).
@@ -309,7 +312,8 @@ void gravity_torque(const typename Space::Chain& chain, const Scratch<Space>& k,
   }
 }
 
-/// Body twists into motion[i], docs/theory.md (2.1). Requires the placements of place().
+/// Body twists into motion[i], docs/theory.md (2.1). Requires the placements of place(). Keeps v in
+/// u[] for gather_forces.
 template <class Space>
 HAMELIN_INLINE void twists(const typename Space::Chain& chain, const Scratch<Space>& k,
                            const typename Space::Scalar* v) noexcept {
@@ -319,6 +323,7 @@ HAMELIN_INLINE void twists(const typename Space::Chain& chain, const Scratch<Spa
     if (i > 0) m = Space::to_child(links[i], k[i].x, m);
     Space::add_along_axis(links[i], m, v[i]);
     k[i].motion = m;
+    if constexpr (Space::has_prismatic_or_rotor) k[i].u = v[i];
   }
 }
 
@@ -331,7 +336,7 @@ void momentum(const typename Space::Chain& chain, const Scratch<Space>& k,
   twists(chain, k, v);
   for (std::size_t i = 0; i < count<Space>(chain); ++i)
     k[i].force = Space::momentum(links_of<Space>(chain)[i], k[i].x, k[i].motion);
-  gather_forces(chain, k, v, p);
+  gather_forces(chain, k, true, p);
 }
 
 template <class Space>
