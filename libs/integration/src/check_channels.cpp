@@ -1,5 +1,8 @@
 #include "check_channels.hpp"
 
+#include <cmath>
+
+#include "finite.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 
@@ -13,6 +16,13 @@ void check_size(const char* function, const char* argument, const Model& model,
                           argument, given, model.dof(), model.robot().name));
 }
 
+void check_finite(const char* function, const char* argument, const ConstVectorRef& x) {
+  if (!all_finite(x)) [[unlikely]]
+    throw Error(
+        ErrorCode::usage,
+        formatted("{}: {}: a number is not finite, expected finite numbers", function, argument));
+}
+
 void check_channels(const char* function, const Model& model, const Channels& channels) {
   const auto sized = [&](const char* argument, const VectorXd& x) {
     if (x.size() != 0) check_size(function, argument, model, x.size());
@@ -20,6 +30,20 @@ void check_channels(const char* function, const Model& model, const Channels& ch
   sized("channels.damping", channels.damping);
   sized("channels.coulomb", channels.coulomb);
   sized("channels.held_torque", channels.held_torque);
+  // Negative ones would feed energy in. NaN passes: the step then fails.
+  const auto dissipates = [&](const char* argument, const VectorXd& x) {
+    if ((x.array() < 0.0).any()) [[unlikely]]
+      throw Error(ErrorCode::usage,
+                  formatted("{}: {}: {} given for a joint, expected numbers of at least 0",
+                            function, argument, x.minCoeff()));
+  };
+  dissipates("channels.damping", channels.damping);
+  dissipates("channels.coulomb", channels.coulomb);
+  if (channels.coulomb.size() != 0 &&
+      !(channels.coulomb_speed > 0.0 && std::isfinite(channels.coulomb_speed))) [[unlikely]]
+    throw Error(ErrorCode::usage,
+                formatted("{}: channels.coulomb_speed: {} given, expected a positive number",
+                          function, channels.coulomb_speed));
   for (const auto& term : channels.gyroscopic)
     if (term.link < 0 || term.link >= model.dof()) [[unlikely]]
       throw Error(

@@ -6,7 +6,8 @@ namespace hamelin::integration {
 
 /// Whether all numbers are finite: 0 x is 0 for a finite x and NaN otherwise. Every step calls
 /// this, so it is written as a sum, which the compiler vectorises.
-[[nodiscard]] inline bool all_finite(const Eigen::VectorXd& x) noexcept {
+template <class Vector>
+[[nodiscard]] bool all_finite(const Eigen::MatrixBase<Vector>& x) noexcept {
   return (0.0 * x).sum() == 0.0;
 }
 

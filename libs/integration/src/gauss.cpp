@@ -8,6 +8,7 @@
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/dynamics/kernel/dispatch.hpp"
 #include "kernel_arguments.hpp"
+#include "state_owner.hpp"
 #include "step_controller.hpp"
 
 namespace hamelin::integration {
@@ -34,6 +35,7 @@ GaussLegendre::GaussLegendre(const Model& model, const GaussOptions& options)
     : Integrator(
           "gauss", model,
           {options.isa, options.max_halvings, options.tolerance, options.rtol, options.atol}),
+      structure_(structure_mode(options)),
       tableau_(gauss_tableau(static_cast<std::size_t>(options.order / 2))),
       kernels_(&kernel::select_gauss_set(options.isa)),
       scratch_(
@@ -53,7 +55,7 @@ std::string GaussLegendre::criterion() const {
 }
 
 std::string GaussLegendre::mode() const {
-  return structure() ? "structure" : "accurate";
+  return structure_ ? "structure" : "accurate";
 }
 
 kernel::GaussMemory GaussLegendre::memory(VectorXd& numbers) const {
@@ -78,14 +80,14 @@ void GaussLegendre::begin(State& state, const ConstVectorRef& v0) {
 }
 
 void GaussLegendre::node_velocity(const State& state, VectorRef v) const {
-  if (structure())
+  if (structure_)
     dynamics::solve_mass(model_, ws_, state.q, state.p, v);
   else
     v = state.v;
 }
 
 void GaussLegendre::add_momentum(State& state, const ConstVectorRef& dp) {
-  if (structure()) {
+  if (structure_) {
     state.p += dp;
   } else {
     dynamics::solve_mass(model_, ws_, state.q, dp, u_next_);
@@ -94,7 +96,7 @@ void GaussLegendre::add_momentum(State& state, const ConstVectorRef& dp) {
 }
 
 void GaussLegendre::replace_velocity(State& state, const ConstVectorRef& v) {
-  if (structure()) {
+  if (structure_) {
     dynamics::momentum(model_, ws_, state.q, v, state.p);
     const auto n = model_.dof();
     VectorXd::Map(memory(state.memory).carry + n, n).setZero();  // of the sum for the old momentum
@@ -150,7 +152,7 @@ void GaussLegendre::accept(State& state, const kernel::GaussOutcome& outcome, do
 
 StepReport GaussLegendre::attempt(State& state, const Channels& channels, double h) {
   StepReport report;
-  const double tolerance = structure() ? structure_tolerance : settings_.tolerance;
+  const double tolerance = structure_ ? structure_tolerance : settings_.tolerance;
   const auto outcome = solve(state, channels, h, tolerance, report);
   report.residual = outcome.residual;
   report.converged = outcome.converged;

@@ -25,27 +25,24 @@ class GaussLegendre final : public Integrator {
   void replace_velocity(State& state, const ConstVectorRef& v) override;
   StepReport attempt(State& state, const Channels& channels, double h) override;
   StepReport controlled_step(State& state, const Channels& channels, double limit) override;
-  /// Fixed steps iterated to rounding.
-  [[nodiscard]] bool structure() const noexcept {
-    return !adaptive() && settings_.tolerance <= 1e-12;
-  }
   [[nodiscard]] kernel::GaussForm form() const noexcept {
-    return structure() ? kernel::GaussForm::momentum : kernel::GaussForm::velocity;
+    return structure_ ? kernel::GaussForm::momentum : kernel::GaussForm::velocity;
   }
   [[nodiscard]] kernel::GaussMemory memory(VectorXd& numbers) const;
   const kernel::GaussGuess& guess_for(double ratio, double older_at);
   /// The part of the state that is stepped beside q.
   [[nodiscard]] VectorXd& rate_part(State& state) const noexcept {
-    return structure() ? state.p : state.v;
+    return structure_ ? state.p : state.v;
   }
   [[nodiscard]] const VectorXd& rate_part(const State& state) const noexcept {
-    return structure() ? state.p : state.v;
+    return structure_ ? state.p : state.v;
   }
   /// Solves a step from the state into q_next_, u_next_ and memory_next_; the state is unchanged.
   kernel::GaussOutcome solve(const State& state, const Channels& channels, double h,
                              double tolerance, StepReport& report);
   void accept(State& state, const kernel::GaussOutcome& outcome, double h, StepReport& report);
 
+  const bool structure_;  ///< fixed steps iterated to rounding
   kernel::GaussTableau tableau_;
   kernel::GaussGuess guess_{};  ///< for these two numbers
   double guess_ratio_ = 0.0, guess_older_at_ = 0.0;

@@ -17,7 +17,7 @@ GaussDifferentiator::Stage::Stage(Index dof)
       p_rate(v) {}
 
 GaussDifferentiator::GaussDifferentiator(const Model& model, const GaussOptions& options)
-    : StepDifferentiator("gauss", model),
+    : StepDifferentiator(model, options),
       tableau_(gauss_tableau(static_cast<std::size_t>(options.order / 2))),
       stages_(options.order / 2),
       ws_(model, options.isa),

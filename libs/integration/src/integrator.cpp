@@ -6,6 +6,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
 #include "hamelin/integration/integrator.hpp"
+#include "state_owner.hpp"
 
 namespace hamelin::integration {
 
@@ -14,7 +15,6 @@ Integrator::Integrator(std::string name, const Model& model, const Settings& set
       settings_(settings),
       ws_(model, settings.isa),
       name_(std::move(name)),
-      shape_{.q = model.dof()},
       velocity_(VectorXd::Zero(model.dof())) {}
 
 double Integrator::tolerance() const noexcept {
@@ -32,13 +32,14 @@ Integrator::Shape Integrator::shape_of(const State& state) noexcept {
 
 void Integrator::check(const char* function, const State& state) const {
   const dynamics::detail::Call call(function, model_, ws_.owner);  // refuses a replaced model
+  if (state.owner != owner_) [[unlikely]]
+    refuse_owner(function, state, owner_, model_);
   if (shape_of(state) != shape_) [[unlikely]]
     refuse_shape(function, state);
 }
 
 void Integrator::refuse_shape(const char* function, const State& state) const {
   check_size(function, "state.q", model_, state.q.size());
-  if (saved_.empty()) return;  // the expected sizes are not known before prepare()
   const Shape given = shape_of(state);
   throw Error(ErrorCode::usage, formatted("{}: state: {} velocities, {} momenta and {} numbers of "
                                           "memory given, expected {}, {} and {}: a "
@@ -48,8 +49,7 @@ void Integrator::refuse_shape(const char* function, const State& state) const {
 }
 
 void Integrator::check(const char* function, const State& state, const Channels& channels,
-                       double h) {
-  if (saved_.empty()) prepare();
+                       double h) const {
   check(function, state);
   if (!channels.none()) check_channels(function, model_, channels);
   if (!(h > 0.0) || !std::isfinite(h)) [[unlikely]]
@@ -61,18 +61,18 @@ State Integrator::start(const ConstVectorRef& q0, const ConstVectorRef& v0) {
   check_size("start", "q0", model_, q0.size());
   check_size("start", "v0", model_, v0.size());
   State state;
+  check_finite("start", "q0", q0);
+  check_finite("start", "v0", v0);
+  state.owner = owner_;
   state.q = q0;
-  if (!all_finite(state.q) || !v0.allFinite())
-    throw Error(ErrorCode::usage,
-                formatted("start: {}: a number is not finite, expected finite numbers",
-                          all_finite(state.q) ? "v0" : "q0"));
-  if (saved_.empty()) prepare();
   begin(state, v0);
   return state;
 }
 
-void Integrator::prepare() {
+void Integrator::prepare(const StateOwner& owner) {
+  owner_ = owner;
   State state;
+  state.owner = owner_;
   state.q = velocity_.setZero();
   begin(state, velocity_);
   shape_ = shape_of(state);
@@ -99,6 +99,7 @@ Energy Integrator::energy(const State& state, const ConstVectorRef& v) const {
 void Integrator::kick(State& state, const ConstVectorRef& dp) {
   check("kick", state);
   check_size("kick", "dp", model_, dp.size());
+  check_finite("kick", "dp", dp);
   add_momentum(state, dp);
   state.jumped = true;
 }
@@ -106,7 +107,9 @@ void Integrator::kick(State& state, const ConstVectorRef& dp) {
 void Integrator::set_velocity(State& state, const ConstVectorRef& v) {
   check("set_velocity", state);
   check_size("set_velocity", "v", model_, v.size());
-  replace_velocity(state, v);
+  check_finite("set_velocity", "v", v);
+  velocity_ = v;  // v may share memory with the state
+  replace_velocity(state, velocity_);
   state.jumped = true;
 }
 
@@ -147,9 +150,11 @@ StepReport Integrator::take_controlled_steps(State& state, const Channels& chann
   StepReport report;
   for (double left = h; left > 0.0 && report.converged;) {
     const StepReport part = take_step(state, channels, left);
-    // the last part must end at exactly h
-    left = part.step_s == left ? 0.0 : left - part.step_s;
     report = merge(report, part);
+    // the last part must end at exactly h
+    const double rest = part.step_s == left ? 0.0 : left - part.step_s;
+    report.converged = report.converged && rest < left;  // else the steps are lost in rounding
+    left = rest;
   }
   if (report.converged) {
     report.step_s = h;

@@ -10,6 +10,7 @@
 #include "lie_exact.hpp"
 #include "newmark.hpp"
 #include "rosenbrock.hpp"
+#include "state_owner.hpp"
 #include "variational.hpp"
 
 namespace hamelin::integration {
@@ -56,7 +57,10 @@ std::unique_ptr<Integrator> make(const Model& model, const RosenbrockOptions& o)
 }  // namespace
 
 std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& options) {
-  return std::visit([&](const auto& o) { return make(model, o); }, checked(options));
+  const Options valid = checked(options);
+  auto integrator = std::visit([&](const auto& o) { return make(model, o); }, valid);
+  integrator->prepare(owner_of_states(model, valid));
+  return integrator;
 }
 
 std::unique_ptr<Integrator> make_integrator(std::string_view name, const Model& model,

@@ -82,6 +82,8 @@ void check_order(const Scheme& scheme, int order) {
                      joined(scheme.orders, ", ")));
 }
 
+constexpr double least_step_tolerance = 1e-16;
+
 void check_step_control(const Scheme& scheme, double rtol, double atol) {
   const auto valid = [](double x) { return std::isfinite(x) && x >= 0.0; };
   if (!valid(rtol) || !valid(atol))
@@ -90,6 +92,13 @@ void check_step_control(const Scheme& scheme, double rtol, double atol) {
   if (!scheme.step_control && (rtol > 0.0 || atol > 0.0))
     refuse(formatted("integrator '{}' has no step control, expected neither rtol nor atol",
                      scheme.name));
+  // Step control would look for steps without rounding, and end only when no time is left to add.
+  const double larger = std::max(rtol, atol);
+  if (larger > 0.0 && larger < least_step_tolerance)
+    refuse(
+        formatted("integrator '{}': rtol {} and atol {} are below rounding, expected one of them "
+                  "to be at least {}",
+                  scheme.name, rtol, atol, least_step_tolerance));
 }
 
 void check_range(const Scheme& scheme, const char* option, double x, double least, double most) {

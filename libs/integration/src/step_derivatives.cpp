@@ -7,33 +7,52 @@
 #include "gauss_derivatives.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/formatted.hpp"
+#include "state_owner.hpp"
 #include "variational_derivatives.hpp"
 
 namespace hamelin::integration {
+
+namespace {
+
+template <class Matrix>
+void check_shape(const char* function, const char* argument, const Matrix& matrix,
+                 Eigen::Index rows, Eigen::Index cols) {
+  if (matrix.rows() != rows || matrix.cols() != cols)
+    throw Error(ErrorCode::usage,
+                formatted("{}: {}: {} x {} numbers given, expected {} x {}", function, argument,
+                          matrix.rows(), matrix.cols(), rows, cols));
+}
+
+}  // namespace
 
 StepDerivatives::StepDerivatives(Eigen::Index dof)
     : by_state(Eigen::MatrixXd::Zero(2 * dof, 2 * dof)),
       by_torque(Eigen::MatrixXd::Zero(2 * dof, dof)),
       by_step(VectorXd::Zero(2 * dof)) {}
 
+StepDifferentiator::StepDifferentiator(const Model& model, const Options& options)
+    : model_(model), owner_(owner_of_states(model, options)) {}
+
 void StepDifferentiator::differentiate(const State& after, const Channels& channels,
                                        StepDerivatives& out) {
   constexpr const char* function = "differentiate";
+  if (after.owner != owner_) refuse_owner(function, after, owner_, model_);
   const Eigen::Index n = model_.dof();
   if (after.q.size() != n || after.p.size() != n)
     throw Error(ErrorCode::usage,
-                formatted("{}: state: {} positions and {} momenta given, expected {} of each: a "
-                          "state of '{}' for this model",
-                          function, after.q.size(), after.p.size(), n, scheme_));
-  if (out.by_state.rows() != 2 * n)
-    throw Error(ErrorCode::usage, formatted("{}: out: made for {} joints, expected {}", function,
-                                            out.by_state.rows() / 2, n));
+                formatted("{}: state: {} positions and {} momenta given, expected {} of each",
+                          function, after.q.size(), after.p.size(), n));
+  check_shape(function, "out.by_state", out.by_state, 2 * n, 2 * n);
+  check_shape(function, "out.by_torque", out.by_torque, 2 * n, n);
+  check_shape(function, "out.by_step", out.by_step, 2 * n, 1);
   check_channels(function, model_, channels);
-  out.step_s = last_step(after);
-  if (!(out.step_s > 0.0))
+  const double h = last_step(after);
+  if (after.jumped || !(h > 0.0))
     throw Error(ErrorCode::usage,
-                formatted("{}: state: it remembers no step of '{}', expected a state after a step",
-                          function, scheme_));
+                formatted("{}: state: it was made, kicked or given a velocity after its last step, "
+                          "expected a state right after a step",
+                          function));
+  out.step_s = h;
   if (!compute(after, channels, out))
     throw Error(ErrorCode::invalid,
                 formatted("{}: the equations of the step at {} s are singular, so that it has no "
@@ -47,7 +66,7 @@ std::unique_ptr<StepDifferentiator> make_step_differentiator(const Model& model,
   if (const auto* o = std::get_if<VariationalOptions>(&valid))
     return std::make_unique<VariationalDifferentiator>(model, *o);
   if (const auto* o = std::get_if<GaussOptions>(&valid)) {
-    if (o->rtol > 0.0 || o->atol > 0.0 || o->tolerance > 1e-12)
+    if (!structure_mode(*o))
       throw Error(
           ErrorCode::usage,
           "make_step_differentiator: gauss in its accurate mode given, expected fixed steps "

@@ -6,7 +6,7 @@ using Eigen::Index;
 
 VariationalDifferentiator::VariationalDifferentiator(const Model& model,
                                                      const VariationalOptions& options)
-    : StepDifferentiator("hamel-variational", model),
+    : StepDifferentiator(model, options),
       ws_(model, options.isa),
       kinetic_(model.dof()),
       potential_(model.dof()),

@@ -291,8 +291,25 @@ TEST_CASE("step derivatives do not allocate, and refuse what does not fit",
   const auto message = [&](const State& state, const Channels& channels, StepDerivatives& to) {
     return test::error_of([&] { differentiator->differentiate(state, channels, to); });
   };
-  CHECK_THAT(message(s.before, s.channels, out), Catch::Contains("remembers no step"));
-  CHECK_THAT(message(s.after, s.channels, small), Catch::Contains("made for 6 joints"));
+  const char* const not_right_after = "expected a state right after a step";
+  CHECK_THAT(message(s.before, s.channels, out), Catch::Contains(not_right_after));
+  State changed = s.after;
+  s.integrator->set_velocity(changed, VectorXd::Constant(7, 0.1));
+  CHECK_THAT(message(changed, s.channels, out), Catch::Contains(not_right_after));
+  changed = s.after;
+  s.integrator->kick(changed, VectorXd::Constant(7, 0.1));
+  CHECK_THAT(message(changed, s.channels, out), Catch::Contains(not_right_after));
+  REQUIRE(s.integrator->step(changed, s.channels, 1e-3).converged);
+  CHECK(message(changed, s.channels, out) == "no error");
+
+  CHECK_THAT(message(s.after, s.channels, small), Catch::Contains("out.by_state: 12 x 12"));
+  StepDerivatives short_torque(7), short_step(7);
+  short_torque.by_torque.resize(1, 1);
+  short_step.by_step.resize(1);
+  CHECK_THAT(message(s.after, s.channels, short_torque),
+             Catch::Contains("out.by_torque: 1 x 1 numbers given, expected 14 x 7"));
+  CHECK_THAT(message(s.after, s.channels, short_step),
+             Catch::Contains("out.by_step: 1 x 1 numbers given, expected 14 x 1"));
   Channels wrong = s.channels;
   wrong.damping.resize(3);
   CHECK_THAT(message(s.after, wrong, out), Catch::Contains("channels.damping"));

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -21,11 +22,15 @@ using model::Model;
 /// constant over the step; forces are evaluated at the scheme's own velocity: midpoint, stage or
 /// sub-step. Channels that are empty have no effect and no cost. The channels potential and node
 /// velocity act between steps: Integrator::kick and Integrator::set_velocity.
+///
+/// Damping and dry friction take energy out, so a step refuses negative ones. Other numbers that
+/// are not finite make the step fail (StepReport::converged).
 struct Channels {
-  VectorXd damping;  ///< torque −damping_i v_i; empty or dof [Nm s/rad]
-  /// Dry friction −coulomb_i tanh(v_i/coulomb_speed); empty or dof [Nm].
+  VectorXd damping;  ///< torque −damping_i v_i; empty or dof numbers of at least 0 [Nm s/rad]
+  /// Dry friction −coulomb_i tanh(v_i/coulomb_speed); empty or dof numbers of at least 0 [Nm].
   VectorXd coulomb;
-  double coulomb_speed = 0.01;  ///< dry friction is viscous below this speed [rad/s or m/s]
+  /// Dry friction is viscous below this speed, above 0 if there is any [rad/s or m/s].
+  double coulomb_speed = 0.01;
   std::vector<GyroscopicTerm> gyroscopic;
   VectorXd held_torque;  ///< empty or dof [Nm]
 
@@ -35,10 +40,21 @@ struct Channels {
   }
 };
 
+/// The scheme and the model of a state. Two integrators have the same owner, and may continue each
+/// other's states, if they are of one scheme for equal models (Model::fingerprint) with the same
+/// options that give the numbers of a state their meaning: the order of gauss and composition, the
+/// mode of gauss, alpha of hamel. Solvers, tolerances, halvings and instruction sets do not count.
+struct StateOwner {
+  std::uint64_t scheme = 0;  ///< 0: no integrator made the state
+  std::uint64_t model = 0;   ///< Model::fingerprint
+  friend bool operator==(const StateOwner&, const StateOwner&) = default;
+};
+
 /// The memory of an integrator between steps: a plain value to copy, keep and restore. Of v and p a
 /// state has the one that its scheme steps, and the other is empty; Integrator::velocity() works
 /// for all schemes.
 struct State {
+  StateOwner owner;  ///< set by Integrator::start()
   double time_s = 0.0;
   long k = 0;
   VectorXd q;
@@ -79,9 +95,13 @@ struct Energy {
 /// memory. A step allocates nothing. The model is kept by reference and must outlive the
 /// integrator.
 ///
-/// Calls check sizes, and that a state is one of this scheme for this model; they throw an Error
-/// (usage). start() also checks that its numbers are finite. If numbers are not finite later, the
-/// step reports converged = false.
+/// Calls check sizes, and that a state is one of this scheme for this model (StateOwner); they
+/// throw an Error (usage). start(), kick() and set_velocity() also check that their numbers are
+/// finite, so a refused call leaves the state unchanged. If numbers are not finite later, the step
+/// reports converged = false.
+///
+/// Arguments may share memory with the state and with each other in any way: kick(state, state.p)
+/// doubles the momentum. What velocity() writes into a vector of the state changes the state.
 class Integrator {
  public:
   virtual ~Integrator() = default;
@@ -98,6 +118,8 @@ class Integrator {
   [[nodiscard]] virtual int order() const = 0;
   /// A step is divided into at most 2^max_halvings parts.
   [[nodiscard]] int max_halvings() const noexcept { return settings_.max_halvings; }
+  /// That of the states of this integrator.
+  [[nodiscard]] const StateOwner& owner() const noexcept { return owner_; }
 
   /// A state at rest or in motion. q0, v0: dof numbers.
   [[nodiscard]] State start(const ConstVectorRef& q0, const ConstVectorRef& v0);
@@ -162,10 +184,12 @@ class Integrator {
   };
   static Shape shape_of(const State& state) noexcept;
   void check(const char* function, const State& state) const;
-  void check(const char* function, const State& state, const Channels& channels, double h);
+  void check(const char* function, const State& state, const Channels& channels, double h) const;
   void refuse_shape(const char* function, const State& state) const;
-  /// Allocates the memory that steps need, at the latest before the first step.
-  void prepare();
+  friend std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& options);
+  /// Makes a constructed scheme ready: sets what its states are and allocates the memory that steps
+  /// need.
+  void prepare(const StateOwner& owner);
   StepReport take_step(State& state, const Channels& channels, double limit);
   /// Exactly h under step control.
   StepReport take_controlled_steps(State& state, const Channels& channels, double h);
@@ -174,7 +198,8 @@ class Integrator {
   void halve(State& state, const Channels& channels, double h, int depth, StepReport& report);
 
   std::string name_;
-  Shape shape_;                ///< of this scheme's states, once prepared
+  StateOwner owner_;
+  Shape shape_;                ///< of this scheme's states
   std::vector<State> saved_;   ///< one per level of halving
   mutable VectorXd velocity_;  ///< scratch of node_energy()
 };

@@ -54,7 +54,8 @@ struct GaussOptions {
   /// iterated to rounding, docs/theory.md (5.4); above, accelerations are collocated, (5.6).
   double tolerance = 1e-12;
   /// A value above 0 switches step control on; State::step_next is then the first step. rtol alone
-  /// sets atol to the same number [rad or m, and per second]; atol alone stays absolute.
+  /// sets atol to the same number [rad or m, and per second]; atol alone stays absolute. The larger
+  /// of them is at least 1e-16.
   double rtol = 0.0, atol = 0.0;
   int max_halvings = 8;
   Isa isa = default_isa();

@@ -1,8 +1,6 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
-#include <string>
-#include <utility>
 
 #include "hamelin/integration/integrator.hpp"
 
@@ -31,21 +29,22 @@ class StepDifferentiator {
   /// (StepReport::halvings) is several; StepDerivatives::step_s tells.
   /// @param after a state after a step of the scheme, with the options of this object
   /// @param channels those of the step
-  /// @throws Error usage for sizes that do not fit, or a state that has not stepped since it was
-  ///         made or its velocity was set; invalid if the derivative does not exist
+  /// @param out made for as many joints; it cannot share memory with the other arguments
+  /// @throws Error usage for sizes that do not fit, a state of another scheme or model
+  ///         (StateOwner), or one that has not stepped since it was made or kicked or its velocity
+  ///         was set; invalid if the derivative does not exist
   void differentiate(const State& after, const Channels& channels, StepDerivatives& out);
 
  protected:
-  StepDifferentiator(std::string scheme, const Model& model)
-      : scheme_(std::move(scheme)), model_(model) {}
+  StepDifferentiator(const Model& model, const Options& options);
   /// The length of the last step; 0 if the state does not remember one of this scheme.
   [[nodiscard]] virtual double last_step(const State& after) const = 0;
   /// @return false if the derivative does not exist
   [[nodiscard]] virtual bool compute(const State& after, const Channels& channels,
                                      StepDerivatives& out) = 0;
 
-  const std::string scheme_;
   const Model& model_;
+  const StateOwner owner_;
 };
 
 /// @throws Error usage for a scheme other than hamel-variational and gauss, and as make_options
