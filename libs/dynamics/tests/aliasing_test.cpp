@@ -150,6 +150,21 @@ TEST_CASE("a matrix that is written may hold the joint vectors that are read",
         CHECK(out[1] == dv);
         CHECK(out[2] == dx);
       }
+
+    // The acceleration is computed first, and the derivatives still need its arguments.
+    forward_dynamics_derivatives(model, dws, q, v, x, a, dq, dv, dx);
+    for (const int argument : {0, 1, 2}) {
+      CAPTURE(argument);
+      VectorXd given[] = {q, v, x};
+      MatrixXd out[] = {MatrixXd::Zero(chain_dof, chain_dof), MatrixXd::Zero(chain_dof, chain_dof),
+                        MatrixXd::Zero(chain_dof, chain_dof)};
+      forward_dynamics_derivatives(model, dws, given[0], given[1], given[2], given[argument],
+                                   out[0], out[1], out[2]);
+      CHECK(given[argument] == a);
+      CHECK(out[0] == dq);
+      CHECK(out[1] == dv);
+      CHECK(out[2] == dx);
+    }
   });
 }
 

@@ -49,7 +49,7 @@ void StepDifferentiator::differentiate(const State& after, const Channels& chann
   const double h = last_step(after);
   if (after.jumped || !(h > 0.0))
     throw Error(ErrorCode::usage,
-                formatted("{}: state: it was made, kicked or given a velocity after its last step, "
+                formatted("{}: state: made, kicked or given a velocity since its last step, "
                           "expected a state right after a step",
                           function));
   out.step_s = h;

@@ -257,7 +257,9 @@ std::string repr(const BoundIntegrator& integrator) {
 
 void add_state(py::module_& module) {
   py::class_<PyState, std::shared_ptr<PyState>>(
-      module, "State", "The memory of an integrator between steps. Integrator.start() makes one.")
+      module, "State",
+      "The memory of an integrator between steps. Integrator.start() makes one. It belongs to the\n"
+      "scheme and the model; integrators of others refuse it with an Error.")
       .def_property_readonly(
           "time_s", [](const PyState& s) { return s.time_s; }, "Time since the start [s].")
       .def_property_readonly(
@@ -315,9 +317,9 @@ void add_channels(py::module_& module) {
           py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
           py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
           "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
-          "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. gyroscopic: terms (link, point,\n"
-          "w), with the point in the link's centre-of-mass frame [m] and w in the world [N s/m].\n"
-          "held_torque: shape (n,) [Nm or N].")
+          "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. Steps refuse negative ones.\n"
+          "gyroscopic: terms (link, point, w), with the point in the link's centre-of-mass frame\n"
+          "[m] and w in the world [N s/m]. held_torque: shape (n,) [Nm or N].")
       .def_property_readonly(
           "damping", [](const PyChannels& c) { return to_array(c.damping); },
           "Viscous damping, shape (n,) or (0,); a copy.")

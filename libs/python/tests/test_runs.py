@@ -315,6 +315,23 @@ def test_integrator_steps(arm):
     np.testing.assert_allclose(integrator.velocity(state), 2 * v0, atol=1e-12)
 
 
+def test_a_state_belongs_to_its_scheme_and_model(arm):
+    rk4 = hamelin.Integrator(arm, "rk4")
+    state = rk4.start(np.zeros(7))
+    hamel = hamelin.Integrator(arm, "hamel")
+    for call in (hamel.velocity, hamel.energy, lambda s: hamel.kick(s, np.ones(7))):
+        with pytest.raises(hamelin.Error, match="state: belongs to rk4, expected a state of hamel"):
+            call(state)
+    loaded = hamelin.Integrator(hamelin.make_chain(links=7, mass_kg=1.1), "rk4")
+    with pytest.raises(hamelin.Error, match="belongs to another model"):
+        loaded.step(state, 0.001)
+    with pytest.raises(hamelin.Error, match="channels.damping: -1 given"):
+        rk4.step(state, 0.001, hamelin.Channels(damping=np.full(7, -1.0)))
+    with pytest.raises(ValueError, match="dp"):
+        rk4.kick(state, np.full(7, np.nan))
+    assert state.k == 0 and rk4.step(state.copy(), 0.001).converged
+
+
 def test_step_control_and_callbacks(arm):
     integrator = hamelin.Integrator(arm, "dop853", rtol=1e-9)
     seen = []
