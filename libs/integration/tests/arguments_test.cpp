@@ -352,9 +352,8 @@ TEST_CASE("a name can include the order", "[integration][unit]") {
   CHECK(make_integrator("gauss:8", model)->name() == "gauss");
   CHECK(make_integrator("gauss:6", model, test::of_order(6))->order() == 6);
   CHECK(find_scheme("gauss:8") == find_scheme("gauss"));
-  CHECK_THROWS_WITH(
-      make_integrator("gauss:7", model),
-      "integrator 'gauss' has no order 7, expected a state of 4, 6, 8, 10, 12, 14, 16");
+  CHECK_THROWS_WITH(make_integrator("gauss:7", model),
+                    "integrator 'gauss' has no order 7, expected one of 4, 6, 8, 10, 12, 14, 16");
   CHECK_THROWS_WITH(make_integrator("rk4:4", model),
                     "integrator 'rk4' has one order, expected none");
   CHECK_THROWS_WITH(make_integrator("gaus:8", model), Contains("integrator 'gaus' is not known"));
@@ -413,8 +412,7 @@ TEST_CASE("options out of range are refused", "[integration][unit]") {
   refuses(LieExactOptions{.max_updates = -1}, "max_updates -1");
   refuses(Dop853Options{.rtol = -1.0}, "integrator 'dop853': rtol -1");
   for (const double tiny : {1e-17, 1e-30, 1e-300}) {
-    refuses(Dop853Options{.rtol = tiny},
-            "are below rounding, expected a state of them to be at least");
+    refuses(Dop853Options{.rtol = tiny}, "are below rounding, expected one of them to be at least");
     refuses(GaussOptions{.rtol = tiny, .atol = tiny}, "integrator 'gauss': rtol");
     refuses(RosenbrockOptions{.atol = tiny}, "integrator 'rosenbrock': rtol 0 and atol");
     CHECK_NOTHROW(make_integrator(model, Dop853Options{.rtol = 1e-6, .atol = tiny}));
