@@ -140,7 +140,7 @@ endfunction()
 # hamelin_tests(NAME scene LINKS hamelin::scene [LABELS slow]): builds tests/*_test.cpp of the
 # calling folder as one program. The tests have the CTest labels NAME and LABELS; `./dev tsan` runs
 # the label `threads` under the thread sanitizer. HAMELIN_SOURCE_DIR tells tests where the checkout
-# is. Tests whose optional data is missing are skipped.
+# is. Tests that cannot run here are skipped; tests/may_skip.txt lists those that may be.
 function(hamelin_tests)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "LINKS;LABELS")
   file(GLOB tests CONFIGURE_DEPENDS tests/*_test.cpp)
@@ -153,9 +153,13 @@ function(hamelin_tests)
   # in std::optional.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+  if(NOT TARGET hamelin_test_support)
+    add_library(hamelin_test_support OBJECT "${PROJECT_SOURCE_DIR}/tests/support/skip.cpp")
+    target_include_directories(hamelin_test_support PUBLIC "${PROJECT_SOURCE_DIR}/tests/support/include")
+    target_link_libraries(hamelin_test_support PRIVATE hamelin_options Catch2::Catch2)
+  endif()
   target_link_libraries(${target} PRIVATE ${arg_LINKS} hamelin::io hamelin_allocation_count
-    hamelin_options Catch2::Catch2WithMain)
-  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/include")
+    hamelin_test_support hamelin_options Catch2::Catch2WithMain)
   target_compile_definitions(${target} PRIVATE
     HAMELIN_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     HAMELIN_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
@@ -163,10 +167,9 @@ function(hamelin_tests)
   # The separators are escaped for each list that the labels pass through before CTest reads them.
   list(PREPEND arg_LABELS ${arg_NAME})
   list(JOIN arg_LABELS "\\\\\\\\;" labels)
-  # Catch2 2 cannot skip tests, so tests without their data print this line (tests/support,
-  # scene_data.hpp).
+  # Catch2 2 cannot skip tests; test::skip (tests/support) prints this line.
   catch_discover_tests(${target} TEST_PREFIX "${arg_NAME}: " PROPERTIES LABELS "${labels}"
-    SKIP_REGULAR_EXPRESSION "skipped: no folder")
+    SKIP_REGULAR_EXPRESSION "test skipped: ")
   if("threads" IN_LIST arg_LABELS)
     set_property(GLOBAL APPEND PROPERTY HAMELIN_THREADS_TESTS ${target})
   endif()

@@ -105,8 +105,32 @@ exit 8
 STUB
 chmod +x "$work/stubs/ctest"
 mkdir -p "$work/tree/build/ci"
+printf '[ci]\nd\n' >"$work/tree/tests/may_skip.txt"
 prints_counts() { ((code == 8)) && [[ "$(sed -n '$p' "$work/out")" == "2 passed, 2 failed, 1 skipped" ]]; }
 run test
 expect "test prints the counts of passed, failed and skipped tests, and returns ctest's exit code" \
   prints_counts
+# ---- A skipped test must be listed for its preset ----
+cat >"$work/stubs/ctest" <<'STUB'
+#!/bin/sh
+while [ "$1" != --output-junit ]; do shift; done
+cat >"$2" <<'XML'
+<testsuite tests="2" failures="0" disabled="0" skipped="1">
+	<testcase name="a" classname="a" time="1" status="run">
+	<testcase name="maps: FCL&apos;s &lt;distances&gt; agree" classname="d" time="1" status="notrun">
+		<skipped message="SKIP_REGULAR_EXPRESSION_MATCHED"/>
+XML
+STUB
+printf "# comment\n[all]\nother\n[tsan]\nmaps: FCL's <distances> agree\n" >"$work/tree/tests/may_skip.txt"
+names_skipped() {
+  ((code == 1)) && printed "^  maps: FCL's <distances> agree\$" &&
+    printed "^dev: skipped, but not listed in tests/may_skip.txt for the preset 'ci':\$" &&
+    [[ "$(sed -n '$p' "$work/out")" == "1 passed, 0 failed, 1 skipped" ]]
+}
+run test
+expect "test fails if a test is skipped that is not listed for the preset" names_skipped
+sed -i 's/tsan/tsan ci/' "$work/tree/tests/may_skip.txt"
+listed() { ((code == 0)) && ! printed '^dev:'; }
+run test
+expect "test succeeds if all skipped tests are listed for the preset" listed
 exit $failed

@@ -15,6 +15,7 @@
 
 #include "hamelin/io/file.hpp"
 #include "hamelin/io/json.hpp"
+#include "hamelin/test/skip.hpp"
 #include "hamelin/test/temporary.hpp"
 
 /// Runs the built program in a temporary directory.
@@ -112,13 +113,16 @@ class Sandbox {
   std::filesystem::path root_ = folder_.path(), work_ = root_ / "work";
 };
 
-/// Whether the templates of the pages were built, which takes Node.js; warns if not.
+/// Whether the templates of the pages were built, which takes Node.js.
 inline bool pages_were_built() {
   const auto folder =
       std::filesystem::path(HAMELIN_PROGRAM).parent_path().parent_path() / "share/hamelin/report";
-  if (std::filesystem::exists(folder / "page.html")) return true;
-  WARN("the pages were not built: skipped");
-  return false;
+  return std::filesystem::exists(folder / "page.html");
+}
+
+/// Skips the test if they were not.
+inline void require_pages() {
+  skip_unless(pages_were_built(), "the pages were not built");
 }
 
 /// The lines of a text.

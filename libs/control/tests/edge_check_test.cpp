@@ -157,7 +157,7 @@ TEST_CASE("checks of motions do not allocate", "[control][guide]") {
   std::vector<VectorXd> q;
   for (int i = 0; i < 100; ++i) q.push_back(rig.random_q());
   (void)rig.query.motion_clear(q[0], q[1], 0.0);
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   CHECK(test::allocations_in([&] {
           for (std::size_t i = 1; i < q.size(); ++i)
             (void)rig.query.motion_clear(q[i - 1], q[i], 0.0);

@@ -128,7 +128,7 @@ TEST_CASE("an arm far from a trajectory is expected at its begin", "[control][tr
 }
 
 TEST_CASE("a reference does not allocate", "[control][trajectory]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   Follower arm;
   arm.follow(10);
   CHECK(test::allocations_in([&] {

@@ -323,7 +323,7 @@ TEST_CASE("an arm that was pushed off its stop comes to rest, with torques of a 
 }
 
 TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   scene::Scene scene = shelf();
   scene.model.self_collision = scene.model.torque_limits = scene.model.joint_limits = true;
   scene.actuation.type = scene::ActuationType::sampled;

@@ -845,12 +845,11 @@ TEST_CASE("the Panda loads with its tip, and without one its leaves are named",
 TEST_CASE("the UR5 loads with its tip, and without one its leaves are named",
           "[description][robot]") {
   const auto robots = test::shared_data("robots");
-  if (!robots) return;
-  CHECK_THAT(leaves_of(*robots / "ur5_robot.urdf"),
+  CHECK_THAT(leaves_of(robots / "ur5_robot.urdf"),
              Catch::Contains("ee_link") && Catch::Contains("tool0") && Catch::Contains("base"));
   RobotOptions options;
   options.tip = "tool0";
-  const Robot robot = read_robot(*robots / "ur5_robot.urdf", options);
+  const Robot robot = read_robot(robots / "ur5_robot.urdf", options);
   REQUIRE(robot.dof() == 6);
   CHECK(noted(robot, "no collision spheres"));
   CHECK(robot.links[2].joint.lower == Approx(-3.14159265359));

@@ -317,7 +317,6 @@ TEST_CASE("a new model at the address of a destroyed one is another model", "[dy
 }
 
 TEST_CASE("segments, columns and maps are used in place", "[dynamics][unit][allocation]") {
-  (void)test::counts_allocations();
   const Model model(test::random_robot(5, n, 3));
   Workspace ws(model);
   const VectorXd x = VectorXd::LinSpaced(4 * n, -1.0, 1.0);
@@ -345,7 +344,6 @@ TEST_CASE("segments, columns and maps are used in place", "[dynamics][unit][allo
 
 TEST_CASE("blocks of states with one row stride are used in place",
           "[dynamics][unit][allocation]") {
-  (void)test::counts_allocations();
   const Model model(test::random_robot(5, n, 3));
   BatchWorkspace ws(model);
   const StatesXd q = StatesXd::Random(n, 12), v = StatesXd::Random(n, 12),

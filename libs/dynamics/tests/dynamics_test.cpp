@@ -193,7 +193,7 @@ TEST_CASE("a mass ratio of 10^6 leaves the solve accurate", "[dynamics][hard]") 
 }
 
 TEST_CASE("nothing allocates after construction", "[dynamics][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const bool planar = GENERATE(false, true);
   const Model model(test::random_robot(61, 7, 3, planar));
   Workspace ws(model);

@@ -46,7 +46,7 @@ void check_tick(Integrator& integrator, const Channels& channels, double h) {
 
 TEST_CASE("the counter sees the allocations of Eigen, operator new and the C library",
           "[allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const VectorXd a = VectorXd::Ones(5), b = a;
   VectorXd c(5);
   double sum = 0.0;
@@ -68,7 +68,7 @@ TEST_CASE("the counter sees the allocations of Eigen, operator new and the C lib
 }
 
 TEST_CASE("a step does not allocate", "[integration][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const auto name = GENERATE(from_range(integrator_names()));
   const bool planar = GENERATE(false, true), prismatic = GENERATE(false, true);
   const Model model(test::random_robot(10, 6, prismatic ? 3 : 0, planar));
@@ -88,7 +88,7 @@ TEST_CASE("a step does not allocate", "[integration][allocation]") {
 
 TEST_CASE("other solvers, halved steps and failed steps do not allocate",
           "[integration][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const Model model(test::random_robot(10, 6));
   Parameters options;
   options.solver = Solver::feedback;

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/test/skip.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -20,6 +21,27 @@ struct Folder {
   }
   test::TemporaryFolder folder;
   const fs::path& path = folder.path();
+};
+
+// Root may write everywhere. Until its destruction, this makes root a user who may not, and gives
+// that user the folder.
+class UnprivilegedUser {
+ public:
+  explicit UnprivilegedUser(const fs::path& folder) {
+    if (::geteuid() != 0) return;
+    constexpr uid_t nobody = 65534;
+    was_root_ =
+        ::chown(folder.c_str(), nobody, static_cast<gid_t>(-1)) == 0 && ::seteuid(nobody) == 0;
+    test::skip_unless(was_root_, "root cannot become another user here");
+  }
+  UnprivilegedUser(const UnprivilegedUser&) = delete;
+  UnprivilegedUser& operator=(const UnprivilegedUser&) = delete;
+  ~UnprivilegedUser() {
+    if (was_root_) (void)!::seteuid(0);
+  }
+
+ private:
+  bool was_root_ = false;
 };
 
 }  // namespace
@@ -92,14 +114,13 @@ TEST_CASE("a failed write leaves the old file and no partial one", "[io][unit]")
     CHECK(folder.files() == 0);
   }
   SECTION("where the folder may not be written to") {
-    if (::geteuid() == 0) {
-      WARN("skipped: root may write everywhere");
-      return;
-    }
     write_file_atomically(folder.path / "f", "old");
     fs::permissions(folder.path, fs::perms::owner_read | fs::perms::owner_exec);
-    CHECK_THROWS_WITH(write_file_atomically(folder.path / "f", "new"),
-                      Catch::Contains("Permission denied"));
+    {
+      const UnprivilegedUser user(folder.path);
+      CHECK_THROWS_WITH(write_file_atomically(folder.path / "f", "new"),
+                        Catch::Contains("Permission denied"));
+    }
     CHECK(read_file(folder.path / "f") == "old");
     CHECK(folder.files() == 1);
   }

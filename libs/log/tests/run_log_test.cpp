@@ -1,4 +1,5 @@
 #include "hamelin/log/run_log.hpp"
+#include "hamelin/test/skip.hpp"
 #include "hamelin/test/temporary.hpp"
 
 #include <catch2/catch.hpp>
@@ -309,10 +310,7 @@ TEST_CASE("an unwritable path is refused before anything is written", "[log][uni
 }
 
 TEST_CASE("a full disk is an error that names the file", "[log][unit]") {
-  if (!fs::exists("/dev/full")) {
-    WARN("no /dev/full here: skipped");
-    return;
-  }
+  test::skip_unless(fs::exists("/dev/full"), "this system has no /dev/full");
   log::RunLog record("/dev/full");
   CHECK_THROWS_WITH(record.write("header", header), Contains("/dev/full: cannot be written"));
 }

@@ -323,7 +323,7 @@ TEST_CASE("a change of the map changes what is touched, and the motion goes on",
 }
 
 TEST_CASE("a step without a change of the map allocates nothing", "[mujoco]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   scene::Scene scene = scene::read_scene(test::data / "scenes" / "clutter.json");
   Rig rig(control::load_model(scene), scene);
   simulation::Plant& plant = rig.rest_at(scene.start_q);

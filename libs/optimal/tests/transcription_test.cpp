@@ -9,6 +9,7 @@
 #include "hamelin/optimal/timed_motion.hpp"
 #include "hamelin/test/errors.hpp"
 #include "hamelin/test/robots.hpp"
+#include "hamelin/test/skip.hpp"
 
 using namespace hamelin;
 using namespace hamelin::optimal;
@@ -118,7 +119,7 @@ TEST_CASE("both solvers find the same motion", "[optimal]") {
   CAPTURE(found.cause, found.iterations, found.violation, found.stationarity, found.cost);
   CHECK(found.converged);
   CHECK(found.violation == 0.0);
-  if (!has_ipopt()) return;
+  test::skip_unless(has_ipopt(), "this build is without Ipopt");
   options.solver = Solver::ipopt;
   const Solution reference = solve(problem, guess, options);
   CAPTURE(reference.cause, reference.iterations, reference.cost);

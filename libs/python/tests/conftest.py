@@ -12,6 +12,13 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 import hamelin  # noqa: E402
 
 
+def pytest_terminal_summary(terminalreporter):
+    """Lets CTest count a file as skipped if some of its tests were and none failed."""
+    if not terminalreporter.stats.get("failed") and not terminalreporter.stats.get("error"):
+        for report in terminalreporter.stats.get("skipped", []):
+            print(f"\ntest skipped: {report.nodeid}: {report.longrepr[2]}")
+
+
 @pytest.fixture(scope="session")
 def source() -> pathlib.Path:
     return pathlib.Path(os.environ["HAMELIN_SOURCE_DIR"])

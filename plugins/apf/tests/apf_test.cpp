@@ -242,7 +242,7 @@ TEST_CASE("wang2018's repulsion vanishes at the goal, khatib's does not", "[apf]
 }
 
 TEST_CASE("apf does not allocate in a tick", "[apf]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const std::string mapping = GENERATE("operational", "potential");
   auto loop = spatial(Json{{"mapping", mapping}, {"law", "wang2018"}});
   REQUIRE(loop.tick());

@@ -263,7 +263,7 @@ TEST_CASE("a joint goal attracts every joint with k_p times its error", "[gyro]"
 }
 
 TEST_CASE("gyro does not allocate in a tick", "[gyro]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const std::string variant = GENERATE("published", "energy-neutral", "chang-marsden", "garimella");
   auto loop = spatial(Json{{"variant", variant}}, test::three_balls);
   loop.v << 0.7, 0.2, -0.4, 0.5;

@@ -36,7 +36,7 @@ test::Task round_ball(bool self_collision = true) {
 }  // namespace
 
 TEST_CASE("the safety filter does not allocate", "[hybrid][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   Rng rng(1);
   const MatrixXd M = test::random_mass(rng, 7), W = M.inverse();
   const VectorXd a = test::random_numbers(rng, 7), low = VectorXd::Constant(7, -1.0),
@@ -55,7 +55,7 @@ TEST_CASE("the safety filter does not allocate", "[hybrid][allocation]") {
 }
 
 TEST_CASE("a rollout does not allocate", "[hybrid][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   test::Scene scene(round_ball());
   const VectorXd start = test::below_ball(), to = test::above_ball();
   CHECK(allocations_in([&] {
@@ -69,7 +69,7 @@ TEST_CASE("a rollout does not allocate", "[hybrid][allocation]") {
 }
 
 TEST_CASE("searches do not allocate", "[hybrid][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   SECTION("towards a joint goal") {
     test::Scene scene(round_ball());
     auto tree = scene.tree(3000);
@@ -108,7 +108,7 @@ TEST_CASE("searches do not allocate", "[hybrid][allocation]") {
 }
 
 TEST_CASE("the memory of stalls does not allocate", "[hybrid][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   test::Scene scene(round_ball());
   hybrid::EscapeMemory memory(scene.setup, scene.box, 5);
   const VectorXd stall = test::below_ball(), goal = test::above_ball();

@@ -324,7 +324,7 @@ TEST_CASE("ways do not lead through what stands still", "[hybrid][look]") {
 }
 
 TEST_CASE("a look does not allocate", "[hybrid][look][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   Looks looks(task_with(Vector4d(1.0, 0.0, 0.0, 0.0),
                         test::moving_ball({0.0, 0.8, 0.0}, 0.5, {0.0, -1.5, 0.0}),
                         {{{0.6, -0.2, 0.0}, 0.1}}));

@@ -401,7 +401,7 @@ planning::Plugin keep_loaded(const std::string& planner) {
 }  // namespace
 
 TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const TemporaryFolder folder;
   const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
   CAPTURE(planner);
@@ -425,7 +425,7 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
 
 TEST_CASE("a tick with everything that can be modelled does not allocate",
           "[simulation][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const TemporaryFolder folder;
   const std::string actuation = GENERATE(as<std::string>{}, "ideal", "sampled");
   CAPTURE(actuation);
@@ -457,7 +457,7 @@ TEST_CASE("a tick with everything that can be modelled does not allocate",
 }
 
 TEST_CASE("a tick of hybrid does not allocate while it searches", "[simulation][allocation]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   // The first link cannot turn past either ball, so no search finds a path.
   const TemporaryFolder folder;
   const auto loaded = keep_loaded("hybrid");

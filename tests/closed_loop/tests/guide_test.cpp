@@ -7,6 +7,7 @@
 #include "hamelin/log/read_log.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "hamelin/test/errors.hpp"
+#include "hamelin/test/guides.hpp"
 #include "hamelin/test/temporary.hpp"
 
 using namespace hamelin;
@@ -47,7 +48,7 @@ const std::string connect = "/planner/guide=rrt-connect";
 
 TEST_CASE("a guided planner without an escape reaches all goals, clear and certified",
           "[closed_loop][guide]") {
-  if (!guide::available()) return;
+  test::require_guides();
   const auto guide = GENERATE(as<std::string>{}, "rrt", "rrt-connect", "rrt-star", "bit-star",
                               "informed-rrt-star");
   CAPTURE(guide);
@@ -65,7 +66,7 @@ TEST_CASE("a guided planner without an escape reaches all goals, clear and certi
 }
 
 TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
-  if (!guide::available()) return;
+  test::require_guides();
   const std::vector<Json> first = logged_ticks({connect}), again = logged_ticks({connect});
   REQUIRE(first.size() > 100);
   CHECK(first == again);
@@ -73,7 +74,7 @@ TEST_CASE("guided runs repeat themselves to the byte", "[closed_loop][guide]") {
 }
 
 TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
-  if (!guide::available()) return;
+  test::require_guides();
   const std::string one_goal =
       R"(/goals=[{"type": "joint", "q": [0.3, -0.4, 0, -1.5, 0, 1.4, 0]}])";
   for (const double check_s : {0.0, 1e-4, 1e-3}) {
@@ -91,7 +92,7 @@ TEST_CASE("the charge of a search delays its path", "[closed_loop][guide]") {
 }
 
 TEST_CASE("a guided run whose map changes in its way searches again", "[closed_loop][guide]") {
-  if (!guide::available()) return;
+  test::require_guides();
   const scene::Scene scene = shelf({connect});
   const control::PathPlan plan = control::plan_paths(scene);
   REQUIRE(plan.found());
@@ -107,7 +108,7 @@ TEST_CASE("a guided run whose map changes in its way searches again", "[closed_l
 
 TEST_CASE("plans have a certificate for each line and chain from goal to goal",
           "[closed_loop][guide]") {
-  if (!guide::available()) return;
+  test::require_guides();
   const control::PathPlan plan = control::plan_paths(shelf({connect}));
   const Json document = control::to_json(plan);
   check_shipped_schema(document, "path", "plan");
@@ -126,7 +127,7 @@ TEST_CASE("plans have a certificate for each line and chain from goal to goal",
 
 TEST_CASE("a scene that asks for a guide says in one line that the build has none",
           "[closed_loop][guide]") {
-  if (guide::available()) return;
+  test::skip_unless(!guide::available(), "this build has OMPL");
   CHECK(test::error_of([] { (void)run({connect}); })
             .ends_with("shelf.json: /planner/guide: is rrt-connect, which this build of hamelin is "
                        "without, expected none; to build with OMPL, install libompl-dev and "

@@ -234,7 +234,7 @@ TEST_CASE("the budget and the seed of looks ahead have an effect",
 }
 
 TEST_CASE("a tick does not allocate while the arm evades", "[simulation][allocation][movers]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const TemporaryFolder folder;
   const auto plugin = planning::find_plugin("hybrid", test::plugin_directories);  // stays loaded
   for (const auto& [name, obstacles] : all_movers()) {

@@ -162,7 +162,7 @@ TEST_CASE("parts that the payload touches when it is attached may go on to touch
 }
 
 TEST_CASE("a tick that takes over another load does not allocate", "[control][load]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   const scene::Scene scene = sampled("clutter.json");
   Loop loop(scene, with_room());
   for (int k = 0; k < 10; ++k) loop.step(VectorXd(loop.tick().torque));

@@ -266,12 +266,9 @@ TEST_CASE(
 }
 
 TEST_CASE("colour appears only on terminals, and can be disabled", "[command_line]") {
-  if (const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY); terminal >= 0) {
-    ::close(terminal);
-  } else {
-    WARN("skipped: no pseudo-terminal is available");
-    return;
-  }
+  const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY);
+  test::skip_unless(terminal >= 0, "no pseudo-terminal is available");
+  ::close(terminal);
   const std::string escape = "\033[";
   CHECK(on_terminal(free_fall, {{"TERM", "xterm"}, {"NO_COLOR", ""}}).find(escape) !=
         std::string::npos);
@@ -286,10 +283,7 @@ TEST_CASE("colour appears only on terminals, and can be disabled", "[command_lin
 }
 
 TEST_CASE("bash completes commands, options, values, planners and files", "[command_line]") {
-  if (!is_installed("bash")) {
-    WARN("skipped: bash is not installed, so completion is not tested");
-    return;
-  }
+  test::skip_unless(is_installed("bash"), "bash is not installed, so completion is not tested");
   CHECK(completions({"sc"}) == Strings{"scene", "schema"});
   CHECK(completions({"scene", ""}) == Strings{"crop", "info", "make"});
   CHECK(completions({"help", "scene", "m"}) == Strings{"make"});
@@ -324,10 +318,8 @@ TEST_CASE("man formats the manual page of each command without a warning", "[com
     for (const char* section : {".SH NAME", ".SH SYNOPSIS", ".SH EXAMPLES", ".SH SEE ALSO"})
       CHECK(page.find(section) != std::string::npos);
   }
-  if (!is_installed("man") || !is_installed("lexgrog")) {
-    WARN("skipped: man or lexgrog is not installed, so the pages are not tested");
-    return;
-  }
+  test::skip_unless(is_installed("man") && is_installed("lexgrog"),
+                    "man or lexgrog is not installed, so the pages are not tested");
   const auto formatted = bash("pages=$(mktemp -d); '" HAMELIN_PROGRAM
                               "' man \"$pages\"; for page in \"$pages\"/*.1; do"
                               " man --warnings -E UTF-8 -l -Tutf8 -Z \"$page\" > /dev/null; "

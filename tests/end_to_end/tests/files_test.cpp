@@ -131,8 +131,7 @@ TEST_CASE("the Panda's URDF loads with its tip and is refused without, listing t
 
 TEST_CASE("the UR5's URDF loads with its tip and is refused without, listing the leaves",
           "[end_to_end]") {
-  if (const auto robots = test::shared_data("robots"))
-    check_tip(fs::canonical(*robots) / "ur5_robot.urdf", "tool0");
+  check_tip(fs::canonical(test::shared_data("robots")) / "ur5_robot.urdf", "tool0");
 }
 
 TEST_CASE("every damaged map is refused with one line, unusual maps are accepted with a note",

@@ -2,6 +2,7 @@
 
 #include "../program.hpp"
 #include "hamelin/guide/guide.hpp"
+#include "hamelin/test/guides.hpp"
 
 using namespace hamelin;
 using test::Sandbox;
@@ -20,7 +21,7 @@ std::vector<std::string> plan_with(std::vector<std::string> command,
 }  // namespace
 
 TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
-  if (!guide::available()) return;
+  test::require_guides();
   Sandbox sandbox;
   const auto text = sandbox.run(plan_with(plan_shelf, {"-o", "path.json"}));
   CHECK(text.exit_code == 0);
@@ -49,7 +50,7 @@ TEST_CASE("plan writes a path per goal, which a scene can use", "[plan]") {
 }
 
 TEST_CASE("a guided run is replayed to the byte", "[plan]") {
-  if (!guide::available()) return;
+  test::require_guides();
   Sandbox sandbox;
   const auto run = sandbox.run({"run", "data/scenes/shelf.json", "--guide", "informed-rrt-star",
                                 "--log", "run.jsonl.zst", "--every", "100"});
@@ -58,7 +59,7 @@ TEST_CASE("a guided run is replayed to the byte", "[plan]") {
 }
 
 TEST_CASE("plan has exit code 1 where there is no path", "[plan]") {
-  if (!guide::available()) return;
+  test::require_guides();
   Sandbox sandbox;
   const std::string unreachable = R"(/goals=[{"type": "position", "position_m": [5.0, 0.0, 0.5]}])";
   const Json plan = test::run_json(sandbox, plan_with(plan_shelf, {"--set", unreachable}), 1);

@@ -91,7 +91,7 @@ TEST_CASE("plugins check finds threads that outlive the planner", "[end_to_end][
 
 TEST_CASE("plugins check finds allocations in ticks that are not declared",
           "[end_to_end][plugins]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   CHECK_THAT(text_of(checks_of("unruly", "memory", 1), "failed", "ticks do not allocate"),
              Catch::Contains("the first in tick 0, expected none"));
   CHECK_FALSE(text_of(checks_of("unruly_declared", "memory", 0), "skipped", "ticks do not allocate")

@@ -9,7 +9,7 @@ using Catch::Matchers::Contains;
 using test::Sandbox;
 
 TEST_CASE("a report is one self-contained file, small enough to send", "[end_to_end][report]") {
-  if (!test::pages_were_built()) return;
+  test::require_pages();
   Sandbox sandbox;
   // This run takes the full 30 s, because apf does not reach the goal.
   REQUIRE(
@@ -33,7 +33,7 @@ TEST_CASE("a report is one self-contained file, small enough to send", "[end_to_
 }
 
 TEST_CASE("free motion and a truncated log can be reported", "[end_to_end][report]") {
-  if (!test::pages_were_built()) return;
+  test::require_pages();
   Sandbox sandbox;
   REQUIRE(
       sandbox
@@ -48,7 +48,7 @@ TEST_CASE("free motion and a truncated log can be reported", "[end_to_end][repor
 
 TEST_CASE("report refuses files that are not logs with one line, and writes no page",
           "[end_to_end][report]") {
-  if (!test::pages_were_built()) return;
+  test::require_pages();
   Sandbox sandbox;
   sandbox.put("empty.jsonl", "");
   sandbox.put("noise.jsonl", "{\"type\":\"header\"}\n");

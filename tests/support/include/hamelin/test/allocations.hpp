@@ -1,7 +1,6 @@
 #pragma once
-#include <catch2/catch.hpp>
-
 #include "hamelin/core/allocation_count.hpp"
+#include "hamelin/test/skip.hpp"
 
 namespace hamelin::test {
 
@@ -13,10 +12,11 @@ long allocations_in(F&& f) {
   return allocation_count() - before;
 }
 
-/// Whether allocations are counted in this build; if not, it warns that the test is skipped.
-inline bool counts_allocations() {
-  if (!hamelin::counts_allocations()) WARN("skipped: this build does not count allocations");
-  return hamelin::counts_allocations();
+using hamelin::counts_allocations;  // for a test of which this is a small part
+
+/// Skips the test if allocations are not counted in this build.
+inline void require_allocation_count() {
+  skip_unless(counts_allocations(), "this build does not count allocations");
 }
 
 }  // namespace hamelin::test

@@ -1,8 +1,8 @@
 #pragma once
-#include <catch2/catch.hpp>
 #include <filesystem>
-#include <optional>
 #include <string>
+
+#include "hamelin/test/skip.hpp"
 
 namespace hamelin::test {
 
@@ -10,13 +10,12 @@ inline const std::filesystem::path data = std::filesystem::path(HAMELIN_SOURCE_D
 /// A third-party arm with its licence; see data/README.md.
 inline const std::filesystem::path third_party_robots = data / "robots" / "third_party";
 
-/// An optional folder of test data that does not ship with the checkout, or nothing. If it is
-/// missing, the test must return: CTest then counts it as skipped because of the printed line.
-inline std::optional<std::filesystem::path> shared_data(const std::string& name) {
+/// A folder of test data that does not ship with the checkout. If it is missing, the test is
+/// skipped.
+inline std::filesystem::path shared_data(const std::string& name) {
   const auto path = std::filesystem::path(HAMELIN_SOURCE_DIR) / ".." / "shared" / "data" / name;
-  if (std::filesystem::exists(path)) return path;
-  WARN("skipped: no folder '" << name << "' of data that does not ship");
-  return std::nullopt;
+  skip_unless(std::filesystem::exists(path), "the folder '" + name + "' of data does not ship");
+  return path;
 }
 
 }  // namespace hamelin::test
