@@ -1,9 +1,12 @@
 // A planner that damps the joints, and breaks the rule of the plugin interface that the environment
 // variable HAMELIN_TEST_BREAKS names. It is compiled twice: UNRULY_PROPERTIES is what it declares.
+#include <unistd.h>
+
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -64,6 +67,10 @@ class Unruly : public Planner {
     if (breaks("no crash")) std::abort();
     if (breaks("no exit")) std::_Exit(0);
     if (breaks("an end")) wait_forever();
+    if (breaks("interruption")) {
+      std::ofstream("hangs." + std::to_string(::getpid()));
+      wait_forever();
+    }
     // One tick in 40 is more than one in 100.
     if (breaks("deadline") && tick.k() % 40 == 0)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));

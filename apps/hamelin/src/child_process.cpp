@@ -14,6 +14,7 @@
 #include <exception>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/sweep/parent_death.hpp"
 
 namespace hamelin::app {
 
@@ -60,9 +61,10 @@ std::string run_in_child(const std::function<std::string()>& action, double time
   std::array<int, 2> pipe_ends{};
   if (::pipe2(pipe_ends.data(), O_CLOEXEC) != 0)
     throw Error(ErrorCode::io, fmt::format("pipe: {}", std::strerror(errno)));
-  const pid_t child = ::fork();
+  const pid_t parent = ::getpid(), child = ::fork();
   if (child < 0) throw Error(ErrorCode::io, fmt::format("fork: {}", std::strerror(errno)));
   if (child == 0) {
+    sweep::end_with_parent(parent);
     ::close(pipe_ends[0]);
     ::dup2(STDERR_FILENO, STDOUT_FILENO);
     // The mark says that the action came to its end.

@@ -91,6 +91,7 @@ int record(const RecordOptions& options, const std::vector<fs::path>& inputs,
     watch.progress = [&progress](double time_s, double duration_s) {
       progress.show(time_s, duration_s);
     };
+    const HangGuard guard;
     result = simulate(watch);
   }
   const Json document = log::to_json(result);

@@ -113,7 +113,10 @@ int sweep_pairs(const PairsOptions& options) {
     records.write(index, drawn.pairs[index], result);
     progress->show(static_cast<double>(index + 1), static_cast<double>(drawn.pairs.size()));
   };
-  const auto results = sweep::run_pairs(scene, drawn.pairs, runs);
+  const auto results = [&] {
+    const HangGuard guard;
+    return sweep::run_pairs(scene, drawn.pairs, runs);
+  }();
   progress.reset();
   const double wall_s = std::chrono::duration<double>(clock::now() - begin).count();
 

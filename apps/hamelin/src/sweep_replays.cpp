@@ -92,6 +92,7 @@ void write_replay(const sweep::MergedRun& run, const fs::path& target,
     watch.log = &log;
     watch.argv = command_line();
     watch.stop = &stop_on_signals();
+    const HangGuard guard;
     now = sweep::run_under_judge(scene, plugin_path(request.plugin_path), watch, plant_factory());
     log.flush();
   }

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
-#include <sys/prctl.h>
 
-#include <csignal>
 #include <memory>
 #include <thread>
 
@@ -61,11 +59,11 @@ int sweep_run(const SweepRunOptions& options) {
 }
 
 int sweep_one(const OneOptions& options) {
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // if the sweep is killed, its runs end too
   const scene::Scene scene = read_scene(options.file, options.flags);
   simulation::Watch watch;
   watch.argv = command_line();
   watch.stop = &stop_on_signals();
+  const HangGuard guard;
   fmt::print("{}\n", sweep::to_line(sweep::run_under_judge(scene, plugin_path(options.plugin_path),
                                                            watch, plant_factory())));
   return 0;

@@ -21,8 +21,23 @@ namespace {
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch it");
 
+// Whether a HangGuard lives.
+std::atomic<bool> guard_lives{false};
+constexpr unsigned time_to_stop_s = 2;
+constexpr int exit_interrupted = 130;
+
 void on_signal(int) {
   stop_requested.store(true);
+  if (guard_lives.load()) ::alarm(time_to_stop_s);
+}
+
+void on_alarm(int) {
+  if (!guard_lives.load()) return;
+  constexpr std::string_view line =
+      "hamelin: interrupted: the run did not stop within 2 s and was ended; its log, if any, is "
+      "unfinished\n";
+  (void)!::write(STDERR_FILENO, line.data(), line.size());
+  ::_exit(exit_interrupted);
 }
 
 // One line per message, even if its text has line breaks: "hamelin: note: text".
@@ -146,6 +161,19 @@ const std::atomic<bool>& stop_on_signals() {
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   return stop_requested;
+}
+
+HangGuard::HangGuard() noexcept {
+  struct sigaction action {};
+  action.sa_handler = on_alarm;
+  ::sigaction(SIGALRM, &action, nullptr);
+  guard_lives.store(true);
+  if (stop_requested.load()) ::alarm(time_to_stop_s);
+}
+
+HangGuard::~HangGuard() {
+  guard_lives.store(false);
+  ::alarm(0);
 }
 
 }  // namespace hamelin::app

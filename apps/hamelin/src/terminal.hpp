@@ -71,4 +71,15 @@ class Progress {
 /// signal ends the program.
 [[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
+/// For code that calls planners, which may not return: if such a signal comes while an object of
+/// this class lives, and the object still lives 2 s later, the program prints one line and ends
+/// with exit code 130, without finishing its log. At most one object may live at a time.
+class HangGuard {
+ public:
+  HangGuard() noexcept;
+  ~HangGuard();
+  HangGuard(const HangGuard&) = delete;
+  HangGuard& operator=(const HangGuard&) = delete;
+};
+
 }  // namespace hamelin::app

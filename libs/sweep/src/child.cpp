@@ -3,7 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/sweep/parent_death.hpp"
 
 namespace hamelin::sweep {
 
@@ -20,37 +21,53 @@ namespace {
 // Exit codes of a child that cannot be set up, and of one that ends by an exception.
 constexpr int not_set_up = 126, by_exception = 3;
 
-// Starts a program. @return its process id
+// Gives a child empty input, its outputs and a group of its own. Safe between fork and exec.
+bool set_up(pid_t parent, int out, int err) noexcept {
+  ::setpgid(0, 0);
+  end_with_parent(parent);
+  const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  return ::dup2(nothing, STDIN_FILENO) >= 0 && ::dup2(out, STDOUT_FILENO) >= 0 &&
+         ::dup2(err, STDERR_FILENO) >= 0;
+}
+
+// Reads the number that a child sends, 0 if it sends none. Closed by exec, the pipe ends.
+int receive_errno(int from) {
+  int number = 0;
+  while (::read(from, &number, sizeof number) < 0 && errno == EINTR) {
+  }
+  return number;
+}
+
+// Starts a program. posix_spawn cannot set the signal for the parent's death.
+// @return its process id
 pid_t spawn(const std::vector<std::string>& command, int out, int err) {
   std::vector<char*> argv;
   argv.reserve(command.size() + 1);
   for (const auto& argument : command) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, out, STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, err, STDERR_FILENO);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);  // the default group 0: a new group
-  pid_t pid = -1;
-  const int failed = ::posix_spawn(&pid, argv[0], &actions, &attributes, argv.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0)
-    throw Error(ErrorCode::io,
-                fmt::format("{}: cannot be started: {}", command.front(), std::strerror(failed)));
-  return pid;
+  std::array<int, 2> failure{};
+  if (::pipe2(failure.data(), O_CLOEXEC) != 0)
+    throw Error(ErrorCode::io, fmt::format("cannot create a pipe: {}", std::strerror(errno)));
+  const pid_t parent = ::getpid(), pid = ::fork();
+  if (pid == 0) {
+    if (set_up(parent, out, err)) ::execv(argv[0], argv.data());
+    const int reason = errno;
+    ::_exit(::write(failure[1], &reason, sizeof reason) > 0 ? not_set_up : by_exception);
+  }
+  const int not_forked = errno;
+  ::close(failure[1]);
+  const int failed = pid < 0 ? not_forked : receive_errno(failure[0]);
+  ::close(failure[0]);
+  if (failed == 0) return pid;
+  if (pid > 0) (void)::waitpid(pid, nullptr, 0);
+  throw Error(ErrorCode::io,
+              fmt::format("{}: cannot be started: {}", command.front(), std::strerror(failed)));
 }
 
 // The life of a forked child.
-[[noreturn]] void live(const std::vector<std::string>& command, const Main& main, int out,
-                       int err) noexcept {
-  const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-  if (::dup2(nothing, STDIN_FILENO) < 0 || ::dup2(out, STDOUT_FILENO) < 0 ||
-      ::dup2(err, STDERR_FILENO) < 0)
-    ::_exit(not_set_up);
+[[noreturn]] void live(const std::vector<std::string>& command, const Main& main, pid_t parent,
+                       int out, int err) noexcept {
+  if (!set_up(parent, out, err)) ::_exit(not_set_up);
   // Above all the locks of the sweep, which must not outlive the parent.
   ::close_range(STDERR_FILENO + 1, ~0U, 0);
   int status = by_exception;
@@ -62,21 +79,23 @@ pid_t spawn(const std::vector<std::string>& command, int out, int err) {
   ::_exit(status);  // without the destructors of the parent's objects
 }
 
-// Forks this process. @return the child's process id
-pid_t fork_process(const std::vector<std::string>& command, const Main& main, int out, int err) {
+// Calls `main` in a fork of this process. @return the child's process id
+pid_t fork_main(const std::vector<std::string>& command, const Main& main, int out, int err) {
   std::fflush(nullptr);  // or the child would print what is buffered once more
-  const pid_t pid = ::fork();
+  const pid_t parent = ::getpid(), pid = ::fork();
   if (pid < 0)
     throw Error(ErrorCode::io, fmt::format("cannot start a run: {}", std::strerror(errno)));
-  if (pid == 0) {
-    ::setpgid(0, 0);
-    live(command, main, out, err);
-  }
+  if (pid == 0) live(command, main, parent, out, err);
   ::setpgid(pid, pid);  // here too, because either process may be first
   return pid;
 }
 
 }  // namespace
+
+void end_with_parent(pid_t parent) noexcept {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(not_set_up);  // it died before the line above
+}
 
 Pipe::Pipe() {
   // reading must not block: a process that the run left behind may keep the other end open
@@ -113,7 +132,7 @@ void Pipe::close(std::size_t end) noexcept {
 
 Child::Child(const PlannedRun& of, const std::vector<std::string>& command, const Main& main)
     : run(&of) {
-  pid = main ? fork_process(command, main, out.writer(), err.writer())
+  pid = main ? fork_main(command, main, out.writer(), err.writer())
              : spawn(command, out.writer(), err.writer());
   out.close_writer();
   err.close_writer();

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstring>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "child.hpp"
@@ -28,8 +29,12 @@ namespace fs = std::filesystem;
 // How often children are checked for their end, and how often once one of them has closed its
 // output.
 constexpr int poll_ms = 100, poll_closed_ms = 1;
+// How long children may take to end after SIGTERM, until they are killed.
+constexpr std::chrono::seconds time_to_end(2);
 // Exit code of a child that found bad input.
 constexpr int bad_input = 2;
+// Exit code of a child that was interrupted while its planner did not return.
+constexpr int interrupted_hanging = 130;
 // Length to which the last line of a child's standard error is truncated.
 constexpr std::size_t line_max = 2000;
 
@@ -168,10 +173,14 @@ class Sweep {
     children_.emplace_back(run, arguments, options_.main);
   }
 
+  // Asks children to end, and kills those that have not ended in time, for example because a
+  // planner does not return.
   void terminate_children() {
-    if (terminated_) return;
-    terminated_ = true;
-    for (const auto& child : children_) child.signal_group(SIGTERM);
+    const auto now = std::chrono::steady_clock::now();
+    const bool late = terminated_ && now - *terminated_ >= time_to_end;
+    if (terminated_ && !late) return;
+    if (!terminated_) terminated_ = now;
+    for (const auto& child : children_) child.signal_group(late ? SIGKILL : SIGTERM);
   }
 
   void wait() {
@@ -216,7 +225,9 @@ class Sweep {
     Json output = Json::parse(child.out.text(), nullptr, false);
     const bool returned = WIFEXITED(status) && output.is_object() && output.contains("result") &&
                           output.contains("judge") && output["result"].is_object();
-    const bool interrupted = returned && output["result"].value("outcome", Json()) == "interrupted";
+    const bool interrupted = returned
+                                 ? output["result"].value("outcome", Json()) == "interrupted"
+                                 : WIFEXITED(status) && WEXITSTATUS(status) == interrupted_hanging;
     if ((interrupted || killed_from_outside(child, status)) && repeated_.insert(child.run).second) {
       pending_.push_back(child.run);
       return;
@@ -292,7 +303,7 @@ class Sweep {
   std::vector<Child> children_;
   std::optional<Error> failure_;
   RunOutcome outcome_;
-  bool terminated_ = false;
+  std::optional<std::chrono::steady_clock::time_point> terminated_;  ///< when SIGTERM was sent
 };
 
 }  // namespace

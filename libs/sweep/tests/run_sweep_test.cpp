@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
@@ -22,6 +23,7 @@
 #include "hamelin/sweep/merge.hpp"
 #include "hamelin/sweep/plan.hpp"
 #include "hamelin/sweep/records.hpp"
+#include "hamelin/test/processes.hpp"
 #include "scripted_sweep.hpp"
 
 using namespace hamelin;
@@ -216,6 +218,58 @@ TEST_CASE("a stopped sweep terminates its children, does not record them, and ca
   CHECK(run_sweep(sweep.root(), sweep.options()).run == 3);
 }
 
+TEST_CASE("children that do not end when they are asked to are killed", "[sweep][unit]") {
+  ScriptedSweep sweep(3);
+  const fs::path root = sweep.root();
+  sweep.script("if [ \"$3\" = p0 ]; then while [ ! -e '" + (root / "p1").string() +
+               "' ]; do sleep 0.01; done; else trap '' TERM; touch '" + root.string() +
+               "'/$3; i=0; while [ $i -lt 60 ]; do sleep 1; i=$((i + 1)); done; touch '" +
+               (root / "late").string() + "'; fi");
+  std::atomic<bool> stop{false};
+  RunOptions options = sweep.options();
+  options.stop = &stop;
+  options.on_done = [&](std::size_t, std::size_t) { stop = true; };
+  CHECK(run_sweep(root, options).stopped);
+  CHECK_FALSE(fs::exists(root / "late"));
+  CHECK(sweep.records().size() == 1);
+}
+
+TEST_CASE("the runs of a sweep that is killed are killed", "[sweep][unit]") {
+  const bool in_forks = GENERATE(false, true);
+  CAPTURE(in_forks);
+  ScriptedSweep sweep(2);
+  const std::string pids = (sweep.root() / "pids").string();
+  sweep.script("echo $$ >> '" + pids + "'; exec sleep 600");
+  RunOptions options = sweep.options();
+  if (in_forks)
+    options.main = [&pids](const std::vector<std::string>&) {
+      std::ofstream(pids, std::ios::app) << ::getpid() << std::endl;
+      ::sleep(600);
+      return 0;
+    };
+  const pid_t parent = ::fork();
+  if (parent == 0) {
+    (void)run_sweep(sweep.root(), options);
+    ::_exit(0);
+  }
+  for (int i = 0; i < 6000 && sweep.lines("pids").size() < 2; ++i) ::usleep(10'000);
+  ::kill(parent, SIGKILL);
+  CHECK(::waitpid(parent, nullptr, 0) == parent);
+  const auto running = sweep.lines("pids");
+  REQUIRE(running.size() == 2);
+  for (const auto& pid : running) {
+    CHECK(test::has_ended(std::stoi(pid)));
+    ::kill(std::stoi(pid), SIGKILL);
+  }
+}
+
+TEST_CASE("a program that cannot be started is an error that names it", "[sweep][unit]") {
+  ScriptedSweep sweep(1);
+  RunOptions options = sweep.options();
+  options.command = {"/no/such/program"};
+  CHECK(sweep.message(options) == "/no/such/program: cannot be started: No such file or directory");
+}
+
 TEST_CASE("a run that takes too long is killed and recorded, and the others continue",
           "[sweep][unit]") {
   ScriptedSweep sweep(3);
@@ -245,19 +299,7 @@ TEST_CASE("a process that a run leaves behind does not delay the sweep, and is k
   CHECK(outcome.crashed == 0);
   const auto left = sweep.lines("left");
   REQUIRE(left.size() == 2);
-  for (const auto& pid : left) {
-    // the killed process may not have been reaped yet
-    std::string state;
-    for (int i = 0; i < 500; ++i) {
-      std::ifstream status("/proc/" + pid + "/stat");
-      std::string word;
-      status >> word >> word >> state;
-      if (!status || state == "Z") break;
-      ::usleep(10'000);
-      state = "running";
-    }
-    CHECK(state != "running");
-  }
+  for (const auto& pid : left) CHECK(test::has_ended(std::stoi(pid)));
 }
 
 TEST_CASE("the processes of a run that is killed after its time limit are killed with it",
