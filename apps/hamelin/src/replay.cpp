@@ -18,7 +18,8 @@ namespace hamelin::app {
 namespace {
 
 // With another build or processor, rounding differs from the first step on. Smooth motion carries
-// the difference along, and a planner may decide differently.
+// the difference along, far below this, until a decision of the planner depends on it: from then on
+// the runs are two different runs of the scene (docs/logs.md).
 constexpr double tolerance_other_build = 1e-6;
 
 struct ReplayOptions {
@@ -37,7 +38,9 @@ Json difference_json(const std::optional<simulation::Verdict::Difference>& diffe
                {"time_s", nullptr},
                {"field", difference->field},
                {"logged", difference->logged},
-               {"replayed", difference->replayed}};
+               {"replayed", difference->replayed},
+               {"difference", nullptr}};
+  if (difference->size) json["difference"] = *difference->size;
   if (difference->k) json["k"] = *difference->k;
   if (difference->time_s) json["time_s"] = *difference->time_s;
   return json;
@@ -51,6 +54,21 @@ std::string describe(const simulation::Verdict::Difference& d) {
                      d.logged, d.replayed);
 }
 
+// What is known of two runs that differ.
+std::string describe_branch(const simulation::Verdict& verdict, double tolerance) {
+  const auto& branch = *verdict.beyond_tolerance;
+  std::string text = fmt::format("differs: {}", describe(branch));
+  if (branch.size) text += fmt::format(", by {:.2g}", *branch.size);
+  text += !verdict.first_difference || verdict.largest == 0.0
+              ? "; equal to the bit before"
+              : fmt::format("; equal within {:g} before, largest difference {:.2g}", tolerance,
+                            verdict.largest);
+  if (!verdict.outcome_logged.empty() && !verdict.outcome_replayed.empty())
+    text += fmt::format("; outcome logged {}, replayed {}", verdict.outcome_logged,
+                        verdict.outcome_replayed);
+  return text;
+}
+
 int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
   const double tolerance =
       options.tolerance.value_or(recorded.other_build.empty() ? 0.0 : tolerance_other_build);
@@ -58,7 +76,8 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
     note(fmt::format("{}: {}", options.file.string(), line));
   if (!recorded.other_build.empty() && !options.tolerance)
     note(fmt::format(
-        "another build or machine: compared within {:g} times max(1, |logged|), not bit for bit",
+        "another build or machine: compared within {:g} times max(1, |logged|), not bit for bit; "
+        "the runs may differ from a decision on that depends on rounding",
         tolerance));
   simulation::Watch watch;
   watch.stop = &stop_on_signals();
@@ -68,6 +87,7 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
     watch.progress = [&progress](double time_s, double duration_s) {
       progress.show(time_s, duration_s);
     };
+    const HangGuard guard;
     verdict = simulation::verify(recorded, options.file, tolerance,
                                  plugin_path(options.plugin_path), watch, plant_factory());
   }
@@ -83,6 +103,8 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
                 {"largest_difference", verdict.largest},
                 {"first_difference", difference_json(verdict.first_difference)},
                 {"beyond_tolerance", difference_json(verdict.beyond_tolerance)},
+                {"outcome_logged", verdict.outcome_logged},
+                {"outcome_replayed", verdict.outcome_replayed},
                 {"other_build", recorded.other_build}});
   } else {
     const std::string extent =
@@ -92,7 +114,7 @@ int verify(const ReplayOptions& options, const simulation::Recorded& recorded) {
     if (verdict.stopped)
       text = fmt::format("interrupted; no difference found in {}", extent);
     else if (verdict.beyond_tolerance)
-      text = fmt::format("differs: {}", describe(*verdict.beyond_tolerance));
+      text = describe_branch(verdict, tolerance);
     else if (verdict.first_difference)
       text = fmt::format("equal within {:g} ({}); largest difference {:.2g}, the first at {}",
                          tolerance, extent, verdict.largest, describe(*verdict.first_difference));
@@ -135,10 +157,12 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_option("log", options->file, "log file, plain or zstd")
       ->required()
       ->type_name("LOG");
-  command->add_flag("--verify", options->verify,
-                    "compare every line with the log: bit for bit on the same build and "
-                    "instruction set, otherwise "
-                    "within 1e-6; the exit code is 1 if they differ");
+  command->add_flag(
+      "--verify", options->verify,
+      "compare every line with the log: bit for bit on the same build and "
+      "instruction set, otherwise within 1e-6 up to the first decision that differs; "
+      "exit code 0: equal so, 1: the line printed names the first tick and field that "
+      "differ, and by how much");
   command
       ->add_option(
           "--tolerance", options->tolerance,

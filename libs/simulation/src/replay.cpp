@@ -132,18 +132,22 @@ class Comparison final : public log::LineSink {
   /// To be called at the end: checks that the log has no further lines.
   void finish() {
     Json logged;
-    if (!enough_ && reader_.next(logged))
+    if (!ended() && reader_.next(logged))
       record_difference("", logged, Json("the repeated run ended here"), logged);
+    while (branched_ && reader_.next(logged)) note_outcome(logged, verdict_.outcome_logged);
   }
 
  private:
   void take(Json replayed) override {
     Json logged;
     if (enough_) return;
+    note_outcome(replayed, verdict_.outcome_replayed);
+    if (branched_) return;
     if (!reader_.next(logged)) {  // the end of an unfinished log
       enough_ = true;
       return;
     }
+    note_outcome(logged, verdict_.outcome_logged);
     // The logged line is not trusted: step and time are those of the replayed line.
     if (replayed["type"] == "tick") {
       k_ = replayed["k"].get<long>();
@@ -155,10 +159,14 @@ class Comparison final : public log::LineSink {
       line->erase("provenance");
     }
     compare("", logged, replayed, logged);
-    if (enough_) return;
+    if (ended()) return;
     ++verdict_.lines;
     verdict_.ticks += logged["type"] == "tick" ? 1 : 0;
     verdict_.finished = logged["type"] == "result";
+  }
+
+  static void note_outcome(const Json& line, std::string& outcome) {
+    if (line.value("type", Json()) == "result") outcome = text_at(line, "/outcome");
   }
 
   // Texts for people: another build may word them differently.
@@ -167,7 +175,7 @@ class Comparison final : public log::LineSink {
   }
 
   void compare(const std::string& at, const Json& a, const Json& b, const Json& line) {
-    if (enough_) return;
+    if (ended()) return;
     if (is_wording(at)) {
       if (a != b) record_difference(at, a, b, line, tolerance_ > 0.0);
     } else if (a.is_object() && b.is_object()) {
@@ -186,16 +194,17 @@ class Comparison final : public log::LineSink {
       const double x = a.get<double>(), y = b.get<double>();
       if (std::bit_cast<std::uint64_t>(x) == std::bit_cast<std::uint64_t>(y)) return;
       const double error = std::abs(x - y) / std::max(1.0, std::abs(x));
-      verdict_.largest = std::max(verdict_.largest, error);
-      record_difference(at, a, b, line, error <= tolerance_);
+      if (error <= tolerance_) verdict_.largest = std::max(verdict_.largest, error);
+      record_difference(at, a, b, line, error <= tolerance_, error);
     } else if (a != b) {
       record_difference(at, a, b, line);
     }
   }
 
   void record_difference(const std::string& field, const Json& logged, const Json& replayed,
-                         const Json& line, bool tolerated = false) {
-    if (enough_) return;
+                         const Json& line, bool tolerated = false,
+                         std::optional<double> size = {}) {
+    if (ended()) return;
     const Json type = line.value("type", Json());
     const Verdict::Difference found{reader_.lines(),
                                     type.is_string() ? type.get<std::string>() : "line",
@@ -203,21 +212,27 @@ class Comparison final : public log::LineSink {
                                     time_s_,
                                     field,
                                     abbreviated(logged),
-                                    abbreviated(replayed)};
+                                    abbreviated(replayed),
+                                    size};
     if (!verdict_.first_difference) verdict_.first_difference = found;
     if (tolerated && tolerance_ > 0.0) return;
     verdict_.beyond_tolerance = found;
-    enough_ = true;
+    // With a tolerance the run continues for its outcome. Without one, any difference is an error.
+    (tolerance_ > 0.0 && found.type == "tick" ? branched_ : enough_) = true;
   }
+
+  // Whether all that can be compared has been compared.
+  [[nodiscard]] bool ended() const noexcept { return enough_ || branched_; }
 
   log::LogReader reader_;
   double tolerance_;
+  bool branched_ = false;
   Verdict verdict_;
   std::optional<long> k_;
   std::optional<double> time_s_;
 };
 
-// Equal bits are promised on one instruction set only, so the run is repeated on the logged one if
+// Equal bits hold on one instruction set only, so the run is repeated on the logged one if
 // this machine has it and the caller names no other.
 void use_logged_isa(const Json& header) {
   if (default_isa_is_set()) return;

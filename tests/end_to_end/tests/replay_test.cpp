@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "../program.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/core/rng.hpp"
 
 using namespace hamelin;
@@ -249,6 +250,85 @@ TEST_CASE("a log of another build is compared within a tolerance, with a note",
   verdict =
       test::run_json(sandbox, {"replay", "other.jsonl", "--verify", "--tolerance", "1e-10"}, 1);
   CHECK(verdict["beyond_tolerance"]["field"] == "/q/1");
+}
+
+TEST_CASE("a run that branches is reported with its first tick, its size and both outcomes",
+          "[end_to_end][replay]") {
+  Sandbox sandbox;
+  auto lines = short_log(sandbox);
+  Json header = parse_json(lines[0], "header");
+  header["provenance"]["isa"] = "v9";
+  lines[0] = header.dump();
+  for (const std::size_t at : {200, 300}) {
+    Json tick = parse_json(lines[at], "tick");
+    tick["q"][1] = tick["q"][1].get<double>() + (at == 200 ? 1e-9 : 0.25);
+    lines[at] = tick.dump();
+  }
+  const Json branch = parse_json(lines[300], "tick");
+  sandbox.put("other.jsonl", joined(lines));
+  const Json verdict = test::run_json(sandbox, {"replay", "other.jsonl", "--verify"}, 1);
+  CHECK(verdict["beyond_tolerance"]["k"] == branch["k"]);
+  CHECK(verdict["beyond_tolerance"]["field"] == "/q/1");
+  CHECK(verdict["beyond_tolerance"]["difference"].get<double>() == Approx(0.25).epsilon(0.25));
+  CHECK(verdict["first_difference"]["difference"].get<double>() == Approx(1e-9).epsilon(0.01));
+  CHECK(verdict["largest_difference"].get<double>() == Approx(1e-9).epsilon(0.01));
+  CHECK(verdict["outcome_logged"] == "timeout");
+  CHECK(verdict["outcome_replayed"] == "timeout");
+  const auto text = sandbox.run({"replay", "other.jsonl", "--verify"});
+  CHECK(text.exit_code == 1);
+  CHECK_THAT(text.out, Contains("differs: tick " + branch["k"].dump()) && Contains(", by 0.2") &&
+                           Contains("equal within 1e-06 before, largest difference 1e-09") &&
+                           Contains("outcome logged timeout, replayed timeout"));
+  CHECK_THAT(text.err, Contains("instruction set: v9 in the log") &&
+                           Contains("may differ from a decision on that depends on rounding"));
+}
+
+// What docs/logs.md says of logs from another instruction set, for each pair of sets.
+TEST_CASE("a log is verified across all instruction sets of the machine", "[end_to_end][replay]") {
+  std::vector<std::string> available;
+  std::string missing;
+  for (const Isa isa : {Isa::baseline, Isa::v3, Isa::v4})
+    if (is_available(isa))
+      available.emplace_back(name_of(isa));
+    else
+      missing += " " + std::string(name_of(isa));
+  Sandbox sandbox;
+  for (const auto& here : available) {
+    const test::EnvironmentVariable logged("HAMELIN_ISA", here);
+    for (const char* scene : {"paper_52_gyro", "clutter", "shelf"})
+      REQUIRE(sandbox
+                  .run({"run", "data/scenes/" + std::string(scene) + ".json", "--log",
+                        here + scene + ".jsonl.zst"})
+                  .exit_code == 0);
+  }
+  for (const auto& here : available)
+    for (const auto& there : available) {
+      CAPTURE(here, there);
+      const test::EnvironmentVariable repeated("HAMELIN_ISA", there);
+      const auto verdict_on = [&](const char* scene, int exit_code) {
+        return test::run_json(sandbox, {"replay", here + scene + ".jsonl.zst", "--verify"},
+                              exit_code);
+      };
+      if (here == there) {
+        CHECK(verdict_on("shelf", 0)["to_the_bit"] == true);
+        continue;
+      }
+      // Runs whose decisions do not depend on rounding agree to their end.
+      for (const char* scene : {"paper_52_gyro", "clutter"}) {
+        const Json verdict = verdict_on(scene, 0);
+        CHECK(verdict["other_build"].size() == 1);
+        CHECK(verdict["finished"] == true);
+        CHECK(verdict["largest_difference"].get<double>() < 1e-7);
+      }
+      // This run may branch. Until then it agrees, and from then on it is a run of its own.
+      const auto output = sandbox.run({"replay", here + "shelf.jsonl.zst", "--verify", "--json"});
+      const Json verdict = parse_json(output.out, "standard output");
+      CHECK(verdict["largest_difference"].get<double>() <= 1e-6);
+      CHECK(verdict["ticks"].get<long>() > 1000);
+      CHECK(verdict["outcome_replayed"] == "reached");
+      CHECK((output.exit_code == 0) == verdict["beyond_tolerance"].is_null());
+    }
+  test::skip_unless(missing.empty(), "this machine is without" + missing);
 }
 
 TEST_CASE("texts of another build may be worded differently, those of the same build may not",

@@ -56,15 +56,20 @@ struct Verdict {
     std::optional<double> time_s;
     std::string field;  ///< as a JSON pointer, e.g. "/q/3"
     std::string logged, replayed;
+    std::optional<double> size;  ///< |a − b| / max(1, |a|) of two numbers
   };
   std::optional<Difference> first_difference;  ///< empty: all bits are equal
   std::optional<Difference> beyond_tolerance;  ///< the first difference beyond the tolerance
-  double largest = 0.0;                        ///< largest |a − b| / max(1, |a|) of all numbers
+  double largest = 0.0;  ///< largest size of the differences within the tolerance
+  /// How both runs end, for example "reached"; empty if the log is unfinished or the repeated run
+  /// ended at a difference.
+  std::string outcome_logged, outcome_replayed;
 };
 
-/// Repeats the run of a log and compares line by line, without timing and provenance. Ends at the
-/// first difference beyond the tolerance. An interrupted run is stopped at the same step. Of an
-/// unfinished log the complete lines are compared.
+/// Repeats the run of a log and compares line by line, without timing and provenance, up to the
+/// first difference beyond the tolerance, where the repeated run ends. If there is a tolerance and
+/// the lines are ticks, it continues for its outcome. An interrupted run
+/// is stopped at the same step. Of an unfinished log the complete lines are compared.
 /// @param recorded the log's header
 /// @param tolerance for numbers: |a − b| ≤ tolerance · max(1, |a|); zero: equal bits. With a
 ///        tolerance, notes, warnings, causes and the text of events may be worded differently.
