@@ -99,7 +99,8 @@ void add_run(CLI::App& app, int& exit_code) {
   restrict_values(
       command->add_option("--plant", options->flags.plant,
                           "what simulates the arm: hamelin, or MuJoCo, which also counts contacts "
-                          "itself (default the scene's, or hamelin)"),
+                          "itself and implies sampled actuation where the scene has the ideal one "
+                          "(default the scene's, or hamelin)"),
       {"hamelin", "mujoco"});
   command->add_option("--step", options->flags.step_s, "time step [s] (default the scene's)")
       ->type_name("H");

@@ -5,16 +5,39 @@
 #include "command_line.hpp"
 #include "document.hpp"
 #include "hamelin/core/error.hpp"
+#include "terminal.hpp"
 
 namespace hamelin::app {
+
+namespace {
+
+// The joints of MuJoCo take torques, so that --plant mujoco implies sampled actuation where the
+// file has the ideal one. --set may still say otherwise, and is then refused.
+bool imply_sampled_actuation(const SceneFlags& flags, Json& document) {
+  if (flags.plant != "mujoco" || !document.is_object()) return false;
+  Json& actuation = document["actuation"];
+  if (actuation.is_null()) actuation = Json::object();
+  if (!actuation.is_object() || actuation.value("type", Json("ideal")) != "ideal") return false;
+  actuation["type"] = "sampled";
+  return true;
+}
+
+}  // namespace
 
 scene::Scene read_scene(const std::filesystem::path& file, const SceneFlags& flags) {
   if (const Kind kind = kind_of(file); kind != Kind::scene)
     throw Error(ErrorCode::invalid,
                 fmt::format("{}: is a {}, expected a scene", file.string(), to_string(kind)));
   Json document = read_json(file);
+  const bool implied = imply_sampled_actuation(flags, document);
   scene::apply(flags, "--planner", document);
-  return scene::scene_from_json(document, file.parent_path(), file.string());
+  scene::Scene scene = scene::scene_from_json(document, file.parent_path(), file.string());
+  if (implied && scene.actuation.type == scene::ActuationType::sampled)
+    note(
+        fmt::format("{}: /actuation/type: is sampled instead of ideal, because the joints of "
+                    "MuJoCo take torques",
+                    file.string()));
+  return scene;
 }
 
 void add_set_option(CLI::App& command, std::vector<std::string>& set, const std::string& help) {
