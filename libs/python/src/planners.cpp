@@ -93,8 +93,30 @@ py::object load_class(const Json& params) {
   });
 }
 
-// The class that influence_m() has loaded for create(), which follows on the same thread.
+// Whether Python can still be entered.
+bool python_runs() noexcept {
+#if PY_VERSION_HEX >= 0x030D0000
+  return Py_IsInitialized() != 0 && Py_IsFinalizing() == 0;
+#else
+  return Py_IsInitialized() != 0 && _Py_IsFinalizing() == 0;
+#endif
+}
+
+// The class that influence_m() has loaded for create(), which follows on the same thread. If no
+// create() follows, it is destroyed at the end of the thread, which does not hold Python's lock.
 struct Loaded {
+  Loaded(Json params_, py::object type_) : params(std::move(params_)), type(std::move(type_)) {}
+  Loaded(const Loaded&) = delete;
+  Loaded& operator=(const Loaded&) = delete;
+  ~Loaded() {
+    if (!python_runs()) {
+      (void)type.release();  // Python's objects are gone or cannot be touched any more
+      return;
+    }
+    const py::gil_scoped_acquire locked;
+    type = py::object();
+  }
+
   Json params;
   py::object type;
 };
@@ -399,7 +421,7 @@ class PythonPlanner final : public planning::Planner {
       source = py::reinterpret_borrow<py::object>(planner_object);
     } else {
       source = load_class(params);
-      last_loaded = std::make_unique<Loaded>(Loaded{params, source});
+      last_loaded = std::make_unique<Loaded>(params, source);
     }
     return guarded(name_of(params), [&] {
       return py::hasattr(source, "influence_m") ? source.attr("influence_m").cast<double>() : -1.0;

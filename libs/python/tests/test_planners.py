@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import subprocess
+import sys
 import threading
 
 import hamelin
@@ -450,6 +451,64 @@ def test_a_planner_of_python_with_a_load(sampled_scene, planner_file, tmp_path):
         controller.detach("cup", q)
         answer = controller.tick(2 * controller.period_s, q, v)
         np.testing.assert_allclose(answer.torque, before, atol=1e-9)
+
+
+THREADS = """
+import builtins, sys, threading, time
+import hamelin
+
+builtins.held_lock = []
+scene = hamelin.load_scene(sys.argv[1])
+
+def run():
+    try:
+        hamelin.run(scene, planner="python:" + sys.argv[2] + ":planner", duration=0.001)
+    except hamelin.Error as error:
+        assert "header line 1" in str(error), error
+    # Now the thread alone keeps the object, which was loaded for a planner that is never made.
+    sys.modules.pop("hamelin_planner_wide").__dict__.clear()
+
+for ended in range(1, 21):
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    for _ in range(1000):  # a thread is joined before its C++ part has ended
+        if len(builtins.held_lock) == ended:
+            break
+        time.sleep(0.01)
+run()  # on the main thread, which ends after the interpreter
+print(builtins.held_lock)
+"""
+
+WIDE = """
+import builtins
+import ctypes
+
+
+class Wide:
+    influence_m = 0.1
+
+    def tick(self, tick, command):
+        pass
+
+    def __del__(self, held_lock=builtins.held_lock, check=ctypes.pythonapi.PyGILState_Check):
+        held_lock.append(check())
+
+
+planner = Wide()
+"""
+
+
+def test_planners_on_threads_that_end(free_scene, tmp_path):
+    (tmp_path / "wide.py").write_text(WIDE)
+    (tmp_path / "map.bt").write_text("no map")  # found after the planner was loaded
+    free_scene = {**free_scene, "map": {"file": str(tmp_path / "map.bt")}}
+    done = subprocess.run(
+        [sys.executable, "-c", THREADS, str(write(tmp_path, free_scene)), str(tmp_path / "wide.py")],
+        env={**os.environ, "PYTHONPATH": os.environ["HAMELIN_PACKAGE_DIR"]}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == [1] * 20
 
 
 def test_environment_variables_are_left_alone():
