@@ -147,22 +147,24 @@ done
 cat <<'EOF'
 ## Peers, as measured before
 
-These figures are from an earlier run on another machine: Pinocchio 3.7, DART 6.12.1, MuJoCo 2.2.2
-on a 3.7 GHz EPYC, g++ 12.2 -O3, the least of many short blocks, with Debian's packages (Pinocchio
-from its headers). Only ratios within one run are meaningful. The rows above for
-`semi-implicit-euler` and `rk4` are the same schemes on hamelin's own dynamics.
+These figures are from an earlier run on another machine (\*): Pinocchio 3.7, DART 6.12.1, MuJoCo
+2.2.2 on a 3.7 GHz EPYC, g++ 12.2 -O3, the least of many short blocks, with Debian's packages
+(Pinocchio from its headers). No program of this repository prints them;
+[tests/peers](../tests/peers/README.md) measures MuJoCo, DART and KDL. Only ratios within one run
+are meaningful. The rows above for `semi-implicit-euler` and `rk4` are the same schemes on hamelin's
+own dynamics.
 
-| ns per step | Panda, 7 joints |
-|---|--:|
-| MuJoCo Euler / RK4 / implicit | 1849 / 7220 / 6413 |
-| DART (semi-implicit Euler) | 7044 |
-| RK4 on Pinocchio's ABA | 8200 |
+| ns per step | Panda, 7 joints | measured by code here |
+|---|--:|---|
+| MuJoCo Euler / RK4 / implicit | 1849 / 7220 / 6413 | no (\*) |
+| DART (semi-implicit Euler) | 7044 | no (\*) |
+| RK4 on Pinocchio's ABA | 8200 | no (\*) |
 
-| energy error, no damping [J], max / end | example 5.1, h = 0.01, 100 s | spatial 3 links, h = 0.001, 200 s | ns per step |
-|---|--:|--:|--:|
-| DART, MuJoCo Euler, Pinocchio + semi-implicit Euler | 2.58e-2 / −1.0e-2 | 0.09–0.11 / +0.09–0.10 | 2818 / 819 / 839 |
-| MuJoCo implicit | 2.62e-2 / −1.1e-2 | 0.106 / −0.106 | 1986 |
-| RK4 (MuJoCo; Pinocchio) | 3.6e-9 / −3.2e-9 | 2e-12 / 2e-12 | 3243; 3370 |
+| energy error, no damping [J], max / end | example 5.1, h = 0.01, 100 s | spatial 3 links, h = 0.001, 200 s | ns per step | measured by code here |
+|---|--:|--:|--:|---|
+| DART, MuJoCo Euler, Pinocchio + semi-implicit Euler | 2.58e-2 / −1.0e-2 | 0.09–0.11 / +0.09–0.10 | 2818 / 819 / 839 | no (\*) |
+| MuJoCo implicit | 2.62e-2 / −1.1e-2 | 0.106 / −0.106 | 1986 | no (\*) |
+| RK4 (MuJoCo; Pinocchio) | 3.6e-9 / −3.2e-9 | 2e-12 / 2e-12 | 3243; 3370 | no (\*) |
 
 **Where a peer is better.** RK4, in MuJoCo or on Pinocchio, keeps the energy better than any
 second-order step at small steps over short and medium times (2e-12 J after 200 s in the table

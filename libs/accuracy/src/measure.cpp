@@ -72,7 +72,7 @@ Job make_job(const model::Model& model, const Scheme& scheme,
   }
   if (integration::find_scheme(scheme.integrator)->iterates && !options.step_control())
     row.tolerance = job.integrator->tolerance();
-  row.isa = name_of(default_isa());
+  row.isa = name_of(job.integrator->isa());
   row.mode = job.integrator->mode();
   return job;
 }

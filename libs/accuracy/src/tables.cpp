@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "tables.hpp"
@@ -208,6 +209,23 @@ Table cheapest_table(const Measurement& measurement, const Symbols& symbols) {
   return table;
 }
 
+namespace {
+
+// "v4; x86-64 for hamel, lie-exact": the set of most rows, and the schemes that ran on another.
+std::string instruction_sets(const std::vector<Row>& rows) {
+  std::map<std::string, std::set<std::string>> schemes;
+  for (const auto& row : rows) schemes[row.isa].insert(row.integrator);
+  const auto most = std::max_element(
+      schemes.begin(), schemes.end(),
+      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  std::string text = most->first;
+  for (const auto& [isa, names] : schemes)
+    if (isa != most->first) text += fmt::format("; {} for {}", isa, fmt::join(names, ", "));
+  return text;
+}
+
+}  // namespace
+
 std::string about(const Measurement& measurement) {
   std::string text = fmt::format("{} joint{}{}, {} s of free motion.", measurement.dof,
                                  measurement.dof == 1 ? "" : "s",
@@ -219,7 +237,7 @@ std::string about(const Measurement& measurement) {
   else
     text += "\nNo reference: errors in q and v are not known.";
   if (!measurement.rows.empty())
-    text += fmt::format("\nInstruction set: {}.", measurement.rows.front().isa);
+    text += fmt::format("\nInstruction set: {}.", instruction_sets(measurement.rows));
   return text;
 }
 

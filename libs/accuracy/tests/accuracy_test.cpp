@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/core/isa.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/io/file.hpp"
@@ -345,6 +346,25 @@ Measurement hand_made() {
 }
 
 }  // namespace
+
+TEST_CASE("each row names the instruction set that it ran on", "[accuracy]") {
+  Options options = free_fall("hamel,hamel-midpoint,hamel-variational,lie-exact,rk4",
+                              VectorXd::Constant(3, 0.3), 0.02);
+  options.steps_s = {0.01};
+  options.reference = false;
+  const Measurement measured = measure(chain(3), options);
+  REQUIRE(measured.rows.size() == 5);
+  const std::string best(name_of(default_isa())), baseline(name_of(Isa::baseline));
+  for (const auto& row : measured.rows) {
+    CAPTURE(row.integrator);
+    const bool compiled_once = row.integrator == "hamel" || row.integrator == "hamel-midpoint" ||
+                               row.integrator == "lie-exact";
+    CHECK(row.isa == (compiled_once ? baseline : best));
+  }
+  Measurement shown = hand_made();
+  shown.rows[3].isa = "v3";
+  CHECK_THAT(to_markdown(shown), Catch::Contains("Instruction set: x86-64; v3 for rk4."));
+}
 
 TEST_CASE(
     "the cost of an error is that of the cheapest row whose error plus the reference's own is "

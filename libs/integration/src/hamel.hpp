@@ -19,6 +19,7 @@ class Hamel final : public Integrator {
   Hamel(const Model& model, const HamelMidpointOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return midpoint_ ? 2 : 1; }
+  [[nodiscard]] Isa isa() const override { return Isa::baseline; }
 
  private:
   Hamel(const Model& model, const HamelOptions& options, bool midpoint);

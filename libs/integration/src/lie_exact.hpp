@@ -16,6 +16,7 @@ class LieExact final : public Momentum {
   LieExact(const Model& model, const LieExactOptions& options);
   [[nodiscard]] std::string criterion() const override;
   [[nodiscard]] int order() const override { return 2; }
+  [[nodiscard]] Isa isa() const override { return Isa::baseline; }
   [[nodiscard]] std::string mode() const override {
     return options_.tolerance <= 1e-12 ? "structure" : "accurate";
   }

@@ -146,6 +146,10 @@ class Integrator {
   /// "structure" for fixed steps of a structure-preserving scheme that are iterated to rounding,
   /// otherwise "accurate".
   [[nodiscard]] virtual std::string mode() const { return "accurate"; }
+  /// The instruction set of the scheme's recursions: that of its options, or `baseline` for schemes
+  /// that are compiled for the baseline only (hamel, hamel-midpoint, lie-exact). Of those, weights
+  /// and mass matrices are computed on the set of the options.
+  [[nodiscard]] virtual Isa isa() const { return settings_.isa; }
 
  protected:
   /// The options that all schemes share.
