@@ -3,7 +3,8 @@
 
 The site has the tracked *.md pages, the reference of the C and C++ headers, of the Python package and of the command
 line, and the JSON Schemas as tables. docs/index.md is its start page; the links in its sections become the side bar.
-Warnings and dead links are errors. `./dev docs` calls this script.
+Warnings and dead links are errors. `./dev docs` calls this script, which prints each step when it begins, with the
+seconds since its start.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -32,6 +34,7 @@ from stage import Stage, linked_pages, toctree, tracked  # noqa: E402
 START = "docs/index.md"
 # Pages whose links are their chapters in the side bar.
 PARENTS = ["docs/theory.md"]
+BEGIN = time.monotonic()
 
 
 def add_headers(stage: Stage, work: Path) -> dict[str, list[str]]:
@@ -145,6 +148,11 @@ def missing_tools(package: Path) -> str:
     return "" if list(package.glob("hamelin/_hamelin*.so")) else f"{package}: has no built Python package"
 
 
+def print_step(what: str) -> None:
+    """Prints what is done next, and the seconds since the start."""
+    print(f"{time.monotonic() - BEGIN:6.1f} s  {what}", flush=True)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path, help="folder of the site; replaced if it exists")
@@ -160,17 +168,23 @@ def main() -> int:
         work = Path(scratch)
         stage = Stage(SOURCE, work / "pages")
         stage.target.mkdir()
+        print_step("reading the public headers with Doxygen")
         libraries = add_headers(stage, work)
+        print_step(f"writing the pages of the headers of {len(libraries)} libraries, the schemas, the command line and "
+                   "the Python package")
         add_schemas(stage)
         add_commands(stage, options.program.resolve())
         stage.add_page("libs/python/hamelin/index.md",
                        python_reference.page(SOURCE / "libs/python/hamelin", options.package.resolve()))
+        print_step(f"staging {len(stage.pages)} pages of the checkout")
         add_pages(stage, libraries)
         stage.add_folders()
         stage.add_sources()
         add_orphans(stage)
         site = work / "site"
+        print_step(f"making HTML of {sum(1 for _ in stage.target.rglob('*.md'))} pages with Sphinx")
         run_sphinx(stage, site, version, work)
+        print_step(f"checking the links of {sum(1 for _ in site.rglob('*.html'))} HTML pages")
         problems = check_site.check(site)
         if problems:
             print("\n".join(problems), file=sys.stderr)
@@ -178,6 +192,7 @@ def main() -> int:
         if out.exists():
             shutil.rmtree(out)
         shutil.move(site, out)
+    print_step(f"done: {out / 'index.html'}")
     return 0
 
 

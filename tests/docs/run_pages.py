@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs what the pages show: run_pages.py SOURCE PROGRAM_DIR [--python-package DIR] [--page PAGE]... [--skip PAGE]...
+"""Runs what the pages show: run_pages.py SOURCE PROGRAM_DIR [--python-package DIR] [--page PAGE]... [--skip PAGE]... [--update]
 
 Each page gets a fresh folder that has copies of data/ and plugins/ of the checkout; the parts of docs/tutorial share
 one. Its blocks run in order:
@@ -9,7 +9,9 @@ one. Its blocks run in order:
 - A ```python block runs in one process with the Python blocks before it.
 - A ```json block must be JSON, JSON Lines or members of an object; `hamelin validate` checks one with a "schema".
 - A ```cpp or ```c block must be in a source that a test compiles, or in a header.
-- Outcomes and goals that ```text blocks show must be printed by some command of the page.
+- A ```text block that looks like output ("outcome     reached") must be printed by some command of the page: each of its
+  lines, with every figure that is not a timing. A line "..." stands for lines that are left out. With --update, lines
+  whose figures differ are replaced in the page by those that were printed.
 
 A block after the comment `<!-- not run: REASON -->` is exempt. The script prints how many blocks ran, and how many are
 exempt for which reason.
@@ -37,7 +39,9 @@ from stage import tracked  # noqa: E402
 SHELL = ("console", "sh")
 EXEMPT = re.compile(r"<!-- not run: (.+?) -->", re.DOTALL)
 SAVED = re.compile(r"Save .*\sas\s+`([^`]+)`:$", re.DOTALL)
-SHOWN = re.compile(r"^(outcome .*|goal .* reached)", re.MULTILINE)
+OUTPUT = re.compile(r"[a-z]+ {2,}\S")  # how the first line of output begins
+TIMING = re.compile(r"[\d.]+ (?=us\b|µs\b|ms\b)|(?<=^cpu {9})[\d.]+ s")
+FIGURE = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 
 @dataclass
@@ -99,9 +103,22 @@ def squeezed(text: str) -> str:
     return "".join(text.split())
 
 
+def without_timings(line: str) -> str:
+    return TIMING.sub("# ", line.rstrip())
+
+
+def without_figures(line: str) -> str:
+    return FIGURE.sub("#", without_timings(line))
+
+
+def lines_of(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line.strip() not in ("", "...")]
+
+
 class Runner:
-    def __init__(self, source: Path, programs: Path, package: Path | None):
+    def __init__(self, source: Path, programs: Path, package: Path | None, update: bool):
         self.source = source
+        self.update = update
         self.programs = programs
         self.package = package
         self.has_pages = (programs.parent / "share/hamelin/report/page.html").is_file()
@@ -154,8 +171,7 @@ class Runner:
                 self.check_compiled(block, place)
         for place, file in documents:
             self.validate(place, file, folder)
-        if printed:
-            self.check_shown(page, [block for block in blocks if block.language == "text"], "".join(printed))
+        self.check_shown(page, blocks, printed)
 
     @staticmethod
     def save(block: Block, folder: Path) -> str:
@@ -227,12 +243,45 @@ class Runner:
         if squeezed(block.text) not in self.compiled:
             self.fail(place, "this example is in no source that is compiled")
 
-    def check_shown(self, page: str, blocks: list[Block], printed: str) -> None:
+    def check_shown(self, page: str, blocks: list[Block], printed: list[str]) -> None:
+        """Whether the lines that the page shows as output were printed, all of them by one command."""
+        changed: dict[str, str] = {}
         for block in blocks:
-            for shown in [] if block.reason else SHOWN.findall(block.text):
-                self.counts["outcomes"] += 1
-                if shown not in printed:
-                    self.fail(f"{page}:{block.line}", f"shows '{shown}', which no command printed")
+            if block.language != "text" or block.reason or not OUTPUT.match(block.text):
+                continue
+            shown = lines_of(block.text)
+            self.counts["blocks of output"] += 1
+            self.counts["lines of output"] += len(shown)
+            missing, lines = self.nearest_output(shown, printed)
+            for line in missing:
+                now = next((other for other in lines if without_figures(other) == without_figures(line)), None)
+                if self.update and now is not None:
+                    changed[line] = now
+                else:
+                    self.fail(f"{page}:{block.line}", f"shows '{line}', printed was '{now or 'no such line'}'")
+        if changed:
+            self.rewrite(page, changed)
+
+    @staticmethod
+    def nearest_output(shown: list[str], printed: list[str]) -> tuple[list[str], list[str]]:
+        """The lines that were not printed, and the output of the command that printed most of the others."""
+
+        def fit(output: list[str]) -> tuple[int, int]:
+            exact, alike = set(map(without_timings, output)), set(map(without_figures, output))
+            return (sum(without_figures(line) in alike for line in shown),
+                    sum(without_timings(line) in exact for line in shown))
+
+        lines = max((lines_of(output) for output in printed), key=fit, default=[])
+        exact = set(map(without_timings, lines))
+        return [line for line in shown if without_timings(line) not in exact], lines
+
+    def rewrite(self, page: str, changed: dict[str, str]) -> None:
+        file = self.source / page
+        text = file.read_text(encoding="utf-8")
+        for before, now in changed.items():
+            text = text.replace(f"\n{before}\n", f"\n{now}\n")
+            print(f"updated {page}: {now}", flush=True)
+        file.write_text(text, encoding="utf-8")
 
     def summarize(self) -> None:
         print("\nran " + ", ".join(f"{number} {what}" for what, number in self.counts.items()))
@@ -248,11 +297,13 @@ def main() -> int:
     parser.add_argument("--python-package", type=Path, help="folder that has the built Python package")
     parser.add_argument("--page", action="append", default=[], help="only this page")
     parser.add_argument("--skip", action="append", default=[], help="not this page")
+    parser.add_argument("--update", action="store_true", help="write the figures that were printed into the pages")
     options = parser.parse_args()
     package = options.python_package
     if package and not list(package.glob("hamelin/_hamelin*.so")):
         package = None
-    runner = Runner(options.source.resolve(), options.programs.resolve(), package and package.resolve())
+    runner = Runner(options.source.resolve(), options.programs.resolve(), package and package.resolve(),
+                    options.update)
     groups: dict[str, list[str]] = {}
     for page in options.page or tracked(runner.source, "*.md"):
         if page not in options.skip:
