@@ -3,8 +3,8 @@
 
 namespace hamelin::geometry {
 
-/// The common interface of SO(2), SO(3), SE(2) and SE(3), for algorithms written once over the
-/// group G.
+/// The common interface of SO(2), SO(3), SE(2) and SE(3), for functions written once over the group
+/// G. The recursive kernels of libs/dynamics do not use it: they have types of their own.
 ///
 /// A value of G is a displacement. `Tangent` is a twist, and also the type of wrenches and momenta:
 /// a plain Eigen vector of size `dof`, angular part first. `Adjoint` is a dof × dof matrix, `Point`
