@@ -127,6 +127,8 @@ class Runner:
         self.failures: list[str] = []
         self.environment = {key: value for key, value in os.environ.items() if key != "HAMELIN_PLUGIN_PATH"}
         self.environment["PATH"] = f"{programs}:{os.environ['PATH']}"
+        # Where rounding changes a decision, figures depend on the instruction set. This one every machine has.
+        self.environment["HAMELIN_ISA"] = "x86-64"
         self.environment["PYTHONDONTWRITEBYTECODE"] = "1"
         self.environment["MPLBACKEND"] = "Agg"
         if package:
