@@ -46,20 +46,20 @@ class ComputedTorque:
 # ## Three runs
 # A payload belongs to the scene, so `scene.model` includes it. The planner that does not know of it
 # gets the model of the scene without payload. The goal's tolerance is so small that all runs last
-# until the end of `duration_s`.
+# until the end of `duration_s`. The planner knows no limits, so the scene has none.
 
 # %%
 document = {
     "schema": "hamelin.scene/1",
     "robot": {"file": str(hamelin.data_path("robots/arm7.urdf"))},
-    "gravity_m_s2": [0.0, 0.0, -9.81],
+    "model": {"joint_limits": False, "velocity_limits": False, "torque_limits": False},
     "start": {"q": start.tolist()},
     "goals": [{"type": "joint", "q": goal.tolist(), "tolerance_rad": 1e-9}],
     "duration_s": 3.0,
 }
 payload = {"mass_kg": 2.0, "position_m": [0.0, 0.0, 0.1]}
 empty = hamelin.Scene(document)
-loaded = hamelin.Scene({**document, "model": {"payload": payload}})
+loaded = hamelin.Scene({**document, "model": {**document["model"], "payload": payload}})
 assert np.isclose(loaded.model.mass - empty.model.mass, payload["mass_kg"])
 runs = {
     "no payload": (empty, empty.model, "#000000"),

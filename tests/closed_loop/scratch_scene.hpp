@@ -24,16 +24,19 @@ inline log::Result run_scene(const TemporaryFolder& folder, const Json& document
                          watch);
 }
 
-/// Example 5.2's arm and goal without obstacles, with planner apf.
+/// Example 5.2's arm and goal without gravity, limits and obstacles, with planner apf.
 inline Json scene_52() {
-  return {{"schema", "hamelin.scene/1"},
-          {"robot", {{"file", "robot.json"}}},
-          {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}}}},
-          {"obstacles", Json::array()},
-          {"planner",
-           {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
-          {"step_s", 0.004},
-          {"duration_s", 40.0}};
+  return {
+      {"schema", "hamelin.scene/1"},
+      {"robot", {{"file", "robot.json"}}},
+      {"gravity_m_s2", {0.0, 0.0, 0.0}},
+      {"model", {{"joint_limits", false}, {"velocity_limits", false}, {"torque_limits", false}}},
+      {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}}}},
+      {"obstacles", Json::array()},
+      {"planner",
+       {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
+      {"step_s", 0.004},
+      {"duration_s", 40.0}};
 }
 
 /// planar4 with this torque limit in each joint.

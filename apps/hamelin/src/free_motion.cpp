@@ -56,7 +56,6 @@ scene::Scene read_motion(const MotionFlags& flags) {
   } else if (kind == Kind::urdf || kind == Kind::robot) {
     scene.name = flags.file.string();
     scene.robot.file = flags.file;
-    scene.gravity_m_s2 = Eigen::Vector3d{0.0, 0.0, -9.81};
   } else {
     throw Error(ErrorCode::invalid, fmt::format("{}: is a {}, expected a robot or a scene",
                                                 flags.file.string(), to_string(kind)));

@@ -144,7 +144,6 @@ class Loop {
 scene::Scene scene_beside_ball(const scene::Goal& goal) {
   scene::Scene scene;
   scene.name = "a chain of three links beside a ball";
-  scene.gravity_m_s2 = Eigen::Vector3d(0.0, 0.0, -9.81);
   scene.start_q = Eigen::Vector3d(0.1, 0.2, -0.1);
   scene.goals = {goal};
   scene.actuation.type = scene::ActuationType::sampled;

@@ -28,21 +28,13 @@ struct RunOptions {
   RecordOptions record;
 };
 
-// Notes the properties of the robot file that the scene does not model.
+// Notes resistance and inertia of joints that the robot file states and the scene does not model.
+// The run itself notes what is modelled.
 void note_unmodelled(const scene::Scene& scene, const model::Robot& robot) {
   const auto any = [&](auto&& has) {
     return std::any_of(robot.links.begin(), robot.links.end(), has);
   };
   std::vector<const char*> unused;
-  if (!scene.model.joint_limits &&
-      any([](const model::Link& l) { return l.joint.lower || l.joint.upper; }))
-    unused.push_back("joint limits");
-  if (!scene.model.velocity_limits &&
-      any([](const model::Link& l) { return l.joint.velocity_max.has_value(); }))
-    unused.push_back("velocity limits");
-  if (!scene.model.torque_limits &&
-      any([](const model::Link& l) { return l.joint.effort_max.has_value(); }))
-    unused.push_back("effort limits");
   if (!scene.model.joint_damping.from_robot &&
       any([](const model::Link& l) { return l.joint.damping != 0.0; }))
     unused.push_back("damping");

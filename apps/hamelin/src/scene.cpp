@@ -13,6 +13,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/make.hpp"
+#include "hamelin/scene/modelled.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/simulation/run.hpp"
 #include "scene_map.hpp"
@@ -157,6 +158,7 @@ Json scene_info(const std::filesystem::path& file) {
             {"goals", goals},
             {"planner", scene.planner ? Json(scene.planner->name) : Json(nullptr)},
             {"integrator", scene.integrator.name},
+            {"model", scene::modelled_info(scene, model)},
             {"obstacles", summary.obstacles},
             {"map", nullptr},
             {"clearance_at_start_m", nullptr},
@@ -164,16 +166,19 @@ Json scene_info(const std::filesystem::path& file) {
             {"timing", {{"build_ms", build_ms}}},
             {"warnings", summary.warnings}};
   if (summary.has_map) info["map"] = map_json(scene, environment, model.reach());
-  if (model.shapes().empty()) return info;
   const auto check_size = [&](const Eigen::VectorXd& q, const std::string& place) {
     if (q.size() != model.dof())
       throw Error(ErrorCode::invalid, fmt::format("{}: {}: {} values given, expected {}",
                                                   file.string(), place, q.size(), model.dof()));
   };
+  if (scene.start_q.size() > 0) check_size(scene.start_q, "/start/q");
+  if (scene.start_v.size() > 0) check_size(scene.start_v, "/start/v");
+  if (const std::string defect = scene::start_defect(scene, model); !defect.empty())
+    info["warnings"].push_back(defect);
+  if (model.shapes().empty()) return info;
   ArmClearance arm(scene, model, environment);
   const Eigen::VectorXd q =
       scene.start_q.size() > 0 ? scene.start_q : Eigen::VectorXd::Zero(model.dof());
-  check_size(q, "/start/q");
   arm.place_at(q);
   if (environment.has_obstacles()) info["clearance_at_start_m"] = arm.clearance();
   if (arm.self()) {
@@ -205,6 +210,11 @@ std::string scene_text(const Json& info) {
   out += info_line("goals", goals.empty() ? "none" : goals);
   out += info_line("planner", fmt::format("{}; integrator {}", text_of(info["planner"]),
                                           text_of(info["integrator"])));
+  const char* label = "model";
+  for (const auto& line : scene::describe_modelled(info["model"])) {
+    out += info_line(label, line);
+    label = "";
+  }
   out += info_line("obstacles", fmt::format("{} besides the map", info["obstacles"].dump()));
   if (const Json& map = info["map"]; !map.is_null()) {
     const Json& near = map["within_reach"];

@@ -1,9 +1,11 @@
 #include "hamelin/control/planner_setup.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "hamelin/control/goal_list.hpp"
 #include "hamelin/core/numbers.hpp"
+#include "hamelin/scene/modelled.hpp"
 
 namespace hamelin::control {
 
@@ -38,14 +40,14 @@ void narrow(const scene::Scene& scene, const VectorXd& reserve, VectorXd& lower,
 
 ModelledLimits modelled_limits(const scene::Scene& scene, const model::Robot& robot) {
   ModelledLimits limits;
-  if (scene.model.joint_limits) {
+  const scene::LimitsInForce in_force = scene::limits_in_force(scene.model, robot);
+  if (in_force.position) {
     limits.q_lower = joint_limits(robot, &model::Joint::lower, -infinity);
     limits.q_upper = joint_limits(robot, &model::Joint::upper, infinity);
   }
-  if (scene.model.velocity_limits)
+  if (in_force.velocity)
     limits.velocity_max = joint_limits(robot, &model::Joint::velocity_max, infinity);
-  if (scene.model.torque_limits)
-    limits.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
+  if (in_force.torque) limits.effort_max = joint_limits(robot, &model::Joint::effort_max, infinity);
   return limits;
 }
 
@@ -60,7 +62,8 @@ planning::SetupData planner_setup(const scene::Scene& scene, const model::Model&
     narrow(scene, reserve.position, limits.q_lower, limits.q_upper);
   data.q_lower = std::move(limits.q_lower);
   data.q_upper = std::move(limits.q_upper);
-  if (reserve.velocity.size() > 0) limits.velocity_max -= reserve.velocity;
+  for (Eigen::Index i = 0; i < reserve.velocity.size(); ++i)  // the reserve of infinity is none
+    if (std::isfinite(limits.velocity_max[i])) limits.velocity_max[i] -= reserve.velocity[i];
   data.velocity_max = std::move(limits.velocity_max);
   data.effort_max = std::move(limits.effort_max);
   if (scene.actuation.torque_rate_max_Nm_s)

@@ -43,8 +43,7 @@ model::Model load_model(const scene::Scene& scene) {
       robot.links[static_cast<std::size_t>(i)].joint.armature =
           armature.size() > 0 ? armature[i] : 0.0;
   }
-  return model::Model(std::move(robot), scene.base,
-                      scene.gravity_m_s2.value_or(Eigen::Vector3d::Zero()));
+  return model::Model(std::move(robot), scene.base, scene.gravity_m_s2);
 }
 
 model::Model scaled_masses(const model::Model& arm, double scale) {

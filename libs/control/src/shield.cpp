@@ -44,8 +44,8 @@ constexpr double move_speed_share = 0.8;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
-double smallest_rest_time(const scene::Scene& scene, double period_s) {
-  return period_s * (scene.model.torque_limits ? stop_steps : unlimited_stop_steps);
+double smallest_rest_time(const ModelledLimits& limits, double period_s) {
+  return period_s * (limits.effort_max.size() > 0 ? stop_steps : unlimited_stop_steps);
 }
 
 MoveTime::Limits move_limits(const scene::Scene& scene, const ModelledLimits& limits,
@@ -115,7 +115,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
       braking_(model, torque_share_ * limits_.effort_max, drive.acceleration_max,
-               1.0 / smallest_rest_time(scene, period_s)),
+               1.0 / smallest_rest_time(limits_, period_s)),
       ws_(model),
       stop_(model.dof()),
       tried_(model.dof()),

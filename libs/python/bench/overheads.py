@@ -59,10 +59,12 @@ class Small:
 
 
 def planner_costs(source):
-    """Time of a step with each planner [s]; the scene models neither obstacles nor a shield."""
+    """Time of a step with each planner [s], without gravity, limits, obstacles and shield."""
     scene = {
         "schema": "hamelin.scene/1",
         "robot": {"file": str(source / "data/robots/arm7.urdf")},
+        "gravity_m_s2": [0.0, 0.0, 0.0],
+        "model": {"joint_limits": False, "velocity_limits": False, "torque_limits": False},
         "start": {"q": [0.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7]},
         "goals": [{"type": "position", "position_m": [5.0, 0.0, 0.5]}],
         "stall": None,

@@ -154,7 +154,6 @@ scene::Scene motion_scene(py::handle source, const std::optional<std::string>& t
     if (is_robot) {
       scene.name = file.string();
       scene.robot.file = file;
-      scene.gravity_m_s2 = Eigen::Vector3d{0.0, 0.0, -9.81};
     } else {
       scene = scene::read_scene(file);
     }

@@ -10,6 +10,7 @@
 #include "bound_scene.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
+#include "hamelin/scene/modelled.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "module.hpp"
 
@@ -431,6 +432,14 @@ void add_scene(py::module_& module) {
                                 : Eigen::VectorXd(Eigen::VectorXd::Zero(dof)));
           },
           "Joint positions at the start, shape (n,) [rad or m].")
+      .def_property_readonly(
+          "modelled",
+          [](BoundScene& s) {
+            const Json info = scene::modelled_info(s.scene, s.model()->model);
+            return fmt::format("{}", fmt::join(scene::describe_modelled(info), "\n"));
+          },
+          "What is modelled, in two lines: gravity, limits and self-collision; then payload, "
+          "damping and dry friction.")
       .def("environment", &make_environment, py::kw_only(), arg("influence") = 0.2,
            "Everything that the arm can hit.\n\n"
            "influence: largest distance at which contacts will be asked for [m].")

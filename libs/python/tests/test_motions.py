@@ -123,6 +123,8 @@ def test_explain(program, robots, tmp_path):
     scene = {
         "schema": "hamelin.scene/1",
         "robot": {"file": str(robots / "arm7.urdf"), "spheres": str(robots / "arm7.spheres.json")},
+        "gravity_m_s2": [0.0, 0.0, 0.0],
+        "model": {"joint_limits": False, "velocity_limits": False, "torque_limits": False},
         "start": {"q": [0.0] * 7},
         "goals": [{"type": "joint", "q": [0.0] * 6 + [1.0]}],
         "obstacles": [

@@ -53,6 +53,8 @@ def free_scene(robots):
     return {
         "schema": "hamelin.scene/1",
         "robot": {"file": str(robots / "arm7.urdf"), "spheres": str(robots / "arm7.spheres.json")},
+        "gravity_m_s2": [0.0, 0.0, 0.0],
+        "model": {"joint_limits": False, "velocity_limits": False, "torque_limits": False},
         "start": {"q": [0.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7]},
         "goals": [{"type": "joint", "q": [0.2, -0.5, 0.1, -2.0, 0.1, 1.4, 0.5]}],
         "duration_s": 5.0,

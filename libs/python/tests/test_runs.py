@@ -215,6 +215,36 @@ def test_scenes(program, scenes, tmp_path):
     assert raised.value.place == "/step_s" and raised.value.code == "invalid"
 
 
+def test_gravity_and_limits_are_on_unless_switched_off(program, robots, tmp_path):
+    document = {"schema": "hamelin.scene/1", "robot": {"file": str(robots / "arm7.urdf")}}
+    home = {"q": [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]}
+    scene = hamelin.Scene({**document, "start": home})
+    resolved = scene.resolved()
+    assert resolved["gravity_m_s2"] == [0.0, 0.0, -9.81]
+    limits = ("joint_limits", "velocity_limits", "torque_limits")
+    assert all(resolved["model"][key] is True for key in limits)
+    assert scene.model.gravity.tolist() == [0.0, 0.0, -9.81]
+    assert np.abs(hamelin.integrate(scene, duration=0.1).v).max() > 0.1  # the arm falls
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(scene.document))
+    shown = run_program(program, "scene", "info", file).stdout
+    assert len(scene.modelled.splitlines()) == 2
+    assert all(line in shown for line in scene.modelled.splitlines())
+    assert "limits: joint on, velocity on, torque on" in scene.modelled
+
+    off = hamelin.Scene({**document, "gravity_m_s2": None, "model": dict.fromkeys(limits, False)})
+    assert off.resolved()["gravity_m_s2"] == [0.0, 0.0, 0.0]
+    assert off.modelled.startswith("no gravity; limits: joint off, velocity off, torque off")
+    assert np.abs(hamelin.integrate(off, duration=0.1).q).max() == 0.0
+
+    goals = [{"type": "joint", "q": home["q"]}]
+    run = {**document, "goals": goals, "planner": {"name": "template"}}
+    with pytest.raises(hamelin.Error, match='"joint_limits": false under /model') as raised:
+        hamelin.run(run, duration=0.01)  # zeros are beyond a limit of joint4
+    assert raised.value.place == "/start/q" and raised.value.code == "invalid"
+    hamelin.run(run, duration=0.01, set="/model/joint_limits=false")
+
+
 def test_values_without_json_are_named(scenes):
     document = hamelin.load_scene(scenes / "pillar.json").document
     goals = [{"type": "joint", "q": [0.0, np.inf]}]

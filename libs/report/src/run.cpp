@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "hamelin/core/error.hpp"
+#include "hamelin/scene/modelled.hpp"
 
 namespace hamelin::report {
 
@@ -175,7 +176,7 @@ Run::Run(const Json& header, const simulation::Recorded& recorded, const World& 
   if (has_trajectory) {
     add("trajectory", "distance from the trajectory", unit(has_revolute, has_prismatic, "rad", "m"),
         false, {{"largest joint error", off_trajectory}});
-    if (recorded.scene.model.torque_limits) {
+    if (scene::limits_in_force(recorded.scene.model, world_.model.robot()).torque) {
       std::size_t share = column + columns + series_count_;  // after the series
       plots_.push_back({"tau_share", "torques as shares of their limits" + suffix, "1", {}, false});
       for (std::size_t i = 0; i < plotted_joints_; ++i)

@@ -404,16 +404,24 @@ Payload read_payload(const Reader& in) {
   return payload;
 }
 
+// Unlike other values, null differs from a missing one: it means no gravity. Logs of earlier
+// versions have null where a scene is weightless.
+Eigen::Vector3d read_gravity(const Json& document, const Reader& in, const Eigen::Vector3d& usual) {
+  const char* const key = "gravity_m_s2";
+  if (!document.contains(key)) return usual;
+  return in.vector(key, Eigen::Vector3d::Zero());
+}
+
 ModelFlags read_model(const Reader& in) {
   ModelFlags model;
   model.joint_damping = read_joint_numbers(in, "joint_damping", model.joint_damping);
   model.friction = read_joint_numbers(in, "friction", model.friction);
   model.friction_speed = in.get("friction_speed", model.friction_speed);
   model.armature = read_joint_numbers(in, "armature", model.armature);
-  model.joint_limits = in.get("joint_limits", false);
-  model.velocity_limits = in.get("velocity_limits", false);
-  model.torque_limits = in.get("torque_limits", false);
-  model.self_collision = in.get("self_collision", false);
+  model.joint_limits = in.get("joint_limits", model.joint_limits);
+  model.velocity_limits = in.get("velocity_limits", model.velocity_limits);
+  model.torque_limits = in.get("torque_limits", model.torque_limits);
+  model.self_collision = in.get("self_collision", model.self_collision);
   if (in.find("payload") != nullptr) model.payload = read_payload(in.child("payload"));
   return model;
 }
@@ -610,8 +618,7 @@ Scene scene_from_json(const Json& document, const std::filesystem::path& base_di
   scene.robot = read_robot_ref(in.child("robot"), base_dir);
   scene.base = in.child("base").pose();
   scene.base_quaternion_wxyz = in.child("base").quaternion();
-  if (in.find("gravity_m_s2") != nullptr)
-    scene.gravity_m_s2 = in.vector("gravity_m_s2", Eigen::Vector3d::Zero());
+  scene.gravity_m_s2 = read_gravity(document, in, scene.gravity_m_s2);
   scene.start_q = in.child("start").joints("q");
   scene.start_v = in.child("start").joints("v");
   scene.goals = read_goals(in, base_dir);

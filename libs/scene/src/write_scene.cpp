@@ -379,7 +379,7 @@ Json resolved_json(const Scene& scene) {
                   {"spheres", path_or_null(scene.robot.spheres)},
                   {"srdf", path_or_null(scene.robot.srdf)}};
   out["base"] = pose_json(scene.base, scene.base_quaternion_wxyz);
-  out["gravity_m_s2"] = scene.gravity_m_s2 ? array(*scene.gravity_m_s2) : Json(nullptr);
+  out["gravity_m_s2"] = array(scene.gravity_m_s2);
   out["start"] = start_json(scene);
   out["goals"] = Json::array();
   for (const Goal& goal : scene.goals) out["goals"].push_back(goal_json(goal));

@@ -49,7 +49,7 @@ Json full_document() {
       {"type": "sphere", "radius_m": 0.1, "position_m": [0.5, 0, 0.5],
        "motion": {"type": "linear", "velocity_m_s": [0, 0.1, 0], "start_s": 2}}
     ],
-    "model": {"joint_damping": [0.1, 0.2], "joint_limits": true, "payload": {"mass_kg": 0.5, "inertia_kg_m2": [1, 2, 3, 0.1, 0.2, 0.3]}},
+    "model": {"joint_damping": [0.1, 0.2], "joint_limits": true, "torque_limits": false, "payload": {"mass_kg": 0.5, "inertia_kg_m2": [1, 2, 3, 0.1, 0.2, 0.3]}},
     "actuation": {"type": "sampled", "control_period_s": 0.002, "delay_s": 0.001, "joint_noise_rad": 1e-4, "planner_mass_scale": 1.1},
     "planner": {"name": "hybrid", "params": {"escape": "tree"}},
     "integrator": {"name": "hamel-variational", "params": {"tolerance": 1e-12}},
@@ -93,7 +93,7 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.robot.spheres == data / "robots/arm7.spheres.json");
   CHECK(scene.robot.tip == "flange");
   CHECK((scene.base * Vector3d(1.0, 0.0, 0.0) - Vector3d(0.1, 1.0, 0.2)).norm() < 1e-15);
-  CHECK(*scene.gravity_m_s2 == Vector3d(0.0, 0.0, -9.81));
+  CHECK(scene.gravity_m_s2 == Vector3d(0.0, 0.0, -9.81));
   CHECK(scene.start_q[3] == -2.356);
   CHECK(scene.start_v.size() == 7);
   REQUIRE(scene.goals.size() == 3);
@@ -128,6 +128,7 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.model.joint_damping.values == std::vector<double>{0.1, 0.2});
   CHECK(scene.model.joint_limits);
   CHECK_FALSE(scene.model.torque_limits);
+  CHECK(scene.model.velocity_limits);
   CHECK(scene.model.payload->inertia_kg_m2(0, 2) == 0.2);
   CHECK(scene.actuation.type == ActuationType::sampled);
   CHECK(scene.actuation.control_period_s == 0.002);
@@ -140,22 +141,56 @@ TEST_CASE("a full scene is read field by field", "[scene][unit]") {
   CHECK(scene.seed == 9007199254740991ULL);
 }
 
-TEST_CASE("what a scene does not name is not modelled, and null means the same", "[scene][unit]") {
+TEST_CASE("parts that a scene does not name have their defaults, and null means the same",
+          "[scene][unit]") {
   Json document = small_document();
   const Json absent = resolved_json(scene_from_json(document, ".", "x.json"));
-  for (const char* key : {"gravity_m_s2", "start", "goals", "map", "obstacles", "model",
-                          "actuation", "planner", "stall"})
+  for (const char* key :
+       {"start", "goals", "map", "obstacles", "model", "actuation", "planner", "stall"})
     document[key] = nullptr;
   CHECK(resolved_json(scene_from_json(document, ".", "x.json")) == absent);
   const Scene scene = scene_from_json(document, ".", "x.json");
-  CHECK_FALSE(scene.gravity_m_s2);
   CHECK_FALSE(scene.map);
   CHECK_FALSE(scene.planner);
   CHECK_FALSE(scene.stall);
-  CHECK_FALSE(scene.model.joint_limits);
   CHECK(scene.model.joint_damping.values.empty());
   CHECK(scene.actuation.control_period_s == scene.step_s);
   CHECK(scene.integrator.name == "hamel-variational");
+}
+
+TEST_CASE("gravity acts and limits are kept unless a scene switches them off", "[scene][unit]") {
+  const auto resolved = [](const Json& document) {
+    return resolved_json(scene_from_json(document, ".", "x.json"));
+  };
+  Json document = small_document();
+  const Json schema = Json::parse(schema_text("scene"))["properties"];
+  const Json defaults = resolved(document);
+  const Json made = resolved_json(Scene());
+  CHECK(made["gravity_m_s2"] == defaults["gravity_m_s2"]);
+  CHECK(made["model"] == defaults["model"]);
+  CHECK(defaults["gravity_m_s2"] == Json({0.0, 0.0, -9.81}));
+  CHECK(schema["gravity_m_s2"]["default"] == defaults["gravity_m_s2"]);
+  for (const char* key : {"joint_limits", "velocity_limits", "torque_limits"}) {
+    CAPTURE(key);
+    CHECK(defaults["model"][key] == true);
+    CHECK(schema["model"]["properties"][key]["default"] == true);
+    document["model"] = {{key, nullptr}};
+    CHECK(resolved(document)["model"][key] == true);
+    document["model"] = {{key, false}};
+    Json expected = defaults["model"];
+    expected[key] = false;
+    CHECK(resolved(document)["model"] == expected);
+    CHECK(resolved(resolved(document)) == resolved(document));
+  }
+  CHECK(defaults["model"]["self_collision"] == false);
+  document.erase("model");
+  // The headers of earlier logs have null for a weightless scene, which must stay one.
+  for (const Json& none : {Json(nullptr), Json({0, 0, 0})}) {
+    document["gravity_m_s2"] = none;
+    CHECK(resolved(document)["gravity_m_s2"] == Json({0.0, 0.0, 0.0}));
+  }
+  set_pointer(document, "/gravity_m_s2=[0, -9.81, 0]");
+  CHECK(resolved(document)["gravity_m_s2"] == Json({0.0, -9.81, 0.0}));
 }
 
 TEST_CASE("paths of a scene follow symbolic links as the system does", "[scene][unit]") {

@@ -13,6 +13,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/log/provenance.hpp"
+#include "hamelin/scene/modelled.hpp"
 #include "hamelin/simulation/integrator_options.hpp"
 #include "scene_values.hpp"
 #include "simulated_arm.hpp"
@@ -209,6 +210,11 @@ void ClosedLoop::make_plant(const PlantFactory& factory) {
   plant_ = std::move(arm);
 }
 
+void ClosedLoop::check_start() const {
+  if (const std::string defect = scene::start_defect(scene_, model_); !defect.empty())
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_.name, defect));
+}
+
 void ClosedLoop::log_planner_message(std::int32_t level, std::string_view line) {
   const bool warning = level == HAMELIN_LOG_WARNING;
   // Such a message would be written nowhere.
@@ -247,6 +253,9 @@ void ClosedLoop::start(const Watch& watch) {
   open_target_feed(watch);
   result_.provenance = log::provenance(inputs_, watch.argv);
   if (recorder_->logging()) log_->header(scene_, planner_params_, result_.provenance, steps_);
+  if (watch.diagnostics)
+    for (const auto& line : scene::describe_modelled(scene::modelled_info(scene_, model_)))
+      watch.diagnostics->info("{}: {}", scene_.name, line);
   for (const auto& line : early_messages_) report_event(line.warning, line.text);
   min_clearance_ = judge_->influence_m();
   min_self_clearance_ = judge_->self_influence_m();

@@ -26,6 +26,9 @@ class ClosedLoop {
   ClosedLoop(const scene::Scene& scene,
              const std::vector<std::filesystem::path>& plugin_directories,
              const PlantFactory& plant_factory);
+  /// @throws Error invalid if the start is beyond a limit in force, see scene::start_defect(). The
+  /// replay of a log does not call this: it repeats what an earlier version ran.
+  void check_start() const;
   [[nodiscard]] log::Result run(const Watch& watch);
 
  private:

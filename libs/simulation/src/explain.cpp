@@ -10,6 +10,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/read_log.hpp"
+#include "hamelin/scene/modelled.hpp"
 #include "hamelin/simulation/replay.hpp"
 #include "recorder.hpp"
 
@@ -92,11 +93,11 @@ std::vector<Explanation::Act> last_of(const std::vector<Explanation::Act>& acts,
   return kept;
 }
 
-std::vector<std::string> notes_of(const scene::Scene& scene,
+std::vector<std::string> notes_of(const scene::Scene& scene, const model::Robot& robot,
                                   const std::vector<log::Trajectory::Point>& points) {
   std::vector<std::string> notes;
-  if (!scene.model.torque_limits)
-    notes.emplace_back("the scene models no torque limits, so motions may be too fast for the arm");
+  if (!scene::limits_in_force(scene.model, robot).torque)
+    notes.emplace_back("no torque limits are modelled, so motions may be too fast for the arm");
   if (scene.map && !scene.map->changes.empty())
     notes.emplace_back("the map changes: motions were checked with the map at the contact");
   const auto last = points.size() - 1;
@@ -189,7 +190,7 @@ Explanation explain(const std::filesystem::path& log, const ExplainOptions& opti
   const auto points = points_until_contact(log, contact_s, model.dof());
   explanation.stops = last_of(logged.stops, contact_s - last_acts_s);
   explanation.planner_acts = last_of(logged.planner_acts, contact_s - last_acts_s);
-  explanation.notes = notes_of(recorded.scene, points);
+  explanation.notes = notes_of(recorded.scene, model.robot(), points);
   EvasionSearch search(
       {log, recorded.scene, model, points, explanation.contact["obstacle"].get<std::string>()},
       options);

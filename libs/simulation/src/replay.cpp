@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "closed_loop.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/isa.hpp"
@@ -117,6 +118,14 @@ void remove_paths(Json& header) {
       header["config"][at] = nullptr;
 }
 
+// Earlier versions wrote null for a weightless scene.
+void state_gravity(Json& header) {
+  if (!header.contains("config") || !header["config"].is_object()) return;
+  Json& config = header["config"];
+  if (const auto found = config.find("gravity_m_s2"); found != config.end() && found->is_null())
+    *found = Json::array({0.0, 0.0, 0.0});
+}
+
 std::string abbreviated(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > 80) text = text.substr(0, 77) + "...";
@@ -155,7 +164,10 @@ class Comparison final : public log::LineSink {
     }
     for (Json* line : {&logged, &replayed}) {
       line->erase("timing");
-      if (line->value("type", Json()) == "header") remove_paths(*line);
+      if (line->value("type", Json()) == "header") {
+        remove_paths(*line);
+        state_gravity(*line);
+      }
       line->erase("provenance");
     }
     compare("", logged, replayed, logged);
@@ -322,7 +334,7 @@ log::Result repeat(const Recorded& recorded, const std::vector<fs::path>& plugin
                    const Watch& watch, const PlantFactory& plant_factory) {
   if (!recorded.changed.empty()) throw Error(ErrorCode::invalid, recorded.changed.front().text);
   if (recorded.program == Recorded::Program::run)
-    return run(recorded.scene, plugin_directories, watch, plant_factory);
+    return ClosedLoop(recorded.scene, plugin_directories, plant_factory).run(watch);
   const model::Model model = control::load_model(recorded.scene);
   return integrate(model, free_motion(recorded.scene, model), watch);
 }

@@ -7,7 +7,9 @@ namespace hamelin::simulation {
 log::Result run(const scene::Scene& scene,
                 const std::vector<std::filesystem::path>& plugin_directories, const Watch& watch,
                 const PlantFactory& plant_factory) {
-  return ClosedLoop(scene, plugin_directories, plant_factory).run(watch);
+  ClosedLoop loop(scene, plugin_directories, plant_factory);
+  loop.check_start();
+  return loop.run(watch);
 }
 
 Json full_config(const scene::Scene& scene,

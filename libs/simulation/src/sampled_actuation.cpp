@@ -13,6 +13,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
+#include "hamelin/scene/modelled.hpp"
 #include "scene_values.hpp"
 
 namespace hamelin::simulation {
@@ -105,10 +106,11 @@ class Encoders {
 class TorqueActuation final : public SampledActuation {
  public:
   /// @param holding the torque that acts until the first one of the controller arrives
-  TorqueActuation(const scene::Scene& scene, Plant& plant, long period_steps, long delay_ticks,
-                  const VectorXd& holding)
+  TorqueActuation(const scene::Scene& scene, const model::Model& model, Plant& plant,
+                  long period_steps, long delay_ticks, const VectorXd& holding)
       : SampledActuation(plant, period_steps),
-        limited_(scene.model.torque_limits || scene.actuation.torque_rate_max_Nm_s),
+        limited_(scene::limits_in_force(scene.model, model.robot()).torque ||
+                 scene.actuation.torque_rate_max_Nm_s),
         decided_(holding),
         encoders_(scene),
         delayed_(delay_ticks, holding) {}
@@ -267,7 +269,7 @@ std::unique_ptr<Actuation> make_sampled_actuation(const scene::Scene& scene,
   dynamics::Workspace ws(model);
   VectorXd holding(model.dof());
   dynamics::gravity_torque(model, ws, plant.node().q, holding);
-  return std::make_unique<TorqueActuation>(scene, plant, period_steps, delay, holding);
+  return std::make_unique<TorqueActuation>(scene, model, plant, period_steps, delay, holding);
 }
 
 }  // namespace hamelin::simulation

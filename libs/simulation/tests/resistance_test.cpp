@@ -155,7 +155,6 @@ TEST_CASE(
 
   // Friction and armature have an effect.
   auto scene = own;
-  scene.gravity_m_s2 = Eigen::Vector3d(0.0, 0.0, -9.81);
   scene.duration_s = 1.0;
   const auto result = simulation::integrate(control::load_model(scene), motion(scene), {});
   CHECK(result.dissipated_J > 1e-3);

@@ -343,7 +343,7 @@ TEST_CASE(
   CHECK(scene.integrator.name == "semi-implicit-euler");
   CHECK(scene.step_s == 0.004);
   CHECK(scene.duration_s == 40.0);
-  CHECK_FALSE(scene.gravity_m_s2.has_value());
+  CHECK(scene.gravity_m_s2.isZero(0.0));
   CHECK(scene.goals.at(0).tip_speed_max_m_s == 0.05);
   CHECK(std::isinf(scene.goals.at(0).speed_max));
   CHECK(scene.obstacles.size() == 1);

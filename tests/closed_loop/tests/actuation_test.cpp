@@ -127,17 +127,18 @@ TEST_CASE("dry friction of the model and of the actuation act alike and add up",
   scene["start"] = {{"v", {1.0, -2.0, 1.5, 0.5}}};
   scene["duration_s"] = 0.5;
   const auto final_q = [&](const Json& model, double share) {
-    scene["model"] = model;
+    scene["model"] = test::scene_52()["model"];
+    scene["model"].update(model);
     scene["actuation"]["coulomb_friction_share"] = share;
     model::Robot robot = test::strong(100.0);
     for (auto& link : robot.links) link.joint.friction = 5.0;
     return run_scene(folder, scene, {}, robot).q;
   };
   const Eigen::VectorXd named = final_q({{"friction", 5.0}}, 0.0);
-  CHECK(named == final_q(nullptr, 0.05));
+  CHECK(named == final_q(Json::object(), 0.05));
   CHECK(named == final_q({{"friction", "robot"}}, 0.0));
   CHECK(named == final_q({{"friction", {2.5, 2.5, 2.5, 2.5}}}, 0.025));
-  CHECK((named - final_q(nullptr, 0.0)).norm() > 1e-3);
+  CHECK((named - final_q(Json::object(), 0.0)).norm() > 1e-3);
   CHECK((named - final_q({{"friction", 5.0}, {"friction_speed", 0.5}}, 0.0)).norm() > 1e-5);
 }
 
@@ -217,7 +218,7 @@ TEST_CASE("torque limits scale a node's change of velocity as a whole, and that 
   const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
   Json scene = scene_of({{"velocity", {1.0, 0.0, 0.0, 0.0}}, {"torque", {2.0, 0.0, 0.0, 0.0}}});
-  scene["model"] = {{"torque_limits", true}};
+  scene["model"]["torque_limits"] = true;
   scene["duration_s"] = 0.01;
   const auto run = logged_run(folder, scene, robot);
   Eigen::VectorXd asked(4);

@@ -126,7 +126,7 @@ TEST_CASE("an arm of capsules is kept clear of itself", "[simulation][capsule]")
   const double corner = M_PI / 2.0;
   scene["start"] = {{"q", {0.0, corner, corner, corner - 0.3}}};  // nearly a square
   scene["goals"] = {{{"type", "joint"}, {"q", {0.0, corner, corner, corner + 0.1}}}};
-  scene["model"] = {{"self_collision", true}};
+  scene["model"]["self_collision"] = true;
   scene["safety"] = {{"type", "certificate"}};  // a shield would stop the arm
   const auto free = run_scene(folder, scene, {}, robot);
   CHECK(free.outcome == Outcome::collision);

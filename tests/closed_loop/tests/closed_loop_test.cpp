@@ -409,7 +409,7 @@ TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25),
                         moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
-  scene["model"] = {{"self_collision", true}};
+  scene["model"]["self_collision"] = true;
   scene["planner"]["name"] = planner;
   if (planner == "hybrid") scene["planner"].erase("params");
   const auto allocations = [&](double duration_s) {
@@ -437,7 +437,7 @@ TEST_CASE("a tick with everything that can be modelled does not allocate",
                         moving(ball("passer-by", 1.5, 0.8, 0.2), 0.5, 0.0)};
   scene["obstacles"][1]["known"] = false;
   scene["obstacles"][1]["visible_within_m"] = 0.5;
-  scene["model"] = {{"self_collision", true}, {"torque_limits", true}};
+  scene["model"]["self_collision"] = scene["model"]["torque_limits"] = true;
   scene["actuation"] = {{"type", actuation}, {"coulomb_friction_share", 0.1}};
   if (actuation == "sampled") scene["actuation"]["torque_rate_max_Nm_s"] = 100.0;
   scene["planner"] = {{"name", "probe"},
@@ -465,7 +465,7 @@ TEST_CASE("a tick of hybrid does not allocate while it searches", "[simulation][
   scene["goals"] = {{{"type", "joint"}, {"q", {std::acos(-1.0), 0.0, 0.0, 0.0}}}};
   scene["obstacles"] = {ball("above", 0.0, 0.6, 0.1), ball("below", 0.0, -0.6, 0.1),
                         moving(ball("near the base", -0.12, 0.0, 0.05), 0.0, 0.02)};
-  scene["model"] = {{"self_collision", true}};
+  scene["model"]["self_collision"] = true;
   const auto run = [&](const std::string& escape, double duration_s) {
     scene["planner"] = {{"name", "hybrid"}, {"params", {{"escape", escape}}}};
     scene["duration_s"] = duration_s;

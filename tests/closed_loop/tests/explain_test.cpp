@@ -35,7 +35,7 @@ Json resting_arm(const Json& obstacle) {
   Json scene = test::scene_52();
   scene["obstacles"] = Json::array({obstacle});
   scene["planner"] = {{"name", "probe"}, {"params", {{"velocity", {0.0, 0.0, 0.0, 0.0}}}}};
-  scene["model"] = {{"torque_limits", true}};
+  scene["model"]["torque_limits"] = true;
   scene["safety"] = {{"type", "none"}};
   scene["step_s"] = 0.001;
   scene["duration_s"] = 3.0;

@@ -106,7 +106,8 @@ TEST_CASE("an arm whose servos know its dynamics follows its set points when the
 TEST_CASE("servos keep the torque limits, and that is counted", "[simulation][servo]") {
   const TemporaryFolder folder;
   Json scene = servo_scene({3.0, 0.0, 0.0, 0.0}, 1e4, 300.0);
-  scene["model"] = {{"torque_limits", true}, {"friction", 0.9}};
+  scene["model"]["torque_limits"] = true;
+  scene["model"]["friction"] = 0.9;
   const auto ticks = logged_ticks(folder, scene, test::strong(1.0));
   double largest = 0.0;
   for (const Json& tick : ticks)
@@ -124,7 +125,7 @@ TEST_CASE("a set point at the goal is not enough: the arm itself must reach it",
   scene["duration_s"] = 12.0;
   scene["actuation"] = {{"type", "position"}, {"servo", {{"kp", 2000.0}, {"kv", 200.0}}}};
   CHECK(run_scene(folder, scene).outcome == Outcome::reached);
-  scene["model"] = {{"friction", 500.0}};
+  scene["model"]["friction"] = 500.0;
   scene["actuation"]["servo"] = {{"kp", 10.0}, {"kv", 1.0}};
   const auto held = run_scene(folder, scene);
   CHECK(held.outcome == Outcome::timeout);

@@ -250,3 +250,68 @@ TEST_CASE("a scene made from a problem has known space all around its arm", "[en
   CHECK_THAT(refused.err, Catch::Contains("problem.json: /obstacles/2/type: is \"mesh\""));
   CHECK_FALSE(fs::exists(sandbox.path("none.bt")));
 }
+
+TEST_CASE("a scene with few keys falls under gravity within all limits, and the program says so",
+          "[end_to_end]") {
+  Sandbox sandbox;
+  Json scene{{"schema", "hamelin.scene/1"},
+             {"robot", {{"file", "data/robots/arm6.urdf"}}},
+             {"start", {{"q", {0.0, 0.3, 0.5, 0.0, 0.0, 0.0}}}},
+             {"goals", {{{"type", "joint"}, {"q", {0.1, 0.35, 0.55, 0.0, 0.0, 0.0}}}}},
+             {"planner", {{"name", "hybrid"}}}};
+  sandbox.put("few.json", scene.dump());
+  const std::string all =
+      "gravity (0, 0, -9.81) m/s^2; limits: joint on, velocity on, torque on; self-collision off";
+  const auto info = sandbox.run({"scene", "info", "few.json"});
+  CHECK_THAT(info.out, Catch::Contains(all) && Catch::Contains("payload none; damping off"));
+  const auto run = sandbox.run({"run", "few.json"});
+  CAPTURE(run.err);
+  CHECK(run.exit_code == 0);
+  CHECK(test::lines_of(run.err).at(0) == "hamelin: note: few.json: " + all);
+  CHECK(sandbox.run({"--quiet", "run", "few.json"}).err.empty());
+  const Json fall = test::run_json(sandbox, {"integrate", "few.json", "--duration", "0.2"});
+  CHECK(std::abs(fall["v"][1].get<double>()) > 0.5);
+
+  const std::vector<std::string> off{
+      "--set", "/gravity_m_s2=null",           "--set", "/model/joint_limits=false",
+      "--set", "/model/velocity_limits=false", "--set", "/model/torque_limits=false"};
+  std::vector<std::string> command{"run", "few.json"};
+  command.insert(command.end(), off.begin(), off.end());
+  CHECK_THAT(sandbox.run(command).err,
+             Catch::Contains("few.json: no gravity; limits: joint off, velocity off, torque off"));
+  command.push_back("--print-config");
+  const Json config = test::run_json(sandbox, command);
+  CHECK(config["gravity_m_s2"] == Json({0.0, 0.0, 0.0}));
+  for (const char* key : {"joint_limits", "velocity_limits", "torque_limits"})
+    CHECK(config["model"][key] == false);
+
+  scene["start"]["q"][4] = 1.4;
+  sandbox.put("beyond.json", scene.dump());
+  const auto beyond = sandbox.run({"run", "beyond.json", "--log", "log.jsonl"});
+  CHECK(beyond.exit_code == 2);
+  CHECK(beyond.out.empty());
+  CHECK(beyond.err ==
+        "hamelin: beyond.json: /start/q: joint 'joint5' is at 1.4, beyond its limit, expected "
+        "at most 1.3 (\"joint_limits\": false under /model switches the limits off)\n");
+  CHECK_THAT(test::run_json(sandbox, {"scene", "info", "beyond.json"})["warnings"].dump(),
+             Catch::Contains("is at 1.4, beyond its limit"));
+}
+
+TEST_CASE("a log of a weightless scene without limits replays as it ran", "[end_to_end]") {
+  // Logs of versions whose scenes had neither gravity nor limits by default state both: null is no
+  // gravity.
+  Sandbox sandbox;
+  REQUIRE(
+      sandbox
+          .run({"run", "data/scenes/paper_52_gyro.json", "--duration", "0.2", "--log", "log.jsonl"})
+          .exit_code == 1);
+  std::string text = sandbox.text("log.jsonl");
+  const std::string now = "\"gravity_m_s2\":[0.0,0.0,0.0]";
+  const auto at = text.find(now);
+  REQUIRE(at != std::string::npos);
+  text.replace(at, now.size(), "\"gravity_m_s2\":null");
+  sandbox.put("old.jsonl", text);
+  const auto replay = sandbox.run({"replay", "old.jsonl", "--verify"});
+  CAPTURE(replay.out, replay.err);
+  CHECK(replay.exit_code == 0);
+}

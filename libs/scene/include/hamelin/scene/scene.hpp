@@ -97,7 +97,8 @@ struct JointNumbers {
 /// Default speed below which dry friction becomes viscous [rad/s or m/s].
 inline constexpr double default_friction_speed = 0.01;
 
-/// Which properties of the robot are modelled. By default all optional ones are off.
+/// Which properties of the robot are modelled. By default the limits that the robot file states are
+/// kept; damping, friction, self-collision and payload are off.
 struct ModelFlags {
   JointNumbers joint_damping;  ///< viscous [Nms/rad or Ns/m]
   JointNumbers friction;       ///< dry: torque −c tanh(v / friction_speed) [Nm or N]
@@ -105,7 +106,8 @@ struct ModelFlags {
   /// Rotor inertia seen at the joint [kg m² or kg]. By default that of the robot file, as for
   /// masses: the motion would be wrong without it.
   JointNumbers armature{true, {}};
-  bool joint_limits = false, velocity_limits = false, torque_limits = false, self_collision = false;
+  bool joint_limits = true, velocity_limits = true, torque_limits = true;
+  bool self_collision = false;
   std::optional<Payload> payload;
 };
 
@@ -216,14 +218,14 @@ struct StallRule {
 };
 
 /// A scene file, read and checked (hamelin.scene/1). docs/schema/scene.schema.json defines each
-/// field. What is empty is not modelled.
+/// field. What is empty is not modelled. The defaults are those of a scene file.
 struct Scene {
   std::string name;  ///< the file it came from
   RobotRef robot;
   geometry::SE3 base;
   Quaternion base_quaternion_wxyz{1.0, 0.0, 0.0, 0.0};  ///< see Quaternion
-  std::optional<Eigen::Vector3d> gravity_m_s2;
-  Eigen::VectorXd start_q, start_v;  ///< empty: zeros
+  Eigen::Vector3d gravity_m_s2{0.0, 0.0, -9.81};        ///< in the world; zero: weightless
+  Eigen::VectorXd start_q, start_v;                     ///< empty: zeros
   std::vector<Goal> goals;
   std::optional<MapSpec> map;
   std::vector<Obstacle> obstacles;
@@ -264,8 +266,8 @@ struct Scene {
 [[nodiscard]] Scene scene_from_json(const Json& document, const std::filesystem::path& base_dir,
                                     const std::string& where);
 
-/// The scene with all defaults written out; what is not modelled is null. scene_from_json() of it
-/// gives the same scene.
+/// The scene with all defaults written out; parts that it does not have are null.
+/// scene_from_json() of it gives the same scene.
 [[nodiscard]] Json resolved_json(const Scene& scene);
 
 /// Sets one value by "/json/pointer=VALUE". VALUE is JSON, or else a string. Keys that the file

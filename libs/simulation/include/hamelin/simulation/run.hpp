@@ -35,9 +35,9 @@ struct Watch {
   /// Called at every node of a run in closed loop, including the first and the last.
   std::function<void(double time_s, const Eigen::VectorXd& q)> at_node;
   std::function<void(double time_s, double duration_s)> progress;  ///< called every 1000 steps
-  /// Receives diagnostics: messages of the planner and obstacles that become visible (debug), goals
-  /// in contact (info), warnings of the planner (warn). Null: none. Levels that are off cost
-  /// nothing.
+  /// Receives diagnostics: messages of the planner and obstacles that become visible (debug), what
+  /// the scene models and goals in contact (info), warnings of the planner (warn). Null: none.
+  /// Levels that are off cost nothing.
   std::shared_ptr<spdlog::logger> diagnostics;
   /// Called once before a run with a log: the largest number of tick lines, and the number of
   /// joints.
@@ -76,7 +76,8 @@ struct FreeMotion {
 /// @param plugin_directories where planners are searched for, in order
 /// @param plant_factory makes the plant if the scene's is not hamelin's own; empty: such scenes are
 ///        refused
-/// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot
+/// @throws Error for bad input: robot, map, planner parameters, goals that do not fit the robot, a
+///         start that is beyond a limit in force
 [[nodiscard]] log::Result run(const scene::Scene& scene,
                               const std::vector<std::filesystem::path>& plugin_directories,
                               const Watch& watch, const PlantFactory& plant_factory = {});
