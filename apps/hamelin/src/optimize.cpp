@@ -146,7 +146,7 @@ void add_optimize(CLI::App& app, int& exit_code) {
                       ->capture_default_str(),
                   {"banded", "ipopt"});
   add_set_option(*command, options->flags.set,
-                 "set one value of the scene, e.g. /model/torque_limits=true; may be repeated");
+                 "set one value of the scene, e.g. /model/torque_limits=false; may be repeated");
   restrict_values(command
                       ->add_option("--format", options->format,
                                    "of the output: json, csv, or ros for the fields of "

@@ -14,7 +14,8 @@ namespace hamelin::control {
                                            std::optional<double> model::Joint::*limit,
                                            double unlimited);
 
-/// The limits of the joints that a scene models; of size zero: not modelled.
+/// The limits of the joints that are in force, see scene::limits_in_force(); of size zero: none of
+/// this kind. Joints for which the robot states none have infinite ones.
 struct ModelledLimits {
   Eigen::VectorXd q_lower, q_upper;  ///< [rad or m]
   Eigen::VectorXd velocity_max;      ///< [rad/s or m/s]
