@@ -52,9 +52,10 @@ int integrate(const IntegrateOptions& options) {
 void add_integrate(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "integrate",
-      "Integrate the free motion of a robot, without planner, obstacles and limits. A robot file "
-      "falls under gravity, -9.81 m/s^2 along z. Of a scene file, robot, base, gravity, damping, "
-      "friction and start are used",
+      "Integrate the free motion of a robot, without planner and obstacles. A robot file falls "
+      "under gravity, -9.81 m/s^2 along z. Of a scene file, robot, base, gravity, damping, "
+      "friction "
+      "and start are used; limits have no effect",
       "hamelin integrate data/robots/planar3.json --step 0.01 --duration 100\n"
       "hamelin integrate data/robots/planar3.json --integrator hamel --alpha 1 --step 0.01 --log "
       "f.jsonl");

@@ -227,7 +227,7 @@ def test_gravity_and_limits_are_on_unless_switched_off(program, robots, tmp_path
     assert np.abs(hamelin.integrate(scene, duration=0.1).v).max() > 0.1  # the arm falls
     file = tmp_path / "scene.json"
     file.write_text(json.dumps(scene.document))
-    shown = run_program(program, "scene", "info", file).stdout
+    shown = run_program(program, "scene", "info", file).stdout.decode()
     assert len(scene.modelled.splitlines()) == 2
     assert all(line in shown for line in scene.modelled.splitlines())
     assert "limits: joint on, velocity on, torque on" in scene.modelled
