@@ -30,7 +30,8 @@ bool is_rotation(const Eigen::Matrix3d& R) {
 }
 
 void check(const TipTarget& target) {
-  require(target.position.allFinite(), "target: the position is not finite, expected finite numbers");
+  require(target.position.allFinite(),
+          "target: the position is not finite, expected finite numbers");
   require(target.tolerance_m > 0.0, "target: tolerance_m is not a number above 0");
   if (!target.turns) return;
   require(is_rotation(target.rotation), "target: the rotation is not a rotation matrix");

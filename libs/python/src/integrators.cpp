@@ -312,14 +312,13 @@ void add_report(py::module_& module) {
 void add_channels(py::module_& module) {
   py::class_<PyChannels, std::shared_ptr<PyChannels>>(
       module, "Channels", "The forces on the arm during a step, besides gravity.")
-      .def(
-          py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
-          py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
-          py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
-          "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
-          "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. Steps refuse negative ones.\n"
-          "gyroscopic: terms (link, point, w), with the point in the link's centre-of-mass frame\n"
-          "[m] and w in the world [N s/m]. held_torque: shape (n,) [Nm or N].")
+      .def(py::init(&make_channels), py::kw_only(), py::arg("damping") = py::none(),
+           py::arg("coulomb") = py::none(), py::arg("coulomb_speed") = 0.01,
+           py::arg("gyroscopic") = py::tuple(), py::arg("held_torque") = py::none(),
+           "damping: viscous, shape (n,) [Nms/rad or Ns/m]. coulomb: dry friction, shape (n,)\n"
+           "[Nm or N], viscous below coulomb_speed [rad/s or m/s]. Steps refuse negative ones.\n"
+           "gyroscopic: terms (link, point, w), with the point in the link's centre-of-mass frame\n"
+           "[m] and w in the world [N s/m]. held_torque: shape (n,) [Nm or N].")
       .def_property_readonly(
           "damping", [](const PyChannels& c) { return to_array(c.damping); },
           "Viscous damping, shape (n,) or (0,); a copy.")
