@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <thread>
+#include <type_traits>
 
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
@@ -190,6 +191,10 @@ TEST_CASE("tight starts and goals are reached with the clearance that they have"
   REQUIRE(path.found());
   CHECK(sampled_distance(world, path.points) > 0.009);
 }
+
+// A guide of a temporary model must not compile.
+static_assert(std::is_constructible_v<guide::Guide, const model::Model&, guide::Settings> &&
+              !std::is_constructible_v<guide::Guide, model::Model, guide::Settings>);
 
 TEST_CASE("bad settings and problems are refused in one line", "[guide]") {
   if (!guide::available()) {
