@@ -241,7 +241,8 @@ def test_gravity_and_limits_are_on_unless_switched_off(program, robots, tmp_path
     run = {**document, "goals": goals, "planner": {"name": "template"}}
     with pytest.raises(hamelin.Error, match='"joint_limits": false under /model') as raised:
         hamelin.run(run, duration=0.01)  # zeros are beyond a limit of joint4
-    assert raised.value.place == "/start/q" and raised.value.code == "invalid"
+    assert str(raised.value).startswith("scene: /start/q: joint 'joint4' is at 0")
+    assert raised.value.code == "invalid"
     hamelin.run(run, duration=0.01, set="/model/joint_limits=false")
 
 
