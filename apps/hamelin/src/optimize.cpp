@@ -30,23 +30,28 @@ std::string goal_text(const optimal::GoalMotion& goal, std::size_t index) {
   const optimal::Optimized& f = goal.found;
   const optimal::Solution& s = f.solution;
   const std::string name = fmt::format("goal {}", index + 1);
-  const char* const state = s.converged    ? "optimal"
+  const bool optimal = goal.valid() && s.converged;
+  const char* const state = optimal        ? "optimal"
                             : goal.valid() ? "valid, not proved optimal"
                                            : "no motion";
   std::string text = fmt::format("{:<12}{} after {} iterations: {:.6g} s, cost {:.6g}\n", name,
-                                 coloured(state, s.converged    ? Colour::good
+                                 coloured(state, optimal        ? Colour::good
                                                  : goal.valid() ? Colour::fair
                                                                 : Colour::bad),
                                  s.iterations, f.motion.duration_s(), s.cost);
-  if (!s.converged) text += fmt::format("{:<12}{}\n", "", s.cause);
+  if (const std::string cause = optimal::cause_of(s); !cause.empty())
+    text += fmt::format("{:<12}{}\n", "", cause);
   if (goal.valid())
     text += fmt::format("{:<12}limits kept{}\n", "",
                         f.torque_share > 0.0 ? fmt::format("; torques up to {:.3g} % of theirs",
                                                            100.0 * f.torque_share)
                                              : "");
   if (!f.proof.certified)
-    text += fmt::format("{:<12}{} from {:.4g} s on\n", "",
-                        coloured("not proved clear", Colour::bad), f.proof.first_open_s);
+    text += f.proof.margin_m > 0.0
+                ? fmt::format("{:<12}{}: proved to keep {:.3g} m\n", "",
+                              coloured("the margin is not kept", Colour::bad), f.proof.margin_m)
+                : fmt::format("{:<12}{} from {:.4g} s on\n", "",
+                              coloured("not proved clear", Colour::bad), f.proof.first_open_s);
   else if (std::isfinite(f.proof.margin_m))
     text += fmt::format("{:<12}proved to keep {:.3g} m from obstacles and from itself\n", "",
                         f.proof.margin_m);
@@ -94,7 +99,7 @@ void add_optimize(CLI::App& app, int& exit_code) {
   auto* command = add_command(
       app, "optimize",
       "Find the motion of least effort or least time to the goals of a scene within all limits, "
-      "and prove it clear. The exit code is 1 if a goal has no such motion",
+      "and prove that it keeps the margin. The exit code is 1 if a goal has no such motion",
       "hamelin optimize data/scenes/shelf.json --guide rrt-connect -o shelf-motion.json\n"
       "hamelin optimize data/scenes/pillar.json --minimize time --rate 1000 --format csv "
       "-o fast.csv");
@@ -116,11 +121,15 @@ void add_optimize(CLI::App& app, int& exit_code) {
                    "of the velocity limits)")
       ->type_name("T")
       ->check(positive);
-  command->add_option("--intervals", motion.intervals, "intervals between knots, to each goal")
+  command
+      ->add_option("--intervals", motion.intervals,
+                   "intervals between knots, to each goal; more where torques between the knots "
+                   "need them")
       ->type_name("N")
       ->check(CLI::Range(optimal::least_intervals, optimal::most_intervals))
       ->capture_default_str();
-  command->add_option("--margin", motion.margin_m, "least clearance [m]")
+  command
+      ->add_option("--margin", motion.margin_m, "least clearance, which is proved at all times [m]")
       ->type_name("M")
       ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();

@@ -26,7 +26,7 @@ double motion_error(const Problem& problem, const Solution& found) {
   const TimedMotion motion{found.step_s, found.control};
   constexpr Index parts = 20;
   dynamics::Workspace ws(*problem.model);
-  MatrixXd torque(problem.q_start.size(), parts * problem.intervals + 1);
+  MatrixXd torque(problem.q_start.size(), parts * motion.intervals() + 1);
   VectorXd at(problem.q_start.size());
   for (Index i = 0; i < torque.cols(); ++i) {
     torque_at(*problem.model, ws, motion, found.step_s * static_cast<double>(i) / parts, at);

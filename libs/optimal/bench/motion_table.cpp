@@ -116,7 +116,7 @@ void tabulate(const std::string& file, const Options& options) {
   if (scene.goals.empty()) throw Error(ErrorCode::invalid, file + ": /goals: there is none");
   const model::Model arm = control::load_model(scene);
   const MatrixXd points = guide_path(scene, arm);
-  control::WorldView view(scene, arm, influence_m);
+  control::WorldView view(scene, arm, influence_of(SceneMotionOptions{}.margin_m));
   for (const auto objective : {Objective::effort, Objective::time}) {
     const char* const least = objective == Objective::time ? "time" : "effort";
     if (!options.least.empty() && options.least != least) continue;

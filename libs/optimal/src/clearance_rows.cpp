@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <limits>
+#include <algorithm>
 
+#include "hamelin/core/numbers.hpp"
 #include "hamelin/optimal/timed_motion.hpp"
 
 namespace hamelin::optimal {
@@ -13,14 +14,24 @@ ClearanceRows::ClearanceRows(const Problem& problem, const Layout& layout, Bound
   if (clearance_ == nullptr) return;
   each_ = clearance_->rows();
   distances_ = VectorXd::Zero(each_);
+  const double inner = problem.margin_m + problem.reserve_m,
+               start = std::min(inner, at_least(problem.q_start, problem.margin_m)),
+               goal = std::min(inner, at_least(problem.q_goal, problem.margin_m));
   for (Index k = 0; k < layout.intervals(); ++k)
-    for (int i = k == 0 ? 1 : 0; i < problem.clearance_points; ++i)
+    for (int i = k == 0 ? 1 : 0; i < problem.clearance_points; ++i) {
       places_.push_back({k, spline_weights(static_cast<double>(i) / problem.clearance_points),
                          MatrixXd::Zero(layout.joints(), each_)});
-  for (Index r = 0; r < rows(); ++r) {
-    bounds.lower.push_back(scale * problem.margin_m);
-    bounds.upper.push_back(std::numeric_limits<double>::infinity());
-  }
+      const double bound = k == 0 ? start : k + 1 == layout.intervals() ? goal : inner;
+      bounds.lower.insert(bounds.lower.end(), static_cast<std::size_t>(each_), scale * bound);
+      bounds.upper.insert(bounds.upper.end(), static_cast<std::size_t>(each_), infinity);
+    }
+}
+
+// The clearance at an end, or the margin if it is less.
+double ClearanceRows::at_least(const VectorXd& q, double margin) {
+  MatrixXd gradients(q.size(), each_);
+  clearance_->evaluate(q, distances_, gradients);
+  return each_ > 0 ? std::max(margin, distances_.minCoeff()) : margin;
 }
 
 void ClearanceRows::evaluate(const Points& points, double* values) {

@@ -46,6 +46,8 @@ class ClearanceRows {
     [[nodiscard]] double weight(Index a) const { return weights[static_cast<std::size_t>(a)]; }
   };
 
+  [[nodiscard]] double at_least(const VectorXd& q, double margin);
+
   Clearance* clearance_;
   Layout layout_;
   Index each_ = 0;  ///< rows of a place

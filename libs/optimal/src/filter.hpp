@@ -21,7 +21,7 @@ class Filter {
   /// @return whether the step from `now` to `next` is accepted; `now` may enter the filter
   bool accept(const Point& now, const Point& next, double slope, double step) {
     const double rounding = 1e-13 * std::abs(now.cost);
-    if (!std::isfinite(next.cost) || next.violation > largest * scale_) return false;
+    if (!std::isfinite(next.cost) || !(next.violation <= largest * scale_)) return false;
     for (const Point& point : points_)
       if (!improves(point, next, rounding)) return false;
     // a step that promises more cost than it has violation must keep the promise

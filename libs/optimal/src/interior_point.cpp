@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/core/numbers.hpp"
+
 namespace hamelin::optimal {
 
 namespace {
@@ -19,6 +21,11 @@ constexpr double least_share = 0.01;      // of a slack or multiplier that a ste
 constexpr double gap_share = 0.03;        // of the duality gap: a decrease that is not worth a step
 constexpr double small_violation = 0.01;  // sum over all rows, for which μ may be lowered early
 constexpr double centred = 3.0;  // largest |s λ − μ| for which μ may be lowered early, in μ
+
+// A number that is not one counts as infinite.
+void grow(double& most, double x) {
+  if (!(x <= most)) most = std::isnan(x) ? infinity : x;
+}
 
 }  // namespace
 
@@ -42,9 +49,10 @@ InteriorPoint::InteriorPoint(Transcription& program, const SolveOptions& options
   });
 }
 
-void InteriorPoint::start(VectorXd x) {
+// False if the program has no finite numbers at x.
+bool InteriorPoint::start(VectorXd x) {
   x_ = std::move(x);
-  program_.evaluate(x_);
+  if (!program_.evaluate(x_)) return false;
   program_.gradient(gradient_);
   scale_ = std::min(1.0, gradient_max / gradient_.lpNorm<Eigen::Infinity>());
   for_each_side([&](Side& side) {
@@ -58,6 +66,7 @@ void InteriorPoint::start(VectorXd x) {
   });
   first_violation_ = std::max(1.0, filter_point().violation);
   filter_.reset(first_violation_);
+  return true;
 }
 
 void InteriorPoint::find_residuals(Side& side) const {
@@ -76,13 +85,12 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
   const double sum = upper_.multiplier.sum() + lower_.multiplier.sum(),
                mean = sum / std::max<double>(1.0, 2.0 * static_cast<double>(program_.rows())),
                divisor = std::max(100.0, mean) / 100.0;
-  Errors out{right_.lpNorm<Eigen::Infinity>() / divisor, 0.0, 0.0};
+  Errors out{right_.allFinite() ? right_.lpNorm<Eigen::Infinity>() / divisor : infinity, 0.0, 0.0};
   for_each_side([&](const Side& side) {
     for (Index r = 0; r < program_.rows(); ++r) {
       if (!side.bounds(r)) continue;
-      out.violation = std::max(out.violation, std::abs(side.residual[r]));
-      out.complementarity = std::max(out.complementarity,
-                                     std::abs(side.slack[r] * side.multiplier[r] - mu) / divisor);
+      grow(out.violation, std::abs(side.residual[r]));
+      grow(out.complementarity, std::abs(side.slack[r] * side.multiplier[r] - mu) / divisor);
     }
   });
   return out;
@@ -93,7 +101,7 @@ InteriorPoint::Errors InteriorPoint::errors(double mu) {
 void InteriorPoint::lower_barrier() {
   if (!can_lower_barrier()) return;
   const Errors now = errors(mu_);
-  const bool solved = now.largest() <= 10.0 * mu_,
+  const bool solved = now.within(10.0 * mu_),
              early = !by_merit_ && near_minimum_ && now.complementarity <= centred * mu_;
   if (!solved && !early && small_decreases_ < small_decreases_max) return;
   small_decreases_ = 0;
@@ -198,6 +206,16 @@ bool InteriorPoint::accepts(const Filter::Point& before, const Filter::Point& no
   return by_merit_ ? merit_.accept(before, now, step) : filter_.accept(before, now, slope, step);
 }
 
+// The iterate before trials that were all rejected: the program may be at one of them, which may
+// not even be a motion.
+void InteriorPoint::restore(const VectorXd& x, const VectorXd& slack_l, const VectorXd& slack_u) {
+  x_ = x;
+  (void)program_.evaluate(x_);
+  lower_.slack = slack_l;
+  upper_.slack = slack_u;
+  for_each_side([&](Side& side) { find_residuals(side); });
+}
+
 bool InteriorPoint::take_step() {
   const VectorXd x = x_;
   const VectorXd slack_l = lower_.slack, slack_u = upper_.slack;
@@ -216,6 +234,7 @@ bool InteriorPoint::take_step() {
     accepted = accepts(before, now, slope, step);
     if (accepted) count_small_decreases(before, now);
   }
+  if (!accepted) restore(x, slack_l, slack_u);
   for_each_side([&](Side& side) {
     side.multiplier += largest_step(side.multiplier, side.multiplier_step) * side.multiplier_step;
     keep_multipliers_near(side);
@@ -232,11 +251,14 @@ void InteriorPoint::keep_multipliers_near(Side& side) const {
 
 Solution InteriorPoint::solve(VectorXd x) {
   Solution out;
-  start(std::move(x));
+  if (!start(std::move(x))) {
+    out.cause = "a number is not finite at the guess";
+    return out;
+  }
   for (out.iterations = 0;; ++out.iterations) {
     const Errors now = errors(0.0);
     out.stationarity = now.stationarity;
-    out.converged = now.largest() <= options_.tolerance;
+    out.converged = now.within(options_.tolerance);
     if (out.converged) break;
     lower_barrier();
     if (out.iterations == options_.iterations_max) {

@@ -19,8 +19,10 @@ class InteriorPoint {
     bool by_merit = false;
   };
   InteriorPoint(Transcription& program, const SolveOptions& options, const Start& start);
-  /// From x; the program is at the last iterate afterwards.
+  /// From x; the program is at the last iterate that was accepted afterwards.
   Solution solve(VectorXd x);
+  /// The last iterate that was accepted.
+  [[nodiscard]] const VectorXd& x() const noexcept { return x_; }
 
  private:
   /// One side of all rows: sign (c − bound) = slack ≥ 0 with a multiplier; where the bound is
@@ -34,12 +36,13 @@ class InteriorPoint {
   /// How far an iterate is from a solution of the problem with the barrier μ.
   struct Errors {
     double stationarity, violation, complementarity;
-    [[nodiscard]] double largest() const {
-      return std::max({stationarity, violation, complementarity});
+    /// A number that is not finite is never within a bound.
+    [[nodiscard]] bool within(double bound) const {
+      return stationarity <= bound && violation <= bound && complementarity <= bound;
     }
   };
 
-  void start(VectorXd x);
+  [[nodiscard]] bool start(VectorXd x);
   void find_residuals(Side& side) const;
   [[nodiscard]] Errors errors(double mu);
   [[nodiscard]] bool can_lower_barrier() const noexcept { return mu_ > options_.tolerance / 10.0; }
@@ -49,6 +52,7 @@ class InteriorPoint {
   void find_side_steps(Side& side);
   void take_slacks(Side& side, const VectorXd& before, double step) const;
   [[nodiscard]] bool take_step();
+  void restore(const VectorXd& x, const VectorXd& slack_l, const VectorXd& slack_u);
   [[nodiscard]] Filter::Point filter_point() const;
   [[nodiscard]] double barrier_slope() const;
   [[nodiscard]] bool accepts(const Filter::Point& before, const Filter::Point& now, double slope,

@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-
 #include <limits>
 
-#include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "refuse.hpp"
 
 namespace hamelin::optimal {
 
@@ -31,10 +30,6 @@ Limits Limits::of(const model::Model& model) {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& what) {
-  throw Error(ErrorCode::invalid, what);
-}
-
 void check_size(const char* what, const VectorXd& x, Index n, bool may_be_empty) {
   if (x.size() != n && !(may_be_empty && x.size() == 0))
     refuse(fmt::format("{}: {} numbers given, expected {} (one per joint)", what, x.size(), n));
@@ -46,6 +41,29 @@ void check_bounds(const char* what, const VectorXd& bound, Index n) {
     if (!(bound[j] > 0.0))
       refuse(fmt::format("{}: {} given for joint {}, expected a positive number", what, bound[j],
                          j + 1));
+}
+
+void check_not_negative(const char* what, double x) {
+  if (!(x >= 0.0) || !std::isfinite(x))
+    refuse(fmt::format("{}: {} given, expected a finite number that is not negative", what, x));
+}
+
+void check_torque_reserve(const Problem& problem) {
+  const MatrixXd& reserve = problem.torque_reserve;
+  const VectorXd& limit = problem.limits.torque;
+  if (reserve.size() == 0) return;
+  if (reserve.rows() != limit.size() || reserve.cols() != problem.intervals + 1)
+    refuse(
+        fmt::format("reserve of torques: {} × {} numbers given, expected {} × {} (torque limits "
+                    "× knots)",
+                    reserve.rows(), reserve.cols(), limit.size(), problem.intervals + 1));
+  for (Index k = 0; k < reserve.cols(); ++k)
+    for (Index j = 0; j < reserve.rows(); ++j)
+      if (!(reserve(j, k) >= 0.0 && reserve(j, k) < limit[j]))
+        refuse(
+            fmt::format("reserve of torques: {} given for joint {}, expected 0 or more, and less "
+                        "than the limit {:.6g}",
+                        reserve(j, k), j + 1, limit[j]));
 }
 
 // One end of the motion.
@@ -62,7 +80,7 @@ void check_end(const Problem& problem, const End& end) {
   if (!end.q.allFinite() || !end.v.allFinite())
     refuse(fmt::format("{}: a number is not finite, expected finite numbers", end.name));
   for (Index j = 0; j < limits.position_min.size(); ++j)
-    if (end.q[j] < limits.position_min[j] || end.q[j] > limits.position_max[j])
+    if (!(end.q[j] >= limits.position_min[j] && end.q[j] <= limits.position_max[j]))
       refuse(fmt::format("{}: the position of joint {} is {:.6g}, expected {:.6g} to {:.6g}",
                          end.name, j + 1, end.q[j], limits.position_min[j],
                          limits.position_max[j]));
@@ -75,7 +93,7 @@ void check_end(const Problem& problem, const End& end) {
   VectorXd hold(n);
   dynamics::gravity_torque(*problem.model, ws, end.q, hold);
   for (Index j = 0; j < n; ++j)
-    if (std::abs(hold[j]) >= limits.torque[j])
+    if (!(std::abs(hold[j]) < limits.torque[j]))
       refuse(
           fmt::format("{}: joint {} needs a torque of {:.6g} to hold the arm, expected less than "
                       "its limit {:.6g}",
@@ -87,14 +105,17 @@ void check_clearance(const Problem& problem, const End& end) {
   VectorXd distances(problem.clearance->rows());
   MatrixXd gradients(end.q.size(), distances.size());
   problem.clearance->evaluate(end.q, distances, gradients);
+  if (!distances.allFinite())
+    refuse(fmt::format("{}: a clearance is not finite, expected finite numbers", end.name));
   if (const double least = distances.minCoeff(); least < problem.margin_m)
-    refuse(fmt::format("{}: the clearance is {:.4f} m, expected at least the margin {:.4f} m",
+    refuse(fmt::format("{}: the clearance is {:.6g} m, expected at least the margin {:.6g} m",
                        end.name, least, problem.margin_m));
 }
 
 }  // namespace
 
 void check(const Problem& problem) {
+  if (problem.model == nullptr) refuse("model: none given, expected one");
   const Limits& limits = problem.limits;
   const Index n = problem.model->dof();
   if (problem.intervals < least_intervals || problem.intervals > most_intervals)
@@ -102,12 +123,24 @@ void check(const Problem& problem) {
                        least_intervals, most_intervals));
   if (!(problem.duration_s > 0.0) || !std::isfinite(problem.duration_s))
     refuse(fmt::format("a duration of {} s given, expected a positive number", problem.duration_s));
+  if (problem.objective == Objective::time && problem.duration_s < least_duration_s)
+    refuse(fmt::format("a duration of {} s given for the first guess, expected at least {} s",
+                       problem.duration_s, least_duration_s));
+  check_not_negative("margin", problem.margin_m);
+  check_not_negative("reserve of the margin", problem.reserve_m);
+  check_not_negative("weight of the effort beside the time", problem.time_effort_weight);
+  if (!std::isfinite(problem.begin_s))
+    refuse(fmt::format("begins at {} s, expected a finite time", problem.begin_s));
+  if (problem.clearance_points < 1)
+    refuse(fmt::format("{} points of clearance per interval given, expected at least 1",
+                       problem.clearance_points));
   check_size("lower position limits", limits.position_min, n, true);
   check_size("upper position limits", limits.position_max, limits.position_min.size(), false);
   check_bounds("velocity limits", limits.velocity, n);
   check_bounds("acceleration limits", limits.acceleration, n);
   check_bounds("jerk limits", limits.jerk, n);
   check_bounds("torque limits", limits.torque, n);
+  check_torque_reserve(problem);
   check_bounds("weights of the effort", problem.effort_weights, n);
   for (const End& end : {End{"start", problem.q_start, problem.v_start},
                          End{"goal", problem.q_goal, problem.v_goal}}) {

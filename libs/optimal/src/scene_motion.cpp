@@ -10,6 +10,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "refuse.hpp"
 
 namespace hamelin::optimal {
 
@@ -17,8 +18,23 @@ using Eigen::Index;
 
 namespace {
 
-[[noreturn]] void refuse(const scene::Scene& scene, const std::string& what) {
+[[noreturn]] void refuse_scene(const scene::Scene& scene, const std::string& what) {
   throw Error(ErrorCode::invalid, scene.name + ": " + what);
+}
+
+void check_positive(const char* what, double x) {
+  if (!(x > 0.0) || !std::isfinite(x))
+    refuse(fmt::format("{}: {} given, expected a positive number", what, x));
+}
+
+// Of what a Problem does not check itself, or only after the map is read.
+void check_options(const SceneMotionOptions& options) {
+  check_positive("share of the limits", options.limit_share);
+  if (options.limit_share > 1.0)
+    refuse(fmt::format("share of the limits: {} given, expected at most 1", options.limit_share));
+  if (!(options.margin_m >= 0.0) || !std::isfinite(options.margin_m))
+    refuse(fmt::format("margin: {} given, expected a finite number that is not negative",
+                       options.margin_m));
 }
 
 bool any(const scene::JointNumbers& numbers) {
@@ -28,18 +44,20 @@ bool any(const scene::JointNumbers& numbers) {
 
 void check_scene(const scene::Scene& scene, bool has_paths) {
   if (any(scene.model.joint_damping) || any(scene.model.friction))
-    refuse(scene,
-           "/model: damping or friction is modelled, expected neither: optimised motions "
-           "do not include it");
-  if (scene.goals.empty()) refuse(scene, "/goals: there is none, expected at least one");
+    refuse_scene(scene,
+                 "/model: damping or friction is modelled, expected neither: optimised motions "
+                 "do not include it");
+  if (scene.goals.empty()) refuse_scene(scene, "/goals: there is none, expected at least one");
   for (std::size_t i = 0; i < scene.goals.size(); ++i) {
     const auto type = scene.goals[i].type;
     if (type == scene::GoalType::follow)
-      refuse(scene, fmt::format("/goals/{}: follows a target, expected a goal to arrive at", i));
+      refuse_scene(scene,
+                   fmt::format("/goals/{}: follows a target, expected a goal to arrive at", i));
     if (type != scene::GoalType::joint && !has_paths)
-      refuse(scene, fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "
-                                "finds them (--guide)",
-                                i, scene::type_name(scene.goals[i])));
+      refuse_scene(scene,
+                   fmt::format("/goals/{}: is a {}, expected joint positions, or a guide that "
+                               "finds them (--guide)",
+                               i, scene::type_name(scene.goals[i])));
   }
 }
 
@@ -97,8 +115,8 @@ std::vector<MatrixXd> guide_paths(const scene::Scene& scene, const model::Model&
                                   control::World& world) {
   const control::PathPlan plan = control::plan_paths(scene, arm, world);
   if (!plan.found())
-    refuse(scene, fmt::format("/goals/{}: {} found no path: {}", plan.goals.size() - 1, plan.guide,
-                              plan.goals.back().path.cause));
+    refuse_scene(scene, fmt::format("/goals/{}: {} found no path: {}", plan.goals.size() - 1,
+                                    plan.guide, plan.goals.back().path.cause));
   std::vector<MatrixXd> paths;
   for (const auto& goal : plan.goals) paths.push_back(goal.path.points);
   return paths;
@@ -121,6 +139,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
     const MatrixXd points = way_points(scene.goals[i], q, i < paths.size() ? &paths[i] : nullptr);
     problem.q_start = q;
     problem.v_start = v;
+    problem.begin_s = out.duration_s();
     problem.q_goal = points.rightCols<1>();
     problem.duration_s =
         options.duration_s.value_or(slow_duration(points, problem.limits.velocity));
@@ -128,7 +147,7 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
       out.goals.push_back({optimize(problem, points, view, options.solve)});
     } catch (const Error& e) {
       if (e.code() != ErrorCode::invalid) throw;
-      refuse(scene, fmt::format("/goals/{}: {}", i, e.what()));
+      refuse_scene(scene, fmt::format("/goals/{}: {}", i, e.what()));
     }
     q = problem.q_goal;
     v = rest;
@@ -141,15 +160,16 @@ SceneMotion optimize_along(const scene::Scene& scene, const SceneMotionOptions& 
 
 SceneMotion optimize_scene(const scene::Scene& scene, const SceneMotionOptions& options) {
   const bool guided = scene.guide.type != scene::GuideType::none;
+  check_options(options);
   check_scene(scene, guided);
   const model::Model model = control::load_model(scene);
   if (!guided) {
-    control::WorldView view(scene, model, influence_m);
+    control::WorldView view(scene, model, influence_of(options.margin_m));
     return optimize_along(scene, options, model, view, {});
   }
   // Guide and optimisation use the same world, so that the map is read once.
   control::World::Options near;
-  near.influence_m = influence_m;
+  near.influence_m = influence_of(options.margin_m);
   control::World world(scene, model, near);
   const std::vector<MatrixXd> paths = guide_paths(scene, model, world);
   const control::WorldView shown(scene, model, world);
@@ -164,6 +184,7 @@ double SceneMotion::duration_s() const {
 }
 
 std::vector<SceneMotion::Point> SceneMotion::points(std::optional<double> rate_hz) const {
+  if (rate_hz) check_positive("rate", *rate_hz);
   std::vector<Point> out;
   dynamics::Workspace ws(model);
   double begun = 0.0, next = 0.0;
@@ -189,6 +210,12 @@ std::vector<SceneMotion::Point> SceneMotion::points(std::optional<double> rate_h
   return out;
 }
 
+std::string cause_of(const Solution& solution) {
+  const char* const between = solution.cause.empty() || solution.violated.empty() ? "" : "; ";
+  return solution.cause + between +
+         (solution.violated.empty() ? "" : "violated: " + solution.violated);
+}
+
 Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
              std::optional<double> rate_hz) {
   const auto numbers = [](const VectorXd& x) {
@@ -201,11 +228,11 @@ Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
     goals.push_back({{"duration_s", f.motion.duration_s()},
                      {"cost", f.solution.cost},
                      {"converged", f.solution.converged},
-                     {"cause", f.solution.cause},
+                     {"cause", cause_of(f.solution)},
                      {"iterations", f.solution.iterations},
                      {"stationarity", finite(f.solution.stationarity)},
-                     {"violation", f.solution.violation},
-                     {"torque_share", f.torque_share},
+                     {"violation", finite(f.solution.violation)},
+                     {"torque_share", finite(f.torque_share)},
                      {"certified", f.proof.certified},
                      {"margin_m", finite(f.proof.margin_m)},
                      {"clearance_points", f.clearance_points}});

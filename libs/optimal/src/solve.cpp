@@ -1,10 +1,14 @@
 #include "hamelin/optimal/solve.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "hamelin/core/error.hpp"
 #include "interior_point.hpp"
+#include "refuse.hpp"
 #include "transcription.hpp"
 #ifdef HAMELIN_HAS_IPOPT
 #include "ipopt_solver.hpp"
@@ -14,6 +18,22 @@
 namespace hamelin::optimal {
 
 namespace {
+
+void check_guess(const MatrixXd& guess, const Problem& problem) {
+  const Eigen::Index n = problem.model->dof(), knots = problem.intervals + 1;
+  if (guess.rows() != n || guess.cols() != knots)
+    refuse(fmt::format("guess: {} × {} numbers given, expected {} × {} (joints × knots)",
+                       guess.rows(), guess.cols(), n, knots));
+  if (!guess.allFinite()) refuse("guess: a number is not finite, expected finite numbers");
+}
+
+void check_options(const SolveOptions& options) {
+  if (!(options.tolerance > 0.0 && options.tolerance < 1.0))
+    refuse(fmt::format("a tolerance of {} given, expected a number between 0 and 1",
+                       options.tolerance));
+  if (options.iterations_max < 0)
+    refuse(fmt::format("{} iterations given, expected 0 or more", options.iterations_max));
+}
 
 #ifdef HAMELIN_HAS_IPOPT
 Solution solve_with_ipopt(Transcription& program, const VectorXd& guess,
@@ -35,11 +55,21 @@ Solution solve_with_ipopt(Transcription&, const VectorXd&, const SolveOptions&) 
 }
 #endif
 
+// Less violation, or the same and less cost; violations within the tolerance are none.
+bool better(double violation, double cost, double than_violation, double than_cost,
+            double tolerance) {
+  const double a = std::max(violation, tolerance), b = std::max(than_violation, tolerance);
+  return a < b || (a == b && cost < than_cost);
+}
+
 // From the same guess with other slacks if a minimum of the violation was found that is not zero.
-// Among obstacles a large μ would centre the motion between kinks of thousands of distances.
+// The program is at the best of the minima afterwards. Among obstacles a large μ would centre the
+// motion between kinks of thousands of distances.
 Solution solve_banded(Transcription& program, const VectorXd& guess, const SolveOptions& options,
                       bool obstacles) {
-  Solution out;
+  Solution best;
+  VectorXd x = guess;
+  double cost = infinity;
   int iterations = 0;
   using Start = InteriorPoint::Start;
   const std::array<Start, 4> starts{
@@ -48,12 +78,21 @@ Solution solve_banded(Transcription& program, const VectorXd& guess, const Solve
       {0.1, 0.01, true},
       {0.1, 0.1, true}};
   for (const Start& start : starts) {
-    out = InteriorPoint(program, options, start).solve(guess);
-    iterations += out.iterations;
-    if (program.violation() <= options.tolerance) break;
+    InteriorPoint solver(program, options, start);
+    Solution found = solver.solve(guess);
+    iterations += found.iterations;
+    found.violation = program.violation();
+    if (&start == &starts.front() ||
+        better(found.violation, program.cost(), best.violation, cost, options.tolerance)) {
+      best = std::move(found);
+      x = solver.x();
+      cost = program.cost();
+    }
+    if (best.violation <= options.tolerance || (options.stop && options.stop())) break;
   }
-  out.iterations = iterations;
-  return out;
+  (void)program.evaluate(x);
+  best.iterations = iterations;
+  return best;
 }
 
 }  // namespace
@@ -68,14 +107,20 @@ bool has_ipopt() noexcept {
 
 Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions& options) {
   check(problem);
+  check_guess(guess, problem);
+  check_options(options);
   Transcription program(problem);
   const VectorXd x = program.variables_of(guess);
   Solution out = options.solver == Solver::ipopt
                      ? solve_with_ipopt(program, x, options)
                      : solve_banded(program, x, options, problem.clearance != nullptr);
-  std::string what;
-  out.violation = program.violation(&what);
-  if (!out.converged && out.violation > options.tolerance) out.cause += "; violated: " + what;
+  out.violation = program.violation(&out.violated);
+  if (out.violation <= options.tolerance) {
+    out.violated.clear();
+  } else if (out.converged) {
+    out.converged = false;
+    out.cause = "bounds are violated by more than the tolerance";
+  }
   out.cost = program.cost();
   out.control = program.points().q;
   out.torque = program.torques();
@@ -84,6 +129,14 @@ Solution solve(const Problem& problem, const MatrixXd& guess, const SolveOptions
 }
 
 MatrixXd guess_along(const MatrixXd& way_points, int intervals) {
+  if (way_points.rows() < 1 || way_points.cols() < 2)
+    refuse(
+        fmt::format("way-points: {} × {} numbers given, expected one column for each of 2 or "
+                    "more points",
+                    way_points.rows(), way_points.cols()));
+  if (!way_points.allFinite())
+    refuse("way-points: a number is not finite, expected finite numbers");
+  if (intervals < 1) refuse(fmt::format("{} intervals given, expected at least 1", intervals));
   const Eigen::Index count = way_points.cols();
   VectorXd lengths = VectorXd::Zero(count);
   for (Eigen::Index i = 1; i < count; ++i)

@@ -51,8 +51,10 @@ Torques::Torques(const Problem& problem, const Layout& layout, Bounds& bounds)
     for (Index j = 0; j < limit.size(); ++j) {
       if (!std::isfinite(limit[j])) continue;
       rows_.push_back({k, j, 1.0 / limit[j]});
-      bounds.lower.push_back(-1.0);
-      bounds.upper.push_back(1.0);
+      const double share =
+          problem.torque_reserve.size() > 0 ? 1.0 - problem.torque_reserve(j, k) / limit[j] : 1.0;
+      bounds.lower.push_back(-share);
+      bounds.upper.push_back(share);
     }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/core/numbers.hpp"
+
 namespace hamelin::optimal {
 
 Transcription::Transcription(const Problem& problem)
@@ -10,6 +12,7 @@ Transcription::Transcription(const Problem& problem)
       layout_(problem),
       quotients_(problem, layout_, bounds_),
       torques_(problem, layout_, bounds_),
+      step_(layout_, bounds_),
       places_(problem, layout_, bounds_),
       lower_(Eigen::Map<const VectorXd>(bounds_.lower.data(), bounds_.size())),
       upper_(Eigen::Map<const VectorXd>(bounds_.upper.data(), bounds_.size())),
@@ -44,15 +47,18 @@ void Transcription::place_points(const VectorXd& x) {
 }
 
 bool Transcription::evaluate(const VectorXd& x) {
+  finite_ = false;
   place_points(x);
   if (!(points_.h > 0.0)) return false;
   double* values = values_.data();
   quotients_.evaluate(points_, values);
-  torques_.evaluate(points_, values + quotients_.rows());
-  places_.evaluate(points_, values + quotients_.rows() + torques_.rows());
+  torques_.evaluate(points_, values += quotients_.rows());
+  step_.evaluate(points_, values += torques_.rows());
+  places_.evaluate(points_, values + step_.rows());
   cost_ = effort_factor() * torques_.effort();
   if (layout_.free_time()) cost_ += points_.h * static_cast<double>(layout_.intervals());
-  return std::isfinite(cost_) && values_.allFinite();
+  finite_ = std::isfinite(cost_) && points_.q.allFinite() && values_.allFinite();
+  return finite_;
 }
 
 // docs/theory.md (18.1): h Σ τᵀRτ, or the mean of τᵀRτ beside the time
@@ -78,10 +84,15 @@ void Transcription::hessian(double factor, const VectorXd& y, const VectorXd& we
   at += quotients_.rows();
   weight += quotients_.rows();
   torques_.add_hessian(factor * effort_factor(), at, weight, curved, sum);
-  places_.add_hessian(weight + torques_.rows(), sum);
+  step_.add_hessian(weight += torques_.rows(), sum);
+  places_.add_hessian(weight + step_.rows(), sum);
 }
 
 double Transcription::violation(std::string* what) const {
+  if (!finite_) {
+    if (what != nullptr) *what = "a number of the motion is not finite";
+    return infinity;
+  }
   double most = 0.0;
   Index at = 0;
   for (Index r = 0; r < rows(); ++r)
@@ -94,7 +105,9 @@ double Transcription::violation(std::string* what) const {
 std::string Transcription::describe(Index row) const {
   if (row < quotients_.rows()) return quotients_.describe(row);
   row -= quotients_.rows();
-  return row < torques_.rows() ? torques_.describe(row) : places_.describe(row - torques_.rows());
+  if (row < torques_.rows()) return torques_.describe(row);
+  row -= torques_.rows();
+  return row < step_.rows() ? step_.describe() : places_.describe(row - step_.rows());
 }
 
 }  // namespace hamelin::optimal

@@ -4,6 +4,7 @@
 #include "banded.hpp"
 #include "clearance_rows.hpp"
 #include "quotient_rows.hpp"
+#include "step_row.hpp"
 #include "torques.hpp"
 
 namespace hamelin::optimal {
@@ -38,8 +39,10 @@ class Transcription {
   template <bool all = false, class F>
   void for_each_entry(F&& f) const {
     quotients_.for_each_entry(f);
-    const Index first_torque = quotients_.rows(), first_place = first_torque + torques_.rows();
+    const Index first_torque = quotients_.rows(), step_row = first_torque + torques_.rows(),
+                first_place = step_row + step_.rows();
     torques_.for_each_entry([&](Index r, Index v, double d) { f(first_torque + r, v, d); });
+    step_.for_each_entry([&](Index r, Index v, double d) { f(step_row + r, v, d); });
     places_.for_each_entry<all>([&](Index r, Index v, double d) { f(first_place + r, v, d); });
   }
   /// factor ∇²f + Σ y_i ∇²c_i + Jᵀ diag(weights) J, without the curvature of distances; without
@@ -48,7 +51,8 @@ class Transcription {
                BandedMatrix& out);
   [[nodiscard]] const Points& points() const noexcept { return points_; }
   [[nodiscard]] const MatrixXd& torques() const noexcept { return torques_.torques(); }
-  /// The largest violation of a row, and what the row bounds.
+  /// The largest violation of a row, and what the row bounds; infinite if the last evaluate() found
+  /// a number that is not finite, or there was none.
   [[nodiscard]] double violation(std::string* what = nullptr) const;
 
  private:
@@ -62,10 +66,12 @@ class Transcription {
   Bounds bounds_;  ///< filled by the members below in this order
   QuotientRows quotients_;
   Torques torques_;
+  StepRow step_;
   ClearanceRows places_;
   VectorXd lower_, upper_;
 
   Points points_;
+  bool finite_ = false;  ///< what the last evaluate() returned
   double cost_ = 0.0;
   VectorXd values_;
 };

@@ -1,9 +1,12 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
 
+#include "../src/interior_point.hpp"
 #include "../src/merit.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "hamelin/model/make_chain.hpp"
 #include "hamelin/optimal/solve.hpp"
 #include "hamelin/test/skip.hpp"
 
@@ -75,4 +78,73 @@ TEST_CASE("active torque limits do not shorten the steps to the least time of a 
   reference.solver = Solver::ipopt;
   CHECK(found.cost ==
         Approx(solve(problem, guess_along(ends, intervals), reference).cost).epsilon(1e-6));
+}
+
+namespace {
+
+// Torques that suffice only for a longer motion: no start finds one without violation.
+Problem hurried_problem(const model::Model& arm) {
+  Problem problem;
+  problem.model = &arm;
+  problem.q_start = VectorXd::LinSpaced(7, -0.8, 0.6);
+  problem.q_goal = VectorXd::LinSpaced(7, 0.7, -0.9);
+  problem.v_start = problem.v_goal = VectorXd::Zero(7);
+  problem.intervals = 10;
+  problem.duration_s = 0.2;
+  problem.limits.velocity = VectorXd::Constant(7, 3.0);
+  problem.limits.torque = VectorXd::Constant(7, 60.0);
+  return problem;
+}
+
+}  // namespace
+
+TEST_CASE("of the starts of the banded solver the least violating one is returned", "[optimal]") {
+  const model::Model arm(model::make_chain({}));
+  const Problem problem = hurried_problem(arm);
+  const MatrixXd guess =
+      guess_along((MatrixXd(7, 2) << problem.q_start, problem.q_goal).finished(), 10);
+  SolveOptions options;
+  options.iterations_max = GENERATE(3, 10, 40);
+  const Solution found = solve(problem, guess, options);
+  using Start = InteriorPoint::Start;
+  double least = infinity, last = infinity;
+  for (const Start& start :
+       {Start{0.1, 1.0}, Start{0.1, 1.0, true}, Start{0.1, 0.01, true}, Start{0.1, 0.1, true}}) {
+    Transcription program(problem);
+    (void)InteriorPoint(program, options, start).solve(program.variables_of(guess));
+    last = program.violation();
+    least = std::min(least, last);
+  }
+  CAPTURE(least, last, options.iterations_max);
+  REQUIRE(least > 0.0);
+  CHECK(found.violation == least);
+}
+
+TEST_CASE("a trial that was rejected is not kept as the iterate", "[optimal]") {
+  // Distances that are finite at the guess alone, so that every step is rejected.
+  struct AtTheGuess final : Clearance {
+    std::vector<VectorXd> known;
+    bool learning = true;
+    [[nodiscard]] Index rows() const override { return 1; }
+    void evaluate(const VectorXd& q, VectorXd& distances, MatrixXd& gradients) override {
+      if (learning) known.push_back(q);
+      const bool found = std::find(known.begin(), known.end(), q) != known.end();
+      distances.setConstant(found ? 1.0 : std::nan(""));
+      gradients.setZero();
+    }
+  } clearance;
+  const model::Model arm(model::make_chain({}));
+  Problem problem = hurried_problem(arm);
+  problem.objective = GENERATE(Objective::effort, Objective::time);
+  problem.clearance = &clearance;
+  Transcription program(problem);
+  const VectorXd x = program.variables_of(
+      guess_along((MatrixXd(7, 2) << problem.q_start, problem.q_goal).finished(), 10));
+  REQUIRE(program.evaluate(x));
+  clearance.learning = false;
+  InteriorPoint solver(program, {}, {0.1, 1.0});
+  CHECK_FALSE(solver.solve(x).converged);
+  CHECK(solver.x() == x);
+  CHECK(program.values().allFinite());
+  CHECK(std::isfinite(program.violation()));
 }

@@ -65,7 +65,8 @@ TEST_CASE("derivatives of cost and rows agree with differences", "[optimal]") {
   const VectorXd x = program.variables_of(knots);
   REQUIRE(program.evaluate(x));
   const Index m = program.rows(), size = program.variables();
-  REQUIRE(m == 4 * (inner + 8 + 9 + (jerk ? 8 : 0) + 9));
+  const Index step_row = objective == Objective::time ? 1 : 0;
+  REQUIRE(m == 4 * (inner + 8 + 9 + (jerk ? 8 : 0) + 9) + step_row);
   VectorXd gradient(size);
   program.gradient(gradient);
   MatrixXd J = MatrixXd::Zero(m, size);
@@ -217,12 +218,101 @@ TEST_CASE("problems without a solution are refused in one line that names the co
              Contains("jerk limits") && Contains("joint 4"));
   CHECK_THAT(message([](Problem& p) { p.effort_weights = VectorXd::Zero(4); }),
              Contains("weights of the effort"));
+  const double nan = std::nan("");
+  CHECK_THAT(message([](Problem& p) { p.model = nullptr; }), Contains("model"));
+  CHECK_THAT(message([&](Problem& p) { p.margin_m = nan; }), Contains("margin: nan"));
+  CHECK_THAT(message([](Problem& p) { p.margin_m = -0.01; }), Contains("margin: -0.01"));
+  CHECK_THAT(message([](Problem& p) { p.reserve_m = -1.0; }), Contains("reserve of the margin"));
+  CHECK_THAT(message([](Problem& p) { p.clearance_points = -3; }),
+             Contains("-3 points of clearance"));
+  CHECK_THAT(message([](Problem& p) { p.time_effort_weight = -1.0; }), Contains("weight"));
+  CHECK_THAT(message([&](Problem& p) { p.time_effort_weight = nan; }), Contains("weight"));
+  CHECK_THAT(message([&](Problem& p) { p.begin_s = nan; }), Contains("begins at nan"));
+  CHECK_THAT(message([&](Problem& p) { p.limits.position_min[2] = nan; }),
+             Contains("position of joint 3"));
+  CHECK_THAT(message([](Problem& p) {
+               p.objective = Objective::time;
+               p.duration_s = 0.5 * least_duration_s;
+             }),
+             Contains("first guess"));
+  CHECK_THAT(message([](Problem& p) { p.torque_reserve = MatrixXd::Zero(4, 3); }),
+             Contains("reserve of torques: 4 × 3"));
+  CHECK_THAT(message([](Problem& p) { p.torque_reserve = MatrixXd::Constant(4, 9, 50.0); }),
+             Contains("less than the limit 50"));
 
   Problem hurried = good;
   hurried.duration_s = 0.1;
   const Solution none = solve(hurried, guess);
   CHECK_FALSE(none.converged);
   CHECK(none.violation > 0.1);
-  CHECK_THAT(none.cause, Contains("violated: "));
+  CHECK_THAT(none.violated, Contains(" of joint "));
   CHECK_THAT(none.cause, !Contains("\n"));
+}
+
+TEST_CASE("guesses and options that are none are refused in one line", "[optimal]") {
+  const model::Model arm(test::random_robot(3, 4, 3));
+  const Problem problem = problem_of(arm, Objective::effort);
+  const MatrixXd ends = (MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(),
+                 guess = guess_along(ends, problem.intervals);
+  using Catch::Contains;
+  const auto solved_from = [&](const MatrixXd& from, const SolveOptions& options = {}) {
+    return test::error_of([&] { (void)solve(problem, from, options); });
+  };
+  CHECK_THAT(solved_from(guess_along(ends, 7)), Contains("guess: 4 × 8") && Contains("4 × 9"));
+  CHECK_THAT(solved_from(MatrixXd::Zero(3, 3)), Contains("guess: 3 × 3"));
+  MatrixXd broken = guess;
+  broken(1, 4) = std::nan("");
+  CHECK_THAT(solved_from(broken), Contains("guess: a number is not finite"));
+  SolveOptions options;
+  options.tolerance = std::nan("");
+  CHECK_THAT(solved_from(guess, options), Contains("tolerance of nan"));
+  options = {};
+  options.iterations_max = -1;
+  CHECK_THAT(solved_from(guess, options), Contains("-1 iterations"));
+  const auto along = [](const MatrixXd& points, int intervals) {
+    return test::error_of([&] { (void)guess_along(points, intervals); });
+  };
+  CHECK_THAT(along(ends.leftCols(1), 8), Contains("way-points: 4 × 1"));
+  CHECK_THAT(along(broken, 8), Contains("way-points: a number is not finite"));
+  CHECK_THAT(along(ends, 0), Contains("0 intervals"));
+}
+
+TEST_CASE("a program that has no finite numbers is violated without bound", "[optimal]") {
+  const model::Model arm(test::random_robot(3, 4, 3));
+  const Problem problem = problem_of(arm, Objective::time);
+  Transcription program(problem);
+  CHECK(std::isinf(program.violation()));  // nothing is evaluated
+  VectorXd x = program.variables_of(
+      guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 8));
+  REQUIRE(program.evaluate(x));
+  CHECK(std::isfinite(program.violation()));
+  x[program.layout().step_variable()] = 1e-4;  // 0.08 ms: shorter than any motion
+  REQUIRE(program.evaluate(x));
+  CHECK(program.violation() > 0.0);
+  x[program.layout().step_variable()] = -0.1;
+  CHECK_FALSE(program.evaluate(x));
+  CHECK(std::isinf(program.violation()));
+  x[program.layout().step_variable()] = 1.0;
+  x[3] = std::nan("");
+  CHECK_FALSE(program.evaluate(x));
+  CHECK(std::isinf(program.violation()));
+}
+
+TEST_CASE("the least time where the goal is the start is the least duration, at rest",
+          "[optimal]") {
+  const model::Model arm(test::random_robot(3, 4, 3));
+  Problem problem = problem_of(arm, Objective::time);
+  problem.q_goal = problem.q_start;
+  problem.v_start.setZero();
+  problem.v_goal.setZero();
+  SolveOptions options;
+  options.solver = GENERATE(Solver::banded, Solver::ipopt);
+  if (options.solver == Solver::ipopt && !has_ipopt()) return;
+  const Solution found =
+      solve(problem, guess_along((MatrixXd(4, 2) << problem.q_start, problem.q_goal).finished(), 8),
+            options);
+  const TimedMotion motion{found.step_s, found.control};
+  CHECK(found.violation <= options.tolerance);
+  CHECK(motion.duration_s() == Approx(least_duration_s).epsilon(1e-3));
+  CHECK((motion.control.colwise() - problem.q_start).norm() <= 1e-6);
 }

@@ -60,10 +60,11 @@ TEST_CASE("an arm goes around a pillar, proved clear", "[optimal][world]") {
   const scene::Scene scene = scene_of(pillar_scene());
   SceneMotionOptions options;
   options.objective = GENERATE(Objective::effort, Objective::time);
+  options.margin_m = GENERATE(0.005, 0.008);
   const SceneMotion motion = optimize_scene(scene, options);
   REQUIRE(motion.valid());
   const GoalMotion& goal = motion.goals[0];
-  CHECK(goal.found.proof.margin_m > 0.0);
+  CHECK(goal.found.proof.margin_m >= options.margin_m);
   CHECK(goal.found.torque_share <= 1.0);
 
   // the straight guess meets the pillar
@@ -77,8 +78,8 @@ TEST_CASE("an arm goes around a pillar, proved clear", "[optimal][world]") {
   for (int i = 0; i <= 2000; ++i) {
     m.at(m.duration_s() * i / 2000.0, q, v, a);
     view.look(q, 0.0);
-    CHECK(view.clearance_m() > 0.0);
-    CHECK(view.self_clearance_m() > 0.0);
+    CHECK(view.clearance_m() >= options.margin_m);
+    CHECK(view.self_clearance_m() >= options.margin_m);
   }
   // points at a rate contain the ends, and the same torques as the motion
   const auto points = motion.points(100.0);
@@ -114,4 +115,128 @@ TEST_CASE("scenes that cannot be optimised are refused in one line", "[optimal][
                d["obstacles"][0]["position_m"] = {0.4, -0.41, 0.3};
              }),
              Contains("/goals/0: start: the clearance is"));
+  const auto refused = [](auto&& change) {
+    SceneMotionOptions options;
+    change(options);
+    return test::error_of([&] { (void)optimize_scene(scene_of(pillar_scene()), options); });
+  };
+  CHECK_THAT(refused([](SceneMotionOptions& o) { o.margin_m = std::nan(""); }),
+             Contains("margin: nan"));
+  CHECK_THAT(refused([](SceneMotionOptions& o) { o.margin_m = 0.01; }),
+             Contains("/goals/0: start: the clearance is 0.00902") && Contains("margin 0.01 m"));
+  CHECK_THAT(refused([](SceneMotionOptions& o) { o.limit_share = 0.0; }),
+             Contains("share of the limits: 0"));
+  CHECK_THAT(refused([](SceneMotionOptions& o) { o.limit_share = std::nan(""); }),
+             Contains("share of the limits: nan"));
+}
+
+TEST_CASE("the margin is kept with few knots too", "[optimal][world]") {
+  SceneMotionOptions options;
+  options.intervals = GENERATE(6, 8, 10);
+  options.objective = GENERATE(Objective::effort, Objective::time);
+  const scene::Scene scene = scene_of(pillar_scene());
+  const SceneMotion motion = optimize_scene(scene, options);
+  REQUIRE(motion.valid());
+  CHECK(motion.goals[0].found.proof.margin_m >= options.margin_m);
+  control::WorldView view(scene, motion.model, 0.1);
+  const TimedMotion& m = motion.goals[0].found.motion;
+  VectorXd q, v, a;
+  for (int i = 0; i <= 2000; ++i) {
+    m.at(m.duration_s() * i / 2000.0, q, v, a);
+    view.look(q, 0.0);
+    CHECK(std::min(view.clearance_m(), view.self_clearance_m()) >= options.margin_m);
+  }
+}
+
+TEST_CASE("nothing is proved of what is no motion", "[optimal][world]") {
+  const scene::Scene scene = scene_of(pillar_scene());
+  const model::Model model = control::load_model(scene);
+  control::WorldView view(scene, model, 0.1);
+  const double nan = std::nan("");
+  TimedMotion motion{0.1, scene.start_q.replicate(1, 9)};
+  CHECK(prove(motion, view).certified);
+  CHECK_FALSE(prove(motion, view, {0.01}).certified);  // 9 mm
+  CHECK(prove(motion, view, {0.01}).margin_m == Approx(0.00902).margin(1e-4));
+  for (const double step : {0.0, -0.1, nan, infinity}) {
+    motion.step_s = step;
+    const MotionProof proof = prove(motion, view);
+    CHECK_FALSE(proof.certified);
+    CHECK(proof.margin_m == -infinity);
+  }
+  motion.step_s = 0.1;
+  motion.control(2, 4) = nan;
+  CHECK_FALSE(prove(motion, view).certified);
+  CHECK_FALSE(prove({}, view).certified);
+  motion.control = scene.start_q.replicate(1, 3);  // no interval
+  CHECK_FALSE(prove(motion, view).certified);
+  VectorXd q, v, a;
+  CHECK(test::error_of([&] { motion.at(0.0, q, v, a); }) != "no error");
+  motion.control = scene.start_q.replicate(1, 9);
+  for (const ProofOptions& wrong :
+       {ProofOptions{nan}, ProofOptions{-1.0}, ProofOptions{0.0, nan}, ProofOptions{0.0, 0.0, 0.0}})
+    CHECK(test::error_of([&] { (void)prove(motion, view, wrong); }) != "no error");
+
+  CHECK_FALSE(MotionProof{}.certified);
+  CHECK(Solution{}.violation == infinity);
+  CHECK_FALSE(GoalMotion{}.valid());
+  const SceneMotion empty{"", "", {}, model, {}, 0};
+  CHECK_FALSE(empty.valid());
+}
+
+TEST_CASE("a margin that is not proved makes the motion invalid, in one line", "[optimal][world]") {
+  // the rows know standing obstacles only, the proof also those that move
+  Json document = pillar_scene();
+  document["obstacles"].push_back(
+      {{"name", "ball"},
+       {"type", "sphere"},
+       {"radius_m", 0.4},
+       {"position_m", {0.45, 1.4, 0.45}},
+       {"motion", {{"type", "linear"}, {"velocity_m_s", {0.0, -1.0, 0.0}}}}});
+  const SceneMotion motion = optimize_scene(scene_of(document), {});
+  CHECK_FALSE(motion.valid());
+  const GoalMotion& goal = motion.goals[0];
+  CHECK_FALSE(goal.found.proof.certified);
+  CHECK(goal.found.solution.violation > 0.0);
+  CHECK_THAT(goal.found.solution.violated, Catch::Contains("clearance") &&
+                                               Catch::Contains("expected the margin 0.005 m") &&
+                                               !Catch::Contains("\n"));
+  // of a motion that begins later, when the ball is gone
+  const scene::Scene scene = scene_of(document);
+  control::WorldView view(scene, motion.model, 0.1);
+  CHECK_FALSE(prove(goal.found.motion, view, {0.005, 0.0}).certified);
+  CHECK(prove(goal.found.motion, view, {0.005, 10.0}).certified);
+}
+
+TEST_CASE("torques between the knots keep their limits, whatever the number of knots",
+          "[optimal][world]") {
+  Json document = pillar_scene();
+  document.erase("obstacles");
+  document["model"] = {{"torque_limits", true}};
+  const auto joints = GENERATE(
+      std::pair<std::vector<double>, std::vector<double>>{{0.3, -0.5, 0.4, -1.2, 0.2, 0.9, -0.3},
+                                                          {-0.9, 0.6, -0.4, 0.3, 1.5, -0.6, 2.0}},
+      std::pair<std::vector<double>, std::vector<double>>{{-1.0, 0.7, -0.2, 0.9, 0.0, -0.8, 0.5},
+                                                          {1.1, -0.4, 0.8, -1.5, -2.0, 0.4, 0.0}});
+  document["start"]["q"] = joints.first;
+  document["goals"][0]["q"] = joints.second;
+  const scene::Scene scene = scene_of(document);
+  SceneMotionOptions options;
+  options.objective = Objective::time;
+  options.intervals = GENERATE(6, 12);
+  options.duration_s = 1.0;
+  const SceneMotion motion = optimize_scene(scene, options);
+  const Optimized& found = motion.goals.at(0).found;
+  CAPTURE(options.intervals, found.torque_share, found.solution.violated);
+  CHECK(motion.valid());
+  CHECK(found.torque_share <= 1.0);
+  const VectorXd limit = Limits::of(motion.model).torque;
+  dynamics::Workspace ws(motion.model);
+  VectorXd torque;
+  double most = 0.0;
+  for (int i = 0; i <= 20000; ++i) {
+    torque_at(motion.model, ws, found.motion, found.motion.duration_s() * i / 20000.0, torque);
+    most = std::max(most, torque.cwiseQuotient(limit).lpNorm<Eigen::Infinity>());
+  }
+  CHECK(most <= 1.0 + 1e-4);
+  CHECK(most >= 0.9);  // some limit binds
 }

@@ -43,14 +43,22 @@ class Clearance {
 /// Numbers of intervals that a Problem may have.
 inline constexpr int least_intervals = 6, most_intervals = 100000;
 
-/// A motion between two states that is sought: docs/theory.md, chapter 17.
+/// With Objective::time no motion is shorter [s]: at rest where the goal is the start, it lasts as
+/// long. Far below what any arm can use, and above zero.
+inline constexpr double least_duration_s = 1e-3;
+
+/// A motion between two states that is sought: docs/theory.md, chapter 18.
 struct Problem {
   const model::Model* model = nullptr;
   VectorXd q_start, v_start, q_goal, v_goal;  ///< dof numbers each
   int intervals = 50;                         ///< N: the motion has N + 1 knots
   Objective objective = Objective::effort;
-  double duration_s = 1.0;  ///< of the motion, or with Objective::time of the first guess
+  /// Of the motion, or with Objective::time of the first guess, at least least_duration_s.
+  double duration_s = 1.0;
   Limits limits;
+  /// Taken off the torque limits at each knot, for what the torques between the knots exceed those
+  /// at the knots by: dof × (N + 1), less than the limits [Nm or N]; with size zero none.
+  MatrixXd torque_reserve;
   /// R of the effort, diagonal, dof numbers; with size zero the inverse squares of the torque
   /// limits, or of 1 without limits; of usual torques
   /// with Objective::time.
@@ -60,13 +68,17 @@ struct Problem {
   double time_effort_weight = 1e-3;
   Clearance* clearance = nullptr;  ///< null: none; called by one thread at a time
   double margin_m = 0.0;           ///< least clearance
+  /// Added to the margin, but in the first and last interval only as far as the clearance of that
+  /// end allows: for what the clearance may fall short by between the places where it is required.
+  double reserve_m = 0.0;
+  double begin_s = 0.0;  ///< time at which the motion begins, for obstacles that move
   /// Configurations per interval at which clearance is required: the knots, and between them.
   int clearance_points = 1;
 };
 
-/// @throws Error invalid, one line that names what is wrong: sizes, numbers that are not finite, a
-///         start or goal outside the limits or too near to an obstacle, too few intervals, joints
-///         that cannot hold the arm at an end
+/// @throws Error invalid, one line that names what is wrong: no model, sizes, numbers that are not
+///         finite or out of their range, a start or goal outside the limits or nearer to an
+///         obstacle than the margin, too few intervals, joints that cannot hold the arm at an end
 void check(const Problem& problem);
 
 }  // namespace hamelin::optimal

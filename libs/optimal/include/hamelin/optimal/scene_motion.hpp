@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,11 +13,11 @@ namespace hamelin::optimal {
 /// What is asked of the motion to the goals of a scene, besides what the scene models.
 struct SceneMotionOptions {
   Objective objective = Objective::effort;
-  int intervals = 50;  ///< to each goal
+  int intervals = 50;  ///< to each goal; more where torques between the knots need them
   /// Time to each goal [s]; none: that in which no joint exceeds half of its velocity limit on the
   /// way of the guess. With Objective::time the first guess.
   std::optional<double> duration_s;
-  double margin_m = 0.005;                   ///< least clearance
+  double margin_m = 0.005;                   ///< least clearance, that is proved at all times
   std::optional<double> acceleration, jerk;  ///< limits of all joints [rad/s² and rad/s³, or m]
   double time_effort_weight = 1e-3;          ///< see Problem
   /// Share of the limits of velocity and torque that the motion may use: the rest is for the
@@ -28,9 +29,10 @@ struct SceneMotionOptions {
 /// The motion to one goal, at rest at both ends but for the start of the scene.
 struct GoalMotion {
   Optimized found;
-  /// Whether it keeps all limits and is proved clear.
+  /// Whether it keeps all limits at all times and is proved to keep the margin.
   [[nodiscard]] bool valid() const {
-    return found.solution.violation <= SolveOptions{}.tolerance && found.proof.certified;
+    return found.solution.violation <= SolveOptions{}.tolerance && found.proof.certified &&
+           found.motion.well_formed();
   }
 };
 
@@ -41,8 +43,10 @@ struct SceneMotion {
   model::Model model;
   std::vector<GoalMotion> goals;  ///< up to the first that is not valid
   std::size_t goal_count = 0;     ///< of the scene
+  /// Whether there is a valid motion to each goal, and at least one goal.
   [[nodiscard]] bool valid() const {
-    return goals.size() == goal_count && (goals.empty() || goals.back().valid());
+    return !goals.empty() && goals.size() == goal_count &&
+           std::all_of(goals.begin(), goals.end(), [](const auto& goal) { return goal.valid(); });
   }
   [[nodiscard]] double duration_s() const;
 
@@ -51,12 +55,16 @@ struct SceneMotion {
     VectorXd q, v, a, torque;
   };
   /// The knots of all motions, or if a rate is given, that number of points per second, with the
-  /// torques along the motion; and the last knot.
+  /// torques along the motion; and the last knot. @throws Error invalid for a rate that is not a
+  /// positive number
   [[nodiscard]] std::vector<Point> points(std::optional<double> rate_hz = {}) const;
 };
 
-/// Obstacles that are farther away count as being at this distance [m].
-inline constexpr double influence_m = 0.1;
+/// Obstacles that are farther away count as being at this distance [m], which is more than the
+/// margin.
+[[nodiscard]] constexpr double influence_of(double margin_m) {
+  return std::max(0.1, 1.5 * margin_m);
+}
 
 /// The problem of a scene's motions, but for start, goal, duration and clearance. The model must
 /// outlive it.
@@ -70,10 +78,14 @@ inline constexpr double influence_m = 0.1;
 /// Optimises the motion from the start of a scene to its first goal, and from each goal to the
 /// next, among the obstacles that stand still. The first guess goes along the paths of the scene's
 /// guide; without a guide along the goals' own paths, or straight.
-/// @throws Error io, parse or invalid for bad input, a scene with damping or friction, goals of the
+/// @throws Error io, parse or invalid for bad input, a start or goal that is nearer to an obstacle
+///         than the margin, a scene with damping or friction, goals of the
 ///         tip without a guide, goals that follow a target, or if the guide finds no path
 [[nodiscard]] SceneMotion optimize_scene(const scene::Scene& scene,
                                          const SceneMotionOptions& options);
+
+/// Why a solution is no proved minimum, and what it violates most: one line, or empty.
+[[nodiscard]] std::string cause_of(const Solution& solution);
 
 /// As hamelin.trajectory/1, docs/schema/trajectory.schema.json.
 [[nodiscard]] Json to_json(const SceneMotion& motion, const SceneMotionOptions& options,
