@@ -52,6 +52,7 @@ TEST_CASE("an optimised motion is run in time, logged, replayed and reported", "
   CHECK(run.exit_code == 0);
   CHECK_THAT(run.out, Catch::Contains("trajectory  ") && Catch::Contains("s long, took"));
   const Json result = sandbox.json("result.json"), file = sandbox.json("calm.json");
+  CHECK(file["goals"][0]["margin_m"].get<double>() >= 0.008);
   const Json& followed = result["trajectory"];
   CHECK(followed["duration_s"] == file["points"].back()["time_s"]);
   CHECK(followed["time_s"].get<double>() < followed["duration_s"].get<double>() + 0.01);
@@ -85,6 +86,40 @@ TEST_CASE("optimize has exit code 1 where there is no motion, and writes nothing
   CHECK_FALSE(std::filesystem::exists(sandbox.path("none.json")));
 }
 
+TEST_CASE("the least time to a goal at the start is the least duration", "[optimize]") {
+  Sandbox sandbox;
+  const auto found = sandbox.run({"optimize", pillar, "--minimize", "time", "--set",
+                                  "/goals/0/q=[-0.8,0.6,0.0,-1.6,0.0,2.0,0.0]", "--format", "ros",
+                                  "-o", "f.json"});
+  CHECK(found.exit_code == 0);
+  const Json points = sandbox.json("f.json")["points"];
+  const auto time_s = [](const Json& point) {
+    const Json& time = point["time_from_start"];
+    return time["sec"].get<double>() + 1e-9 * time["nanosec"].get<double>();
+  };
+  for (std::size_t k = 1; k < points.size(); ++k) CHECK(time_s(points[k]) > time_s(points[k - 1]));
+  CHECK(time_s(points.back()) == Approx(optimal::least_duration_s).epsilon(1e-3));
+}
+
+TEST_CASE("optimize has exit code 1 where the margin is not proved", "[optimize]") {
+  Sandbox sandbox;
+  const std::string ball =
+      R"({"name": "ball", "type": "sphere", "radius_m": 0.4, "position_m": [0.45, 1.4, 0.45],
+          "motion": {"type": "linear", "velocity_m_s": [0, -1, 0]}})";
+  Json scene = sandbox.json(pillar);
+  scene["obstacles"].push_back(Json::parse(ball));
+  for (const char* key : {"file", "spheres"})
+    scene["robot"][key] =
+        "data/robots/" +
+        std::filesystem::path(scene["robot"][key].get<std::string>()).filename().string();
+  write_file_atomically(sandbox.path("scene.json"), scene.dump());
+  const auto found = sandbox.run({"optimize", "scene.json", "-o", "none.json"});
+  CHECK(found.exit_code == 1);
+  CHECK_THAT(found.out, Catch::Contains("no motion") && Catch::Contains("violated: clearance") &&
+                            Catch::Contains("expected the margin 0.005 m"));
+  CHECK_FALSE(std::filesystem::exists(sandbox.path("none.json")));
+}
+
 TEST_CASE("optimize refuses bad input in one line", "[optimize]") {
   Sandbox sandbox;
   const auto refused = [&](std::vector<std::string> more) {
@@ -102,6 +137,8 @@ TEST_CASE("optimize refuses bad input in one line", "[optimize]") {
   CHECK_THAT(refused({"--set", "/model/friction=0.1"}), Contains("damping or friction"));
   CHECK_THAT(refused({"--set", "/obstacles/0/position_m=[0.38,-0.4,0.3]"}),
              Contains("start: the clearance is"));
+  CHECK_THAT(refused({"--margin", "0.01"}),
+             Contains("start: the clearance is 0.00902") && Contains("the margin 0.01 m"));
   CHECK_THAT(refused({"-o", pillar}), Contains(pillar));
   if (!optimal::has_ipopt())
     CHECK_THAT(refused({"--solver", "ipopt"}), Contains("coinor-libipopt-dev"));
