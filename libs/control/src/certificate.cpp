@@ -56,6 +56,7 @@ Certificate::Verdict Certificate::check(dynamics::Workspace& ws,
   pieces_ = 0;
 
   Verdict verdict;
+  verdict.certified = true;
   verdict.margin_m = from.clearance.empty() ? self_limit_ : limit_;
   const auto include = [&](Subject subject, double bound, double d, double d_next) {
     if (bound <= 0.0) bound = std::min(far_, prove(ws, subject, {0.0, 1.0, d, d_next}));

@@ -72,7 +72,7 @@ TorqueShares torque_shares(const Problem& problem, const TimedMotion& motion) {
 }
 
 // Solves a problem, and again with tighter bounds or more knots until the motion keeps what was
-// asked for at all times, docs/theory.md (18.20).
+// asked for at all times, docs/theory.md (18.19).
 class Refinement {
  public:
   Refinement(const Problem& asked, const MatrixXd& way_points, control::WorldView& view,

@@ -59,7 +59,7 @@ namespace {
 constexpr int bisections_max = 6;            // of a piece
 constexpr double bound_resolution_m = 1e-5;  // of bounds below the margin
 
-// Proves the pieces of a motion in the order of time, docs/theory.md (18.19). Places are times in
+// Proves the pieces of a motion in the order of time, docs/theory.md (18.18). Places are times in
 // intervals.
 class Prover {
  public:

@@ -40,7 +40,7 @@ class Certificate {
               double self_limit, std::size_t obstacles_max);
 
   struct Verdict {
-    bool certified = true;
+    bool certified = false;
     double margin_m = 0.0;  ///< lower bound of all distances; zero or below: not proved, or contact
     bool contact = false;   ///< a clearance of zero or below was found between the nodes
     int self_pair = -1;     ///< the pair of parts that touched, or −1

@@ -20,7 +20,7 @@ struct Optimized {
 
 /// Solves a problem and examines its motion at all times: whether the margin is proved, and whether
 /// the torques between the knots keep their limits. If not, it is solved again, docs/theory.md
-/// (18.20): with more points of clearance per interval, up to `clearance_points_max`, and a larger
+/// (18.19): with more points of clearance per interval, up to `clearance_points_max`, and a larger
 /// reserve of the margin; with more intervals where torques between the knots are far above their
 /// limits, and with lower torques at the knots. Of these motions the one that violates least is
 /// returned, with its violation.

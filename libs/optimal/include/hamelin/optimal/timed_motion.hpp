@@ -55,7 +55,7 @@ struct ProofOptions {
 };
 
 /// Proves that the arm keeps the margin along a motion, in pieces of at most `piece_s` that are
-/// bisected where that is not enough, docs/theory.md (18.19). A motion that is not well_formed() is
+/// bisected where that is not enough, docs/theory.md (18.18). A motion that is not well_formed() is
 /// not certified.
 /// @throws Error invalid for options out of their range
 [[nodiscard]] MotionProof prove(const TimedMotion& motion, control::WorldView& view,
