@@ -442,14 +442,16 @@ void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
     reserve_.self_m = stop_line_.largest_pair_stray({tracking, straying_.shapes(), margin_m_});
   speed_max_ = limits_.velocity_max;
   if (speed_max_.size() == 0) return;
-  reserve_.velocity = exact_speed_reserve * limits_.velocity_max;
-  if (!sampled_) return;
+  // of joints that have a limit
+  const auto reserve_of = [&](const VectorXd& kept) {
+    reserve_.velocity = limits_.velocity_max.array().isFinite().select(kept, 0.0);
+  };
+  if (!sampled_) return reserve_of(exact_speed_reserve * limits_.velocity_max);
   const bool estimates = scene.actuation.estimates_velocity;
   speed_max_ *= 1.0 - (estimates ? estimated_speed_reserve : sampled_speed_reserve);
   if (scene.actuation.type == scene::ActuationType::sampled) speed_max_ -= error.velocity;
   speed_max_ = speed_max_.cwiseMax(least_speed_share * limits_.velocity_max);
-  reserve_.velocity =
-      limits_.velocity_max - speed_max_ + planner_speed_reserve * limits_.velocity_max;
+  reserve_of(limits_.velocity_max - speed_max_ + planner_speed_reserve * limits_.velocity_max);
 }
 
 // Whether the bounds that the scene states hold can be seen by what a stop does.

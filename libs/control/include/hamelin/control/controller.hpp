@@ -256,7 +256,7 @@ class Controller {
   [[nodiscard]] const PlannerHost::Drawing& drawing() const noexcept {
     return arm_->planner.drawing();
   }
-  /// Pose of the tip at the last tick, in the world.
+  /// Pose of the tip at the last tick, in the world. @throws Error before the first tick
   [[nodiscard]] geometry::SE3 tip() const {
     return dynamics::tip_pose(arm_->model, arm_->view.poses());
   }
