@@ -246,7 +246,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a tick that refuses a load does not allocate", "[control][borders]") {
-  if (!test::counts_allocations()) return;
+  test::require_allocation_count();
   scene::Scene scene = sampled("clutter.json");
   if (GENERATE(true, false)) scene.safety.type = scene::SafetyType::none;
   control::Controller::Options options;
