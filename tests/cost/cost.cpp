@@ -22,6 +22,7 @@ class PlainRk4 final : public integration::Integrator {
  public:
   explicit PlainRk4(const model::Model& model) : Integrator("rk4", model, {}) {
     q_ = v_ = q_sum_ = v_sum_ = acceleration_ = none_ = VectorXd::Zero(model.dof());
+    prepare({1, model.fingerprint()});
   }
   [[nodiscard]] std::string criterion() const override { return "none"; }
   [[nodiscard]] int order() const override { return 4; }

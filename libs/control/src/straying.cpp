@@ -147,7 +147,7 @@ void Straying::include_model_errors(const Effort& effort) {
   const double time_s = effort.duration_s + hold_time_s;
   const double ramp = limits_rate_ ? effort.ramp_s : 0.0;
   const double compliance =
-      std::min(compliance_s2_ + ramp_compliance * ramp * ramp, time_s * time_s) + estimate_s2_;
+      std::min(compliance_s2_ + estimate_s2_ + ramp_compliance * ramp * ramp, time_s * time_s);
   invert_mass(effort.q);
   torque_.noalias() = mass_ * effort.acceleration;
   dynamics::bias_torque(model_, ws_, effort.q, effort.velocity, bias_);

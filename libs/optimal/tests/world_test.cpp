@@ -211,7 +211,7 @@ TEST_CASE("torques between the knots keep their limits, whatever the number of k
           "[optimal][world]") {
   Json document = pillar_scene();
   document.erase("obstacles");
-  document["model"] = {{"torque_limits", true}};
+  document["model"] = {{"joint_limits", false}, {"velocity_limits", false}};
   const auto joints = GENERATE(
       std::pair<std::vector<double>, std::vector<double>>{{0.3, -0.5, 0.4, -1.2, 0.2, 0.9, -0.3},
                                                           {-0.9, 0.6, -0.4, 0.3, 1.5, -0.6, 2.0}},

@@ -499,11 +499,11 @@ Safety read_safety(const Reader& in) {
                   : *type == "certificate" ? SafetyType::certificate
                                            : SafetyType::none;
   safety.margin_m = in.get("margin_m", safety.margin_m);
-  safety.torque_share = in.maybe<double>("torque_share");
-  safety.tracking_rad = in.maybe<double>("tracking_rad");
+  safety.torque_share = in.get("torque_share", unstated);
+  safety.tracking_rad = in.get("tracking_rad", unstated);
   safety.mass_error = in.get("mass_error", safety.mass_error);
   safety.friction_share = in.get("friction_share", safety.friction_share);
-  safety.joint_noise_rad = in.maybe<double>("joint_noise_rad");
+  safety.joint_noise_rad = in.get("joint_noise_rad", unstated);
   return safety;
 }
 

@@ -1,16 +1,21 @@
+#include <cmath>
+
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::scene {
 
 SafetyBounds safety_bounds(const Scene& scene) {
-  const Safety& stated = scene.safety;
+  const auto stated_or = [](double stated, double otherwise) {
+    return std::isnan(stated) ? otherwise : stated;
+  };
+  const Safety& safety = scene.safety;
   const bool ideal = scene.actuation.type == ActuationType::ideal;
-  return {stated.margin_m,
-          stated.torque_share.value_or(ideal ? 0.95 : 0.8),
-          stated.tracking_rad.value_or(ideal ? 1e-5 : 2e-4),
-          stated.mass_error,
-          stated.friction_share,
-          stated.joint_noise_rad.value_or(scene.actuation.joint_noise_rad)};
+  return {safety.margin_m,
+          stated_or(safety.torque_share, ideal ? 0.95 : 0.8),
+          stated_or(safety.tracking_rad, ideal ? 1e-5 : 2e-4),
+          safety.mass_error,
+          safety.friction_share,
+          stated_or(safety.joint_noise_rad, scene.actuation.joint_noise_rad)};
 }
 
 SafetyType safety_type(const Scene& scene) {

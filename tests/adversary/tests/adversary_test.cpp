@@ -123,7 +123,11 @@ TEST_CASE("a bound that does not hold is noticed by what stops do, and named", "
        [](scene::Scene& scene) { scene.safety.friction_share = 0.05; }},
       {"masses", [](scene::Scene& scene) { scene.actuation.planner_mass_scale = 0.9; },
        [](scene::Scene& scene) { scene.safety.mass_error = 0.12; }},
-      {"noise", [](scene::Scene& scene) { scene.actuation.joint_noise_rad = 5e-4; },
+      {"noise",
+       [](scene::Scene& scene) {
+         scene.actuation.joint_noise_rad = 5e-4;
+         scene.safety.joint_noise_rad = 0.0;
+       },
        [](scene::Scene& scene) { scene.safety.joint_noise_rad = 5e-4; }},
       {"tracking", [](scene::Scene& scene) { scene.safety.tracking_rad = 1e-7; },
        [](scene::Scene& scene) { scene.safety.tracking_rad = 2e-4; }}};

@@ -179,6 +179,10 @@ class Integrator {
   const Settings settings_;
   mutable dynamics::Workspace ws_;
 
+  /// Makes a constructed scheme ready: sets what its states are and allocates the memory that steps
+  /// need. make_integrator() calls it; a scheme that is made without that calls it itself.
+  void prepare(const StateOwner& owner);
+
  private:
   /// The sizes of a scheme's states.
   struct Shape {
@@ -191,9 +195,6 @@ class Integrator {
   void check(const char* function, const State& state, const Channels& channels, double h) const;
   void refuse_shape(const char* function, const State& state) const;
   friend std::unique_ptr<Integrator> make_integrator(const Model& model, const Options& options);
-  /// Makes a constructed scheme ready: sets what its states are and allocates the memory that steps
-  /// need.
-  void prepare(const StateOwner& owner);
   StepReport take_step(State& state, const Channels& channels, double limit);
   /// Exactly h under step control.
   StepReport take_controlled_steps(State& state, const Channels& channels, double h);

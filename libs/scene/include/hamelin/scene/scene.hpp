@@ -154,19 +154,22 @@ enum class SafetyType : std::int32_t { shield, certificate, none };
 
 [[nodiscard]] std::string_view to_string(SafetyType type) noexcept;
 
+/// A bound of Safety that a scene does not state: NaN.
+inline constexpr double unstated = std::numeric_limits<double>::quiet_NaN();
+
 /// The safety of a run, with bounds of the errors that the shield's margins cover. What is not
 /// stated depends on the scene and on the actuation in force: safety_type(), safety_bounds().
 struct Safety {
   std::optional<SafetyType> type;
-  double margin_m = 0.0;               ///< distance kept beyond what the bounds require
-  std::optional<double> torque_share;  ///< of the torque limits, that a stop may use
+  double margin_m = 0.0;           ///< distance kept beyond what the bounds require
+  double torque_share = unstated;  ///< of the torque limits, that a stop may use
   /// By how much a joint strays from the motion of a stop if all is as modelled [rad or m].
-  std::optional<double> tracking_rad;
+  double tracking_rad = unstated;
   /// Of the controller's masses and inertias, as a share of the true ones.
   double mass_error = 0.0;
   double friction_share = 0.0;  ///< dry friction that is not modelled, of the effort limits
   /// Standard deviation of measured joint positions [rad or m].
-  std::optional<double> joint_noise_rad;
+  double joint_noise_rad = unstated;
 };
 
 /// The bounds of Safety, all of them.
