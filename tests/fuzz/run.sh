@@ -13,7 +13,7 @@ if command -v ccache >/dev/null; then export CMAKE_CXX_COMPILER_LAUNCHER=ccache;
 cmake -S "$source" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DHAMELIN_BUILD_TESTS=ON -DHAMELIN_BUILD_FUZZ=ON \
   -DHAMELIN_SANITIZE='fuzzer-no-link;address;undefined' >/dev/null
-cmake --build "$build" --target "${targets[@]/#/hamelin_fuzz_}" hamelin_fuzz_replay
+cmake --build "$build" --target "${targets[@]/#/hamelin_fuzz_}" hamelin_fuzz_replay hamelin_c_calls
 
 # AddressSanitizer keeps freed memory to detect its use. Small quarantines keep executions fast.
 export ASAN_OPTIONS=quarantine_size_mb=1:thread_local_quarantine_size_kb=64:malloc_context_size=4
