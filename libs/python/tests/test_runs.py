@@ -170,12 +170,12 @@ def test_plots_and_pages(shelf_log, tmp_path):
     assert len(figure.axes[0].lines) == 7
     with pytest.raises(KeyError):
         log.plot("nothing")
-    page_template = os.path.join(
-        os.path.dirname(hamelin.plugin_path()[-1]), "..", "..", "share", "hamelin", "report"
-    )
-    if not os.path.isfile(os.path.join(page_template, "page.html")):
+    try:
+        page = hamelin.report(shelf_log, output=tmp_path / "page.html")
+    except hamelin.Error as error:
+        if "is missing" not in str(error):
+            raise
         pytest.skip("the page was not built: Node.js with npm is missing")
-    page = hamelin.report(shelf_log, output=tmp_path / "page.html")
     assert (tmp_path / "page.html").read_text(encoding="utf-8") == page.text
     assert page._repr_html_().startswith("<iframe srcdoc=")
 
