@@ -71,7 +71,8 @@ Strings sweep_of_hanging_runs(const std::filesystem::path& directory) {
 }  // namespace
 
 TEST_CASE("one Ctrl-C ends a run whose planner does not return, with one line", "[end_to_end]") {
-  HangingProgram program({"--quiet", "run", gyro_scene, "--planner", "unruly", "--log", "run.jsonl"});
+  HangingProgram program(
+      {"--quiet", "run", gyro_scene, "--planner", "unruly", "--log", "run.jsonl"});
   program.wait_for(1);
   const auto output = program.end_by(SIGINT);
   CHECK(output.exit_code == 130);

@@ -207,8 +207,8 @@ typedef struct hamelin_setup {
   double shield_margin_m, shield_self_margin_m;
 } hamelin_setup;
 
-/* The input of one tick. Where something is attached to the arm or detached from it, this planner is
- * replaced by another one, which was created for the arm as it is then. */
+/* The input of one tick. Where something is attached to the arm or detached from it, this planner
+ * is replaced by another one, which was created for the arm as it is then. */
 typedef struct hamelin_tick {
   uint32_t struct_size;
   uint64_t k;
@@ -386,8 +386,8 @@ enum {
 
 /* All functions never throw. They are called on one thread, that of tick, unless stated otherwise;
  * create and destroy may run on another one, but never while another function of the same planner
- * does. Those that return an int32_t return 0; on failure they return nonzero and write a nul-terminated line
- * to `error` (error_size bytes). */
+ * does. Those that return an int32_t return 0; on failure they return nonzero and write a
+ * nul-terminated line to `error` (error_size bytes). */
 typedef struct hamelin_plugin {
   uint32_t struct_size;
   uint32_t abi_version;     /* the newest version that the plugin supports */

@@ -49,7 +49,8 @@ class Plant {
   /// @param step_s the same at each call
   /// @return whether it converged; if not, the node is unchanged
   [[nodiscard]] virtual bool step(const Eigen::VectorXd& torque, double step_s) = 0;
-  /// From this node on the arm carries something else: the model of the setup has changed, in place.
+  /// From this node on the arm carries something else: the model of the setup has changed, in
+  /// place.
   virtual void take_load() = 0;
   /// From this node on the map is another one. @throws Error as scene::Environment::with_change
   virtual void change_map(const scene::MapChangeSpec&) {}
