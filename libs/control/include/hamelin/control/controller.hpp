@@ -186,9 +186,8 @@ class Controller {
   [[nodiscard]] Json planner_params() const;
 
   /// observe() and decide().
-  /// @param time_s of the measurement; does not fall from tick to tick. If it does, or is not
-  /// finite,
-  ///        the arm is brought to rest.
+  /// @param time_s of the measurement; must not fall from tick to tick. If it falls, or is not
+  ///        finite, the arm is brought to rest.
   /// @param q, v measured joint positions and velocities; dof numbers each. v is not used if the
   ///        scene lets the controller estimate velocities. If one of them is not finite or beyond
   ///        1e6, the arm is brought to rest.
