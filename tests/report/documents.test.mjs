@@ -298,8 +298,10 @@ for (const file of sweeps) {
     await page.getByRole('button', { name: `Show the ${count} runs of: ${failure}`, exact: true }).click();
     assert.match(await status(page), new RegExp(`of ${count} runs`));
     assert.equal(await page.getByRole('region', { name: 'Runs', exact: true }).locator('tbody tr').count(), Math.min(50, count));
-    await page.locator('details.failure-class').first().locator('summary').click();
-    const commands = await page.locator('details.failure-class').first().locator('code').allTextContents();
+    const details = page.locator('details.failure-class').first();
+    await details.locator('summary').click();
+    await details.locator('code').first().waitFor(); // drawn when the browser says that it was opened
+    const commands = await details.locator('code').allTextContents();
     const known = study.failed.filter((i) => study.text('texts', 'failure', i) === failure).map(study.command);
     assert.equal(commands.length, Math.min(20, count));
     assert.ok(commands.every((command) => known.includes(command)));
