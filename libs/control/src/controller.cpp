@@ -421,9 +421,13 @@ double Controller::braking_time_s() const {
   return std::max(brake_time_s, brake_periods * period_s_);
 }
 
+// The cause is copied: its planner may be gone while the arm is still held.
 void Controller::start_braking(std::string_view cause) {
+  LineBuffer line;
+  append(line, "{}", cause);
+  cause_line_ = line;
   answer_.state = ControlState::stopping;
-  answer_.cause = cause;
+  answer_.cause = cause_line_.view();
   brake_q_ = q_;
   brake_v_ = v_;
 }

@@ -204,7 +204,7 @@ class Controller {
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
   /// Brings the arm to rest from the next answer on, as if the planner had failed. For the thread
-  /// of tick(). @param cause for Answer::cause; must outlive this
+  /// of tick(). @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
   void stop(std::string_view cause) { start_braking(cause); }
 
   /// Searches the path that the last tick has asked for, if it did, without Options::guide_thread.
@@ -367,8 +367,9 @@ class Controller {
   std::string_view lost_;  ///< why the last measurement cannot be used; empty if it can
   std::string_view failure_;
   int late_answers_ = 0;  ///< in a row
-  /// Memory of lost_, of failure_ where answers were late, and of answer_.load_refusal.
-  LineBuffer lost_line_, late_line_, load_refusal_;
+  /// Memory of lost_, of failure_ where answers were late, of answer_.cause while the arm stops,
+  /// and of answer_.load_refusal.
+  LineBuffer lost_line_, late_line_, cause_line_, load_refusal_;
   bool reset_ = false;  ///< whether the planner is to be told of a new start
   Eigen::VectorXd q_, v_, rate_, command_rate_;
   Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest
