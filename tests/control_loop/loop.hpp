@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 
 namespace hamelin::test {
 
+inline constexpr double not_finite = std::numeric_limits<double>::quiet_NaN();
 inline const std::filesystem::path data_folder = std::filesystem::path(HAMELIN_SOURCE_DIR) / "data";
 
 /// A scene of data/, controlled by one torque per millisecond as a robot is.

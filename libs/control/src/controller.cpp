@@ -102,6 +102,16 @@ World::Options world_options(const scene::Scene& scene, const model::Model& arm,
   return out;
 }
 
+// The largest speeds of a set point, of size zero where they are not bounded. What the shield keeps
+// for itself is left free: it would refuse what needs it.
+VectorXd set_point_speeds(const scene::Scene& scene, const model::Model& model,
+                          const Shield* shield) {
+  VectorXd out = modelled_limits(scene, model.robot()).velocity_max;
+  if (shield != nullptr && shield->limit_reserve().velocity.size() == out.size())
+    out -= shield->limit_reserve().velocity;
+  return out;
+}
+
 model::Model nominal_of(const scene::Scene& scene, const model::Model& arm) {
   check_numbers(scene, arm);
   return scaled_masses(arm, scene.actuation.planner_mass_scale);
@@ -138,15 +148,19 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
                                            nominal_.dof())),
       jerk_max_(positive_per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
+      tracking_max_(
+          positive_per_joint(scene_, options_.tracking_max, "tracking_max", nominal_.dof())),
       world_(scene_, nominal_,
              world_options(scene_, nominal_, options_, plugin.influence_m(params))),
       params_(params),
       arm_(std::make_unique<LoadedArm>(scene_, nominal_, params_, common())),
       newest_goals_(scene_.goals),
       newest_arm_(arm_.get()),
+      measured_(static_cast<std::size_t>(nominal_.dof())),
       new_goals_(std::make_unique<GoalList>(0, scene_.goals)),
       new_params_(std::make_unique<NewParams>()),
       new_load_(std::make_unique<NewLoad>()),
+      new_stop_(std::make_unique<StopRequest>()),
       goal_list_(&new_goals_.take()),
       new_target_(std::make_unique<StreamedTarget>()),
       reference_(nominal_.dof()),
@@ -154,13 +168,15 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
   check_follows(scene_, plugin);
   expect_target(scene_.goals);
   const VectorXd zero = VectorXd::Zero(nominal_.dof());
-  answer_.torque = answer_.q_next = answer_.v_next = point_q_ = point_v_ = q_measured_ = zero;
+  answer_.torque = answer_.q_next = answer_.v_next = q_measured_ = v_measured_ = zero;
   q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
   make_guidance();
+  if (options_.position) velocity_max_ = set_point_speeds(scene_, nominal_, arm_->shield.get());
+  if (!forms_torque() || options_.position) return;
+  issued_.assign(delay_periods(scene_, period_s_) + 1, zero);
   if (!scene_.actuation.estimates_velocity) return;
   estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
                      scene_.actuation.joint_noise_rad);
-  issued_.assign(delay_periods(scene_, period_s_) + 1, zero);
 }
 
 void Controller::make_guidance() {
@@ -204,7 +220,9 @@ void Controller::reset() {
   answer_.overruns = 0;
   answer_.saturated = answer_.stopping = false;
   answer_.state = ControlState::running;
+  answer_.reason = StopReason::none;
   answer_.cause = lost_ = {};
+  stopped_ = 0;
   verdict_.reset();
   goals_.restart();
   expect_target(newest_goals_);
@@ -239,6 +257,7 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
     arm_->view.look(q_, time_s_);
   }
   take_load();
+  take_stop();
   answer_.snapshot = arm_->view.snapshot();
   take_goals();
   answer_.goals_number = goal_list_->number;
@@ -262,36 +281,50 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
 
 void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
   const Eigen::Index dof = nominal_.dof();
-  if (q.size() != dof || (!estimator_ && v.size() != dof))
+  const bool uses_v = !scene_.actuation.estimates_velocity;
+  if (q.size() != dof || (uses_v && v.size() != dof))
     throw Error(ErrorCode::invalid,
                 fmt::format("the measured q and v: {} and {} values given, expected {} each (one "
                             "per joint of '{}')",
                             q.size(), v.size(), dof, nominal_.robot().name));
-  const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s >= time_s_),
-             usable = within(q, measured_max) && (estimator_ || within(v, measured_max));
-  if (!in_order || !usable) lose_measurement(time_s, in_order);
+  const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s >= given_s_),
+             finite = within(q, measured_max) && (!uses_v || within(v, measured_max));
+  usable_ = in_order && finite;
+  if (!usable_) lose_measurement(time_s, in_order);
   // what moves goes on as predicted while the clock cannot be used
-  time_s_ = in_order ? time_s : time_s_ + period_s_;
-  if (!usable) return take_braking_state();
+  if (!in_order)
+    time_s_ = time_s_ + period_s_;
+  else
+    time_s_ = k_ == 0 ? time_s : std::max(time_s, time_s_.load());
+  if (in_order) given_s_ = time_s;
+  if (finite)
+    for (Eigen::Index i = 0; i < dof; ++i)
+      measured_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
+  if (finite) q_measured_ = q;
+  if (finite && uses_v) v_measured_ = v;
+  if (options_.position) return take_set_point();
+  const bool seen_before = std::exchange(seen_, finite);
+  if (!finite) return extrapolate();
   if (!estimator_) {
-    q_ = q_measured_ = q;
+    q_ = q;
     v_ = v;
     return;
   }
-  if (k_ == 0) {
-    estimator_->start(q);
+  if (k_ == 0 || !seen_before) {
+    estimator_->start(q, k_ == 0 ? v_measured_ : v_);
   } else {
-    // Issued `delay` ticks before the last one; it acted since then.
-    const VectorXd& acting = issued_[static_cast<std::size_t>(k_) % issued_.size()];
-    if (options_.position)
-      rate_ = acting;
-    else
-      dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting, rate_);
+    dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting_torque(), rate_);
     estimator_->update(q, rate_);
   }
   q_ = estimator_->q();
   v_ = estimator_->v();
-  q_measured_ = q;
+}
+
+// A planner that was shown where servos have brought the arm would correct what they are about to
+// correct, and oscillate.
+void Controller::take_set_point() {
+  q_ = k_ == 0 ? q_measured_ : answer_.q_next;
+  v_ = k_ == 0 ? v_measured_ : answer_.v_next;
 }
 
 // The first line stays: it says why the arm stops.
@@ -313,27 +346,34 @@ void Controller::lose_measurement(double time_s, bool in_order) {
   lost_ = line.view();
 }
 
-// Without a measurement the arm is where braking was to bring it.
-void Controller::take_braking_state() {
-  if (answer_.state != ControlState::stopping) return;
-  q_ = q_measured_ = brake_q_;
-  v_ = brake_v_;
+// Without a measurement the arm is where its model and what was not explained last take it.
+void Controller::extrapolate() {
+  if (issued_.empty()) return;
+  dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting_torque(), rate_);
+  if (estimator_)
+    rate_ += estimator_->disturbance();
+  else if (arm_->pipeline)
+    rate_ += arm_->pipeline->disturbance();
+  q_ += period_s_ * v_ + (0.5 * period_s_ * period_s_) * rate_;
+  v_ += period_s_ * rate_;
+  q_measured_ = q_;
+}
+
+// Issued `delay` ticks before the last one; it acted since then.
+const VectorXd& Controller::acting_torque() const noexcept {
+  return issued_[static_cast<std::size_t>(k_) % issued_.size()];
 }
 
 // Until the first answer acts, the arm is held against gravity.
 void Controller::start_outputs() {
   answer_.q_next = q_;
   answer_.v_next = v_;
-  if (arm_->shield) {
-    point_q_ = q_;
-    point_v_ = v_;
-  }
   command_rate_.setZero();
   if (!forms_torque()) return;
   dynamics::gravity_torque(arm_->model, arm_->ws, q_, answer_.torque);
   arm_->limits.start_from(answer_.torque);
   if (arm_->pipeline) arm_->pipeline->start_from(answer_.torque);
-  for (auto& issued : issued_) issued = options_.position ? command_rate_ : answer_.torque;
+  for (auto& issued : issued_) issued = answer_.torque;
 }
 
 void Controller::decide() {
@@ -343,18 +383,16 @@ void Controller::decide() {
     shielded_ = true;
   }
   if (answer_.state != ControlState::stopping) {
-    if (!lost_.empty()) {
-      start_braking(lost_);
-    } else if (!ask_planner()) {
-      start_braking(failure_);
-    } else if (arm_->planner.gave_up() && !(guidance_ && guidance_->stalled())) {
-      answer_.state = ControlState::gave_up;
-      answer_.cause = arm_->planner.command().raw().cause;
-    }
+    if (!lost_.empty())
+      start_braking(StopReason::measurement, lost_);
+    else
+      check_tracking();
   }
+  if (answer_.state != ControlState::stopping) ask_planner();
   answer_.series = arm_->planner.command().series();
   if (!form_outputs()) {
     start_braking(
+        StopReason::planner,
         "the sum of the planner's channels is no torque or acceleration of an arm, expected finite "
         "numbers below 1e12");
     (void)form_outputs();
@@ -364,14 +402,25 @@ void Controller::decide() {
     shield_position();
   else if (arm_->pipeline)
     shield_torque();
-  if (estimator_)
-    issued_[static_cast<std::size_t>(k_) % issued_.size()] =
-        options_.position ? command_rate_ : answer_.torque;
+  if (!issued_.empty()) issued_[static_cast<std::size_t>(k_) % issued_.size()] = answer_.torque;
   if (options_.certify) arm_->view.depart(q_, v_);
   ++k_;
 }
 
-bool Controller::ask_planner() {
+void Controller::check_tracking() {
+  if (!options_.position) return;
+  Eigen::Index j = 0;
+  const double excess = ((q_measured_ - q_).cwiseAbs() - tracking_max_).maxCoeff(&j);
+  if (excess <= 0.0) return;
+  const auto& joint = nominal_.robot().links[static_cast<std::size_t>(j)].joint;
+  LineBuffer line;
+  append(line, "joint '{}' is {:.3g} {} from its set point, expected at most {:.3g} (tracking_max)",
+         joint.name, excess + tracking_max_[j],
+         joint.type == model::JointType::prismatic ? "m" : "rad", tracking_max_[j]);
+  start_braking(StopReason::tracking, line.view());
+}
+
+void Controller::ask_planner() {
   take_params();
   if (reset_) arm_->planner.reset(q_, v_);
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
@@ -386,24 +435,26 @@ bool Controller::ask_planner() {
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
   const bool sends_torque = forms_torque() && !options_.position;
-  if (!arm_->planner.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr)) {
-    failure_ = arm_->planner.error();
-    return false;
-  }
-  return options_.clock_s == nullptr || in_time(options_.clock_s() - since_s);
+  if (!arm_->planner.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr))
+    return start_braking(StopReason::planner, arm_->planner.error());
+  if (options_.clock_s != nullptr) note_time(options_.clock_s() - since_s);
+  if (answer_.state == ControlState::stopping || !arm_->planner.gave_up() ||
+      (guidance_ && guidance_->stalled()))
+    return;
+  answer_.state = ControlState::gave_up;
+  answer_.cause = arm_->planner.command().raw().cause;
 }
 
-bool Controller::in_time(double planner_s) {
+void Controller::note_time(double planner_s) {
   answer_.planner_s = planner_s;
   late_answers_ = planner_s > deadline_s_ ? late_answers_ + 1 : 0;
   if (late_answers_ > 0 && ++answer_.overruns == 1) log_first_overrun();
-  if (options_.late_answers_max == 0 || late_answers_ < options_.late_answers_max) return true;
-  late_line_.clear();
-  append(late_line_,
+  if (options_.late_answers_max == 0 || late_answers_ < options_.late_answers_max) return;
+  LineBuffer line;
+  append(line,
          "the last {} answers were late, expected answers within {} s; the last one took {:.3g} s",
          late_answers_, deadline_s_, planner_s);
-  failure_ = late_line_.view();
-  return false;
+  start_braking(StopReason::late, line.view());
 }
 
 // Later ones are counted only: an arm that is always late would fill a log.
@@ -422,12 +473,14 @@ double Controller::braking_time_s() const {
 }
 
 // The cause is copied: its planner may be gone while the arm is still held.
-void Controller::start_braking(std::string_view cause) {
+void Controller::start_braking(StopReason reason, std::string_view cause) {
   LineBuffer line;
   append(line, "{}", cause);
   cause_line_ = line;
   answer_.state = ControlState::stopping;
+  answer_.reason = reason;
   answer_.cause = cause_line_.view();
+  stopped_ = ++stops_;
   brake_q_ = q_;
   brake_v_ = v_;
 }
@@ -471,7 +524,7 @@ void Controller::shield_torque() {
 }
 
 void Controller::shield_position() {
-  const Shield::Node from{point_q_, point_v_}, to{answer_.q_next, answer_.v_next};
+  const Shield::Node from{q_, v_}, to{answer_.q_next, answer_.v_next};
   if (answer_.channels != nullptr) {
     answer_.stopping = !arm_->shield->accept(
         surroundings(), {from, from.v, to, command_rate_, answer_.torque, command_rate_});
@@ -481,10 +534,8 @@ void Controller::shield_position() {
   }
   if (answer_.stopping) {
     arm_->shield->stop_point(answer_.q_next, answer_.v_next);
-    command_rate_ = (answer_.v_next - point_v_) / period_s_;
+    command_rate_ = (answer_.v_next - v_) / period_s_;
   }
-  point_q_ = answer_.q_next;
-  point_v_ = answer_.v_next;
 }
 
 // Follows a motion that loses its velocity and then rests, with gravity and Coriolis torques
@@ -501,6 +552,14 @@ void Controller::brake() {
   brake_q_ += period_s_ * brake_v_;
 }
 
+// The largest rate from which a jerk within its bound can end before the speed has risen by more
+// than `rise`: the rise by a rate that falls from r to zero is r²/(2 j) + r T/2.
+double Controller::rate_up_to(double rise, Eigen::Index joint) const {
+  const double T = period_s_, j = jerk_max_[joint];
+  if (!(rise > 0.0)) return rise / T;
+  return j * (std::sqrt(0.25 * T * T + 2.0 * rise / j) - 0.5 * T);
+}
+
 // The velocity goes to zero if the planner failed. Otherwise it follows the planner's, or the one
 // that the torque causes, within bounds of acceleration and jerk; the position integrates it.
 bool Controller::form_position() {
@@ -515,7 +574,10 @@ bool Controller::form_position() {
   if (!within(rate_, commanded_max)) return false;
   for (Eigen::Index i = 0; i < rate_.size(); ++i) {
     const double step = jerk_max_[i] * T;
-    const double bounded = std::clamp(rate_[i], -acceleration_max_[i], acceleration_max_[i]);
+    double bounded = std::clamp(rate_[i], -acceleration_max_[i], acceleration_max_[i]);
+    if (velocity_max_.size() > 0)
+      bounded = std::clamp(bounded, -rate_up_to(velocity_max_[i] + answer_.v_next[i], i),
+                           rate_up_to(velocity_max_[i] - answer_.v_next[i], i));
     command_rate_[i] = std::clamp(bounded, command_rate_[i] - step, command_rate_[i] + step);
   }
   answer_.v_next += T * command_rate_;

@@ -129,12 +129,27 @@ const std::vector<scene::Payload>& Controller::payloads() const {
   return load_number_ > 0 && refused_load_.load() == load_number_ ? accepted_ : attached_;
 }
 
+model::Model Controller::model_carrying(std::span<const scene::Payload> payloads,
+                                        const VectorXd& q) const {
+  return carrying(nominal_, payloads, scene_.model.self_collision, scene_.safety.margin_m, q);
+}
+
 std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const VectorXd& q) {
   if (q.size() != nominal_.dof() || !q.allFinite())
     throw Error(
         ErrorCode::invalid,
         fmt::format("q: {} values given, expected {} finite numbers (one per joint of '{}')",
                     q.size(), nominal_.dof(), nominal_.robot().name));
+  model::Model model = model_carrying(all, q);
+  check_size(all, model, world_);
+  publish_arm(load_number_ + 1, 0, std::move(model), q);
+  if (used_load_.load() == load_number_) accepted_ = attached_;
+  attached_ = std::move(all);
+  return ++load_number_;
+}
+
+void Controller::publish_arm(std::uint64_t number, std::uint64_t resumes, model::Model model,
+                             const VectorXd& q) {
   scene::Scene scene = scene_;
   scene.start_q = q;
   scene.start_v.resize(0);
@@ -142,45 +157,76 @@ std::uint64_t Controller::publish_load(std::vector<scene::Payload> all, const Ve
     const std::lock_guard goals_lock(goals_mutex_);
     scene.goals = newest_goals_;
   }
-  model::Model model =
-      carrying(nominal_, all, scene_.model.self_collision, scene_.safety.margin_m, q);
-  check_size(all, model, world_);
   auto fresh = std::make_unique<NewLoad>();
-  fresh->number = load_number_ + 1;
+  fresh->serial = serial_ + 1;
+  fresh->number = number;
   fresh->params_number = params_number_;
   fresh->arm = std::make_unique<LoadedArm>(scene, std::move(model), params_, common());
-  if (used_load_.load() == load_number_) accepted_ = attached_;
-  attached_ = std::move(all);
+  // one that was not taken yet may be asked to go on, too
+  if (taken_serial_.load() == serial_) resumes_ = 0;
+  fresh->resumes = resumes_ = std::max(resumes_, resumes);
   newest_arm_ = fresh->arm.get();
   new_load_.publish(std::move(fresh));
-  return ++load_number_;
+  ++serial_;
 }
 
-std::string_view Controller::load_defect(LoadedArm& fresh) {
+void Controller::resume() {
+  const std::lock_guard lock(load_mutex_);
+  const std::uint64_t stop = stopped_.load();
+  if (stop == 0) return;
+  VectorXd q(nominal_.dof());
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = measured_[static_cast<std::size_t>(i)].load();
+  const bool refused = load_number_ > 0 && refused_load_.load() == load_number_;
+  publish_arm(refused ? used_load_.load() : load_number_, stop,
+              model_carrying(refused ? accepted_ : attached_, q), q);
+}
+
+void Controller::stop(std::string_view cause) {
+  auto fresh = std::make_unique<StopRequest>();
+  append(fresh->cause, "{}", cause);
+  const std::lock_guard lock(stop_mutex_);
+  fresh->number = ++stop_number_;
+  new_stop_.publish(std::move(fresh));
+}
+
+void Controller::take_stop() {
+  const StopRequest& newest = new_stop_.take();
+  if (newest.number == taken_stop_) return;
+  taken_stop_ = newest.number;
+  if (answer_.state != ControlState::stopping)
+    start_braking(StopReason::request, newest.cause.view());
+}
+
+void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
   (void)fresh.view.take_newest();
   fresh.view.look(q_, time_s_);
-  load_refusal_.clear();
   if (!fresh.shield) {
-    if (fresh.view.touching()) fresh.view.describe_contact(load_refusal_);
-    return load_refusal_.view();
+    if (fresh.view.touching()) fresh.view.describe_contact(line);
+    return;
   }
   const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
-  const Shield::Node now =
-      options_.position ? Shield::Node{point_q_, point_v_} : Shield::Node{q_, v_};
-  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, now)) return {};
-  fresh.shield->describe(world.environment, load_refusal_);
-  return load_refusal_.view();
+  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, {q_, v_})) return;
+  fresh.shield->describe(world.environment, line);
 }
 
 // Takes over what the arm is doing, so that its torque goes on from the last one.
 void Controller::take_load() {
   NewLoad& newest = new_load_.take();
-  if (newest.number == answer_.load || newest.number == answer_.refused_load) return;
+  if (newest.serial == taken_serial_.load()) return;
+  taken_serial_ = newest.serial;
+  const bool asked = newest.resumes > 0 && newest.resumes == stopped_.load(),
+             resumes = asked && usable_;
+  if (newest.number == answer_.load && !resumes) return;
   LoadedArm& fresh = *newest.arm;
-  if (const std::string_view defect = load_defect(fresh); !defect.empty()) {
-    answer_.refused_load = newest.number;
-    answer_.load_refusal = defect;
-    refused_load_.store(newest.number);
+  if (resumes && options_.position) {  // where servos have brought it
+    q_ = q_measured_;
+    v_ = v_measured_;
+  }
+  LineBuffer defect;
+  describe_defect(fresh, defect);
+  if (!defect.view().empty()) {
+    if (resumes) refuse_to_go_on(defect);
+    if (newest.number != answer_.load) refuse_load(newest.number, defect);
     return;
   }
   fresh.limits.start_from(answer_.torque);
@@ -192,6 +238,34 @@ void Controller::take_load() {
   used_load_.store(newest.number);
   if (goal_.goal != nullptr) ++goal_.number;
   ++listed_number_;
+  if (resumes) go_on();
+}
+
+void Controller::refuse_load(std::uint64_t number, const LineBuffer& defect) {
+  load_refusal_ = defect;
+  answer_.refused_load = number;
+  answer_.load_refusal = load_refusal_.view();
+  refused_load_.store(number);
+}
+
+void Controller::refuse_to_go_on(const LineBuffer& defect) {
+  if (options_.position) take_set_point();
+  cause_line_.clear();
+  append(cause_line_, "cannot go on: {}", defect.view());
+  answer_.cause = cause_line_.view();
+}
+
+void Controller::go_on() {
+  answer_.state = ControlState::running;
+  answer_.reason = StopReason::none;
+  lost_ = {};
+  stopped_ = 0;
+  late_answers_ = 0;
+  goals_.forget_rest();
+  if (!options_.position) return;
+  answer_.q_next = q_;
+  answer_.v_next = v_;
+  command_rate_.setZero();
 }
 
 void Controller::take_goals() {

@@ -28,9 +28,9 @@ StateEstimator::Gains StateEstimator::gains(double bandwidth) const {
           rest * rest * rest / (period_s_ * period_s_)};
 }
 
-void StateEstimator::start(const Eigen::VectorXd& q) {
+void StateEstimator::start(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   q_ = q;
-  v_.setZero();
+  v_ = v;
   disturbance_.setZero();
   smooth_error_.setZero();
 }

@@ -18,7 +18,7 @@ namespace {
 Matrix3d error_step(double period_s, double bandwidth) {
   const VectorXd zero = VectorXd::Zero(1);
   StateEstimator estimator(1, period_s, bandwidth);
-  estimator.start(VectorXd::Ones(1));
+  estimator.start(VectorXd::Ones(1), VectorXd::Zero(1));
   Matrix3d before, after;
   for (int k = 0; k < 4; ++k) {
     const Vector3d error(estimator.q()[0], estimator.v()[0], estimator.disturbance()[0]);
@@ -47,7 +47,7 @@ TEST_CASE("an unknown constant acceleration leaves no error", "[control][estimat
   StateEstimator estimator(2, period_s, 45.0);
   const VectorXd known = Eigen::Vector2d(0.3, -1.0), unknown = Eigen::Vector2d(-2.0, 0.5);
   const VectorXd acceleration = known + unknown, q0 = Eigen::Vector2d(0.4, -0.2);
-  estimator.start(q0);
+  estimator.start(q0, VectorXd::Zero(2));
   double time_s = 0.0;
   VectorXd q(2), v(2);
   for (int k = 1; k <= 1000; ++k) {
@@ -72,7 +72,7 @@ TEST_CASE("noise of positions reaches the velocity as theory says", "[control][e
                         (2.0 * period_s * period_s * std::pow(1.0 + theta, 5)));
   StateEstimator estimator(1, period_s, bandwidth, stated);
   const VectorXd zero = VectorXd::Zero(1);
-  estimator.start(zero);
+  estimator.start(zero, zero);
   Rng random(7);
   constexpr int settle = 2000, samples = 400'000;
   double sum = 0.0;
@@ -90,7 +90,7 @@ TEST_CASE("a bandwidth that rises follows a growing disturbance", "[control][est
   const double raised = std::pow(growth * bandwidth / sigma, 0.25);
   StateEstimator fixed(1, period_s, bandwidth), adapting(1, period_s, bandwidth, sigma);
   const VectorXd zero = VectorXd::Zero(1);
-  for (auto* estimator : {&fixed, &adapting}) estimator->start(zero);
+  for (auto* estimator : {&fixed, &adapting}) estimator->start(zero, zero);
   double v = 0.0;
   for (int k = 1; k <= 10'000; ++k) {
     const double t = period_s * k;

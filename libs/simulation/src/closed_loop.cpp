@@ -595,6 +595,10 @@ void ClosedLoop::ask_planner() {
 bool ClosedLoop::planner_answered() {
   const control::Answer& answer = controller_->answer();
   if (answer.channels != nullptr) return true;
+  if (answer.reason == control::StopReason::tracking) {
+    finish_at_rest(log::Outcome::stalled, std::string(answer.cause));
+    return false;
+  }
   finish_at_rest(log::Outcome::defect,
                  fmt::format("planner '{}' at step {}: {}", scene_.planner->name, plant_->node().k,
                              answer.cause));

@@ -139,8 +139,7 @@ class TorqueActuation final : public SampledActuation {
 };
 
 /// Position servos: the set point of a tick is held for a period, and each joint follows it by
-/// docs/theory.md (8.14) within its torque limit. The controller is shown its own last set point:
-/// shown the arm, it would correct what the servos are about to correct, and oscillate.
+/// docs/theory.md (8.14) within its torque limit.
 class ServoActuation final : public SampledActuation {
  public:
   ServoActuation(const scene::Scene& scene, const model::Model& model, Plant& plant,
@@ -170,8 +169,8 @@ class ServoActuation final : public SampledActuation {
     feed_forward();
   }
   void observe(VectorXd& q, VectorXd& v) override {
-    q = sent_.q;
-    v = sent_.v;
+    encoders_.measure(plant_.node().q, q);
+    v = plant_.node().v;
   }
   bool limited() const override { return effort_max_.size() > 0; }
 

@@ -125,12 +125,24 @@ TEST_CASE("a set point at the goal is not enough: the arm itself must reach it",
   scene["duration_s"] = 12.0;
   scene["actuation"] = {{"type", "position"}, {"servo", {{"kp", 2000.0}, {"kv", 200.0}}}};
   CHECK(run_scene(folder, scene).outcome == Outcome::reached);
+  scene["model"]["friction"] = 180.0;
+  const auto off = run_scene(folder, scene);
+  CHECK(off.outcome == Outcome::timeout);
+  CHECK(*off.goal->error_m > 0.01);
+  CHECK(off.goal->index == 1);  // by the set point
+}
+
+TEST_CASE("a run ends where servos cannot follow their set points", "[simulation][servo]") {
+  const TemporaryFolder folder;
+  Json scene = test::scene_52();
+  scene["step_s"] = period_s;
+  scene["duration_s"] = 12.0;
   scene["model"]["friction"] = 500.0;
-  scene["actuation"]["servo"] = {{"kp", 10.0}, {"kv", 1.0}};
+  scene["actuation"] = {{"type", "position"}, {"servo", {{"kp", 10.0}, {"kv", 1.0}}}};
   const auto held = run_scene(folder, scene);
-  CHECK(held.outcome == Outcome::timeout);
-  CHECK(*held.goal->error_m > 1.0);
-  CHECK(held.goal->index == 1);  // by the set point
+  CHECK(held.outcome == Outcome::stalled);
+  CHECK_THAT(held.cause, Catch::Contains("rad from its set point, expected at most 0.1"));
+  CHECK(held.time_s < 5.0);
 }
 
 TEST_CASE("servos reach the goals of the clutter with friction, wrong masses and noise",

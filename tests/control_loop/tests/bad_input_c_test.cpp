@@ -50,7 +50,6 @@ struct CLoop {
     options.scene_file = name.c_str();
     options.plugin_directories = plugins.data();
     options.plugin_directory_count = plugins.size();
-    options.position = 1;
     options.late_answers_max = late_answers_max;
     options.log = [](void* context, std::int32_t level, const char* text, std::size_t size) {
       static_cast<CLoop*>(context)->lines.push_back({level, std::string(text, size)});
@@ -301,8 +300,6 @@ TEST_CASE("in C, bad updates return one line and do not change the motion",
     undisturbed.tick();
     REQUIRE(std::equal(disturbed.answer.torque, disturbed.answer.torque + disturbed.v.size(),
                        undisturbed.answer.torque));
-    REQUIRE(std::equal(disturbed.answer.q_next, disturbed.answer.q_next + disturbed.v.size(),
-                       undisturbed.answer.q_next));
     CHECK(disturbed.answer.snapshot == 1);
     CHECK(disturbed.answer.goals == 0);
     disturbed.step();
@@ -410,7 +407,6 @@ TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",
   }
   CHECK_THAT(loop.answer.cause, Contains(cause));
   CHECK(loop.v.lpNorm<Eigen::Infinity>() < 1e-4);
-  CHECK(VectorXd::Map(loop.answer.v_next, loop.v.size()).lpNorm<Eigen::Infinity>() < 1e-4);
 }
 
 TEST_CASE("in C, late answers are counted and reported once, and then the arm is brought to rest",

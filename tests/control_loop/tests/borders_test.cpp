@@ -13,12 +13,11 @@ using Catch::Contains;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using test::Loop;
+using test::not_finite;
 using test::refusal;
 using test::sampled;
 
 namespace {
-
-constexpr double not_finite = std::numeric_limits<double>::quiet_NaN();
 
 bool all_finite(const control::Answer& answer) {
   return answer.torque.allFinite() && answer.q_next.allFinite() && answer.v_next.allFinite();

@@ -28,15 +28,21 @@ namespace hamelin::control {
 
 /// Where a control loop is. running: towards a goal. reached: all goals met; the planner holds the
 /// last one. stalled: by the scene's stall rule. gave_up: by the planner's own judgement. stopping:
-/// the planner failed, or a measurement or its time cannot be used, and the arm is brought to rest
-/// and held until reset().
+/// the planner failed, a measurement or its time cannot be used, the arm does not follow its set
+/// point, or stop() was called: the arm is brought to rest and held until resume() or reset().
 enum class ControlState : std::int32_t { running, reached, stalled, gave_up, stopping };
+
+/// What an arm is stopped for. planner: it failed, or its sum of channels is no number. late: too
+/// many answers in a row were. measurement: it or its time cannot be used. tracking: the arm is
+/// away from its set point. request: stop().
+enum class StopReason : std::int32_t { none, planner, late, measurement, tracking, request };
 
 /// The answer of a tick; its torques, positions and velocities are always finite. References stay
 /// valid until the next tick.
 struct Answer {
   ControlState state = ControlState::running;
-  std::string_view cause;  ///< why it gave up or stops: one line, or empty
+  StopReason reason = StopReason::none;  ///< where it stops
+  std::string_view cause;                ///< why it gave up or stops: one line, or empty
   const planning::CommandBuffers* channels = nullptr;  ///< the planner's; null if it failed
   /// Sum of all channels within the limits of torque and its rate [Nm or N], docs/theory.md (8.7).
   Eigen::VectorXd torque;
@@ -83,6 +89,9 @@ struct ControllerOptions {
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³]:
   /// one value, or one per joint.
   std::vector<double> acceleration_max{15.0}, jerk_max{5000.0};
+  /// By how much an arm that is controlled by position may be away from its set point [rad or m],
+  /// one value, or one per joint: farther away it is held up, and its set point is brought to rest.
+  std::vector<double> tracking_max{0.1};
   /// The largest number of way-points of a goal's path, also of goals that are set later; none:
   /// that of the scene's goals, at least 256.
   std::optional<std::size_t> path_points_max;
@@ -203,9 +212,16 @@ class Controller {
   void decide();
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
-  /// Brings the arm to rest from the next answer on, as if the planner had failed. For the thread
-  /// of tick(). @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
-  void stop(std::string_view cause) { start_braking(cause); }
+  /// Brings the arm to rest from the next tick on, and holds it. Any thread.
+  /// @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
+  void stop(std::string_view cause);
+  /// Goes on from where the arm is measured to be, from the next tick on, if the last answer has
+  /// the state `stopping` and its cause is gone. Planner, guide and shield are made again, goals go
+  /// on where they were. The arm remains stopped if the measurement of that tick cannot be used, or
+  /// if there is no way to stop from where it is; Answer::cause says so. A stop that no answer has
+  /// shown yet remains. Any thread; this takes milliseconds.
+  /// @throws Error plugin if the planner refuses to start; nothing changes then
+  void resume();
 
   /// Searches the path that the last tick has asked for, if it did, without Options::guide_thread.
   /// For the thread of tick(); this allocates.
@@ -272,23 +288,45 @@ class Controller {
   };
   /// What the arm carries, on its way to the tick.
   struct NewLoad {
+    std::uint64_t serial = 0;
     std::uint64_t number = 0;
     std::uint64_t params_number = 0;  ///< of the parameters that its planner was made with
     std::unique_ptr<LoadedArm> arm;   ///< after it was taken: the one before
+    std::uint64_t resumes = 0;        ///< the stop after which the arm is to go on; 0: none
+  };
+  struct StopRequest {
+    std::uint64_t number = 0;
+    LineBuffer cause;
   };
   [[nodiscard]] LoadedArm::Common common() noexcept;
   /// Publishes an arm with other payloads. The caller has locked load_mutex_.
   std::uint64_t publish_load(std::vector<scene::Payload> payloads, const Eigen::VectorXd& q);
+  /// Makes an arm of these payloads, and hands it to the tick. The caller has locked load_mutex_.
+  void publish_arm(std::uint64_t number, std::uint64_t resumes, model::Model model,
+                   const Eigen::VectorXd& q);
+  [[nodiscard]] model::Model model_carrying(std::span<const scene::Payload> payloads,
+                                            const Eigen::VectorXd& q) const;
   /// What is attached, or will be if the tick does not refuse it. The caller has locked
   /// load_mutex_.
   [[nodiscard]] const std::vector<scene::Payload>& payloads() const;
   void take_load();
-  /// Why the arm cannot begin with the load, in load_refusal_; empty if it can.
-  [[nodiscard]] std::string_view load_defect(LoadedArm& fresh);
+  void refuse_to_go_on(const LineBuffer& defect);
+  void refuse_load(std::uint64_t number, const LineBuffer& defect);
+  /// Ends the stop.
+  void go_on();
+  void take_stop();
+  /// Writes why the arm cannot begin with the load; nothing if it can.
+  void describe_defect(LoadedArm& fresh, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
-  void take_braking_state();
+  void extrapolate();
+  [[nodiscard]] const Eigen::VectorXd& acting_torque() const noexcept;
+  /// What the tick acts on where positions are sent: the set point.
+  void take_set_point();
+  /// Stops an arm that is away from its set point.
+  void check_tracking();
+  [[nodiscard]] double rate_up_to(double rise, Eigen::Index joint) const;
   void start_outputs();
   void make_guidance();
   void take_goals();
@@ -303,12 +341,12 @@ class Controller {
   void take_params();
   /// Lets the guide choose what the planner is shown.
   void update_guidance();
-  /// Calls the planner. @return whether it has not failed; else failure_ says why
-  [[nodiscard]] bool ask_planner();
-  [[nodiscard]] bool in_time(double planner_s);
+  /// Calls the planner; stops the arm if it fails or was late too often.
+  void ask_planner();
+  void note_time(double planner_s);
   void log_first_overrun();
   [[nodiscard]] double braking_time_s() const;
-  void start_braking(std::string_view cause);
+  void start_braking(StopReason reason, std::string_view cause);
   /// Sums the planner's channels, or brakes. @return whether the result can be sent
   [[nodiscard]] bool form_outputs();
   [[nodiscard]] bool form_torque();
@@ -327,6 +365,8 @@ class Controller {
   planning::Plugin plugin_;
   model::Model nominal_;  ///< the planner's model of the arm, without what is attached later
   Eigen::VectorXd acceleration_max_, jerk_max_;  ///< of each joint, of positions
+  Eigen::VectorXd tracking_max_;
+  Eigen::VectorXd velocity_max_;  ///< of set points; of size zero: not bounded
   World world_;
   Json params_;                      ///< of the planner, as last set
   std::atomic<double> time_s_{0.0};  ///< of the last tick
@@ -339,9 +379,18 @@ class Controller {
   LoadedArm* newest_arm_;  ///< for writers: the last that was published, or the first
   std::vector<scene::Payload> attached_, accepted_;  ///< with the newest load, and one in use
   std::atomic<std::uint64_t> refused_load_{0}, used_load_{0};
+  std::uint64_t serial_ = 0, resumes_ = 0;  ///< of the newest NewLoad
+  std::atomic<std::uint64_t> taken_serial_{0};
+  std::mutex stop_mutex_;
+  std::uint64_t stop_number_ = 0, taken_stop_ = 0;
+  /// How often the arm was stopped, and at which of the stops it stands still; 0: it does not.
+  std::uint64_t stops_ = 0;
+  std::atomic<std::uint64_t> stopped_{0};
+  std::vector<std::atomic<double>> measured_;  ///< the last joint positions, for other threads
   Newest<GoalList> new_goals_;
   Newest<NewParams> new_params_;
   Newest<NewLoad> new_load_;
+  Newest<StopRequest> new_stop_;
   const GoalList* goal_list_;  ///< that the tick uses
   TargetReceiver receiver_;    ///< among writers, as goals_mutex_
   bool receives_ = false;      ///< whether the newest goals follow a streamed target
@@ -356,20 +405,20 @@ class Controller {
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
   std::optional<StateEstimator> estimator_;
-  std::vector<Eigen::VectorXd> issued_;  ///< for the estimator: torques, or accelerations
+  std::vector<Eigen::VectorXd> issued_;  ///< torques on their way to the arm, where it takes them
   /// What the shield starts from: where friction is not known, an estimate lags behind.
-  Eigen::VectorXd q_measured_;
-  Eigen::VectorXd point_q_, point_v_;  ///< set point of the last tick
+  Eigen::VectorXd q_measured_, v_measured_;
+  bool usable_ = false;   ///< whether the measurement of this tick can be used
+  bool seen_ = false;     ///< whether at least its positions and velocities can
+  double given_s_ = 0.0;  ///< the last time that was in order
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
 
   long k_ = 0;
   std::string_view lost_;  ///< why the last measurement cannot be used; empty if it can
-  std::string_view failure_;
-  int late_answers_ = 0;  ///< in a row
-  /// Memory of lost_, of failure_ where answers were late, of answer_.cause while the arm stops,
-  /// and of answer_.load_refusal.
-  LineBuffer lost_line_, late_line_, cause_line_, load_refusal_;
+  int late_answers_ = 0;   ///< in a row
+  /// Memory of lost_, of answer_.cause while the arm stops, and of answer_.load_refusal.
+  LineBuffer lost_line_, cause_line_, load_refusal_;
   bool reset_ = false;  ///< whether the planner is to be told of a new start
   Eigen::VectorXd q_, v_, rate_, command_rate_;
   Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest

@@ -16,8 +16,8 @@ class StateEstimator {
   ///        (8.19). 0 keeps the bandwidth.
   StateEstimator(Eigen::Index dof, double period_s, double bandwidth, double noise = 0.0);
 
-  /// Starts at a measured position, at rest.
-  void start(const Eigen::VectorXd& q);
+  /// Starts at a measured position with a velocity.
+  void start(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// Advances the estimate by one period to the measurement at its end.
   /// @param q measured joint positions
   /// @param acceleration of the nominal model during the period [rad/s² or m/s²]
