@@ -125,7 +125,8 @@ TEST_CASE("a set point at the goal is not enough: the arm itself must reach it",
   scene["duration_s"] = 12.0;
   scene["actuation"] = {{"type", "position"}, {"servo", {{"kp", 2000.0}, {"kv", 200.0}}}};
   CHECK(run_scene(folder, scene).outcome == Outcome::reached);
-  scene["model"]["friction"] = 180.0;
+  scene["model"]["friction"] = 100.0;
+  scene["duration_s"] = 6.0;
   const auto off = run_scene(folder, scene);
   CHECK(off.outcome == Outcome::timeout);
   CHECK(*off.goal->error_m > 0.01);
