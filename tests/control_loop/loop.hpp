@@ -12,6 +12,7 @@
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/integration/integrator.hpp"
+#include "hamelin/scene/payload.hpp"
 
 namespace hamelin::test {
 
@@ -34,6 +35,24 @@ inline std::string refusal(const std::function<void()>& update) {
     return e.what();
   }
   return "no error";
+}
+
+/// A body for the tip.
+inline scene::Payload small_can() {
+  scene::Payload can;
+  can.name = "can";
+  can.mass_kg = 0.3;
+  can.inertia_kg_m2 = 1e-3 * Eigen::Matrix3d::Identity();
+  can.spheres.push_back({{0.0, 0.0, 0.05}, 0.02});
+  return can;
+}
+
+/// Options of a controller whose arm is to carry something.
+inline control::Controller::Options with_room() {
+  control::Controller::Options options;
+  options.payload_reach_m = 0.3;
+  options.payload_shapes_max = 8;
+  return options;
 }
 
 /// An arm that is simulated by an integrator alone, and a controller that moves it.

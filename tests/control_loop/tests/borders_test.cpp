@@ -38,22 +38,6 @@ std::vector<VectorXd> torques(const scene::Scene& scene, int ticks) {
   return out;
 }
 
-scene::Payload small_can() {
-  scene::Payload can;
-  can.name = "can";
-  can.mass_kg = 0.3;
-  can.inertia_kg_m2 = 1e-3 * Eigen::Matrix3d::Identity();
-  can.spheres.push_back({{0.0, 0.0, 0.05}, 0.02});
-  return can;
-}
-
-control::Controller::Options with_room_for_a_can() {
-  control::Controller::Options options;
-  options.payload_reach_m = 0.3;
-  options.payload_shapes_max = 4;
-  return options;
-}
-
 }  // namespace
 
 TEST_CASE("what a controller drives decides the bounds of safety, not the file of the scene",
@@ -231,9 +215,9 @@ TEST_CASE(
     "parameters that are set between the halves of a tick hold for a load attached there, too",
     "[control][borders]") {
   scene::Scene scene = sampled("clutter.json");
-  const scene::Payload can = small_can();
+  const scene::Payload can = test::small_can();
   const auto fastest = [&](bool attaches) {
-    Loop loop(scene, with_room_for_a_can());
+    Loop loop(scene, test::with_room());
     double most = 0.0;
     for (int k = 0; k < 1200; ++k) {
       loop.controller.observe(loop.state.time_s, loop.state.q, loop.v);
@@ -257,7 +241,7 @@ TEST_CASE("why an arm is held is told for longer than the planner that failed ex
           "[control][borders]") {
   scene::Scene scene = sampled("clutter.json");
   scene.planner->name = "breaking";
-  Loop loop(scene, with_room_for_a_can(), {{"at_tick", 3}, {"how", "throw"}});
+  Loop loop(scene, test::with_room(), {{"at_tick", 3}, {"how", "throw"}});
   for (int k = 0; k < 5; ++k) loop.step(VectorXd(loop.tick().torque));
   REQUIRE(loop.controller.answer().state == control::ControlState::stopping);
   const std::string cause(loop.controller.answer().cause);
@@ -265,7 +249,7 @@ TEST_CASE("why an arm is held is told for longer than the planner that failed ex
   // each change makes a planner, and the second one frees the first planner
   for (int i = 0; i < 4; ++i) {
     if (i % 2 == 0)
-      loop.controller.attach(small_can(), loop.state.q);
+      loop.controller.attach(test::small_can(), loop.state.q);
     else
       loop.controller.detach("can", loop.state.q);
     loop.step(VectorXd(loop.tick().torque));

@@ -14,6 +14,7 @@ using Eigen::VectorXd;
 using test::Loop;
 using test::refusal;
 using test::sampled;
+using test::with_room;
 
 namespace {
 
@@ -25,13 +26,6 @@ scene::Payload box_of(double mass_kg) {
   box.inertia_kg_m2 = 0.001 * mass_kg * Eigen::Matrix3d::Identity();
   box.spheres = {{{0.0, 0.0, 0.1}, 0.05}};
   return box;
-}
-
-control::Controller::Options with_room() {
-  control::Controller::Options options;
-  options.payload_reach_m = 0.3;
-  options.payload_shapes_max = 8;
-  return options;
 }
 
 }  // namespace

@@ -236,24 +236,16 @@ TEST_CASE("an arm cannot go on from where it could not stop, and says so", "[con
 
 TEST_CASE("a load that is attached while an arm is held stays attached when it goes on",
           "[control][stop]") {
-  control::Controller::Options options;
-  options.payload_reach_m = 0.3;
-  options.payload_shapes_max = 4;
-  Loop loop(sampled("clutter.json"), options);
+  Loop loop(sampled("clutter.json"), test::with_room());
   move_on(loop, 300);
   loop.controller.stop("a request");
   move_on(loop, 500);
-  scene::Payload can;
-  can.name = "can";
-  can.mass_kg = 0.3;
-  can.inertia_kg_m2 = 1e-3 * Eigen::Matrix3d::Identity();
-  can.spheres.push_back({{0.0, 0.0, 0.05}, 0.02});
   if (GENERATE(true, false)) {
-    loop.controller.attach(can, loop.state.q);
+    loop.controller.attach(test::small_can(), loop.state.q);
     loop.controller.resume();
   } else {
     loop.controller.resume();
-    loop.controller.attach(can, loop.state.q);
+    loop.controller.attach(test::small_can(), loop.state.q);
   }
   move_on(loop, 1);
   CHECK(loop.controller.answer().state == ControlState::running);
