@@ -187,7 +187,7 @@ void Controller::make_guidance() {
 }
 
 LoadedArm::Common Controller::common() noexcept {
-  Shield::Drive drive;
+  ChangeBounds drive;
   if (options_.position) {
     drive.acceleration_max = acceleration_max_;
     drive.jerk_max = jerk_max_;
@@ -515,8 +515,8 @@ void Controller::shield_torque() {
     answer_.stopping = true;
   }
   if (answer_.stopping) {
-    arm_->shield->stop_torque(from, arm_->pipeline->disturbance(), arm_->pipeline->last(),
-                              answer_.torque);
+    arm_->shield->stop().torque(from, arm_->pipeline->disturbance(), arm_->pipeline->last(),
+                                answer_.torque);
     arm_->limits.start_from(arm_->pipeline->last());
     answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
   }
@@ -533,7 +533,7 @@ void Controller::shield_position() {
     answer_.stopping = true;
   }
   if (answer_.stopping) {
-    arm_->shield->stop_point(answer_.q_next, answer_.v_next);
+    arm_->shield->stop().point(answer_.q_next, answer_.v_next);
     command_rate_ = (answer_.v_next - v_) / period_s_;
   }
 }

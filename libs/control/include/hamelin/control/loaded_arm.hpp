@@ -31,7 +31,7 @@ struct LoadedArm {
     PlannerHost::LineSink log;
     double period_s;
     std::size_t path_points_max;
-    Shield::Drive drive;
+    ChangeBounds drive;
     /// Whether torques are the output, so that a shield must predict where they lead.
     bool sends_torque;
     std::size_t delay_periods;
