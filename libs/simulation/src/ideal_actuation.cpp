@@ -2,6 +2,7 @@
 
 #include "actuation.hpp"
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/torque_limits.hpp"
 #include "hamelin/core/numbers.hpp"
 
 namespace hamelin::simulation {

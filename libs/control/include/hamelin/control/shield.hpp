@@ -110,9 +110,9 @@ class Shield {
                                        const Node& node);
   /// A step of the arm.
   struct Step {
-    const Node& from;                  ///< the node as it was verified
+    Node from;                         ///< the node as it was verified
     const Eigen::VectorXd& departure;  ///< velocity with which the arm would leave it
-    const Node& to;                    ///< what the step would lead to
+    Node to;                           ///< what the step would lead to
     /// Acceleration and torque with which the arm would go on after the step, where these change at
     /// a bounded rate only, and the acceleration that acts besides that of the torque; else not
     /// used.
