@@ -102,6 +102,9 @@ struct ControllerOptions {
   /// The planner has failed after so many answers in a row beyond the deadline; 0: never. Single
   /// late answers are used. Without a clock none is late.
   int late_answers_max = 10;
+  /// For so many ticks in a row the arm may be without a measurement that can be used: it is then
+  /// where its model takes it. After more of them it is stopped.
+  int lost_measurements_max = 0;
   /// How far payloads that are attached later extend beyond the tip [m], and how many shapes they
   /// have together; none: as the scene's events say. What the arm can reach is known so much
   /// farther.
@@ -204,6 +207,10 @@ class Controller {
   /// @throws Error invalid for arrays of another size, or if the time, q or v of the first tick
   ///         cannot be used
   const Answer& tick(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+
+  /// The same for a tick at which no measurement came, a period after the last one.
+  /// @throws Error usage at the first tick
+  const Answer& tick_unseen();
 
   /// The first half of a tick: takes the newest snapshot, finds near obstacles, checks goals and
   /// stalls. answer().state is running, reached or stalled afterwards.
@@ -319,6 +326,8 @@ class Controller {
   /// Writes why the arm cannot begin with the load at a node; nothing if it can.
   void describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// The rest of observe(), once the measurement is taken or missing.
+  void look(bool first);
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
   /// Stops an arm that cannot be seen, or does not do what it is sent.
@@ -392,6 +401,7 @@ class Controller {
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
   bool usable_ = false;   ///< whether the measurement of this tick can be used
+  int unusable_ = 0;      ///< so many in a row cannot be used
   double given_s_ = 0.0;  ///< the last time that was in order
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
