@@ -22,18 +22,15 @@ namespace {
 
 // Obstacles are searched within this distance if the planner gives no other.
 constexpr double default_influence_m = 0.2;
-// Time in which an arm whose planner failed loses most of its speed, as far as accelerations allow;
-// it takes at least so many periods, because the feedback of a shorter time would oscillate.
-constexpr double brake_time_s = 0.05, brake_periods = 10.0;
 // The longest path of goals that are set later, if the caller gives no other.
 constexpr std::size_t default_path_points = 256;
 // The longest path of a guide.
 constexpr std::size_t guide_path_points = 256;
 // The longest time between two ticks: an arm that is told less often is not controlled [s].
 constexpr double period_max_s = 1.0;
-// Larger numbers are neither positions nor velocities of a joint [rad or m, rad/s or m/s], or
-// neither torques nor accelerations [Nm or N, rad/s² or m/s²]: what follows from them may overflow.
-constexpr double measured_max = 1e6, commanded_max = 1e12;
+// Larger numbers are neither positions nor velocities of a joint [rad or m, rad/s or m/s]: what
+// follows from them may overflow.
+constexpr double measured_max = 1e6;
 
 // Also false for numbers that are not finite.
 bool within(const VectorXd& x, double bound) {
@@ -87,8 +84,20 @@ void check_follows(const scene::Scene& scene, const planning::Plugin& plugin) {
                           scene.name, scene.goals.size() - 1, plugin.name()));
 }
 
-std::size_t delay_periods(const scene::Scene& scene, double period_s) {
-  return static_cast<std::size_t>(std::round(scene.actuation.delay_s / period_s));
+DriveOptions drive_options(const scene::Scene& scene, const ControllerOptions& options,
+                           double period_s, int dof) {
+  DriveOptions out;
+  if (options.position)
+    out.kind = DriveKind::position;
+  else
+    out.kind = options.torque ? DriveKind::torque : DriveKind::none;
+  out.period_s = period_s;
+  out.delay_periods = static_cast<std::size_t>(std::round(scene.actuation.delay_s / period_s));
+  out.acceleration_max =
+      positive_per_joint(scene, options.acceleration_max, "acceleration_max", dof);
+  out.jerk_max = positive_per_joint(scene, options.jerk_max, "jerk_max", dof);
+  out.tracking_max = positive_per_joint(scene, options.tracking_max, "tracking_max", dof);
+  return out;
 }
 
 World::Options world_options(const scene::Scene& scene, const model::Model& arm,
@@ -99,16 +108,6 @@ World::Options world_options(const scene::Scene& scene, const model::Model& arm,
                      options.prepare_maps, options.observations};
   out.payload_reach_m = options.payload_reach_m.value_or(bounds.reach_m);
   out.payload_shapes = options.payload_shapes_max.value_or(bounds.shapes);
-  return out;
-}
-
-// The largest speeds of a set point, of size zero where they are not bounded. What the shield keeps
-// for itself is left free: it would refuse what needs it.
-VectorXd set_point_speeds(const scene::Scene& scene, const model::Model& model,
-                          const Shield* shield) {
-  VectorXd out = modelled_limits(scene, model.robot()).velocity_max;
-  if (shield != nullptr && shield->limit_reserve().velocity.size() == out.size())
-    out -= shield->limit_reserve().velocity;
   return out;
 }
 
@@ -145,11 +144,7 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
            scene_.guide.type != scene::GuideType::none ? guide_path_points : std::size_t{0}})),
       plugin_(plugin),
       nominal_(nominal_of(scene_, arm)),
-      acceleration_max_(positive_per_joint(scene_, options_.acceleration_max, "acceleration_max",
-                                           nominal_.dof())),
-      jerk_max_(positive_per_joint(scene_, options_.jerk_max, "jerk_max", nominal_.dof())),
-      tracking_max_(
-          positive_per_joint(scene_, options_.tracking_max, "tracking_max", nominal_.dof())),
+      drive_options_(drive_options(scene_, options_, period_s_, nominal_.dof())),
       world_(scene_, nominal_,
              world_options(scene_, nominal_, options_, plugin.influence_m(params))),
       params_(params),
@@ -167,16 +162,8 @@ Controller::Controller(const scene::Scene& given, const model::Model& arm,
       goals_(goal_list_->goals, scene_.stall, arm_->model) {
   check_follows(scene_, plugin);
   expect_target(scene_.goals);
-  const VectorXd zero = VectorXd::Zero(nominal_.dof());
-  answer_.torque = answer_.q_next = answer_.v_next = q_measured_ = v_measured_ = zero;
-  q_ = v_ = rate_ = command_rate_ = brake_q_ = brake_v_ = brake_rate_ = zero;
+  answer_.torque = answer_.q_next = answer_.v_next = VectorXd::Zero(nominal_.dof());
   make_guidance();
-  if (options_.position) velocity_max_ = set_point_speeds(scene_, nominal_, arm_->shield.get());
-  if (!forms_torque() || options_.position) return;
-  issued_.assign(delay_periods(scene_, period_s_) + 1, zero);
-  if (!scene_.actuation.estimates_velocity) return;
-  estimator_.emplace(nominal_.dof(), period_s_, scene_.actuation.estimator_bandwidth,
-                     scene_.actuation.joint_noise_rad);
 }
 
 void Controller::make_guidance() {
@@ -187,23 +174,8 @@ void Controller::make_guidance() {
 }
 
 LoadedArm::Common Controller::common() noexcept {
-  Shield::Drive drive;
-  if (options_.position) {
-    drive.acceleration_max = acceleration_max_;
-    drive.jerk_max = jerk_max_;
-  } else if (options_.torque) {
-    drive.torque_rate = scene_.actuation.torque_rate_max_Nm_s.value_or(0.0);
-  }
-  return {plugin_,
-          world_,
-          options_.log,
-          period_s_,
-          path_points_max_,
-          std::move(drive),
-          options_.torque && !options_.position,
-          delay_periods(scene_, period_s_),
-          time_s_.load(),
-          options_.guide_thread};
+  return {plugin_,        world_,         options_.log,         path_points_max_,
+          drive_options_, time_s_.load(), options_.guide_thread};
 }
 
 double steady_clock_s() {
@@ -222,7 +194,7 @@ void Controller::reset() {
   answer_.state = ControlState::running;
   answer_.reason = StopReason::none;
   answer_.cause = lost_ = {};
-  stopped_ = 0;
+  stopped_ = begun_stop_ = 0;
   verdict_.reset();
   goals_.restart();
   expect_target(newest_goals_);
@@ -249,12 +221,12 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   measure(time_s, q, v);
   verdict_.reset();
   if (options_.certify && !first) {  // against the world in which the arm moved
-    arm_->view.look(q_, time_s_);
-    verdict_ = arm_->view.certify(q_, v_);
-    if (arm_->view.take_newest()) arm_->view.look(q_, time_s_);
+    arm_->view.look(this->q(), time_s_);
+    verdict_ = arm_->view.certify(this->q(), this->v());
+    if (arm_->view.take_newest()) arm_->view.look(this->q(), time_s_);
   } else {
     (void)arm_->view.take_newest();
-    arm_->view.look(q_, time_s_);
+    arm_->view.look(this->q(), time_s_);
   }
   take_load();
   take_stop();
@@ -265,13 +237,14 @@ void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   answer_.state = ControlState::running;
   answer_.cause = {};
   update_reference();
-  while (!reference_.on_the_way() && goals_.advance(arm_->view.poses(), q_, v_)) update_reference();
+  while (!reference_.on_the_way() && goals_.advance(arm_->view.poses(), this->q(), this->v()))
+    update_reference();
   answer_.goal_index = goals_.index();
   update_target();
   if (goals_.all_reached())
     answer_.state = ControlState::reached;
   else if (!(guidance_ && guidance_->waits()) && !arm_->planner.detects_stalls() &&
-           goals_.stalled(arm_->view.poses(), v_, period_s_)) {
+           goals_.stalled(arm_->view.poses(), this->v(), period_s_)) {
     if (guidance_ && guidance_->stalled())
       goals_.forget_rest();
     else
@@ -300,31 +273,7 @@ void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
   if (finite)
     for (Eigen::Index i = 0; i < dof; ++i)
       measured_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
-  if (finite) q_measured_ = q;
-  if (finite && uses_v) v_measured_ = v;
-  if (options_.position) return take_set_point();
-  const bool seen_before = std::exchange(seen_, finite);
-  if (!finite) return extrapolate();
-  if (!estimator_) {
-    q_ = q;
-    v_ = v;
-    return;
-  }
-  if (k_ == 0 || !seen_before) {
-    estimator_->start(q, k_ == 0 ? v_measured_ : v_);
-  } else {
-    dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting_torque(), rate_);
-    estimator_->update(q, rate_);
-  }
-  q_ = estimator_->q();
-  v_ = estimator_->v();
-}
-
-// A planner that was shown where servos have brought the arm would correct what they are about to
-// correct, and oscillate.
-void Controller::take_set_point() {
-  q_ = k_ == 0 ? q_measured_ : answer_.q_next;
-  v_ = k_ == 0 ? v_measured_ : answer_.v_next;
+  arm_->drive->measure(q, v, finite);
 }
 
 // The first line stays: it says why the arm stops.
@@ -346,83 +295,37 @@ void Controller::lose_measurement(double time_s, bool in_order) {
   lost_ = line.view();
 }
 
-// Without a measurement the arm is where its model and what was not explained last take it.
-void Controller::extrapolate() {
-  if (issued_.empty()) return;
-  dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, acting_torque(), rate_);
-  if (estimator_)
-    rate_ += estimator_->disturbance();
-  else if (arm_->pipeline)
-    rate_ += arm_->pipeline->disturbance();
-  q_ += period_s_ * v_ + (0.5 * period_s_ * period_s_) * rate_;
-  v_ += period_s_ * rate_;
-  q_measured_ = q_;
-}
-
-// Issued `delay` ticks before the last one; it acted since then.
-const VectorXd& Controller::acting_torque() const noexcept {
-  return issued_[static_cast<std::size_t>(k_) % issued_.size()];
-}
-
-// Until the first answer acts, the arm is held against gravity.
-void Controller::start_outputs() {
-  answer_.q_next = q_;
-  answer_.v_next = v_;
-  command_rate_.setZero();
-  if (!forms_torque()) return;
-  dynamics::gravity_torque(arm_->model, arm_->ws, q_, answer_.torque);
-  arm_->limits.start_from(answer_.torque);
-  if (arm_->pipeline) arm_->pipeline->start_from(answer_.torque);
-  for (auto& issued : issued_) issued = answer_.torque;
-}
-
 void Controller::decide() {
-  if (k_ == 0) start_outputs();
+  Drive& drive = *arm_->drive;
+  if (k_ == 0) drive.start();
   if (arm_->shield && !shielded_) {
-    arm_->shield->start(surroundings(), {q_, v_});
+    arm_->shield->start(surroundings(), drive.node());
     shielded_ = true;
   }
-  if (answer_.state != ControlState::stopping) {
-    if (!lost_.empty())
-      start_braking(StopReason::measurement, lost_);
-    else
-      check_tracking();
-  }
+  if (answer_.state != ControlState::stopping) check_arm();
   if (answer_.state != ControlState::stopping) ask_planner();
   answer_.series = arm_->planner.command().series();
-  if (!form_outputs()) {
-    start_braking(
-        StopReason::planner,
-        "the sum of the planner's channels is no torque or acceleration of an arm, expected finite "
-        "numbers below 1e12");
-    (void)form_outputs();
-  }
-  answer_.stopping = false;
-  if (arm_->shield && options_.position)
-    shield_position();
-  else if (arm_->pipeline)
-    shield_torque();
-  if (!issued_.empty()) issued_[static_cast<std::size_t>(k_) % issued_.size()] = answer_.torque;
-  if (options_.certify) arm_->view.depart(q_, v_);
+  propose();
+  act();
+  const Setpoint& sent = drive.send();
+  answer_.torque = sent.torque;
+  answer_.saturated = sent.saturated;
+  answer_.q_next = sent.q;
+  answer_.v_next = sent.v;
+  if (options_.certify) arm_->view.depart(q(), v());
   ++k_;
 }
 
-void Controller::check_tracking() {
-  if (!options_.position) return;
-  Eigen::Index j = 0;
-  const double excess = ((q_measured_ - q_).cwiseAbs() - tracking_max_).maxCoeff(&j);
-  if (excess <= 0.0) return;
-  const auto& joint = nominal_.robot().links[static_cast<std::size_t>(j)].joint;
-  LineBuffer line;
-  append(line, "joint '{}' is {:.3g} {} from its set point, expected at most {:.3g} (tracking_max)",
-         joint.name, excess + tracking_max_[j],
-         joint.type == model::JointType::prismatic ? "m" : "rad", tracking_max_[j]);
-  start_braking(StopReason::tracking, line.view());
+void Controller::check_arm() {
+  if (!lost_.empty()) return start_braking(StopReason::measurement, lost_);
+  LineBuffer defect;
+  arm_->drive->describe_defect(defect);
+  if (!defect.view().empty()) start_braking(StopReason::tracking, defect.view());
 }
 
 void Controller::ask_planner() {
   take_params();
-  if (reset_) arm_->planner.reset(q_, v_);
+  if (reset_) arm_->planner.reset(q(), v());
   const std::size_t index = std::min(goals_.index(), goals_.size() - 1);
   const hamelin_goal* const listed = &goal_list_->for_planner[index];
   if (reset_ || (listed_ != nullptr && listed_ != listed)) {
@@ -434,8 +337,7 @@ void Controller::ask_planner() {
   goal_ = {goal_for_planner(), goal_.number, index};
   reset_ = false;
   const double since_s = options_.clock_s != nullptr ? options_.clock_s() : 0.0;
-  const bool sends_torque = forms_torque() && !options_.position;
-  if (!arm_->planner.tick(k_, time_s_, q_, v_, goal_, sends_torque ? &answer_.torque : nullptr))
+  if (!arm_->planner.tick(k_, time_s_, q(), v(), goal_, arm_->drive->last_torque()))
     return start_braking(StopReason::planner, arm_->planner.error());
   if (options_.clock_s != nullptr) note_time(options_.clock_s() - since_s);
   if (answer_.state == ControlState::stopping || !arm_->planner.gave_up() ||
@@ -468,10 +370,6 @@ void Controller::log_first_overrun() {
   options_.log(HAMELIN_LOG_WARNING, line.view());
 }
 
-double Controller::braking_time_s() const {
-  return std::max(brake_time_s, brake_periods * period_s_);
-}
-
 // The cause is copied: its planner may be gone while the arm is still held.
 void Controller::start_braking(StopReason reason, std::string_view cause) {
   LineBuffer line;
@@ -481,108 +379,34 @@ void Controller::start_braking(StopReason reason, std::string_view cause) {
   answer_.reason = reason;
   answer_.cause = cause_line_.view();
   stopped_ = ++stops_;
-  brake_q_ = q_;
-  brake_v_ = v_;
 }
 
-bool Controller::form_outputs() {
+void Controller::propose() {
   answer_.channels = answer_.state == ControlState::stopping ? nullptr : &arm_->planner.command();
-  return (!forms_torque() || form_torque()) && (!options_.position || form_position());
+  if (answer_.channels == nullptr || arm_->drive->propose(*answer_.channels)) return;
+  start_braking(
+      StopReason::planner,
+      "the sum of the planner's channels is no torque or acceleration of an arm, expected finite "
+      "numbers below 1e12");
+  answer_.channels = nullptr;
 }
 
-bool Controller::form_torque() {
-  if (answer_.channels == nullptr)
-    brake();
-  else
-    arm_->sum.sum(arm_->ws, *answer_.channels, q_, v_, q_, period_s_, 1.0, answer_.torque);
-  if (!within(answer_.torque, commanded_max)) return false;
-  answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
-  return true;
-}
-
-void Controller::shield_torque() {
-  arm_->pipeline->observe(arm_->ws, q_, v_);
-  arm_->pipeline->predict(arm_->ws, q_measured_, v_);
-  const Shield::Node from{arm_->pipeline->q(), arm_->pipeline->v()};
-  if (answer_.channels != nullptr) {
-    arm_->pipeline->advance(arm_->ws, answer_.torque);
-    const Shield::Node to{arm_->pipeline->q_next(), arm_->pipeline->v_next()};
-    answer_.stopping =
-        !arm_->shield->accept(surroundings(), {from, from.v, to, arm_->pipeline->acceleration(),
-                                               answer_.torque, arm_->pipeline->disturbance()});
-  } else {
-    arm_->shield->refuse();
+void Controller::act() {
+  answer_.stopping = false;
+  Drive& drive = *arm_->drive;
+  if (!drive.acts()) return;
+  if (Shield* const shield = arm_->shield.get()) {
+    if (answer_.channels == nullptr)
+      shield->refuse();
+    else if (shield->accept(surroundings(), drive.step()))
+      return;
     answer_.stopping = true;
-  }
-  if (answer_.stopping) {
-    arm_->shield->stop_torque(from, arm_->pipeline->disturbance(), arm_->pipeline->last(),
-                              answer_.torque);
-    arm_->limits.start_from(arm_->pipeline->last());
-    answer_.saturated = arm_->limits.limit(answer_.torque, period_s_);
-  }
-  arm_->pipeline->send(answer_.torque);
-}
-
-void Controller::shield_position() {
-  const Shield::Node from{q_, v_}, to{answer_.q_next, answer_.v_next};
-  if (answer_.channels != nullptr) {
-    answer_.stopping = !arm_->shield->accept(
-        surroundings(), {from, from.v, to, command_rate_, answer_.torque, command_rate_});
   } else {
-    arm_->shield->refuse();
-    answer_.stopping = true;
+    if (answer_.channels != nullptr) return;
+    if (begun_stop_ != stopped_) drive.begin(arm_->stop());
+    begun_stop_ = stopped_;
   }
-  if (answer_.stopping) {
-    arm_->shield->stop_point(answer_.q_next, answer_.v_next);
-    command_rate_ = (answer_.v_next - v_) / period_s_;
-  }
-}
-
-// Follows a motion that loses its velocity and then rests, with gravity and Coriolis torques
-// compensated. Without the two terms of feedback, errors of the nominal masses would let the arm
-// sink; with them it rests off by the error of its acceleration times the square of the time.
-void Controller::brake() {
-  const double time_s = braking_time_s();
-  const VectorXd& a = acceleration_max_;
-  brake_rate_ = (-brake_v_ / time_s).cwiseMin(a).cwiseMax(-a);
-  rate_ = brake_rate_ + 2.0 / time_s * (brake_v_ - v_) + (brake_q_ - q_) / (time_s * time_s);
-  rate_ = rate_.cwiseMin(a).cwiseMax(-a);
-  dynamics::inverse_dynamics(arm_->model, arm_->ws, q_, v_, rate_, answer_.torque);
-  brake_v_ += period_s_ * brake_rate_;
-  brake_q_ += period_s_ * brake_v_;
-}
-
-// The largest rate from which a jerk within its bound can end before the speed has risen by more
-// than `rise`: the rise by a rate that falls from r to zero is r²/(2 j) + r T/2.
-double Controller::rate_up_to(double rise, Eigen::Index joint) const {
-  const double T = period_s_, j = jerk_max_[joint];
-  if (!(rise > 0.0)) return rise / T;
-  return j * (std::sqrt(0.25 * T * T + 2.0 * rise / j) - 0.5 * T);
-}
-
-// The velocity goes to zero if the planner failed. Otherwise it follows the planner's, or the one
-// that the torque causes, within bounds of acceleration and jerk; the position integrates it.
-bool Controller::form_position() {
-  const double T = period_s_;
-  if (answer_.channels == nullptr) {
-    rate_ = -answer_.v_next / braking_time_s();
-  } else if (answer_.channels->raw().has_node_velocity != 0) {
-    rate_ = (answer_.channels->node_velocity() - answer_.v_next) / T;
-  } else {
-    dynamics::forward_dynamics(arm_->model, arm_->ws, q_, v_, answer_.torque, rate_);
-  }
-  if (!within(rate_, commanded_max)) return false;
-  for (Eigen::Index i = 0; i < rate_.size(); ++i) {
-    const double step = jerk_max_[i] * T;
-    double bounded = std::clamp(rate_[i], -acceleration_max_[i], acceleration_max_[i]);
-    if (velocity_max_.size() > 0)
-      bounded = std::clamp(bounded, -rate_up_to(velocity_max_[i] + answer_.v_next[i], i),
-                           rate_up_to(velocity_max_[i] - answer_.v_next[i], i));
-    command_rate_[i] = std::clamp(bounded, command_rate_[i] - step, command_rate_[i] + step);
-  }
-  answer_.v_next += T * command_rate_;
-  answer_.q_next += T * answer_.v_next;
-  return true;
+  drive.follow(arm_->stop());
 }
 
 }  // namespace hamelin::control

@@ -197,15 +197,15 @@ void Controller::take_stop() {
     start_braking(StopReason::request, newest.cause.view());
 }
 
-void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
+void Controller::describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line) {
   (void)fresh.view.take_newest();
-  fresh.view.look(q_, time_s_);
+  fresh.view.look(node.q, time_s_);
   if (!fresh.shield) {
     if (fresh.view.touching()) fresh.view.describe_contact(line);
     return;
   }
   const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
-  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, {q_, v_})) return;
+  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, node)) return;
   fresh.shield->describe(world.environment, line);
 }
 
@@ -218,19 +218,17 @@ void Controller::take_load() {
              resumes = asked && usable_;
   if (newest.number == answer_.load && !resumes) return;
   LoadedArm& fresh = *newest.arm;
-  if (resumes && options_.position) {  // where servos have brought it
-    q_ = q_measured_;
-    v_ = v_measured_;
-  }
+  const Drive& drive = *arm_->drive;
   LineBuffer defect;
-  describe_defect(fresh, defect);
+  describe_defect(fresh, resumes ? drive.resume_node() : drive.node(), defect);
   if (!defect.view().empty()) {
     if (resumes) refuse_to_go_on(defect);
     if (newest.number != answer_.load) refuse_load(newest.number, defect);
     return;
   }
-  fresh.limits.start_from(answer_.torque);
-  if (fresh.pipeline) fresh.pipeline->continue_from(*arm_->pipeline);
+  fresh.drive->continue_from(drive);
+  if (resumes) fresh.drive->resume();
+  begun_stop_ = 0;
   std::swap(arm_, newest.arm);
   goals_.set_model(arm_->model);
   used_params_ = newest.params_number;  // newer ones are applied to this arm's planner, too
@@ -249,7 +247,6 @@ void Controller::refuse_load(std::uint64_t number, const LineBuffer& defect) {
 }
 
 void Controller::refuse_to_go_on(const LineBuffer& defect) {
-  if (options_.position) take_set_point();
   cause_line_.clear();
   append(cause_line_, "cannot go on: {}", defect.view());
   answer_.cause = cause_line_.view();
@@ -262,10 +259,6 @@ void Controller::go_on() {
   stopped_ = 0;
   late_answers_ = 0;
   goals_.forget_rest();
-  if (!options_.position) return;
-  answer_.q_next = q_;
-  answer_.v_next = v_;
-  command_rate_.setZero();
 }
 
 void Controller::take_goals() {
@@ -295,7 +288,7 @@ void Controller::update_reference() {
   answer_.reference = nullptr;
   if (!goal.trajectory) return reference_.stop();
   if (reference_.goal() != &goal) reference_.start(goal);
-  answer_.reference = &reference_.update(period_s_, q_, v_);
+  answer_.reference = &reference_.update(period_s_, q(), v());
   // an arm that waits where its reference does has not stalled
   if (reference_.on_the_way() && answer_.reference->rate > 0.0) goals_.forget_rest();
 }
@@ -311,7 +304,7 @@ const hamelin_goal* Controller::goal_for_planner() {
 
 void Controller::update_guidance() {
   const Guidance::News news = guidance_->update(
-      {time_s_, period_s_, q_, goals_.goal(), listed_number_ + 1, arm_->view.snapshot()},
+      {time_s_, period_s_, q(), goals_.goal(), listed_number_ + 1, arm_->view.snapshot()},
       *arm_->guide);
   if (const std::uint64_t number = guidance_->number(); number != guidance_number_) {
     guidance_number_ = number;

@@ -78,19 +78,26 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
       shield(make_shield(scene, common)),
       planner(common.plugin, make_setup(scene, common), params, model, common.world, view,
               common.log, common.now_s),
-      limits(model, modelled_limits(scene, model.robot()).effort_max,
-             scene.actuation.torque_rate_max_Nm_s),
-      sum(model, view.contacts_max()),
-      ws(model),
       guide(make_guide(scene, params, common)),
       start_q_(scene.start_q) {
-  if (shield && common.sends_torque) pipeline.emplace(model, common.delay_periods, common.period_s);
+  DriveOptions of_drive = common.drive;
+  of_drive.gyroscopic_terms_max = view.contacts_max();
+  drive = make_drive(scene, model, of_drive, shield ? shield->limit_reserve() : LimitReserve{});
+  if (!shield && drive->acts()) make_stop(scene, common);
+}
+
+void LoadedArm::make_stop(const scene::Scene& scene, const Common& common) {
+  ChangeBounds changes = common.drive.changes(scene);
+  changes.acceleration_max = common.drive.acceleration_max;
+  finder_.emplace(scene, model, common.drive.period_s, changes);
+  unverified_stop_.emplace(scene, model, common.drive.period_s, changes, *finder_, nullptr);
 }
 
 bool LoadedArm::restart(scene::Scene scene, const Json& params, const Common& common) {
   scene.start_q = start_q_;
   shield = make_shield(scene, common);
   guide = make_guide(scene, params, common);
+  drive->forget();
   if (common.plugin.can_reset()) return false;
   planner.restart(make_setup(scene, common), params);
   return true;
@@ -99,7 +106,8 @@ bool LoadedArm::restart(scene::Scene scene, const Json& params, const Common& co
 std::unique_ptr<Shield> LoadedArm::make_shield(const scene::Scene& scene,
                                                const Common& common) const {
   if (scene::safety_type(scene) != scene::SafetyType::shield) return nullptr;
-  return std::make_unique<Shield>(scene, model, view.self_field(), common.period_s, common.drive);
+  return std::make_unique<Shield>(scene, model, view.self_field(), common.drive.period_s,
+                                  common.drive.changes(scene));
 }
 
 std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, const Json& params,
@@ -113,7 +121,7 @@ std::unique_ptr<GuideSearch> LoadedArm::make_guide(const scene::Scene& scene, co
 
 planning::SetupData LoadedArm::make_setup(const scene::Scene& scene, const Common& common) {
   if (common.now_s > 0.0) view.look(scene.start_q, common.now_s);  // the planner may ask at once
-  planning::SetupData setup = planner_setup(scene, model, view, common.period_s,
+  planning::SetupData setup = planner_setup(scene, model, view, common.drive.period_s,
                                             shield ? shield->limit_reserve() : LimitReserve{});
   setup.path_points_max = common.path_points_max;
   return setup;

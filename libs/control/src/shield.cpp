@@ -20,13 +20,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// ω of docs/theory.md (14.14) [1/s]; feedback that is faster than the steps would oscillate.
-constexpr double feedback_rate = 50.0, feedback_per_step = 0.2;
 // A stop lasts at least this long, so that the planner's answer does not alternate with it [s].
 constexpr double dwell_s = 0.005;
-// A stop takes at least so many steps, or as many without torque limits: a torque that stops the
-// arm at once would not resolve the motion.
-constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // What planners are kept from limits beyond the shield's own margins: most of them pass their
 // bounds a little [rad or m]; and as shares of the speed limits, where velocities are exact, which
 // change a little within a step, and where they are not.
@@ -37,25 +32,19 @@ constexpr double sampled_speed_reserve = 0.02, estimated_speed_reserve = 0.1,
                  least_speed_share = 0.5;
 // Steps in which a margin is sought that would do [m].
 constexpr double smallest_m = 1e-9;
-// The share of the torques' rate with which a stop is planned: the rest is for its feedback.
-constexpr double ramp_share = 0.5;
 // The share of the speed limits that the move of an evasion uses.
 constexpr double move_speed_share = 0.8;
 // Velocities may exceed their limit by rounding.
 constexpr double velocity_rounding = 1e-9;
 
-double smallest_rest_time(const ModelledLimits& limits, double period_s) {
-  return period_s * (limits.effort_max.size() > 0 ? stop_steps : unlimited_stop_steps);
-}
-
 MoveTime::Limits move_limits(const scene::Scene& scene, const ModelledLimits& limits,
-                             const Shield::Drive& drive, double period_s) {
+                             const ChangeBounds& changes, double period_s) {
   MoveTime::Limits out{scene::safety_bounds(scene).torque_share * limits.effort_max,
                        limits.velocity_max,
-                       drive.acceleration_max,
-                       drive.jerk_max,
-                       ramp_share * drive.torque_rate,
-                       unlimited_stop_steps * period_s};
+                       changes.acceleration_max,
+                       changes.jerk_max,
+                       StopFinder::ramp_share * changes.torque_rate,
+                       StopFinder::least_time_s(false, period_s)};
   if (out.velocity_max.size() > 0) out.velocity_max *= move_speed_share;
   return out;
 }
@@ -92,7 +81,7 @@ std::string_view to_string(StopCause cause) noexcept {
 }
 
 Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-               double period_s, const Drive& drive)
+               double period_s, const ChangeBounds& changes)
     : model_(model),
       self_(self),
       scene_name_(scene.name),
@@ -100,31 +89,24 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       period_s_(period_s),
       margin_m_(scene.safety.margin_m),
       dwell_(std::lround(dwell_s / period_s)),
-      feedback_rate_(std::min(feedback_rate, feedback_per_step / period_s)),
       limits_(modelled_limits(scene, model.robot())),
-      damping_(joint_numbers(scene, scene.model.joint_damping, "joint_damping", model.robot(),
-                             &model::Joint::damping)),
-      friction_(joint_numbers(scene, scene.model.friction, "friction", model.robot(),
-                              &model::Joint::friction)),
-      friction_speed_(scene.model.friction_speed),
       torque_share_(scene::safety_bounds(scene).torque_share),
       levers_(model, self),
-      drive_(drive),
-      straying_(scene, model, levers_, period_s, feedback_rate_, drive.torque_rate),
+      finder_(scene, model, period_s, changes),
+      straying_(scene, model, levers_, period_s, Stop::feedback_rate(period_s),
+                changes.torque_rate),
+      stop_(scene, model, period_s, changes, finder_, &straying_),
       step_line_(model, levers_, self),
       ramp_line_(model, levers_, self),
       stop_line_(model, levers_, self),
-      braking_(model, torque_share_ * limits_.effort_max, drive.acceleration_max,
-               1.0 / smallest_rest_time(limits_, period_s)),
       ws_(model),
-      stop_(model.dof()),
       tried_(model.dof()),
       arm_from_(model),
       arm_to_(model),
       arm_line_(model),
       arm_end_(model),
       lead_s_(sampled_ ? scene.actuation.delay_s : 0.0),
-      move_time_(model, move_limits(scene, limits_, drive, period_s)),
+      move_time_(model, move_limits(scene, limits_, changes, period_s)),
       move_line_(model, levers_, self),
       other_line_(model, levers_, self),
       stop_check_(model, levers_),
@@ -134,10 +116,7 @@ Shield::Shield(const scene::Scene& scene, const model::Model& model, const scene
       bounded_check_(model, levers_) {
   const Index n = model.dof();
   set_reserve(scene, scene.start_q.size() > 0 ? scene.start_q : VectorXd::Zero(n));
-  stop_bounds_ = straying_.bounds();
-  for (auto* x : {&stop_stray_, &line_stray_, &integral_, &zero_, &w_, &reference_q_, &reference_v_,
-                  &q_, &v_, &rate_, &hold_, &acceleration_})
-    x->setZero(n);
+  for (auto* x : {&line_stray_, &zero_, &way_, &hold_}) x->setZero(n);
   aside_ = zero_;
   asides_.emplace(model, limits_, reserve_.position, scene.seed);
   for (const auto& shape : model.shapes()) shape_names_.push_back(model.describe(shape));
@@ -173,6 +152,7 @@ void Shield::notice(const Surroundings& world) {
 
 void Shield::start(const Surroundings& world, const Node& node) {
   counts_ = {};
+  stop_.set_strayed({});
   largest_margin_ = 0.0;
   if (try_start(world, node)) return;
   throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
@@ -189,6 +169,7 @@ bool Shield::try_start(const Surroundings& world, const Node& node) {
 bool Shield::start_in_place_of(const Shield& other, const Surroundings& world, const Node& node) {
   if (!try_start(world, node)) return false;
   counts_ = other.counts_;
+  stop_.set_strayed(other.stop_.strayed());
   largest_margin_ = std::max(largest_margin_, other.largest_margin_);
   return true;
 }
@@ -200,7 +181,7 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
       return fmt::format(
           "/safety/torque_share: {} of the torque limits is too little to stop at the start and "
           "hold the arm there, expected at least {}",
-          torque_share_, std::ceil(1e3 * torque_share_ * braking_.utilisation()) / 1e3);
+          torque_share_, std::ceil(1e3 * torque_share_ * finder_.utilisation()) / 1e3);
     case StopCause::joint_limit:
     case StopCause::velocity_limit:
       return fmt::format("/start: {}, expected a start from which the arm can stop", what);
@@ -225,14 +206,11 @@ std::string Shield::defect_at_start(const Surroundings& world, const Node& node)
 }
 
 void Shield::take_tried() {
-  std::swap(stop_, tried_);
-  stop_bounds_ = straying_.bounds();
-  stop_stray_ = stop_bounds_.tracking + stop_bounds_.errors;
-  stop_time_ = 0.0;
+  stop_.begin(tried_, straying_.bounds());
   stopping_ = changed_ = false;
   run_ = 0;
   largest_margin_ = std::max(largest_margin_, stop_line_.largest_stray_m());
-  if (stop_.stop().braking().ramp_s > 0.0)
+  if (stop_.motion().stop().braking().ramp_s > 0.0)
     largest_margin_ = std::max(largest_margin_, ramp_line_.largest_stray_m());
 }
 
@@ -241,7 +219,7 @@ bool Shield::accept(const Surroundings& world, const Step& step) {
   ++counts_.steps;
   notice(world);
   const bool movers = list_movers(world, step.from);
-  const bool dwells = stopping_ && run_ < dwell_ && !at_rest();
+  const bool dwells = stopping_ && run_ < dwell_ && !stop_.at_rest();
   if (!dwells && to.q.allFinite() && to.v.allFinite() && verify(world, step) &&
       (!movers || allow_for_movers(world, step))) {
     take_tried();
@@ -266,11 +244,11 @@ void Shield::refuse() {
 
 void Shield::count_refusal() {
   ++counts_.refused;
-  if (at_rest()) ++counts_.at_rest;
+  if (stop_.at_rest()) ++counts_.at_rest;
   if (!stopping_) {
     ++counts_.stops;
     ++counts_.causes[static_cast<std::size_t>(refusal_.cause)];
-    if (stop_.moves()) ++counts_.evasions;
+    if (stop_.motion().moves()) ++counts_.evasions;
   }
   stopping_ = true;
   counts_.longest = std::max(counts_.longest, ++run_);
@@ -283,9 +261,9 @@ void Shield::check_overtaken(const Surroundings& world, const Node& node) {
         .check(ws_, &world.environment, world.time_s, from, to, {zero_, no_addition_, 0.0})
         .has_value();
   };
-  const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.end(), arm_end_);
-  const bool goes_on = stop_.moves() && stop_time_ < stop_.stop_s();
-  const LineCheck::End turn = goes_on ? place(stop_.stop().end(), arm_line_) : from;
+  const LineCheck::End from = place(node.q, arm_from_), end = place(stop_.motion().end(), arm_end_);
+  const bool goes_on = stop_.motion().moves() && !stop_.has_stopped();
+  const LineCheck::End turn = goes_on ? place(stop_.motion().stop().end(), arm_line_) : from;
   if ((goes_on && blocked(from, turn)) || blocked(turn, end)) ++counts_.overtaken;
 }
 
@@ -380,49 +358,13 @@ bool Shield::stop_is_clear(const Surroundings& world, const LineCheck::End& at_t
   return is_clear(ramp_line_, world, at_to, at_line, line_stray_);
 }
 
-std::pair<double, double> Shield::transition_times(const Step& step, double rate) {
-  double ramp = 0.0, fade = 0.0;
-  if (drive_.torque_rate > 0.0) {
-    const double torque_rate = ramp_share * drive_.torque_rate;
-    rate_ = -rate * w_ - step.disturbance;
-    dynamics::inverse_dynamics(model_, ws_, step.to.q, w_, rate_, q_);
-    ramp = (q_ - step.torque).cwiseAbs().maxCoeff() / torque_rate;
-    dynamics::momentum(model_, ws_, step.to.q, w_, q_);
-    fade = rate * q_.cwiseAbs().maxCoeff() / torque_rate;
-  }
-  for (Index j = 0; j < drive_.jerk_max.size(); ++j) {
-    ramp = std::max(ramp, std::abs(step.acceleration[j] + rate * w_[j]) / drive_.jerk_max[j]);
-    fade = std::max(fade, std::abs(rate * w_[j]) / drive_.jerk_max[j]);
-  }
-  return {ramp, fade};
-}
-
-// docs/theory.md (14.13): the rate of braking and the time to reach it depend on each other.
 bool Shield::find_stop(const Step& step, double least_utilisation) {
-  constexpr int tries = 3;
-  constexpr double whole = 1.0;  // of docs/theory.md (14.13)
   const Node& to = step.to;
-  double ramp = 0.0, fade = 0.0, rate = 0.0;
-  w_ = to.v;
-  for (int i = 0; i < tries; ++i) {
-    reference_q_ = to.q + ramp * to.v;
-    const std::optional<double> found = braking_.find(reference_q_, w_, least_utilisation);
-    if (!found) {
-      refusal_ = {StopCause::torque, {}, -1};
-      return false;
-    }
-    rate = *found;
-    if (drive_.torque_rate == 0.0 && drive_.jerk_max.size() == 0) break;
-    std::tie(ramp, fade) = transition_times(step, rate);
-    // faster braking would take longer to begin
-    for (int k = 0; k < tries && rate * (ramp + fade) > whole; ++k) {
-      rate *= std::sqrt(whole / (rate * (ramp + fade)));
-      std::tie(ramp, fade) = transition_times(step, rate);
-    }
-    if (rate * (ramp + fade) > 1.9 * whole) rate = 1.9 * whole / (ramp + fade);
-    w_ = to.v + 0.5 * ramp * step.acceleration;
+  if (!finder_.find({to.q, to.v, step.acceleration, step.torque, step.disturbance},
+                    least_utilisation, tried_)) {
+    refusal_ = {StopCause::torque, {}, -1};
+    return false;
   }
-  tried_.set_stop(to.q, to.v, step.acceleration, {rate, ramp, fade});
   straying_.bound(tried_.stop());
   return true;
 }
@@ -454,94 +396,12 @@ void Shield::set_reserve(const scene::Scene& scene, const VectorXd& q) {
   reserve_of(limits_.velocity_max - speed_max_ + planner_speed_reserve * limits_.velocity_max);
 }
 
-// Whether the bounds that the scene states hold can be seen by what a stop does.
-void Shield::note_straying(const VectorXd& q) {
-  for (Index j = 0; j < q.size(); ++j) note_straying(j, std::abs(q[j] - reference_q_[j]));
-}
-
-void Shield::note_straying(Index joint, double strayed) {
-  counts_.strayed = std::max(counts_.strayed, strayed);
-  const double bound = stop_stray_[joint];
-  if (!(strayed > counts_.strayed_share * bound)) return;
-  counts_.strayed_share = strayed / bound;
-  counts_.strayed_joint = static_cast<int>(joint);
-}
-
-void Shield::stop_torque(const Node& node, const VectorXd& disturbance, const VectorXd& last,
-                         VectorXd& torque) {
-  follow_stop(node, disturbance, torque);
-  if (has_lost_stop(node, torque, last)) {
-    begin_again(node, disturbance, last);
-    follow_stop(node, disturbance, torque);
-  }
-  stop_time_ += period_s_;
-}
-
-void Shield::follow_stop(const Node& node, const VectorXd& disturbance, VectorXd& torque) {
-  const double middle = stop_time_ + 0.5 * period_s_, end = stop_time_ + period_s_;
-  stop_.at(stop_time_, reference_q_, reference_v_);
-  note_straying(node.q);
-  feed_back(node);
-  stop_.at(end, q_, v_);
-  rate_ += (v_ - reference_v_) / period_s_;
-  if (!at_rest()) rate_ -= disturbance;
-  stop_.at(middle, q_, v_);
-  dynamics::inverse_dynamics(model_, ws_, q_, v_, rate_, torque);
-  if (at_rest()) resist(disturbance, torque);
-  if (damping_.size() > 0) torque += damping_.cwiseProduct(v_);
-  if (friction_.size() > 0)
-    torque.array() += friction_.array() * (v_ / friction_speed_).array().tanh();
-  if (limits_.effort_max.size() > 0)
-    torque = torque.cwiseMin(limits_.effort_max).cwiseMax(-limits_.effort_max);
-}
-
-// docs/theory.md (14.15): friction holds an arm that rests, so what may be friction is left to it.
-// An integral against it would make the arm swing slowly.
-void Shield::resist(const VectorXd& disturbance, VectorXd& torque) {
-  const VectorXd& friction = straying_.friction();
-  dynamics::momentum(model_, ws_, q_, disturbance, rate_);
-  torque -= rate_ - rate_.cwiseMin(friction).cwiseMax(-friction);
-}
-
-// docs/theory.md (14.14): ideal actuation has no estimate of what the model does not explain, but
-// an integral.
-void Shield::feed_back(const Node& node) {
-  const double w = feedback_rate_;
-  if (sampled_) {
-    rate_ = w * (w * (reference_q_ - node.q) + 2.0 * (reference_v_ - node.v));
-    return;
-  }
-  if (stop_time_ == 0.0) integral_.setZero();
-  integral_ += w * period_s_ * (reference_q_ - node.q);
-  rate_ = w * (w * (3.0 * (reference_q_ - node.q) + integral_) + 3.0 * (reference_v_ - node.v));
-}
-
-bool Shield::has_lost_stop(const Node& node, const VectorXd& torque, const VectorXd& last) const {
-  return drive_.torque_rate > 0.0 &&
-         (torque - last).lpNorm<Eigen::Infinity>() > drive_.torque_rate / feedback_rate_ &&
-         ((node.q - reference_q_).cwiseAbs().array() > stop_stray_.array()).any();
-}
-
-// Feedback that asks for more than the drives can follow makes the arm swing, docs/theory.md
-// (14.23). Where the stop ends now is as far from the verified one as the arm has strayed.
-void Shield::begin_again(const Node& node, const VectorXd& disturbance, const VectorXd& last) {
-  const Refusal refusal = refusal_;
-  dynamics::forward_dynamics(model_, ws_, node.q, node.v, last, acceleration_);
-  acceleration_ += disturbance;
-  if (find_stop({node, node.v, node, acceleration_, last, disturbance},
-                BrakingRate::usual_utilisation)) {
-    for (Index j = 0; j < node.q.size(); ++j)
-      note_straying(j, std::abs(tried_.end()[j] - stop_.end()[j]));
-    std::swap(stop_, tried_);
-    stop_bounds_ = straying_.bounds();
-    stop_time_ = 0.0;
-  }
-  refusal_ = refusal;
-}
-
-void Shield::stop_point(VectorXd& q, VectorXd& v) {
-  stop_time_ += period_s_;
-  stop_.at(stop_time_, q, v);
+Shield::Counts Shield::counts() const noexcept {
+  Counts out = counts_;
+  out.strayed = stop_.strayed().most;
+  out.strayed_share = stop_.strayed().share;
+  out.strayed_joint = stop_.strayed().joint;
+  return out;
 }
 
 void Shield::describe(const scene::Environment& environment, LineBuffer& line) const {

@@ -75,36 +75,34 @@ void Shield::note_proof() {
 }
 
 Shield::Foresight Shield::prove_stop_in_force(const Surroundings& world) {
-  const Foresight in_force = prove(force_check_, world, {stop_, stop_bounds_, stop_time_, lead_s_});
+  const Foresight in_force =
+      prove(force_check_, world, {stop_.motion(), stop_.bounds(), stop_.time_s(), lead_s_});
   proof_ = in_force.proof;
   return in_force;
 }
 
 void Shield::go_on_among_movers(const Surroundings& world) {
   const Foresight in_force = prove_stop_in_force(world);
-  const bool may_turn = at_rest() || !stop_.moves() || stop_time_ < stop_.stop_s();
+  const bool may_turn = stop_.at_rest() || !stop_.motion().moves() || !stop_.has_stopped();
   if (in_force.proof != MoverProof::none || predicted_.empty() || !may_turn) return;
-  tried_ = stop_;
+  tried_ = stop_.motion();
   tried_.drop_move();
-  double from_s = stop_time_;
-  if (at_rest()) {
-    tried_.set_at_rest(stop_.end());
+  double from_s = stop_.time_s();
+  if (stop_.at_rest()) {
+    tried_.set_at_rest(stop_.motion().end());
     from_s = 0.0;
   }
   straying_.bound(tried_.stop());
   const Foresight evasion = find_evasion(world, force_check_, from_s, zero_);
   if (evasion.proof == MoverProof::none) return;
-  std::swap(stop_, tried_);
-  stop_bounds_.include(straying_.bounds());
-  stop_stray_ = stop_bounds_.tracking + stop_bounds_.errors;
-  stop_time_ = from_s;
+  stop_.turn_to(tried_, from_s, straying_.bounds());
   ++counts_.evasions;
   proof_ = evasion.proof;
 }
 
 bool Shield::allow_for_movers(const Surroundings& world, const Step& step) {
   const Foresight tried = find_fail_safe(world, step);
-  const bool evades = stopping_ && stop_.moves() && !at_rest();
+  const bool evades = stopping_ && stop_.motion().moves() && !stop_.at_rest();
   const bool hit_soon = tried.proof == MoverProof::none && tried.clear_s < refused_within_s;
   if (hit_soon || (evades && tried.least_m < comfortable_m)) {
     if (prove_stop_in_force(world).proof != MoverProof::none) {
@@ -194,8 +192,8 @@ Shield::Foresight Shield::try_move(LineCheck& line, MoverCheck& check, const Sur
                                    double from_s, const VectorXd& target) {
   constexpr Foresight none{MoverProof::none, 0.0, 0.0};
   const VectorXd& from = tried_.stop().end();
-  w_ = target - from;
-  const std::optional<double> time_s = move_time_.find(from, w_);
+  way_ = target - from;
+  const std::optional<double> time_s = move_time_.find(from, way_);
   if (!time_s || *time_s > MoverCheck::horizon_s) return none;
   tried_.set_move(target, *time_s);
   straying_.include_move(tried_);

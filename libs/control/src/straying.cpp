@@ -49,6 +49,12 @@ double gain_of_feedback(const scene::Scene& scene, double period_s, double feedb
 
 }  // namespace
 
+VectorXd unknown_friction(const scene::Scene& scene, const model::Robot& robot) {
+  VectorXd out = joint_limits(robot, &model::Joint::effort_max, 0.0);
+  out *= scene.safety.friction_share;
+  return out;
+}
+
 void Straying::Bounds::include(const Bounds& others) {
   tracking = tracking.cwiseMax(others.tracking);
   errors = errors.cwiseMax(others.errors);
@@ -75,10 +81,7 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
   velocity_error_s_ = late_share * (period_s + scene.actuation.delay_s);
   if (scene.actuation.estimates_velocity)
     velocity_error_s_ += estimator_share / scene.actuation.estimator_bandwidth;
-  friction_ = VectorXd::Zero(n);
-  if (scene.safety.friction_share > 0.0)
-    friction_ =
-        scene.safety.friction_share * joint_limits(model.robot(), &model::Joint::effort_max, 0.0);
+  friction_ = unknown_friction(scene, model.robot());
   if (has_model_errors() || noise_ > 0.0)
     bounds_.shapes = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
   bounds_.tracking = bounds_.errors = torque_ = bias_ = q_ = velocity_ = acceleration_ =

@@ -58,7 +58,7 @@ void TorquePipeline::advance(dynamics::Workspace& ws, const VectorXd& torque) {
 
 void TorquePipeline::start_from(const VectorXd& torque) {
   for (auto& waiting : waiting_) waiting = torque;
-  last_ = torque;
+  last_ = acting_ = torque;
   disturbance_.setZero();
   sent_ = false;
 }
@@ -68,6 +68,7 @@ void TorquePipeline::continue_from(const TorquePipeline& other) {
   for (std::size_t i = 0; i < waiting_.size(); ++i) waiting_[i] = other.waiting_[i];
   first_ = other.first_;
   last_ = other.last_;
+  acting_ = other.acting_;
   disturbance_ = other.disturbance_;
   sent_ = false;
 }

@@ -206,10 +206,10 @@ TEST_CASE("an arm at rest leaves the way of an obstacle that comes", "[shield]")
     if (shield.accept(world, {here, v, {hold, zero}, zero, zero, zero})) {
       v = zero;
     } else {
-      shield.stop_point(next_q, next_v);
+      shield.stop().point(next_q, next_v);
       at = next_q;
       v = next_v;
-      moved = moved || shield.stop().moves();
+      moved = moved || shield.stop().motion().moves();
     }
     dynamics::forward_kinematics(bare, ws, at);
     arm.place(bare, ws);

@@ -77,23 +77,23 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
   double most = 0.0;
   const int late = ideal ? 0 : delay_periods;
   VectorXd at(1), rate(1);
-  for (int k = 0; k == 0 || !shield.at_rest(); ++k) {
+  for (int k = 0; k == 0 || !shield.stop().at_rest(); ++k) {
     pipeline.observe(ws, q, v);
     pipeline.predict(ws, q, v);
     const Shield::Node node = ideal ? Shield::Node{q, v} : Shield::Node{pipeline.q(), pipeline.v()};
     if (k == 0) shield.start({environment, 0, 0.0}, node);
     if (k >= late) {
-      shield.stop().at(static_cast<double>(k - late) * T, at, rate);
+      shield.stop().motion().at(static_cast<double>(k - late) * T, at, rate);
       most = std::max(most, std::abs(q[0] - at[0]));
     }
     shield.refuse();
     const VectorXd none = VectorXd::Zero(1);
-    shield.stop_torque(node, ideal ? none : pipeline.disturbance(), pipeline.last(), torque);
+    shield.stop().torque(node, ideal ? none : pipeline.disturbance(), pipeline.last(), torque);
     pipeline.send(torque);
     move(c);
   }
-  CHECK(shield.stop().stop_s() > 0.15);
-  straying.bound(shield.stop().stop());
+  CHECK(shield.stop().motion().stop_s() > 0.15);
+  straying.bound(shield.stop().motion().stop());
   return most / (straying.errors()[0] + straying.tracking()[0]);
 }
 
@@ -211,7 +211,7 @@ TEST_CASE("a step after which the ramp of the stop would pass a joint limit is r
   const model::Model model(std::move(robot));
   scene::Scene scene = scene_of(model, scene::ActuationType::position);
   scene.model.joint_limits = true;
-  const Shield::Drive drive{0.0, VectorXd::Constant(1, 15.0), VectorXd::Constant(1, 100.0)};
+  const control::ChangeBounds drive{0.0, VectorXd::Constant(1, 15.0), VectorXd::Constant(1, 100.0)};
   constexpr double T = 0.001;
   const scene::Environment environment;
   const VectorXd none = VectorXd::Zero(1);
@@ -231,7 +231,7 @@ TEST_CASE("a step after which the ramp of the stop would pass a joint limit is r
       continue;
     }
     for (int k = 0; k <= 500; ++k) {
-      shield.stop().at(shield.stop().stop_s() * k / 500.0, at, rate);
+      shield.stop().motion().at(shield.stop().motion().stop_s() * k / 500.0, at, rate);
       if (at[0] > 1.0) ++passed;
     }
   }

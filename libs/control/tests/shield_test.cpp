@@ -237,7 +237,7 @@ TEST_CASE("friction does not make an arm swing that a stop holds", "[shield]") {
   for (int k = 0; k < 1500; ++k) {
     pipeline.observe(own, q, v);
     shield.refuse();
-    shield.stop_torque({q, v}, pipeline.disturbance(), pipeline.last(), tau);
+    shield.stop().torque({q, v}, pipeline.disturbance(), pipeline.last(), tau);
     pipeline.send(tau);
     for (int i = 0; i < substeps; ++i) {
       const VectorXd against = friction.cwiseProduct((v / friction_speed).array().tanh().matrix());
@@ -249,7 +249,7 @@ TEST_CASE("friction does not make an arm swing that a stop holds", "[shield]") {
     lowest = lowest.cwiseMin(q);
     highest = highest.cwiseMax(q);
   }
-  CHECK(shield.at_rest());
+  CHECK(shield.stop().at_rest());
   CHECK(shield.counts().strayed_share < 1.0);
   CHECK((highest - lowest).maxCoeff() < 6e-4);
 }
@@ -308,7 +308,7 @@ TEST_CASE("an arm that was pushed off its stop comes to rest, with torques of a 
   double fastest = 0.0;
   for (int k = 0; k < 3000; ++k) {
     shield.refuse();
-    shield.stop_torque({q, v}, zero, sent, tau);
+    shield.stop().torque({q, v}, zero, sent, tau);
     sent = tau.cwiseMin((sent.array() + T * torque_rate).matrix())
                .cwiseMax((sent.array() - T * torque_rate).matrix());
     dynamics::forward_dynamics(model, ws, q, v, sent, a);
@@ -351,7 +351,7 @@ TEST_CASE("verifying a step and stopping do not allocate", "[shield]") {
         v = v1;
       } else {
         ++refused;
-        shield.stop_torque(from, zero, zero, tau);
+        shield.stop().torque(from, zero, zero, tau);
         v *= 0.98;
         q += 0.001 * v;
       }

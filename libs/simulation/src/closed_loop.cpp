@@ -78,7 +78,7 @@ model::Model load_checked(const scene::Scene& scene) {
 }
 
 log::Result::Shield shield_figures(const control::Shield& shield, double work_J) {
-  const control::Shield::Counts& counts = shield.counts();
+  const control::Shield::Counts counts = shield.counts();
   log::Result::Shield out;
   out.margin_m = shield.largest_margin_m();
   out.steps = counts.steps;
@@ -103,7 +103,7 @@ log::Result::Shield shield_figures(const control::Shield& shield, double work_J)
 }
 
 std::string shield_warning(const control::Shield& shield, const model::Model& model) {
-  const control::Shield::Counts& counts = shield.counts();
+  const control::Shield::Counts counts = shield.counts();
   const auto joint = static_cast<std::size_t>(counts.strayed_joint);
   return fmt::format(
       "the bounds of /safety do not hold: joint '{}' strayed from the motion of a "
@@ -429,13 +429,13 @@ void ClosedLoop::check_outcome() {
 std::string ClosedLoop::timeout_cause() const {
   const std::string cause = fmt::format("goal not reached within {} s", scene_.duration_s);
   const control::Shield* const shield = controller_->shield();
-  if (shield == nullptr || !shield->stopping() || !shield->at_rest()) return cause;
+  if (shield == nullptr || !shield->stopping() || !shield->stop().at_rest()) return cause;
   return fmt::format("{}; the shield has held the arm since {:.3f} s: {}", cause, stopped_at_s_,
                      shield->describe(controller_->view().environment()));
 }
 
 bool ClosedLoop::rests() const {
-  return controller_->shield()->at_rest() &&
+  return controller_->shield()->stop().at_rest() &&
          plant_->node().v.lpNorm<Eigen::Infinity>() < resting_speed;
 }
 

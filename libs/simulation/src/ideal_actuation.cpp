@@ -2,6 +2,7 @@
 
 #include "actuation.hpp"
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/torque_limits.hpp"
 #include "hamelin/core/numbers.hpp"
 
 namespace hamelin::simulation {
@@ -208,7 +209,7 @@ class IdealActuation final : public Actuation {
       channels.damping = arm_.own_damping;
     else
       channels.damping.setZero();
-    shield.stop_torque({at_node_.q, v_}, zero_, zero_, channels.held_torque);
+    shield.stop().torque({at_node_.q, v_}, zero_, zero_, channels.held_torque);
     gradient_.setZero();
     gradient_before_.setZero();
     node_velocity_ = v_;

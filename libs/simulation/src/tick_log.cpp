@@ -90,8 +90,8 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   const control::Shield* const shield = controller_.shield();
   if (shield != nullptr && acts && shield->stopping()) {
     fields["stop"] = {{"cause", to_string(shield->refusal().cause)},
-                      {"q_end", to_json(shield->stop().end())}};
-    if (shield->stop().moves()) fields["stop"]["evades"] = true;
+                      {"q_end", to_json(shield->stop().motion().end())}};
+    if (shield->stop().motion().moves()) fields["stop"]["evades"] = true;
   }
   const control::TargetState* const target = controller_.answer().target;
   if (tracking_ != nullptr && target != nullptr && !target->waiting)

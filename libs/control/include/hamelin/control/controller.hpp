@@ -19,7 +19,6 @@
 #include "hamelin/control/live_target.hpp"
 #include "hamelin/control/loaded_arm.hpp"
 #include "hamelin/control/newest.hpp"
-#include "hamelin/control/state_estimator.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
@@ -259,8 +258,8 @@ class Controller {
   /// The controller's model of the arm with what it carries, until the load changes.
   [[nodiscard]] const model::Model& model() const noexcept { return arm_->model; }
   /// The state that the last tick acted on: as measured, or as estimated.
-  [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
-  [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
+  [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return arm_->drive->q(); }
+  [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return arm_->drive->v(); }
   [[nodiscard]] const GoalTracker& goals() const noexcept { return goals_; }
   [[nodiscard]] const planning::Plugin& plugin() const noexcept { return plugin_; }
   /// The numeric series that the planner declared, in the order of Answer::series.
@@ -315,19 +314,13 @@ class Controller {
   /// Ends the stop.
   void go_on();
   void take_stop();
-  /// Writes why the arm cannot begin with the load; nothing if it can.
-  void describe_defect(LoadedArm& fresh, LineBuffer& line);
+  /// Writes why the arm cannot begin with the load at a node; nothing if it can.
+  void describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
-  void extrapolate();
-  [[nodiscard]] const Eigen::VectorXd& acting_torque() const noexcept;
-  /// What the tick acts on where positions are sent: the set point.
-  void take_set_point();
-  /// Stops an arm that is away from its set point.
-  void check_tracking();
-  [[nodiscard]] double rate_up_to(double rise, Eigen::Index joint) const;
-  void start_outputs();
+  /// Stops an arm that cannot be seen, or does not do what it is sent.
+  void check_arm();
   void make_guidance();
   void take_goals();
   /// Notes whether these goals follow a streamed target.
@@ -345,18 +338,11 @@ class Controller {
   void ask_planner();
   void note_time(double planner_s);
   void log_first_overrun();
-  [[nodiscard]] double braking_time_s() const;
   void start_braking(StopReason reason, std::string_view cause);
-  /// Sums the planner's channels, or brakes. @return whether the result can be sent
-  [[nodiscard]] bool form_outputs();
-  [[nodiscard]] bool form_torque();
-  [[nodiscard]] bool form_position();
-  /// Replaces an output that the shield refuses by that of its stop.
-  void shield_torque();
-  void shield_position();
-  void brake();
-  /// Positions follow from the torque where the planner sets no velocity.
-  [[nodiscard]] bool forms_torque() const noexcept { return options_.torque || options_.position; }
+  /// Lets the drive make a proposal of the planner's answer.
+  void propose();
+  /// Lets the proposal act, or a stop.
+  void act();
 
   Options options_;
   scene::Scene scene_;  ///< with the actuation and the safety that are in force
@@ -364,9 +350,7 @@ class Controller {
   std::size_t path_points_max_;
   planning::Plugin plugin_;
   model::Model nominal_;  ///< the planner's model of the arm, without what is attached later
-  Eigen::VectorXd acceleration_max_, jerk_max_;  ///< of each joint, of positions
-  Eigen::VectorXd tracking_max_;
-  Eigen::VectorXd velocity_max_;  ///< of set points; of size zero: not bounded
+  DriveOptions drive_options_;
   World world_;
   Json params_;                      ///< of the planner, as last set
   std::atomic<double> time_s_{0.0};  ///< of the last tick
@@ -385,6 +369,7 @@ class Controller {
   std::uint64_t stop_number_ = 0, taken_stop_ = 0;
   /// How often the arm was stopped, and at which of the stops it stands still; 0: it does not.
   std::uint64_t stops_ = 0;
+  std::uint64_t begun_stop_ = 0;  ///< the last one that began without a shield
   std::atomic<std::uint64_t> stopped_{0};
   std::vector<std::atomic<double>> measured_;  ///< the last joint positions, for other threads
   Newest<GoalList> new_goals_;
@@ -404,12 +389,7 @@ class Controller {
   std::optional<Guidance> guidance_;  ///< none without a guide
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
-  std::optional<StateEstimator> estimator_;
-  std::vector<Eigen::VectorXd> issued_;  ///< torques on their way to the arm, where it takes them
-  /// What the shield starts from: where friction is not known, an estimate lags behind.
-  Eigen::VectorXd q_measured_, v_measured_;
   bool usable_ = false;   ///< whether the measurement of this tick can be used
-  bool seen_ = false;     ///< whether at least its positions and velocities can
   double given_s_ = 0.0;  ///< the last time that was in order
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;
@@ -420,8 +400,6 @@ class Controller {
   /// Memory of lost_, of answer_.cause while the arm stops, and of answer_.load_refusal.
   LineBuffer lost_line_, cause_line_, load_refusal_;
   bool reset_ = false;  ///< whether the planner is to be told of a new start
-  Eigen::VectorXd q_, v_, rate_, command_rate_;
-  Eigen::VectorXd brake_q_, brake_v_, brake_rate_;  ///< of the motion that ends at rest
 };
 
 }  // namespace hamelin::control

@@ -5,12 +5,11 @@
 #include <optional>
 #include <span>
 
+#include "hamelin/control/drive.hpp"
 #include "hamelin/control/guide_search.hpp"
 #include "hamelin/control/planner_host.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/shield.hpp"
-#include "hamelin/control/torque_limits.hpp"
-#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
@@ -29,12 +28,8 @@ struct LoadedArm {
     const planning::Plugin& plugin;
     World& world;
     PlannerHost::LineSink log;
-    double period_s;
     std::size_t path_points_max;
-    Shield::Drive drive;
-    /// Whether torques are the output, so that a shield must predict where they lead.
-    bool sends_torque;
-    std::size_t delay_periods;
+    DriveOptions drive;
     double now_s;       ///< time of the last tick; 0 before the first
     bool guide_thread;  ///< whether a guide searches on a thread of its own
   };
@@ -56,19 +51,22 @@ struct LoadedArm {
   WorldView view;
   std::unique_ptr<Shield> shield;  ///< null if there is none
   PlannerHost planner;
-  TorqueLimits limits;
-  ChannelSum sum;
-  dynamics::Workspace ws;
-  std::optional<TorquePipeline> pipeline;  ///< with a shield, where torques are the output
-  std::unique_ptr<GuideSearch> guide;      ///< null if the scene asks for none
+  std::unique_ptr<Drive> drive;
+  std::unique_ptr<GuideSearch> guide;  ///< null if the scene asks for none
+
+  /// The stop that acts where no answer does.
+  [[nodiscard]] Stop& stop() noexcept { return shield ? shield->stop() : *unverified_stop_; }
 
  private:
+  void make_stop(const scene::Scene& scene, const Common& common);
   [[nodiscard]] planning::SetupData make_setup(const scene::Scene& scene, const Common& common);
   [[nodiscard]] std::unique_ptr<Shield> make_shield(const scene::Scene& scene,
                                                     const Common& common) const;
   [[nodiscard]] std::unique_ptr<GuideSearch> make_guide(const scene::Scene& scene,
                                                         const Json& params, const Common& common);
 
+  std::optional<StopFinder> finder_;  ///< without a shield, as the next
+  std::optional<Stop> unverified_stop_;
   Eigen::VectorXd start_q_;  ///< for which it was made
 };
 

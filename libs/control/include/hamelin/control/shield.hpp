@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "hamelin/control/asides.hpp"
-#include "hamelin/control/braking_rate.hpp"
 #include "hamelin/control/fail_safe.hpp"
 #include "hamelin/control/levers.hpp"
 #include "hamelin/control/line_buffer.hpp"
@@ -19,6 +18,8 @@
 #include "hamelin/control/move_time.hpp"
 #include "hamelin/control/mover_check.hpp"
 #include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/stop.hpp"
+#include "hamelin/control/stop_finder.hpp"
 #include "hamelin/control/straying.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
@@ -61,11 +62,7 @@ inline constexpr std::size_t mover_proofs = 3;
 /// to its planner. One object per thread; no allocation after construction.
 class Shield {
  public:
-  /// A configuration and a velocity.
-  struct Node {
-    const Eigen::VectorXd& q;
-    const Eigen::VectorXd& v;
-  };
+  using Node = Stop::Node;
   /// What the arm must not touch, and when.
   struct Surroundings {
     const scene::Environment& environment;
@@ -95,19 +92,11 @@ class Shield {
     long evasions = 0;  ///< of the stops, those that were followed by a move when they began
   };
 
-  /// What bounds the changes of the arm's motion.
-  struct Drive {
-    /// Largest rate of change of each torque [Nm/s or N/s]; zero: unbounded.
-    double torque_rate = 0.0;
-    /// For arms that are controlled by position: of each joint [rad/s² or m/s²] and [rad/s³ or
-    /// m/s³]; of size zero: unbounded.
-    Eigen::VectorXd acceleration_max = {}, jerk_max = {};
-  };
   /// @param model the controller's model of the arm, kept by reference
   /// @param self null if self-collision is not modelled; kept by reference
   /// @param period_s time between two steps
   Shield(const scene::Scene& scene, const model::Model& model, const scene::SelfField* self,
-         double period_s, const Drive& drive);
+         double period_s, const ChangeBounds& changes);
 
   /// By how much the planner's limits should lie inside those that this keeps.
   [[nodiscard]] const LimitReserve& limit_reserve() const noexcept { return reserve_; }
@@ -121,9 +110,9 @@ class Shield {
                                        const Node& node);
   /// A step of the arm.
   struct Step {
-    const Node& from;                  ///< the node as it was verified
+    Node from;                         ///< the node as it was verified
     const Eigen::VectorXd& departure;  ///< velocity with which the arm would leave it
-    const Node& to;                    ///< what the step would lead to
+    Node to;                           ///< what the step would lead to
     /// Acceleration and torque with which the arm would go on after the step, where these change at
     /// a bounded rate only, and the acceleration that acts besides that of the torque; else not
     /// used.
@@ -135,25 +124,15 @@ class Shield {
   [[nodiscard]] bool accept(const Surroundings& world, const Step& step);
   /// Counts a step that cannot be tried: there is no usable answer, or no state after it.
   void refuse();
-  /// The torque for the next period of the stop, and goes on with it: docs/theory.md (14.14).
-  /// @param disturbance acceleration that acts besides that of the torques [rad/s² or m/s²]
-  /// @param last the torque of the period before, where torques change at a bounded rate
-  void stop_torque(const Node& node, const Eigen::VectorXd& disturbance,
-                   const Eigen::VectorXd& last, Eigen::VectorXd& torque);
-
-  /// Goes on with the stop for a period, for arms that are controlled by position.
-  void stop_point(Eigen::VectorXd& q, Eigen::VectorXd& v);
-
   /// Whether the last step was refused.
   [[nodiscard]] bool stopping() const noexcept { return stopping_; }
-  /// Whether the stop has ended.
-  [[nodiscard]] bool at_rest() const noexcept { return stop_time_ >= stop_.duration_s(); }
+  /// The stop in force, which goes on if the next step is refused.
+  [[nodiscard]] Stop& stop() noexcept { return stop_; }
+  [[nodiscard]] const Stop& stop() const noexcept { return stop_; }
   /// Whether the last step was the first of a stop.
   [[nodiscard]] bool stop_began() const noexcept { return stopping_ && run_ == 1; }
   [[nodiscard]] const Refusal& refusal() const noexcept { return refusal_; }
-  [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
-  /// The motion that goes on if the next step is refused.
-  [[nodiscard]] const FailSafe& stop() const noexcept { return stop_; }
+  [[nodiscard]] Counts counts() const noexcept;
   /// What is proved of moving obstacles after the last step; none given if there are none in reach.
   [[nodiscard]] std::optional<MoverProof> mover_proof() const noexcept { return proof_; }
   /// The largest margin of any shape that any stop required [m].
@@ -177,23 +156,6 @@ class Shield {
   [[nodiscard]] bool find_stop(const Step& step, double least_utilisation);
   /// Whether the stop after the step keeps the joint limits and stays clear.
   [[nodiscard]] bool stop_is_safe(const Surroundings& world, const Step& step);
-  /// The ramp and the fade that the drive's bounds require for a rate.
-  [[nodiscard]] std::pair<double, double> transition_times(const Step& step, double rate);
-  void note_straying(const Eigen::VectorXd& q);
-  void note_straying(Eigen::Index joint, double strayed);
-  /// The torque that keeps to the stop in the next period.
-  void follow_stop(const Node& node, const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
-  /// Adds what resists a disturbance at rest.
-  void resist(const Eigen::VectorXd& disturbance, Eigen::VectorXd& torque);
-  /// Sets rate_ to the acceleration that brings the arm back to the stop.
-  void feed_back(const Node& node);
-  /// Whether the arm has strayed beyond its bounds, and the torque that would bring it back is
-  /// farther from the last one than the drives can go in the time of the feedback.
-  [[nodiscard]] bool has_lost_stop(const Node& node, const Eigen::VectorXd& torque,
-                                   const Eigen::VectorXd& last) const;
-  /// Lets the stop begin again from where the arm is.
-  void begin_again(const Node& node, const Eigen::VectorXd& disturbance,
-                   const Eigen::VectorXd& last);
   [[nodiscard]] bool stop_is_clear(const Surroundings& world, const LineCheck::End& at_to);
   // Of obstacles that move, in shield_movers.cpp.
   /// Lists those that could touch the arm within the horizon. @return whether there are any
@@ -250,34 +212,27 @@ class Shield {
   std::vector<std::string> shape_names_, pair_names_;  ///< for describe()
   bool sampled_;                                       ///< whether actuation is not ideal
   double period_s_, margin_m_;
-  long dwell_;            ///< steps that a stop lasts at least, unless it ends before
-  double feedback_rate_;  ///< ω [1/s]
+  long dwell_;  ///< steps that a stop lasts at least, unless it ends before
   ModelledLimits limits_;
-  Eigen::VectorXd damping_, friction_;  ///< of size zero: not modelled
-  double friction_speed_, torque_share_;
+  double torque_share_;
   Eigen::VectorXd speed_max_;  ///< of size zero: not modelled
   LimitReserve reserve_;
   Levers levers_;
-  Drive drive_;
+  StopFinder finder_;
   Straying straying_;  ///< of tried_
+  Stop stop_;
   LineCheck step_line_, ramp_line_, stop_line_;
-  BrakingRate braking_;
   dynamics::Workspace ws_;
-  FailSafe stop_, tried_;
+  FailSafe tried_;
   scene::PlacedShapes arm_from_, arm_to_, arm_line_, arm_end_;
-  Straying::Bounds stop_bounds_;  ///< of stop_
-  Eigen::VectorXd stop_stray_;    ///< by how much joints may stray from stop_ [rad or m]
-  Eigen::VectorXd integral_;      ///< of the deviation from stop_, times ω [rad or m]
-  Eigen::VectorXd no_addition_;   ///< of size zero
+  Eigen::VectorXd no_addition_;  ///< of size zero
   double largest_margin_ = 0.0;
-  Eigen::VectorXd line_stray_, zero_, w_;
-  Eigen::VectorXd reference_q_, reference_v_, q_, v_, rate_, hold_, acceleration_;
+  Eigen::VectorXd line_stray_, zero_, way_, hold_;
 
   std::optional<std::uint64_t> snapshot_;  ///< for which the lines' anchors hold
   std::size_t existing_ = 0;               ///< obstacles at the last call
   bool changed_ = false;  ///< whether obstacles changed since the stop was verified
   bool stopping_ = false;
-  double stop_time_ = 0.0;
   long run_ = 0;
   Refusal refusal_;
   Counts counts_;

@@ -12,6 +12,10 @@
 
 namespace hamelin::control {
 
+/// Bound of the friction that a scene's model of the arm does not have, of each joint [Nm or N].
+[[nodiscard]] Eigen::VectorXd unknown_friction(const scene::Scene& scene,
+                                               const model::Robot& robot);
+
 /// By how much an arm may stray from a stop, given the errors that a scene states:
 /// docs/theory.md (14.17)–(14.21). No allocation after construction.
 class Straying {
@@ -44,8 +48,6 @@ class Straying {
   [[nodiscard]] const Eigen::VectorXd& tracking() const noexcept { return bounds_.tracking; }
   [[nodiscard]] const Eigen::VectorXd& errors() const noexcept { return bounds_.errors; }
   [[nodiscard]] const Eigen::VectorXd& shapes() const noexcept { return bounds_.shapes; }
-  /// Bound of the friction that the model does not have, of each joint [Nm or N].
-  [[nodiscard]] const Eigen::VectorXd& friction() const noexcept { return friction_; }
   /// Bound of the noise of measured joint positions [rad or m].
   [[nodiscard]] double noise() const noexcept { return noise_; }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "hamelin/control/stop.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 
 namespace hamelin::control {
@@ -25,12 +26,16 @@ class TorquePipeline {
   void predict(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
   [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
+  [[nodiscard]] Stop::Node now() const noexcept { return {q_, v_}; }
   /// The state one period after q(), v() if this torque acts, and its acceleration.
   void advance(dynamics::Workspace& ws, const Eigen::VectorXd& torque);
   [[nodiscard]] const Eigen::VectorXd& q_next() const noexcept { return q_next_; }
   [[nodiscard]] const Eigen::VectorXd& v_next() const noexcept { return v_next_; }
+  [[nodiscard]] Stop::Node next() const noexcept { return {q_next_, v_next_}; }
   [[nodiscard]] const Eigen::VectorXd& acceleration() const noexcept { return rate_; }
 
+  /// The next call of observe() is the first one, so that it learns nothing.
+  void begin_observing() noexcept { sent_ = false; }
   /// Forgets the past: this torque has acted and will act.
   void start_from(const Eigen::VectorXd& torque);
   /// Goes on where that of the arm with another load was.
@@ -39,6 +44,8 @@ class TorquePipeline {
   void send(const Eigen::VectorXd& torque);
   /// The torque that was sent last.
   [[nodiscard]] const Eigen::VectorXd& last() const noexcept { return last_; }
+  /// The torque that acts since the last tick.
+  [[nodiscard]] const Eigen::VectorXd& acting() const noexcept { return acting_; }
 
  private:
   void step(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
