@@ -19,8 +19,8 @@ Scene scene_with(const char* key, Json part, const std::filesystem::path& base_d
 
 void require_object(const Json& document, const std::string& where, const char* place) {
   if (!document.is_object())
-    throw Error(ErrorCode::invalid, fmt::format("{}: {}: is a {}, expected an object", where, place,
-                                                document.type_name()));
+    throw Error(ErrorCode::invalid, fmt::format("{}: {}: has the type {}, expected an object",
+                                                where, place, document.type_name()));
 }
 
 }  // namespace
