@@ -53,7 +53,7 @@ double period_of(const scene::Scene& scene, const ControllerOptions& options) {
 scene::Scene in_force(scene::Scene scene, const ControllerOptions& options) {
   if (options.position)
     scene.actuation.type = scene::ActuationType::position;
-  else if (options.torque && scene.actuation.type == scene::ActuationType::ideal)
+  else if (options.ideal_arm == nullptr && scene.actuation.type == scene::ActuationType::ideal)
     scene.actuation.type = scene::ActuationType::sampled;
   if (!scene.safety.type)
     scene.safety.type = options.fixed_world ? scene::safety_type(scene) : scene::SafetyType::shield;
@@ -90,7 +90,8 @@ DriveOptions drive_options(const scene::Scene& scene, const ControllerOptions& o
   if (options.position)
     out.kind = DriveKind::position;
   else
-    out.kind = options.torque ? DriveKind::torque : DriveKind::none;
+    out.kind = options.ideal_arm == nullptr ? DriveKind::torque : DriveKind::ideal;
+  out.arm = options.ideal_arm;
   out.period_s = period_s;
   out.delay_periods = static_cast<std::size_t>(std::round(scene.actuation.delay_s / period_s));
   out.acceleration_max =
@@ -394,11 +395,11 @@ void Controller::propose() {
 void Controller::act() {
   answer_.stopping = false;
   Drive& drive = *arm_->drive;
-  if (!drive.acts()) return;
   if (Shield* const shield = arm_->shield.get()) {
-    if (answer_.channels == nullptr)
+    const auto step = answer_.channels != nullptr ? drive.step() : std::nullopt;
+    if (!step)
       shield->refuse();
-    else if (shield->accept(surroundings(), drive.step()))
+    else if (shield->accept(surroundings(), *step))
       return;
     answer_.stopping = true;
   } else {

@@ -83,7 +83,7 @@ LoadedArm::LoadedArm(const scene::Scene& scene, model::Model nominal, const Json
   DriveOptions of_drive = common.drive;
   of_drive.gyroscopic_terms_max = view.contacts_max();
   drive = make_drive(scene, model, of_drive, shield ? shield->limit_reserve() : LimitReserve{});
-  if (!shield && drive->acts()) make_stop(scene, common);
+  if (!shield) make_stop(scene, common);
 }
 
 void LoadedArm::make_stop(const scene::Scene& scene, const Common& common) {

@@ -120,8 +120,9 @@ void PositionDrive::advance() {
   setpoint_.q = q_ + T * setpoint_.v;
 }
 
-Shield::Step PositionDrive::step() {
-  return {node(), v_, {setpoint_.q, setpoint_.v}, command_rate_, setpoint_.torque, command_rate_};
+std::optional<Shield::Step> PositionDrive::step() {
+  return Shield::Step{node(),           v_,           {setpoint_.q, setpoint_.v}, command_rate_,
+                      setpoint_.torque, command_rate_};
 }
 
 void PositionDrive::begin(Stop& stop) {

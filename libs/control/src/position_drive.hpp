@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include "hamelin/control/drive.hpp"
 #include "hamelin/control/torque_limits.hpp"
 
@@ -21,7 +22,7 @@ class PositionDrive final : public Drive {
   void resume() override;
   void describe_defect(LineBuffer& line) const override;
   bool propose(const planning::CommandBuffers& answer) override;
-  Shield::Step step() override;
+  std::optional<Shield::Step> step() override;
   void begin(Stop& stop) override;
   void follow(Stop& stop) override;
   const Setpoint& send() override { return setpoint_; }

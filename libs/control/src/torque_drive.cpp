@@ -89,11 +89,11 @@ void TorqueDrive::look_ahead() {
   pipeline_.predict(ws_, q_measured_, v_);
 }
 
-Shield::Step TorqueDrive::step() {
+std::optional<Shield::Step> TorqueDrive::step() {
   look_ahead();
   pipeline_.advance(ws_, proposed_);
-  return {pipeline_.now(),          pipeline_.v(), pipeline_.next(),
-          pipeline_.acceleration(), proposed_,     pipeline_.disturbance()};
+  return Shield::Step{pipeline_.now(),          pipeline_.v(), pipeline_.next(),
+                      pipeline_.acceleration(), proposed_,     pipeline_.disturbance()};
 }
 
 void TorqueDrive::begin(Stop& stop) {

@@ -20,7 +20,7 @@ class TorqueDrive final : public Drive {
   void continue_from(const Drive& other) override;
   const Eigen::VectorXd* last_torque() const noexcept override { return &setpoint_.torque; }
   bool propose(const planning::CommandBuffers& answer) override;
-  Shield::Step step() override;
+  std::optional<Shield::Step> step() override;
   void begin(Stop& stop) override;
   void follow(Stop& stop) override;
   const Setpoint& send() override;

@@ -109,7 +109,6 @@ class Controller:
         planner: str | Planner | None = ...,
         plugin_path: Paths = ...,
         period: float | None = ...,
-        torque: bool = ...,
         position: bool = ...,
         certify: bool = ...,
         obstacles_max: int = ...,

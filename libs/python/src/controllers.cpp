@@ -177,8 +177,8 @@ py::object verdict(const BoundController& c) {
 }
 
 SharedController make_controller(py::handle scene, py::object planner, py::handle plugins,
-                                 const std::optional<double>& period, bool torque, bool position,
-                                 bool certify, std::size_t obstacles_max,
+                                 const std::optional<double>& period, bool position, bool certify,
+                                 std::size_t obstacles_max,
                                  const std::vector<double>& acceleration_max,
                                  const std::vector<double>& jerk_max) {
   scene::Overrides overrides;
@@ -189,7 +189,6 @@ SharedController make_controller(py::handle scene, py::object planner, py::handl
     object = std::move(planner);
   control::ControllerOptions options;
   options.period_s = period;
-  options.torque = torque;
   options.position = position;
   options.certify = certify;
   if (obstacles_max > 100'000)
@@ -327,13 +326,14 @@ void add_controller(py::module_& module) {
                                                 "world, goals and parameters.")
       .def(
           py::init(&make_controller), arg("scene"), py::kw_only(), arg("planner") = py::none(),
-          arg("plugin_path") = py::none(), arg("period") = py::none(), arg("torque") = true,
-          arg("position") = false, arg("certify") = true, arg("obstacles_max") = 64,
+          arg("plugin_path") = py::none(), arg("period") = py::none(), arg("position") = false,
+          arg("certify") = true, arg("obstacles_max") = 64,
           arg("acceleration_max") = std::vector<double>{15.0},
           arg("jerk_max") = std::vector<double>{5000.0},
           "scene: a Scene, a dict or a file. planner: a name, an object with tick(tick, command),\n"
-          "or None: the scene's. period: time between two ticks [s]; None: the scene's. torque,\n"
-          "position: what answers contain. certify: prove that the motion since the last tick was\n"
+          "or None: the scene's. period: time between two ticks [s]; None: the scene's.\n"
+          "position: whether answers have q_next and v_next. certify: prove that the motion since "
+          "the last tick was\n"
           "clear. acceleration_max, jerk_max: of the positions, one value or one per joint.")
       .def("tick", &tick, arg("time"), arg("q"), arg("v"),
            "Answers the measured state of the arm: time [s], increasing; q, v of shape (n,).")

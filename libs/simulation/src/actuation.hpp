@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <cstddef>
 #include <memory>
 
 #include "energy_audit.hpp"
@@ -10,7 +9,8 @@
 
 namespace hamelin::simulation {
 
-/// How a planner's commands become motion of a plant.
+/// The robot's side of the control loop: what measures the arm, and how a controller's answers
+/// become motion of a plant.
 class Actuation {
  public:
   Actuation() = default;
@@ -18,30 +18,22 @@ class Actuation {
   Actuation& operator=(const Actuation&) = delete;
   virtual ~Actuation() = default;
 
-  /// Completes the plant's velocity at a node, before the planner is called.
-  virtual void reach_node() {}
-  /// Reserves memory for answers with so many gyroscopic terms.
-  virtual void reserve(std::size_t) {}
   /// The arm carries something else: the model has changed, in place.
   virtual void take_load() {}
   /// The state that the controller is shown at a tick.
   virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
-  /// Whether the planner is called at node k.
-  [[nodiscard]] virtual bool asks_planner(long k) const = 0;
-  /// Books the last node's energies with the planner's answer at the node.
-  virtual void book(const planning::CommandBuffers& answer, EnergyAudit& audit) = 0;
-  /// Books the node and makes the controller's answer act from it on, unless a shield refuses it.
-  /// Without an answer, the shield's stop acts.
-  virtual void apply(control::Controller& controller, EnergyAudit& audit) = 0;
-  /// Whether a stop of the shield acts from this node on.
-  [[nodiscard]] virtual bool stopping() const { return false; }
+  /// Whether node k is a tick.
+  [[nodiscard]] virtual bool is_tick(long k) const = 0;
+  /// Books the node, and takes the answer of a tick.
+  virtual void apply(const control::Answer& answer, EnergyAudit& audit) = 0;
   /// Lets the plant step. @return whether it converged
   [[nodiscard]] virtual bool step(double step_s) = 0;
   /// Whether the account of the last node needs one more answer of the planner.
-  [[nodiscard]] virtual bool needs_answer_at_end() const = 0;
+  [[nodiscard]] virtual bool needs_answer_at_end() const { return false; }
   /// Velocity with which the motion leaves the node.
-  [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity() = 0;
+  [[nodiscard]] virtual const Eigen::VectorXd& departure_velocity() const = 0;
   /// Torque of each channel that acts from this node on, and their sum, for the log.
+  /// @param answer null if a stop acts
   virtual void torques(const planning::CommandBuffers* answer, Eigen::VectorXd& sum,
                        Json& channels) = 0;
   /// Whether a limit cut the current answer.
@@ -52,7 +44,7 @@ class Actuation {
   [[nodiscard]] virtual bool limited() const = 0;
 };
 
-/// The ideal actuation of a scene, which only hamelin's own plant can carry out.
+/// That of hamelin's own plant under ideal actuation, which the controller drives itself.
 [[nodiscard]] std::unique_ptr<Actuation> make_ideal_actuation(const scene::Scene& scene,
                                                               SimulatedArm& arm);
 

@@ -154,7 +154,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   options.path_points_max = 0;   // no more than the scene's
   options.guide_thread = false;  // results do not depend on the speed of the machine
   options.certify = false;       // the judge does, for every step and with all obstacles
-  options.torque = scene.actuation.type != scene::ActuationType::ideal;
+  options.ideal_arm = ideal_arm_;
   options.position = scene.actuation.type == scene::ActuationType::position;
   const auto bounds = [&](const std::vector<double>& values, const char* key) {
     const VectorXd all = servo_values(scene, values, key, model_.dof());
@@ -177,7 +177,6 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
   judge_ = own_judge_ ? own_judge_.get() : &controller_->view();
   if (judge_->has_self() && !judge_->self_field()->note().empty())
     result_.warnings.push_back(judge_->self_field()->note());
-  actuation_->reserve(controller_->view().contacts_max());
   inputs_ = all_inputs(scene, plugin, planner_params_);
 }
 
@@ -204,9 +203,12 @@ void ClosedLoop::make_plant(const PlantFactory& factory) {
       scene_, model_,
       integrator_options(scene_.integrator.params, scene_.name + ": /integrator/params"));
   arm->start(q, v);
-  actuation_ = scene_.actuation.type == scene::ActuationType::ideal
-                   ? make_ideal_actuation(scene_, *arm)
-                   : make_sampled_actuation(scene_, model_, *arm);
+  if (scene_.actuation.type == scene::ActuationType::ideal) {
+    ideal_arm_ = &arm->arm();
+    actuation_ = make_ideal_actuation(scene_, *arm);
+  } else {
+    actuation_ = make_sampled_actuation(scene_, model_, *arm);
+  }
   plant_ = std::move(arm);
 }
 
@@ -298,7 +300,7 @@ log::Result ClosedLoop::run(const Watch& watch) {
     check_outcome();
     if (done_)
       book_last_node();
-    else if (actuation_->asks_planner(plant_->node().k))
+    else if (actuation_->is_tick(plant_->node().k))
       ask_planner();
     if (!done_) apply_answer();
     if (controller_->guide_figures() != nullptr) {
@@ -321,7 +323,6 @@ log::Result ClosedLoop::run(const Watch& watch) {
 }
 
 void ClosedLoop::observe_node() {
-  actuation_->reach_node();
   judge_->look(plant_->node().q, plant_->node().time_s);
   note_limits();
   reveal_obstacles();
@@ -402,7 +403,7 @@ void ClosedLoop::check_outcome() {
   }
   if (contact) return refuse();
   if (done_) return;
-  const bool tick = actuation_->asks_planner(node.k);
+  const bool tick = actuation_->is_tick(node.k);
   if (tick) let_controller_observe();
   if (tick && next_event_ < scene_.events.size()) advance_events();
   if (done_) return;
@@ -589,7 +590,7 @@ void ClosedLoop::ask_planner() {
   recorder_->planner_time(controller_->answer().planner_s);
   if (planner_answered() && controller_->answer().state == control::ControlState::gave_up)
     finish(log::Outcome::stalled, std::string(controller_->answer().cause));
-  if (done_ && !actuation_->needs_answer_at_end()) book_last_node();
+  if (done_) book_answer();
 }
 
 bool ClosedLoop::planner_answered() {
@@ -616,7 +617,7 @@ void ClosedLoop::finish_at_rest(log::Outcome outcome, std::string cause) {
 
 void ClosedLoop::report_stop() {
   const control::Shield* const shield = controller_->shield();
-  if (shield == nullptr || !actuation_->stopping() || !shield->stop_began()) return;
+  if (shield == nullptr || !controller_->answer().stopping || !shield->stop_began()) return;
   const double last_s = std::exchange(stopped_at_s_, plant_->node().time_s);
   if (stopped_at_s_ - last_s < stop_again_s) return;
   report_event(false, fmt::format("the shield stops the arm: {}",
@@ -624,11 +625,11 @@ void ClosedLoop::report_stop() {
 }
 
 void ClosedLoop::apply_answer() {
-  actuation_->apply(*controller_, *audit_);
+  actuation_->apply(controller_->answer(), *audit_);
   report_stop();
   finish_if(audit_->fault(*plant_));
   const planning::CommandBuffers* const channels = controller_->answer().channels;
-  if (channels == nullptr || actuation_->stopping()) return;
+  if (channels == nullptr || controller_->answer().stopping) return;
   const std::string fault = audit_->fault_of_planner(channels->raw());
   if (!fault.empty())
     finish_if(
@@ -638,15 +639,21 @@ void ClosedLoop::apply_answer() {
 // Only the planner knows a control potential's value and its gradient for the closing half-kick.
 void ClosedLoop::book_last_node() {
   if (plant_->node().k == 0 || result_.outcome == log::Outcome::diverged) return;
-  if (!actuation_->needs_answer_at_end()) {
-    audit_->book_node(*plant_);
-  } else {
+  if (actuation_->needs_answer_at_end()) {
     if (observed_k_ != plant_->node().k) let_controller_observe();
     controller_->decide();
-    if (controller_->answer().channels == nullptr) return;
-    actuation_->book(*controller_->answer().channels, *audit_);
+    book_answer();
+  } else {
+    audit_->book_node(*plant_);
   }
   if (result_.outcome != log::Outcome::collision) finish_if(audit_->fault(*plant_));
+}
+
+void ClosedLoop::book_answer() {
+  if (controller_->answer().channels != nullptr)
+    actuation_->apply(controller_->answer(), *audit_);
+  else
+    audit_->book_node(*plant_);
 }
 
 void ClosedLoop::write_tick() {
@@ -665,7 +672,7 @@ void ClosedLoop::step() {
     if (recorder_->logging()) log_->tick(certified_, nullptr);
     return;
   }
-  audit_->book_step(plant_->report(), actuation_->stopping());
+  audit_->book_step(plant_->report(), controller_->answer().stopping);
   recorder_->progress(plant_->node().k, plant_->node().time_s, scene_.duration_s);
 }
 

@@ -107,6 +107,8 @@ class ClosedLoop {
   void apply_answer();
   /// Books the last node: nothing acts any more, but its energies belong to the account.
   void book_last_node();
+  /// Books the last node with the answer that was made for it, if there is one.
+  void book_answer();
   void write_tick();
   void step();
 
@@ -119,6 +121,7 @@ class ClosedLoop {
   control::ModelledLimits limits_;
   long steps_ = 0;
   std::unique_ptr<Plant> plant_;
+  control::DiscreteArm* ideal_arm_ = nullptr;  ///< the plant's, under ideal actuation
   Json planner_params_;
   std::vector<log::Input> inputs_;
   log::Result result_;

@@ -45,31 +45,25 @@ class SampledActuation : public Actuation {
  public:
   SampledActuation(Plant& plant, long period_steps) : plant_(plant), period_steps_(period_steps) {}
 
-  bool asks_planner(long k) const override { return k % period_steps_ == 0; }
-  void book(const planning::CommandBuffers&, EnergyAudit& audit) override {
-    audit.book_node(plant_, 0.0);
-  }
-  void apply(control::Controller& controller, EnergyAudit& audit) override {
-    const control::Answer& decided = controller.answer();
+  bool is_tick(long k) const override { return k % period_steps_ == 0; }
+  void apply(const control::Answer& answer, EnergyAudit& audit) override {
     audit.book_node(plant_, 0.0);
     const long k = plant_.node().k;
-    if (asks_planner(k)) {
-      stopping_ = decided.stopping;
-      if (!stopping_ && decided.channels->raw().has_node_velocity != 0)
-        audit.book_filter(decided.channels->raw());
-      receive(decided, k / period_steps_);
+    if (is_tick(k)) {
+      const bool acts = answer.channels != nullptr && !answer.stopping;
+      if (acts && answer.channels->raw().has_node_velocity != 0)
+        audit.book_filter(answer.channels->raw());
+      receive(answer, k / period_steps_);
     }
     form_torque();
   }
   bool step(double step_s) override { return plant_.step(torque_, step_s); }
-  bool needs_answer_at_end() const override { return false; }
-  const VectorXd& departure_velocity() override { return plant_.node().v; }
-  void torques(const planning::CommandBuffers*, VectorXd& sum, Json& by_channel) override {
+  const VectorXd& departure_velocity() const override { return plant_.node().v; }
+  void torques(const planning::CommandBuffers* answer, VectorXd& sum, Json& by_channel) override {
     sum = torque_;
-    if (!sum.isZero(0.0)) by_channel[stopping_ ? "stop" : "held"] = to_json(sum);
+    if (!sum.isZero(0.0)) by_channel[answer == nullptr ? "stop" : "held"] = to_json(sum);
   }
   bool saturated() const override { return saturated_; }
-  bool stopping() const override { return stopping_; }
 
  protected:
   /// Takes the answer of a tick.
@@ -82,7 +76,6 @@ class SampledActuation : public Actuation {
   bool saturated_ = false;
 
  private:
-  bool stopping_ = false;
   long period_steps_;
 };
 

@@ -7,71 +7,53 @@ namespace hamelin::simulation {
 
 using Eigen::VectorXd;
 
-SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& arm,
+namespace {
+
+integration::Channels own_channels(const scene::Scene& scene, const model::Robot& robot) {
+  integration::Channels own;
+  own.damping = plant_damping(scene, robot);
+  own.coulomb = plant_friction(scene, robot);
+  own.coulomb_speed = scene.model.friction_speed;
+  return own;
+}
+
+}  // namespace
+
+SimulatedArm::SimulatedArm(const scene::Scene& scene, const model::Model& model,
                            const integration::Parameters& options)
-    : model(arm),
-      ws(arm),
-      integrator(integration::make_integrator(scene.integrator.name, arm, options)),
-      own_damping(plant_damping(scene, arm.robot())),
-      scheme_(scene.integrator.name),
+    : scheme_(scene.integrator.name),
       options_(options),
+      arm_(model, integration::make_integrator(scheme_, model, options),
+           own_channels(scene, model.robot())),
       description_{"hamelin",
                    "hamelin",
                    std::string(version()),
-                   integrator->name(),
-                   integrator->criterion(),
-                   integrator->tolerance(),
+                   arm_.integrator->name(),
+                   arm_.integrator->criterion(),
+                   arm_.integrator->tolerance(),
                    "found no root",
-                   false} {
-  const VectorXd zero = VectorXd::Zero(arm.dof());
-  channels.coulomb = plant_friction(scene, arm.robot());
-  channels.coulomb_speed = scene.model.friction_speed;
-  channels.held_torque = zero;
-  channels.damping = own_damping.size() > 0 ? own_damping : zero;
-}
+                   false} {}
 
 void SimulatedArm::start(const VectorXd& q, const VectorXd& v) {
-  state = integrator->start(q, v);
-  node_ = {0, 0.0, q, v};
-  update_velocity();
+  arm_.start(q, v);
+  node_ = {0, 0.0, q, arm_.v};
 }
 
-// Schemes of more than one step begin again, as they do at the start of a run.
 void SimulatedArm::take_load() {
-  ws = dynamics::Workspace(model);
-  integrator = integration::make_integrator(scheme_, model, options_);
-  const VectorXd v = node_.v;
-  state = integrator->start(node_.q, v);
-  state.k = node_.k;
-  state.time_s = node_.time_s;
+  arm_.take_load(integration::make_integrator(scheme_, arm_.model, options_));
   update_velocity();
 }
 
 bool SimulatedArm::step(const VectorXd& torque, double step_s) {
-  channels.held_torque = torque;
-  if (!step_channels(step_s)) return false;
-  update_velocity();
-  return true;
+  arm_.channels.held_torque = torque;
+  return make_step(step_s);
 }
 
-bool SimulatedArm::step_channels(double step_s) {
-  report_ = integrator->step(state, channels, step_s);
-  if (report_.converged) reach(step_s);
-  return report_.converged;
-}
-
-void SimulatedArm::accept(const integration::State& stepped, const integration::StepReport& report,
-                          double step_s) {
-  state = stepped;
-  report_ = report;
-  reach(step_s);
-}
-
-void SimulatedArm::reach(double step_s) {
-  state.time_s = static_cast<double>(state.k) * step_s;
-  node_.k = state.k;
-  node_.time_s = state.time_s;
-  node_.q = state.q;
+bool SimulatedArm::make_step(double step_s) {
+  const bool made = arm_.step(step_s);
+  report_ = arm_.report();
+  if (made) node_ = {arm_.state.k, arm_.state.time_s, arm_.state.q, arm_.v};
+  return made;
 }
 
 }  // namespace hamelin::simulation

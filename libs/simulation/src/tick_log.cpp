@@ -65,9 +65,9 @@ void TickLog::header(const scene::Scene& scene, const Json& params, const Json& 
 
 void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
   // a planner that has failed answers no more, but the shield brings the arm to rest
-  const bool acts = answer != nullptr || actuation_.stopping();
+  const bool stops = controller_.answer().stopping, acts = answer != nullptr || stops;
   Json channels = Json::object();
-  if (acts) actuation_.torques(answer, torque_, channels);
+  if (acts) actuation_.torques(stops ? nullptr : answer, torque_, channels);
   Json fields{{"k", plant_.node().k},
               {"time_s", plant_.node().time_s},
               {"q", to_json(plant_.node().q)},

@@ -159,7 +159,6 @@ TEST_CASE("positions come to rest within their bounds if the planner fails",
   scene.planner->name = "breaking";
   control::Controller::Options options;
   options.position = true;
-  options.torque = GENERATE(true, false);
   Loop loop(scene, options, {{"at_tick", 100}, {"how", "nan"}});
   VectorXd q = scene.start_q, v = VectorXd::Zero(loop.arm.dof());
   double fastest = 0.0, acceleration = 0.0;

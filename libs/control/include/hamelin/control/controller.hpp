@@ -83,8 +83,10 @@ struct ControllerOptions {
   bool certify = true;
   /// Time between two ticks [s], at most 1; none: that of the scene.
   std::optional<double> period_s;
-  bool torque = true;     ///< fill Answer::torque
-  bool position = false;  ///< fill Answer::q_next and v_next, and Answer::torque
+  bool position = false;  ///< fill Answer::q_next and v_next besides Answer::torque
+  /// For simulations: makes this arm take the discrete step that the answer means, in place of
+  /// sending a torque. Kept by reference; null: none.
+  DiscreteArm* ideal_arm = nullptr;
   /// Bounds of the motion that q_next and v_next describe [rad/s² and rad/s³, or m/s² and m/s³]:
   /// one value, or one per joint.
   std::vector<double> acceleration_max{15.0}, jerk_max{5000.0};

@@ -2,8 +2,10 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "hamelin/control/discrete_arm.hpp"
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/shield.hpp"
@@ -13,8 +15,8 @@
 
 namespace hamelin::control {
 
-/// What a robot is sent. none: nothing; what an answer does is up to the caller.
-enum class DriveKind { none, torque, position };
+/// What a robot is sent. ideal: nothing, but the arm of a simulation makes the discrete step.
+enum class DriveKind { ideal, torque, position };
 
 /// What a Drive is made with.
 struct DriveOptions {
@@ -22,6 +24,7 @@ struct DriveOptions {
   double period_s = 0.001;        ///< between two ticks
   std::size_t delay_periods = 0;  ///< after which a torque acts
   std::size_t gyroscopic_terms_max = 0;
+  DiscreteArm* arm = nullptr;  ///< of an ideal drive; kept by reference
   /// Of set points, per joint [rad/s² and rad/s³, or m/s² and m/s³].
   Eigen::VectorXd acceleration_max, jerk_max;
   Eigen::VectorXd tracking_max;  ///< how far the arm may be from its set point [rad or m]
@@ -46,8 +49,6 @@ class Drive {
   Drive& operator=(const Drive&) = delete;
   virtual ~Drive() = default;
 
-  /// Whether it sends anything, so that a stop can act.
-  [[nodiscard]] virtual bool acts() const noexcept { return true; }
   /// Takes what was measured. @param seen whether it can be used; else it is not read
   virtual void measure(const Eigen::VectorXd& q, const Eigen::VectorXd& v, bool seen) = 0;
   /// The state that planner, goals and shield are shown: measured, estimated, or the set point.
@@ -71,8 +72,8 @@ class Drive {
   [[nodiscard]] virtual const Eigen::VectorXd* last_torque() const noexcept { return nullptr; }
   /// What an answer makes of it, within the limits of the drive. @return false if that is no number
   [[nodiscard]] virtual bool propose(const planning::CommandBuffers& answer) = 0;
-  /// Where the proposal leads to. Refers to the drive.
-  [[nodiscard]] virtual Shield::Step step() = 0;
+  /// Where the proposal leads to; none if it leads nowhere. Refers to the drive.
+  [[nodiscard]] virtual std::optional<Shield::Step> step() = 0;
   /// Lets a stop begin where the arm is.
   virtual void begin(Stop& stop) = 0;
   /// The next period of a stop instead of a proposal.
