@@ -177,6 +177,21 @@ TEST_CASE("in C, an arm without measurements stops for that reason", "[control][
   CHECK_FALSE(std::string(loop.answer.cause).empty());
 }
 
+TEST_CASE("in C, torques stay finite where a measurement is lost after an absurd velocity",
+          "[control][c]") {
+  CLoop loop(c_document("hybrid"));
+  loop.move(10);
+  const std::vector<double> absurd(7, 1e6), nowhere(7, test::not_finite);
+  for (int k = 0; k < 50; ++k) {
+    loop.state.time_s += 0.001;
+    REQUIRE(hamelin_controller_tick(loop.controller, loop.state.time_s,
+                                    k == 0 ? loop.state.q.data() : nowhere.data(), absurd.data(),
+                                    &loop.answer) == 0);
+    REQUIRE(VectorXd::Map(loop.answer.torque, 7).allFinite());
+  }
+  CHECK(loop.answer.reason == HAMELIN_STOP_MEASUREMENT);
+}
+
 TEST_CASE("in C, a list of goals replaces others, and the goals are reached in order",
           "[control][c]") {
   CLoop loop(c_document("hybrid"), by_position);
