@@ -8,12 +8,12 @@ using namespace hamelin::control;
 
 namespace {
 
-// One value for all joints, or one per joint, of which the controller checks the number.
+// One value for all joints, or one per joint; the controller checks how many there are.
 void take_per_joint(const double* values, std::size_t count, const char* what,
                     std::vector<double>& out) {
   if (values == nullptr && count == 0) return;
   constexpr std::size_t count_max = 10'000;
-  if (count == 0 || count > count_max)
+  if (count > count_max)
     throw Error(ErrorCode::usage,
                 fmt::format("{}: {} values given, expected one, or one per joint", what, count));
   out.assign(required(values, what), values + count);

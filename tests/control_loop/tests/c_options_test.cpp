@@ -140,7 +140,7 @@ TEST_CASE("in C, a small scene as text is enough", "[control][c]") {
   CHECK(creation_failure(c_document("hybrid"), as_text(text, folder.c_str())) == "made");
 }
 
-TEST_CASE("in C, texts that are no scene are refused with one line", "[control][c]") {
+TEST_CASE("in C, texts that are not a scene are refused with one line", "[control][c]") {
   const auto refusal = [](const std::string& text) {
     return creation_failure(c_document("hybrid"), as_text(text, nullptr));
   };

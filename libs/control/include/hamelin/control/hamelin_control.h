@@ -50,17 +50,17 @@ typedef struct hamelin_controller_options {
    * they have together. 0: as the scene's events say. */
   double payload_reach_m;
   size_t payload_shapes_max;
-  /* In place of scene_file, which is null then: the text of a scene. Needed are schema, robot,
-   * goals and planner; all else has the defaults of a scene file. Relative paths in it start from
-   * scene_folder; null: the working directory. */
+  /* In place of scene_file, which is null then: the text of a scene. schema, robot, goals
+   * and planner are required; everything else has the defaults of a scene file. Relative paths in
+   * it start from scene_folder; null: the working directory. */
   const char *scene_json, *scene_folder;
   /* Bounds of single joints, one number or one per joint; null: those above. */
   const double* joint_acceleration_max; /* [rad/s^2 or m/s^2] */
   size_t joint_acceleration_max_count;
   const double* joint_jerk_max; /* [rad/s^3 or m/s^3] */
   size_t joint_jerk_max_count;
-  /* By how much an arm that is controlled by position may be away from its set point [rad or m],
-   * one number or one per joint; farther away it is stopped. Null: 0.1. */
+  /* Largest distance of an arm that is controlled by position from its set point [rad or m], one
+   * number or one per joint; beyond it the arm is stopped. Null: 0.1. */
   const double* tracking_max;
   size_t tracking_max_count;
   double period_s;         /* between two ticks, at most 1; 0: that of the scene */
@@ -81,13 +81,13 @@ enum {
   HAMELIN_CONTROL_STOPPING = 4
 };
 
-/* What an arm is stopped for. */
+/* Why an arm is stopped. */
 enum {
   HAMELIN_STOP_NONE = 0,
   HAMELIN_STOP_PLANNER = 1,     /* it failed, or its torques are not finite */
   HAMELIN_STOP_LATE = 2,        /* too many of its answers in a row were late */
-  HAMELIN_STOP_MEASUREMENT = 3, /* it or its time cannot be used */
-  HAMELIN_STOP_TRACKING = 4,    /* the arm is away from its set point */
+  HAMELIN_STOP_MEASUREMENT = 3, /* q, v or the time cannot be used */
+  HAMELIN_STOP_TRACKING = 4,    /* the arm is too far from its set point */
   HAMELIN_STOP_REQUEST = 5      /* hamelin_controller_stop */
 };
 
@@ -169,7 +169,7 @@ typedef struct hamelin_shield {
   int64_t causes[8];      /* of the stops' beginnings, by HAMELIN_SHIELD_... */
   double strayed;         /* largest deviation of a joint from a stop's motion [rad or m] */
   double strayed_share;   /* the same as a share of the bound that the margins cover */
-  int64_t overtaken;      /* stops that went on after the world had changed in their way */
+  int64_t overtaken;      /* stops that continued after the world had changed in their way */
   int64_t evasions;       /* stops that were followed by a move out of the way */
   int64_t proofs[3];      /* steps with moving obstacles in reach, by HAMELIN_PROOF_... */
 } hamelin_shield;
@@ -255,8 +255,8 @@ int32_t hamelin_controller_reset(hamelin_controller* controller, char* error, si
  * hamelin_answer.cause, which has its first 511 bytes. */
 int32_t hamelin_controller_stop(hamelin_controller* controller, const char* cause, char* error,
                                 size_t error_size);
-/* After any stop: goes on from where the arm is measured to be, from the next tick on, with the
- * goals where they were; by any thread. It has no effect unless the last answer has the state
+/* After any stop: resumes from the measured position, from the next tick on, with the same goal as
+ * before; by any thread. It has no effect unless the last answer has the state
  * HAMELIN_CONTROL_STOPPING. The arm remains stopped, and hamelin_answer.cause says why, if the
  * measurement of that tick cannot be used or the arm could not stop from where it is. This takes
  * milliseconds. */
