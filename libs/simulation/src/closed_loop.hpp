@@ -7,8 +7,8 @@
 #include "energy_audit.hpp"
 #include "hamelin/control/controller.hpp"
 #include "hamelin/control/planner_setup.hpp"
-#include "hamelin/control/world_view.hpp"
 #include "hamelin/simulation/run.hpp"
+#include "judge.hpp"
 #include "recorder.hpp"
 #include "target_feed.hpp"
 #include "tick_log.hpp"
@@ -39,17 +39,14 @@ class ClosedLoop {
   [[nodiscard]] bool has_diagnostics(int level) const;
   /// Makes the plant, at the scene's start, and the actuation that drives it.
   void make_plant(const PlantFactory& factory);
+  [[nodiscard]] control::Controller::Options controller_options();
   void start(const Watch& watch);
   /// Opens the stream of targets, if a goal follows one.
   void open_target_feed(const Watch& watch);
-  void warn_of_goals_in_contact(const Watch& watch);
 
   /// Observes the node that the last step reached: velocity, surroundings, proof that the step
   /// stayed clear, and changes of the map that are due.
   void observe_node();
-  void certify();
-  /// Notes by how much joints are beyond their limits.
-  void note_limits();
   /// Shows the controller obstacles that come into sight.
   void reveal_obstacles();
   void change_map();
@@ -78,15 +75,6 @@ class ClosedLoop {
   [[nodiscard]] bool arrived() const;
   /// Of the arm itself, at the current goal or the last one.
   [[nodiscard]] control::GoalError goal_error() const;
-  /// Counts the contacts of this node for the result, if the plant counts, too.
-  void count_contacts();
-  /// Describes the contact at this node, and who counted it if the plant counts, too.
-  [[nodiscard]] std::string describe_contact() const;
-  /// Describes the contact with an obstacle that moves or appears; none if it is with something
-  /// else.
-  [[nodiscard]] std::optional<log::Result::MoverContact> mover_contact() const;
-  /// Ends a run whose start is in contact.
-  void refuse();
   /// Lets the controller look at the arm, as it measures it, and at its goals.
   void let_controller_observe();
   /// Passes on the targets that are due.
@@ -126,10 +114,7 @@ class ClosedLoop {
   std::vector<log::Input> inputs_;
   log::Result result_;
   std::unique_ptr<control::Controller> controller_;
-  /// The judge's own view; null if the controller sees all that exists, and where the arm really
-  /// is.
-  std::unique_ptr<control::WorldView> own_judge_;
-  control::WorldView* judge_ = nullptr;  ///< that view, or the controller's
+  std::unique_ptr<Judge> judge_;
   std::unique_ptr<Actuation> actuation_;
   Eigen::VectorXd q_shown_, v_shown_;  ///< to the controller
 
@@ -148,15 +133,10 @@ class ClosedLoop {
     std::string text;
   };
   std::vector<Message> early_messages_;  ///< of the planner, before the log was open
-  bool certifies_ = true;                ///< whether the scene asks for proofs
-  bool certified_ = true;                ///< whether the step that led to this node was certified
-  bool touching_ = false;                ///< by the judge
-  Plant::Contacts contacts_;             ///< by the plant
   bool done_ = false;
   double stopped_at_s_ = -1.0;  ///< beginning of the shield's last stop
   bool halting_ = false;        ///< whether the run ends when the shield's stop does
-  double min_clearance_ = 0.0, min_self_clearance_ = 0.0;
-  long certified_steps_ = 0, checked_steps_ = 0, saturated_steps_ = 0;
+  long saturated_steps_ = 0;
   std::size_t next_map_change_ = 0, goals_reached_ = 0, next_event_ = 0;
   model::Model bare_;                    ///< the arm without what events attach to it
   std::vector<scene::Payload> carried_;  ///< attached by events

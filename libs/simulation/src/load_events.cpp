@@ -68,7 +68,7 @@ void ClosedLoop::note_refused_load(const scene::Event& event) {
 
 void ClosedLoop::complete(const scene::Event& event, bool accepted) {
   if (event.map) {
-    own_judge_->change_map(*event.map);
+    judge_->change_map(*event.map);
     plant_->change_map(*event.map);
     report_event(false, "the map changes");
   }
@@ -80,11 +80,8 @@ void ClosedLoop::complete(const scene::Event& event, bool accepted) {
     record_load(*event.detach, "detached");
   }
   if (accepted) take_load();
-  judge_->look(plant_->node().q, plant_->node().time_s);
-  min_clearance_ = std::min(min_clearance_, judge_->clearance_m());
-  min_self_clearance_ = std::min(min_self_clearance_, judge_->self_clearance_m());
-  touching_ = judge_->touching();
-  if (touching_ && !done_) finish(log::Outcome::collision, describe_contact());
+  judge_->look_again();
+  if (judge_->touching() && !done_) finish(log::Outcome::collision, judge_->describe_contact());
 }
 
 void ClosedLoop::record_load(const std::string& name, const char* what) {
@@ -102,9 +99,8 @@ void ClosedLoop::take_load() {
   if (tracking_) tracking_->take_load();
   const integration::Energy after = plant_->energy();
   audit_->book_load(after.kinetic_J + after.potential_J - before.kinetic_J - before.potential_J);
-  own_judge_ = control::WorldView::for_other_load(scene_, model_, *own_judge_);
-  judge_ = own_judge_.get();
-  log_->set_world(*judge_);
+  judge_->take_load();
+  log_->set_world(judge_->view());
 }
 
 }  // namespace hamelin::simulation
