@@ -1,5 +1,8 @@
 #include "disturbances.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -21,8 +24,11 @@ constexpr double inf = std::numeric_limits<double>::infinity();
 
 // An arm that is slower than this rests [rad/s].
 constexpr double rest_speed = 1e-3;
+// How far a hand moves each joint [rad].
+constexpr double hand_way = 1.0;
 // What a hand keeps from obstacles, from other parts of the arm and from joint limits [m, m, rad].
-constexpr double hand_clearance_m = 0.08, hand_self_clearance_m = 0.04, hand_reserve = 0.1;
+constexpr double hand_clearance_m = 0.04, hand_self_clearance_m = 0.005, hand_reserve = 0.05;
+constexpr std::size_t trail_max = 5;
 constexpr double deadline_exceeded_s = 0.01;
 
 thread_local double clock_now_s = 0.0, planner_takes_s = 0.0;
@@ -60,6 +66,7 @@ Disturbances::Disturbances(control::Controller& controller, Arm& arm, const mode
     : controller_(controller),
       arm_(arm),
       bare_(bare),
+      start_q_(arm.q()),
       rng_(seed),
       world_(controller, arm.q(), has_map, seed + 1) {
   planner_takes_s = 0.0;
@@ -67,6 +74,15 @@ Disturbances::Disturbances(control::Controller& controller, Arm& arm, const mode
 
 double Disturbances::clock_s() {
   return clock_now_s += planner_takes_s;
+}
+
+void Disturbances::note(std::string event) {
+  trail_.push_front(fmt::format("{:.3f} s {}", time_s_, event));
+  if (trail_.size() > trail_max) trail_.pop_back();
+}
+
+std::string Disturbances::trail() const {
+  return fmt::format("{}", fmt::join(trail_, ", "));
 }
 
 template <class F>
@@ -80,6 +96,7 @@ void Disturbances::attempt(long& count, F&& change) {
 }
 
 bool Disturbances::disturb(double time_s) {
+  time_s_ = time_s;
   if (since_start_ == 0) return true;
   if (guide_by_hand(time_s)) {
     since_start_ = 0;
@@ -98,20 +115,26 @@ void Disturbances::stop_or_resume() {
   if (happens(0.002)) {
     controller_.stop("a person entered the cell");
     ++events_.stops;
+    note("stop");
   }
   const bool stops = controller_.answer().state == control::ControlState::stopping;
   if (!guided_ && stops && happens(0.02)) {
     controller_.resume();
     ++events_.resumptions;
+    note("resume");
   }
   if (!guided_ && happens(0.001)) {
     controller_.stop("somebody takes the arm by its hand");
+    note("stop for a hand");
     guided_ = true;
   }
 }
 
 void Disturbances::begin_faults() {
-  if (happens(0.003)) late_ = 1 + static_cast<int>(rng_.below(25));
+  if (happens(0.003)) {
+    late_ = 1 + static_cast<int>(rng_.below(25));
+    note(fmt::format("{} late answers", late_));
+  }
   planner_takes_s = late_ > 0 ? deadline_exceeded_s : 0.0;
   if (late_ > 0) ++events_.late;
   late_ = std::max(0, late_ - 1);
@@ -119,6 +142,8 @@ void Disturbances::begin_faults() {
   (rng_.below(3) == 0 ? untimed_ : blind_) =
       1 + static_cast<int>(rng_.below(rng_.below(3) == 0 ? 30 : 3));
   how_ = static_cast<int>(rng_.below(5));
+  note(fmt::format("{} ticks without a measurement, {} without a time, kind {}", blind_, untimed_,
+                   how_));
 }
 
 Measurement Disturbances::measure(double time_s) {
@@ -152,6 +177,7 @@ bool Disturbances::guide_by_hand(double time_s) {
   controller_.reset();
   guided_ = false;
   ++events_.resets;
+  note("reset");
   return true;
 }
 
@@ -164,9 +190,11 @@ std::optional<VectorXd> Disturbances::free_configuration(double time_s) {
   const scene::SelfField self(model);
   VectorXd q(model.dof());
   for (int i = 0; i < 20; ++i) {
+    const VectorXd& from = rng_.below(2) == 0 ? start_q_ : arm_.q();
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       const auto& joint = model.robot().links[static_cast<std::size_t>(j)].joint;
-      q[j] = rng_.uniform(*joint.lower + hand_reserve, *joint.upper - hand_reserve);
+      q[j] = std::clamp(from[j] + rng_.uniform(-hand_way, hand_way), *joint.lower + hand_reserve,
+                        *joint.upper - hand_reserve);
     }
     dynamics::forward_kinematics(model, ws, q);
     arm.place(model, ws);
@@ -219,6 +247,7 @@ std::optional<model::Model> Disturbances::take_load() {
   if (answer.load == load_) return std::nullopt;
   load_ = answer.load;
   ++events_.loads;
+  note(fmt::format("{} loads carried", loads_[load_].size()));
   return control::carrying(bare_, loads_[load_], true, 0.0, arm_.q());
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <deque>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,10 +46,13 @@ class Disturbances {
   [[nodiscard]] std::optional<model::Model> take_load();
 
   [[nodiscard]] const Events& events() const noexcept { return events_; }
+  /// The last events with their times, the newest first.
+  [[nodiscard]] std::string trail() const;
   /// For Options::clock_s: the planners of this thread take as long as disturb() has chosen.
   static double clock_s();
 
  private:
+  void note(std::string event);
   [[nodiscard]] bool happens(double share) { return rng_.uniform() < share; }
   template <class F>
   void attempt(long& count, F&& change);
@@ -63,9 +68,12 @@ class Disturbances {
   control::Controller& controller_;
   Arm& arm_;
   const model::Model& bare_;
+  Eigen::VectorXd start_q_;
   Rng rng_;
   WorldUpdates world_;
   Events events_;
+  double time_s_ = 0.0;
+  std::deque<std::string> trail_;
   bool guided_ = false;                     ///< whether somebody waits to move the arm by hand
   long since_start_ = 0;                    ///< ticks since the first one or the last reset()
   int late_ = 0, blind_ = 0, untimed_ = 0;  ///< ticks for which this goes on

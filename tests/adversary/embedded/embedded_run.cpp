@@ -96,7 +96,8 @@ class Loop {
   void tick(int k);
   std::unique_ptr<Arm> make_arm() const;
   Bounds bounds() const;
-  void note_shield();
+  void note_shield(const std::string& at);
+  void explain();
 
   const EmbeddedRun& run_;
   Choice choice_;
@@ -134,11 +135,25 @@ Bounds Loop::bounds() const {
           period_s};
 }
 
-void Loop::note_shield() {
+void Loop::note_shield(const std::string& at) {
   const control::Shield* const shield = controller_.shield();
-  if (shield == nullptr) return;
+  if (shield == nullptr) return explain();
   report_.overtaken = std::max(report_.overtaken, shield->counts().overtaken);
   report_.strayed_share = std::max(report_.strayed_share, shield->counts().strayed_share);
+  judge_.check_straying(shield->counts().strayed_share, at);
+  explain();
+}
+
+// What a seed chose, and what was done before the fault.
+void Loop::explain() {
+  while (report_.findings.size() < judge_.findings().size())
+    report_.findings.push_back(
+        fmt::format("{} ({}, {}, delay {}, rate {:.0f}, lag {:.4f} s, self {}, overtaken {}; {})",
+                    judge_.findings()[report_.findings.size()],
+                    std::filesystem::path(choice_.scene.name).stem().string(), plugin_.name(),
+                    choice_.delay_periods,
+                    choice_.scene.actuation.torque_rate_max_Nm_s.value_or(0.0), choice_.lag_s,
+                    choice_.scene.model.self_collision, report_.overtaken, disturbances_.trail()));
 }
 
 void Loop::tick(int k) {
@@ -163,7 +178,7 @@ void Loop::tick(int k) {
   arm_->step(answer);
   judge_.check_motion(q, v, arm_->q(), arm_->v(), *world, time_s, at);
   report_.path += (arm_->q() - q).lpNorm<Eigen::Infinity>();
-  note_shield();
+  note_shield(at);
 }
 
 EmbeddedReport Loop::run() {
@@ -176,15 +191,8 @@ EmbeddedReport Loop::run() {
     }
   }
   report_.events = disturbances_.events();
-  report_.findings = judge_.findings();
   report_.least_clearance_m = judge_.least_clearance_m();
   for (std::size_t i = 0; i < faults; ++i) report_.counts[i] = judge_.count(static_cast<Fault>(i));
-  for (std::string& line : report_.findings)
-    line += fmt::format(" ({}, {}, delay {}, rate {}, lag {:.4f} s, self {}, overtaken {})",
-                        std::filesystem::path(choice_.scene.name).stem().string(), plugin_.name(),
-                        choice_.delay_periods,
-                        choice_.scene.actuation.torque_rate_max_Nm_s.value_or(0.0), choice_.lag_s,
-                        choice_.scene.model.self_collision, report_.overtaken);
   return report_;
 }
 

@@ -28,8 +28,8 @@ constexpr int samples = 8;
 
 std::string_view to_string(Fault fault) noexcept {
   constexpr std::array<std::string_view, faults> names{
-      "contact",     "self_contact", "position", "speed", "torque",
-      "torque_rate", "acceleration", "jerk",     "jump",  "not_finite"};
+      "contact",      "self_contact", "position", "speed",      "torque", "torque_rate",
+      "acceleration", "jerk",         "jump",     "not_finite", "strayed"};
   return names[static_cast<std::size_t>(fault)];
 }
 
@@ -66,6 +66,10 @@ void Judge::note(Fault fault, const std::string& at, double value, double bound)
   if (++counts_[static_cast<std::size_t>(fault)] > 1) return;
   findings_.push_back(
       fmt::format("{} {}: {:.6g}, bound {:.6g}", at, to_string(fault), value, bound));
+}
+
+void Judge::check_straying(double share, const std::string& at) {
+  if (share > 1.0) note(Fault::strayed, at, share, 1.0);
 }
 
 void Judge::check_bound(Fault fault, const VectorXd& values, const VectorXd& bounds,

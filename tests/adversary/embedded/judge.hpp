@@ -23,9 +23,10 @@ enum class Fault {
   acceleration,  ///< of a set point
   jerk,          ///< of a set point
   jump,          ///< of a set point's position
-  not_finite
+  not_finite,
+  strayed  ///< from the motion of a stop, by more than the shield's margins cover
 };
-inline constexpr std::size_t faults = 10;
+inline constexpr std::size_t faults = 11;
 [[nodiscard]] std::string_view to_string(Fault fault) noexcept;
 
 /// Bounds of what a controller sends.
@@ -54,6 +55,9 @@ class Judge {
   void check_motion(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& q_to,
                     const Eigen::VectorXd& v_to, const control::WorldSnapshot& world, double time_s,
                     const std::string& at);
+
+  /// @param share of the bound, of the shield that is in force
+  void check_straying(double share, const std::string& at);
 
   [[nodiscard]] long count(Fault fault) const { return counts_[static_cast<std::size_t>(fault)]; }
   /// One line per kind of fault, about its first.
