@@ -66,11 +66,11 @@ void PositionDrive::continue_from(const Drive& other) {
   limits_.start_from(setpoint_.torque);
 }
 
-// From where servos have brought the arm.
+// From where servos have brought the arm, with the acceleration that it was sent: an arm that is
+// still being stopped goes on without a jump.
 void PositionDrive::resume() {
   q_ = setpoint_.q = q_measured_;
   v_ = setpoint_.v = v_measured_;
-  command_rate_.setZero();
 }
 
 void PositionDrive::describe_defect(LineBuffer& line) const {
@@ -125,8 +125,8 @@ std::optional<Shield::Step> PositionDrive::step() {
                       setpoint_.torque, command_rate_};
 }
 
-void PositionDrive::begin(Stop& stop) {
-  stop.begin({q_, v_, command_rate_, setpoint_.torque, command_rate_});
+StopFinder::Start PositionDrive::stop_start() {
+  return {q_, v_, command_rate_, setpoint_.torque, command_rate_};
 }
 
 void PositionDrive::follow(Stop& stop) {

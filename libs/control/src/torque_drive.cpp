@@ -96,11 +96,11 @@ std::optional<Shield::Step> TorqueDrive::step() {
                       pipeline_.acceleration(), proposed_,     pipeline_.disturbance()};
 }
 
-void TorqueDrive::begin(Stop& stop) {
+StopFinder::Start TorqueDrive::stop_start() {
   look_ahead();
   dynamics::forward_dynamics(model_, ws_, pipeline_.q(), pipeline_.v(), pipeline_.last(), rate_);
   rate_ += pipeline_.disturbance();
-  stop.begin({pipeline_.q(), pipeline_.v(), rate_, pipeline_.last(), pipeline_.disturbance()});
+  return {pipeline_.q(), pipeline_.v(), rate_, pipeline_.last(), pipeline_.disturbance()};
 }
 
 void TorqueDrive::follow(Stop& stop) {

@@ -182,12 +182,12 @@ void Loop::tick(int k) {
 }
 
 EmbeddedReport Loop::run() {
-  for (int k = 0; k < run_.ticks && !report_.unstarted; ++k) {
+  for (int k = 0; k < run_.ticks && report_.unstarted.empty(); ++k) {
     try {
       tick(k);
     } catch (const Error& e) {
       if (k == 0) throw;
-      report_.unstarted = true;
+      report_.unstarted = e.what();
     }
   }
   report_.events = disturbances_.events();

@@ -23,7 +23,7 @@ struct EmbeddedReport {
   std::array<long, faults> counts{};
   Events events;
   long ticks = 0, stopping = 0, overtaken = 0;
-  bool unstarted = false;  ///< whether a reset found no way to stop where the arm was put
+  std::string unstarted;  ///< why the controller could not start where the arm was put; or empty
   double least_clearance_m = 1.0, strayed_share = 0.0, path = 0.0;
 };
 

@@ -26,7 +26,7 @@ struct Totals {
 
   void add(const EmbeddedReport& report) {
     ++runs;
-    unstarted += report.unstarted ? 1 : 0;
+    unstarted += report.unstarted.empty() ? 0 : 1;
     ticks += report.ticks;
     stopping += report.stopping;
     overtaken += report.overtaken;
@@ -67,6 +67,9 @@ void work(std::atomic<long>& next, long count, std::uint64_t first, bool positio
       const std::lock_guard lock(mutex);
       totals.add(report);
       for (const std::string& line : report.findings) fmt::print("{}\n", line);
+      if (!report.unstarted.empty())
+        fmt::print("seed {} {}: no start after a reset: {}\n", run.seed,
+                   position ? "position" : "torque", report.unstarted);
     } catch (const std::exception& e) {
       const std::lock_guard lock(mutex);
       ++totals.failed;

@@ -316,8 +316,8 @@ class Controller {
   /// Ends the stop.
   void go_on();
   void take_stop();
-  /// Writes why the arm cannot begin with the load at a node; nothing if it can.
-  void describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line);
+  /// Writes why the arm cannot begin with the load where it is; nothing if it can.
+  void describe_defect(LoadedArm& fresh, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
