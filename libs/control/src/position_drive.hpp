@@ -27,6 +27,7 @@ class PositionDrive final : public Drive {
   const Setpoint& send() override { return setpoint_; }
 
  private:
+  [[nodiscard]] bool moves_as_sent() const;
   [[nodiscard]] double rate_up_to(double rise, Eigen::Index joint) const;
   /// Sets the change of velocity to that of rate_ within the bounds, and the set point by it.
   void advance();

@@ -97,6 +97,7 @@ void Disturbances::attempt(long& count, F&& change) {
 
 bool Disturbances::disturb(double time_s) {
   time_s_ = time_s;
+  resumes_ = false;
   if (since_start_ == 0) return true;
   if (guide_by_hand(time_s)) {
     since_start_ = 0;
@@ -120,6 +121,7 @@ void Disturbances::stop_or_resume() {
   const bool stops = controller_.answer().state == control::ControlState::stopping;
   if (!guided_ && stops && happens(0.02)) {
     controller_.resume();
+    resumes_ = true;
     ++events_.resumptions;
     note("resume");
   }

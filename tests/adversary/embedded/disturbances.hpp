@@ -45,6 +45,8 @@ class Disturbances {
   /// another one
   [[nodiscard]] std::optional<model::Model> take_load();
 
+  /// Whether disturb() has asked the next tick to resume.
+  [[nodiscard]] bool resumes() const noexcept { return resumes_; }
   [[nodiscard]] const Events& events() const noexcept { return events_; }
   /// The last events with their times, the newest first.
   [[nodiscard]] std::string trail() const;
@@ -74,6 +76,7 @@ class Disturbances {
   Events events_;
   double time_s_ = 0.0;
   std::deque<std::string> trail_;
+  bool resumes_ = false;
   bool guided_ = false;                     ///< whether somebody waits to move the arm by hand
   long since_start_ = 0;                    ///< ticks since the first one or the last reset()
   int late_ = 0, blind_ = 0, untimed_ = 0;  ///< ticks for which this goes on

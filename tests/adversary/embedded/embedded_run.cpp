@@ -49,6 +49,8 @@ void choose_drive(Choice& choice, bool position, Rng& rng) {
   actuation.type = scene::ActuationType::sampled;
   actuation.control_period_s = choice.scene.step_s = period_s;
   choice.options.position = position;
+  // for planners that are told of velocities, they may be those of an estimator
+  actuation.estimates_velocity = rng.below(4) == 0;
   if (!position) {
     choice.delay_periods = rng.below(2);
     actuation.delay_s = period_s * static_cast<double>(choice.delay_periods);
@@ -147,13 +149,13 @@ void Loop::note_shield(const std::string& at) {
 // What a seed chose, and what was done before the fault.
 void Loop::explain() {
   while (report_.findings.size() < judge_.findings().size())
-    report_.findings.push_back(
-        fmt::format("{} ({}, {}, delay {}, rate {:.0f}, lag {:.4f} s, self {}, overtaken {}; {})",
-                    judge_.findings()[report_.findings.size()],
-                    std::filesystem::path(choice_.scene.name).stem().string(), plugin_.name(),
-                    choice_.delay_periods,
-                    choice_.scene.actuation.torque_rate_max_Nm_s.value_or(0.0), choice_.lag_s,
-                    choice_.scene.model.self_collision, report_.overtaken, disturbances_.trail()));
+    report_.findings.push_back(fmt::format(
+        "{} ({}, {}, delay {}, rate {:.0f}, estimates {}, lag {:.4f} s, self {}, overtaken {}; {})",
+        judge_.findings()[report_.findings.size()],
+        std::filesystem::path(choice_.scene.name).stem().string(), plugin_.name(),
+        choice_.delay_periods, choice_.scene.actuation.torque_rate_max_Nm_s.value_or(0.0),
+        choice_.scene.actuation.estimates_velocity, choice_.lag_s,
+        choice_.scene.model.self_collision, report_.overtaken, disturbances_.trail()));
 }
 
 void Loop::tick(int k) {
@@ -162,10 +164,13 @@ void Loop::tick(int k) {
       fmt::format("seed {} {} tick {}", run_.seed, run_.position ? "position" : "torque", k);
   if (disturbances_.disturb(time_s)) judge_.expect_start(arm_->q());
   const Measurement measured = disturbances_.measure(time_s);
-  const bool stopped = controller_.answer().state == control::ControlState::stopping;
+  const control::Shield* const shield = controller_.shield();
   const control::Answer& answer = controller_.tick(measured.time_s, measured.q, measured.v);
   const bool stops = answer.state == control::ControlState::stopping;
-  if (stopped && !stops) judge_.expect_resumption(arm_->q(), arm_->v());
+  if (disturbances_.resumes() && (controller_.shield() != shield || !stops))
+    judge_.expect_resumption(arm_->q(), choice_.scene.actuation.estimates_velocity
+                                            ? VectorXd(VectorXd::Zero(bare_.dof()))
+                                            : arm_->v());
   if (const auto model = disturbances_.take_load()) {
     arm_->carry(*model);
     judge_.set_arm(*model);

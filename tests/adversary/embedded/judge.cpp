@@ -57,6 +57,8 @@ void Judge::expect_start(const VectorXd& q) {
 }
 
 void Judge::expect_resumption(const VectorXd& q, const VectorXd& v) {
+  const double rest = bounds_.acceleration * bounds_.period_s;
+  if (!v_.isZero(0.0) || v.lpNorm<Eigen::Infinity>() > rest) return;
   rate_known_ = q == q_ && v == v_;
   q_ = q;
   v_ = v;

@@ -47,7 +47,7 @@ class Judge {
   void set_arm(const model::Model& model);
   /// The next output follows a new start at a configuration at rest.
   void expect_start(const Eigen::VectorXd& q);
-  /// Set points go on from where the arm is measured to be.
+  /// Set points may go on from where the arm is measured to be, if it rests there.
   void expect_resumption(const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// @param at what a line about it begins with
   void check_output(const control::Answer& answer, const std::string& at);

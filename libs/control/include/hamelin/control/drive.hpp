@@ -64,7 +64,7 @@ class Drive {
   virtual void continue_from(const Drive& other) = 0;
   /// From now on this one acts, in place of the one that it continues.
   virtual void take_over() {}
-  /// Goes on from where the arm is when a stop ends.
+  /// Goes on when a stop ends, from where the arm is.
   virtual void resume() {}
   /// Writes that the arm does not do what it was sent; nothing if it does.
   virtual void describe_defect(LineBuffer&) const {}
