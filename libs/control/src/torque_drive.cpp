@@ -33,8 +33,12 @@ void TorqueDrive::measure(const VectorXd& q, const VectorXd& v, bool seen) {
     v_ = v;
     return;
   }
-  if (!started_ || !seen_before) {
-    estimator_->start(q, started_ ? v_ : zero_);
+  if (!started_) {
+    estimator_->start(q, zero_);
+  } else if (!seen_before) {
+    extrapolate();  // v_ is that of the tick before
+    q_measured_ = q;
+    estimator_->start(q, v_);
   } else {
     dynamics::forward_dynamics(model_, ws_, q_, v_, pipeline_.acting(), rate_);
     estimator_->update(q, rate_);

@@ -1,7 +1,8 @@
-// An arm that goes on with another load, or after a stop, while it moves: what it is sent goes on
-// from what it was sent last, and where that acts.
+// An arm that goes on with another load, after a stop, or after measurements were lost, while it
+// moves: what it is sent goes on from what it was sent last, and where that acts.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <utility>
 
 #include "../loop.hpp"
@@ -16,10 +17,17 @@ namespace {
 
 constexpr double period_s = 0.001;
 
-/// Servos that do exactly what they are sent, and the largest changes of that.
+/// Servos that do what they are sent, also with a lag of the first order, and the largest changes
+/// of what they are sent.
 struct SetPoints {
-  explicit SetPoints(const scene::Scene& scene)
-      : loop(scene, options()), q(scene.start_q), v(VectorXd::Zero(7)), a(v) {}
+  explicit SetPoints(const scene::Scene& scene, double lag_s = 0.0)
+      : loop(scene, options()),
+        q(scene.start_q),
+        v(VectorXd::Zero(7)),
+        q_sent(q),
+        v_sent(v),
+        a(v),
+        share(lag_s > 0.0 ? 1.0 - std::exp(-period_s / lag_s) : 1.0) {}
 
   static control::Controller::Options options() {
     control::Controller::Options options = test::with_room();
@@ -31,19 +39,23 @@ struct SetPoints {
     for (int k = 0; k < ticks; ++k) {
       const control::Answer& answer =
           loop.controller.tick(period_s * static_cast<double>(at++), q, v);
-      const VectorXd rate = (answer.v_next - v) / period_s;
+      const VectorXd rate = (answer.v_next - v_sent) / period_s;
       acceleration = std::max(acceleration, rate.lpNorm<Eigen::Infinity>());
       jerk = std::max(jerk, (rate - a).lpNorm<Eigen::Infinity>() / period_s);
-      q = answer.q_next;
-      v = answer.v_next;
+      jump = std::max(jump, (answer.q_next - q_sent).lpNorm<Eigen::Infinity>());
+      q_sent = answer.q_next;
+      v_sent = answer.v_next;
       a = rate;
+      v = share < 1.0 ? VectorXd(share / period_s * (q_sent - q)) : v_sent;
+      q += share * (q_sent - q);
     }
   }
 
   Loop loop;
-  VectorXd q, v, a;
+  VectorXd q, v, q_sent, v_sent, a;
+  double share;
   long at = 0;
-  double acceleration = 0.0, jerk = 0.0;
+  double acceleration = 0.0, jerk = 0.0, jump = 0.0;
 };
 
 }  // namespace
@@ -79,7 +91,11 @@ TEST_CASE("a stop after a resumption begins where the torques on their way have 
 
 TEST_CASE("set points go on without a jump of their acceleration after a resumption and a load",
           "[control][takeover]") {
-  SetPoints points(sampled("clutter.json"));
+  const double lag_s = GENERATE(0.0, 0.01);
+  CAPTURE(lag_s);
+  scene::Scene scene = sampled("clutter.json");
+  scene.actuation.estimates_velocity = GENERATE(false, true);
+  SetPoints points(scene, lag_s);
   control::Controller& controller = points.loop.controller;
   double slowest = 10.0;
   for (int round = 0; round < 8; ++round) {
@@ -103,4 +119,41 @@ TEST_CASE("set points go on without a jump of their acceleration after a resumpt
   CHECK(points.acceleration <= 15.0 * (1.0 + 1e-6));
   CHECK(points.jerk <= 5000.0 * (1.0 + 1e-6));
   CHECK(points.jerk > 1000.0);
+  CHECK(points.jump < 2.7 * period_s);
+}
+
+TEST_CASE("set points of servos that rest elsewhere go on from there", "[control][takeover]") {
+  SetPoints points(sampled("clutter.json"));
+  points.move(150);
+  points.loop.controller.stop("a request");
+  points.move(400);
+  REQUIRE(points.v.isZero(0.0));
+  points.q[1] += 0.02;  // where brakes hold it
+  points.loop.controller.resume();
+  const VectorXd held = points.q;
+  points.move(1);
+  CHECK(points.loop.controller.answer().state == ControlState::running);
+  CHECK((points.q_sent - held).lpNorm<Eigen::Infinity>() < 1e-4);
+}
+
+TEST_CASE("an estimated velocity goes on over measurements that are lost while it changes",
+          "[control][takeover]") {
+  scene::Scene scene = sampled("clutter.json");
+  scene.actuation.estimates_velocity = true;
+  Loop loop(scene);
+  const auto move = [&](int ticks) {
+    for (int k = 0; k < ticks; ++k) loop.step(VectorXd(loop.tick().torque));
+  };
+  move(400);
+  const double before = loop.v.norm();
+  loop.controller.stop("a request");
+  move(3);
+  const int lost = GENERATE(1, 3);
+  const VectorXd nowhere = VectorXd::Constant(7, test::not_finite);
+  for (int k = 0; k < lost; ++k)
+    loop.step(VectorXd(loop.controller.tick(loop.state.time_s, nowhere, nowhere).torque));
+  const VectorXd v = loop.v;
+  (void)loop.tick();
+  CHECK((loop.controller.v() - v).lpNorm<Eigen::Infinity>() < 3e-3);
+  CHECK(before - v.norm() > 0.05);  // it brakes
 }
