@@ -144,6 +144,7 @@ void Disturbances::begin_faults() {
   (rng_.below(3) == 0 ? untimed_ : blind_) =
       1 + static_cast<int>(rng_.below(rng_.below(3) == 0 ? 30 : 3));
   how_ = static_cast<int>(rng_.below(5));
+  longest_blind_ = std::max(longest_blind_, blind_);
   note(fmt::format("{} ticks without a measurement, {} without a time, kind {}", blind_, untimed_,
                    how_));
 }

@@ -45,6 +45,8 @@ class Disturbances {
   /// another one
   [[nodiscard]] std::optional<model::Model> take_load();
 
+  /// The largest number of ticks in a row without a measurement.
+  [[nodiscard]] int longest_blind() const noexcept { return longest_blind_; }
   /// Whether disturb() has asked the next tick to resume.
   [[nodiscard]] bool resumes() const noexcept { return resumes_; }
   [[nodiscard]] const Events& events() const noexcept { return events_; }
@@ -81,6 +83,7 @@ class Disturbances {
   long since_start_ = 0;                    ///< ticks since the first one or the last reset()
   int late_ = 0, blind_ = 0, untimed_ = 0;  ///< ticks for which this goes on
   int how_ = 0;
+  int longest_blind_ = 0;
   int payloads_ = 0;
   std::map<std::string, scene::Payload> known_;
   std::map<std::uint64_t, std::vector<scene::Payload>> loads_;
