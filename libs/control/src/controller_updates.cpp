@@ -197,7 +197,8 @@ void Controller::take_stop() {
     start_braking(StopReason::request, newest.cause.view());
 }
 
-void Controller::describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line) {
+void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
+  const Stop::Node node = fresh.drive->node();
   (void)fresh.view.take_newest();
   fresh.view.look(node.q, time_s_);
   if (!fresh.shield) {
@@ -205,7 +206,9 @@ void Controller::describe_defect(LoadedArm& fresh, const Stop::Node& node, LineB
     return;
   }
   const Shield::Surroundings world{fresh.view.environment(), fresh.view.snapshot(), time_s_.load()};
-  if (!shielded_ || fresh.shield->start_in_place_of(*arm_->shield, world, node)) return;
+  if (!shielded_ ||
+      fresh.shield->start_in_place_of(*arm_->shield, world, node, fresh.drive->stop_start()))
+    return;
   fresh.shield->describe(world.environment, line);
 }
 
@@ -218,16 +221,16 @@ void Controller::take_load() {
              resumes = asked && usable_;
   if (newest.number == answer_.load && !resumes) return;
   LoadedArm& fresh = *newest.arm;
-  const Drive& drive = *arm_->drive;
+  fresh.drive->continue_from(*arm_->drive);
+  if (resumes) fresh.drive->resume();
   LineBuffer defect;
-  describe_defect(fresh, resumes ? drive.resume_node() : drive.node(), defect);
+  describe_defect(fresh, defect);
   if (!defect.view().empty()) {
     if (resumes) refuse_to_go_on(defect);
     if (newest.number != answer_.load) refuse_load(newest.number, defect);
     return;
   }
-  fresh.drive->continue_from(drive);
-  if (resumes) fresh.drive->resume();
+  fresh.drive->take_over();
   begun_stop_ = 0;
   std::swap(arm_, newest.arm);
   goals_.set_model(arm_->model);

@@ -28,10 +28,13 @@ void IdealDrive::start() {
   setpoint_.v = v_;
 }
 
-// The planner of the arm with the other load starts from rest, so no half-kick is due.
 void IdealDrive::continue_from(const Drive& other) {
   q_ = other.q();
   v_ = other.v();
+}
+
+// The planner of the arm with the other load starts from rest, so no half-kick is due.
+void IdealDrive::take_over() {
   forget();
   start();
 }
@@ -94,8 +97,8 @@ std::optional<Shield::Step> IdealDrive::step() {
                       zero_};
 }
 
-void IdealDrive::begin(Stop& stop) {
-  stop.begin({q_, v_, zero_, zero_, zero_});
+StopFinder::Start IdealDrive::stop_start() {
+  return {q_, v_, zero_, zero_, zero_};
 }
 
 // From the node as it was measured.

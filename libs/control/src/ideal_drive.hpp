@@ -18,9 +18,10 @@ class IdealDrive final : public Drive {
   void start() override;
   void forget() noexcept override { arm_.closes_with_kick = false; }
   void continue_from(const Drive& other) override;
+  void take_over() override;
   bool propose(const planning::CommandBuffers& answer) override;
   std::optional<Shield::Step> step() override;
-  void begin(Stop& stop) override;
+  StopFinder::Start stop_start() override;
   void follow(Stop& stop) override;
   const Setpoint& send() override { return setpoint_; }
 

@@ -66,11 +66,19 @@ void PositionDrive::continue_from(const Drive& other) {
   limits_.start_from(setpoint_.torque);
 }
 
-// From where servos have brought the arm.
+// Servos lag while the arm moves, so that a set point that went back to where the arm is would
+// jump. An arm that rests may be held by brakes, and must not be pulled to its set point.
+bool PositionDrive::moves_as_sent() const {
+  const bool moves = !v_.isZero(0.0) || (v_measured_.cwiseAbs().array() >
+                                         options_.period_s * options_.acceleration_max.array())
+                                            .any();
+  return moves && ((q_measured_ - q_).cwiseAbs().array() <= options_.tracking_max.array()).all();
+}
+
 void PositionDrive::resume() {
+  if (moves_as_sent()) return;
   q_ = setpoint_.q = q_measured_;
   v_ = setpoint_.v = v_measured_;
-  command_rate_.setZero();
 }
 
 void PositionDrive::describe_defect(LineBuffer& line) const {
@@ -125,8 +133,8 @@ std::optional<Shield::Step> PositionDrive::step() {
                       setpoint_.torque, command_rate_};
 }
 
-void PositionDrive::begin(Stop& stop) {
-  stop.begin({q_, v_, command_rate_, setpoint_.torque, command_rate_});
+StopFinder::Start PositionDrive::stop_start() {
+  return {q_, v_, command_rate_, setpoint_.torque, command_rate_};
 }
 
 void PositionDrive::follow(Stop& stop) {

@@ -18,16 +18,16 @@ class PositionDrive final : public Drive {
   void start() override;
   void forget() noexcept override { started_ = false; }
   void continue_from(const Drive& other) override;
-  Stop::Node resume_node() const noexcept override { return {q_measured_, v_measured_}; }
   void resume() override;
   void describe_defect(LineBuffer& line) const override;
   bool propose(const planning::CommandBuffers& answer) override;
   std::optional<Shield::Step> step() override;
-  void begin(Stop& stop) override;
+  StopFinder::Start stop_start() override;
   void follow(Stop& stop) override;
   const Setpoint& send() override { return setpoint_; }
 
  private:
+  [[nodiscard]] bool moves_as_sent() const;
   [[nodiscard]] double rate_up_to(double rise, Eigen::Index joint) const;
   /// Sets the change of velocity to that of rate_ within the bounds, and the set point by it.
   void advance();

@@ -154,20 +154,23 @@ void Shield::start(const Surroundings& world, const Node& node) {
   counts_ = {};
   stop_.set_strayed({});
   largest_margin_ = 0.0;
-  if (try_start(world, node)) return;
-  throw Error(ErrorCode::invalid, fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
-}
-
-bool Shield::try_start(const Surroundings& world, const Node& node) {
   notice(world);
   dynamics::gravity_torque(model_, ws_, node.q, hold_);
-  if (!verify(world, {node, node.v, node, zero_, hold_, zero_})) return false;
+  if (!verify(world, {node, node.v, node, zero_, hold_, zero_}))
+    throw Error(ErrorCode::invalid,
+                fmt::format("{}: {}", scene_name_, defect_at_start(world, node)));
   take_tried();
-  return true;
 }
 
-bool Shield::start_in_place_of(const Shield& other, const Surroundings& world, const Node& node) {
-  if (!try_start(world, node)) return false;
+// The arm may move and accelerate, and torques may be on their way: the stop begins where the next
+// command acts, and goes on from what acts there.
+bool Shield::start_in_place_of(const Shield& other, const Surroundings& world, const Node& node,
+                               const StopFinder::Start& stop) {
+  notice(world);
+  if (!verify(world,
+              {node, node.v, {stop.q, stop.v}, stop.acceleration, stop.torque, stop.disturbance}))
+    return false;
+  take_tried();
   counts_ = other.counts_;
   stop_.set_strayed(other.stop_.strayed());
   largest_margin_ = std::max(largest_margin_, other.largest_margin_);

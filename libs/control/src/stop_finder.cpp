@@ -15,6 +15,9 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
+// A stop begins to brake before it ends to: the largest product of its rate and of both transitions
+// is below 2, docs/theory.md (14.13).
+constexpr double longest_transitions = 1.9;
 
 BrakingRate braking_within(const scene::Scene& scene, const model::Model& model, double period_s,
                            const ChangeBounds& bounds) {
@@ -55,6 +58,25 @@ std::pair<double, double> StopFinder::transition_times(const Start& start, doubl
   return {ramp, fade};
 }
 
+// The ramp leads to the velocity w, from which the arm brakes, and w decides how long the ramp must
+// be. Each try solves for the ramp as if this were linear.
+void StopFinder::keep_bounds(const Start& start, double& rate, double& ramp, double& fade) {
+  constexpr int tries = 10;
+  for (int i = 0; i < tries; ++i) {
+    double slope = 0.0;  // of the ramp that is needed, by the ramp
+    for (Index j = 0; j < w_.size(); ++j) {
+      if (w_[j] != 0.0) rate = std::min(rate, bounds_.acceleration_max[j] / std::abs(w_[j]));
+      slope = std::max(slope, 0.5 * rate * std::abs(start.acceleration[j]) / bounds_.jerk_max[j]);
+    }
+    double needed = 0.0;
+    std::tie(needed, fade) = transition_times(start, rate);
+    if (needed <= ramp) return;
+    ramp += (needed - ramp) / (1.0 - std::min(slope, 0.9));
+    rate = std::min(rate, longest_transitions / (ramp + fade));
+    w_ = start.v + 0.5 * ramp * start.acceleration;
+  }
+}
+
 // The rate of braking and the time to reach it depend on each other.
 bool StopFinder::find(const Start& start, double least_utilisation, FailSafe& out) {
   constexpr int tries = 3;
@@ -73,9 +95,10 @@ bool StopFinder::find(const Start& start, double least_utilisation, FailSafe& ou
       rate *= std::sqrt(whole / (rate * (ramp + fade)));
       std::tie(ramp, fade) = transition_times(start, rate);
     }
-    if (rate * (ramp + fade) > 1.9 * whole) rate = 1.9 * whole / (ramp + fade);
+    rate = std::min(rate, longest_transitions * whole / (ramp + fade));
     w_ = start.v + 0.5 * ramp * start.acceleration;
   }
+  if (bounds_.jerk_max.size() > 0) keep_bounds(start, rate, ramp, fade);
   out.set_stop(start.q, start.v, start.acceleration, {rate, ramp, fade});
   return true;
 }

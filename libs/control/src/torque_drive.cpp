@@ -33,8 +33,12 @@ void TorqueDrive::measure(const VectorXd& q, const VectorXd& v, bool seen) {
     v_ = v;
     return;
   }
-  if (!started_ || !seen_before) {
-    estimator_->start(q, started_ ? v_ : zero_);
+  if (!started_) {
+    estimator_->start(q, zero_);
+  } else if (!seen_before) {
+    extrapolate();  // v_ is that of the tick before
+    q_measured_ = q;
+    estimator_->start(q, v_);
   } else {
     dynamics::forward_dynamics(model_, ws_, q_, v_, pipeline_.acting(), rate_);
     estimator_->update(q, rate_);
@@ -97,11 +101,11 @@ std::optional<Shield::Step> TorqueDrive::step() {
                       pipeline_.acceleration(), proposed_,     pipeline_.disturbance()};
 }
 
-void TorqueDrive::begin(Stop& stop) {
+StopFinder::Start TorqueDrive::stop_start() {
   look_ahead();
   dynamics::forward_dynamics(model_, ws_, pipeline_.q(), pipeline_.v(), pipeline_.last(), rate_);
   rate_ += pipeline_.disturbance();
-  stop.begin({pipeline_.q(), pipeline_.v(), rate_, pipeline_.last(), pipeline_.disturbance()});
+  return {pipeline_.q(), pipeline_.v(), rate_, pipeline_.last(), pipeline_.disturbance()};
 }
 
 void TorqueDrive::follow(Stop& stop) {

@@ -21,7 +21,7 @@ class TorqueDrive final : public Drive {
   const Eigen::VectorXd* last_torque() const noexcept override { return &setpoint_.torque; }
   bool propose(const planning::CommandBuffers& answer) override;
   std::optional<Shield::Step> step() override;
-  void begin(Stop& stop) override;
+  StopFinder::Start stop_start() override;
   void follow(Stop& stop) override;
   const Setpoint& send() override;
 

@@ -224,7 +224,7 @@ class Controller {
   /// @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
   void stop(std::string_view cause);
   /// Goes on from where the arm is measured to be, from the next tick on, if the last answer has
-  /// the state `stopping` and its cause is gone. Planner, guide and shield are made again, goals go
+  /// the state `stopping` and its cause is gone. Servos that still move go on from their set point. Planner, guide and shield are made again, goals go
   /// on where they were. The arm remains stopped if the measurement of that tick cannot be used, or
   /// if there is no way to stop from where it is; Answer::cause says so. A stop that no answer has
   /// shown yet remains. Any thread; this takes milliseconds.
@@ -323,8 +323,8 @@ class Controller {
   /// Ends the stop.
   void go_on();
   void take_stop();
-  /// Writes why the arm cannot begin with the load at a node; nothing if it can.
-  void describe_defect(LoadedArm& fresh, const Stop::Node& node, LineBuffer& line);
+  /// Writes why the arm cannot begin with the load where it is; nothing if it can.
+  void describe_defect(LoadedArm& fresh, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
   /// The rest of observe(), once the measurement is taken or missing.
   void look(bool first);

@@ -60,10 +60,11 @@ class Drive {
   virtual void start() = 0;
   /// The next tick is the first one again.
   virtual void forget() noexcept = 0;
-  /// Goes on in place of the drive of the arm with another load, of the same kind.
+  /// Takes the state of the drive of the arm with another load, of the same kind.
   virtual void continue_from(const Drive& other) = 0;
-  /// Where the arm is when a stop ends, and goes on from there.
-  [[nodiscard]] virtual Stop::Node resume_node() const noexcept { return node(); }
+  /// From now on this one acts, in place of the one that it continues.
+  virtual void take_over() {}
+  /// Goes on when a stop ends, from where the arm is.
   virtual void resume() {}
   /// Writes that the arm does not do what it was sent; nothing if it does.
   virtual void describe_defect(LineBuffer&) const {}
@@ -74,8 +75,9 @@ class Drive {
   [[nodiscard]] virtual bool propose(const planning::CommandBuffers& answer) = 0;
   /// Where the proposal leads to; none if it leads nowhere. Refers to the drive.
   [[nodiscard]] virtual std::optional<Shield::Step> step() = 0;
-  /// Lets a stop begin where the arm is.
-  virtual void begin(Stop& stop) = 0;
+  /// Where a stop can begin, and what acts there. Refers to the drive.
+  [[nodiscard]] virtual StopFinder::Start stop_start() = 0;
+  void begin(Stop& stop) { stop.begin(stop_start()); }
   /// The next period of a stop instead of a proposal.
   virtual void follow(Stop& stop) = 0;
   /// What acts in the next period.

@@ -105,9 +105,10 @@ class Shield {
   /// @throws Error invalid if it has none, with the bound that would do
   void start(const Surroundings& world, const Node& node);
   /// Begins in place of the shield of the arm with another load, whose counts go on.
+  /// @param node where the arm is @param stop where a stop can begin, and what acts there
   /// @return whether there is a verified stop; else see refusal()
   [[nodiscard]] bool start_in_place_of(const Shield& other, const Surroundings& world,
-                                       const Node& node);
+                                       const Node& node, const StopFinder::Start& stop);
   /// A step of the arm.
   struct Step {
     Node from;                         ///< the node as it was verified
@@ -145,8 +146,6 @@ class Shield {
  private:
   /// Sets what is kept from the limits. @param q where the arm starts
   void set_reserve(const scene::Scene& scene, const Eigen::VectorXd& q);
-  /// Verifies a stop at the node. @return whether there is one
-  [[nodiscard]] bool try_start(const Surroundings& world, const Node& node);
   /// Why the arm cannot begin at a node, and what would do.
   [[nodiscard]] std::string defect_at_start(const Surroundings& world, const Node& node);
   [[nodiscard]] bool verify(const Surroundings& world, const Step& step);

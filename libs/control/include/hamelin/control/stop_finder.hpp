@@ -49,6 +49,9 @@ class StopFinder {
   /// The ramp and the fade that the bounds require for a rate.
   [[nodiscard]] std::pair<double, double> transition_times(const Start& start, double rate);
 
+  /// Makes the stop keep the bounds of acceleration and jerk, where there are any. Changes w_.
+  void keep_bounds(const Start& start, double& rate, double& ramp, double& fade);
+
   const model::Model& model_;
   ChangeBounds bounds_;
   BrakingRate braking_;
