@@ -1,7 +1,6 @@
 #include <memory>
 
 #include "c_interface.hpp"
-#include "hamelin/core/text.hpp"
 
 using namespace hamelin;
 using namespace hamelin::control;
@@ -168,12 +167,10 @@ std::int32_t hamelin_controller_reset(hamelin_controller* controller, char* erro
                  [](hamelin_controller& of) { of.controller.reset(); });
 }
 
-// The cause becomes a line of the answer.
 std::int32_t hamelin_controller_stop(hamelin_controller* controller, const char* cause, char* error,
                                      std::size_t error_size) {
-  return guarded(controller, error, error_size, [&](hamelin_controller& of) {
-    of.controller.stop(one_line(required(cause, "cause")));
-  });
+  return guarded(controller, error, error_size,
+                 [&](hamelin_controller& of) { of.controller.stop(required(cause, "cause")); });
 }
 
 std::int32_t hamelin_controller_resume(hamelin_controller* controller, char* error,

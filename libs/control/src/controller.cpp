@@ -216,8 +216,7 @@ const Answer& Controller::tick(double time_s, const VectorXd& q, const VectorXd&
 }
 
 const Answer& Controller::tick_unseen() {
-  if (k_ == 0)
-    throw Error(ErrorCode::usage, "tick_unseen: the first tick needs a measurement");
+  if (k_ == 0) throw Error(ErrorCode::usage, "tick_unseen: the first tick needs a measurement");
   usable_ = false;
   ++unusable_;
   if (lost_.empty()) {

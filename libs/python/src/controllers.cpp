@@ -39,9 +39,8 @@ py::object tick(BoundController& c, double time_s, py::handle q, py::handle v) {
 }
 
 void stop(BoundController& c, const std::string& cause) {
-  const std::string line = one_line(cause);
   const py::gil_scoped_release unlocked;
-  c.controller->stop(line);
+  c.controller->stop(cause);
 }
 
 void resume(BoundController& c) {

@@ -98,9 +98,10 @@ void Keeper::write(bool unseen) {
   setpoint_.clearance_m = controller_.view().clearance_m();
   setpoint_.state = static_cast<std::int32_t>(answer.state);
   setpoint_.reason = static_cast<std::int32_t>(answer.reason);
-  setpoint_.flags = (answer.saturated ? HAMELIN_SETPOINT_SATURATED : 0U) |
-                    (answer.stopping ? HAMELIN_SETPOINT_SHIELDED : 0U) |
-                    (unseen ? HAMELIN_SETPOINT_UNSEEN : 0U);
+  setpoint_.flags = 0;
+  if (answer.saturated) setpoint_.flags |= HAMELIN_SETPOINT_SATURATED;
+  if (answer.stopping) setpoint_.flags |= HAMELIN_SETPOINT_SHIELDED;
+  if (unseen) setpoint_.flags |= HAMELIN_SETPOINT_UNSEEN;
   setpoint_.goal_index = static_cast<std::uint32_t>(answer.goal_index);
   setpoint_.lost = counts_.lost;
   setpoint_.late = counts_.late;

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cstring>
 #include <string>
-#include <thread>
 #include <utility>
 
+#include "clerk.hpp"
 #include "hamelin/core/error.hpp"
+#include "requests.hpp"
 
 namespace hamelin::serve {
 
@@ -29,7 +30,8 @@ Server::Server(control::Controller& controller, const ServerOptions& options)
     : controller_(controller),
       options_(options),
       listener_(options.socket),
-      keeper_(controller, options.gap_max) {
+      keeper_(controller, options.gap_max),
+      clerk_(std::make_unique<Clerk>()) {
   const int dof = controller.model().dof();
   if (dof > HAMELIN_LINK_JOINTS)
     throw Error(ErrorCode::invalid,
@@ -68,7 +70,7 @@ void Server::serve(Connection client, const std::atomic<bool>& stop) {
     if (limited) wait_s = std::clamp(due_s + options_.patience_s - now_s(), 0.0, glance_s);
     const News news = client.wait(wait_s, sequence, text);
     const double since_s = now_s();
-    if (news == News::text) answer_text(client, text);
+    if (news == News::text) answer_text(client, std::move(text));
     if (news == News::frame) {
       hamelin_measurement measurement;
       std::memcpy(&measurement, &memory_->measurement, sizeof measurement);
@@ -84,7 +86,10 @@ void Server::serve(Connection client, const std::atomic<bool>& stop) {
     if (keeper_.wants_resume()) resume();
     if (news == News::nothing || keeper_.counts().ticks % glance_periods == 0) turn_away_others();
   }
+  clerk_->finish();
 }
+
+Server::~Server() = default;
 
 void Server::answer(const Connection& client) {
   std::memcpy(&memory_->setpoint, &keeper_.setpoint(), sizeof(hamelin_setpoint));
@@ -95,8 +100,15 @@ void Server::turn_away_others() {
   (void)listener_.accept(0.0);
 }
 
+void Server::answer_text(const Connection& client, std::string text) {
+  clerk_->post([this, &client, text = std::move(text)] {
+    (void)client.send(answer_request(controller_, text, options_.folder));
+  });
+}
+
+// The arm remains stopped if the planner refuses to start.
 void Server::resume() {
-  std::thread([&controller = controller_] { controller.resume(); }).detach();
+  clerk_->post([this] { (void)answer_request(controller_, R"({"resume": true})", {}); });
 }
 
 }  // namespace hamelin::serve

@@ -221,13 +221,14 @@ class Controller {
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
   /// Brings the arm to rest from the next tick on, and holds it. Any thread.
-  /// @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
+  /// @param cause for Answer::cause, as one line, which has its first LineBuffer::size_max bytes
   void stop(std::string_view cause);
   /// Goes on from where the arm is measured to be, from the next tick on, if the last answer has
-  /// the state `stopping` and its cause is gone. Servos that still move go on from their set point. Planner, guide and shield are made again, goals go
-  /// on where they were. The arm remains stopped if the measurement of that tick cannot be used, or
-  /// if there is no way to stop from where it is; Answer::cause says so. A stop that no answer has
-  /// shown yet remains. Any thread; this takes milliseconds.
+  /// the state `stopping` and its cause is gone; servos that still move go on from their set point.
+  /// Planner, guide and shield are made again, goals go on where they were. The arm remains stopped
+  /// if the measurement of that tick cannot be used, or if there is no way to stop from where it
+  /// is; Answer::cause says so. A stop that no answer has shown yet remains. Any thread; this takes
+  /// milliseconds.
   /// @throws Error plugin if the planner refuses to start; nothing changes then
   void resume();
 

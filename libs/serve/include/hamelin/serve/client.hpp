@@ -60,8 +60,8 @@ struct SimulatedClientOptions {
 struct SimulatedClientReport {
   log::Result result;  ///< outcome and figures of the robot's side
   long periods = 0;
-  Faults made;              ///< counts of what it did wrong, not shares
-  long unanswered = 0;      ///< periods without a set point of their own
+  Faults made;                  ///< counts of what it did wrong, not shares
+  long unanswered = 0;          ///< periods without a set point of their own
   TimeHistogram round_trip_us;  ///< from sending a measurement to its set point, without faults
   std::uint64_t lost = 0, late = 0, damaged = 0;  ///< measurements by the server's account
   long stopping = 0;                              ///< periods in which the controller stopped

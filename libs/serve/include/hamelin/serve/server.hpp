@@ -2,6 +2,8 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <string>
 
 #include "hamelin/control/controller.hpp"
 #include "hamelin/core/time_histogram.hpp"
@@ -9,6 +11,8 @@
 #include "hamelin/serve/link.hpp"
 
 namespace hamelin::serve {
+
+class Clerk;
 
 struct ServerOptions {
   std::filesystem::path socket;
@@ -18,6 +22,7 @@ struct ServerOptions {
   double patience_s = 0.0;
   /// So many periods in a row are made up for where sequence numbers leave them out.
   int gap_max = 10;
+  std::filesystem::path folder;  ///< that relative paths in requests start from
 };
 
 /// Serves one client after another with the set points of a controller, see hamelin_frames.h.
@@ -34,6 +39,10 @@ class Server {
   /// @throws Error io, or invalid for an arm with too many joints
   Server(control::Controller& controller, const ServerOptions& options);
 
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
   /// Serves until `stop` is set. @param gone is told of each client when it has gone; false ends
   void run(const std::atomic<bool>& stop, const std::function<bool(const Report&)>& gone);
 
@@ -41,7 +50,7 @@ class Server {
   void serve(Connection client, const std::atomic<bool>& stop);
   /// Hands the set point of the last period to the client.
   void answer(const Connection& client);
-  void answer_text(const Connection& client, const std::string& text);
+  void answer_text(const Connection& client, std::string text);
   void turn_away_others();
   /// On a thread of its own: it takes longer than a period.
   void resume();
@@ -52,6 +61,7 @@ class Server {
   LinkMemory memory_;
   Keeper keeper_;
   Report report_;
+  std::unique_ptr<Clerk> clerk_;
 };
 
 }  // namespace hamelin::serve
