@@ -1,4 +1,4 @@
-#include "hamelin/control/target_line.hpp"
+#include "loop/target_line.hpp"
 
 #include <cmath>
 

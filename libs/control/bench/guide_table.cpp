@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "hamelin/control/guide_query.hpp"
+#include "guide/guide_query.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 

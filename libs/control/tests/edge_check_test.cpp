@@ -1,8 +1,8 @@
-#include "hamelin/control/edge_check.hpp"
+#include "guide/edge_check.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "hamelin/control/guide_query.hpp"
+#include "guide/guide_query.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/model/make_chain.hpp"

@@ -1,17 +1,17 @@
-#include "hamelin/control/mover_check.hpp"
+#include "shield/mover_check.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
 
-#include "hamelin/control/move_time.hpp"
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/control/preparation.hpp"
-#include "hamelin/control/shield.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
+#include "shield/move_time.hpp"
+#include "shield/shield.hpp"
 
 using namespace hamelin;
 using control::FailSafe;

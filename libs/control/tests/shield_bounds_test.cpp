@@ -4,14 +4,14 @@
 #include <deque>
 
 #include "hamelin/control/preparation.hpp"
-#include "hamelin/control/shield.hpp"
-#include "hamelin/control/straying.hpp"
-#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/robots.hpp"
+#include "loop/torque_pipeline.hpp"
+#include "shield/shield.hpp"
+#include "shield/straying.hpp"
 
 using namespace hamelin;
 using control::Levers;
@@ -94,8 +94,10 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
   }
   CHECK(shield.stop().motion().stop_s() > 0.15);
   straying.bound(shield.stop().motion().stop());
-  const double lag = ideal ? 0.0 : 0.25 * T * std::abs(shield.stop().motion().stop().line_velocity()[0]);
-  return most / (straying.errors()[0] + straying.tracking()[0] - lag);  // velocities do not lag here
+  const double lag =
+      ideal ? 0.0 : 0.25 * T * std::abs(shield.stop().motion().stop().line_velocity()[0]);
+  return most /
+         (straying.errors()[0] + straying.tracking()[0] - lag);  // velocities do not lag here
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "hamelin/control/shield.hpp"
+#include "shield/shield.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "hamelin/control/preparation.hpp"
-#include "hamelin/control/torque_pipeline.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/core/numbers.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
+#include "loop/torque_pipeline.hpp"
 
 using namespace hamelin;
 using control::BrakingRate;

@@ -1,4 +1,4 @@
-#include "hamelin/control/state_estimator.hpp"
+#include "loop/state_estimator.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

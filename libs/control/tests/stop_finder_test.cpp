@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "hamelin/control/preparation.hpp"
-#include "hamelin/control/stop_finder.hpp"
 #include "hamelin/core/rng.hpp"
+#include "loop/stop_finder.hpp"
 
 using namespace hamelin;
 using Eigen::VectorXd;

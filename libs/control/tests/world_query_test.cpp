@@ -1,4 +1,4 @@
-#include "hamelin/control/world_query.hpp"
+#include "world/world_query.hpp"
 
 #include <array>
 #include <catch2/catch.hpp>

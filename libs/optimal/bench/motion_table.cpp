@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "execution.hpp"
-#include "hamelin/control/guide_query.hpp"
+#include "guide/guide_query.hpp"
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/optimal/scene_motion.hpp"

@@ -100,16 +100,16 @@ py::object make_answer(const control::Answer& answer) {
 }
 
 py::object shield_counts(control::Controller& controller) {
-  control::Shield* const shield = controller.shield();
-  if (shield == nullptr) return py::none();
-  const control::Shield::Counts counts = shield->counts();
-  std::optional<control::StopCause> cause;
-  if (shield->stopping()) cause = shield->refusal().cause;
+  const auto report = controller.shield_report();
+  if (!report) return py::none();
+  const control::ShieldCounts& counts = report->counts;
+  control::LineBuffer line;
+  controller.describe_refusal(line);
   py::dict out;
-  out["stopping"] = shield->stopping();
-  out["cause"] = name_or_none(cause);
-  out["line"] = cause ? shield->describe(controller.surroundings().environment) : std::string();
-  out["proof"] = name_or_none(shield->mover_proof());
+  out["stopping"] = report->stopping;
+  out["cause"] = name_or_none(report->cause);
+  out["line"] = std::string(line.view());
+  out["proof"] = name_or_none(report->proof);
   out["steps"] = counts.steps;
   out["refused"] = counts.refused;
   out["at_rest"] = counts.at_rest;
@@ -127,7 +127,7 @@ py::object shield_counts(control::Controller& controller) {
 }
 
 py::object guide_counts(control::Controller& controller) {
-  const control::Guidance::Figures* const figures = controller.guide_figures();
+  const control::GuideFigures* const figures = controller.guide_figures();
   if (figures == nullptr) return py::none();
   py::dict out;
   out["searches"] = figures->searches;

@@ -169,12 +169,12 @@ void ClosedLoop::ask_planner() {
 }
 
 void ClosedLoop::report_stop() {
-  const control::Shield* const shield = controller_->shield();
-  if (shield == nullptr || !controller_->answer().stopping || !shield->stop_began()) return;
+  if (!controller_->answer().stopping || !controller_->shield_report()->began) return;
   const double last_s = std::exchange(stopped_at_s_, plant_->node().time_s);
   if (stopped_at_s_ - last_s < stop_again_s) return;
-  report_event(false, fmt::format("the shield stops the arm: {}",
-                                  shield->describe(controller_->view().environment())));
+  control::LineBuffer line;
+  controller_->describe_refusal(line);
+  report_event(false, fmt::format("the shield stops the arm: {}", line.view()));
 }
 
 void ClosedLoop::let_answer_act() {

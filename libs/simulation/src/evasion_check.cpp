@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "hamelin/control/fail_safe.hpp"
 #include "scene_values.hpp"
+#include "shield/fail_safe.hpp"
 
 namespace hamelin::simulation {
 

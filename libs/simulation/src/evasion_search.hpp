@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "evasion_check.hpp"
-#include "hamelin/control/asides.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/log/trajectory.hpp"
 #include "hamelin/simulation/explain.hpp"
+#include "shield/asides.hpp"
 
 namespace hamelin::simulation {
 

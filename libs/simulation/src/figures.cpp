@@ -7,10 +7,10 @@ namespace hamelin::simulation {
 
 namespace {
 
-log::Result::Shield shield_figures(const control::Shield& shield, double work_J) {
-  const control::Shield::Counts counts = shield.counts();
+log::Result::Shield shield_figures(const control::ShieldReport& report, double work_J) {
+  const control::ShieldCounts& counts = report.counts;
   log::Result::Shield out;
-  out.margin_m = shield.largest_margin_m();
+  out.margin_m = report.largest_margin_m;
   out.steps = counts.steps;
   out.refused = counts.refused;
   out.refused_at_rest = counts.at_rest;
@@ -32,8 +32,7 @@ log::Result::Shield shield_figures(const control::Shield& shield, double work_J)
   return out;
 }
 
-std::string shield_warning(const control::Shield& shield, const model::Model& model) {
-  const control::Shield::Counts counts = shield.counts();
+std::string shield_warning(const control::ShieldCounts& counts, const model::Model& model) {
   const auto joint = static_cast<std::size_t>(counts.strayed_joint);
   return fmt::format(
       "the bounds of /safety do not hold: joint '{}' strayed from the motion of a "
@@ -45,11 +44,12 @@ std::string shield_warning(const control::Shield& shield, const model::Model& mo
 
 void ClosedLoop::fill_result() {
   if (const auto* change = actuation_->torque_change()) result_.torque_change = *change;
-  if (const control::Shield* const shield = controller_->shield())
+  if (const auto shield = controller_->shield_report()) {
     result_.shield = shield_figures(*shield, audit_->ledger().stop);
-  if (result_.shield && result_.shield->strayed_share > 1.0)
-    result_.warnings.push_back(shield_warning(*controller_->shield(), model_));
-  if (const control::Guidance::Figures* const guide = controller_->guide_figures())
+    if (shield->counts.strayed_share > 1.0)
+      result_.warnings.push_back(shield_warning(shield->counts, model_));
+  }
+  if (const control::GuideFigures* const guide = controller_->guide_figures())
     result_.guide = {std::string(to_string(scene_.guide.type)),
                      guide->searches,
                      guide->found,

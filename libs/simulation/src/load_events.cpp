@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "closed_loop.hpp"
-#include "hamelin/control/loaded_arm.hpp"
+#include "loop/loaded_arm.hpp"
 
 namespace hamelin::simulation {
 

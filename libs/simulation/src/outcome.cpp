@@ -54,14 +54,16 @@ void ClosedLoop::check_outcome() {
 
 std::string ClosedLoop::timeout_cause() const {
   const std::string cause = fmt::format("goal not reached within {} s", scene_.duration_s);
-  const control::Shield* const shield = controller_->shield();
-  if (shield == nullptr || !shield->stopping() || !shield->stop().at_rest()) return cause;
+  const auto shield = controller_->shield_report();
+  if (!shield || !shield->stopping || !shield->at_rest) return cause;
+  control::LineBuffer line;
+  controller_->describe_refusal(line);
   return fmt::format("{}; the shield has held the arm since {:.3f} s: {}", cause, stopped_at_s_,
-                     shield->describe(controller_->view().environment()));
+                     line.view());
 }
 
 bool ClosedLoop::rests() const {
-  return controller_->shield()->stop().at_rest() &&
+  return controller_->shield_report()->at_rest &&
          plant_->node().v.lpNorm<Eigen::Infinity>() < resting_speed;
 }
 
@@ -119,7 +121,7 @@ bool ClosedLoop::planner_answered() {
 }
 
 void ClosedLoop::finish_at_rest(log::Outcome outcome, std::string cause) {
-  if (controller_->shield() == nullptr) return finish(outcome, std::move(cause));
+  if (!controller_->shield_report()) return finish(outcome, std::move(cause));
   if (!halting_) {
     result_.outcome = outcome;
     result_.cause = std::move(cause);

@@ -2,10 +2,10 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "hamelin/control/discrete_arm.hpp"
 #include "hamelin/integration/integrator.hpp"
 #include "hamelin/scene/scene.hpp"
 #include "hamelin/simulation/plant.hpp"
+#include "loop/discrete_arm.hpp"
 
 namespace hamelin::simulation {
 

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <utility>
 
-#include "hamelin/control/target_line.hpp"
 #include "hamelin/core/error.hpp"
+#include "loop/target_line.hpp"
 
 namespace hamelin::simulation {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "hamelin/control/controller.hpp"
-#include "hamelin/control/target_line.hpp"
+#include "loop/target_line.hpp"
 
 namespace hamelin::simulation {
 

@@ -17,7 +17,7 @@ std::string obstacle_name(const scene::Environment& environment, int obstacle) {
 }
 
 // One list of numbers per line, in steps of 0.1 mm: a drawing needs no more.
-Json paths_json(const control::PlannerHost::Drawing& drawing) {
+Json paths_json(const control::Drawing& drawing) {
   constexpr double steps_per_m = 1e4;
   Json paths = Json::array();
   std::size_t from = 0;
@@ -87,11 +87,10 @@ void TickLog::tick(bool certified, const planning::CommandBuffers* answer) {
     drawn_ = drawing.number;
     fields["paths"] = paths_json(drawing);
   }
-  const control::Shield* const shield = controller_.shield();
-  if (shield != nullptr && acts && shield->stopping()) {
-    fields["stop"] = {{"cause", to_string(shield->refusal().cause)},
-                      {"q_end", to_json(shield->stop().motion().end())}};
-    if (shield->stop().motion().moves()) fields["stop"]["evades"] = true;
+  const auto shield = controller_.shield_report();
+  if (shield && acts && shield->stopping) {
+    fields["stop"] = {{"cause", to_string(*shield->cause)}, {"q_end", to_json(*shield->stop_end)}};
+    if (shield->evades) fields["stop"]["evades"] = true;
   }
   const control::TargetState* const target = controller_.answer().target;
   if (tracking_ != nullptr && target != nullptr && !target->waiting)

@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-#include "hamelin/control/loaded_arm.hpp"
+#include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/scene/self_collision.hpp"
 

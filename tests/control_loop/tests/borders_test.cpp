@@ -60,9 +60,9 @@ TEST_CASE("what a controller drives decides the bounds of safety, not the file o
     if (k == 700) loop.controller.stop("a request of the test");
     loop.step(torque);
   }
-  REQUIRE(loop.controller.shield()->counts().refused > 1000);
-  CHECK(loop.controller.shield()->counts().strayed > 0.0);
-  CHECK(loop.controller.shield()->counts().strayed_share < 1.0);
+  REQUIRE(loop.controller.shield_report()->counts.refused > 1000);
+  CHECK(loop.controller.shield_report()->counts.strayed > 0.0);
+  CHECK(loop.controller.shield_report()->counts.strayed_share < 1.0);
 }
 
 TEST_CASE("a controller has a shield for what is added to an empty world", "[control][borders]") {

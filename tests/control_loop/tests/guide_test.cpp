@@ -76,7 +76,7 @@ TEST_CASE("a path that stays clear is kept where the world changes, and searched
     }
   };
   ticks(400);
-  const control::Guidance::Figures& figures = *loop.controller.guide_figures();
+  const control::GuideFigures& figures = *loop.controller.guide_figures();
   REQUIRE(figures.found == 1);
   scene::Obstacle ball;
   ball.name = "ball";
@@ -115,7 +115,7 @@ TEST_CASE("new goals, a new start and a load begin with a search of their own",
       loop.controller.run_guide();
     }
   };
-  const control::Guidance::Figures& figures = *loop.controller.guide_figures();
+  const control::GuideFigures& figures = *loop.controller.guide_figures();
   ticks(50);
   CHECK(figures.searches == 1);
   loop.controller.set_goal(scene::joint_goal(loop.state.q + VectorXd::Constant(7, 0.1)));

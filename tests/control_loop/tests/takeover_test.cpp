@@ -86,7 +86,7 @@ TEST_CASE("a stop after a resumption begins where the torques on their way have 
     loop.controller.resume();
   }
   CHECK(slowest > 0.05);  // it moved
-  CHECK(loop.controller.shield()->counts().strayed_share <= 1.0);
+  CHECK(loop.controller.shield_report()->counts.strayed_share <= 1.0);
 }
 
 TEST_CASE("set points go on without a jump of their acceleration after a resumption and a load",

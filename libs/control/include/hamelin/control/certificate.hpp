@@ -1,16 +1,18 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "hamelin/control/levers.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/self_collision.hpp"
 #include "hamelin/scene/shapes.hpp"
 
 namespace hamelin::control {
+
+class Levers;
 
 /// Proves that the motion between two nodes stays clear: chapter 12 of docs/theory.md. The motion
 /// is assumed to follow the joint-space line q + s Δq, from which joint j deviates by at most σ_j,
@@ -38,6 +40,7 @@ class Certificate {
   /// @param obstacles_max the largest number of obstacles in any environment to be checked
   Certificate(const model::Model& model, double limit, const scene::SelfField* self,
               double self_limit, std::size_t obstacles_max);
+  ~Certificate();
 
   struct Verdict {
     bool certified = false;
@@ -100,17 +103,14 @@ class Certificate {
   /// existed all the time.
   [[nodiscard]] double clearance_of_appearing(const scene::Shapes& shape,
                                               const scene::Moment& moment, double clearance) const;
-  [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const {
-    return (subject.is_pair ? levers_.pairs() : levers_.shapes())
-        .row(static_cast<Eigen::Index>(subject.index));
-  }
+  [[nodiscard]] Eigen::MatrixXd::ConstRowXpr lever(Subject subject) const;
 
   const model::Model& model_;
   const scene::Environment* environment_ = nullptr;  ///< of the step that is checked
   double limit_;
   const scene::SelfField* self_;
   double self_limit_;
-  Levers levers_;
+  std::unique_ptr<Levers> levers_;
 
   // of the step that is checked
   Eigen::VectorXd q_, dq_, stray_;  ///< stray: σ

@@ -11,65 +11,29 @@
 #include <string_view>
 #include <vector>
 
-#include "hamelin/control/goal_list.hpp"
+#include "hamelin/control/answer.hpp"
 #include "hamelin/control/goal_tracker.hpp"
-#include "hamelin/control/guidance.hpp"
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
-#include "hamelin/control/loaded_arm.hpp"
-#include "hamelin/control/newest.hpp"
+#include "hamelin/control/shield_report.hpp"
 #include "hamelin/control/world.hpp"
+#include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::control {
 
-/// Where a control loop is. running: towards a goal. reached: all goals met; the planner holds the
-/// last one. stalled: by the scene's stall rule. gave_up: by the planner's own judgement. stopping:
-/// the planner failed, a measurement or its time cannot be used, the arm does not follow its set
-/// point, or stop() was called: the arm is brought to rest and held until resume() or reset().
-enum class ControlState : std::int32_t { running, reached, stalled, gave_up, stopping };
-
-/// What an arm is stopped for. planner: it failed, or its sum of channels is no number. late: too
-/// many answers in a row were. measurement: it or its time cannot be used. tracking: the arm is
-/// away from its set point. request: stop().
-enum class StopReason : std::int32_t { none, planner, late, measurement, tracking, request };
-
-/// The answer of a tick; its torques, positions and velocities are always finite. References stay
-/// valid until the next tick.
-struct Answer {
-  ControlState state = ControlState::running;
-  StopReason reason = StopReason::none;  ///< where it stops
-  std::string_view cause;                ///< why it gave up or stops: one line, or empty
-  const planning::CommandBuffers* channels = nullptr;  ///< the planner's; null if it failed
-  /// Sum of all channels within the limits of torque and its rate [Nm or N], docs/theory.md (8.7).
-  Eigen::VectorXd torque;
-  bool saturated = false;  ///< whether a limit reduced it
-  /// Whether the shield refused the planner's answer, and torque or position are those of its stop.
-  bool stopping = false;
-  /// For arms that are controlled by position: joint positions and velocities one period ahead.
-  Eigen::VectorXd q_next, v_next;
-  /// Number of the list of goals: 0 for the scene's, else what set_goals() returned.
-  std::uint64_t goals_number = 0;
-  std::size_t goal_index = 0;  ///< of the current goal in it; the number of goals after the last
-  /// The target of the current goal, where that is a follow goal; else null.
-  const TargetState* target = nullptr;
-  /// The reference of the current goal, where that has a trajectory; else null.
-  const ReferenceState* reference = nullptr;
-  /// Number of the World's snapshot that the answer is for.
-  std::uint64_t snapshot = 0;
-  /// Number of what the arm carries: 0 at first, else what attach() or detach() returned last of
-  /// those that took effect; and of the last one that was refused, with the reason, one line.
-  std::uint64_t load = 0, refused_load = 0;
-  std::string_view load_refusal;
-  /// The planner's own figures, see Controller::series(); NaN where it set none.
-  std::span<const double> series;
-  /// Time that the planner took by Options::clock_s [s], and in how many ticks since the start it
-  /// took longer than the deadline; 0 without a clock.
-  double planner_s = 0.0;
-  std::uint64_t overruns = 0;
-};
+class DiscreteArm;
+class Guidance;
+class Shield;
+class Stop;
+struct GoalList;
+struct ArmSetup;
+struct DriveOptions;
+struct LoadedArm;
+struct Mailbox;
+struct NewLoad;
 
 /// Seconds of the computer's steady clock.
 [[nodiscard]] double steady_clock_s();
@@ -114,7 +78,7 @@ struct ControllerOptions {
   /// run_guide(), and each check of a search delays the path by the scene's check_time_s.
   bool guide_thread = true;
   /// Receives the planner's messages on the thread that calls the planner; empty: none.
-  PlannerHost::LineSink log;
+  LineSink log;
   /// Tell `log` of the first tick in which the planner exceeded its deadline. The line contains
   /// measured time, so it differs from run to run.
   bool log_overrun = true;
@@ -149,6 +113,7 @@ class Controller {
   /// @param params of the planner, checked and with defaults
   Controller(const scene::Scene& scene, const model::Model& arm, const planning::Plugin& plugin,
              const Json& params, Options options);
+  ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
@@ -234,13 +199,9 @@ class Controller {
 
   /// Searches the path that the last tick has asked for, if it did, without Options::guide_thread.
   /// For the thread of tick(); this allocates.
-  void run_guide() {
-    if (arm_->guide) arm_->guide->run();
-  }
+  void run_guide();
   /// What the scene's guide did; null if it has none.
-  [[nodiscard]] const Guidance::Figures* guide_figures() const noexcept {
-    return guidance_ ? &guidance_->figures() : nullptr;
-  }
+  [[nodiscard]] const GuideFigures* guide_figures() const noexcept;
 
   /// The proof for the motion between the last two ticks; empty after the first one and without
   /// Options::certify.
@@ -254,60 +215,43 @@ class Controller {
   /// @throws Error plugin if the planner refuses to start again; do not call tick() then
   void reset();
 
-  /// The shield; null if the scene refuses one, or needs none, see Options::fixed_world. Another
-  /// object after reset() and whenever the load changes.
-  [[nodiscard]] Shield* shield() noexcept { return arm_->shield.get(); }
+  /// What the shield did; none if the scene refuses one, or needs none, see Options::fixed_world.
+  /// For the thread of tick().
+  [[nodiscard]] std::optional<ShieldReport> shield_report() const;
+  /// Describes what was in the way of the last step that the shield refused, at the end of a line,
+  /// without allocating; nothing if it refused none.
+  void describe_refusal(LineBuffer& line) const;
+  /// The shield itself, for tests; null if there is none. Another object after reset() and whenever
+  /// the load changes.
+  [[nodiscard]] Shield* shield() noexcept;
+  [[nodiscard]] const Shield* shield() const noexcept;
   /// What the shield keeps the arm from, at the last tick.
-  [[nodiscard]] Shield::Surroundings surroundings() const noexcept {
-    return {arm_->view.environment(), arm_->view.snapshot(), time_s_};
-  }
+  [[nodiscard]] Surroundings surroundings() const noexcept;
 
   /// What it sees, until the load changes. A caller may look() at and certify() the motion between
   /// ticks with it.
-  [[nodiscard]] WorldView& view() noexcept { return arm_->view; }
+  [[nodiscard]] WorldView& view() noexcept;
+  [[nodiscard]] const WorldView& view() const noexcept;
   /// The controller's model of the arm with what it carries, until the load changes.
-  [[nodiscard]] const model::Model& model() const noexcept { return arm_->model; }
+  [[nodiscard]] const model::Model& model() const noexcept;
   /// The state that the last tick acted on: as measured, or as estimated.
-  [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return arm_->drive->q(); }
-  [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return arm_->drive->v(); }
+  [[nodiscard]] const Eigen::VectorXd& q() const noexcept;
+  [[nodiscard]] const Eigen::VectorXd& v() const noexcept;
   [[nodiscard]] const GoalTracker& goals() const noexcept { return goals_; }
   [[nodiscard]] const planning::Plugin& plugin() const noexcept { return plugin_; }
   /// The numeric series that the planner declared, in the order of Answer::series.
-  [[nodiscard]] const std::vector<planning::Series>& series() const noexcept {
-    return arm_->planner.series();
-  }
+  [[nodiscard]] const std::vector<planning::Series>& series() const noexcept;
   /// The lines that the planner drew last.
-  [[nodiscard]] const PlannerHost::Drawing& drawing() const noexcept {
-    return arm_->planner.drawing();
-  }
+  [[nodiscard]] const Drawing& drawing() const noexcept;
   /// Pose of the tip at the last tick, in the world. @throws Error before the first tick
-  [[nodiscard]] geometry::SE3 tip() const {
-    return dynamics::tip_pose(arm_->model, arm_->view.poses());
-  }
+  [[nodiscard]] geometry::SE3 tip() const;
   /// Time between two ticks [s].
   [[nodiscard]] double period_s() const noexcept { return period_s_; }
   /// Time that the planner should not exceed in a tick [s], see Answer::overruns.
   [[nodiscard]] double deadline_s() const noexcept { return deadline_s_; }
 
  private:
-  /// The planner's parameters on their way to the tick.
-  struct NewParams {
-    std::uint64_t number = 0;
-    std::optional<planning::PreparedParams> params;
-  };
-  /// What the arm carries, on its way to the tick.
-  struct NewLoad {
-    std::uint64_t serial = 0;
-    std::uint64_t number = 0;
-    std::uint64_t params_number = 0;  ///< of the parameters that its planner was made with
-    std::unique_ptr<LoadedArm> arm;   ///< after it was taken: the one before
-    std::uint64_t resumes = 0;        ///< the stop after which the arm is to go on; 0: none
-  };
-  struct StopRequest {
-    std::uint64_t number = 0;
-    LineBuffer cause;
-  };
-  [[nodiscard]] LoadedArm::Common common() noexcept;
+  [[nodiscard]] ArmSetup arm_setup() noexcept;
   /// Publishes an arm with other payloads. The caller has locked load_mutex_.
   std::uint64_t publish_load(std::vector<scene::Payload> payloads, const Eigen::VectorXd& q);
   /// Makes an arm of these payloads, and hands it to the tick. The caller has locked load_mutex_.
@@ -362,7 +306,7 @@ class Controller {
   std::size_t path_points_max_;
   planning::Plugin plugin_;
   model::Model nominal_;  ///< the planner's model of the arm, without what is attached later
-  DriveOptions drive_options_;
+  std::unique_ptr<DriveOptions> drive_options_;
   World world_;
   Json params_;                      ///< of the planner, as last set
   std::atomic<double> time_s_{0.0};  ///< of the last tick
@@ -384,21 +328,17 @@ class Controller {
   std::uint64_t begun_stop_ = 0;  ///< the last one that began without a shield
   std::atomic<std::uint64_t> stopped_{0};
   std::vector<std::atomic<double>> measured_;  ///< the last joint positions, for other threads
-  Newest<GoalList> new_goals_;
-  Newest<NewParams> new_params_;
-  Newest<NewLoad> new_load_;
-  Newest<StopRequest> new_stop_;
+  std::unique_ptr<Mailbox> mail_;
   const GoalList* goal_list_;  ///< that the tick uses
   TargetReceiver receiver_;    ///< among writers, as goals_mutex_
   bool receives_ = false;      ///< whether the newest goals follow a streamed target
-  Newest<StreamedTarget> new_target_;
   LiveTarget target_;
   LiveReference reference_;
   const hamelin_goal* listed_ = nullptr;  ///< the goal of the last tick in its list
   hamelin_goal live_goal_{};              ///< the current one if it changes from tick to tick
   std::uint64_t used_params_ = 0;
   PlannerGoal goal_{};
-  std::optional<Guidance> guidance_;  ///< none without a guide
+  std::unique_ptr<Guidance> guidance_;  ///< null without a guide
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
   bool usable_ = false;   ///< whether the measurement of this tick can be used

@@ -79,4 +79,7 @@ class GoalTracker {
   double rest_s_ = 0.0;
 };
 
+/// The goal that follows a target, which is the last one; null if there is none.
+[[nodiscard]] const scene::Goal* follow_goal_of(const std::vector<scene::Goal>& goals) noexcept;
+
 }  // namespace hamelin::control

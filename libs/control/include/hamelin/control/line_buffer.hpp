@@ -1,9 +1,14 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <string_view>
 
 namespace hamelin::control {
+
+/// Receives lines for a log: level HAMELIN_LOG_INFO or HAMELIN_LOG_WARNING.
+using LineSink = std::function<void(std::int32_t level, std::string_view line)>;
 
 /// Memory for a line that a tick makes, which must not allocate. What does not fit is cut.
 class LineBuffer {

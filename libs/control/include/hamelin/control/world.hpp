@@ -11,12 +11,14 @@
 #include <vector>
 
 #include "hamelin/control/motion_estimator.hpp"
-#include "hamelin/control/newest.hpp"
 #include "hamelin/model/model.hpp"
 #include "hamelin/scene/environment.hpp"
 #include "hamelin/scene/scene.hpp"
 
 namespace hamelin::control {
+
+template <class T>
+class Newest;
 
 /// The surroundings of an arm at some moment. Immutable once published; queries may run on any
 /// thread.
@@ -52,6 +54,7 @@ class World {
   /// @throws Error io, parse or invalid, also for more obstacles than obstacles_max;
   ///        invalid for options that check() refuses
   World(const scene::Scene& scene, const model::Model& model, const Options& options);
+  ~World();
 
   /// Adds an obstacle, or replaces the one of the same name, which keeps its id.
   /// @return the number of the snapshot from which on it exists, as do all updates
@@ -101,7 +104,7 @@ class World {
   };
   /// The newest snapshot, valid until the next call. For the thread of the control loop: never
   /// waits, never allocates.
-  [[nodiscard]] View& take() noexcept { return newest_->take(); }
+  [[nodiscard]] View& take() noexcept;
   /// The newest snapshot with working memory of its own. Any thread; this allocates.
   [[nodiscard]] View view_of_latest() const;
 
@@ -133,7 +136,7 @@ class World {
   /// Obstacles of the scene that are not known at first, with their indices in the scene.
   std::vector<std::pair<std::string, std::int32_t>> reserved_;
   std::shared_ptr<const WorldSnapshot> latest_;
-  std::optional<Newest<View>> newest_;
+  std::unique_ptr<Newest<View>> newest_;
 };
 
 }  // namespace hamelin::control

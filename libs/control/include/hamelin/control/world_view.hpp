@@ -18,6 +18,13 @@
 
 namespace hamelin::control {
 
+/// What an arm must not touch, and when.
+struct Surroundings {
+  const scene::Environment& environment;
+  std::uint64_t snapshot;  ///< differs if the environment is another one
+  double time_s;
+};
+
 /// Obstacles are searched within this distance if the planner gives no other [m].
 inline constexpr double default_influence_m = 0.2;
 

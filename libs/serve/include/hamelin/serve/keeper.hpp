@@ -24,7 +24,7 @@ class Keeper {
   /// @param period_gap_max so many periods in a row are made up for if measurements are missing
   Keeper(control::Controller& controller, int period_gap_max);
 
-  /// Another client begins: its sequence numbers start anew.
+  /// Another client begins: its sequence numbers start again.
   void begin_client();
   /// Takes a measurement. @return whether there is a set point for it; else it is not used
   [[nodiscard]] bool take(const hamelin_measurement& measurement);

@@ -1,0 +1,143 @@
+#include "guide/edge_check.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+// A sphere's tube is not asked for where it would be wider than this [m]: bisecting is cheaper.
+constexpr double wide_tube_m = 0.03;
+// Bounds are reduced by this, far above what rounding can add [m].
+constexpr double edge_rounding_m = 1e-12;
+
+std::size_t at(Index i) {
+  return static_cast<std::size_t>(i);
+}
+
+}  // namespace
+
+EdgeCheck::EdgeCheck(const model::Model& model, const scene::SelfField* self)
+    : model_(model),
+      self_(self),
+      levers_(model, self),
+      hints_(model.shapes().size(), -1),
+      ws_(model),
+      first_(model),
+      last_(model),
+      levels_(at(depth_max), Level{scene::PlacedShapes(model), {}}) {
+  all_.resize(hints_.size() + (self != nullptr ? self->pairs().size() : 0));
+  std::iota(all_.begin(), all_.end(), 0);
+  // Pairs first: they are few, and their distances need no map.
+  std::rotate(all_.begin(), all_.begin() + shape_count(), all_.end());
+  for (Level& level : levels_) level.open.reserve(all_.size());
+  const Index n = model.dof();
+  for (auto* x : {&start_, &dq_, &q_, &curvature_}) x->setZero(n);
+  bend_ = way_ = VectorXd::Zero(shape_count());
+  pair_way_ = VectorXd::Zero(levers_.pairs().rows());
+}
+
+void EdgeCheck::set_environment(const scene::Environment& environment, double time_s) {
+  environment_ = &environment;
+  time_s_ = time_s;
+  obstacles_ = environment.has_obstacles();
+  movers_ = environment.has_movers();
+  std::fill(hints_.begin(), hints_.end(), -1);
+}
+
+void EdgeCheck::place(const VectorXd& q, scene::PlacedShapes& arm) {
+  dynamics::forward_kinematics(model_, ws_, q);
+  arm.place(model_, ws_);
+  ++checks_;
+}
+
+bool EdgeCheck::posture_clear(const VectorXd& q, double margin_m) {
+  place(q, last_);
+  return std::all_of(all_.begin(), all_.end(),
+                     [&](int subject) { return keeps_margin(subject, last_.view(), margin_m); });
+}
+
+bool EdgeCheck::keeps_margin(int subject, const scene::Shapes& arm, double margin_m) {
+  if (subject >= shape_count())
+    return self_->distance(at(subject - shape_count()), arm, margin_m + edge_rounding_m) >=
+           margin_m;
+  if (!obstacles_) return true;
+  const std::size_t shape = at(subject);
+  const double radius = arm.radii[shape] + margin_m;
+  if (environment_
+          ->nearest_standing(arm.is_capsule(shape) ? arm.from(shape) : arm.centers[shape],
+                             arm.is_capsule(shape) ? arm.to(shape) : arm.centers[shape],
+                             radius + edge_rounding_m, time_s_, hints_[shape])
+          .distance < radius)
+    return false;
+  return !movers_ ||
+         environment_->clearance(arm.single(shape), time_s_, margin_m + edge_rounding_m,
+                                 scene::View::judge, {}, scene::Among::moving) >= margin_m;
+}
+
+bool EdgeCheck::motion_clear(const VectorXd& a, const VectorXd& b, double margin_m) {
+  start_ = a;
+  dq_ = b - a;
+  margin_ = margin_m + edge_rounding_m;
+  q_.setZero();
+  levers_.extend_travel(a, q_);
+  levers_.extend_travel(b, q_);
+  levers_.curvature(dq_, curvature_);
+  bend_.noalias() = 0.125 * (levers_.shapes() * curvature_);
+  q_ = dq_.cwiseAbs();
+  way_.noalias() = levers_.shapes() * q_;
+  pair_way_.noalias() = levers_.pairs() * q_;
+  // The end first, because it is the likeliest to be in collision.
+  if (!posture_clear(b, margin_)) return false;
+  place(a, first_);
+  return prove({0.0, 1.0, first_.view(), last_.view()}, all_, 0);
+}
+
+// docs/theory.md (17.2)–(17.4): a sphere strays from its chord, all else from the middle of the
+// piece.
+double EdgeCheck::stray(const Piece& piece, int subject) const {
+  if (subject >= shape_count()) return 0.5 * piece.width * pair_way_[subject - shape_count()];
+  if (piece.from.is_capsule(at(subject)) || movers_) return 0.5 * piece.width * way_[subject];
+  return piece.width * piece.width * bend_[subject];
+}
+
+bool EdgeCheck::proved(const Piece& piece, int subject, const scene::Shapes& middle) {
+  const double keep = margin_ + stray(piece, subject);
+  if (subject >= shape_count())
+    return self_->distance(at(subject - shape_count()), middle, keep + edge_rounding_m) > keep;
+  if (!obstacles_) return true;
+  const std::size_t shape = at(subject);
+  if (piece.from.is_capsule(shape) || movers_)
+    return environment_->clearance(middle.single(shape), time_s_, keep + edge_rounding_m) > keep;
+  if (keep - margin_ > wide_tube_m) return false;
+  const double radius = piece.from.radii[shape] + keep;
+  return environment_
+             ->nearest_standing(piece.from.centers[shape], piece.to.centers[shape],
+                                radius + edge_rounding_m, time_s_, hints_[shape])
+             .distance > radius;
+}
+
+bool EdgeCheck::prove(const Piece& piece, std::span<const int> subjects, int depth) {
+  if (depth == depth_max) return false;
+  Level& level = levels_[at(depth)];
+  q_ = start_ + (piece.at + 0.5 * piece.width) * dq_;
+  place(q_, level.arm);
+  const scene::Shapes middle = level.arm.view();
+  level.open.clear();
+  for (const int subject : subjects) {
+    if (proved(piece, subject, middle)) continue;
+    if (stray(piece, subject) <= resolution_m || !keeps_margin(subject, middle, margin_))
+      return false;
+    level.open.push_back(subject);
+  }
+  if (level.open.empty()) return true;
+  const double half = 0.5 * piece.width;
+  return prove({piece.at + half, half, middle, piece.to}, level.open, depth + 1) &&
+         prove({piece.at, half, piece.from, middle}, level.open, depth + 1);
+}
+
+}  // namespace hamelin::control

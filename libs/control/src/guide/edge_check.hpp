@@ -1,0 +1,77 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/scene/environment.hpp"
+#include "hamelin/scene/self_collision.hpp"
+#include "hamelin/scene/shapes.hpp"
+#include "shield/levers.hpp"
+
+namespace hamelin::control {
+
+/// Proves that the arm keeps a margin on straight joint motions, which may be long and have nothing
+/// to do with each other, as the edges of a search: docs/theory.md (17.2)–(17.4). A motion is
+/// bisected, but only for those shapes and pairs of parts that are not proved on the piece yet.
+/// Obstacles that move are taken to stand where they are. One object per thread. No allocation
+/// after construction.
+class EdgeCheck {
+ public:
+  /// A piece is not bisected again for a shape that strays by no more than this from what was
+  /// measured [m].
+  static constexpr double resolution_m = 1e-4;
+
+  /// @param self null if self-collision is not modelled
+  EdgeCheck(const model::Model& model, const scene::SelfField* self);
+
+  /// The obstacles of the following checks; must stay until the next call.
+  void set_environment(const scene::Environment& environment, double time_s);
+  /// Whether all distances are more than the margin on the line from a to b, ends included; false
+  /// also if there is no proof.
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                                  double margin_m);
+  /// Whether all distances are at least the margin at q.
+  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m);
+  /// Postures at which the arm was placed since the start.
+  [[nodiscard]] long checks() const noexcept { return checks_; }
+
+ private:
+  static constexpr int depth_max = 16;
+  /// The arm in the middle of a piece, and what is not proved there.
+  struct Level {
+    scene::PlacedShapes arm;
+    std::vector<int> open;  ///< shapes, and behind them pairs of parts
+  };
+  struct Piece {
+    double at, width;  ///< start and width in s, 0 to 1
+    scene::Shapes from, to;
+  };
+  void place(const Eigen::VectorXd& q, scene::PlacedShapes& arm);
+  /// Whether a shape or pair keeps the margin at a posture.
+  [[nodiscard]] bool keeps_margin(int subject, const scene::Shapes& arm, double margin_m);
+  /// @param subjects what is to be proved on the piece
+  [[nodiscard]] bool prove(const Piece& piece, std::span<const int> subjects, int depth);
+  [[nodiscard]] bool proved(const Piece& piece, int subject, const scene::Shapes& middle);
+  /// How far a shape, or the shapes of a pair, may stray on a piece from where they were measured.
+  [[nodiscard]] double stray(const Piece& piece, int subject) const;
+  [[nodiscard]] int shape_count() const noexcept { return static_cast<int>(hints_.size()); }
+
+  const model::Model& model_;
+  const scene::SelfField* self_;
+  Levers levers_;
+  const scene::Environment* environment_ = nullptr;
+  double time_s_ = 0.0, margin_ = 0.0;
+  bool obstacles_ = false, movers_ = false;
+  std::vector<std::int32_t> hints_;  ///< of each shape, for the map
+  std::vector<int> all_;             ///< all subjects
+  dynamics::Workspace ws_;
+  Eigen::VectorXd start_, dq_, q_, curvature_, bend_, way_, pair_way_;
+  scene::PlacedShapes first_, last_;
+  std::vector<Level> levels_;
+  long checks_ = 0;
+};
+
+}  // namespace hamelin::control

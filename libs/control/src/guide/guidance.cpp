@@ -1,0 +1,186 @@
+#include "guide/guidance.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "loop/goal_list.hpp"
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// A way-point is passed where no joint is farther from it than this, if the planner follows no
+// paths [rad or m].
+constexpr double passed = 0.1;
+// The stretch of a new path on which the arm may have moved on while it was searched [rad or m].
+constexpr double moved_on = 1.0;
+// Tolerance of what the planner is shown. Whether a goal is reached does not depend on it.
+constexpr double shown_tolerance = 0.02;
+constexpr std::size_t cause_max = 256;
+
+}  // namespace
+
+Guidance::Guidance(const scene::GuideSpec& spec, Index dof, Index points_max, bool follows_paths,
+                   bool charges)
+    : spec_(spec),
+      follows_paths_(follows_paths),
+      check_time_s_(charges ? spec.check_time_s : 0.0),
+      path_(MatrixXd::Zero(dof, points_max)) {
+  cause_.reserve(cause_max);
+}
+
+Guidance::News Guidance::update(const Now& now, GuideSearch& search) {
+  if (goal_number_ != now.goal_number) begin(now);
+  if (mode_ == Mode::off) return News::none;
+  News news = News::none;
+  if (awaits_) news = take(now, search);
+  if (!awaits_ && !wants_ && world_ != now.world) wants_ = true;
+  if (wants_ && !search.busy()) ask(now, search);
+  if (mode_ == Mode::waiting) figures_.waited_s += now.period_s;
+  if (mode_ == Mode::guided && !follows_paths_) show_next_point(now);
+  return news;
+}
+
+// A goal with a path of its own needs no guide, and one that follows a target has no end.
+void Guidance::begin(const Now& now) {
+  goal_number_ = now.goal_number;
+  const bool guided = now.goal.type != scene::GoalType::follow && now.goal.path.cols() == 0;
+  mode_ = guided ? Mode::waiting : Mode::off;
+  awaits_ = false;
+  wants_ = guided;
+  searches_ = guided ? 1 : 0;
+  ++number_;
+  if (guided) hold(now);
+}
+
+bool Guidance::stalled() {
+  if (mode_ == Mode::off) return false;
+  if (mode_ == Mode::waiting) return true;
+  if (searches_ >= spec_.searches_max) return false;
+  ++searches_;
+  mode_ = Mode::waiting;
+  awaits_ = false;
+  wants_ = true;
+  count_ = 0;  // the next request holds the arm where it is then
+  return true;
+}
+
+void Guidance::ask(const Now& now, GuideSearch& search) {
+  GuideRequest& request = search.request();
+  request.number = ++asked_;
+  request.time_s = now.time_s;
+  request.q = now.q;
+  request.goal.type = now.goal.type;
+  if (now.goal.type == scene::GoalType::joint) request.goal.q = now.goal.q;
+  request.goal.pose = now.goal.pose;
+  request.goal.tolerance_m = now.goal.tolerance_m;
+  request.goal.tolerance_rad = now.goal.tolerance_rad;
+  request.search = asked_;
+  request.kept_count = 0;
+  if (mode_ == Mode::guided) fill_kept(now, request);
+  if (mode_ == Mode::waiting && count_ == 0) {
+    ++number_;
+    hold(now);
+  }
+  asked_s_ = now.time_s;
+  awaits_ = true;
+  wants_ = false;
+  search.ask();
+}
+
+Guidance::News Guidance::take(const Now& now, GuideSearch& search) {
+  const GuideAnswer& answer = search.take();
+  if (answer.number != asked_) return News::none;
+  // docs/theory.md (17.5)
+  if (now.time_s < asked_s_ + check_time_s_ * static_cast<double>(answer.checks)) return News::none;
+  awaits_ = false;
+  world_ = answer.snapshot;
+  figures_.checks += answer.checks;
+  if (answer.kept) {
+    ++figures_.kept;
+    return News::none;
+  }
+  ++figures_.searches;
+  if (answer.path.found() && answer.path.points.cols() <= path_.cols()) {
+    ++figures_.found;
+    figures_.length = answer.path.length;
+    set_path(now, answer.path.points);
+    return News::path;
+  }
+  cause_.assign(answer.path.cause, 0, cause_max);
+  if (mode_ == Mode::waiting) {
+    mode_ = Mode::unguided;
+    ++number_;
+  }
+  return News::no_path;
+}
+
+// The arm may have moved on since it asked.
+void Guidance::set_path(const Now& now, const MatrixXd& points) {
+  count_ = points.cols();
+  path_.leftCols(count_) = points;
+  const Place place = nearest(now.q, moved_on);
+  path_.col(place.line) += place.share * (path_.col(place.line + 1) - path_.col(place.line));
+  mode_ = Mode::guided;
+  point_ = place.line;
+  show(now, place.line, follows_paths_ ? count_ - place.line : 1);
+}
+
+Guidance::Place Guidance::nearest(const VectorXd& q, double length) const {
+  Place best;
+  double least = std::numeric_limits<double>::infinity();
+  for (Index i = 0; i + 1 < count_ && length > 0.0; ++i) {
+    const auto line = path_.col(i + 1) - path_.col(i);
+    const double size = line.norm();
+    if (size <= 0.0) continue;
+    const double share =
+        std::clamp((q - path_.col(i)).dot(line) / (size * size), 0.0, std::min(1.0, length / size));
+    const double distance = (path_.col(i) + share * line - q).squaredNorm();
+    if (distance < least) {
+      least = distance;
+      best = {i, share};
+    }
+    length -= size;
+  }
+  return best;
+}
+
+void Guidance::fill_kept(const Now& now, GuideRequest& request) const {
+  const Place place = nearest(now.q, std::numeric_limits<double>::infinity());
+  request.kept_count = count_ - place.line;
+  request.kept.leftCols(request.kept_count) = path_.middleCols(place.line, request.kept_count);
+  request.kept.col(0) += place.share * (path_.col(place.line + 1) - path_.col(place.line));
+}
+
+void Guidance::hold(const Now& now) {
+  path_.col(0) = now.q;
+  count_ = 1;
+  show(now, 0, 1);
+}
+
+void Guidance::show(const Now& now, Index first, Index count) {
+  ++number_;
+  shown_ = {};
+  shown_.struct_size = sizeof shown_;
+  shown_.type = HAMELIN_GOAL_JOINT;
+  shown_.quaternion_wxyz[0] = 1.0;
+  shown_.tolerance_rad = shown_tolerance;
+  shown_.speed_max = now.goal.speed_max;
+  shown_.q = path_.col(first + count - 1).data();
+  if (!follows_paths_ || count == 1) return;
+  shown_.path = path_.col(first).data();
+  shown_.path_points = static_cast<std::size_t>(count);
+}
+
+void Guidance::show_next_point(const Now& now) {
+  const Index before = point_;
+  while (point_ + 1 < count_ && (now.q - path_.col(point_)).lpNorm<Eigen::Infinity>() < passed)
+    ++point_;
+  if (point_ != before) show(now, point_, 1);
+}
+
+}  // namespace hamelin::control

@@ -1,0 +1,91 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "guide/guide_search.hpp"
+#include "hamelin/control/answer.hpp"
+#include "hamelin/planning/plugin_abi.h"
+#include "hamelin/scene/scene.hpp"
+
+namespace hamelin::control {
+
+/// What a planner is shown in place of each goal: a joint goal with the path that a guide found.
+/// Until it has one, the arm holds its place; if none is found, the planner is shown the goal
+/// itself. The guide is asked again where the arm stalls, and where the world changes. One thread;
+/// no allocation after construction.
+class Guidance {
+ public:
+  /// @param points_max the largest number of way-points of a path
+  /// @param follows_paths whether the planner follows paths; else it is shown their way-points one
+  ///        after the other
+  /// @param charges whether each check delays the answer by the scene's check_time_s
+  Guidance(const scene::GuideSpec& spec, Eigen::Index dof, Eigen::Index points_max,
+           bool follows_paths, bool charges);
+
+  using Figures = GuideFigures;
+  enum class News { none, path, no_path };
+
+  /// What a tick knows.
+  struct Now {
+    double time_s, period_s;
+    const Eigen::VectorXd& q;
+    const scene::Goal& goal;    ///< the current one
+    std::uint64_t goal_number;  ///< another one whenever the goal or the load is another one
+    std::uint64_t world;        ///< number of the snapshot
+  };
+  /// To be called once per tick, before the planner. @return what has arrived
+  News update(const Now& now, GuideSearch& search);
+  /// The arm does not make progress. @return whether the guide will search again
+  [[nodiscard]] bool stalled();
+  /// Whether the arm holds its place until a path arrives.
+  [[nodiscard]] bool waits() const noexcept { return mode_ == Mode::waiting; }
+  /// What the planner is shown; null: the goal itself.
+  [[nodiscard]] const hamelin_goal* goal() const noexcept {
+    return mode_ == Mode::waiting || mode_ == Mode::guided ? &shown_ : nullptr;
+  }
+  /// Counts whatever is shown.
+  [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
+  [[nodiscard]] const Figures& figures() const noexcept { return figures_; }
+  /// Why the last search found none.
+  [[nodiscard]] std::string_view cause() const noexcept { return cause_; }
+
+ private:
+  enum class Mode { off, waiting, guided, unguided };
+  void begin(const Now& now);
+  void ask(const Now& now, GuideSearch& search);
+  News take(const Now& now, GuideSearch& search);
+  void set_path(const Now& now, const Eigen::MatrixXd& points);
+  void hold(const Now& now);
+  void show(const Now& now, Eigen::Index first, Eigen::Index count);
+  void show_next_point(const Now& now);
+  void fill_kept(const Now& now, GuideRequest& request) const;
+  /// The place of the path that is nearest to q, on its first lines up to a length.
+  struct Place {
+    Eigen::Index line = 0;  ///< after this way-point
+    double share = 0.0;     ///< of the line
+  };
+  [[nodiscard]] Place nearest(const Eigen::VectorXd& q, double length) const;
+
+  scene::GuideSpec spec_;
+  bool follows_paths_;
+  double check_time_s_;
+  Mode mode_ = Mode::off;
+  Eigen::MatrixXd path_;
+  Eigen::Index count_ = 0;  ///< way-points of the path
+  Eigen::Index point_ = 0;  ///< that is shown to a planner that follows none
+  hamelin_goal shown_{};
+  std::uint64_t number_ = 0, goal_number_ = 0;
+  std::uint64_t world_ = 0;  ///< that the path, or the lack of one, belongs to
+  std::uint64_t asked_ = 0;  ///< number of the last request
+  bool awaits_ = false;      ///< its answer
+  bool wants_ = false;       ///< to ask as soon as the guide is free
+  double asked_s_ = 0.0;
+  int searches_ = 0;  ///< at this goal, of those that a stall or the start began
+  std::string cause_;
+  Figures figures_;
+};
+
+}  // namespace hamelin::control

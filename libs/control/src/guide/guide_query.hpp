@@ -1,0 +1,69 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <utility>
+
+#include "guide/edge_check.hpp"
+#include "hamelin/control/planner_setup.hpp"
+#include "hamelin/control/world.hpp"
+#include "hamelin/control/world_view.hpp"
+#include "hamelin/guide/guide.hpp"
+#include "world/world_query.hpp"
+
+namespace hamelin::control {
+
+/// A world as guides see it: the snapshot of the last refresh(), with obstacles where they are at
+/// its time. One thread.
+class GuideQuery final : public guide::Query {
+ public:
+  /// All must outlive this.
+  GuideQuery(const model::Model& model, const World& world, const WorldView& view);
+
+  /// Takes the newest snapshot, as it is at a time; to be called once before anything else.
+  /// @return its number
+  std::uint64_t refresh(double time_s);
+
+  [[nodiscard]] double clearance(const Eigen::VectorXd& q, double at_least_m) override;
+  [[nodiscard]] bool posture_clear(const Eigen::VectorXd& q, double margin_m) override {
+    poll();
+    return edges_.posture_clear(q, margin_m);
+  }
+  [[nodiscard]] bool motion_clear(const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                                  double margin_m) override {
+    poll();
+    return edges_.motion_clear(a, b, margin_m);
+  }
+  [[nodiscard]] long checks() const override { return edges_.checks() + clearances_; }
+
+  /// A function to be called now and then during searches. It may throw, which ends the search.
+  void set_poll(std::function<void()> poll) { poll_ = std::move(poll); }
+
+  /// The largest distance, but for 0.1 mm, that the arm is proved to keep on the line from a to b;
+  /// at most the world's influence. Zero or below: the line is not proved clear. Does not count as
+  /// checks.
+  [[nodiscard]] double proved_clearance(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
+
+ private:
+  void poll() {
+    constexpr long calls_between = 256;
+    if (poll_ && ++calls_ % calls_between == 0) poll_();
+  }
+
+  WorldQuery query_;
+  EdgeCheck edges_;
+  double influence_, time_s_ = 0.0;
+  long clearances_ = 0, calls_ = 0;
+  std::function<void()> poll_;
+};
+
+/// How a scene's guide searches for an arm.
+/// @param nominal the controller's model @param view of the world
+/// @param reserve what a shield keeps
+/// @param params of the planner: guides keep somewhat more than its margin_m
+/// @throws Error invalid if the build has no OMPL
+[[nodiscard]] guide::Settings guide_settings(const scene::Scene& scene, const model::Model& nominal,
+                                             const WorldView& view, const LimitReserve& reserve,
+                                             const Json& params);
+
+}  // namespace hamelin::control

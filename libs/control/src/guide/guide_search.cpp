@@ -1,0 +1,75 @@
+#include "guide/guide_search.hpp"
+
+#include <exception>
+#include <memory>
+#include <utility>
+
+namespace hamelin::control {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+GuideRequest::GuideRequest(Index dof, Index points_max)
+    : q(VectorXd::Zero(dof)), kept(Eigen::MatrixXd::Zero(dof, points_max)) {
+  goal.q = q;
+}
+
+GuideSearch::GuideSearch(const model::Model& model, const World& world, const WorldView& view,
+                         guide::Settings settings, Index points_max, bool threaded)
+    : guide_(model, std::move(settings)),
+      query_(model, world, view),
+      request_(model.dof(), points_max),
+      answers_(std::make_unique<GuideAnswer>()) {
+  if (threaded) thread_ = std::thread([this] { work(); });
+}
+
+GuideSearch::~GuideSearch() {
+  if (!thread_.joinable()) return;
+  state_ = State::ended;
+  state_.notify_one();
+  thread_.join();
+}
+
+void GuideSearch::ask() noexcept {
+  state_ = State::asked;
+  state_.notify_one();
+}
+
+void GuideSearch::run() {
+  if (thread_.joinable() || state_ != State::asked) return;
+  answer();
+  state_ = State::idle;
+}
+
+void GuideSearch::work() {
+  for (;;) {
+    state_.wait(State::idle);
+    if (state_ == State::ended) return;
+    answer();
+    State asked = State::asked;  // or ended in the meantime
+    state_.compare_exchange_strong(asked, State::idle);
+  }
+}
+
+bool GuideSearch::still_clear() {
+  for (Index i = 0; i + 1 < request_.kept_count; ++i)
+    if (!query_.motion_clear(request_.kept.col(i), request_.kept.col(i + 1), 0.0)) return false;
+  return request_.kept_count > 0;
+}
+
+void GuideSearch::answer() {
+  auto out = std::make_unique<GuideAnswer>();
+  const long before = query_.checks();
+  out->number = request_.number;
+  out->snapshot = query_.refresh(request_.time_s);
+  out->kept = still_clear();
+  try {
+    if (!out->kept) out->path = guide_.search({request_.q, request_.goal, request_.search}, query_);
+  } catch (const std::exception& e) {  // on a thread of its own nobody could catch it
+    out->path.cause = e.what();
+  }
+  out->checks = query_.checks() - before;
+  answers_.publish(std::move(out));
+}
+
+}  // namespace hamelin::control

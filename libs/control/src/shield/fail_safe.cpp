@@ -1,0 +1,46 @@
+#include "shield/fail_safe.hpp"
+
+#include <algorithm>
+
+namespace hamelin::control {
+
+using Eigen::VectorXd;
+
+FailSafe::FailSafe(Eigen::Index dof) : stop_(dof) {
+  way_ = target_ = VectorXd::Zero(dof);
+}
+
+void FailSafe::set_stop(const VectorXd& q, const VectorXd& v, const VectorXd& a,
+                        const StopMotion::Braking& braking) {
+  move_s_ = 0.0;
+  stop_.set(q, v, a, braking);
+}
+
+void FailSafe::set_at_rest(const VectorXd& q) {
+  move_s_ = 0.0;
+  stop_.set_at_rest(q);
+}
+
+void FailSafe::set_move(const VectorXd& target, double duration_s) {
+  target_ = target;
+  way_ = target - stop_.end();
+  move_s_ = duration_s;
+}
+
+// docs/theory.md (14.24)
+FailSafe::Profile FailSafe::profile(double share) {
+  const double x = std::clamp(share, 0.0, 1.0), y = x * (1.0 - x);
+  return {x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * y * y, 60.0 * y * (1.0 - 2.0 * x)};
+}
+
+void FailSafe::at(double time_s, VectorXd& q, VectorXd& v) const {
+  if (!moves() || time_s < stop_s()) {
+    stop_.at(time_s, q, v);
+  } else {
+    const Profile at = profile((time_s - stop_s()) / move_s_);
+    q = stop_.end() + at.position * way_;
+    v = at.velocity / move_s_ * way_;
+  }
+}
+
+}  // namespace hamelin::control
