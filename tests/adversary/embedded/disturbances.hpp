@@ -39,7 +39,7 @@ class Disturbances {
 
   /// Before a tick. @return whether it is the first one after reset()
   bool disturb(double time_s);
-  /// What the tick is told of the arm.
+  /// The measurement for the tick.
   [[nodiscard]] Measurement measure(double time_s);
   /// After a tick. @return the model of the arm with what it carries since this tick, if that is
   /// another one
