@@ -3,11 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <memory>
 #include <string>
 
-#include "hamelin/control/hamelin_control.h"
+#include "c_choices.hpp"
 #include "hamelin/core/text.hpp"
 #include "targets.hpp"
 
@@ -15,102 +13,10 @@ namespace hamelin::fuzz {
 
 namespace {
 
-constexpr std::size_t dof = 7;
-using Joints = std::array<double, dof>;
-constexpr Joints start{0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785};
-constexpr std::uint32_t any_size = 0xffffffff;
-
-/// What the bytes of an input choose.
-class Choices {
- public:
-  explicit Choices(std::string_view bytes) : bytes_(bytes) {}
-  [[nodiscard]] bool ended() const { return at_ >= bytes_.size(); }
-  std::uint8_t byte() { return ended() ? 0 : static_cast<std::uint8_t>(bytes_[at_++]); }
-  bool rarely() { return byte() < 24; }
-  double number() {
-    constexpr double inf = std::numeric_limits<double>::infinity(),
-                     nan = std::numeric_limits<double>::quiet_NaN();
-    constexpr std::array<double, 14> odd{nan,    inf,   -inf, 0.0,      -0.0, 1e308, -1e308,
-                                         1e-320, 1e200, 1e6,  1.0001e6, -1.0, 100.0, 1e-3};
-    const std::uint8_t kind = byte();
-    if (kind < 40) return odd[kind % odd.size()];
-    return (static_cast<double>(byte()) - 128.0) / 64.0;
-  }
-  template <std::size_t N>
-  std::array<double, N> numbers() {
-    std::array<double, N> out{};
-    for (double& x : out) x = number();
-    return out;
-  }
-  /// The pointer, or null.
-  template <class T>
-  T* or_null(T* pointer) {
-    return rarely() ? nullptr : pointer;
-  }
-  std::uint32_t size_or_other(std::size_t size) {
-    return rarely() ? (byte() < 128 ? byte() : any_size) : static_cast<std::uint32_t>(size);
-  }
-  const char* name() {
-    constexpr std::array<const char*, 5> names{"ball", "crate", "", "can", nullptr};
-    return names[byte() % names.size()];
-  }
-
- private:
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-struct Destroy {
-  void operator()(hamelin_controller* controller) const { hamelin_controller_destroy(controller); }
-};
-using Owned = std::unique_ptr<hamelin_controller, Destroy>;
-
-const std::string& scene_file() {
-  static const MemoryFile file(
-      R"({"schema": "hamelin.scene/1", "robot": {"file": ")" HAMELIN_SOURCE_DIR
-      R"(/data/robots/arm7.urdf", "tip": "flange", "spheres": ")" HAMELIN_SOURCE_DIR
-      R"(/data/robots/arm7.spheres.json"}, "gravity_m_s2": [0, 0, -9.81],
-      "start": {"q": [0, -0.785, 0, -2.356, 0, 1.571, 0.785]},
-      "goals": [{"type": "joint", "q": [0.5, -0.7, 0.4, -1.2, 0.1, 2.2, 0.6]}],
-      "model": {"joint_limits": true, "velocity_limits": true, "torque_limits": true,
-      "self_collision": true}, "planner": {"name": "template"}})");
-  return file.path();
-}
-
-Owned make(Choices& choose, bool usual) {
-  const char* const plugins = HAMELIN_TEST_PLUGIN_DIR;
-  hamelin_controller_options options{};
-  options.struct_size = sizeof options;
-  options.scene_file = scene_file().c_str();
-  options.plugin_directories = &plugins;
-  options.plugin_directory_count = 1;
-  options.position = choose.byte() % 2;
-  options.payload_reach_m = 0.3;
-  options.payload_shapes_max = 4;
-  if (!usual) {
-    options.struct_size = choose.size_or_other(sizeof options);
-    options.scene_file = choose.or_null(options.scene_file);
-    options.plugin_directories = choose.or_null(options.plugin_directories);
-    options.acceleration_max = choose.number();
-    options.jerk_max = choose.number();
-    options.late_answers_max = static_cast<std::int32_t>(choose.byte()) - 8;
-    options.observation_noise_m = choose.number();
-    options.observation_jerk_m_s3 = choose.number();
-    options.observation_timeout_s = choose.number();
-    options.payload_reach_m = choose.number();
-    options.obstacles_max = choose.byte();
-  }
-  std::array<char, 200> error{};
-  Owned made(hamelin_controller_create(&options, error.data(), error.size()));
-  require((made == nullptr) == (error.front() != '\0'), "null is returned with a line, only then");
-  require(!usual || made != nullptr, std::string("a controller can be made: ") + error.data());
-  return made;
-}
-
 /// A controller, and the calls that an input makes of it.
 class Calls {
  public:
-  explicit Calls(std::string_view bytes) : choose_(bytes), owned_(make(choose_, true)) {}
+  explicit Calls(std::string_view bytes) : choose_(bytes), owned_(make_controller(choose_, true)) {}
 
   /// @return number of calls
   long run() {
@@ -123,7 +29,7 @@ class Calls {
       if (which < 128)
         tick();
       else
-        check(change(which % 17));
+        check(change(which % 28));
     }
     return made;
   }
@@ -193,6 +99,16 @@ class Calls {
         return hamelin_controller_set_target_twist(of_, choose_.number(), choose_.or_null(v.data()),
                                                    choose_.or_null(w.data()), error, size);
       }
+      default:
+        return change_arm(which, out);
+    }
+  }
+
+  /// The planner's parameters, loads and obstacles.
+  std::int32_t change_arm(int which, std::uint64_t* out) {
+    char* const error = error_.data();
+    const std::size_t size = error_.size();
+    switch (which) {
       case 7: {
         constexpr std::array<const char*, 6> texts{R"({"stiffness": 10})", "{}",  "{",
                                                    R"({"no": 1})",         "[1]", nullptr};
@@ -213,6 +129,15 @@ class Calls {
             of_, choose_.name(), choose_.or_null(p.data()), choose_.or_null(w.data()),
             choose_.or_null(v.data()), choose_.number(), out, error, size);
       }
+      default:
+        return change_world(which, out);
+    }
+  }
+
+  std::int32_t change_world(int which, std::uint64_t* out) {
+    char* const error = error_.data();
+    const std::size_t size = error_.size();
+    switch (which) {
       case 12: {
         Observed observed(choose_);
         return hamelin_controller_observe_obstacle(of_, choose_.name(),
@@ -228,14 +153,120 @@ class Calls {
       case 15:
         return hamelin_controller_set_map(of_, choose_.or_null("/no/such/map.bt"), out, error,
                                           size);
+      case 22:
+        return hamelin_controller_set_map_json(of_, map(), choose_.or_null("/no/such/folder"),
+                                               choose_.or_null(q_.data()), out, error, size);
+      case 23:
+        return hamelin_controller_change_map(of_, map_change(), nullptr, out, error, size);
       default:
-        break;
+        return control(which, out);
     }
+  }
+
+  /// Stops, goals as JSON, and what is read.
+  std::int32_t control(int which, std::uint64_t* out) {
+    char* const error = error_.data();
+    const std::size_t size = error_.size();
+    constexpr std::array<const char*, 5> causes{"a request", "two\nlines", "\xff\x01", "", nullptr};
+    switch (which) {
+      case 17:
+        return hamelin_controller_stop(of_, causes[choose_.byte() % causes.size()], error, size);
+      case 18:
+      case 19:
+        return hamelin_controller_resume(of_, error, size);
+      case 20:
+        return hamelin_controller_run_guide(of_, error, size);
+      case 21:
+        return hamelin_controller_set_goals(of_, goals(), choose_.or_null("/no/such/folder"), out,
+                                            error, size);
+      case 24:
+        return written(hamelin_controller_planner_params);
+      case 25:
+        return written(hamelin_controller_attached);
+      case 26:
+        return shield();
+      case 27:
+        return guide();
+      default:
+        return make_again();
+    }
+  }
+
+  const char* goals() {
+    constexpr std::array<const char*, 9> texts{
+        R"([{"type": "joint", "q": [0, -0.7, 0, -2.3, 0, 1.5, 0.7]}])",
+        R"({"type": "position", "position_m": [0.4, 0.2, 0.5]})",
+        R"([{"type": "joint", "q": [0]}])",
+        R"([{"type": "joint", "q": [1e999]}])",
+        R"({"type": "path", "file": "way.json"})",
+        "[]",
+        "null",
+        "[",
+        nullptr};
+    return texts[choose_.byte() % texts.size()];
+  }
+
+  const char* map() {
+    constexpr std::array<const char*, 6> texts{
+        R"({"file": "/no/such/map.bt"})", "null", R"({"file": 1})", "[]", "{", nullptr};
+    return texts[choose_.byte() % texts.size()];
+  }
+
+  const char* map_change() {
+    constexpr std::array<const char*, 6> texts{
+        R"({"occupied_boxes_m": [[0.3, 0.3, 0.3, 0.4, 0.4, 0.4]]})",
+        R"({"free_boxes_m": [[-1e308, 0, 0, 1e308, 0, 0]]})",
+        R"({"file": "/no/such/map.bt"})",
+        "null",
+        "{",
+        nullptr};
+    return texts[choose_.byte() % texts.size()];
+  }
+
+  /// A function that writes JSON to memory of any size.
+  template <class Write>
+  std::int32_t written(Write&& write) {
+    std::array<char, 64> json{};
+    json.fill('#');
+    std::size_t needed = 0;
+    const std::size_t size = choose_.byte() % json.size();
+    const std::int32_t failed = write(of_, choose_.or_null(json.data()), size,
+                                      choose_.or_null(&needed), error_.data(), error_.size());
+    for (std::size_t i = size; i < json.size(); ++i)
+      require(json[i] == '#', "nothing is written beyond the end");
+    return failed;
+  }
+
+  std::int32_t shield() {
+    hamelin_shield shield{};
+    shield.struct_size = choose_.size_or_other(sizeof shield);
+    const bool whole = shield.struct_size >= sizeof shield;
+    const std::int32_t failed =
+        hamelin_controller_shield(of_, choose_.or_null(&shield), error_.data(), error_.size());
+    if (failed == 0 && whole) {
+      require(shield.active == 1 && shield.refused <= shield.steps, "its counts agree");
+      require(one_line(shield.line) == shield.line, "what is in the way is one line");
+    }
+    return failed;
+  }
+
+  std::int32_t guide() {
+    hamelin_guide guide{};
+    guide.struct_size = choose_.size_or_other(sizeof guide);
+    const std::int32_t failed =
+        hamelin_controller_guide(of_, choose_.or_null(&guide), error_.data(), error_.size());
+    require(guide.active == 0 && guide.searches == 0, "the scene has no guide");
+    return failed;
+  }
+
+  std::int32_t make_again() {
+    (void)hamelin_controller_series_name(of_, choose_.byte());
+    (void)hamelin_controller_deadline_s(of_);
     require(hamelin_controller_dof(of_) == (of_ != nullptr ? dof : 0), "it has seven joints");
     require(hamelin_controller_period_s(of_) == (of_ != nullptr ? 0.001 : 0.0), "and a period");
     if (choose_.byte() < 64) {
-      Owned other = make(choose_, false);
-      if (other) owned_ = make(choose_, true);
+      OwnedController other = make_controller(choose_, false);
+      if (other) owned_ = make_controller(choose_, true);
     }
     return 0;
   }
@@ -317,7 +348,7 @@ class Calls {
   }
 
   Choices choose_;
-  Owned owned_;
+  OwnedController owned_;
   hamelin_controller* of_ = nullptr;  ///< of the call; now and then null
   double time_s_ = 0.0;
   Joints q_ = start, v_{};

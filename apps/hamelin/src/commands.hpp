@@ -14,6 +14,8 @@ void add_replay(CLI::App& app, int& exit_code);
 void add_explain(CLI::App& app, int& exit_code);
 void add_export(CLI::App& app, int& exit_code);
 void add_report(CLI::App& app, int& exit_code);
+void add_serve(CLI::App& app, int& exit_code);
+void add_plant(CLI::App& app, int& exit_code);
 void add_robot(CLI::App& app, int& exit_code);
 void add_scene(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);

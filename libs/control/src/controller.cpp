@@ -20,8 +20,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Obstacles are searched within this distance if the planner gives no other.
-constexpr double default_influence_m = 0.2;
 // The longest path of goals that are set later, if the caller gives no other.
 constexpr std::size_t default_path_points = 256;
 // The longest path of a guide.
@@ -189,7 +187,7 @@ void Controller::reset() {
   const std::lock_guard goals_lock(goals_mutex_);
   k_ = 0;
   shielded_ = false;
-  late_answers_ = 0;
+  late_answers_ = unusable_ = 0;
   answer_.overruns = 0;
   answer_.saturated = answer_.stopping = false;
   answer_.state = ControlState::running;
@@ -217,9 +215,29 @@ const Answer& Controller::tick(double time_s, const VectorXd& q, const VectorXd&
   return answer_;
 }
 
+const Answer& Controller::tick_unseen() {
+  if (k_ == 0) throw Error(ErrorCode::usage, "tick_unseen: the first tick needs a measurement");
+  usable_ = false;
+  ++unusable_;
+  if (lost_.empty()) {
+    lost_line_.clear();
+    append(lost_line_, "no measurement came, expected one in each period of {} s", period_s_);
+    lost_ = lost_line_.view();
+  }
+  time_s_ = time_s_ + period_s_;
+  arm_->drive->measure(q(), v(), false);
+  look(false);
+  decide();
+  return answer_;
+}
+
 void Controller::observe(double time_s, const VectorXd& q, const VectorXd& v) {
   const bool first = k_ == 0;
   measure(time_s, q, v);
+  look(first);
+}
+
+void Controller::look(bool first) {
   verdict_.reset();
   if (options_.certify && !first) {  // against the world in which the arm moved
     arm_->view.look(this->q(), time_s_);
@@ -264,7 +282,11 @@ void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
   const bool in_order = std::isfinite(time_s) && (k_ == 0 || time_s >= given_s_),
              finite = within(q, measured_max) && (!uses_v || within(v, measured_max));
   usable_ = in_order && finite;
-  if (!usable_) lose_measurement(time_s, in_order);
+  unusable_ = usable_ ? 0 : unusable_ + 1;
+  if (!usable_)
+    lose_measurement(time_s, in_order);
+  else if (answer_.state != ControlState::stopping)
+    lost_ = {};
   // what moves goes on as predicted while the clock cannot be used
   if (!in_order)
     time_s_ = time_s_ + period_s_;
@@ -274,7 +296,8 @@ void Controller::measure(double time_s, const VectorXd& q, const VectorXd& v) {
   if (finite)
     for (Eigen::Index i = 0; i < dof; ++i)
       measured_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
-  arm_->drive->measure(q, v, finite);
+  // where the clock is broken for good, the arm is brought to rest by what is measured
+  arm_->drive->measure(q, v, finite && (in_order || unusable_ > options_.lost_measurements_max));
 }
 
 // The first line stays: it says why the arm stops.
@@ -318,7 +341,8 @@ void Controller::decide() {
 }
 
 void Controller::check_arm() {
-  if (!lost_.empty()) return start_braking(StopReason::measurement, lost_);
+  if (unusable_ > options_.lost_measurements_max)
+    return start_braking(StopReason::measurement, lost_);
   LineBuffer defect;
   arm_->drive->describe_defect(defect);
   if (!defect.view().empty()) start_braking(StopReason::tracking, defect.view());

@@ -183,7 +183,7 @@ void Controller::resume() {
 
 void Controller::stop(std::string_view cause) {
   auto fresh = std::make_unique<StopRequest>();
-  append(fresh->cause, "{}", cause);
+  append(fresh->cause, "{}", one_line(cause));
   const std::lock_guard lock(stop_mutex_);
   fresh->number = ++stop_number_;
   new_stop_.publish(std::move(fresh));

@@ -108,7 +108,10 @@ void IdealDrive::follow(Stop& stop) {
   arm_.integrator->velocity(arm_.state, arm_.v);
   auto& channels = arm_.channels;
   channels.gyroscopic.clear();
-  channels.damping = arm_.own_damping.size() > 0 ? arm_.own_damping : zero_;
+  if (arm_.own_damping.size() > 0)
+    channels.damping = arm_.own_damping;
+  else
+    channels.damping.setZero();
   stop.torque(node(), zero_, zero_, channels.held_torque);
   gradient_before_.setZero();
   arm_.closes_with_kick = setpoint_.saturated = false;

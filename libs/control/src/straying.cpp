@@ -32,6 +32,9 @@ constexpr double hold_time_s = 0.007;
 // of the estimator's time constant, and of the time in which torques change; docs/theory.md
 // (14.22).
 constexpr double late_share = 0.5, estimator_share = 0.05, ramp_share_of_speed = 0.4;
+// The drift from a stop's motion per change of velocity, as a share of the period, where velocities
+// are measured: differences of positions lag by half a period; docs/theory.md (14.17).
+constexpr double lag_share = 0.25;
 // Longer than any disturbance acts before feedback answers it [s].
 constexpr double long_s = 1.0;
 // On a shorter line, torques and masses change so little that its beginning suffices [rad or m];
@@ -81,6 +84,8 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
   velocity_error_s_ = late_share * (period_s + scene.actuation.delay_s);
   if (scene.actuation.estimates_velocity)
     velocity_error_s_ += estimator_share / scene.actuation.estimator_bandwidth;
+  if (scene.actuation.type == scene::ActuationType::sampled && !scene.actuation.estimates_velocity)
+    lag_s_ = lag_share * period_s;
   friction_ = unknown_friction(scene, model.robot());
   if (has_model_errors() || noise_ > 0.0)
     bounds_.shapes = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
@@ -96,7 +101,7 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
 void Straying::bound(const StopMotion& stop) {
   const VectorXd& w = stop.line_velocity();
   acceleration_ = stop.braking().rate * w;
-  begin(acceleration_);
+  begin(w, acceleration_);
   if (has_model_errors()) {
     const double duration_s = stop.duration_s(), ramp_s = stop.braking().ramp_s;
     include_model_errors({stop.line_start(), w, acceleration_, duration_s, ramp_s});
@@ -115,7 +120,7 @@ void Straying::bound(const StopMotion& stop) {
 
 void Straying::bound_at_rest(const VectorXd& q) {
   velocity_.setZero();
-  begin(velocity_);
+  begin(velocity_, velocity_);
   if (has_model_errors()) include_model_errors({q, velocity_, velocity_, long_s, usual_ramp_s});
   if (noise_ > 0.0) add_noise();
 }
@@ -125,7 +130,7 @@ void Straying::include_move(const FailSafe& motion) {
   const double time_s = motion.move_s();
   velocity_ = FailSafe::peak_velocity / time_s * motion.way();
   acceleration_ = FailSafe::peak_acceleration / (time_s * time_s) * motion.way();
-  begin(acceleration_);
+  begin(velocity_, acceleration_);
   if (has_model_errors()) {
     for (const double share : {0.0, 0.5, 1.0}) {
       q_ = motion.stop().end() + share * motion.way();
@@ -139,8 +144,9 @@ void Straying::include_move(const FailSafe& motion) {
 }
 
 // docs/theory.md (14.17)
-void Straying::begin(const VectorXd& acceleration) {
-  bounds_.tracking = stated_ + 0.25 * period_s_ * period_s_ * acceleration.cwiseAbs();
+void Straying::begin(const VectorXd& velocity, const VectorXd& acceleration) {
+  bounds_.tracking = stated_ + lag_s_ * velocity.cwiseAbs() +
+                     0.25 * period_s_ * period_s_ * acceleration.cwiseAbs();
   bounds_.errors.setZero();
   bounds_.shapes.setZero();
 }

@@ -50,6 +50,7 @@ void TorqueDrive::measure(const VectorXd& q, const VectorXd& v, bool seen) {
 void TorqueDrive::extrapolate() {
   dynamics::forward_dynamics(model_, ws_, q_, v_, pipeline_.acting(), rate_);
   rate_ += estimator_ ? estimator_->disturbance() : pipeline_.disturbance();
+  if (!can_be_sent(rate_)) rate_.setZero();  // the prediction diverges
   q_ += period_s_ * v_ + (0.5 * period_s_ * period_s_) * rate_;
   v_ += period_s_ * rate_;
   q_measured_ = q_;
@@ -110,6 +111,7 @@ StopFinder::Start TorqueDrive::stop_start() {
 void TorqueDrive::follow(Stop& stop) {
   look_ahead();
   stop.torque(pipeline_.now(), pipeline_.disturbance(), pipeline_.last(), proposed_);
+  if (!can_be_sent(proposed_)) proposed_ = pipeline_.last();
   limits_.start_from(pipeline_.last());
   saturated_ = limits_.limit(proposed_, period_s_);
 }

@@ -119,6 +119,9 @@ scene::ObservedMotion observed_motion(const scene::Obstacle& obstacle,
 World::World(const scene::Scene& scene, const model::Model& model, const Options& options)
     : options_(options), scene_(scene), model_(model) {
   check(options_.observations);
+  if (!(std::isfinite(options_.payload_reach_m) && options_.payload_reach_m >= 0.0))
+    throw Error(ErrorCode::invalid,
+                fmt::format("payload_reach_m: {} m, expected 0 or more", options_.payload_reach_m));
   options_.obstacles_max = std::max(options_.obstacles_max, scene.obstacles.size());
   contacts_max_ = scene::Environment::contacts_max(shapes_max(), options_.obstacles_max);
   std::vector<scene::Obstacle> obstacles;

@@ -94,7 +94,8 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
   }
   CHECK(shield.stop().motion().stop_s() > 0.15);
   straying.bound(shield.stop().motion().stop());
-  return most / (straying.errors()[0] + straying.tracking()[0]);
+  const double lag = ideal ? 0.0 : 0.25 * T * std::abs(shield.stop().motion().stop().line_velocity()[0]);
+  return most / (straying.errors()[0] + straying.tracking()[0] - lag);  // velocities do not lag here
 }
 
 }  // namespace

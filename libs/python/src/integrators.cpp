@@ -249,7 +249,7 @@ py::dict simulate(BoundIntegrator& integrator, py::handle q0, py::handle v0, dou
   return motion.to_python(completed);
 }
 
-std::string repr(const BoundIntegrator& integrator) {
+std::string repr_of_integrator(const BoundIntegrator& integrator) {
   return fmt::format("<hamelin.Integrator '{}' of order {} for '{}'{}>", integrator.scheme->name(),
                      integrator.scheme->order(), integrator.model->model.robot().name,
                      integrator.scheme->adaptive() ? ", step control" : "");
@@ -438,7 +438,7 @@ void add_integrator(py::module_& module) {
           "'potential_J' (N,); for the intervals between them 'updates', 'evaluations',\n"
           "'factorizations', 'halvings', 'rejected', 'residual', 'dissipated_J', 'held_work_J'\n"
           "(N - 1,); and 'completed', false if a step did not converge.")
-      .def("__repr__", &repr);
+      .def("__repr__", &repr_of_integrator);
 }
 
 }  // namespace

@@ -421,7 +421,7 @@ SharedModel make_chain(int links, const std::string& axes, double length_m, doub
                    pose_of("make_chain", "base", base), g));
 }
 
-std::string repr(const BoundModel& bound) {
+std::string repr_of_model(const BoundModel& bound) {
   double mass = 0.0;
   for (const auto& link : bound.model.robot().links) mass += link.mass_kg;
   return fmt::format("<hamelin.Model '{}': {} joints, {}, {:.4g} kg, {} collision shapes>",
@@ -601,7 +601,7 @@ void add_models(py::module_& module) {
             return to_python(description::robot_to_json(m.model.robot()));
           },
           "The robot as a document of schema hamelin.robot/1, without base and gravity.")
-      .def("__repr__", &repr)
+      .def("__repr__", &repr_of_model)
       .def(py::pickle(&state_of, &from_state));
   module.def(
       "make_chain", &make_chain, py::kw_only(), py::arg("links") = 7, py::arg("axes") = "x,z,x",

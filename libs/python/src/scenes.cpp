@@ -388,7 +388,7 @@ scene::Overrides checked_overrides(const py::dict& given) {
   }
 }
 
-std::string repr(const BoundScene& s) {
+std::string repr_of_scene(const BoundScene& s) {
   return fmt::format("<hamelin.Scene '{}': robot '{}', {} goals, {}, {} obstacles, planner {}>",
                      s.name, s.scene.robot.file.filename().string(), s.scene.goals.size(),
                      s.scene.map ? s.scene.map->file.filename().string() : "no map",
@@ -451,7 +451,7 @@ void add_scene(py::module_& module) {
             return std::make_shared<BoundScene>(document, s.folder, s.name);
           },
           arg("overrides"), "A copy with other values.")
-      .def("__repr__", &repr)
+      .def("__repr__", &repr_of_scene)
       .def(py::pickle(
           [](const BoundScene& s) {
             return py::make_tuple(s.document.dump(), fs::absolute(s.folder).string(), s.name);

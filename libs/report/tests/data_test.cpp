@@ -225,7 +225,8 @@ TEST_CASE(
     "a force at the tip is its channel's torque mapped by the damped operational-space inertia",
     "[report]") {
   const auto log = test::scratch("forces") / "run.jsonl";
-  const scene::Scene scene = test::shelf(0.6);
+  scene::Scene scene = test::shelf(0.6);
+  scene.actuation.type = scene::ActuationType::ideal;  // which keeps the channels apart
   (void)test::log_run(scene, log);
   const Decoded page(report::make_data({log}).bytes);
   const Json& frames = page.head["runs"][0]["frames"];

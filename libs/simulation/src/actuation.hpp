@@ -24,8 +24,11 @@ class Actuation {
   virtual void observe(Eigen::VectorXd& q, Eigen::VectorXd& v) = 0;
   /// Whether node k is a tick.
   [[nodiscard]] virtual bool is_tick(long k) const = 0;
-  /// Books the node, and takes the answer of a tick.
-  virtual void apply(const control::Answer& answer, EnergyAudit& audit) = 0;
+  /// Lets an answer act from the node on. @param fresh whether the node is a tick; else the answer
+  /// is that of the last one
+  virtual void take(const control::Answer& answer, bool fresh) = 0;
+  /// Books the node, after take().
+  virtual void book(const control::Answer& answer, bool fresh, EnergyAudit& audit) = 0;
   /// Lets the plant step. @return whether it converged
   [[nodiscard]] virtual bool step(double step_s) = 0;
   /// Whether the account of the last node needs one more answer of the planner.

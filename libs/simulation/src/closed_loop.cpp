@@ -177,8 +177,14 @@ void ClosedLoop::report_stop() {
                                   shield->describe(controller_->view().environment())));
 }
 
+void ClosedLoop::let_answer_act() {
+  const bool fresh = actuation_->is_tick(plant_->node().k);
+  actuation_->take(controller_->answer(), fresh);
+  actuation_->book(controller_->answer(), fresh, *audit_);
+}
+
 void ClosedLoop::apply_answer() {
-  actuation_->apply(controller_->answer(), *audit_);
+  let_answer_act();
   report_stop();
   finish_if(audit_->fault(*plant_));
   const planning::CommandBuffers* const channels = controller_->answer().channels;
@@ -204,7 +210,7 @@ void ClosedLoop::book_last_node() {
 
 void ClosedLoop::book_answer() {
   if (controller_->answer().channels != nullptr)
-    actuation_->apply(controller_->answer(), *audit_);
+    let_answer_act();
   else
     audit_->book_node(*plant_);
 }

@@ -91,7 +91,8 @@ class ClosedLoop {
   void finish_at_rest(log::Outcome outcome, std::string cause);
   /// Logs where a stop of the shield begins, unless it follows another one at once.
   void report_stop();
-  /// Books the node and applies the answer.
+  void let_answer_act();
+  /// The same, and checks the accounts.
   void apply_answer();
   /// Books the last node: nothing acts any more, but its energies belong to the account.
   void book_last_node();

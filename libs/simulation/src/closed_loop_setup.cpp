@@ -11,9 +11,8 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/log/provenance.hpp"
 #include "hamelin/scene/modelled.hpp"
-#include "hamelin/simulation/integrator_options.hpp"
+#include "plants.hpp"
 #include "scene_values.hpp"
-#include "simulated_arm.hpp"
 
 namespace hamelin::simulation {
 
@@ -82,7 +81,7 @@ ClosedLoop::ClosedLoop(const scene::Scene& scene,
       in_scene(scene, "/duration_s", [&] { return step_count(scene.duration_s, scene.step_s); });
   controller_ = std::make_unique<control::Controller>(scene, model_, plugin, planner_params_,
                                                       controller_options());
-  judge_ = std::make_unique<Judge>(scene, model_, *plant_, controller_->view());
+  judge_ = std::make_unique<Judge>(scene, model_, *plant_, &controller_->view());
   if (const control::WorldView& view = judge_->view();
       view.has_self() && !view.self_field()->note().empty())
     result_.warnings.push_back(view.self_field()->note());
@@ -116,35 +115,16 @@ control::Controller::Options ClosedLoop::controller_options() {
 }
 
 void ClosedLoop::make_plant(const PlantFactory& factory) {
-  const VectorXd zero = VectorXd::Zero(model_.dof());
-  const VectorXd &q = scene_.start_q.size() > 0 ? scene_.start_q : zero,
-                 &v = scene_.start_v.size() > 0 ? scene_.start_v : zero;
-  if (scene_.plant != scene::PlantType::hamelin) {
-    if (!factory)
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: /plant/type: is {}, which this build of hamelin is without, "
-                              "expected hamelin; to build with MuJoCo, install libmujoco-dev and "
-                              "configure again",
-                              scene_.name, to_string(scene_.plant)));
-    const VectorXd damping = plant_damping(scene_, model_.robot()),
-                   friction = plant_friction(scene_, model_.robot());
-    plant_ = factory({scene_, model_, damping.size() > 0 ? damping : zero,
-                      friction.size() > 0 ? friction : zero});
-    plant_->start(q, v);
-    actuation_ = make_sampled_actuation(scene_, model_, *plant_);
-    return;
-  }
-  auto arm = std::make_unique<SimulatedArm>(
-      scene_, model_,
-      integrator_options(scene_.integrator.params, scene_.name + ": /integrator/params"));
-  arm->start(q, v);
-  if (scene_.actuation.type == scene::ActuationType::ideal) {
+  if (scene_.actuation.type == scene::ActuationType::ideal &&
+      scene_.plant == scene::PlantType::hamelin) {
+    auto arm = make_simulated_arm(scene_, model_);
     ideal_arm_ = &arm->arm();
     actuation_ = make_ideal_actuation(scene_, *arm);
+    plant_ = std::move(arm);
   } else {
-    actuation_ = make_sampled_actuation(scene_, model_, *arm);
+    plant_ = simulation::make_plant(scene_, model_, factory);
+    actuation_ = make_sampled_actuation(scene_, model_, *plant_);
   }
-  plant_ = std::move(arm);
 }
 
 void ClosedLoop::check_start() const {

@@ -26,9 +26,11 @@ class IdealActuation final : public Actuation {
   }
   bool is_tick(long) const override { return true; }
 
-  void apply(const control::Answer& answer, EnergyAudit& audit) override {
+  void take(const control::Answer& answer, bool) override {
     plant_.update_velocity();  // the half-kick that closed the last step has been mended
     saturated_ = answer.saturated;
+  }
+  void book(const control::Answer& answer, bool, EnergyAudit& audit) override {
     if (answer.channels == nullptr || answer.stopping) return audit.book_node(plant_, 0.0);
     const hamelin_command& command = answer.channels->raw();
     if (arm_.departure.potential) audit.note_potential();

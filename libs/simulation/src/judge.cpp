@@ -30,17 +30,18 @@ void raise(std::optional<double>& most, double value) {
 }  // namespace
 
 Judge::Judge(const scene::Scene& scene, const model::Model& model, const Plant& plant,
-             control::WorldView& controllers)
+             control::WorldView* controllers)
     : scene_(scene),
       model_(model),
       plant_(plant),
       limits_(control::modelled_limits(scene, model.robot())),
       certifies_(scene::safety_type(scene) != scene::SafetyType::none),
-      view_(&controllers) {
-  if (!controller_sees_all(scene)) {
-    own_ = std::make_unique<control::WorldView>(scene, model, controllers);
-    view_ = own_.get();
-  }
+      view_(controllers) {
+  if (controllers == nullptr)
+    own_ = std::make_unique<control::WorldView>(scene, model, control::default_influence_m);
+  else if (!controller_sees_all(scene))
+    own_ = std::make_unique<control::WorldView>(scene, model, *controllers);
+  if (own_) view_ = own_.get();
   min_clearance_ = view_->influence_m();
   min_self_clearance_ = view_->self_influence_m();
 }

@@ -17,9 +17,10 @@ namespace hamelin::simulation {
 class Judge {
  public:
   /// @param model the arm as it is, kept by reference, as are the others
-  /// @param controllers what the controller sees; judged by that if nothing is hidden from it
+  /// @param controllers what the controller sees: judged by that if nothing is hidden from it; null
+  ///        if that is not known
   Judge(const scene::Scene& scene, const model::Model& model, const Plant& plant,
-        control::WorldView& controllers);
+        control::WorldView* controllers);
 
   [[nodiscard]] control::WorldView& view() noexcept { return *view_; }
   /// Whether its view is not the controller's.

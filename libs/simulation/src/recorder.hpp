@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "hamelin/core/time_histogram.hpp"
 #include "hamelin/simulation/run.hpp"
-#include "time_histogram.hpp"
 
 namespace hamelin::simulation {
 

@@ -46,16 +46,15 @@ class SampledActuation : public Actuation {
   SampledActuation(Plant& plant, long period_steps) : plant_(plant), period_steps_(period_steps) {}
 
   bool is_tick(long k) const override { return k % period_steps_ == 0; }
-  void apply(const control::Answer& answer, EnergyAudit& audit) override {
-    audit.book_node(plant_, 0.0);
-    const long k = plant_.node().k;
-    if (is_tick(k)) {
-      const bool acts = answer.channels != nullptr && !answer.stopping;
-      if (acts && answer.channels->raw().has_node_velocity != 0)
-        audit.book_filter(answer.channels->raw());
-      receive(answer, k / period_steps_);
-    }
+  void take(const control::Answer& answer, bool fresh) override {
+    if (fresh) receive(answer, ticks_++);
     form_torque();
+  }
+  void book(const control::Answer& answer, bool fresh, EnergyAudit& audit) override {
+    audit.book_node(plant_, 0.0);
+    const bool acts = fresh && answer.channels != nullptr && !answer.stopping;
+    if (acts && answer.channels->raw().has_node_velocity != 0)
+      audit.book_filter(answer.channels->raw());
   }
   bool step(double step_s) override { return plant_.step(torque_, step_s); }
   const VectorXd& departure_velocity() const override { return plant_.node().v; }
@@ -76,7 +75,7 @@ class SampledActuation : public Actuation {
   bool saturated_ = false;
 
  private:
-  long period_steps_;
+  long period_steps_, ticks_ = 0;
 };
 
 /// Joint positions as they are measured.

@@ -52,8 +52,12 @@ bool SimulatedArm::step(const VectorXd& torque, double step_s) {
 bool SimulatedArm::make_step(double step_s) {
   const bool made = arm_.step(step_s);
   report_ = arm_.report();
-  if (made) node_ = {arm_.state.k, arm_.state.time_s, arm_.state.q, arm_.v};
-  return made;
+  if (!made) return false;
+  node_.k = arm_.state.k;
+  node_.time_s = arm_.state.time_s;
+  node_.q = arm_.state.q;
+  node_.v = arm_.v;
+  return true;
 }
 
 }  // namespace hamelin::simulation

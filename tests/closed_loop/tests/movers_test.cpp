@@ -181,8 +181,8 @@ TEST_CASE("the arm in the shelf evades a person who reaches in", "[hybrid][close
     fastest = std::max(fastest, (tip(t + 0.01) - tip(t)).norm() / 0.01);
     deepest = std::max(deepest, tip(t).x());
   }
-  CHECK(fastest > 0.6);
-  CHECK(fastest < 0.8);
+  CHECK(fastest > 0.3);
+  CHECK(fastest < 0.4);
   CHECK(deepest > 0.7);  // the shelf begins at 0.6 m
 
   // An arm that does not know of the person is hit.

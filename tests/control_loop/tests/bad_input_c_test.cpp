@@ -7,87 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "../loop.hpp"
-#include "hamelin/control/hamelin_control.h"
-#include "hamelin/io/file.hpp"
-#include "hamelin/test/temporary.hpp"
+#include "../c_loop.hpp"
 
 using namespace hamelin;
 using Catch::Contains;
-using Eigen::VectorXd;
-using test::sampled;
+using test::c_document;
+using test::CLoop;
 
 namespace {
-
-struct CLogLine {
-  std::int32_t level;
-  std::string text;
-};
-
-/// A controller in C, and an arm that it moves.
-struct CLoop {
-  CLoop(const std::filesystem::path& folder, const std::string& planner, const Json& params,
-        std::int32_t late_answers_max = 0,
-        std::uint32_t options_size = sizeof(hamelin_controller_options)) {
-    Json document =
-        parse_json(read_file(test::data_folder / "scenes/clutter.json"), "clutter.json");
-    document["robot"]["file"] = (test::data_folder / "robots/arm7.urdf").string();
-    document["robot"]["spheres"] = (test::data_folder / "robots/arm7.spheres.json").string();
-    document["map"]["file"] = (test::data_folder / "maps/clutter.bt").string();
-    document["planner"] = {{"name", planner}, {"params", params}};
-    document["actuation"] = {
-        {"type", "sampled"}, {"control_period_s", 0.001}, {"deadline_s", 0.001}};
-    const std::filesystem::path file = folder / "scene.json";
-    write_file_atomically(file, document.dump());
-    scene = scene::read_scene(file);
-
-    const std::array<const char*, 2> plugins{HAMELIN_TEST_PLUGIN_DIR, HAMELIN_TEST_ONLY_PLUGIN_DIR};
-    const std::string name = file.string();
-    hamelin_controller_options options{};
-    options.struct_size = options_size;
-    options.observation_noise_m = -1.0;
-    if (options_size == sizeof options) options.observation_noise_m = 0.001;
-    options.scene_file = name.c_str();
-    options.plugin_directories = plugins.data();
-    options.plugin_directory_count = plugins.size();
-    options.late_answers_max = late_answers_max;
-    options.log = [](void* context, std::int32_t level, const char* text, std::size_t size) {
-      static_cast<CLoop*>(context)->lines.push_back({level, std::string(text, size)});
-    };
-    options.log_context = this;
-    controller = hamelin_controller_create(&options, error.data(), error.size());
-    INFO(error.data());
-    REQUIRE(controller != nullptr);
-    answer.struct_size = sizeof answer;
-    model.emplace(control::load_model(scene));
-    integrator = integration::make_integrator("hamel-variational", *model);
-    v = VectorXd::Zero(model->dof());
-    state = integrator->start(scene.start_q, v);
-  }
-  CLoop(const CLoop&) = delete;
-  CLoop& operator=(const CLoop&) = delete;
-  ~CLoop() { hamelin_controller_destroy(controller); }
-
-  void tick() {
-    hamelin_controller_tick(controller, state.time_s, state.q.data(), v.data(), &answer);
-  }
-  void step() {
-    channels.held_torque = VectorXd::Map(answer.torque, v.size());
-    REQUIRE(integrator->step(state, channels, 0.001).converged);
-    integrator->velocity(state, v);
-  }
-
-  scene::Scene scene;
-  std::optional<model::Model> model;
-  std::unique_ptr<integration::Integrator> integrator;
-  integration::State state;
-  integration::Channels channels;
-  VectorXd v;
-  hamelin_controller* controller = nullptr;
-  hamelin_answer answer{};
-  std::array<char, 512> error{};
-  std::vector<CLogLine> lines;
-};
 
 constexpr std::array<double, 4> upright{1.0, 0.0, 0.0, 0.0};
 constexpr std::array<double, 3> origin{0.0, 0.0, 0.0};
@@ -277,8 +204,7 @@ std::vector<BadCall> bad_calls(const std::string& bad_map) {
 TEST_CASE("in C, bad updates return one line and do not change the motion",
           "[control][bad_input]") {
   const test::TemporaryFolder folder;
-  CLoop disturbed(folder.path(), "hybrid", Json::object()),
-      undisturbed(folder.path(), "hybrid", Json::object());
+  CLoop disturbed(c_document("hybrid")), undisturbed(c_document("hybrid"));
   const hamelin_obstacle ball = c_ball();
   for (CLoop* loop : {&disturbed, &undisturbed})
     REQUIRE(hamelin_controller_set_obstacle(loop->controller, &ball, nullptr, nullptr, 0) == 0);
@@ -309,8 +235,8 @@ TEST_CASE("in C, bad updates return one line and do not change the motion",
 
 TEST_CASE("in C, obstacles have predictions, and poses of them are streamed",
           "[control][tracking]") {
-  const test::TemporaryFolder folder;
-  CLoop loop(folder.path(), "reporting", Json::object());
+  CLoop loop(c_document("reporting"),
+             [](hamelin_controller_options& options) { options.observation_noise_m = 0.001; });
   hamelin_obstacle ball = c_ball();
   ball.prediction = HAMELIN_CONSTANT_VELOCITY;
   ball.speed_max_m_s = 0.5;
@@ -350,9 +276,10 @@ TEST_CASE("in C, obstacles have predictions, and poses of them are streamed",
 
 TEST_CASE("in C, structs of callers that were built against earlier headers are accepted",
           "[control][tracking]") {
-  const test::TemporaryFolder folder;
-  CLoop loop(folder.path(), "reporting", Json::object(), 0,
-             offsetof(hamelin_controller_options, observation_noise_m));
+  CLoop loop(c_document("reporting"), [](hamelin_controller_options& options) {
+    options.struct_size = offsetof(hamelin_controller_options, observation_noise_m);
+    options.observation_noise_m = -1.0;  // beyond its end
+  });
   hamelin_obstacle ball = c_ball();
   ball.struct_size = offsetof(hamelin_obstacle, prediction);
   ball.prediction = 99;  // beyond its end
@@ -362,8 +289,7 @@ TEST_CASE("in C, structs of callers that were built against earlier headers are 
 }
 
 TEST_CASE("in C, a body is attached to the arm and detached again", "[control][load]") {
-  const test::TemporaryFolder folder;
-  CLoop loop(folder.path(), "hybrid", Json::object());
+  CLoop loop(c_document("hybrid"));
   const hamelin_payload_capsule small{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.001};
   hamelin_payload body{};
   body.struct_size = sizeof body;
@@ -396,10 +322,9 @@ TEST_CASE("in C, a body is attached to the arm and detached again", "[control][l
 
 TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",
           "[control][bad_input]") {
-  const test::TemporaryFolder folder;
   const auto [how, cause] =
       GENERATE(table<std::string, std::string>({{"throw", "out of ideas"}, {"nan", "not finite"}}));
-  CLoop loop(folder.path(), "breaking", {{"at_tick", 100}, {"how", how}});
+  CLoop loop(c_document("breaking", {{"at_tick", 100}, {"how", how}}));
   for (int k = 0; k < 1500; ++k) {
     loop.tick();
     CHECK((loop.answer.state == HAMELIN_CONTROL_STOPPING) == (k >= 100));
@@ -411,8 +336,8 @@ TEST_CASE("in C, a planner that fails leaves the arm at rest and says why",
 
 TEST_CASE("in C, late answers are counted and reported once, and then the arm is brought to rest",
           "[control][bad_input]") {
-  const test::TemporaryFolder folder;
-  CLoop loop(folder.path(), "reporting", {{"sleep_s", 0.002}}, 30);
+  CLoop loop(c_document("reporting", {{"sleep_s", 0.002}}),
+             [](hamelin_controller_options& options) { options.late_answers_max = 30; });
   for (int k = 0; k < 400; ++k) {
     loop.tick();
     CHECK(loop.answer.overruns == static_cast<std::uint64_t>(std::min(k + 1, 30)));

@@ -43,8 +43,8 @@ std::vector<VectorXd> torques(const scene::Scene& scene, int ticks) {
 TEST_CASE("what a controller drives decides the bounds of safety, not the file of the scene",
           "[control][borders]") {
   // for a scene of ideal actuation, also if a program changes it afterwards
-  const scene::Scene as_read = clutter();
-  REQUIRE(as_read.actuation.type == scene::ActuationType::ideal);
+  scene::Scene as_read = clutter();
+  as_read.actuation.type = scene::ActuationType::ideal;
   scene::Scene changed = as_read, stated = as_read;
   changed.actuation.type = stated.actuation.type = scene::ActuationType::sampled;
   stated.safety.tracking_rad = 2e-4;

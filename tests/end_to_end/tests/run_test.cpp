@@ -55,11 +55,11 @@ TEST_CASE("the arm moves in MuJoCo where the build has it, and one line says so 
   CHECK(result["plant"]["judge_contacts"] == 0);
   CHECK_FALSE(std::filesystem::exists(sandbox.path("MUJOCO_LOG.TXT")));
   const auto described =
-      sandbox.run({"run", "data/scenes/clutter.json", "--plant", "mujoco", "--print-config"});
+      sandbox.run({"run", "data/scenes/paper_52_hybrid.json", "--plant", "mujoco", "--print-config"});
   CHECK(described.exit_code == 0);
   CHECK(described.err ==
-        "hamelin: note: data/scenes/clutter.json: /actuation/type: is sampled instead of ideal, "
-        "because the joints of MuJoCo take torques\n");
+        "hamelin: note: data/scenes/paper_52_hybrid.json: /actuation/type: is sampled instead of "
+        "ideal, because the joints of MuJoCo take torques\n");
   const auto refused = sandbox.run(
       {"run", "data/scenes/clutter.json", "--plant", "mujoco", "--set", "/actuation/type=ideal"});
   CHECK(refused.exit_code == 2);

@@ -102,6 +102,9 @@ struct ControllerOptions {
   /// The planner has failed after so many answers in a row beyond the deadline; 0: never. Single
   /// late answers are used. Without a clock none is late.
   int late_answers_max = 10;
+  /// For so many ticks in a row the arm may be without a measurement that can be used: it is then
+  /// where its model takes it. After more of them it is stopped.
+  int lost_measurements_max = 0;
   /// How far payloads that are attached later extend beyond the tip [m], and how many shapes they
   /// have together; none: as the scene's events say. What the arm can reach is known so much
   /// farther.
@@ -205,6 +208,10 @@ class Controller {
   ///         cannot be used
   const Answer& tick(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
 
+  /// The same for a tick at which no measurement came, a period after the last one.
+  /// @throws Error usage at the first tick
+  const Answer& tick_unseen();
+
   /// The first half of a tick: takes the newest snapshot, finds near obstacles, checks goals and
   /// stalls. answer().state is running, reached or stalled afterwards.
   void observe(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
@@ -214,13 +221,14 @@ class Controller {
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
 
   /// Brings the arm to rest from the next tick on, and holds it. Any thread.
-  /// @param cause for Answer::cause, which has its first LineBuffer::size_max bytes
+  /// @param cause for Answer::cause, as one line, which has its first LineBuffer::size_max bytes
   void stop(std::string_view cause);
   /// Goes on from where the arm is measured to be, from the next tick on, if the last answer has
-  /// the state `stopping` and its cause is gone. Servos that still move go on from their set point. Planner, guide and shield are made again, goals go
-  /// on where they were. The arm remains stopped if the measurement of that tick cannot be used, or
-  /// if there is no way to stop from where it is; Answer::cause says so. A stop that no answer has
-  /// shown yet remains. Any thread; this takes milliseconds.
+  /// the state `stopping` and its cause is gone; servos that still move go on from their set point.
+  /// Planner, guide and shield are made again, goals go on where they were. The arm remains stopped
+  /// if the measurement of that tick cannot be used, or if there is no way to stop from where it
+  /// is; Answer::cause says so. A stop that no answer has shown yet remains. Any thread; this takes
+  /// milliseconds.
   /// @throws Error plugin if the planner refuses to start; nothing changes then
   void resume();
 
@@ -319,6 +327,8 @@ class Controller {
   /// Writes why the arm cannot begin with the load where it is; nothing if it can.
   void describe_defect(LoadedArm& fresh, LineBuffer& line);
   void measure(double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// The rest of observe(), once the measurement is taken or missing.
+  void look(bool first);
   /// Notes why the measurement cannot be used. @throws Error invalid at the first tick
   void lose_measurement(double time_s, bool in_order);
   /// Stops an arm that cannot be seen, or does not do what it is sent.
@@ -392,6 +402,7 @@ class Controller {
   std::uint64_t guidance_number_ = 0, listed_number_ = 0;
   GoalTracker goals_;
   bool usable_ = false;   ///< whether the measurement of this tick can be used
+  int unusable_ = 0;      ///< so many in a row cannot be used
   double given_s_ = 0.0;  ///< the last time that was in order
   Answer answer_;
   std::optional<Certificate::Verdict> verdict_;

@@ -67,7 +67,8 @@ class Straying {
     const Eigen::VectorXd &q, &velocity, &acceleration;
     double duration_s, ramp_s;
   };
-  void begin(const Eigen::VectorXd& acceleration);
+  /// Sets them for an arm that is as modelled, whose velocity changes by so much.
+  void begin(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration);
   /// Raises errors and shapes to what errors of the model cause there.
   void include_model_errors(const Effort& effort);
   void add_noise();
@@ -87,6 +88,7 @@ class Straying {
   double compliance_s2_;
   double estimate_s2_;       ///< the same for wrong estimates of velocity
   double velocity_error_s_;  ///< of a velocity per unexplained acceleration
+  double lag_s_ = 0.0;       ///< drift per change of velocity
   Eigen::VectorXd stated_;   ///< safety.tracking_rad
   Bounds bounds_, before_;
   Eigen::VectorXd q_, velocity_, acceleration_;

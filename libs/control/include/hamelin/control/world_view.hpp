@@ -18,6 +18,9 @@
 
 namespace hamelin::control {
 
+/// Obstacles are searched within this distance if the planner gives no other [m].
+inline constexpr double default_influence_m = 0.2;
+
 /// The surroundings of the arm at a configuration: near points of obstacles and of its own parts,
 /// the smallest clearances, and the proof that the motion between two configurations was clear of
 /// both. One object per thread. After construction, only advance_map() and change_map() allocate.

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace hamelin::simulation {
+namespace hamelin {
 
 /// Counts durations in bins whose bounds grow by a constant factor, docs/theory.md (13.15),
 /// (13.16), so that memory does not depend on their number: 64 bins per doubling between 2⁻¹⁰ µs (1
@@ -51,4 +51,4 @@ class TimeHistogram {
   double largest_ = 0.0;
 };
 
-}  // namespace hamelin::simulation
+}  // namespace hamelin

@@ -1,4 +1,4 @@
-#include "../src/time_histogram.hpp"
+#include "hamelin/core/time_histogram.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "hamelin/core/rng.hpp"
 
-using hamelin::simulation::TimeHistogram;
+using hamelin::TimeHistogram;
 
 TEST_CASE("quantiles of tick times are correct to the stated error; the largest is exact",
           "[simulation][unit]") {

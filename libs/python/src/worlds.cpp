@@ -1,0 +1,113 @@
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "bound_controller.hpp"
+#include "hamelin/scene/parts.hpp"
+
+namespace hamelin::python {
+
+namespace {
+
+const std::filesystem::path& folder_of(const BoundWorld& w) {
+  return w.owner->scene->folder;
+}
+
+}  // namespace
+
+void add_world(py::module_& module) {
+  using py::arg;
+  py::class_<BoundWorld, std::shared_ptr<BoundWorld>>(
+      module, "World",
+      "The surroundings of a controller. Any thread may update them; an update\n"
+      "takes effect at the next tick and returns the number of its snapshot.")
+      .def(
+          "set_obstacle",
+          [](const BoundWorld& w, py::handle obstacle) {
+            const auto read =
+                scene::obstacle_from_json(to_json(obstacle), folder_of(w), "obstacle");
+            const py::gil_scoped_release unlocked;
+            return w.get().set_obstacle(read);
+          },
+          arg("obstacle"),
+          "Adds an obstacle, a dict as in a scene, or replaces the one of the same name.")
+      .def(
+          "move_obstacle",
+          [](const BoundWorld& w, const std::string& name, py::handle pose, py::handle velocity,
+             double time_s) {
+            const auto at = pose_of("move_obstacle", "pose", pose);
+            const auto v = optional_vector3("move_obstacle", "velocity", velocity)
+                               .value_or(Eigen::Vector3d::Zero());
+            const py::gil_scoped_release unlocked;
+            return w.get().move_obstacle(name, at, v, time_s);
+          },
+          arg("name"), arg("pose"), py::kw_only(), arg("velocity") = py::none(), arg("time"),
+          "Moves an obstacle: at `time` [s] it is at the pose, shape (4, 4), from where it goes "
+          "on\n"
+          "with the velocity, shape (3,) [m/s].")
+      .def(
+          "observe_obstacle",
+          [](const BoundWorld& w, const std::string& name, py::handle pose, double time_s,
+             py::handle velocity, py::handle acceleration, py::handle angular_velocity) {
+            const auto seen = observation_of("observe_obstacle", time_s, pose, velocity,
+                                             acceleration, angular_velocity);
+            const py::gil_scoped_release unlocked;
+            return w.get().observe_obstacle(name, seen);
+          },
+          arg("name"), arg("pose"), py::kw_only(), arg("time"), arg("velocity") = py::none(),
+          arg("acceleration") = py::none(), arg("angular_velocity") = py::none(),
+          "Takes a pose, shape (4, 4), of a stream of poses. Motion that is not given, shape (3,)\n"
+          "each, is estimated.")
+      .def(
+          "remove_obstacle",
+          [](const BoundWorld& w, const std::string& name) {
+            const py::gil_scoped_release unlocked;
+            return w.get().remove_obstacle(name);
+          },
+          arg("name"), "Removes an obstacle.")
+      .def(
+          "last_observed",
+          [](const BoundWorld& w, const std::string& name) {
+            const py::gil_scoped_release unlocked;
+            return w.get().last_observed(name);
+          },
+          arg("name"), "Time of the last observation [s]; None without one.")
+      .def(
+          "set_map",
+          [](const BoundWorld& w, py::handle map, py::handle q) {
+            const auto read = scene::map_from_json(to_json(map), folder_of(w), "map");
+            const Eigen::VectorXd at =
+                optional_vector("set_map", "q", q, w.owner->controller->model().dof());
+            const py::gil_scoped_release unlocked;
+            return w.get().set_map(read, at);
+          },
+          arg("map"), arg("q") = py::none(),
+          "Replaces the map by that of a dict as in a scene; None removes it. q: configuration in\n"
+          "which a self-filter finds the arm, shape (n,); None: the scene's start. Changes that "
+          "it\n"
+          "lists are not made: change_map() makes them.")
+      .def(
+          "change_map",
+          [](const BoundWorld& w, py::handle change) {
+            const auto read = scene::map_change_from_json(to_json(change), folder_of(w), "change");
+            const py::gil_scoped_release unlocked;
+            return w.get().change_map(read);
+          },
+          arg("change"),
+          "Frees and occupies voxels of the map now: a dict as in /map/changes of a scene, whose\n"
+          "time_s may be left out and is not used.")
+      .def_property_readonly(
+          "number",
+          [](const BoundWorld& w) {
+            const py::gil_scoped_release unlocked;
+            return w.get().latest()->number;
+          },
+          "Number of the newest snapshot.")
+      .def("__repr__", [](const BoundWorld& w) {
+        const py::gil_scoped_release unlocked;
+        const auto latest = w.get().latest();
+        return fmt::format("<hamelin.World snapshot {}, {} obstacles>", latest->number,
+                           latest->environment.obstacles().size());
+      });
+}
+
+}  // namespace hamelin::python

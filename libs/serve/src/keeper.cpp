@@ -1,0 +1,125 @@
+#include "hamelin/serve/keeper.hpp"
+
+#include <algorithm>
+#include <exception>
+
+namespace hamelin::serve {
+
+using Eigen::VectorXd;
+
+namespace {
+
+// Copies what is not of zero size, as outputs that are not asked for are.
+void copy(const VectorXd& from, double* to) {
+  std::copy(from.begin(), from.end(), to);
+}
+
+}  // namespace
+
+Keeper::Keeper(control::Controller& controller, int period_gap_max)
+    : controller_(controller), gap_max_(period_gap_max) {
+  q_ = v_ = VectorXd::Zero(controller.model().dof());
+}
+
+void Keeper::begin_client() {
+  sequence_ = 0;
+  request_ = HAMELIN_REQUEST_NONE;
+}
+
+bool Keeper::take(const hamelin_measurement& measurement) {
+  if (measurement.checksum != hamelin_measurement_checksum(&measurement)) {
+    ++counts_.damaged;
+    return false;
+  }
+  if (measurement.sequence <= sequence_) {
+    ++counts_.late;
+    return false;
+  }
+  // a client that has just come does not begin with a gap
+  const std::uint64_t gap = sequence_ == 0 ? 0 : measurement.sequence - sequence_ - 1;
+  for (std::uint64_t i = 0; i < std::min<std::uint64_t>(gap, static_cast<unsigned>(gap_max_)); ++i)
+    (void)miss();
+  sequence_ = measurement.sequence;
+  return tick(measurement);
+}
+
+bool Keeper::tick(const hamelin_measurement& measurement) {
+  q_ = Eigen::Map<const VectorXd>(measurement.q, q_.size());
+  v_ = Eigen::Map<const VectorXd>(measurement.v, v_.size());
+  time_s_ = measurement.time_s;
+  try {
+    take_request(measurement.request);
+    (void)controller_.tick(time_s_, q_, v_);
+  } catch (const std::exception& e) {
+    // only a first tick refuses: a measurement that cannot be used, or no way to stop
+    refuse_to_begin(e.what());
+    return true;
+  }
+  begun_ = true;
+  ++counts_.ticks;
+  write(false);
+  return true;
+}
+
+bool Keeper::miss() {
+  if (!begun_) return false;
+  ++counts_.lost;
+  ++sequence_;
+  time_s_ += controller_.period_s();
+  (void)controller_.tick_unseen();
+  ++counts_.ticks;
+  write(true);
+  return true;
+}
+
+void Keeper::take_request(std::uint32_t request) {
+  if (request == request_) return;
+  request_ = request;
+  if (request == HAMELIN_REQUEST_STOP) controller_.stop("the client has asked for it");
+  if (request == HAMELIN_REQUEST_RESUME) wants_resume_ = true;
+  if (request == HAMELIN_REQUEST_RESET && begun_) {
+    controller_.reset();
+    begun_ = false;
+  }
+}
+
+bool Keeper::wants_resume() noexcept {
+  return std::exchange(wants_resume_, false);
+}
+
+void Keeper::write(bool unseen) {
+  const control::Answer& answer = controller_.answer();
+  const auto state_before = setpoint_.state;
+  setpoint_.sequence = sequence_;
+  setpoint_.time_s = time_s_;
+  copy(answer.torque, setpoint_.torque);
+  copy(answer.q_next, setpoint_.q);
+  copy(answer.v_next, setpoint_.v);
+  setpoint_.clearance_m = controller_.view().clearance_m();
+  setpoint_.state = static_cast<std::int32_t>(answer.state);
+  setpoint_.reason = static_cast<std::int32_t>(answer.reason);
+  setpoint_.flags = 0;
+  if (answer.saturated) setpoint_.flags |= HAMELIN_SETPOINT_SATURATED;
+  if (answer.stopping) setpoint_.flags |= HAMELIN_SETPOINT_SHIELDED;
+  if (unseen) setpoint_.flags |= HAMELIN_SETPOINT_UNSEEN;
+  setpoint_.goal_index = static_cast<std::uint32_t>(answer.goal_index);
+  setpoint_.lost = counts_.lost;
+  setpoint_.late = counts_.late;
+  setpoint_.damaged = counts_.damaged;
+  setpoint_.cause[answer.cause.copy(setpoint_.cause, HAMELIN_LINK_TEXT - 1)] = '\0';
+  setpoint_.checksum = hamelin_setpoint_checksum(&setpoint_);
+  if (answer.state == control::ControlState::stopping && setpoint_.state != state_before)
+    ++counts_.stops;
+}
+
+void Keeper::refuse_to_begin(const std::string& cause) {
+  setpoint_ = {};
+  setpoint_.sequence = sequence_;
+  setpoint_.time_s = time_s_;
+  setpoint_.state = static_cast<std::int32_t>(control::ControlState::stopping);
+  setpoint_.flags = HAMELIN_SETPOINT_NOT_BEGUN;
+  setpoint_.cause[cause.copy(setpoint_.cause, HAMELIN_LINK_TEXT - 1)] = '\0';
+  setpoint_.checksum = hamelin_setpoint_checksum(&setpoint_);
+}
+
+}  // namespace hamelin::serve
