@@ -56,7 +56,7 @@ class Disturbances {
   static double clock_s();
 
  private:
-  void note(std::string event);
+  void note(const std::string& event);
   [[nodiscard]] bool happens(double share) { return rng_.uniform() < share; }
   template <class F>
   void attempt(long& count, F&& change);
