@@ -76,7 +76,7 @@ double Disturbances::clock_s() {
   return clock_now_s += planner_takes_s;
 }
 
-void Disturbances::note(std::string event) {
+void Disturbances::note(const std::string& event) {
   trail_.push_front(fmt::format("{:.3f} s {}", time_s_, event));
   if (trail_.size() > trail_max) trail_.pop_back();
 }

@@ -39,7 +39,7 @@ class Disturbances {
 
   /// Before a tick. @return whether it is the first one after reset()
   bool disturb(double time_s);
-  /// What the tick is given of the arm.
+  /// The measurement for the tick.
   [[nodiscard]] Measurement measure(double time_s);
   /// After a tick. @return the model of the arm with what it carries since this tick, if that is
   /// another one
@@ -56,7 +56,7 @@ class Disturbances {
   static double clock_s();
 
  private:
-  void note(std::string event);
+  void note(const std::string& event);
   [[nodiscard]] bool happens(double share) { return rng_.uniform() < share; }
   template <class F>
   void attempt(long& count, F&& change);
