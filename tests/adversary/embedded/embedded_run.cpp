@@ -13,6 +13,7 @@
 
 #include "hamelin/control/preparation.hpp"
 #include "hamelin/core/error.hpp"
+#include "shield/shield.hpp"
 
 namespace hamelin::test {
 

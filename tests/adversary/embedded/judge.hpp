@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hamelin/control/controller.hpp"
+#include "hamelin/control/planner_setup.hpp"
 #include "hamelin/scene/self_collision.hpp"
 
 namespace hamelin::test {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "hamelin/core/error.hpp"
+#include "shield/shield.hpp"
 
 namespace hamelin::test {
 

@@ -6,6 +6,7 @@
 
 #include "../c_loop.hpp"
 #include "hamelin/test/guides.hpp"
+#include "shield/shield.hpp"
 
 using namespace hamelin;
 using Catch::Contains;

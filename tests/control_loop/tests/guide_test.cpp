@@ -3,6 +3,8 @@
 #include <thread>
 
 #include "../loop.hpp"
+#include "guide/guidance.hpp"
+#include "guide/guide_search.hpp"
 #include "hamelin/guide/guide.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/guides.hpp"

@@ -6,6 +6,7 @@
 
 #include "hamelin/core/error.hpp"
 #include "hamelin/description/robot_io.hpp"
+#include "loop/goal_list.hpp"
 
 namespace hamelin::control {
 

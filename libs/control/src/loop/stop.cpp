@@ -16,8 +16,6 @@ namespace {
 
 // Feedback that is faster than the steps would oscillate [1/s].
 constexpr double usual_feedback_rate = 50.0, feedback_per_step = 0.2;
-// An arm whose limits allow no stop brakes at this rate, and is limited afterwards [1/s].
-constexpr double forced_rate = 20.0;
 
 }  // namespace
 
@@ -58,8 +56,7 @@ void Stop::begin(FailSafe& motion, const Straying::Bounds& bounds) {
 }
 
 void Stop::begin(const StopFinder::Start& start) {
-  if (!finder_.find(start, BrakingRate::usual_utilisation, motion_))
-    motion_.set_stop(start.q, start.v, start.acceleration, {forced_rate, 0.0, 0.0});
+  if (!finder_.find(start, BrakingRate::usual_utilisation, motion_)) finder_.force(start, motion_);
   time_s_ = 0.0;
 }
 

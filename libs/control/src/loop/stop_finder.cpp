@@ -14,6 +14,8 @@ using Eigen::VectorXd;
 
 namespace {
 
+// An arm whose limits allow no stop brakes at this rate, and is limited afterwards [1/s].
+constexpr double forced_rate = 20.0;
 constexpr double stop_steps = 4.0, unlimited_stop_steps = 10.0;
 // A stop begins to brake before it ends to: the largest product of its rate and of both transitions
 // is below 2, docs/theory.md (14.13).
@@ -101,6 +103,13 @@ bool StopFinder::find(const Start& start, double least_utilisation, FailSafe& ou
   if (bounds_.jerk_max.size() > 0) keep_bounds(start, rate, ramp, fade);
   out.set_stop(start.q, start.v, start.acceleration, {rate, ramp, fade});
   return true;
+}
+
+void StopFinder::force(const Start& start, FailSafe& out) {
+  double rate = forced_rate, ramp = 0.0, fade = 0.0;
+  w_ = start.v;
+  if (bounds_.jerk_max.size() > 0) keep_bounds(start, rate, ramp, fade);
+  out.set_stop(start.q, start.v, start.acceleration, {rate, ramp, fade});
 }
 
 }  // namespace hamelin::control

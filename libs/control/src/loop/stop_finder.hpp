@@ -36,6 +36,8 @@ class StopFinder {
   };
   /// Sets a motion to a stop. @return whether there is one within the torque limits
   [[nodiscard]] bool find(const Start& start, double least_utilisation, FailSafe& out);
+  /// The same where there is none: within the bounds of acceleration and jerk, where there are any.
+  void force(const Start& start, FailSafe& out);
   /// The share of the allowed torques that the last stop needs.
   [[nodiscard]] double utilisation() const noexcept { return braking_.utilisation(); }
 

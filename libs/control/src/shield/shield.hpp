@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "hamelin/control/answer.hpp"
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/planner_setup.hpp"
-#include "hamelin/control/shield_report.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/scene/environment.hpp"

@@ -16,7 +16,6 @@
 #include "hamelin/control/line_buffer.hpp"
 #include "hamelin/control/live_reference.hpp"
 #include "hamelin/control/live_target.hpp"
-#include "hamelin/control/shield_report.hpp"
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
