@@ -84,8 +84,7 @@ Straying::Straying(const scene::Scene& scene, const model::Model& model, const L
   velocity_error_s_ = late_share * (period_s + scene.actuation.delay_s);
   if (scene.actuation.estimates_velocity)
     velocity_error_s_ += estimator_share / scene.actuation.estimator_bandwidth;
-  if (scene.actuation.type == scene::ActuationType::sampled && !scene.actuation.estimates_velocity)
-    lag_s_ = lag_share * period_s;
+  if (scene.actuation.type == scene::ActuationType::sampled) lag_s_ = lag_share * period_s;
   friction_ = unknown_friction(scene, model.robot());
   if (has_model_errors() || noise_ > 0.0)
     bounds_.shapes = VectorXd::Zero(static_cast<Index>(model.shapes().size()));
