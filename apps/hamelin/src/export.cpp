@@ -42,10 +42,10 @@ int export_motion(const ExportOptions& options) {
 }  // namespace
 
 void add_export(CLI::App& app, int& exit_code) {
-  auto* command = add_command(
-      app, "export", "Write the motion in a log as CSV, or as a ROS 2 JointTrajectory in JSON",
-      "hamelin export shelf.jsonl -o shelf.csv\n"
-      "hamelin export shelf.jsonl --format ros --rate 100 -o shelf-trajectory.json");
+  auto* command =
+      add_command(app, "export", "Write the motion in a log as CSV or as a ROS 2 JointTrajectory",
+                  "hamelin export shelf.jsonl -o shelf.csv\n"
+                  "hamelin export shelf.jsonl --format ros --rate 100 -o shelf-trajectory.json");
   const auto options = std::make_shared<ExportOptions>();
   command->add_option("log", options->file, "log file, plain or zstd")
       ->required()

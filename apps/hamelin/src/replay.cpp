@@ -150,7 +150,7 @@ int replay(const ReplayOptions& options) {
 
 void add_replay(CLI::App& app, int& exit_code) {
   auto* command = add_command(
-      app, "replay", "Repeat the run that a log records, or verify the log against a repeated run",
+      app, "replay", "Repeat the run that a log records, or verify the log by repeating it",
       "hamelin replay shelf.jsonl --verify\n"
       "hamelin replay shelf.jsonl --result again.json");
   const auto options = std::make_shared<ReplayOptions>();

@@ -145,9 +145,7 @@ void add_share(CLI::App& command, const char* name, double& value, const char* h
 
 void add_serve(CLI::App& app, int& exit_code) {
   auto* command = add_command(
-      app, "serve",
-      "Run the controller of a scene as a process that exchanges measurements and set points with "
-      "the driver of an arm, over a Unix socket and shared memory",
+      app, "serve", "Run the control loop of a scene as a process, for the driver of an arm",
       "hamelin serve data/scenes/shelf.json --socket /run/user/1000/arm\n"
       "chrt --fifo 50 hamelin serve arm.json --socket /run/arm");
   const auto options = std::make_shared<ServeOptions>();
@@ -189,9 +187,7 @@ void add_serve(CLI::App& app, int& exit_code) {
 
 void add_plant(CLI::App& app, int& exit_code) {
   auto* command = add_command(
-      app, "plant",
-      "Simulate the arm of a scene as a client of `hamelin serve`, as the driver of a real arm is "
-      "one, with frames that are lost, late, repeated or damaged",
+      app, "plant", "Simulate the arm of a scene as a client of `hamelin serve`, with faults",
       "hamelin plant data/scenes/shelf.json --socket /run/user/1000/arm --plant mujoco\n"
       "hamelin plant data/scenes/shelf.json --socket arm --real-time --lost 0.01 --late 0.01");
   const auto options = std::make_shared<PlantOptions>();

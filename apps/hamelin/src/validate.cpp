@@ -169,13 +169,12 @@ int validate(const ValidateOptions& options) {
 }  // namespace
 
 void add_validate(CLI::App& app, int& exit_code) {
-  auto* command =
-      add_command(app, "validate",
-                  "Check files of all formats: robots, scenes, maps, logs, results and the others. "
-                  "The kind of each file is recognised by its content",
-                  "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
-                  "hamelin validate arm.urdf --tip tool0\n"
-                  "hamelin validate run.jsonl --json");
+  auto* command = add_command(app, "validate",
+                              "Check files of all formats, from robots to results. "
+                              "The kind of each file is recognised by its content",
+                              "hamelin validate data/scenes/shelf.json data/maps/shelf.bt\n"
+                              "hamelin validate arm.urdf --tip tool0\n"
+                              "hamelin validate run.jsonl --json");
   const auto options = std::make_shared<ValidateOptions>();
   command->add_option("files", options->files, "files to check")->required()->type_name("FILE...");
   command->add_option("--tip", options->tip, "tip link (default for a URDF: its only leaf)")

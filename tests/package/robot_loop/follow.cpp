@@ -9,7 +9,6 @@ using namespace hamelin;
 int main(int argc, char** argv) {  // follow_cpp SCENE PLUGIN_DIRECTORY
   if (argc != 3) return 2;
   scene::Scene scene = scene::read_scene(argv[1]);
-  scene.actuation.type = scene::ActuationType::sampled;
   scene.goals = {scene::follow_goal()};  // with the default bounds of what is believed
   control::Controller controller(scene, {argv[2]});
   const double period_s = controller.period_s();

@@ -20,7 +20,6 @@ struct Robot {  // a simulated arm: the driver of your robot takes its place
 int main(int argc, char** argv) {  // live_cpp SCENE PLUGIN_DIRECTORY
   if (argc != 3) return 2;
   scene::Scene scene = scene::read_scene(argv[1]);
-  scene.actuation.type = scene::ActuationType::sampled;  // each torque is held for one period
   control::Controller controller(scene, {argv[2]});
   Robot robot{control::load_model(scene)};
   robot.state = robot.simulation->start(scene.start_q, Eigen::VectorXd::Zero(robot.arm.dof()));

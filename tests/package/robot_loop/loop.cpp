@@ -8,7 +8,6 @@ using namespace hamelin;
 int main(int argc, char** argv) {  // loop_cpp SCENE PLUGIN_DIRECTORY
   if (argc != 3) return 2;
   scene::Scene scene = scene::read_scene(argv[1]);
-  scene.actuation.type = scene::ActuationType::sampled;  // each torque is held for one period
   control::Controller controller(scene, {argv[2]});
   const double period_s = controller.period_s();
 

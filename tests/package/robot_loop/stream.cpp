@@ -14,7 +14,6 @@ geometry::SE3 hand_at(double time_s) {
 int main(int argc, char** argv) {  // stream_cpp SCENE PLUGIN_DIRECTORY
   if (argc != 3) return 2;
   scene::Scene scene = scene::read_scene(argv[1]);
-  scene.actuation.type = scene::ActuationType::sampled;
   control::Controller::Options options;
   options.observations.noise_m = 0.001;  // of the camera
   control::Controller controller(scene, {argv[2]}, options);
