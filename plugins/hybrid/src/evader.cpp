@@ -24,7 +24,7 @@ Evader::Evader(const planning::Host& host, const planning::Setup& setup, const m
       movers_(host, model),
       arm_(model),
       sweep_(movers_),
-      trail_(setup.dof(), trail_points),
+      trail_(setup.dof(), trail_points, trail_spacing),
       evasion_(setup.dof()),
       look_(setup, model, law, margins, host),
       row_(Eigen::VectorXd::Zero(setup.dof())) {

@@ -3,48 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hamelin/planning/trail.hpp"
+
 namespace hamelin::hybrid {
 
-/// Configurations that the arm came along, at least `spacing` apart; the oldest are forgotten.
-class Trail {
- public:
-  static constexpr double spacing = 0.04, reached = 0.1;  ///< [rad or m]
-  Trail(Eigen::Index dof, Eigen::Index capacity) : points_(dof, capacity) {}
+using planning::Trail;
 
-  void clear() noexcept { size_ = 0; }
-  /// The point that was added `age` points before the newest.
-  [[nodiscard]] auto point(Eigen::Index age) const {
-    return points_.col((newest_ - age + points_.cols()) % points_.cols());
-  }
-  /// Adds q if it is far enough from the newest point.
-  void add(const Eigen::VectorXd& q) {
-    if (size_ > 0 && (point(0) - q).norm() < spacing) return;
-    newest_ = (newest_ + 1) % points_.cols();
-    points_.col(newest_) = q;
-    size_ = std::min(size_ + 1, points_.cols());
-  }
-  [[nodiscard]] Eigen::Index size() const noexcept { return size_; }
-  /// Skips points that q has reached on the way back, from `age` on. The oldest one is kept.
-  [[nodiscard]] Eigen::Index next(Eigen::Index age, const Eigen::VectorXd& q) const {
-    while (age + 1 < size_ && (point(age) - q).norm() < reached) ++age;
-    return age;
-  }
-  /// Takes the newest points of another trail, as many as it has room for.
-  void copy(const Trail& other) {
-    size_ = std::min(other.size_, points_.cols());
-    newest_ = points_.cols() - 1;
-    for (Eigen::Index age = 0; age < size_; ++age) points_.col(newest_ - age) = other.point(age);
-  }
-  /// Forgets the newest points.
-  void forget(Eigen::Index count) {
-    newest_ = (newest_ - count + points_.cols()) % points_.cols();
-    size_ -= count;
-  }
-
- private:
-  Eigen::MatrixXd points_;  ///< a ring, one column per point
-  Eigen::Index newest_ = 0, size_ = 0;
-};
+/// Of the trail along which the arm goes back [rad or m]: distance between its points, and that at
+/// which one is reached.
+inline constexpr double trail_spacing = 0.04, trail_reached = 0.1;
 
 /// What the arm does about moving obstacles: it goes its own way, stops, goes back along its trail,
 /// or moves towards a configuration.
@@ -71,7 +38,7 @@ inline void evasion_velocity(const Evasion& evasion, const Trail& trail, const E
     u = evasion.aside - q;
     u *= std::min(gain, speed / std::max(u.norm(), 1e-9));
   } else if (evasion.act == Act::back && trail.size() > 0) {
-    age = trail.next(age, q);
+    age = trail.next(age, q, trail_reached);
     u = trail.point(age) - q;
     const double far = u.norm();
     u *= age + 1 < trail.size() ? speed / std::max(far, slow_within)

@@ -35,7 +35,7 @@ LookAhead::LookAhead(const planning::Setup& setup, const model::Model& model, La
       margins_(margins),
       surroundings_(host, setup, model),
       movers_(host, model),
-      trail_(setup.dof(), looked_trail_points),
+      trail_(setup.dof(), looked_trail_points, trail_spacing),
       ws_(model),
       arm_(model),
       obstacles_(setup, standing_radius_m),

@@ -29,7 +29,7 @@ struct Looks {
       : scene(task),
         law(scene.setup, scene.model, test::law_params),
         look(scene.setup, scene.model, law, scene.margins, scene.planner_host()),
-        trail(4, 64),
+        trail(4, 64, hybrid::trail_spacing),
         own(4),
         q(std::move(at)),
         v(VectorXd::Zero(4)),

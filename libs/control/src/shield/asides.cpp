@@ -14,6 +14,7 @@ namespace {
 // Distance between configurations of the trail, and lengths of ways, one after the other [rad or
 // m].
 constexpr double trail_spacing = 0.1;
+constexpr Index trail_points = 16;
 constexpr std::array<double, 3> lengths{0.25, 0.5, Asides::longest};
 constexpr double least_row = 1e-6;
 
@@ -21,17 +22,10 @@ constexpr double least_row = 1e-6;
 
 Asides::Asides(const model::Model& model, const ModelledLimits& limits, const VectorXd& reserve,
                std::uint64_t seed)
-    : model_(model), rng_(seed), trail_(Eigen::MatrixXd::Zero(model.dof(), trail_points)) {
+    : model_(model), rng_(seed), trail_(model.dof(), trail_points, trail_spacing) {
   if (limits.q_lower.size() == 0) return;
   lower_ = limits.q_lower + reserve;
   upper_ = limits.q_upper - reserve;
-}
-
-void Asides::pass(const VectorXd& q) {
-  if (size_ > 0 && (trail_.col(newest_) - q).norm() < trail_spacing) return;
-  newest_ = (newest_ + 1) % trail_points;
-  trail_.col(newest_) = q;
-  size_ = std::min(size_ + 1, trail_points);
 }
 
 void Asides::propose(dynamics::Workspace& ws, const MoverCheck::Threat& threat,
@@ -48,9 +42,9 @@ void Asides::propose(dynamics::Workspace& ws, const MoverCheck::Threat& threat,
     dynamics::point_jacobian_transpose(model_, ws,
                                        model_.shapes()[static_cast<std::size_t>(threat.shape)].link,
                                        threat.point, ways[static_cast<std::size_t>(kind)], target);
-  } else if (kind < directions + 2 && size_ > 0) {
-    const Index age = std::min(size_ - 1, static_cast<Index>(length / trail_spacing));
-    target = trail_.col((newest_ - age + trail_points) % trail_points) - from;
+  } else if (kind < directions + 2 && trail_.size() > 0) {
+    const Index age = std::min(trail_.size() - 1, static_cast<Index>(length / trail_spacing));
+    target = trail_.point(age) - from;
   } else if (kind == directions + 2) {
     target = ahead;
   }

@@ -6,6 +6,7 @@
 #include "hamelin/control/planner_setup.hpp"
 #include "hamelin/core/rng.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
+#include "hamelin/planning/trail.hpp"
 #include "shield/mover_check.hpp"
 
 namespace hamelin::control {
@@ -20,7 +21,7 @@ class Asides {
          std::uint64_t seed);
 
   /// Notes where the arm is.
-  void pass(const Eigen::VectorXd& q);
+  void pass(const Eigen::VectorXd& q) { trail_.add(q); }
   /// The next proposal, in a fixed order that begins again at its end.
   /// @param threat where the arm would be hit if it stopped @param from where it would stop
   /// @param ahead velocity with which it moves
@@ -32,15 +33,13 @@ class Asides {
   static constexpr double longest = 1.2;
 
  private:
-  static constexpr Eigen::Index trail_points = 16;
   static constexpr int directions = 6, kinds = directions + 4;
 
   const model::Model& model_;
   Eigen::VectorXd lower_, upper_;  ///< of size zero: none
   Rng rng_;
   int next_ = 0;
-  Eigen::MatrixXd trail_;  ///< a ring, one column per configuration
-  Eigen::Index newest_ = 0, size_ = 0;
+  planning::Trail trail_;
 };
 
 }  // namespace hamelin::control
