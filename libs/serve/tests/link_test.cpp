@@ -81,10 +81,18 @@ TEST_CASE("memory of another program, version or size is refused", "[serve]") {
   const LinkMemory memory = LinkMemory::make(7, false, 0.001);
   const auto open = [&] { const LinkMemory again(Descriptor(::dup(memory.descriptor()))); };
   CHECK(error_of(open) == "no error");
-  SECTION("magic") { memory->magic ^= 1; }
-  SECTION("version") { ++memory->version; }
-  SECTION("size") { --memory->size; }
-  SECTION("joints") { memory->joints = 33; }
+  SECTION("magic") {
+    memory->magic ^= 1;
+  }
+  SECTION("version") {
+    ++memory->version;
+  }
+  SECTION("size") {
+    --memory->size;
+  }
+  SECTION("joints") {
+    memory->joints = 33;
+  }
   CHECK_THAT(error_of(open), Contains("expected"));
 }
 
@@ -130,8 +138,7 @@ TEST_CASE("an empty message is a text, and does not end the connection", "[serve
 
 TEST_CASE("sending does not block for ever if the other end does not read", "[serve]") {
   Pair pair;
-  for (int i = 0; i < 3000; ++i) (void)pair.here.ring(1);
-  CHECK_FALSE(pair.here.ring(1));
+  for (int i = 0; i < 3000; ++i) CHECK(pair.here.ring(1));  // the other end is there
   const double since_s = control::steady_clock_s();
   CHECK_FALSE(pair.here.send("text"));
   CHECK(control::steady_clock_s() - since_s < 30.0);

@@ -15,8 +15,8 @@ using serve::LinkMemory;
 using serve::News;
 using test::clutter;
 using test::error_of;
-using test::exchange;
 using test::ExactArm;
+using test::exchange;
 using test::Serving;
 
 namespace {
@@ -161,15 +161,19 @@ TEST_CASE("a client that has gone cannot write into the memory of the next one",
 
 TEST_CASE("numbers that are rung do not matter, only the frame in the memory does", "[serve]") {
   Serving serving;
-  RawClient client(serving.socket());
-  ExactArm arm(start());
-  client.measure(arm);
-  for (const std::uint64_t wrong : {std::uint64_t{0}, std::uint64_t{1}, ~std::uint64_t{0}})
-    REQUIRE(client.connection.ring(wrong));  // each is the first frame once more
-  client.measure(arm);
-  CHECK(client.memory->setpoint.sequence == 2);
-  CHECK(client.memory->setpoint.late == 3);
-  CHECK(client.memory->setpoint.lost == 0);
+  {
+    RawClient client(serving.socket());
+    ExactArm arm(start());
+    client.measure(arm);
+    for (const std::uint64_t wrong : {std::uint64_t{0}, std::uint64_t{1}, ~std::uint64_t{0}})
+      REQUIRE(client.connection.ring(wrong));
+    client.measure(arm);
+    CHECK(client.memory->setpoint.sequence == 2);
+  }
+  REQUIRE(serving.wait_for_gone(1));
+  CHECK(serving.report().counts.ticks == 2);
+  CHECK(serving.report().counts.late == 3);
+  CHECK(serving.report().counts.lost == 0);
 }
 
 TEST_CASE("texts that are no request are answered by an error", "[serve]") {
@@ -194,8 +198,7 @@ TEST_CASE("a client that asks and never reads does not keep the server from endi
   ExactArm arm(start());
   client.measure(arm);
   const std::string request = R"({"planner_params": {"no_such": 1}})";
-  for (int i = 0; i < 2000; ++i)
-    (void)client.connection.send(request);
+  for (int i = 0; i < 2000; ++i) (void)client.connection.send(request);
   const double since_s = control::steady_clock_s();
   serving.stop();
   CHECK(control::steady_clock_s() - since_s < 30.0);
