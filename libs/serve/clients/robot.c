@@ -219,6 +219,9 @@ static int run(struct link* link, struct arm* arm, uint32_t request) {
   printf("%llu periods, %llu without a set point; state %d, goal %u%s%s\n",
          (unsigned long long)frame.sequence, (unsigned long long)lost, link->setpoint.state,
          link->setpoint.goal_index, link->setpoint.cause[0] != 0 ? ": " : "", link->setpoint.cause);
+  printf("the arm is at ");
+  for (uint32_t j = 0; j < link->memory->joints; ++j) printf("%s%.9g", j > 0 ? "," : "", arm->q[j]);
+  printf("\n");
   return code;
 }
 

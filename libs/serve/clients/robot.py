@@ -194,6 +194,7 @@ def main():
         f"{driver.sequence} periods, {driver.lost} without a set point; state {setpoint.state}, "
         f"goal {setpoint.goal_index}" + (f": {setpoint.cause}" if setpoint.cause else "")
     )
+    print("the arm is at " + ",".join(f"{q:.9g}" for q in driver.arm.q))
     return code
 
 

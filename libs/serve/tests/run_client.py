@@ -15,10 +15,10 @@ import time
 START = "0,-0.785,0,-2.356,0,1.571,0.785"
 
 
-def run(client, socket, *options, interrupt=False):
+def run(client, socket, start, *options, interrupt=False):
     """Runs the client. @return its exit code and what it printed"""
     with subprocess.Popen(
-        [*client, str(socket), "--start", START, *options], stdout=subprocess.PIPE, text=True
+        [*client, str(socket), "--start", start, *options], stdout=subprocess.PIPE, text=True
     ) as process:
         connected = process.stdout.readline()
         if interrupt:
@@ -34,12 +34,14 @@ def expect(condition, what):
 
 
 def check(client, socket):
-    code, text = run(client, socket, interrupt=True)
+    code, text = run(client, socket, START, interrupt=True)
     print(text, end="")
     expect("7 joints, a period of 0.001 s" in text, "the joints and the period of the scene")
     expect(code == 130, f"exit code 130 after an interruption, not {code}")
     expect("state 4, goal 0: the client has asked for it" in text, "an arm that was stopped")
-    code, text = run(client, socket, "--resume")
+    start = text.splitlines()[-1].removeprefix("the arm is at ")
+    expect(start != START, "an arm that has moved")
+    code, text = run(client, socket, start, "--resume")
     print(text, end="")
     expect(code == 0, f"exit code 0 after the goal, not {code}")
     expect("state 1, goal 1" in text, "an arm at its goal")
@@ -49,7 +51,7 @@ def main():
     program, scene, *client = sys.argv[1:]
     with tempfile.TemporaryDirectory(prefix="hamelin-serve-") as folder:
         socket = pathlib.Path(folder) / "arm"
-        code, _ = run(client, socket)
+        code, _ = run(client, socket, START)
         expect(code not in (0, 130), f"a failure without a server, not {code}")
         server = subprocess.Popen([program, "serve", scene, "--socket", str(socket), "--lockstep"])
         try:
