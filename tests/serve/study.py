@@ -1,6 +1,6 @@
 """How the control loop as a process of its own compares with the loop within one process.
 
-    python3 tests/serve/study.py HAMELIN [--per-family N] [-o OUT.json]
+    python3 tests/serve/study.py HAMELIN [--per-family N] [--way WAY]... [-o OUT.json]
 
 Runs problems of the benchmark (data/bench) with sampled torques and MuJoCo as the arm: with
 `hamelin run`, and with `hamelin serve` and `hamelin plant` as two processes, once without faults
@@ -20,7 +20,7 @@ ROBOT = SOURCE / "data/robots/arm7.urdf"
 SPHERES = SOURCE / "data/robots/arm7.spheres.json"
 # The server waits so long for a measurement. It is far more than the simulated arm needs, so that
 # the computer's other work does not add to the faults.
-PATIENCE_S = 0.02
+PATIENCE_S = 0.04
 
 
 def make_scenes(program, per_family, folder):
@@ -76,26 +76,39 @@ def describe(results):
     touched = sum((r.get("plant") or {}).get("contacts", 0) > 0 for r in results)
     judged = sum((r.get("plant") or {}).get("judge_contacts", 0) > 0 for r in results)
     links = [r["link"] for r in results if "link" in r]
-    faults = f"; {sum(x['lost'] for x in links)} lost, {sum(x['late'] for x in links)} late" if links else ""
+    counts = [sum(link[key] for link in links) for key in ("periods", "lost", "late")]
+    faults = "; {} periods, {} lost, {} late".format(*counts) if links else ""
     return f"{reached} of {len(results)} reached, {touched} touched ({judged} by the judge){faults}"
+
+
+def print_equal(records):
+    """Prints how many runs end at the same time in the same configuration as those of one process."""
+    one, two = (records.get(way, {}) for way in ("one process", "two processes"))
+    same = sum((one[name]["time_s"], one[name]["q"]) == (two[name]["time_s"], two[name]["q"]) for name in one if name in two)
+    if one and two:
+        print(f"{same} of {len(two)} runs end equal to the last bit in one and in two processes")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("--per-family", type=int, default=6)
+    parser.add_argument("--way", action="append", choices=list(ways("")), help="only this one; may be repeated")
     parser.add_argument("-o", "--output", type=pathlib.Path)
     options = parser.parse_args()
     records = {}
     with tempfile.TemporaryDirectory(prefix="hamelin-serve-") as name:
         scenes = make_scenes(options.program.resolve(), options.per_family, pathlib.Path(name))
         for way, run in ways(options.program.resolve()).items():
+            if options.way and way not in options.way:
+                continue
             records[way] = {}
             for scene in scenes:
                 with tempfile.TemporaryDirectory(prefix="hamelin-serve-") as folder:
                     result = records[way][scene.stem] = run(scene, pathlib.Path(folder))
                 print(f"{way}: {scene.stem}: {result['outcome']}", file=sys.stderr, flush=True)
             print(f"{way}: {describe(list(records[way].values()))}", flush=True)
+    print_equal(records)
     if options.output:
         options.output.write_text(json.dumps(records, indent=1) + "\n")
 

@@ -63,7 +63,8 @@ class Setpoint:
     def __init__(self, fields):
         self.sequence, self.time_s = fields[0:2]
         arrays = fields[2 : 2 + 3 * JOINTS]
-        self.torque, self.q, self.v = (list(arrays[i : i + JOINTS]) for i in range(0, 3 * JOINTS, JOINTS))
+        self.torque, self.q = list(arrays[:JOINTS]), list(arrays[JOINTS : 2 * JOINTS])
+        self.v = list(arrays[2 * JOINTS :])
         rest = fields[2 + 3 * JOINTS :]
         self.clearance_m, self.state, self.reason, self.flags, self.goal_index = rest[:5]
         self.lost, self.late, self.damaged = rest[5:8]
@@ -83,7 +84,9 @@ class Link:
         os.close(descriptors[0])
         magic, version, size, self.joints, position, self.period_s = HEADER.unpack_from(self.memory)
         if (magic, version, size) != (MAGIC, VERSION, SIZE):
-            raise ConnectionError(f"{path}: version {version} of {size} bytes, expected {VERSION} of {SIZE}")
+            raise ConnectionError(
+                f"{path}: version {version} of {size} bytes, expected {VERSION} of {SIZE}"
+            )
         self.position = position != 0
         self.setpoint, self.damaged = None, 0
 
@@ -175,10 +178,12 @@ class Driver:
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("socket")
-    parser.add_argument("--start", help="joint positions at which the simulated arm starts, separated by commas")
-    parser.add_argument("--resume", action="store_true", help="let an arm go on that was stopped when a client has gone")
+    parser.add_argument("--start", help="joint positions of the simulated arm, comma-separated")
+    parser.add_argument("--resume", action="store_true", help="continue after a stop")
     options = parser.parse_args()
     link = Link(options.socket)
     if not link.position:

@@ -193,7 +193,7 @@ TEST_CASE("a request acts once, when it changes", "[serve]") {
   CHECK(kept.keeper.counts().stops == 1);
 }
 
-TEST_CASE("a client that begins anew has its own sequence numbers and counts", "[serve]") {
+TEST_CASE("a client that begins has its own sequence numbers and counts", "[serve]") {
   Kept kept(clutter(false));
   kept.run(100);
   CHECK(kept.keeper.miss());

@@ -104,7 +104,7 @@ TEST_CASE("the next client sees an arm that stops until it requests to resume", 
   CHECK(client.setpoint().state == HAMELIN_CONTROL_RUNNING);
 }
 
-TEST_CASE("a client whose clock starts anew can resume", "[serve]") {
+TEST_CASE("a client whose clock starts again can resume", "[serve]") {
   Serving serving(-1.0, clutter(false));
   Eigen::VectorXd q = start();
   {

@@ -37,7 +37,7 @@ enum {
   HAMELIN_REQUEST_NONE = 0,
   HAMELIN_REQUEST_STOP = 1,   /* bring the arm to rest, and hold it */
   HAMELIN_REQUEST_RESUME = 2, /* go on after a stop */
-  HAMELIN_REQUEST_RESET = 3   /* start anew from this measurement; takes longer than a period */
+  HAMELIN_REQUEST_RESET = 3   /* start again from this measurement; takes longer than a period */
 };
 
 typedef struct hamelin_measurement {

@@ -44,7 +44,7 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Serves until `stop` is set. @param gone is told of each client when it has gone; false ends
+  /// Serves until `stop` is set. @param gone is called when a client has gone; false ends
   void run(const std::atomic<bool>& stop, const std::function<bool(const Report&)>& gone);
 
  private:
