@@ -1,7 +1,7 @@
 /*
  * A driver of an arm as a client of `hamelin serve`, in C11 on Linux.
  *
- *     cc -std=c11 -O2 -I ../include/hamelin/serve robot.c -o robot -lm
+ *     cc -std=c11 -O2 -I ../include robot.c -o robot -lm
  *     hamelin serve reach.json --socket /run/user/1000/arm &
  *     ./robot /run/user/1000/arm --start 0,-0.785,0,-2.356,0,1.571,0.785
  *
@@ -15,6 +15,7 @@
  */
 #define _GNU_SOURCE
 #include <errno.h>
+#include <hamelin/serve/hamelin_frames.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
@@ -26,8 +27,6 @@
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
-
-#include "hamelin_frames.h"
 
 /* As HAMELIN_CONTROL_... of hamelin_control.h. */
 enum { RUNNING = 0, REACHED = 1, STALLED = 2, GAVE_UP = 3, STOPPING = 4 };

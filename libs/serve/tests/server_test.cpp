@@ -1,9 +1,6 @@
 // A server with clients of all kinds.
 #include "hamelin/serve/server.hpp"
 
-#include <sys/socket.h>
-
-#include "hamelin/io/json.hpp"
 #include "hamelin/test/errors.hpp"
 #include "serving.hpp"
 
@@ -202,6 +199,7 @@ TEST_CASE("a client that asks and never reads does not keep the server from endi
   const double since_s = control::steady_clock_s();
   serving.stop();
   CHECK(control::steady_clock_s() - since_s < 30.0);
+  CHECK(serving.report().refused_requests > 0);
 }
 
 TEST_CASE("a client that connects while another is served is turned away", "[serve]") {
