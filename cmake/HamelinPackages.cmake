@@ -168,6 +168,7 @@ endfunction()
 function(hamelin_install_debian_extras)
   set(examples "${CMAKE_INSTALL_DOCDIR_BASE}/libhamelin-dev/examples")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/plugins/template" "${PROJECT_SOURCE_DIR}/tests/package/robot_loop"
+    "${PROJECT_SOURCE_DIR}/libs/serve/clients"
     DESTINATION "${examples}" COMPONENT libhamelin-dev EXCLUDE_FROM_ALL PATTERN tests EXCLUDE)
   install(CODE "set(HAMELIN_SOURCE \"${PROJECT_SOURCE_DIR}\")\nset(HAMELIN_DOC \"${CMAKE_INSTALL_DOCDIR_BASE}/hamelin-doc\")"
     COMPONENT hamelin-doc EXCLUDE_FROM_ALL)

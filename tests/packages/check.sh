@@ -44,7 +44,8 @@ expect "libhamelin0 has the shared library" contains libhamelin0 "$lib/libhameli
 expect "libhamelin-dev has what programs in C and C++ link" contains libhamelin-dev "$lib/libhamelin[.]so" \
   "$lib/pkgconfig/hamelin[.]pc" "$lib/libhamelin_control[.]a" "$lib/cmake/hamelin/hamelinConfig[.]cmake" \
   "usr/include/hamelin/control/hamelin_control[.]h" "usr/share/doc/libhamelin-dev/examples/template/src/template[.]cpp" \
-  "usr/share/doc/libhamelin-dev/examples/robot_loop/live[.]c"
+  "usr/share/doc/libhamelin-dev/examples/robot_loop/live[.]c" \
+  "usr/include/hamelin/serve/hamelin_frames[.]h" "usr/share/doc/libhamelin-dev/examples/clients/robot[.]c"
 expect "hamelin-plugins has the planners" contains hamelin-plugins \
   "$lib/hamelin/plugins/"{apf,gyro,hybrid,mppi,template}"[.]hamelin[.]so"
 expect "hamelin has the program, manual pages, completion, data and schemas" contains hamelin "usr/bin/hamelin" \

@@ -71,6 +71,8 @@ PYTHON
     prints '^home after [0-9.]+ s, clearance 0[.][0-9]+ m at least$' \
       ./live $scenes/clutter.json "$(pkg-config --variable=plugindir hamelin)"
     ok "a program in C links libhamelin by pkg-config and controls an arm"
+    cc -std=c11 -Wall -Werror /usr/share/doc/libhamelin-dev/examples/clients/robot.c -o robot -lm
+    ok "the driver in C compiles with the header of the frames alone"
     mkdir project && cd project
     cp /usr/share/doc/libhamelin-dev/examples/robot_loop/loop.cpp .
     printf '%s\n' 'cmake_minimum_required(VERSION 3.25)' 'project(loop LANGUAGES CXX)' \

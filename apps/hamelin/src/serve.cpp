@@ -63,12 +63,16 @@ control::ControllerOptions controller_options(const scene::Scene& scene,
 
 std::string describe(const serve::Server::Report& report) {
   const serve::Keeper::Counts& counts = report.counts;
-  return fmt::format(
+  std::string text = fmt::format(
       "client      {} ticks; {} of {} goals reached; stopped {} times\n"
       "frames      {} lost, {} late or repeated, {} damaged\n"
       "answer      {}\n",
       counts.ticks, report.goals_reached, report.goals, counts.stops, counts.lost, counts.late,
       counts.damaged, times(report.answer_us));
+  if (report.refused_requests > 0)
+    text += fmt::format("requests    {} not answered, because too many were waiting\n",
+                        report.refused_requests);
+  return text;
 }
 
 int serve_scene(const ServeOptions& options) {

@@ -4,12 +4,25 @@
 
 namespace hamelin::serve {
 
-void Clerk::post(std::function<void()> errand) {
+namespace {
+
+constexpr std::size_t waiting_max = 64;
+
+}  // namespace
+
+bool Clerk::post(std::function<void()> errand) {
   {
     const std::lock_guard lock(mutex_);
+    if (errands_.size() >= waiting_max) return false;
     errands_.push_back(std::move(errand));
   }
   news_.notify_all();
+  return true;
+}
+
+void Clerk::drop_waiting() {
+  const std::lock_guard lock(mutex_);
+  errands_.clear();
 }
 
 void Clerk::finish() {

@@ -12,7 +12,10 @@ namespace hamelin::serve {
 class Clerk {
  public:
   Clerk() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
-  void post(std::function<void()> errand);
+  /// @return false if too many wait already
+  [[nodiscard]] bool post(std::function<void()> errand);
+  /// Forgets what has not begun.
+  void drop_waiting();
   /// Waits until nothing is left to do.
   void finish();
 

@@ -33,6 +33,8 @@ bool Client::receive(std::uint64_t sequence, double timeout_s) {
         setpoint_ = newest;
       else
         ++damaged_;
+    } else if (news == News::closed) {
+      connection_.close();
     } else if (news == News::nothing && left_s <= 0.0) {
       return false;
     }

@@ -1,7 +1,12 @@
 #include "hamelin/serve/keeper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
+#include <utility>
+
+#include "hamelin/core/error.hpp"
 
 namespace hamelin::serve {
 
@@ -18,12 +23,19 @@ void copy(const VectorXd& from, double* to) {
 
 Keeper::Keeper(control::Controller& controller, int period_gap_max)
     : controller_(controller), gap_max_(period_gap_max) {
-  q_ = v_ = VectorXd::Zero(controller.model().dof());
+  const int dof = controller.model().dof();
+  if (dof > HAMELIN_LINK_JOINTS)
+    throw Error(ErrorCode::invalid,
+                fmt::format("robot '{}': has {} joints, expected at most {}",
+                            controller.model().robot().name, dof, int{HAMELIN_LINK_JOINTS}));
+  q_ = v_ = VectorXd::Zero(dof);
 }
 
 void Keeper::begin_client() {
   sequence_ = 0;
   request_ = HAMELIN_REQUEST_NONE;
+  counts_ = {};
+  first_ = true;
 }
 
 bool Keeper::take(const hamelin_measurement& measurement) {
@@ -46,12 +58,16 @@ bool Keeper::take(const hamelin_measurement& measurement) {
 bool Keeper::tick(const hamelin_measurement& measurement) {
   q_ = Eigen::Map<const VectorXd>(measurement.q, q_.size());
   v_ = Eigen::Map<const VectorXd>(measurement.v, v_.size());
-  time_s_ = measurement.time_s;
+  shift_time(measurement.time_s);
+  time_s_ = measurement.time_s + shift_s_;
   try {
     take_request(measurement.request);
+    if (needs_reset_) controller_.reset();
+    needs_reset_ = false;
     (void)controller_.tick(time_s_, q_, v_);
   } catch (const std::exception& e) {
-    // only a first tick refuses: a measurement that cannot be used, or no way to stop
+    // a first tick refuses a measurement that cannot be used, or has no way to stop; a planner may
+    // refuse to start again, and is asked once more in the next period
     refuse_to_begin(e.what());
     return true;
   }
@@ -59,6 +75,13 @@ bool Keeper::tick(const hamelin_measurement& measurement) {
   ++counts_.ticks;
   write(false);
   return true;
+}
+
+void Keeper::shift_time(double client_s) {
+  if (!first_) return;
+  first_ = false;
+  const double next_s = time_s_ + controller_.period_s();
+  shift_s_ = begun_ && client_s < time_s_ ? next_s - client_s : 0.0;
 }
 
 bool Keeper::miss() {
@@ -78,7 +101,7 @@ void Keeper::take_request(std::uint32_t request) {
   if (request == HAMELIN_REQUEST_STOP) controller_.stop("the client has asked for it");
   if (request == HAMELIN_REQUEST_RESUME) wants_resume_ = true;
   if (request == HAMELIN_REQUEST_RESET && begun_) {
-    controller_.reset();
+    needs_reset_ = true;
     begun_ = false;
   }
 }
@@ -91,7 +114,7 @@ void Keeper::write(bool unseen) {
   const control::Answer& answer = controller_.answer();
   const auto state_before = setpoint_.state;
   setpoint_.sequence = sequence_;
-  setpoint_.time_s = time_s_;
+  setpoint_.time_s = time_s_ - shift_s_;
   copy(answer.torque, setpoint_.torque);
   copy(answer.q_next, setpoint_.q);
   copy(answer.v_next, setpoint_.v);
@@ -103,11 +126,7 @@ void Keeper::write(bool unseen) {
   if (answer.stopping) setpoint_.flags |= HAMELIN_SETPOINT_SHIELDED;
   if (unseen) setpoint_.flags |= HAMELIN_SETPOINT_UNSEEN;
   setpoint_.goal_index = static_cast<std::uint32_t>(answer.goal_index);
-  setpoint_.lost = counts_.lost;
-  setpoint_.late = counts_.late;
-  setpoint_.damaged = counts_.damaged;
-  setpoint_.cause[answer.cause.copy(setpoint_.cause, HAMELIN_LINK_TEXT - 1)] = '\0';
-  setpoint_.checksum = hamelin_setpoint_checksum(&setpoint_);
+  finish_setpoint(answer.cause);
   if (answer.state == control::ControlState::stopping && setpoint_.state != state_before)
     ++counts_.stops;
 }
@@ -115,9 +134,16 @@ void Keeper::write(bool unseen) {
 void Keeper::refuse_to_begin(const std::string& cause) {
   setpoint_ = {};
   setpoint_.sequence = sequence_;
-  setpoint_.time_s = time_s_;
+  setpoint_.time_s = time_s_ - shift_s_;
   setpoint_.state = static_cast<std::int32_t>(control::ControlState::stopping);
   setpoint_.flags = HAMELIN_SETPOINT_NOT_BEGUN;
+  finish_setpoint(cause);
+}
+
+void Keeper::finish_setpoint(std::string_view cause) {
+  setpoint_.lost = counts_.lost;
+  setpoint_.late = counts_.late;
+  setpoint_.damaged = counts_.damaged;
   setpoint_.cause[cause.copy(setpoint_.cause, HAMELIN_LINK_TEXT - 1)] = '\0';
   setpoint_.checksum = hamelin_setpoint_checksum(&setpoint_);
 }

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -22,6 +23,8 @@ namespace hamelin::serve {
 namespace {
 
 constexpr std::size_t text_max = 1 << 20;
+// So long an end may take to read what it was sent, or to answer a connection [s].
+constexpr double send_timeout_s = 1.0, connect_timeout_s = 5.0;
 
 [[noreturn]] void fail(const std::string& what) {
   throw Error(ErrorCode::io, fmt::format("{}: {}", what, std::strerror(errno)));
@@ -45,15 +48,18 @@ Descriptor make_socket() {
   return made;
 }
 
-// Whether there is something to read.
-bool ready(int fd, double timeout_s) {
-  pollfd one{fd, POLLIN, 0};
+enum class Event { none, ready, end };
+
+// Waits until a socket can be read or written, or the other end is closed.
+Event wait_for(int fd, short events, double timeout_s) {
+  pollfd one{fd, events, 0};
   timespec limit{};
   if (timeout_s >= 0.0) {
     limit.tv_sec = static_cast<time_t>(timeout_s);
     limit.tv_nsec = static_cast<long>(1e9 * (timeout_s - std::floor(timeout_s)));
   }
-  return ::ppoll(&one, 1, timeout_s < 0.0 ? nullptr : &limit, nullptr) > 0;
+  if (::ppoll(&one, 1, timeout_s < 0.0 ? nullptr : &limit, nullptr) <= 0) return Event::none;
+  return (one.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0 ? Event::end : Event::ready;
 }
 
 // The first message of a server: the magic number, and the descriptor of the memory.
@@ -74,6 +80,21 @@ Descriptor receive_memory(int socket) {
   Descriptor memory(fd);
   if (got != sizeof magic || magic != HAMELIN_LINK_MAGIC) return {};
   return memory;
+}
+
+// Removes a socket that a server has left behind, but none that a program listens to: only such a
+// one refuses connections.
+void remove_stale_socket(const std::filesystem::path& path, const sockaddr* where, socklen_t size) {
+  std::error_code unknown;
+  if (!std::filesystem::is_socket(path, unknown)) return;
+  const Descriptor other(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!other.is_open()) fail("socket");
+  if (::connect(other.get(), where, size) != 0 && errno == ECONNREFUSED) {
+    std::filesystem::remove(path, unknown);
+    return;
+  }
+  throw Error(ErrorCode::io, fmt::format("{}: another server listens, expected a socket of its own",
+                                         path.string()));
 }
 
 }  // namespace
@@ -146,6 +167,10 @@ Connection Connection::to(const std::filesystem::path& socket, LinkMemory& memor
   if (::connect(made.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
     throw Error(ErrorCode::io, fmt::format("{}: {}, expected the socket of `hamelin serve`",
                                            socket.string(), std::strerror(errno)));
+  if (wait_for(made.get(), POLLIN, connect_timeout_s) == Event::none)
+    throw Error(ErrorCode::io, fmt::format("{}: no message within {} s, expected the memory of "
+                                           "`hamelin serve`",
+                                           socket.string(), connect_timeout_s));
   Descriptor received = receive_memory(made.get());
   if (!received.is_open())
     throw Error(ErrorCode::io,
@@ -156,30 +181,35 @@ Connection Connection::to(const std::filesystem::path& socket, LinkMemory& memor
   return Connection(std::move(made));
 }
 
-News Connection::wait(double timeout_s, std::uint64_t& sequence, std::string& text) {
+News Connection::wait(double timeout_s, std::uint64_t& sequence, std::string& text) const {
   if (!is_open()) return News::closed;
-  if (!ready(socket_.get(), timeout_s)) return News::nothing;
+  const Event event = wait_for(socket_.get(), POLLIN | POLLRDHUP, timeout_s);
+  if (event == Event::none) return News::nothing;
   const ssize_t size = ::recv(socket_.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC | MSG_DONTWAIT);
   if (size == static_cast<ssize_t>(sizeof sequence) &&
-      ::recv(socket_.get(), &sequence, sizeof sequence, MSG_DONTWAIT) == size)
+      ::recv(socket_.get(), &sequence, sizeof sequence, MSG_DONTWAIT) == size) {
+    std::atomic_thread_fence(std::memory_order_acquire);  // the frame is read after its number
     return News::frame;
-  if (size <= 0) {
-    if (size < 0 && (errno == EAGAIN || errno == EINTR)) return News::nothing;
-    close();
-    return News::closed;
   }
+  if (size < 0 && (errno == EAGAIN || errno == EINTR)) return News::nothing;
+  // an empty message looks like the end, but for the state of the socket
+  if (size < 0 || (size == 0 && event == Event::end)) return News::closed;
   text.resize(std::min(static_cast<std::size_t>(size), text_max));
   (void)::recv(socket_.get(), text.data(), text.size(), MSG_DONTWAIT);
   return News::text;
 }
 
 bool Connection::ring(std::uint64_t sequence) const noexcept {
-  return ::send(socket_.get(), &sequence, sizeof sequence, MSG_NOSIGNAL | MSG_DONTWAIT) ==
-         sizeof sequence;
+  std::atomic_thread_fence(std::memory_order_release);  // the frame is written before its number
+  const ssize_t sent =
+      ::send(socket_.get(), &sequence, sizeof sequence, MSG_NOSIGNAL | MSG_DONTWAIT);
+  // an end that has not read the numbers before is there, and reads the newest frame by those
+  return sent == sizeof sequence || (sent < 0 && errno == EAGAIN);
 }
 
 bool Connection::send(std::string_view text) const noexcept {
-  return ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL) ==
+  if (wait_for(socket_.get(), POLLOUT, send_timeout_s) != Event::ready) return false;
+  return ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT) ==
          static_cast<ssize_t>(text.size());
 }
 
@@ -204,14 +234,7 @@ bool Connection::hand_over(const LinkMemory& memory) const noexcept {
 Listener::Listener(std::filesystem::path socket) : path_(std::move(socket)) {
   const sockaddr_un address = address_of(path_);
   const auto* const where = reinterpret_cast<const sockaddr*>(&address);
-  if (std::filesystem::is_socket(path_)) {
-    const Descriptor other = make_socket();
-    if (::connect(other.get(), where, sizeof address) == 0)
-      throw Error(ErrorCode::io, fmt::format("{}: another server listens, expected a socket of its "
-                                             "own",
-                                             path_.string()));
-    std::filesystem::remove(path_);
-  }
+  remove_stale_socket(path_, where, sizeof address);
   socket_ = make_socket();
   // nobody else may move the arm
   const mode_t mask = ::umask(0077);
@@ -226,7 +249,7 @@ Listener::~Listener() {
 }
 
 std::optional<Connection> Listener::accept(double timeout_s) {
-  if (!ready(socket_.get(), timeout_s)) return std::nullopt;
+  if (wait_for(socket_.get(), POLLIN, timeout_s) == Event::none) return std::nullopt;
   Descriptor client(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
   if (!client.is_open()) return std::nullopt;
   return Connection(std::move(client));

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "hamelin/control/controller.hpp"
 #include "hamelin/serve/hamelin_frames.h"
@@ -22,9 +23,11 @@ class Keeper {
   };
   /// @param controller kept by reference, as are the frames
   /// @param period_gap_max so many periods in a row are made up for if measurements are missing
+  /// @throws Error invalid for an arm with more joints than a frame has
   Keeper(control::Controller& controller, int period_gap_max);
 
-  /// Another client begins: its sequence numbers start again.
+  /// Another client begins: its sequence numbers and counts start again. If its clock is behind that
+  /// of the client before, its times are shifted, because those of a controller may not fall.
   void begin_client();
   /// Takes a measurement. @return whether there is a set point for it; else it is not used
   [[nodiscard]] bool take(const hamelin_measurement& measurement);
@@ -40,17 +43,22 @@ class Keeper {
 
  private:
   [[nodiscard]] bool tick(const hamelin_measurement& measurement);
-  void tick_unseen();
   void take_request(std::uint32_t request);
+  void shift_time(double client_s);
   void write(bool unseen);
   void refuse_to_begin(const std::string& cause);
+  /// Adds the counts, the cause and the checksum.
+  void finish_setpoint(std::string_view cause);
 
   control::Controller& controller_;
   int gap_max_;
   bool begun_ = false;
   bool wants_resume_ = false;
+  bool needs_reset_ = false;
   std::uint64_t sequence_ = 0;  ///< of the last period
-  double time_s_ = 0.0;
+  double time_s_ = 0.0;         ///< of the last period, for the controller
+  double shift_s_ = 0.0;        ///< time_s_ less the client's time
+  bool first_ = true;           ///< whether the client's first measurement is awaited
   std::uint32_t request_ = HAMELIN_REQUEST_NONE;
   Eigen::VectorXd q_, v_;
   Counts counts_;

@@ -62,9 +62,11 @@ class Connection {
   void close() noexcept { socket_ = {}; }
   /// Waits for a message. @param timeout_s at most so long; below 0: for ever
   /// @param sequence of a frame that is new in the memory @param text of another message
-  [[nodiscard]] News wait(double timeout_s, std::uint64_t& sequence, std::string& text);
+  [[nodiscard]] News wait(double timeout_s, std::uint64_t& sequence, std::string& text) const;
   /// Says that a frame is new. @return whether the other end is there
   bool ring(std::uint64_t sequence) const noexcept;
+  /// Sends a text, also on another thread. @return false if the other end has gone, or has not read
+  /// what it was sent before for a second
   bool send(std::string_view text) const noexcept;
   /// Hands over the memory, as the first message.
   bool hand_over(const LinkMemory& memory) const noexcept;

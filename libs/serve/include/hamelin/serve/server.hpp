@@ -34,6 +34,7 @@ class Server {
     TimeHistogram answer_us;  ///< from the message of a measurement to that of its set point
     control::ControlState state = control::ControlState::running;
     std::size_t goals_reached = 0, goals = 0;
+    std::uint64_t refused_requests = 0;  ///< not answered, because too many were waiting
   };
   /// @param controller kept by reference; only the server lets it tick
   /// @throws Error io, or invalid for an arm with too many joints
@@ -43,18 +44,21 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Serves until `stop` is set.
-  /// @param gone is given a report of each client when it has gone; false ends
+  /// Serves until `stop` is set. @param gone is called when a client has gone; false ends
   void run(const std::atomic<bool>& stop, const std::function<bool(const Report&)>& gone);
 
  private:
-  void serve(Connection client, const std::atomic<bool>& stop);
+  void serve(const Connection& client, const std::atomic<bool>& stop);
+  /// Takes the measurement that is in the memory. @return whether it has its set point
+  [[nodiscard]] bool take_measurement(const Connection& client, double since_s);
+  /// Hands over a memory of the client's own, which the one before cannot write to.
+  [[nodiscard]] bool hand_over_memory(const Connection& client);
   /// Hands the set point of the last period to the client.
   void answer(const Connection& client);
   void answer_text(const Connection& client, std::string text);
   void turn_away_others();
-  /// On a thread of its own: it takes longer than a period.
-  void resume();
+  /// On a thread of its own: it takes longer than a period. @return false if too much waits there
+  [[nodiscard]] bool resume();
 
   control::Controller& controller_;
   ServerOptions options_;
