@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <utility>
 
@@ -59,12 +60,13 @@ bool Keeper::tick(const hamelin_measurement& measurement) {
   q_ = Eigen::Map<const VectorXd>(measurement.q, q_.size());
   v_ = Eigen::Map<const VectorXd>(measurement.v, v_.size());
   shift_time(measurement.time_s);
-  time_s_ = measurement.time_s + shift_s_;
+  const double time_s = measurement.time_s + shift_s_;
+  time_s_ = std::isfinite(time_s) ? time_s : time_s_ + controller_.period_s();
   try {
     take_request(measurement.request);
     if (needs_reset_) controller_.reset();
     needs_reset_ = false;
-    (void)controller_.tick(time_s_, q_, v_);
+    (void)controller_.tick(time_s, q_, v_);
   } catch (const std::exception& e) {
     // a first tick refuses a measurement that cannot be used, or has no way to stop; a planner may
     // refuse to start again, and is asked once more in the next period
@@ -78,7 +80,7 @@ bool Keeper::tick(const hamelin_measurement& measurement) {
 }
 
 void Keeper::shift_time(double client_s) {
-  if (!first_) return;
+  if (!first_ || !std::isfinite(client_s)) return;
   first_ = false;
   const double next_s = time_s_ + controller_.period_s();
   shift_s_ = begun_ && client_s < time_s_ ? next_s - client_s : 0.0;

@@ -41,8 +41,8 @@ enum {
 };
 
 typedef struct hamelin_measurement {
-  uint64_t sequence;             /* of the period: 1 in the first one, then one more in each */
-  double time_s;                 /* when it was measured; does not fall */
+  uint64_t sequence; /* of the period: from 1; after a pause the newest set point's + 1 */
+  double time_s;     /* when it was measured; does not fall */
   double q[HAMELIN_LINK_JOINTS]; /* joint positions; zeros after the last joint */
   double v[HAMELIN_LINK_JOINTS]; /* joint velocities; not used if the scene has them estimated */
   uint32_t request;              /* HAMELIN_REQUEST_... */

@@ -26,8 +26,8 @@ class Keeper {
   /// @throws Error invalid for an arm with more joints than a frame has
   Keeper(control::Controller& controller, int period_gap_max);
 
-  /// Another client begins: its sequence numbers and counts start again. If its clock is behind that
-  /// of the client before, its times are shifted, because those of a controller may not fall.
+  /// Another client begins: its sequence numbers and counts start again. If its clock is behind
+  /// that of the client before, its times are shifted, because those of a controller may not fall.
   void begin_client();
   /// Takes a measurement. @return whether there is a set point for it; else it is not used
   [[nodiscard]] bool take(const hamelin_measurement& measurement);
