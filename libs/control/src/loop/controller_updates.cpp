@@ -97,7 +97,7 @@ std::uint64_t Controller::attach(const scene::Payload& payload, const VectorXd& 
   const std::string where = fmt::format("payload '{}'", payload.name);
   scene::check(payload, where);
   const std::lock_guard lock(load_mutex_);
-  std::vector<scene::Payload> all = payloads();
+  std::vector<scene::Payload> all = newest_load().payloads;
   for (const auto& other : all)
     if (other.name == payload.name)
       throw Error(ErrorCode::invalid,
@@ -108,7 +108,7 @@ std::uint64_t Controller::attach(const scene::Payload& payload, const VectorXd& 
 
 std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
   const std::lock_guard lock(load_mutex_);
-  std::vector<scene::Payload> all = payloads();
+  std::vector<scene::Payload> all = newest_load().payloads;
   const auto found = std::find_if(all.begin(), all.end(),
                                   [&](const auto& payload) { return payload.name == name; });
   if (found == all.end()) {
@@ -125,12 +125,14 @@ std::uint64_t Controller::detach(std::string_view name, const VectorXd& q) {
 std::vector<std::string> Controller::attached() const {
   const std::lock_guard lock(load_mutex_);
   std::vector<std::string> names;
-  for (const auto& payload : payloads()) names.push_back(payload.name);
+  for (const auto& payload : newest_load().payloads) names.push_back(payload.name);
   return names;
 }
 
-const std::vector<scene::Payload>& Controller::payloads() const {
-  return load_number_ > 0 && refused_load_.load() == load_number_ ? accepted_ : attached_;
+Controller::Carried Controller::newest_load() const {
+  const bool refused = load_number_ > 0 && refused_load_.load() == load_number_;
+  if (refused) return {used_load_.load(), accepted_};
+  return {load_number_, attached_};
 }
 
 model::Model Controller::model_carrying(std::span<const scene::Payload> payloads,
@@ -180,9 +182,8 @@ void Controller::resume() {
   if (stop == 0) return;
   VectorXd q(nominal_.dof());
   for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = measured_[static_cast<std::size_t>(i)].load();
-  const bool refused = load_number_ > 0 && refused_load_.load() == load_number_;
-  publish_arm(refused ? used_load_.load() : load_number_, stop,
-              model_carrying(refused ? accepted_ : attached_, q), q);
+  const Carried load = newest_load();
+  publish_arm(load.number, stop, model_carrying(load.payloads, q), q);
 }
 
 void Controller::stop(std::string_view cause) {

@@ -258,9 +258,13 @@ class Controller {
                    const Eigen::VectorXd& q);
   [[nodiscard]] model::Model model_carrying(std::span<const scene::Payload> payloads,
                                             const Eigen::VectorXd& q) const;
-  /// What is attached, or will be if the tick does not refuse it. The caller has locked
-  /// load_mutex_.
-  [[nodiscard]] const std::vector<scene::Payload>& payloads() const;
+  /// What is attached, or will be if the tick does not refuse it, and its number. The caller has
+  /// locked load_mutex_.
+  struct Carried {
+    std::uint64_t number;
+    const std::vector<scene::Payload>& payloads;
+  };
+  [[nodiscard]] Carried newest_load() const;
   void take_load();
   void refuse_to_go_on(const LineBuffer& defect);
   void refuse_load(std::uint64_t number, const LineBuffer& defect);
