@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -187,10 +186,8 @@ News Connection::wait(double timeout_s, std::uint64_t& sequence, std::string& te
   if (event == Event::none) return News::nothing;
   const ssize_t size = ::recv(socket_.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC | MSG_DONTWAIT);
   if (size == static_cast<ssize_t>(sizeof sequence) &&
-      ::recv(socket_.get(), &sequence, sizeof sequence, MSG_DONTWAIT) == size) {
-    std::atomic_thread_fence(std::memory_order_acquire);  // the frame is read after its number
+      ::recv(socket_.get(), &sequence, sizeof sequence, MSG_DONTWAIT) == size)
     return News::frame;
-  }
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return News::nothing;
   // an empty message looks like the end, but for the state of the socket
   if (size < 0 || (size == 0 && event == Event::end)) return News::closed;
@@ -199,8 +196,9 @@ News Connection::wait(double timeout_s, std::uint64_t& sequence, std::string& te
   return News::text;
 }
 
+// The kernel passes a message on under a lock, so that the frame, which was written before its
+// number was sent, is read whole by whoever has received the number.
 bool Connection::ring(std::uint64_t sequence) const noexcept {
-  std::atomic_thread_fence(std::memory_order_release);  // the frame is written before its number
   const ssize_t sent =
       ::send(socket_.get(), &sequence, sizeof sequence, MSG_NOSIGNAL | MSG_DONTWAIT);
   // an end that has not read the numbers before is there, and reads the newest frame by those
