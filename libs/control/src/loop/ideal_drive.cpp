@@ -45,9 +45,7 @@ bool IdealDrive::propose(const planning::CommandBuffers& answer) {
   arm_.departure.energy = arm_.integrator->energy(arm_.state, arm_.v);
   arm_.departure.potential = answer.raw().potential_J != 0.0 || !gradient_.isZero(0.0);
   set_channels(answer);
-  if (arm_.departure.potential)
-    arm_.integrator->kick(arm_.state, impulse_ = -0.5 * step_s_ * gradient_);
-  close_with_kick();
+  kick();
   return true;
 }
 
@@ -82,11 +80,12 @@ void IdealDrive::set_node_velocity(const planning::CommandBuffers& answer) {
   arm_.integrator->set_velocity(arm_.state, arm_.departure.set_v);
 }
 
-// With the gradient here, until the one at the next node is known. A potential that has acted once
-// may act again at any node.
-void IdealDrive::close_with_kick() {
+// Both half-kicks of the step are by the gradient here, until the one at the next node is known. A
+// potential that has acted once may act again at any node.
+void IdealDrive::kick() {
   gradient_before_ = gradient_;
   arm_.closing_kick = -0.5 * step_s_ * gradient_;
+  if (arm_.departure.potential) arm_.integrator->kick(arm_.state, arm_.closing_kick);
   arm_.closes_with_kick = arm_.closes_with_kick || arm_.departure.potential;
   if (arm_.closes_with_kick) arm_.integrator->velocity(arm_.state, arm_.departure.v);
 }

@@ -30,7 +30,7 @@ class IdealDrive final : public Drive {
   void correct_kick();
   void set_channels(const planning::CommandBuffers& answer);
   void set_node_velocity(const planning::CommandBuffers& answer);
-  void close_with_kick();
+  void kick();
 
   DiscreteArm& arm_;
   double step_s_;
