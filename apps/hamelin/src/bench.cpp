@@ -271,11 +271,7 @@ void add_run_command(CLI::App& parent, int& exit_code) {
       ->check(CLI::PositiveNumber);
   command->add_flag("--markdown", options->markdown, "print the tables in Markdown");
   add_set_options(*command, *options);
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   command->callback([options, &exit_code] { exit_code = bench_run(*options); });
 }
 

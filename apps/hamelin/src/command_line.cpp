@@ -199,6 +199,14 @@ std::optional<std::filesystem::path> prefix() {
   return program.parent_path().parent_path();
 }
 
+void add_plugin_path_option(CLI::App& command, std::vector<std::filesystem::path>& directories) {
+  command
+      .add_option("--plugin-path", directories,
+                  "directory to search first for planners; may be repeated")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+}
+
 std::vector<std::filesystem::path> plugin_path(const std::vector<std::filesystem::path>& given) {
   std::vector<std::filesystem::path> own;
   if (const auto base = prefix()) {

@@ -62,6 +62,8 @@ void set_command_line(std::vector<std::string> words);
 /// The installation prefix, which holds this program's bin/; none if the system does not reveal it.
 [[nodiscard]] std::optional<std::filesystem::path> prefix();
 
+/// Adds --plugin-path DIR, which may be repeated.
+void add_plugin_path_option(CLI::App& command, std::vector<std::filesystem::path>& directories);
 /// The directories searched for planners: `given`, HAMELIN_PLUGIN_PATH, then this program's prefix.
 [[nodiscard]] std::vector<std::filesystem::path> plugin_path(
     const std::vector<std::filesystem::path>& given);

@@ -169,11 +169,7 @@ void add_replay(CLI::App& app, int& exit_code) {
           "with --verify: numbers may differ by E times max(1, |logged|); 0 means bit for bit")
       ->type_name("E")
       ->check(CLI::Range(0.0, 1e300));
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   add_record_options(*command, options->record);
   command->callback([options, &exit_code] { exit_code = replay(*options); });
 }

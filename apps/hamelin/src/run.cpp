@@ -103,11 +103,7 @@ void add_run(CLI::App& app, int& exit_code) {
   add_seed_option(*command, options->flags);
   add_set_option(*command, options->flags.set,
                  "set one value of the scene, e.g. /planner/params/gain=2; may be repeated");
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   command
       ->add_option("--target", options->target,
                    "follow the targets of a file, or of standard input (-): JSON lines with time_s "

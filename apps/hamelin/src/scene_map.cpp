@@ -275,11 +275,7 @@ void add_scene_crop(CLI::App& scene) {
           "keep unknown space unknown, or mark as free the part that touches the region "
           "(default keep)"),
       {"keep", "free"});
-  command
-      ->add_option("--plugin-path", flags->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, flags->plugin_path);
   command
       ->add_option("-o,--output", flags->output,
                    "map to write (.bt), in metres, so that it needs no scale")

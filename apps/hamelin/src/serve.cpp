@@ -181,11 +181,7 @@ void add_serve(CLI::App& app, int& exit_code) {
   add_seed_option(*command, options->flags);
   add_set_option(*command, options->flags.set,
                  "set one value of the scene, e.g. /planner/params/gain=2; may be repeated");
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   command->callback([options, &exit_code] { exit_code = serve_scene(*options); });
 }
 

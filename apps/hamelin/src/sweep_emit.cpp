@@ -125,11 +125,7 @@ void add_sweep_emit(CLI::App& sweep, int& exit_code) {
                    "path of hamelin where the script runs (default this program's; with --transfer "
                    "`hamelin`)")
       ->type_name("PATH");
-  command
-      ->add_option("--plugin-path", options->script.plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->script.plugin_path);
   command->add_option("-o,--output", options->output, "file to write (default standard output)")
       ->type_name("FILE");
   command->callback([options, &exit_code] {

@@ -182,11 +182,7 @@ void add_sweep_pairs(CLI::App& sweep, int& exit_code) {
       ->type_name("NAME|PATH");
   add_set_option(*pairs, options->flags.set,
                  "set one value of the scene, e.g. /map/file=cell.bt; may be repeated");
-  pairs
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*pairs, options->plugin_path);
   pairs->add_flag("--json", options->json, "print the summary as JSON");
   pairs->add_option("-o,--output", options->output, "write one JSON line per run")
       ->type_name("RECORDS.jsonl");

@@ -213,11 +213,7 @@ void add_sweep_plan(CLI::App& sweep, int& exit_code) {
                           "(default touch)"),
       {"touch", "centre"});
   add_generated_scenes(*command, *flags);
-  command
-      ->add_option("--plugin-path", flags->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, flags->plugin_path);
   command->add_flag("--json", flags->json, "print a summary of the plan as JSON");
   command->callback([flags, &exit_code] { exit_code = sweep_plan(*flags); });
 }

@@ -135,11 +135,7 @@ void add_sweep_run(CLI::App& sweep, int& exit_code) {
       ->check(CLI::PositiveNumber);
   command->add_flag("--fresh", options->sweep.fresh, "delete the existing records and start again")
       ->excludes("--shard");
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   command->callback([options, &exit_code] { exit_code = sweep_run(*options); });
 }
 
@@ -156,11 +152,7 @@ void add_sweep_one(CLI::App& sweep, int& exit_code) {
   command->add_option("--seed", options->flags.seed, "seed of all random numbers")
       ->type_name("S")
       ->check(unsigned_range());
-  command
-      ->add_option("--plugin-path", options->plugin_path,
-                   "directory to search first for planners; may be repeated")
-      ->type_name("DIR")
-      ->allow_extra_args(false);
+  add_plugin_path_option(*command, options->plugin_path);
   command->callback([options, &exit_code] { exit_code = sweep_one(*options); });
 }
 
