@@ -9,6 +9,7 @@
 #include "hamelin/description/robot_io.hpp"
 #include "hamelin/model/make_chain.hpp"
 #include "hamelin/test/robots.hpp"
+#include "loop/state_estimator.hpp"
 #include "loop/torque_pipeline.hpp"
 #include "shield/shield.hpp"
 #include "shield/straying.hpp"
@@ -51,9 +52,12 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
   const double M = inertia[0], T = period_s;
   control::TorquePipeline pipeline(model, static_cast<std::size_t>(delay_periods), T);
   pipeline.start_from(VectorXd::Zero(1));
+  control::StateEstimator estimate(1, T);
   const bool ideal = scene.actuation.type == scene::ActuationType::ideal;
   VectorXd q = VectorXd::Zero(1), v = VectorXd::Constant(1, 1.0), torque = VectorXd::Zero(1);
   std::deque<double> waiting(static_cast<std::size_t>(delay_periods), 0.0);
+  estimate.start(q, v);
+  const auto observe = [&] { estimate.update(q, v, pipeline.acting() / M); };
   const auto move = [&](double disturbance) {
     waiting.push_back(torque[0]);
     const double acting = waiting.front();
@@ -65,8 +69,8 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
     }
   };
   for (int k = 0; k < 300; ++k) {  // the disturbance is known, or an integral holds against it
-    pipeline.observe(ws, q, v);
-    torque[0] = ideal ? c : -M * pipeline.disturbance()[0];
+    if (k > 0) observe();
+    torque[0] = ideal ? c : -M * estimate.disturbance()[0];
     pipeline.send(torque);
     move(-c);
   }
@@ -78,8 +82,8 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
   const int late = ideal ? 0 : delay_periods;
   VectorXd at(1), rate(1);
   for (int k = 0; k == 0 || !shield.stop().at_rest(); ++k) {
-    pipeline.observe(ws, q, v);
-    pipeline.predict(ws, q, v);
+    observe();
+    pipeline.predict(ws, q, v, estimate.disturbance());
     const Shield::Node node = ideal ? Shield::Node{q, v} : Shield::Node{pipeline.q(), pipeline.v()};
     if (k == 0) shield.start({environment, 0, 0.0}, node);
     if (k >= late) {
@@ -88,7 +92,7 @@ double strayed_at_reversal(const model::Model& model, const scene::Scene& scene,
     }
     shield.refuse();
     const VectorXd none = VectorXd::Zero(1);
-    shield.stop().torque(node, ideal ? none : pipeline.disturbance(), pipeline.last(), torque);
+    shield.stop().torque(node, ideal ? none : estimate.disturbance(), pipeline.last(), torque);
     pipeline.send(torque);
     move(c);
   }

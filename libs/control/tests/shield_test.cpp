@@ -11,7 +11,7 @@
 #include "hamelin/core/rng.hpp"
 #include "hamelin/test/allocations.hpp"
 #include "hamelin/test/robots.hpp"
-#include "loop/torque_pipeline.hpp"
+#include "loop/state_estimator.hpp"
 
 using namespace hamelin;
 using control::BrakingRate;
@@ -226,19 +226,21 @@ TEST_CASE("friction does not make an arm swing that a stop holds", "[shield]") {
   constexpr double T = 0.001, friction_speed = 0.01;
   constexpr int substeps = 100;  // friction is stiff
   Shield shield(scene, believed, nullptr, T, {});
-  control::TorquePipeline pipeline(believed, 0, T);
+  control::StateEstimator estimate(arm.dof(), T);
   dynamics::Workspace ws(arm), own(believed);
-  VectorXd q = scene.start_q, v = VectorXd::Constant(arm.dof(), 0.5), a = v, tau = v;
+  VectorXd q = scene.start_q, v = VectorXd::Constant(arm.dof(), 0.5), a = v, tau = v, expected = v,
+           last = v;
   dynamics::gravity_torque(believed, own, q, tau);
-  pipeline.start_from(tau);
+  estimate.start(q, v);
   const scene::Environment environment;
   shield.start({environment, 0, 0.0}, {q, v});
   VectorXd lowest = q, highest = q;
   for (int k = 0; k < 1500; ++k) {
-    pipeline.observe(own, q, v);
+    if (k > 0) estimate.update(q, v, expected);
     shield.refuse();
-    shield.stop().torque({q, v}, pipeline.disturbance(), pipeline.last(), tau);
-    pipeline.send(tau);
+    last = tau;
+    shield.stop().torque({q, v}, estimate.disturbance(), last, tau);
+    dynamics::forward_dynamics(believed, own, q, v, tau, expected);
     for (int i = 0; i < substeps; ++i) {
       const VectorXd against = friction.cwiseProduct((v / friction_speed).array().tanh().matrix());
       dynamics::forward_dynamics(arm, ws, q, v, tau - against, a);

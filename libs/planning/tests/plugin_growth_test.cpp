@@ -204,6 +204,15 @@ TEST_CASE("in hosts without a future of obstacles, all obstacles stand", "[plann
   CHECK(Tick(tick, 3).moving_count() == 0);
   tick.struct_size = sizeof tick;
   CHECK(Tick(tick, 3).moving_count() == 5);
+
+  CHECK_FALSE(Tick(tick, 3).disturbance());  // null
+  const std::array<double, 3> disturbance{0.1, 0.2, 0.3};
+  tick.disturbance = disturbance.data();
+  tick.struct_size = offsetof(hamelin_tick, disturbance);
+  CHECK_FALSE(Tick(tick, 3).disturbance());
+  tick.struct_size = sizeof tick;
+  REQUIRE(Tick(tick, 3).disturbance());
+  CHECK((*Tick(tick, 3).disturbance())[2] == 0.3);
 }
 
 TEST_CASE("in services that do not move obstacles, none moves", "[planning][plugin]") {

@@ -259,10 +259,9 @@ py::object tick_reference(const PyTick& t) {
   return out;
 }
 
-py::object tick_torque(const PyTick& t) {
-  const auto torque = t.get().torque();
-  if (!torque) return py::none();
-  return to_array(Eigen::VectorXd(*torque));
+py::object array_or_none(const std::optional<planning::ConstVectorMap>& values) {
+  if (!values) return py::none();
+  return to_array(Eigen::VectorXd(*values));
 }
 
 // hamelin.Command: arrays that a planner writes, copied to the host after its tick.
@@ -606,9 +605,14 @@ void add_tick(py::module_& module) {
           "reference", &tick_reference,
           "Where the arm should be by the trajectory of its goal: a dict with q,\n"
           "v, a, time_s, rate; None without a trajectory.")
-      .def_property_readonly("torque", &tick_torque,
-                             "Joint torques sent to the arm last, shape (n,); None under ideal\n"
-                             "actuation.")
+      .def_property_readonly(
+          "torque", [](const PyTick& t) { return array_or_none(t.get().torque()); },
+          "Joint torques sent to the arm last, shape (n,); None under ideal\n"
+          "actuation.")
+      .def_property_readonly(
+          "disturbance", [](const PyTick& t) { return array_or_none(t.get().disturbance()); },
+          "Joint accelerations that the model does not explain, because of friction or wrong\n"
+          "masses, shape (n,); None where no torques are sent.")
       .def_property_readonly(
           "world", [](const PyTick& t) { return t.get().world(); },
           "Number of the world's snapshot; changes with obstacles and map.")

@@ -10,8 +10,8 @@
  * server of torques: what torques do to an arm needs a model of it, see `hamelin plant`.
  *
  * --resume lets an arm go on that was stopped when the client before has gone. The program ends
- * when the goals are reached (exit code 0), when the arm cannot begin, gives up or stalls (1), and
- * after Ctrl-C, when the server has brought the arm to rest (130).
+ * when the goals are reached (exit code 0), when the arm cannot begin, gives up, stalls or remains
+ * stopped (1), and after Ctrl-C, when the server has brought the arm to rest (130).
  */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -32,6 +32,8 @@
 enum { RUNNING = 0, REACHED = 1, STALLED = 2, GAVE_UP = 3, STOPPING = 4 };
 /* After so many periods in a row without a set point the driver holds the arm by itself. */
 enum { MISSED_MAX = 20 };
+/* After so many periods at rest in a stop that nobody ends the program does. */
+enum { RESTS_MAX = 2000 };
 
 struct arm { /* the simulated one */
   double q[HAMELIN_LINK_JOINTS], v[HAMELIN_LINK_JOINTS];
@@ -161,17 +163,17 @@ static void add_period(struct timespec* at, double period_s) {
 }
 
 /* Whether the run is over, and then how the program ends. */
-static int is_over(const struct link* link, int* code) {
+static int is_over(const struct link* link, int* rests_for, int* code) {
   const hamelin_setpoint* const setpoint = &link->setpoint;
   double speed = 0.0;
   for (uint32_t j = 0; j < link->memory->joints; ++j) speed = fmax(speed, fabs(setpoint->v[j]));
-  const int rests = setpoint->state == STOPPING && speed < 1e-6;
+  *rests_for = setpoint->state == STOPPING && speed < 1e-6 ? *rests_for + 1 : 0;
   *code = interrupted ? 130 : 1;
   if ((setpoint->flags & HAMELIN_SETPOINT_NOT_BEGUN) != 0) return 1;
   if (setpoint->state == REACHED) *code = 0;
   if (setpoint->state == REACHED || setpoint->state == STALLED || setpoint->state == GAVE_UP)
     return 1;
-  return interrupted && rests;
+  return *rests_for > (interrupted ? 0 : RESTS_MAX);
 }
 
 /* One period: a measurement goes out, and what has come back by its end acts on the arm. Returns -1
@@ -205,7 +207,7 @@ static void wait_for_period(struct timespec* due, double period_s) {
 static int run(struct link* link, struct arm* arm, uint32_t request) {
   hamelin_measurement frame = {0};
   struct timespec due;
-  int code = 1, missed = 0;
+  int code = 1, missed = 0, rests_for = 0;
   uint64_t lost = 0;
   frame.request = request;
   clock_gettime(CLOCK_MONOTONIC, &due);
@@ -214,7 +216,7 @@ static int run(struct link* link, struct arm* arm, uint32_t request) {
     if (exchange(link, arm, &frame, &missed) != 0) return 1;
     lost += missed > 0;
     wait_for_period(&due, link->memory->period_s);
-  } while (!is_over(link, &code));
+  } while (!is_over(link, &rests_for, &code));
   printf("%llu periods, %llu without a set point; state %d, goal %u%s%s\n",
          (unsigned long long)frame.sequence, (unsigned long long)lost, link->setpoint.state,
          link->setpoint.goal_index, link->setpoint.cause[0] != 0 ? ": " : "", link->setpoint.cause);

@@ -8,8 +8,8 @@ Replace Arm.read() and Arm.write() by calls of the arm's own interface. As they 
 servos that follow their set points exactly, so that a server of torques is refused: what torques do
 to an arm needs a model of it, see `hamelin plant`.
 
-The program ends when the goals are reached (exit code 0), when the arm cannot begin, gives up or
-stalls (1), and after Ctrl-C, when the server has brought the arm to rest (130).
+The program ends when the goals are reached (exit code 0), when the arm cannot begin, gives up,
+stalls or remains stopped (1), and after Ctrl-C, when the server has brought the arm to rest (130).
 """
 
 import argparse
@@ -37,6 +37,7 @@ REACHED, STALLED, GAVE_UP, STOPPING = 1, 2, 3, 4
 NOT_BEGUN = 8  # flag of a set point
 
 MISSED_MAX = 20  # after so many periods in a row without a set point the driver holds the arm
+RESTS_MAX = 2000  # after so many periods at rest in a stop that nobody ends the program does
 
 
 class Arm:
@@ -130,6 +131,7 @@ class Driver:
         self.link, self.arm, self.request = link, arm, request
         self.sequence, self.missed, self.lost = 0, 0, 0
         self.interrupted = False
+        self.rests_for = 0
 
     def interrupt(self, *_):
         self.interrupted = True
@@ -162,7 +164,10 @@ class Driver:
         if setpoint.flags & NOT_BEGUN or setpoint.state in (STALLED, GAVE_UP):
             return 1
         rests = setpoint.state == STOPPING and max(map(abs, setpoint.v)) < 1e-6
-        return 130 if self.interrupted and rests else None
+        self.rests_for = self.rests_for + 1 if rests else 0
+        if self.interrupted:
+            return 130 if rests else None
+        return 1 if self.rests_for > RESTS_MAX else None
 
     def run(self):
         due_s = time.monotonic()

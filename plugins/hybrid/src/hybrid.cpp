@@ -19,7 +19,6 @@
 #include "law.hpp"
 #include "margins.hpp"
 #include "memory.hpp"
-#include "observer.hpp"
 #include "obstacles.hpp"
 #include "params_schema.hpp"
 #include "rollout.hpp"
@@ -121,8 +120,6 @@ class Hybrid final : public planning::Planner {
     if (setup.sampled()) {
       const double period = setup.control_period_s();
       horizon_s_ = std::max(period, params["horizon_s"].get<double>());
-      observer_.emplace(setup.dof(), period,
-                        static_cast<int>(std::lround(setup.delay_s() / period)));
       if (const auto rate = setup.effort_rate_max()) ramp_.emplace(*rate, period, setup.delay_s());
     }
     const std::string escape = params["escape"];
@@ -141,7 +138,7 @@ class Hybrid final : public planning::Planner {
     for (auto* x : {&q_, &v_, &w_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_,
                     &steering_})
       *x = VectorXd::Zero(n);
-    torque_ = VectorXd::Zero(n);
+    torque_ = disturbance_ = unexplained_ = last_torque_ = VectorXd::Zero(n);
     // Scenes in which nothing moves need no series.
     if (host.obstacles_ahead(0.0, HAMELIN_MOVING, {}) > 0) {
       evasion_series_ = host.declare_series("evasion", "");
@@ -185,7 +182,6 @@ class Hybrid final : public planning::Planner {
   void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
     memory_.reset();
     if (search_) search_->reset();
-    if (observer_) observer_->reset();
     held_back_ = false;
     evader_.reset();
     evades_since_s_ = 0.0;
@@ -224,7 +220,7 @@ class Hybrid final : public planning::Planner {
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
       // Steering turns faster than the law follows, so the arm would circle around a near target,
       // or stray from a path.
-      if (!observer_ && !(mode_ == Mode::goal && !path_.empty() && !evader_.active()))
+      if (!setup_.sampled() && !(mode_ == Mode::goal && !path_.empty() && !evader_.active()))
         law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_,
                    std::min(1.0, distance / steering_fade), command);
     }
@@ -239,7 +235,7 @@ class Hybrid final : public planning::Planner {
     // A reference accelerates as the motors can, so the velocity that counts is the present one.
     x_ = w_ + horizon_s_ * (gain * (u_ - (tracks_ ? v_ : w_))).cwiseMin(drive).cwiseMax(-drive);
     project(command);
-    if (observer_)
+    if (setup_.sampled())
       answer_by_torque(command);
     else
       answer_by_velocity(command);
@@ -309,7 +305,7 @@ class Hybrid final : public planning::Planner {
     const auto reference = *tick.reference();
     // Under ideal actuation v_ is that of the step before, on average half a period old.
     const double lead =
-        1.0 / target_velocity_gain_ - (observer_ ? 0.0 : 0.5 * setup_.control_period_s());
+        1.0 / target_velocity_gain_ - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
     u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - q_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
   }
@@ -325,23 +321,33 @@ class Hybrid final : public planning::Planner {
     M_inv_ = identity_;
     llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
-    if (observer_) {
-      if (const auto sent = tick.torque()) observer_->correct(*sent);
-      observer_->update(v_);
-      if (const auto effort = setup_.effort_max()) {
-        scratch_ = disturbance_share * *effort;
-        observer_->limit(M_, scratch_);
-      }
-    }
+    take_disturbance(tick);
     w_ = v_;
-    if (ramp_ && observer_->ready()) {
-      scratch_ = bias_;
-      scratch_.noalias() -= M_ * observer_->disturbance();
-      ramp_->update(observer_->last(), scratch_, M_inv_, v_);
+    if (ramp_) {
+      scratch_ = bias_ - unexplained_;
+      ramp_->update(last_torque_, scratch_, M_inv_, v_);
       w_ = ramp_->coasting_velocity();
     }
     dynamics::forward_kinematics(model_, ws_, q_);
     obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
+  }
+
+  // Scaled down to what friction and wrong masses may explain: docs/theory.md (10.23).
+  void take_disturbance(const planning::Tick& tick) {
+    last_torque_ =
+        tick.torque() ? *tick.torque() : planning::ConstVectorMap(bias_.data(), q_.size());
+    disturbance_.setZero();
+    unexplained_.setZero();
+    if (!tick.disturbance()) return;
+    disturbance_ = *tick.disturbance();
+    unexplained_.noalias() = M_ * disturbance_;
+    const auto effort = setup_.effort_max();
+    if (!effort) return;
+    const double excess =
+        unexplained_.cwiseAbs().cwiseQuotient(disturbance_share * *effort).maxCoeff();
+    if (excess <= 1.0) return;
+    disturbance_ /= excess;
+    unexplained_ /= excess;
   }
 
   Target choose_target() {
@@ -392,16 +398,15 @@ class Hybrid final : public planning::Planner {
     command.held_torque() = bias_;
   }
 
-  // The torque that leads to x over the horizon, by the nominal model and its observer:
+  // The torque that leads to x over the horizon, by the nominal model and what it does not explain:
   // docs/theory.md (10.22).
   void answer_by_torque(planning::Command& command) {
-    scratch_ = (x_ - w_) / horizon_s_ - observer_->disturbance();
+    scratch_ = (x_ - w_) / horizon_s_ - disturbance_;
     torque_.noalias() = M_ * scratch_;
     torque_ += bias_;
     if (const auto effort = setup_.effort_max())
       torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
-    if (ramp_ && observer_->ready()) ramp_->limit(torque_, observer_->last());
-    observer_->issue(torque_, v_, M_inv_, bias_);
+    if (ramp_) ramp_->limit(torque_, last_torque_);
     command.held_torque() = torque_;
   }
 
@@ -481,8 +486,7 @@ class Hybrid final : public planning::Planner {
     const auto effort = setup_.effort_max();
     if (!effort) return;
     momentum_.noalias() = M_ * w_;
-    scratch_ = bias_ + steering_;
-    if (observer_) scratch_.noalias() -= M_ * observer_->disturbance();
+    scratch_ = bias_ + steering_ - unexplained_;
     lower_ = momentum_ + horizon_s_ * (-torque_share * *effort - scratch_);
     upper_ = momentum_ + horizon_s_ * (torque_share * *effort - scratch_);
     filter_.set_momentum_box(lower_, upper_);
@@ -721,12 +725,14 @@ class Hybrid final : public planning::Planner {
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
   int passes_ = 1, max_escapes_, search_steps_ = 1;
-  double horizon_s_;                  ///< time after which the velocity is to be x
-  std::optional<Observer> observer_;  ///< only under sampled actuation
-  std::optional<TorqueRamp> ramp_;    ///< only where the rate of the torque is limited
+  double horizon_s_;                ///< time after which the velocity is to be x
+  std::optional<TorqueRamp> ramp_;  ///< only where the rate of the torque is limited
   bool uses_memory_ = false;
   JointPath path_;
   VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
+  /// What the nominal model does not explain, as acceleration and as torque; both are zero under
+  /// ideal actuation.
+  VectorXd disturbance_, unexplained_, last_torque_;
   std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;

@@ -38,6 +38,13 @@ struct Setpoint {
   Eigen::VectorXd q, v;    ///< one period ahead, where positions are sent
 };
 
+/// What a planner is shown of torques; null where there are none.
+struct Torques {
+  const Eigen::VectorXd* last = nullptr;  ///< that was sent, or that of the set point
+  /// The acceleration that the controller's model does not explain [rad/s² or m/s²].
+  const Eigen::VectorXd* disturbance = nullptr;
+};
+
 /// Makes set points of a planner's answers. It knows where the arm is, what was sent last, and the
 /// limits of what can be sent. In each tick: measure(), and then either propose() and, with a
 /// shield, step(), or follow() where the proposal must not act; send() at the end. No allocation
@@ -69,8 +76,7 @@ class Drive {
   /// Writes that the arm does not do what it was sent; nothing if it does.
   virtual void describe_defect(LineBuffer&) const {}
 
-  /// The torque that was sent last, for the planner; null where none is.
-  [[nodiscard]] virtual const Eigen::VectorXd* last_torque() const noexcept { return nullptr; }
+  [[nodiscard]] virtual Torques torques() const noexcept { return {}; }
   /// What an answer makes of it, within the limits of the drive. @return false if that is no number
   [[nodiscard]] virtual bool propose(const planning::CommandBuffers& answer) = 0;
   /// Where the proposal leads to; none if it leads nowhere. Refers to the drive.

@@ -100,7 +100,7 @@ void PlannerHost::restart(planning::SetupData setup, const Json& params) {
 }
 
 bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                       const PlannerGoal& goal, const Eigen::VectorXd* torque) {
+                       const PlannerGoal& goal, const Torques& torques) {
   time_s_ = time_s;
   draws_ = false;
   if (const std::uint64_t world = view_.snapshot(); world != world_number_) {
@@ -129,7 +129,8 @@ bool PlannerHost::tick(long k, double time_s, const Eigen::VectorXd& q, const Ei
   tick.goal_index = goal.index;
   tick.world = world_number_;
   tick.speed_scale = view_.speed_scale();
-  tick.torque = torque != nullptr ? torque->data() : nullptr;
+  tick.torque = torques.last != nullptr ? torques.last->data() : nullptr;
+  tick.disturbance = torques.disturbance != nullptr ? torques.disturbance->data() : nullptr;
   tick.moving_count = list_obstacles(view_.environment(), view_.obstacle_ids(), time_s,
                                      scene::Among::moving, {nullptr, 0, 0});
   return planner_.tick(tick, command_);

@@ -11,6 +11,7 @@
 #include "hamelin/control/world.hpp"
 #include "hamelin/control/world_view.hpp"
 #include "hamelin/planning/plugin_host.hpp"
+#include "loop/drive.hpp"
 
 namespace hamelin::control {
 
@@ -30,10 +31,10 @@ class PlannerHost final : private planning::HostServices {
 
   /// Calls the planner with the contacts of the world's last look().
   /// @param k, time_s index and time of the tick
-  /// @param q, v as measured; dof numbers each @param torque sent last, or null
+  /// @param q, v as measured; dof numbers each @param torques of the drive
   /// @return false if the planner failed: see error()
   [[nodiscard]] bool tick(long k, double time_s, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                          const PlannerGoal& goal, const Eigen::VectorXd* torque);
+                          const PlannerGoal& goal, const Torques& torques);
   /// Tells the planner that the next tick is a new start.
   void reset(const Eigen::VectorXd& q, const Eigen::VectorXd& v) noexcept { planner_.reset(q, v); }
   /// Makes the planner again. @throws Error as the constructor

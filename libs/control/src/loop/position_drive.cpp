@@ -33,7 +33,8 @@ PositionDrive::PositionDrive(const scene::Scene& scene, const model::Model& mode
               scene.actuation.torque_rate_max_Nm_s),
       sum_(model, options.gyroscopic_terms_max),
       ws_(model) {
-  q_ = v_ = q_measured_ = v_measured_ = rate_ = command_rate_ = VectorXd::Zero(model.dof());
+  q_ = v_ = q_measured_ = v_measured_ = rate_ = command_rate_ = torque_ =
+      VectorXd::Zero(model.dof());
   setpoint_.torque = setpoint_.q = setpoint_.v = q_;
 }
 
@@ -51,7 +52,6 @@ void PositionDrive::start() {
   setpoint_.saturated = false;
   command_rate_.setZero();
   dynamics::gravity_torque(model_, ws_, q_, setpoint_.torque);
-  limits_.start_from(setpoint_.torque);
 }
 
 void PositionDrive::continue_from(const Drive& other) {
@@ -63,7 +63,6 @@ void PositionDrive::continue_from(const Drive& other) {
   started_ = before.started_;
   command_rate_ = before.command_rate_;
   setpoint_ = before.setpoint_;
-  limits_.start_from(setpoint_.torque);
 }
 
 // Servos lag while the arm moves, so that a set point that went back to where the arm is would
@@ -93,14 +92,13 @@ void PositionDrive::describe_defect(LineBuffer& line) const {
 }
 
 bool PositionDrive::propose(const planning::CommandBuffers& answer) {
-  VectorXd& torque = setpoint_.torque;
-  sum_.sum(ws_, answer, q_, v_, q_, options_.period_s, 1.0, torque);
-  if (!can_be_sent(torque)) return false;
-  setpoint_.saturated = limits_.limit(torque, options_.period_s);
+  sum_.sum(ws_, answer, q_, v_, q_, options_.period_s, 1.0, torque_);
+  if (!can_be_sent(torque_)) return false;
+  setpoint_.saturated = limits_.limit(torque_, setpoint_.torque, options_.period_s);
   if (answer.raw().has_node_velocity != 0)
     rate_ = (answer.node_velocity() - v_) / options_.period_s;
   else
-    dynamics::forward_dynamics(model_, ws_, q_, v_, torque, rate_);
+    dynamics::forward_dynamics(model_, ws_, q_, v_, torque_, rate_);
   if (!can_be_sent(rate_)) return false;
   advance();
   return true;
@@ -129,8 +127,8 @@ void PositionDrive::advance() {
 }
 
 std::optional<Shield::Step> PositionDrive::step() {
-  return Shield::Step{node(),           v_,           {setpoint_.q, setpoint_.v}, command_rate_,
-                      setpoint_.torque, command_rate_};
+  return Shield::Step{node(),        v_,      {setpoint_.q, setpoint_.v},
+                      command_rate_, torque_, command_rate_};
 }
 
 StopFinder::Start PositionDrive::stop_start() {
@@ -140,8 +138,13 @@ StopFinder::Start PositionDrive::stop_start() {
 void PositionDrive::follow(Stop& stop) {
   stop.point(setpoint_.q, setpoint_.v);
   command_rate_ = (setpoint_.v - v_) / options_.period_s;
-  dynamics::inverse_dynamics(model_, ws_, q_, v_, command_rate_, setpoint_.torque);
-  setpoint_.saturated = limits_.limit(setpoint_.torque, options_.period_s);
+  dynamics::inverse_dynamics(model_, ws_, q_, v_, command_rate_, torque_);
+  setpoint_.saturated = limits_.limit(torque_, setpoint_.torque, options_.period_s);
+}
+
+const Setpoint& PositionDrive::send() {
+  setpoint_.torque = torque_;
+  return setpoint_;
 }
 
 }  // namespace hamelin::control

@@ -20,11 +20,12 @@ class PositionDrive final : public Drive {
   void continue_from(const Drive& other) override;
   void resume() override;
   void describe_defect(LineBuffer& line) const override;
+  Torques torques() const noexcept override { return {&setpoint_.torque}; }
   bool propose(const planning::CommandBuffers& answer) override;
   std::optional<Shield::Step> step() override;
   StopFinder::Start stop_start() override;
   void follow(Stop& stop) override;
-  const Setpoint& send() override { return setpoint_; }
+  const Setpoint& send() override;
 
  private:
   [[nodiscard]] bool moves_as_sent() const;
@@ -41,7 +42,7 @@ class PositionDrive final : public Drive {
   dynamics::Workspace ws_;
   bool started_ = false;
   Eigen::VectorXd q_measured_, v_measured_;
-  Eigen::VectorXd rate_, command_rate_;
+  Eigen::VectorXd rate_, command_rate_, torque_;
   Setpoint setpoint_;
 };
 

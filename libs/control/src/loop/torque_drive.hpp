@@ -18,7 +18,9 @@ class TorqueDrive final : public Drive {
   void start() override;
   void forget() noexcept override { started_ = false; }
   void continue_from(const Drive& other) override;
-  const Eigen::VectorXd* last_torque() const noexcept override { return &setpoint_.torque; }
+  Torques torques() const noexcept override {
+    return {&setpoint_.torque, &estimate_.disturbance()};
+  }
   bool propose(const planning::CommandBuffers& answer) override;
   std::optional<Shield::Step> step() override;
   StopFinder::Start stop_start() override;
@@ -26,7 +28,8 @@ class TorqueDrive final : public Drive {
   const Setpoint& send() override;
 
  private:
-  void extrapolate();
+  /// The model's acceleration since the last tick, in rate_.
+  void predict_rate();
   /// Where the arm will be when the next torque begins to act; once in a tick.
   void look_ahead();
 
@@ -35,12 +38,12 @@ class TorqueDrive final : public Drive {
   TorqueLimits limits_;
   ChannelSum sum_;
   TorquePipeline pipeline_;
-  std::optional<StateEstimator> estimator_;
+  StateEstimator estimate_;
+  bool measures_velocity_;
   dynamics::Workspace ws_;
   bool started_ = false;
   bool seen_ = false;    ///< whether the last measurement could be used
   bool looked_ = false;  ///< ahead in this tick
-  bool looked_before_ = false;
   /// What a stop starts from: where friction is not known, an estimate lags behind.
   Eigen::VectorXd q_measured_;
   Eigen::VectorXd proposed_, rate_, zero_;

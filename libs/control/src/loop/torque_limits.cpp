@@ -26,7 +26,7 @@ void copy_gyroscopic_terms(const planning::CommandBuffers& command,
 TorqueLimits::TorqueLimits(const model::Model& model, VectorXd effort_max,
                            std::optional<double> rate_max)
     : model_(model), effort_max_(std::move(effort_max)), rate_max_(rate_max) {
-  gyroscopic_ = requested_ = rate_ = impulse_ = last_ = VectorXd::Zero(model.dof());
+  gyroscopic_ = requested_ = rate_ = impulse_ = VectorXd::Zero(model.dof());
 }
 
 bool TorqueLimits::limit(dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v,
@@ -67,14 +67,13 @@ double TorqueLimits::share_of_velocity_change(dynamics::Workspace& ws, const Vec
   return share;
 }
 
-bool TorqueLimits::limit(VectorXd& torque, double period_s) {
+bool TorqueLimits::limit(VectorXd& torque, const VectorXd& last, double period_s) {
   requested_ = torque;
   if (effort_max_.size() > 0) torque = torque.cwiseMin(effort_max_).cwiseMax(-effort_max_);
   if (rate_max_) {
     const double change = *rate_max_ * period_s;
-    torque = torque.cwiseMin((last_.array() + change).matrix())
-                 .cwiseMax((last_.array() - change).matrix());
-    last_ = torque;
+    torque = torque.cwiseMin((last.array() + change).matrix())
+                 .cwiseMax((last.array() - change).matrix());
   }
   return torque != requested_;
 }

@@ -43,18 +43,16 @@ class TorqueLimits {
                                                 const Eigen::VectorXd& change, double h,
                                                 const Eigen::VectorXd& held_torque);
 
-  /// Limits the sum of all channels: cuts it at the torque limits and at the rate limit since the
-  /// last call.
+  /// Limits the sum of all channels: cuts it at the torque limits and at the rate limit.
+  /// @param last the torque that was sent a period before
   /// @return whether anything was reduced
-  bool limit(Eigen::VectorXd& torque, double period_s);
-  /// The torque that acted before the first call of limit(torque).
-  void start_from(const Eigen::VectorXd& torque) { last_ = torque; }
+  bool limit(Eigen::VectorXd& torque, const Eigen::VectorXd& last, double period_s);
 
  private:
   const model::Model& model_;
   Eigen::VectorXd effort_max_;
   std::optional<double> rate_max_;
-  Eigen::VectorXd gyroscopic_, requested_, rate_, impulse_, last_;
+  Eigen::VectorXd gyroscopic_, requested_, rate_, impulse_;
 };
 
 /// All channels of a planner's answer as one torque at (q, v), which is what a sampled controller

@@ -1,26 +1,14 @@
 #include "loop/torque_pipeline.hpp"
 
-#include <cmath>
-
 namespace hamelin::control {
 
 using Eigen::VectorXd;
 
-namespace {
-
-constexpr double observer_bandwidth = 100.0;  // [1/s]
-
-}  // namespace
-
 TorquePipeline::TorquePipeline(const model::Model& model, std::size_t delay_periods,
                                double period_s)
-    : model_(model),
-      period_s_(period_s),
-      waiting_(delay_periods, VectorXd::Zero(model.dof())),
-      gain_((1.0 - std::exp(-observer_bandwidth * period_s)) / period_s) {
-  for (auto* x : {&q_, &v_, &q_next_, &v_next_, &rate_, &last_, &disturbance_, &q_before_,
-                  &v_before_, &acting_})
-    x->setZero(model.dof());
+    : model_(model), period_s_(period_s), waiting_(delay_periods, VectorXd::Zero(model.dof())) {
+  q_ = v_ = q_next_ = v_next_ = rate_ = last_ = acting_ = disturbance_ =
+      VectorXd::Zero(model.dof());
 }
 
 // The acceleration changes so little in a period that its value at the start is taken for all of
@@ -33,18 +21,11 @@ void TorquePipeline::step(dynamics::Workspace& ws, const VectorXd& q, const Vect
   v_next_ = v + period_s_ * rate_;
 }
 
-void TorquePipeline::observe(dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v) {
-  if (sent_) {
-    step(ws, q_before_, v_before_, acting_);
-    disturbance_ += gain_ * (v - v_next_);
-  }
-  q_before_ = q;
-  v_before_ = v;
-}
-
-void TorquePipeline::predict(dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v) {
+void TorquePipeline::predict(dynamics::Workspace& ws, const VectorXd& q, const VectorXd& v,
+                             const VectorXd& disturbance) {
   q_ = q;
   v_ = v;
+  disturbance_ = disturbance;
   for (std::size_t i = 0; i < waiting_.size(); ++i) {
     step(ws, q_, v_, waiting_[(first_ + i) % waiting_.size()]);
     q_.swap(q_next_);
@@ -59,23 +40,17 @@ void TorquePipeline::advance(dynamics::Workspace& ws, const VectorXd& torque) {
 void TorquePipeline::start_from(const VectorXd& torque) {
   for (auto& waiting : waiting_) waiting = torque;
   last_ = acting_ = torque;
-  disturbance_.setZero();
-  sent_ = false;
 }
 
-// What moved the arm until now was not this model, so that its motion tells nothing of errors.
 void TorquePipeline::continue_from(const TorquePipeline& other) {
   for (std::size_t i = 0; i < waiting_.size(); ++i) waiting_[i] = other.waiting_[i];
   first_ = other.first_;
   last_ = other.last_;
   acting_ = other.acting_;
-  disturbance_ = other.disturbance_;
-  sent_ = false;
 }
 
 void TorquePipeline::send(const VectorXd& torque) {
   last_ = torque;
-  sent_ = true;
   acting_ = waiting_.empty() ? torque : waiting_[first_];
   if (waiting_.empty()) return;
   waiting_[first_] = torque;

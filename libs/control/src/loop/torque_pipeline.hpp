@@ -9,21 +9,18 @@
 namespace hamelin::control {
 
 /// The torques that are on their way to an arm whose torques act late, and where the arm will be
-/// when they have acted: docs/theory.md (14.16). What the model does not explain (friction, wrong
-/// masses) is estimated as an acceleration from the difference between the velocity and its
-/// prediction, and is expected to go on. No allocation after construction.
+/// when they have acted: docs/theory.md (14.16). What the model does not explain is expected to go
+/// on. No allocation after construction.
 class TorquePipeline {
  public:
   /// @param delay_periods how many periods after the tick its torque acts
   /// @param period_s for which each torque is held
   TorquePipeline(const model::Model& model, std::size_t delay_periods, double period_s);
 
-  /// Updates the estimate of the unexplained acceleration with the state at a tick.
-  void observe(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
-  /// That estimate [rad/s² or m/s²].
-  [[nodiscard]] const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }
   /// The state when the next torque begins to act, from the state now.
-  void predict(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v);
+  /// @param disturbance acceleration that the model does not explain [rad/s² or m/s²]
+  void predict(dynamics::Workspace& ws, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+               const Eigen::VectorXd& disturbance);
   [[nodiscard]] const Eigen::VectorXd& q() const noexcept { return q_; }
   [[nodiscard]] const Eigen::VectorXd& v() const noexcept { return v_; }
   [[nodiscard]] Stop::Node now() const noexcept { return {q_, v_}; }
@@ -34,8 +31,6 @@ class TorquePipeline {
   [[nodiscard]] Stop::Node next() const noexcept { return {q_next_, v_next_}; }
   [[nodiscard]] const Eigen::VectorXd& acceleration() const noexcept { return rate_; }
 
-  /// The next call of observe() is the first one, so that it learns nothing.
-  void begin_observing() noexcept { sent_ = false; }
   /// Forgets the past: this torque has acted and will act.
   void start_from(const Eigen::VectorXd& torque);
   /// Goes on where that of the arm with another load was.
@@ -55,10 +50,7 @@ class TorquePipeline {
   double period_s_;
   std::vector<Eigen::VectorXd> waiting_;  ///< oldest at first_
   std::size_t first_ = 0;
-  double gain_;
-  Eigen::VectorXd q_, v_, q_next_, v_next_, rate_, last_, disturbance_;
-  Eigen::VectorXd q_before_, v_before_, acting_;  ///< at the last tick, and the torque since then
-  bool sent_ = false;
+  Eigen::VectorXd q_, v_, q_next_, v_next_, rate_, last_, acting_, disturbance_;
 };
 
 }  // namespace hamelin::control

@@ -237,6 +237,13 @@ class Tick {
   [[nodiscard]] std::size_t moving_count() const {
     return HAMELIN_HAS_FIELD(raw_, hamelin_tick, moving_count) ? raw_->moving_count : 0;
   }
+  /// The joint accelerations that the model does not explain [rad/s² or m/s²], because of friction
+  /// or wrong masses. None where no torques are sent.
+  [[nodiscard]] std::optional<ConstVectorMap> disturbance() const {
+    if (!HAMELIN_HAS_FIELD(raw_, hamelin_tick, disturbance) || raw_->disturbance == nullptr)
+      return std::nullopt;
+    return ConstVectorMap(raw_->disturbance, dof_);
+  }
   [[nodiscard]] const hamelin_tick& raw() const { return *raw_; }
 
  private:

@@ -226,10 +226,15 @@ typedef struct hamelin_tick {
   uint64_t world;     /* number of the world's snapshot: changes with obstacles and map */
   double speed_scale; /* 1, or less in unknown space if the scene's policy is "slow" */
   /* The joint torques sent to the arm last [Nm or N], within all limits and not the planner's where
-   * a shield stopped the arm: dof numbers; null under ideal actuation. */
+   * a shield stopped the arm; where positions are sent, the torque of the set point: dof numbers;
+   * null under ideal actuation. */
   const double* torque;
   /* Appended in version 4. */
   size_t moving_count; /* obstacles that move, or may move later, however far they are */
+  /* The joint accelerations that the model does not explain, because of friction or wrong masses,
+   * as the controller estimates them [rad/s^2 or m/s^2]: dof numbers; null where no torques are
+   * sent. They are those of the arm, whatever a shield did with the planner's torques. */
+  const double* disturbance;
 } hamelin_tick;
 
 /* DETECTS_STALLS: running, and the planner detects its stalls itself: the scene's stall rule is
