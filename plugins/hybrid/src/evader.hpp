@@ -4,8 +4,7 @@
 
 #include "evasion.hpp"
 #include "look_ahead.hpp"
-#include "movers.hpp"
-#include "sweep.hpp"
+#include "parts.hpp"
 
 namespace hamelin::hybrid {
 

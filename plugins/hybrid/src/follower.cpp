@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "approach_speed.hpp"
+#include "hamelin/reactive/approach_speed.hpp"
 
 namespace hamelin::hybrid {
 

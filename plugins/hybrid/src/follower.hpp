@@ -7,9 +7,7 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
-#include "law.hpp"
-#include "obstacles.hpp"
-#include "safety_filter.hpp"
+#include "parts.hpp"
 
 namespace hamelin::hybrid {
 

@@ -4,11 +4,7 @@
 #include "evasion.hpp"
 #include "hamelin/core/rng.hpp"
 #include "joint_path.hpp"
-#include "law.hpp"
-#include "margins.hpp"
-#include "movers.hpp"
-#include "safety_filter.hpp"
-#include "surroundings.hpp"
+#include "parts.hpp"
 
 namespace hamelin::hybrid {
 

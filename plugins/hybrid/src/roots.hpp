@@ -3,8 +3,7 @@
 
 #include "hamelin/core/rng.hpp"
 #include "joint_path.hpp"
-#include "law.hpp"
-#include "rollout.hpp"
+#include "parts.hpp"
 
 namespace hamelin::hybrid {
 

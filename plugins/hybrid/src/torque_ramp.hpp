@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "approach_speed.hpp"
+#include "hamelin/reactive/approach_speed.hpp"
 
 namespace hamelin::hybrid {
 

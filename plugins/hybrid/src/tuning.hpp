@@ -1,8 +1,7 @@
 #pragma once
 #include "follower.hpp"
 #include "hamelin/io/json.hpp"
-#include "law.hpp"
-#include "margins.hpp"
+#include "parts.hpp"
 
 namespace hamelin::hybrid {
 

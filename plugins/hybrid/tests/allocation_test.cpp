@@ -5,7 +5,7 @@
 
 #include "../src/memory.hpp"
 #include "fixture.hpp"
-#include "random_mass.hpp"
+#include "hamelin/test/random_mass.hpp"
 
 using namespace hamelin;
 using Eigen::MatrixXd;

@@ -4,7 +4,7 @@
 
 #include "fixture.hpp"
 #include "hamelin/test/allocations.hpp"
-#include "random_mass.hpp"
+#include "hamelin/test/random_mass.hpp"
 
 using namespace hamelin;
 using Eigen::MatrixXd;

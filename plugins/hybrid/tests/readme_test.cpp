@@ -1,4 +1,4 @@
-#include "../src/safety_filter.hpp"
+#include "hamelin/reactive/safety_filter.hpp"
 
 #include <Eigen/Dense>
 

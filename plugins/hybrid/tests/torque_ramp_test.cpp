@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "random_mass.hpp"
+#include "hamelin/test/random_mass.hpp"
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

@@ -1,9 +1,9 @@
-#include "movers.hpp"
+#include "hamelin/reactive/movers.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -120,4 +120,4 @@ double Movers::clearance(const scene::Shapes& arm, const Places& places, double 
   return limit;
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

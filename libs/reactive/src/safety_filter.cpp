@@ -1,10 +1,10 @@
-#include "safety_filter.hpp"
+#include "hamelin/reactive/safety_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -205,4 +205,4 @@ double SafetyFilter::recovery() const {
   return sum;
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -1,16 +1,16 @@
-#include "../src/movers.hpp"
+#include "hamelin/reactive/movers.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
-#include "fixture.hpp"
-#include "random_mass.hpp"
+#include "hamelin/test/random_mass.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using hybrid::MoverPoint;
-using hybrid::Movers;
+using reactive::MoverPoint;
+using reactive::Movers;
 
 namespace {
 
@@ -62,13 +62,13 @@ double distance(const scene::Shapes& arm, std::size_t i, const scene::Obstacle& 
 }  // namespace
 
 TEST_CASE("predicted obstacles are where the host says, and lists of ticks replace each other",
-          "[hybrid][movers]") {
+          "[reactive][movers]") {
   auto task = test::joint_task(VectorXd::Zero(4), {{{0.0, 2.0, 0.0}, 0.1}});
   task.movers = {test::moving_ball({1.0, 0.0, 0.0}, 0.1, {0.0, 1.0, 0.0}),
                  test::moving_ball({0.0, 1.0, 0.0}, 0.2, {2.0, 0.0, 0.0})};
   task.movers[1].prediction = scene::Prediction::speed_bound;
   task.movers[1].speed_max_m_s = 2.5;
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   Movers movers(scene.planner_host(), scene.model);
   CHECK(movers.count() == 0);
   CHECK_FALSE(movers.contains(1));
@@ -91,20 +91,20 @@ TEST_CASE("predicted obstacles are where the host says, and lists of ticks repla
   CHECK_FALSE(movers.contains(scene.mover_id(0)));
 }
 
-TEST_CASE("an older host has no moving obstacles", "[hybrid][movers]") {
-  test::Scene scene(test::joint_task(VectorXd::Zero(4), {{{0.5, 0.0, 0.0}, 0.1}}));
+TEST_CASE("an older host has no moving obstacles", "[reactive][movers]") {
+  test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4), {{{0.5, 0.0, 0.0}, 0.1}}));
   Movers movers(scene.planner_host(), scene.model);
   movers.update(3);
   CHECK(movers.count() == 0);
 }
 
 TEST_CASE("more moving obstacles than there is room for: the first ones count",
-          "[hybrid][movers]") {
+          "[reactive][movers]") {
   auto task = test::joint_task(VectorXd::Zero(4));
   for (std::size_t i = 0; i < Movers::max_count + 10; ++i)
     task.movers.push_back(
         test::moving_ball({0.0, 5.0 + static_cast<double>(i), 0.0}, 0.1, Vector3d::UnitX()));
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   Movers movers(scene.planner_host(), scene.model);
   movers.update(task.movers.size());
   CHECK(movers.count() == Movers::max_count);
@@ -116,7 +116,7 @@ TEST_CASE("more moving obstacles than there is room for: the first ones count",
 }
 
 TEST_CASE("clearance and the nearest point of each link are those of all pairs of shapes",
-          "[hybrid][movers][property]") {
+          "[reactive][movers][property]") {
   int near = 0, far = 0;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     CAPTURE(seed);
@@ -125,7 +125,7 @@ TEST_CASE("clearance and the nearest point of each link are those of all pairs o
     if (seed % 2 == 0) task.robot = with_capsules();
     const std::size_t count = 1 + rng.below(4);
     for (std::size_t m = 0; m < count; ++m) task.movers.push_back(random_solid(rng));
-    test::Scene scene(task);
+    test::ReactiveScene scene(task);
     Movers movers(scene.planner_host(), scene.model);
     movers.update(count);
     const double ahead = rng.uniform(0.0, 0.5);
@@ -172,11 +172,11 @@ TEST_CASE("clearance and the nearest point of each link are those of all pairs o
   CHECK(far > 5);
 }
 
-TEST_CASE("an obstacle has passed when it is nearest from the other side", "[hybrid][movers]") {
+TEST_CASE("an obstacle has passed when it is nearest from the other side", "[reactive][movers]") {
   auto task = test::joint_task(VectorXd::Zero(4));
   task.movers = {test::moving_ball({0.525, 0.4, 0.0}, 0.1, {0.0, -2.0, 0.0})};
   // It crosses the arm at 0.2 s, at the centre of a sphere.
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   Movers movers(scene.planner_host(), scene.model);
   movers.update(1);
   dynamics::Workspace ws(scene.model);

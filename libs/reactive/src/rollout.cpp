@@ -1,10 +1,10 @@
-#include "rollout.hpp"
+#include "hamelin/reactive/rollout.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -118,4 +118,4 @@ void Rollout::filter() {
   (void)filter_.project(u_, passes);
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

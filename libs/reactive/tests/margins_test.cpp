@@ -1,15 +1,15 @@
-#include "../src/margins.hpp"
+#include "hamelin/reactive/margins.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "fixture.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
-using hybrid::Margins;
-using hybrid::NearPoint;
+using reactive::Margins;
+using reactive::NearPoint;
 
 namespace {
 
@@ -40,8 +40,8 @@ constexpr int last_sphere = 19;
 }  // namespace
 
 TEST_CASE("margins shrink from the full one to that of the goal on the approach",
-          "[hybrid][margins]") {
-  test::Scene scene(beside_ball(0.006));
+          "[reactive][margins]") {
+  test::ReactiveScene scene(beside_ball(0.006));
   const auto& margins = scene.margins;
   CHECK(margin(margins, of_sphere(last_sphere), 1.0) == 0.01);
   CHECK(margin(margins, of_sphere(last_sphere), 0.0) == Approx(0.003));  // 6 mm − 3 mm
@@ -55,19 +55,19 @@ TEST_CASE("margins shrink from the full one to that of the goal on the approach"
 }
 
 TEST_CASE("a sphere without near obstacles at the goal keeps its full margin there",
-          "[hybrid][margins]") {
-  test::Scene scene(beside_ball(0.006));
+          "[reactive][margins]") {
+  test::ReactiveScene scene(beside_ball(0.006));
   CHECK(margin(scene.margins, of_sphere(0), 0.0) == 0.01);
   CHECK_FALSE(scene.margins.tight_at_goal(of_sphere(0)));
   CHECK(scene.margins.tight_at_goal(of_sphere(last_sphere)));
 }
 
-TEST_CASE("margins keep the posture of a joint goal admissible", "[hybrid][margins]") {
+TEST_CASE("margins keep the posture of a joint goal admissible", "[reactive][margins]") {
   const double clearance = GENERATE(0.0011, 0.002, 0.0039, 0.004, 0.0041, 0.012, 0.013, 0.014, 0.1);
   CAPTURE(clearance);
-  test::Scene scene(beside_ball(clearance));
+  test::ReactiveScene scene(beside_ball(clearance));
   dynamics::Workspace ws(scene.model);
-  hybrid::Obstacles obstacles(scene.setup, test::contact_radius);
+  reactive::Obstacles obstacles(scene.setup, test::contact_radius);
   const VectorXd goal = VectorXd::Zero(4);
   dynamics::forward_kinematics(scene.model, ws, goal);
   scene.surroundings.query(goal, test::contact_radius, 0.1);
@@ -84,13 +84,13 @@ TEST_CASE("margins keep the posture of a joint goal admissible", "[hybrid][margi
   CHECK(obstacles.points().front().margin == Approx(std::clamp(clearance - 0.003, 0.001, 0.01)));
 }
 
-TEST_CASE("a goal in contact has the smallest margin", "[hybrid][margins]") {
-  test::Scene scene(beside_ball(-0.02));
+TEST_CASE("a goal in contact has the smallest margin", "[reactive][margins]") {
+  test::ReactiveScene scene(beside_ball(-0.02));
   CHECK(margin(scene.margins, of_sphere(last_sphere), 0.0) == 0.001);
 }
 
-TEST_CASE("at a tip goal the margin of all spheres is that of the goal", "[hybrid][margins]") {
-  test::Scene scene(test::tip_task({0.9, 0.0, 0.0}, {{{0.975, 0.2, 0.0}, 0.1}}));
+TEST_CASE("at a tip goal the margin of all spheres is that of the goal", "[reactive][margins]") {
+  test::ReactiveScene scene(test::tip_task({0.9, 0.0, 0.0}, {{{0.975, 0.2, 0.0}, 0.1}}));
   for (const int sphere : {0, last_sphere}) {
     CHECK(margin(scene.margins, of_sphere(sphere), 0.0) == 0.003);
     CHECK(margin(scene.margins, of_sphere(sphere), 1.0) == 0.01);
@@ -99,11 +99,11 @@ TEST_CASE("at a tip goal the margin of all spheres is that of the goal", "[hybri
 }
 
 TEST_CASE("the margin between parts of the arm shrinks for a goal that is folded closer",
-          "[hybrid][margins]") {
+          "[reactive][margins]") {
   // Joints 2 and 3 bring link 4 close to link 1.
   auto task = test::joint_task(Vector4d(0.0, 2.0, 2.0, 0.0));
   task.self_collision = true;
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   scene.surroundings.query(task.q_goal, 0.01, 1.0);
   double nearest = 1.0;
   for (const auto& contact : scene.surroundings.self_contacts())
@@ -129,7 +129,7 @@ TEST_CASE("the margin between parts of the arm shrinks for a goal that is folded
     REQUIRE(nearest == Approx(0.005));
     auto tight = test::joint_task(q);
     tight.self_collision = true;
-    test::Scene folded(tight);
+    test::ReactiveScene folded(tight);
     CHECK(margin(folded.margins, within_arm(), 0.0) == Approx(0.002));
     CHECK(margin(folded.margins, within_arm(), 1.0) == 0.005);
     CHECK(folded.margins.tight_at_goal(within_arm()));

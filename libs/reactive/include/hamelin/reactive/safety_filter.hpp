@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Finds the admissible velocity nearest to ũ in the norm of kinetic energy, docs/theory.md (10.9):
 ///   x = argmin ½ (x − ũ)ᵀ M (x − ũ)  subject to a_i·x ≥ b_i and boxes on x and the momentum M x,
@@ -100,4 +100,4 @@ class SafetyFilter {
   Eigen::VectorXd Mx_, step_, Mfrom_;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

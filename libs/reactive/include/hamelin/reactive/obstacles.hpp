@@ -5,7 +5,7 @@
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// A point of the arm that is near an obstacle or another part of the arm, with its row a for the
 /// law and the safety filter: docs/theory.md (10.1).
@@ -61,4 +61,4 @@ class Obstacles {
   Eigen::VectorXd row_;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

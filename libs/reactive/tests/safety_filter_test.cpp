@@ -1,15 +1,15 @@
-#include "../src/safety_filter.hpp"
+#include "hamelin/reactive/safety_filter.hpp"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
 #include <limits>
 
-#include "random_mass.hpp"
+#include "hamelin/test/random_mass.hpp"
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using hamelin::Rng;
-using hamelin::hybrid::SafetyFilter;
+using hamelin::reactive::SafetyFilter;
 using hamelin::test::random_mass;
 using hamelin::test::random_numbers;
 
@@ -50,7 +50,7 @@ VectorXd nearest_by_active_sets(const MatrixXd& M, const VectorXd& target, const
 }  // namespace
 
 TEST_CASE("the filter finds the nearest admissible velocity in the metric of kinetic energy",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   const auto seed = GENERATE(range(1u, 40u));
   CAPTURE(seed);
   Rng rng(seed);
@@ -75,7 +75,7 @@ TEST_CASE("the filter finds the nearest admissible velocity in the metric of kin
 }
 
 TEST_CASE("the filter adds no kinetic energy where rest is admissible, after any number of passes",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   const int passes = GENERATE(1, 2, 5, 12);
   for (std::uint64_t seed = 1; seed <= 10000; ++seed) {
     Rng rng(seed);
@@ -105,7 +105,7 @@ TEST_CASE("the filter adds no kinetic energy where rest is admissible, after any
 }
 
 TEST_CASE("rows that demand motion add no more energy than is booked as recovery",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
     Rng rng(seed);
     const int n = 1 + static_cast<int>(rng.below(7)), m = 1 + static_cast<int>(rng.below(10));
@@ -124,7 +124,7 @@ TEST_CASE("rows that demand motion add no more energy than is booked as recovery
   }
 }
 
-TEST_CASE("floors hold after a single pass", "[hybrid][property]") {
+TEST_CASE("floors hold after a single pass", "[reactive][property]") {
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
     Rng rng(seed);
     const int n = 7, m = 12;
@@ -200,7 +200,7 @@ VectorXd nearest_with_soft_rows(const MatrixXd& M, const VectorXd& target, const
 }  // namespace
 
 TEST_CASE("soft rows give way at the price of half the work of their violation",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   int gave_way = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     CAPTURE(seed);
@@ -231,7 +231,7 @@ TEST_CASE("soft rows give way at the price of half the work of their violation",
 }
 
 TEST_CASE("soft rows add no more energy than is booked as recovery, after any number of passes",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   const int passes = GENERATE(1, 2, 5, 12);
   int projected_twice = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
@@ -265,7 +265,7 @@ TEST_CASE("soft rows add no more energy than is booked as recovery, after any nu
 }
 
 TEST_CASE("where soft rows break floors of hard ones, a second projection has none of them",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   // Soft rows push the arm into walls with a larger demand than the passes can resolve.
   constexpr int n = 7, hard = 6, soft = 6, passes = 3;
   int twice = 0;
@@ -313,7 +313,7 @@ TEST_CASE("where soft rows break floors of hard ones, a second projection has no
 }
 
 TEST_CASE("a wall that soft rows push against is kept without scaling the rest of the velocity",
-          "[hybrid][property]") {
+          "[reactive][property]") {
   // The second projection onto a single wall is exact.
   int twice = 0;
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
@@ -398,7 +398,7 @@ double reach(const Boxes& boxes, const VectorXd& from, const VectorXd& step, dou
 
 }  // namespace
 
-TEST_CASE("the braking room can be reached within the boxes", "[hybrid][property]") {
+TEST_CASE("the braking room can be reached within the boxes", "[reactive][property]") {
   int positive = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     CAPTURE(seed);
@@ -431,7 +431,7 @@ TEST_CASE("the braking room can be reached within the boxes", "[hybrid][property
   CHECK(positive > 1000);
 }
 
-TEST_CASE("the filter reaches a row within the braking room", "[hybrid][property]") {
+TEST_CASE("the filter reaches a row within the braking room", "[reactive][property]") {
   // A row that demands 0.9 of the room holds together with the boxes.
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     CAPTURE(seed);
@@ -451,7 +451,7 @@ TEST_CASE("the filter reaches a row within the braking room", "[hybrid][property
   }
 }
 
-TEST_CASE("the braking room is never negative, at any point", "[hybrid][property]") {
+TEST_CASE("the braking room is never negative, at any point", "[reactive][property]") {
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     CAPTURE(seed);
     Rng rng(seed);
@@ -465,7 +465,7 @@ TEST_CASE("the braking room is never negative, at any point", "[hybrid][property
   }
 }
 
-TEST_CASE("a row that no joint moves has no braking room", "[hybrid]") {
+TEST_CASE("a row that no joint moves has no braking room", "[reactive]") {
   const MatrixXd M = MatrixXd::Identity(3, 3);
   const VectorXd one = VectorXd::Ones(3), none = VectorXd::Zero(3);
   SafetyFilter filter(3, 4);

@@ -8,7 +8,7 @@
 #include "hamelin/scene/obstacles.hpp"
 #include "hamelin/scene/shapes.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Where a moving obstacle is predicted to be.
 struct MoverPlace {
@@ -79,4 +79,4 @@ class Movers {
   std::array<double, max_count> balls_{};          ///< bounding radii [m]
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

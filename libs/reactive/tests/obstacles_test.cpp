@@ -1,23 +1,23 @@
-#include "../src/obstacles.hpp"
+#include "hamelin/reactive/obstacles.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
-#include "fixture.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 #include "hamelin/test/single_tick.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using hybrid::NearPoint;
-using hybrid::Obstacles;
+using reactive::NearPoint;
+using reactive::Obstacles;
 
 namespace {
 
 /// The obstacles of a scene, updated with given contacts.
 struct ObstacleFixture {
-  explicit ObstacleFixture(const test::Scene& scene, double radius)
+  explicit ObstacleFixture(const test::ReactiveScene& scene, double radius)
       : model(scene.model), ws(scene.model), obstacles(scene.setup, radius) {}
   void update(const VectorXd& q, std::span<const hamelin_contact> contacts,
               std::span<const hamelin_self_contact> self_contacts = {}) {
@@ -58,8 +58,8 @@ bool covers(const NearPoint& point, const hamelin_contact& contact, int link) {
 }  // namespace
 
 TEST_CASE("each near contact is chosen, or a nearer and similar one of its link",
-          "[hybrid][obstacles]") {
-  const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
+          "[reactive][obstacles]") {
+  const test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4)));
   const double radius = 0.15;
   ObstacleFixture chosen(scene, radius);
   int full = 0;
@@ -95,8 +95,8 @@ TEST_CASE("each near contact is chosen, or a nearer and similar one of its link"
   CHECK(full < 200);
 }
 
-TEST_CASE("no two chosen points are similar", "[hybrid][obstacles]") {
-  const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
+TEST_CASE("no two chosen points are similar", "[reactive][obstacles]") {
+  const test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4)));
   ObstacleFixture chosen(scene, 0.15);
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     CAPTURE(seed);
@@ -112,13 +112,13 @@ TEST_CASE("no two chosen points are similar", "[hybrid][obstacles]") {
   }
 }
 
-TEST_CASE("an obstacle's row is the gradient of its distance", "[hybrid][obstacles]") {
+TEST_CASE("an obstacle's row is the gradient of its distance", "[reactive][obstacles]") {
   Rng rng(3);
   for (int trial = 0; trial < 20; ++trial) {
     CAPTURE(trial);
     test::Task task = test::joint_task(VectorXd::Zero(6));
     task.robot = test::random_robot(static_cast<std::uint64_t>(trial) + 1, 6, 3);
-    test::Scene scene(task);
+    test::ReactiveScene scene(task);
     ObstacleFixture chosen(scene, 2.0);
     const VectorXd q = test::random_joints(rng, 6);
     const Vector3d from = test::random_vector(rng);
@@ -149,7 +149,7 @@ TEST_CASE("an obstacle's row is the gradient of its distance", "[hybrid][obstacl
 }
 
 TEST_CASE("a self contact's row is the gradient of the distance between two parts",
-          "[hybrid][obstacles]") {
+          "[reactive][obstacles]") {
   const bool base = GENERATE(false, true);
   CAPTURE(base);
   Rng rng(5);
@@ -157,7 +157,7 @@ TEST_CASE("a self contact's row is the gradient of the distance between two part
     CAPTURE(trial);
     test::Task task = test::joint_task(VectorXd::Zero(6));
     task.robot = test::random_robot(static_cast<std::uint64_t>(trial) + 100, 6, 3);
-    test::Scene scene(task);
+    test::ReactiveScene scene(task);
     ObstacleFixture chosen(scene, 0.15);
     const VectorXd q = test::random_joints(rng, 6);
     const std::size_t a = 2 + rng.below(4), b = rng.below(a);
@@ -190,8 +190,8 @@ TEST_CASE("a self contact's row is the gradient of the distance between two part
   }
 }
 
-TEST_CASE("self contacts beyond their radius are ignored", "[hybrid][obstacles]") {
-  const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
+TEST_CASE("self contacts beyond their radius are ignored", "[reactive][obstacles]") {
+  const test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4)));
   ObstacleFixture chosen(scene, 0.15);
   hamelin_self_contact contact{};
   contact.shape_a = 19;
@@ -204,8 +204,8 @@ TEST_CASE("self contacts beyond their radius are ignored", "[hybrid][obstacles]"
   CHECK(chosen.obstacles.points().size() == 1);
 }
 
-TEST_CASE("self contacts may use up the whole capacity", "[hybrid][obstacles]") {
-  const test::Scene scene(test::joint_task(VectorXd::Zero(4)));
+TEST_CASE("self contacts may use up the whole capacity", "[reactive][obstacles]") {
+  const test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4)));
   ObstacleFixture chosen(scene, 0.15);
   hamelin_self_contact contact{};
   contact.shape_a = 19;

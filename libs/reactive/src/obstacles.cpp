@@ -1,8 +1,8 @@
-#include "obstacles.hpp"
+#include "hamelin/reactive/obstacles.hpp"
 
 #include <algorithm>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -100,4 +100,4 @@ void Obstacles::update(const model::Model& model, const dynamics::Workspace& ws,
   }
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// What is lost before braking acts at full strength.
 struct BrakingLoss {
@@ -28,4 +28,4 @@ struct BrakingLoss {
          brake * lag;
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -1,8 +1,8 @@
-#include "margins.hpp"
+#include "hamelin/reactive/margins.hpp"
 
 #include <algorithm>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -63,4 +63,4 @@ bool Margins::tight_at_goal(const NearPoint& point) const {
   return joint_goal_ && clearance_at_goal_[static_cast<std::size_t>(point.shape)] < params_.full_m;
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

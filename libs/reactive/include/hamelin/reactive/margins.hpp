@@ -1,10 +1,10 @@
 #pragma once
 #include <vector>
 
-#include "obstacles.hpp"
-#include "surroundings.hpp"
+#include "hamelin/reactive/obstacles.hpp"
+#include "hamelin/reactive/surroundings.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 struct MarginParams {
   double full_m;   ///< from obstacles, far from the goal
@@ -44,4 +44,4 @@ class Margins {
   std::vector<double> clearance_at_goal_;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

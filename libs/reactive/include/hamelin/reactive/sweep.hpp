@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "movers.hpp"
+#include "hamelin/reactive/movers.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Where moving obstacles were in the last seconds. What swings or turns in place will be there
 /// again. Only the constructor allocates.
@@ -58,4 +58,4 @@ class Sweep {
   double recorded_s_ = 0.0;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

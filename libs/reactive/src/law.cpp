@@ -1,11 +1,11 @@
-#include "law.hpp"
+#include "hamelin/reactive/law.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 namespace {
 
@@ -172,4 +172,4 @@ void Law::steer(const model::Model& model, const dynamics::Workspace& ws,
   }
 }
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -1,15 +1,15 @@
-#include "../src/rollout.hpp"
+#include "hamelin/reactive/rollout.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "fixture.hpp"
+#include "hamelin/test/reactive_scene.hpp"
 
 using namespace hamelin;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
-using Step = hybrid::Rollout::Step;
+using Step = reactive::Rollout::Step;
 
 namespace {
 
@@ -20,7 +20,7 @@ struct Ended {
 
 /// Runs a rollout to its end and calls `each` with every configuration that it moves to.
 template <class Each>
-Ended run(hybrid::Rollout& rollout, Each&& each) {
+Ended run(reactive::Rollout& rollout, Each&& each) {
   for (int steps = 0;; ++steps) {
     const Step step = rollout.step();
     if (step != Step::moved) return {step, steps};
@@ -38,8 +38,8 @@ VectorXd random_joints(Rng& rng, double size) {
 
 }  // namespace
 
-TEST_CASE("in free space a rollout arrives", "[hybrid][rollout]") {
-  test::Scene scene(test::joint_task(Vector4d(0.5, -0.4, 0.3, 0.2)));
+TEST_CASE("in free space a rollout arrives", "[reactive][rollout]") {
+  test::ReactiveScene scene(test::joint_task(Vector4d(0.5, -0.4, 0.3, 0.2)));
   auto& rollout = scene.rollout;
   SECTION("at a joint vector") {
     const VectorXd to = Vector4d(1.0, -0.5, 0.7, 0.1);
@@ -57,8 +57,8 @@ TEST_CASE("in free space a rollout arrives", "[hybrid][rollout]") {
   }
 }
 
-TEST_CASE("in free space a rollout takes the tip to its goal", "[hybrid][rollout]") {
-  test::Scene scene(test::tip_task({0.5, 0.5, 0.0}));
+TEST_CASE("in free space a rollout takes the tip to its goal", "[reactive][rollout]") {
+  test::ReactiveScene scene(test::tip_task({0.5, 0.5, 0.0}));
   const VectorXd start = Vector4d(0.1, 0.4, -0.3, 0.2);
   scene.rollout.begin(start, 300);
   CHECK(run(scene.rollout, nothing).step == Step::arrived);
@@ -67,18 +67,18 @@ TEST_CASE("in free space a rollout takes the tip to its goal", "[hybrid][rollout
         Approx(2.0 * (scene.tip(start) - Vector3d(0.5, 0.5, 0.0)).norm()));
 }
 
-TEST_CASE("a rollout ends after its number of steps", "[hybrid][rollout]") {
-  test::Scene scene(test::joint_task(VectorXd::Zero(4)));
+TEST_CASE("a rollout ends after its number of steps", "[reactive][rollout]") {
+  test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4)));
   scene.rollout.begin(VectorXd::Zero(4), Vector4d(3.0, 0.0, 0.0, 0.0), 5, 0.01);
   int moved = 0;
   CHECK(run(scene.rollout, [&](const VectorXd&) { ++moved; }).step == Step::ended);
   CHECK(moved == 5);
 }
 
-TEST_CASE("a rollout keeps joint limits", "[hybrid][rollout]") {
+TEST_CASE("a rollout keeps joint limits", "[reactive][rollout]") {
   auto task = test::joint_task(VectorXd::Zero(4));
   task.joint_limit = 1.0;
-  test::Scene scene(task);
+  test::ReactiveScene scene(task);
   scene.rollout.begin(VectorXd::Zero(4), Vector4d(2.0, -2.0, 0.5, 0.0), 100, 0.01);
   double most = 0.0;
   const auto end = run(scene.rollout, [&](const VectorXd& q) {
@@ -89,9 +89,9 @@ TEST_CASE("a rollout keeps joint limits", "[hybrid][rollout]") {
   CHECK(most > 0.95);
 }
 
-TEST_CASE("a rollout stops in front of a wall", "[hybrid][rollout]") {
+TEST_CASE("a rollout stops in front of a wall", "[reactive][rollout]") {
   // The wall is a large ball with its surface at x = 0.8.
-  test::Scene scene(test::joint_task(VectorXd::Zero(4), {{{100.8, 0.0, 0.0}, 100.0}}));
+  test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4), {{{100.8, 0.0, 0.0}, 100.0}}));
   const VectorXd start = Vector4d(1.4, 0.0, 0.0, 0.0);
   REQUIRE(scene.clearance(start) > 0.1);
   scene.rollout.begin(start, VectorXd::Zero(4), 200, 0.02);
@@ -106,7 +106,7 @@ TEST_CASE("a rollout stops in front of a wall", "[hybrid][rollout]") {
 }
 
 TEST_CASE("configurations that a rollout keeps are never in contact",
-          "[hybrid][rollout][property]") {
+          "[reactive][rollout][property]") {
   const bool to_goal = GENERATE(false, true);
   CAPTURE(to_goal);
   int arrived = 0, ended = 0, touched = 0;
@@ -120,7 +120,7 @@ TEST_CASE("configurations that a rollout keeps are never in contact",
       balls.push_back(
           {Vector3d(radius * std::cos(at), radius * std::sin(at), 0.0), rng.uniform(0.05, 0.15)});
     }
-    test::Scene scene(test::joint_task(random_joints(rng, 2.0), balls));
+    test::ReactiveScene scene(test::joint_task(random_joints(rng, 2.0), balls));
     VectorXd start = random_joints(rng, 2.0);
     while (scene.clearance(start) < 0.0) start = random_joints(rng, 2.0);
     if (to_goal)
@@ -144,8 +144,8 @@ TEST_CASE("configurations that a rollout keeps are never in contact",
   CHECK(touched < 15);
 }
 
-TEST_CASE("a rollout that starts in contact reports it at once", "[hybrid][rollout]") {
-  test::Scene scene(test::joint_task(VectorXd::Zero(4), {{{0.5, 0.0, 0.0}, 0.1}}));
+TEST_CASE("a rollout that starts in contact reports it at once", "[reactive][rollout]") {
+  test::ReactiveScene scene(test::joint_task(VectorXd::Zero(4), {{{0.5, 0.0, 0.0}, 0.1}}));
   scene.rollout.begin(VectorXd::Zero(4), 10);
   CHECK(scene.rollout.step() == Step::touched);
 }

@@ -3,9 +3,9 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
-#include "obstacles.hpp"
+#include "hamelin/reactive/obstacles.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// The target of the law: the goal, or a way-point in joint space.
 struct Target {
@@ -78,4 +78,4 @@ class Law {
   Eigen::VectorXd centring_, scratch_;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -3,9 +3,9 @@
 #include <vector>
 
 #include "hamelin/planning/plugin.hpp"
-#include "sweep.hpp"
+#include "hamelin/reactive/sweep.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Contacts at configurations other than the arm's present one with what stands still, queried from
 /// the host, and on demand with where moving obstacles were in the last seconds. Only the
@@ -85,4 +85,4 @@ class Surroundings {
   std::size_t count_ = 0, self_count_ = 0;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

@@ -1,11 +1,11 @@
 #pragma once
-#include "law.hpp"
-#include "margins.hpp"
-#include "obstacles.hpp"
-#include "safety_filter.hpp"
-#include "surroundings.hpp"
+#include "hamelin/reactive/law.hpp"
+#include "hamelin/reactive/margins.hpp"
+#include "hamelin/reactive/obstacles.hpp"
+#include "hamelin/reactive/safety_filter.hpp"
+#include "hamelin/reactive/surroundings.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Runs a simplified form of the law under the safety filter ahead from any configuration:
 /// kinematics only, unit inertia, long steps, docs/theory.md (10.26), (10.27). The arm follows the
@@ -58,4 +58,4 @@ class Rollout {
   double tolerance_ = 0.0, distance_ = 0.0, best_ = 0.0;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive
