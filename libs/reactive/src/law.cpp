@@ -24,12 +24,7 @@ constexpr double centring_gain = 0.3;  // towards the middle of the limits, in t
 }  // namespace
 
 Law::Law(const planning::Setup& setup, const model::Model& model, const LawParams& params)
-    : params_(params),
-      J_(6, model.dof()),
-      Jp_(3, model.dof()),
-      JpW_(3, model.dof()),
-      centring_(model.dof()),
-      scratch_(model.dof()) {
+    : params_(params), J_(6, model.dof()), centring_(model.dof()), scratch_(model.dof()) {
   const auto lower = setup.q_lower(), upper = setup.q_upper();
   if (lower && upper && lower->allFinite() && upper->allFinite()) middle_ = 0.5 * (*lower + *upper);
 }
@@ -134,41 +129,6 @@ void Law::repel(std::span<const NearPoint> points, double strength, Eigen::Vecto
     u += (strength * params_.repulsion_speed * (1.0 - h / params_.repulsion_range) /
           std::max(0.05, point.row.squaredNorm())) *
          point.row;
-  }
-}
-
-void Law::steer(const model::Model& model, const dynamics::Workspace& ws,
-                std::span<const NearPoint> points, const Eigen::MatrixXd& W,
-                const Eigen::VectorXd& v, double strength, planning::Command& command) {
-  if (strength * params_.steering_gain <= 0.0) return;
-  int last_link = -1;
-  for (const auto& point : points) {
-    const double h = std::max(point.distance - point.margin, 0.01);
-    // Contacts are sorted by distance. A point is skipped if the last steered point belongs to its
-    // link.
-    if (h >= params_.steering_range || point.link == last_link) continue;
-    const Vector3d velocity = dynamics::point_velocity(model, ws, point.link, point.arm_point, v);
-    const double speed = velocity.norm();
-    if (speed < 1e-3) continue;
-    const Vector3d heading = velocity / speed;
-    const double approach = -heading.dot(point.direction);
-    if (approach <= 0.0) continue;
-    Vector3d axis = heading.cross(point.direction);
-    axis = axis.norm() > 0.05 ? Vector3d(axis.normalized())
-                              : Vector3d(point.direction.unitOrthogonal());
-    dynamics::point_jacobian(model, ws, point.link, point.arm_point, Jp_);
-    JpW_.noalias() = Jp_ * W;
-    // The trace bounds the largest mobility, so no direction turns faster than `rate`.
-    const double mobility = JpW_.cwiseProduct(Jp_).sum();
-    if (mobility < 1e-9) continue;
-    const double rate =
-        strength * params_.steering_gain * approach * (1.0 / h - 1.0 / params_.steering_range);
-    // (axis × heading)·n is the sine of the angle between heading and n, so the force does not push
-    // towards the obstacle. docs/theory.md (10.8)
-    command.add_gyroscopic(point.link,
-                           dynamics::link_pose(model, ws, point.link).inverse() * point.arm_point,
-                           axis * (rate / mobility));
-    last_link = point.link;
   }
 }
 

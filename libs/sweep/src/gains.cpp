@@ -89,10 +89,8 @@ void set_gains(PlannedRun& run, const Gains& g) {
   set("k_p", g.k_p);
   set("k_v", g.k_v);
   set("joint_damping", g.joint_damping);
-  if (run.planner == "apf")
-    set("eta", g.eta);
-  else
-    set(run.planner == "hybrid" ? "steering_gain" : "k_obs", g.k_obs);
+  if (run.planner == "apf") set("eta", g.eta);
+  if (run.planner == "gyro") set("k_obs", g.k_obs);
 }
 
 // docs/theory.md (13.24)

@@ -335,7 +335,7 @@ TEST_CASE(
     const std::string last = run.set.back();
     CHECK(last.starts_with(run.planner == "apf"    ? "/planner/params/eta="
                            : run.planner == "gyro" ? "/planner/params/k_obs="
-                                                   : "/planner/params/steering_gain="));
+                                                   : "/planner/params/joint_damping="));
   }
   CHECK(planners == std::map<std::string, std::size_t>{
                         {"apf", 3}, {"apf without the obstacle", 3}, {"gyro", 3}, {"hybrid", 3}});

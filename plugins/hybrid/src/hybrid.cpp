@@ -34,11 +34,9 @@ using Eigen::VectorXd;
 constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint limit [1/s]
 constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
 constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
-constexpr double steering_share = 0.1;    // largest share of the torque limits for steering
 // Share of the torque limits that friction and wrong masses may explain.
 constexpr double disturbance_share = 0.3;
 constexpr double torque_share = 0.98;  // share of the torque limits for the momentum box
-constexpr double steering_fade = 0.5;  // distance from the target below which steering fades
 // Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
@@ -87,6 +85,12 @@ VectorXd lever_weights(const model::Model& model) {
   return (lever / (0.25 * std::max(1e-9, lever.maxCoeff()))).cwiseMin(1.0).cwiseMax(0.3);
 }
 
+TurnKinds turn_kinds(const Json& params) {
+  const std::string kinds = params["turns"];
+  if (kinds == "tangents") return TurnKinds::tangents;
+  return kinds == "axes" ? TurnKinds::axes : TurnKinds::all;
+}
+
 class Hybrid final : public planning::Planner {
  public:
   static constexpr std::uint32_t properties =
@@ -129,9 +133,25 @@ class Hybrid final : public planning::Planner {
       else
         search_ = std::make_unique<Vias>(setup_, *rollout_, *roots_, box_);
     }
+    if (params["steering"].get<bool>()) {
+      steering_ = std::make_unique<Steering>(host, setup_, model_, Tuning(setup, params).law,
+                                             margins_, SteeringParams{turn_kinds(params)});
+      turn_series_ = host.declare_series("turn", "s");
+    }
     const int n = setup.dof();
-    for (auto* x : {&q_, &v_, &w_, &u_, &x_, &via_, &bias_, &momentum_, &lower_, &upper_, &scratch_,
-                    &steering_})
+    for (auto* x : {
+             &q_,
+             &v_,
+             &w_,
+             &u_,
+             &x_,
+             &via_,
+             &bias_,
+             &momentum_,
+             &lower_,
+             &upper_,
+             &scratch_,
+         })
       *x = VectorXd::Zero(n);
     torque_ = disturbance_ = unexplained_ = last_torque_ = VectorXd::Zero(n);
     // Scenes in which nothing moves need no series.
@@ -140,7 +160,6 @@ class Hybrid final : public planning::Planner {
       clearance_series_ = host.declare_series("clearance_ahead", "m");
     }
     M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
-    terms_.reserve(Obstacles::max_points);
     llt_.compute(identity_);  // allocates its memory
     apply_params(Tuning(setup, params));
   }
@@ -152,6 +171,7 @@ class Hybrid final : public planning::Planner {
   void apply_params(const Tuning& tuning) {
     law_.set_params(tuning.law);
     if (rollout_) rollout_->set_params(tuning.search_law);
+    if (steering_) steering_->set_params(tuning.law);
     if (roots_) roots_->set_params(tuning.search_law);
     margins_.set_params(tuning.margins);
     follower_.set_params(tuning.follow);
@@ -212,14 +232,9 @@ class Hybrid final : public planning::Planner {
       closing_speed = law_.attract(model_, ws_, q_, target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
       const double distance = law_.distance(model_, ws_, q_, target);
+      if (steering_ && mode_ == Mode::goal && path_.empty()) steer(tick, distance);
       law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
-      // Steering turns faster than the law follows, so the arm would circle around a near target,
-      // or stray from a path.
-      if (!setup_.sampled() && !(mode_ == Mode::goal && !path_.empty() && !evader_.active()))
-        law_.steer(model_, ws_, obstacles_.points(), M_inv_, v_,
-                   std::min(1.0, distance / steering_fade), command);
     }
-    bound_steering(command);
 
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
@@ -241,6 +256,7 @@ class Hybrid final : public planning::Planner {
       stall_.restart(tick.time_s());
     else
       check_stall(tick.time_s(), target, closing_speed, command);
+    if (steering_) command.set_series(turn_series_, steering_->turn().left_s);
     if (!evader_.active()) return;
     command.set_series(evasion_series_, static_cast<double>(evader_.act()));
     if (const auto clearance = evader_.clearance_ahead())
@@ -264,6 +280,7 @@ class Hybrid final : public planning::Planner {
     goal_ = &goal;
     goal_number_ = tick.goal_number();
     memory_.restart();
+    if (steering_) steering_->restart();
     escapes_ = 0;
     measure_margins_ = true;
     path_.clear();
@@ -303,6 +320,12 @@ class Hybrid final : public planning::Planner {
         1.0 / target_velocity_gain_ - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
     u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - q_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
+  }
+
+  // docs/theory.md (10.40)
+  void steer(const planning::Tick& tick, double distance) {
+    steering_->advance(tick.time_s(), q_, distance, *goal_, tick.moving_count() > 0);
+    steering_->apply(M_, u_);
   }
 
   void measure_margins() {
@@ -405,27 +428,6 @@ class Hybrid final : public planning::Planner {
     command.held_torque() = torque_;
   }
 
-  // Limits steering to a small share of the torque limits: the rest is reserved for braking.
-  void bound_steering(planning::Command& command) {
-    steering_.setZero();
-    const auto effort = setup_.effort_max();
-    if (!effort || command.gyroscopic_count() == 0) return;
-    terms_.clear();
-    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i) {
-      const auto& term = command.gyroscopic(i);
-      terms_.push_back(
-          {term.link, planning::vec3(term.point_link_m), planning::vec3(term.w_world)});
-    }
-    dynamics::gyroscopic_torque(model_, ws_, q_, v_, terms_, steering_);
-    double scale = 1.0;
-    for (int k = 0; k < setup_.dof(); ++k)
-      scale =
-          std::min(scale, steering_share * (*effort)[k] / std::max(1e-12, std::abs(steering_[k])));
-    for (std::size_t i = 0; i < command.gyroscopic_count(); ++i)
-      for (auto& w : command.gyroscopic(i).w_world) w *= scale;
-    steering_ *= scale;
-  }
-
   void project(planning::Command& command) {
     filter_.begin(M_, M_inv_);
     set_joint_box();
@@ -481,7 +483,7 @@ class Hybrid final : public planning::Planner {
     const auto effort = setup_.effort_max();
     if (!effort) return;
     momentum_.noalias() = M_ * w_;
-    scratch_ = bias_ + steering_ - unexplained_;
+    scratch_ = bias_ - unexplained_;
     lower_ = momentum_ + horizon_s_ * (-torque_share * *effort - scratch_);
     upper_ = momentum_ + horizon_s_ * (torque_share * *effort - scratch_);
     filter_.set_momentum_box(lower_, upper_);
@@ -581,7 +583,7 @@ class Hybrid final : public planning::Planner {
 
   void check_stall(double now, const Target& target, double closing_speed,
                    planning::Command& command) {
-    if (uses_memory_ || search_) command.disable_stall_rule();
+    if (uses_memory_ || search_ || steering_) command.disable_stall_rule();
     if (mode_ == Mode::search) return continue_search(now);
     if (!evader_.evades()) {
       evades_since_s_ = now;
@@ -625,7 +627,19 @@ class Hybrid final : public planning::Planner {
     return now - progress_s_ > patience_s;
   }
 
+  // A stall is left to steering for a while, and if there is no search, until it has tried all it
+  // knows many times.
+  [[nodiscard]] bool steers_on(double now) const {
+    constexpr double steered_s = 10.0;
+    constexpr int rounds = 40;
+    if (mode_ != Mode::goal || !path_.empty()) return false;
+    if (!uses_memory_ && !search_) return steering_->rounds_in_vain() < rounds;
+    return (steering_->turn().on() || steering_->arrives()) &&
+           now - steering_->in_vain_since_s() < steered_s;
+  }
+
   void start_escape(double now, const Target& target, planning::Command& command) {
+    if (steering_ && steers_on(now)) return stall_.restart(now);
     if ((!uses_memory_ && !search_) || escapes_ >= max_escapes_) return command.give_up(cause());
     ++escapes_;
     std::array<char, 64> line{};
@@ -716,6 +730,8 @@ class Hybrid final : public planning::Planner {
   std::unique_ptr<Rollout> rollout_;
   std::unique_ptr<Roots> roots_;
   std::unique_ptr<Search> search_;
+  std::unique_ptr<Steering> steering_;
+  std::int32_t turn_series_ = -1;
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
@@ -724,11 +740,10 @@ class Hybrid final : public planning::Planner {
   std::optional<TorqueRamp> ramp_;  ///< only where the rate of the torque is limited
   bool uses_memory_ = false;
   JointPath path_;
-  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, steering_, torque_;
+  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, torque_;
   /// What the nominal model does not explain, as acceleration and as torque; both are zero under
   /// ideal actuation.
   VectorXd disturbance_, unexplained_, last_torque_;
-  std::vector<dynamics::GyroscopicTerm> terms_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_

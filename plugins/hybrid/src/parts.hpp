@@ -5,6 +5,7 @@
 #include "hamelin/reactive/obstacles.hpp"
 #include "hamelin/reactive/rollout.hpp"
 #include "hamelin/reactive/safety_filter.hpp"
+#include "hamelin/reactive/steering.hpp"
 #include "hamelin/reactive/surroundings.hpp"
 
 namespace hamelin::hybrid {

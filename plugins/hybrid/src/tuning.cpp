@@ -12,8 +12,8 @@ constexpr double joint_speed_share = 1.5;  // of the cruise speed, for |u| towar
 constexpr double voxel_at_goal = 0.4;      // share of a voxel that is kept near a tip goal
 
 // These determine the crop of the map, the kind of search, or the size of memory.
-constexpr std::array fixed{"contact_radius_m", "escape", "search_budget", "max_escapes",
-                           "horizon_s"};
+constexpr std::array fixed{"contact_radius_m", "escape",   "search_budget", "max_escapes",
+                           "horizon_s",        "steering", "turns"};
 
 double value_or(const Json& value, double otherwise) {
   return value.is_null() ? otherwise : value.get<double>();
@@ -24,9 +24,9 @@ LawParams law_params(const Json& params, bool own_gains) {
   const double gain = !own_gains || params["k_p"].is_null()
                           ? 0.0
                           : params["k_p"].get<double>() / value_or(params["k_v"], 1.0);
-  return {gain > 0.0 ? gain : 4.0,       gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
-          params["tip_speed_m_s"],       params["tip_turn_rad_s"], params["repulsion_range_m"],
-          params["repulsion_speed_m_s"], params["steering_gain"],  params["steering_range_m"]};
+  return {gain > 0.0 ? gain : 4.0,      gain > 0.0 ? gain : 3.0,  params["cruise_speed"],
+          params["tip_speed_m_s"],      params["tip_turn_rad_s"], params["repulsion_range_m"],
+          params["repulsion_speed_m_s"]};
 }
 
 MarginParams margin_params(const planning::Setup& setup, const Json& params) {

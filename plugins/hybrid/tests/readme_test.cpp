@@ -9,7 +9,7 @@ TEST_CASE("the README's example runs", "[hybrid][docs]") {
   // [example]
 // The nearest admissible velocity for one obstacle row and a velocity box.
 const Eigen::MatrixXd M = Eigen::Vector2d(2.0, 1.0).asDiagonal(), W = M.inverse();
-hamelin::hybrid::SafetyFilter filter(2, 8);
+hamelin::reactive::SafetyFilter filter(2, 8);
 filter.begin(M, W);
 filter.add_row(Eigen::Vector2d(1.0, 0.0), -0.1, -0.2);  // a·x ≥ −0.1, and in any case ≥ −0.2
 filter.set_box(Eigen::Vector2d(-1.0, -1.0), Eigen::Vector2d(1.0, 1.0));

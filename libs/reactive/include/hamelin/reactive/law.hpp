@@ -32,11 +32,9 @@ struct LawParams {
   double joint_gain, tip_gain;  ///< near a target of the joints and of the tip [1/s]
   double cruise_speed, tip_speed, tip_turn;
   double repulsion_range, repulsion_speed;
-  double steering_gain, steering_range;
 };
 
-/// The desired joint velocity without regard to limits: attraction, short repulsion, and gyroscopic
-/// terms that steer around approached obstacles without doing work.
+/// The desired joint velocity without regard to limits: attraction and short repulsion.
 class Law {
  public:
   Law(const planning::Setup& setup, const model::Model& model, const LawParams& params);
@@ -62,19 +60,11 @@ class Law {
   /// u += strength · speed (1 − h/range)/max(0.05, |a|²) · a, with the row a and
   /// h = max(distance − margin, 0).
   void repel(std::span<const NearPoint> points, double strength, Eigen::VectorXd& u) const;
-  /// Adds gyroscopic terms that turn approaching points away from the obstacle without work,
-  /// docs/theory.md (10.8): w = κ unit(v̂ × n)/tr(J W Jᵀ), κ = strength · gain α (1/h − 1/range),
-  /// α = −v̂·n, h = max(distance − margin, 1 cm).
-  /// @param W inverse of the mass matrix
-  void steer(const model::Model& model, const dynamics::Workspace& ws,
-             std::span<const NearPoint> points, const Eigen::MatrixXd& W, const Eigen::VectorXd& v,
-             double strength, planning::Command& command);
 
  private:
   LawParams params_;
   Eigen::VectorXd middle_;  ///< of the joint limits; empty where they are not modelled
   dynamics::Matrix6Xd J_;
-  dynamics::Matrix3Xd Jp_, JpW_;
   Eigen::VectorXd centring_, scratch_;
 };
 

@@ -1,9 +1,6 @@
 #pragma once
+#include "hamelin/reactive/glide.hpp"
 #include "hamelin/reactive/law.hpp"
-#include "hamelin/reactive/margins.hpp"
-#include "hamelin/reactive/obstacles.hpp"
-#include "hamelin/reactive/safety_filter.hpp"
-#include "hamelin/reactive/surroundings.hpp"
 
 namespace hamelin::reactive {
 
@@ -39,19 +36,14 @@ class Rollout {
  private:
   void start(const Eigen::VectorXd& q, int steps);
   [[nodiscard]] bool arrived(const Target& target) const;
-  void filter();
 
-  const planning::Setup setup_;
   const model::Model& model_;
-  const Margins& margins_;
-  Surroundings& surroundings_;
   dynamics::Workspace ws_;
   Law law_;
   LawParams params_;
-  Obstacles obstacles_;
-  SafetyFilter filter_;
+  Glide glide_;
   Eigen::MatrixXd identity_;
-  Eigen::VectorXd q_, to_, u_, lower_, upper_;
+  Eigen::VectorXd q_, to_, u_;
   const hamelin_goal* goal_ = nullptr;
   bool to_goal_ = false;
   int steps_left_ = 0, idle_ = 0;

@@ -24,11 +24,16 @@ class Surroundings {
   /// What counts in addition to what stands still; null: nothing.
   void count(Sweep* sweep) noexcept { sweep_ = sweep; }
   /// Finds the contacts at q up to `radius` from obstacles and the self contacts up to
-  /// `self_radius` [m].
-  void query(const Eigen::VectorXd& q, double radius, double self_radius) {
+  /// `self_radius` [m]. @param ahead_s time at which moving obstacles count where they are
+  /// predicted to be; below 0 they do not count
+  void query(const Eigen::VectorXd& q, double radius, double self_radius, double ahead_s = -1.0) {
     const std::span<const double> at(q.data(), static_cast<std::size_t>(q.size()));
-    count_ = std::min(host_.closest_ahead(at, 0.0, HAMELIN_STANDING, radius, contacts_),
-                      contacts_.size());
+    const bool moving = ahead_s >= 0.0;
+    count_ =
+        std::min(host_.closest_ahead(at, moving ? ahead_s : 0.0,
+                                     moving ? HAMELIN_STANDING | HAMELIN_MOVING : HAMELIN_STANDING,
+                                     radius, contacts_),
+                 contacts_.size());
     if (sweep_ != nullptr) add_sweep(q, radius);
     self_count_ = 0;
     if (self_collision_)

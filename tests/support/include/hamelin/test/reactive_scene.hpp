@@ -72,7 +72,7 @@ inline Task tip_task(const Eigen::Vector3d& p, std::vector<Ball> balls = {}) {
 }
 
 /// The default parameters of the planner.
-inline constexpr reactive::LawParams law_params{4.0, 3.0, 2.0, 0.5, 1.5, 0.02, 0.15, 1.0, 0.08};
+inline constexpr reactive::LawParams law_params{4.0, 3.0, 2.0, 0.5, 1.5, 0.02, 0.15};
 inline constexpr reactive::MarginParams margin_params{0.01, 0.003, 0.003, 0.005};
 inline constexpr double contact_radius = 0.15;
 
