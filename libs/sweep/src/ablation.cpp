@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view params_pointer = "/planner/params/";
 
 // The key of "/planner/params/KEY=VALUE"; empty for assignments of other values.
-std::string key_of(std::string_view assignment) {
+std::string parameter_key(std::string_view assignment) {
   if (!assignment.starts_with(params_pointer)) return {};
   const auto rest = assignment.substr(params_pointer.size());
   return std::string(rest.substr(0, rest.find_first_of("=/")));
@@ -126,7 +126,7 @@ Json value_without(const std::string& planner, const std::string& part, const st
 }
 
 // The text of a value after "key=" in a planner, where commas separate parameters.
-std::string text_of(const Json& value) {
+std::string planner_text_of(const Json& value) {
   if (!value.is_string()) return value.dump();
   const std::string& text = value.get_ref<const std::string&>();
   const bool plain = text.find_first_of(",\"[{") == std::string::npos && !Json::accept(text);
@@ -147,9 +147,9 @@ Ablation make_ablation(const std::string& planner, const std::string& part,
   const Json value = value_without(planner, part, name, Parameters(variant, plugin_directories));
   std::vector<std::string> others;
   for (const auto& assignment : variant.set)
-    if (const auto key = key_of(assignment); !key.empty() && key != name)
+    if (const auto key = parameter_key(assignment); !key.empty() && key != name)
       others.push_back(assignment.substr(params_pointer.size()));
-  others.push_back(fmt::format("{}={}", name, text_of(value)));
+  others.push_back(fmt::format("{}={}", name, planner_text_of(value)));
   return {planner,
           fmt::format("{}:{}", planner.substr(0, planner.find(':')), fmt::join(others, ",")), name,
           value};
@@ -179,7 +179,7 @@ void add_ablations(PlanOptions& options, const std::vector<std::string>& parts) 
 }
 
 std::string part_of(const Ablation& ablation) {
-  return fmt::format("{}={}", ablation.parameter, text_of(ablation.value));
+  return fmt::format("{}={}", ablation.parameter, planner_text_of(ablation.value));
 }
 
 }  // namespace hamelin::sweep
