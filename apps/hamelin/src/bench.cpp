@@ -83,7 +83,6 @@ int bench_make(const SetOptions& options) {
 void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
                     const std::vector<bench::Problem>& problems) {
   sweep::PlanOptions plan;
-  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
   plan.problem.robot = set.robot.robot;
   plan.problem.spheres = set.robot.spheres;
   plan.problem.tip = set.robot.tip;
@@ -95,6 +94,7 @@ void plan_benchmark(const RunOptions& options, const fs::path& file, const bench
   plan.plugin_directories = plugin_path(options.plugin_path);
   if (!options.ablations.empty() && plan.planners.empty()) plan.planners = {"hybrid"};
   sweep::add_ablations(plan, options.ablations);
+  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
   Progress progress("problems made");
   plan.on_scene = [&progress](std::size_t done, std::size_t all) {
     progress.show(static_cast<double>(done), static_cast<double>(all));
@@ -122,6 +122,7 @@ bench::Results write_results(const fs::path& directory, const bench::ProblemSet&
   const fs::path target = directory / "benchmark.json";
   write_file_atomically(target, document.dump(2) + "\n");
   for (const auto& text : results.by_family.notes) note(text);
+  for (const auto& text : bench::parts_without_effect(results)) note(text);
   if (json)
     print_json(document);
   else

@@ -200,4 +200,16 @@ std::vector<std::string> harmful_parts(const Results& results) {
   return lines;
 }
 
+std::vector<std::string> parts_without_effect(const Results& results) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < results.ablations.size(); ++i) {
+    const sweep::Comparison& c = results.ablations[i];
+    if (c.both == 0 || c.only_a + c.only_b + c.times.used > 0) continue;
+    lines.push_back(fmt::format("{}: {} changes neither success nor arrival of any of {} problems",
+                                c.a, sweep::part_of(results.by_family.sweeps.ablations[i]),
+                                c.pairs));
+  }
+  return lines;
+}
+
 }  // namespace hamelin::bench

@@ -100,6 +100,7 @@ TEST_CASE("an ablation is tested by hand-counted pairs", "[bench][unit]") {
   CHECK_THAT(table, Catch::Contains("| p | turn=false | 11/14 | 7/14 | 5 | 1 | 0.22 | +28.6 | "));
   CHECK_THAT(table, Catch::Contains("| 0 | 2 | -3.50 | -6.00 to -1.00 |\n"));
   CHECK(harmful_parts(results).empty());
+  CHECK(parts_without_effect(results).empty());
 }
 
 TEST_CASE("without discordant pairs Tango's interval has a closed form", "[bench][unit]") {
@@ -113,6 +114,9 @@ TEST_CASE("without discordant pairs Tango's interval has a closed form", "[bench
   CHECK(ablation["reached"]["difference_interval"][1].get<double>() ==
         Approx(z2 / (10.0 + z2)).margin(1e-6));
   CHECK(ablation["arrival"]["p"].is_null());
+  CHECK(parts_without_effect(results) ==
+        std::vector<std::string>{
+            "p: turn=false changes neither success nor arrival of any of 10 problems"});
   check_shipped_schema(to_json(results), "benchmark", "made results");
 }
 

@@ -98,7 +98,7 @@ class Parameters {
   Json given_, now_, rules_;
 };
 
-[[noreturn]] void refuse(const std::string& part, const std::string& what) {
+[[noreturn]] void refuse_part(const std::string& part, const std::string& what) {
   throw Error(ErrorCode::usage, fmt::format("--ablate {}: {}", part, what));
 }
 
@@ -106,22 +106,23 @@ class Parameters {
 Json value_without(const std::string& planner, const std::string& part, const std::string& name,
                    const Parameters& parameters) {
   if (!parameters.has(name))
-    refuse(part, fmt::format("planner '{}' has no parameter '{}', expected one of {}", planner,
-                             name, parameters.choices()));
+    refuse_part(part, fmt::format("planner '{}' has no parameter '{}', expected one of {}", planner,
+                                  name, parameters.choices()));
   Json value;
   if (name.size() < part.size()) {
     value = params_of({fmt::format("{}{}", params_pointer, part)})[name];
-    if (const auto why = parameters.refusal(name, value); !why.empty()) refuse(part, why);
+    if (const auto why = parameters.refusal(name, value); !why.empty()) refuse_part(part, why);
   } else if (const auto off = parameters.off(name)) {
     value = *off;
   } else {
-    refuse(part, fmt::format("planner '{0}' does not allow to switch '{1}' off by 0 or by a "
-                             "negation, expected {1}=VALUE or one of {2}",
-                             planner, name, parameters.choices()));
+    refuse_part(
+        part, fmt::format("'{1}' of planner '{0}' can be neither 0 nor negated, expected {1}=VALUE "
+                          "or one of {2}",
+                          planner, name, parameters.choices()));
   }
   if (value == parameters.now(name))
-    refuse(part, fmt::format("planner '{}' has {}={} already, expected another value", planner,
-                             name, value.dump()));
+    refuse_part(part, fmt::format("planner '{}' has {}={} already, expected another value", planner,
+                                  name, value.dump()));
   return value;
 }
 
@@ -138,11 +139,12 @@ std::string planner_text_of(const Json& value) {
 Ablation make_ablation(const std::string& planner, const std::string& part,
                        const std::vector<fs::path>& plugin_directories) {
   const std::string name = part.substr(0, part.find('='));
-  if (name.empty()) refuse(part, "no parameter, expected PARAMETER or PARAMETER=VALUE");
+  if (name.empty()) refuse_part(part, "no parameter, expected PARAMETER or PARAMETER=VALUE");
   if (scene::python_planner(planner, "--planner"))
-    refuse(part, fmt::format("'{}' is written in Python, expected a planner whose plugin has a "
-                             "schema of its parameters",
-                             planner));
+    refuse_part(part,
+                fmt::format("'{}' is written in Python, expected a planner whose plugin has a "
+                            "schema of its parameters",
+                            planner));
   const Variant variant = parse_variant(planner, ".");
   const Json value = value_without(planner, part, name, Parameters(variant, plugin_directories));
   std::vector<std::string> others;
@@ -165,12 +167,13 @@ void add_ablations(PlanOptions& options, const std::vector<std::string>& parts) 
       Ablation ablation = make_ablation(planner, part, options.plugin_directories);
       for (const auto& assignment : options.set)
         if (sets_parameter(assignment, ablation.parameter))
-          refuse(part, fmt::format("--set {} sets this parameter in all runs, expected it to be "
-                                   "set by --planner NAME:key=value",
-                                   assignment));
+          refuse_part(part,
+                      fmt::format("--set {} sets this parameter in all runs, expected it to be "
+                                  "set by --planner NAME:key=value",
+                                  assignment));
       if (std::find(planners.begin(), planners.end(), ablation.without) != planners.end())
-        refuse(part,
-               fmt::format("'{}' is planned already, expected each part once", ablation.without));
+        refuse_part(part, fmt::format("'{}' is planned already, expected each part once",
+                                      ablation.without));
       planners.push_back(ablation.without);
       options.ablations.push_back(std::move(ablation));
     }

@@ -35,4 +35,9 @@ struct Results {
 /// test): a line for each, that names planner and part.
 [[nodiscard]] std::vector<std::string> harmful_parts(const Results& results);
 
+/// Parts that change neither success nor arrival of any problem, as if the planner did not use
+/// them: a line for each, that names planner and part. Parts without a problem that both solve are
+/// left out.
+[[nodiscard]] std::vector<std::string> parts_without_effect(const Results& results);
+
 }  // namespace hamelin::bench
