@@ -83,18 +83,24 @@ TEST_CASE("planners run with the benchmark, and its results fit their schema", "
 
 TEST_CASE("planners are compared with themselves without a part", "[end_to_end]") {
   Sandbox sandbox;
-  const Strings command{"bench",        "run",  "--family",      "shelf,pillars",
-                        "--per-family", "1",    "--planner",     "hybrid",
-                        "--planner",    "gyro", "--ablate",      "joint_damping=0.5",
-                        "--duration",   "3",    "--expect-gain", "-o",
+  const Strings command{"bench",         "run",
+                        "--family",      "shelf,pillars",
+                        "--per-family",  "1",
+                        "--planner",     "hybrid",
+                        "--planner",     "hybrid:escape=memory",
+                        "--ablate",      "repulsion_speed_m_s",
+                        "--duration",    "3",
+                        "--expect-gain", "-o",
                         "parts"};
   const auto output = sandbox.run(command);
   CAPTURE(output.err);
   REQUIRE(output.exit_code == 0);
   CHECK_THAT(line_of(output.out, "family"),
-             Catch::EndsWith("hybrid  hybrid:joint_damping=0.5  gyro  gyro:joint_damping=0.5"));
+             Catch::EndsWith("hybrid  hybrid:repulsion_speed_m_s=0  hybrid:escape=memory  "
+                             "hybrid:escape=memory,repulsion_speed_m_s=0"));
   CHECK_THAT(line_of(output.out, "ablation"), Catch::Contains("only with  only without"));
-  CHECK_THAT(line_of(output.out, "gyro:joint_damping=0.5"), Catch::Contains("/2"));
+  CHECK_THAT(line_of(output.out, "hybrid:escape=memory,repulsion_speed_m_s=0"),
+             Catch::Contains("/2"));
   const auto checked = sandbox.run({"validate", "parts/benchmark.json", "parts/plan.json"});
   CAPTURE(checked.err);
   CHECK(checked.exit_code == 0);
@@ -102,21 +108,22 @@ TEST_CASE("planners are compared with themselves without a part", "[end_to_end]"
   CHECK(results["planners"].size() == 4);
   REQUIRE(results["ablations"].size() == 2);
   CHECK(results["ablations"][0]["planner"] == "hybrid");
-  CHECK(results["ablations"][1]["without"] == "gyro:joint_damping=0.5");
+  CHECK(results["ablations"][1]["without"] == "hybrid:escape=memory,repulsion_speed_m_s=0");
   for (const auto& ablation : results["ablations"]) {
-    CHECK(ablation["value"] == 0.5);
+    CHECK(ablation["value"] == 0);
     CHECK(ablation["pairs"] == 2);
     CHECK(ablation["left_out"] == 0);
   }
-  // the directory knows what was ablated, and the records show that the part was off
+  // the directory stores what was ablated, and only those runs have the part switched off
   CHECK(sandbox.run({"bench", "table", "parts"}).out == output.out);
   for (const auto& run : sandbox.json("parts/plan.json")["runs"]) {
-    const bool ablated = run["labels"]["planner"].get<std::string>().ends_with("=0.5");
-    CHECK(run["set"].dump().find("/planner/params/joint_damping=0.5") != std::string::npos ==
-          ablated);
+    const bool ablated = run["labels"]["planner"].get<std::string>().ends_with("=0");
+    const bool set =
+        run["set"].dump().find("/planner/params/repulsion_speed_m_s=0") != std::string::npos;
+    CHECK(set == ablated);
   }
   CHECK_THAT(sandbox.run({"sweep", "compare", "parts"}).out,
-             Catch::Contains("gyro against gyro:joint_damping=0.5: 2 pairs"));
+             Catch::Contains("hybrid against hybrid:repulsion_speed_m_s=0: 2 pairs"));
   test::require_pages();
   CHECK(sandbox.run({"sweep", "merge", "parts", "--page", "page.html"}).exit_code == 0);
   CHECK(sandbox.has("page.html"));
