@@ -12,6 +12,7 @@
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/file.hpp"
 #include "hamelin/log/result.hpp"
+#include "hamelin/sweep/ablation.hpp"
 #include "hamelin/sweep/make_plan.hpp"
 #include "hamelin/sweep/run_sweep.hpp"
 #include "output.hpp"
@@ -32,7 +33,8 @@ struct SetOptions {
 };
 
 struct RunOptions : SetOptions {
-  std::vector<std::string> planners, assignments;
+  std::vector<std::string> planners, assignments, ablations;
+  bool expect_gain = false;
   std::string goal = "joint";
   double duration_s = 20.0;
   std::size_t jobs = 1;
@@ -81,7 +83,6 @@ int bench_make(const SetOptions& options) {
 void plan_benchmark(const RunOptions& options, const fs::path& file, const bench::ProblemSet& set,
                     const std::vector<bench::Problem>& problems) {
   sweep::PlanOptions plan;
-  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
   plan.problem.robot = set.robot.robot;
   plan.problem.spheres = set.robot.spheres;
   plan.problem.tip = set.robot.tip;
@@ -91,6 +92,9 @@ void plan_benchmark(const RunOptions& options, const fs::path& file, const bench
   plan.set = options.assignments;
   plan.duration_s = options.duration_s;
   plan.plugin_directories = plugin_path(options.plugin_path);
+  if (!options.ablations.empty() && plan.planners.empty()) plan.planners = {"hybrid"};
+  sweep::add_ablations(plan, options.ablations);
+  plan.files = bench::write_problems(problems, options.output / "problems", file.string());
   Progress progress("problems made");
   plan.on_scene = [&progress](std::size_t done, std::size_t all) {
     progress.show(static_cast<double>(done), static_cast<double>(all));
@@ -111,34 +115,42 @@ sweep::RunOutcome run_benchmark(const RunOptions& options) {
   return sweep::run_sweep(options.output, sweep);
 }
 
-void write_results(const fs::path& directory, const bench::ProblemSet& set, bool markdown,
-                   bool json) {
-  const bench::Results results = bench::read_results(directory, set);
+bench::Results write_results(const fs::path& directory, const bench::ProblemSet& set, bool markdown,
+                             bool json) {
+  bench::Results results = bench::read_results(directory, set);
   const Json document = bench::to_json(results);
   const fs::path target = directory / "benchmark.json";
   write_file_atomically(target, document.dump(2) + "\n");
   for (const auto& text : results.by_family.notes) note(text);
+  for (const auto& text : bench::parts_without_effect(results)) note(text);
   if (json)
     print_json(document);
   else
     report(fmt::format("{}\n{}: {}\n", bench::to_table(results, markdown), target.string(),
                        describe(set, results.problems.size())));
+  return results;
 }
 
 int bench_table(const TableOptions& options) {
-  write_results(options.directory, bench::read_problem_set(set_file(options.set)), options.markdown,
-                options.json);
+  (void)write_results(options.directory, bench::read_problem_set(set_file(options.set)),
+                      options.markdown, options.json);
   return 0;
 }
 
 int bench_run(const RunOptions& options) {
+  if (options.expect_gain && options.ablations.empty())
+    throw Error(ErrorCode::usage, "--expect-gain: has no effect without --ablate");
   const fs::path file = set_file(options.set);
   const bench::ProblemSet set = bench::read_problem_set(file);
   const auto problems = bench::select(set, options.selection);
   plan_benchmark(options, file, set, problems);
   const sweep::RunOutcome outcome = run_benchmark(options);
-  write_results(options.output, set, options.markdown, options.json);
-  return outcome.stopped ? log::exit_code(log::Outcome::interrupted) : 0;
+  const auto results = write_results(options.output, set, options.markdown, options.json);
+  if (outcome.stopped) return log::exit_code(log::Outcome::interrupted);
+  if (!options.expect_gain) return 0;
+  const auto harmful = bench::harmful_parts(results);
+  for (const auto& line : harmful) error_line(line);
+  return harmful.empty() ? 0 : 1;
 }
 
 /// A directory for temporary files, removed at the end.
@@ -226,24 +238,38 @@ void add_make(CLI::App& parent, int& exit_code) {
   command->callback([options, &exit_code] { exit_code = bench_make(*options); });
 }
 
+void add_planner_options(CLI::App& command, RunOptions& options) {
+  command
+      .add_option("--planner", options.planners,
+                  "planner, with parameters as in hybrid:escape=tree, with a guide as in "
+                  "hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default hybrid)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  command
+      .add_option("--ablate", options.ablations,
+                  "also run each planner without one part, and compare the two by paired tests: a "
+                  "boolean parameter is negated, a number becomes 0, others need a value as in "
+                  "escape=none; may be repeated")
+      ->type_name("PARAMETER[=VALUE]")
+      ->allow_extra_args(false);
+  command.add_flag("--expect-gain", options.expect_gain,
+                   "with --ablate: exit with code 1 if a planner solves significantly more "
+                   "problems without a part (p < 0.05), and name the part");
+}
+
 void add_run_command(CLI::App& parent, int& exit_code) {
   auto* command = add_command(
       parent, "run",
       "Run planners with the problems of a set, print a table of the results and write them to "
       "DIR/benchmark.json. Resumes where it stopped if it was interrupted",
       "hamelin bench run --planner hybrid --planner apf --per-family 1 -o quick\n"
-      "hamelin bench run --planner hybrid+rrt-connect --planner ./libmine.so -o full\n"
-      "hamelin bench run --planner python:mine.py:Mine -o mine --markdown");
+      "hamelin bench run --planner hybrid+rrt-connect --planner python:mine.py:Mine -o full\n"
+      "hamelin bench run --ablate steering_gain --ablate escape=none --per-family 2 -o parts");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("-o,--output", options->output, "directory to write problems and records to")
       ->required()
       ->type_name("DIR");
-  command
-      ->add_option("--planner", options->planners,
-                   "planner, with parameters as in hybrid:escape=tree, with a guide as in "
-                   "hybrid+rrt-connect, or python:FILE:CLASS; may be repeated (default hybrid)")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
+  add_planner_options(*command, *options);
   command
       ->add_option("--set", options->assignments,
                    "set one value of all scenes, e.g. /step_s=0.002; may be repeated")

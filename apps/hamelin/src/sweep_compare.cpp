@@ -61,7 +61,7 @@ int sweep_compare(const CompareCommand& options) {
   if (page) {
     sweep::PageExtras extras;
     if (directories.size() > 1) extras.comparisons.emplace_back("Sweeps", comparisons);
-    for (auto& more : sweep::comparisons_of_page(merged.sweeps.runs))
+    for (auto& more : sweep::comparisons_of_page(merged.sweeps))
       extras.comparisons.push_back(std::move(more));
     write_page(*template_file, report::pack(sweep::page_json(merged, extras)), *page);
   }

@@ -58,7 +58,7 @@ int sweep_merge(const MergeOptions& options) {
   if (page) {
     sweep::PageExtras extras;
     extras.replays = write_replays(merged, {options.replay, *page, options.plugin_path});
-    extras.comparisons = sweep::comparisons_of_page(merged.sweeps.runs);
+    extras.comparisons = sweep::comparisons_of_page(merged.sweeps);
     write_page(*template_file, report::pack(sweep::page_json(merged, extras)), *page);
   }
   if (records) sweep::write_records(merged.sweeps, *records, timing);

@@ -8,6 +8,7 @@
 #include "hamelin/bench/families.hpp"
 #include "hamelin/core/error.hpp"
 #include "hamelin/io/text_table.hpp"
+#include "hamelin/sweep/ablation.hpp"
 
 namespace hamelin::bench {
 
@@ -67,6 +68,61 @@ TextTable planner_table(const Results& results) {
   return table;
 }
 
+// "-1.2 to +3.4", of an interval that is multiplied by `scale`.
+std::string shown(const sweep::Interval& interval, double scale, int digits) {
+  return fmt::format("{:+.{}f} to {:+.{}f}", scale * interval.low, digits, scale * interval.high,
+                     digits);
+}
+
+TextTable ablation_table(const Results& results) {
+  TextTable table{
+      {"ablation of", "part", "with", "without", "only with", "only without", "p", "difference %",
+       "95 %", "contacts with", "contacts without", "later by s", "95 % s"},
+      {},
+      2};
+  for (std::size_t i = 0; i < results.ablations.size(); ++i) {
+    const sweep::Ablation& ablation = results.by_family.sweeps.ablations[i];
+    const sweep::Comparison& c = results.ablations[i];
+    const auto& time = c.time_difference_s;
+    table.rows.push_back(
+        {ablation.planner, sweep::part_of(ablation),
+         fmt::format("{}/{}", c.both + c.only_a, c.pairs),
+         fmt::format("{}/{}", c.both + c.only_b, c.pairs), fmt::format("{}", c.only_a),
+         fmt::format("{}", c.only_b), fmt::format("{:.2g}", c.reached_p),
+         fmt::format("{:+.1f}", 100.0 * c.difference()), shown(c.difference_interval, 100.0, 1),
+         fmt::format("{}", c.contacts_a), fmt::format("{}", c.contacts_b),
+         time ? fmt::format("{:+.2f}", time->estimate) : "-",
+         time && time->interval ? shown(*time->interval, 1.0, 2) : "-"});
+  }
+  return table;
+}
+
+Json ablation_json(const sweep::Ablation& ablation, const sweep::Comparison& c) {
+  const auto interval = [](const sweep::Interval& i) { return Json::array({i.low, i.high}); };
+  const auto& time = c.time_difference_s;
+  return {{"planner", ablation.planner},
+          {"without", ablation.without},
+          {"parameter", ablation.parameter},
+          {"value", ablation.value},
+          {"pairs", c.pairs},
+          {"left_out", c.without},
+          {"reached",
+           {{"with", c.both + c.only_a},
+            {"without", c.both + c.only_b},
+            {"only_with", c.only_a},
+            {"only_without", c.only_b},
+            {"difference", c.difference()},
+            {"difference_interval", interval(c.difference_interval)},
+            {"p", c.reached_p}}},
+          {"contacts", {{"with", c.contacts_a}, {"without", c.contacts_b}}},
+          {"arrival",
+           {{"pairs", c.both},
+            {"difference_s", time ? Json(time->estimate) : Json(nullptr)},
+            {"difference_interval_s",
+             time && time->interval ? interval(*time->interval) : Json(nullptr)},
+            {"p", c.times.used > 0 ? Json(c.times.p) : Json(nullptr)}}}};
+}
+
 // The problems of the set that the plan has.
 std::vector<Problem> planned_problems(const sweep::Plan& plan, const ProblemSet& set,
                                       const std::string& where) {
@@ -90,6 +146,7 @@ Results read_results(const std::filesystem::path& directory, const ProblemSet& s
                   {},
                   {},
                   sweep::merge(sweep::read_sweeps({directory}), {"family", "planner"}),
+                  {},
                   {}};
   for (const auto& run : results.by_family.sweeps.runs) {
     const std::string& planner = run.run.labels.at("planner");
@@ -98,6 +155,7 @@ Results read_results(const std::filesystem::path& directory, const ProblemSet& s
       results.planners.push_back(planner);
   }
   results.by_planner = sweep::group(results.by_family.sweeps.runs, {"planner"});
+  results.ablations = sweep::compare_ablations(results.by_family.sweeps);
   const sweep::Plan plan = sweep::read_plan(directory);
   const auto problems = planned_problems(plan, set, sweep::plan_file(directory).string());
   check_maps(problems, plan, sweep::plan_file(directory).string());
@@ -106,19 +164,52 @@ Results read_results(const std::filesystem::path& directory, const ProblemSet& s
 }
 
 Json to_json(const Results& results) {
+  Json ablations = Json::array();
+  for (std::size_t i = 0; i < results.ablations.size(); ++i)
+    ablations.push_back(ablation_json(results.by_family.sweeps.ablations[i], results.ablations[i]));
   return {{"schema", "hamelin.benchmark/1"},
           {"set", {{"name", results.set_name}, {"sha256", results.set_sha256}}},
           {"problems", results.problems},
           {"planners", results.planners},
           {"machine", results.by_family.sweeps.machine},
-          {"summary", sweep::to_json(results.by_family)}};
+          {"summary", sweep::to_json(results.by_family)},
+          {"ablations", std::move(ablations)}};
 }
 
 std::string to_table(const Results& results, bool markdown) {
   const auto text = [markdown](const TextTable& table) {
     return markdown ? to_markdown(table) : hamelin::to_text(table);
   };
-  return text(family_table(results)) + "\n" + text(planner_table(results));
+  std::string all = text(family_table(results)) + "\n" + text(planner_table(results));
+  if (!results.ablations.empty()) all += "\n" + text(ablation_table(results));
+  return all;
+}
+
+std::vector<std::string> harmful_parts(const Results& results) {
+  constexpr double level = 0.05;
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < results.ablations.size(); ++i) {
+    const sweep::Comparison& c = results.ablations[i];
+    if (c.only_b <= c.only_a || c.reached_p >= level) continue;
+    lines.push_back(fmt::format(
+        "{}: reaches {} of {} goals, and {} with {} (McNemar p = {:.2g}), expected no part to "
+        "reduce success",
+        c.a, c.both + c.only_a, c.pairs, c.both + c.only_b,
+        sweep::part_of(results.by_family.sweeps.ablations[i]), c.reached_p));
+  }
+  return lines;
+}
+
+std::vector<std::string> parts_without_effect(const Results& results) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < results.ablations.size(); ++i) {
+    const sweep::Comparison& c = results.ablations[i];
+    if (c.both == 0 || c.only_a + c.only_b + c.times.used > 0) continue;
+    lines.push_back(fmt::format("{}: {} changes neither success nor arrival of any of {} problems",
+                                c.a, sweep::part_of(results.by_family.sweeps.ablations[i]),
+                                c.pairs));
+  }
+  return lines;
 }
 
 }  // namespace hamelin::bench

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -66,6 +67,8 @@ class Pairing {
     ++out_.pairs;
     const bool left = a.facts.success, right = b.facts.success;
     ++(left && right ? out_.both : left ? out_.only_a : right ? out_.only_b : out_.neither);
+    out_.contacts_a += a.facts.judge_saw_contact ? 1U : 0U;
+    out_.contacts_b += b.facts.judge_saw_contact ? 1U : 0U;
     if (left && right)
       times_.push_back(a.facts.time_s.value_or(0.0) - b.facts.time_s.value_or(0.0));
   }
@@ -135,8 +138,11 @@ Comparison compare_sweeps(const std::vector<MergedRun>& runs, const std::filesys
                  });
 }
 
-std::vector<Comparison> compare_values(const std::vector<MergedRun>& runs,
-                                       const CompareOptions& options, std::size_t most) {
+namespace {
+
+// The runs by the value of a label, for at most so many values.
+std::map<std::string, Side> sides_of(const std::vector<MergedRun>& runs,
+                                     const CompareOptions& options, std::size_t most) {
   check_label(runs, "--label", options.label);
   std::set<std::string> ignore(options.ignore.begin(), options.ignore.end());
   for (const auto& label : ignore) check_label(runs, "--ignore", label);
@@ -148,13 +154,35 @@ std::vector<Comparison> compare_values(const std::vector<MergedRun>& runs,
     if (sides.size() == most && !sides.contains(value->second)) continue;
     add_to(sides[value->second], key_of(r, ignore, {r.directory.string(), r.run.scene}), r);
   }
+  return sides;
+}
+
+Comparison compare(const std::string& a, const std::string& b, const Side& side_a,
+                   const Side& side_b) {
+  return compare(a, b, side_a, side_b, [](Comparison&, const MergedRun&, const MergedRun&) {});
+}
+
+}  // namespace
+
+std::vector<Comparison> compare_values(const std::vector<MergedRun>& runs,
+                                       const CompareOptions& options, std::size_t most) {
+  const auto sides = sides_of(runs, options, most);
   std::vector<Comparison> all;
   for (auto a = sides.begin(); a != sides.end(); ++a)
     for (auto b = std::next(a); b != sides.end(); ++b) {
-      auto one = compare(a->first, b->first, a->second, b->second,
-                         [](Comparison&, const MergedRun&, const MergedRun&) {});
+      auto one = compare(a->first, b->first, a->second, b->second);
       if (one.pairs > 0) all.push_back(std::move(one));
     }
+  return all;
+}
+
+std::vector<Comparison> compare_ablations(const Sweeps& sweeps) {
+  if (sweeps.ablations.empty()) return {};
+  auto sides = sides_of(sweeps.runs, {}, std::numeric_limits<std::size_t>::max());
+  std::vector<Comparison> all;
+  for (const auto& ablation : sweeps.ablations)
+    all.push_back(compare(ablation.planner, ablation.without, sides[ablation.planner],
+                          sides[ablation.without]));
   return all;
 }
 
@@ -174,6 +202,7 @@ Json to_json(const Comparison& c) {
             {"difference", c.difference()},
             {"difference_interval", interval(c.difference_interval)},
             {"p", c.reached_p}}},
+          {"contacts", {{"a", c.contacts_a}, {"b", c.contacts_b}}},
           {"arrival",
            {{"pairs", c.both},
             {"different", c.times.used},
@@ -218,6 +247,8 @@ std::string to_text(const std::vector<Comparison>& comparisons) {
         c.both, c.a, c.only_a, c.b, c.only_b, c.neither, 100.0 * c.difference(), c.a, c.b,
         100.0 * c.difference_interval.low, 100.0 * c.difference_interval.high, c.reached_p);
     text += time_text(c);
+    if (c.contacts_a + c.contacts_b > 0)
+      text += fmt::format("  contact     {} {}, {} {}\n", c.a, c.contacts_a, c.b, c.contacts_b);
     if (c.without > 0)
       text +=
           fmt::format("  left out    {} runs without a recorded, feasible partner\n", c.without);

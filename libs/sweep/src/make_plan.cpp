@@ -62,6 +62,7 @@ class PlanBuilder {
     Plan plan;
     for (const auto& entry : entries_) plan.scenes.push_back(entry.scene);
     add_runs(plan);
+    plan.ablations = options_.ablations;
     check(plan);
     add_inputs(plan);
     write_plan(plan, directory_);

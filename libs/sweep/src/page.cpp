@@ -136,10 +136,13 @@ class Columns {
 }  // namespace
 
 std::vector<std::pair<std::string, std::vector<Comparison>>> comparisons_of_page(
-    const std::vector<MergedRun>& runs) {
-  auto planners = compare_values(runs);
-  if (planners.empty()) return {};
-  return {{"Planners", std::move(planners)}};
+    const Sweeps& sweeps) {
+  std::vector<std::pair<std::string, std::vector<Comparison>>> all;
+  if (auto ablations = compare_ablations(sweeps); !ablations.empty())
+    all.emplace_back("Ablations: with the part − without it", std::move(ablations));
+  if (auto planners = compare_values(sweeps.runs); !planners.empty())
+    all.emplace_back("Planners", std::move(planners));
+  return all;
 }
 
 Json page_json(const Merged& merged, const PageExtras& extras) {

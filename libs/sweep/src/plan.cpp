@@ -46,6 +46,12 @@ Json to_json(const Plan& plan) {
                                 {"labels", std::move(labels)},
                                 {"gains", run.gains.empty() ? Json(nullptr) : std::move(gains)}});
   }
+  // Plans without ablations have the same bytes as those of earlier versions.
+  for (const auto& a : plan.ablations)
+    document["ablations"].push_back({{"planner", a.planner},
+                                     {"without", a.without},
+                                     {"parameter", a.parameter},
+                                     {"value", a.value}});
   return document;
 }
 
@@ -115,6 +121,8 @@ Plan read_plan_file(const fs::path& file) {
       for (const auto& [name, value] : from["gains"].items()) run.gains[name] = value.get<double>();
     plan.runs.push_back(std::move(run));
   }
+  for (const Json& from : document.value("ablations", Json::array()))
+    plan.ablations.push_back({from["planner"], from["without"], from["parameter"], from["value"]});
   return plan;
 }
 

@@ -82,6 +82,12 @@ class Join {
       const PlannedScene& scene = *scenes.at(run.scene);
       sweeps.runs.push_back({run, directory, scene.feasible, scene.reason, {}, {}});
     }
+    for (const auto& ablation : plan.ablations)
+      if (std::none_of(
+              sweeps.ablations.begin(), sweeps.ablations.end(), [&](const Ablation& known) {
+                return known.planner == ablation.planner && known.without == ablation.without;
+              }))
+        sweeps.ablations.push_back(ablation);
   }
 
   void add(const fs::path& file) {

@@ -89,6 +89,33 @@ TEST_CASE("planners are compared on the scenes that both ran", "[sweep][unit]") 
                                Catch::Contains("+25.0 %") && Catch::Contains("4 runs without"));
 }
 
+TEST_CASE("ablations are compared in their own order, with contacts, and stand first on the page",
+          "[sweep][unit]") {
+  Sweeps sweeps;
+  sweeps.runs = study();
+  sweeps.runs[1].facts.judge_saw_contact = true;  // of q
+  sweeps.ablations = {{"q", "p", "x", false}, {"p", "absent", "y", 0}};
+  const auto all = compare_ablations(sweeps);
+  REQUIRE(all.size() == 2);
+  CHECK(all[0].a == "q");
+  CHECK(all[0].pairs == 8);
+  CHECK(all[0].only_a == 1);
+  CHECK(all[0].only_b == 3);
+  CHECK(all[0].contacts_a == 1);
+  CHECK(all[0].contacts_b == 0);
+  CHECK_THAT(to_text(all), Catch::Contains("contact     q 1, p 0"));
+  CHECK(all[1].pairs == 0);
+  CHECK(all[1].without == 8);
+  check_shipped_schema(to_json(all), "comparison", "ablations");
+  const auto shown = comparisons_of_page(sweeps);
+  REQUIRE(shown.size() == 2);
+  CHECK_THAT(shown[0].first, Catch::StartsWith("Ablations"));
+  CHECK(shown[0].second.size() == 2);
+  CHECK(shown[1].first == "Planners");
+  sweeps.ablations.clear();
+  CHECK(compare_ablations(sweeps).empty());
+}
+
 TEST_CASE("only so many values of a label are compared, and unknown labels are refused",
           "[sweep][unit]") {
   auto runs = study();
@@ -174,7 +201,7 @@ TEST_CASE("varied values are those of the label, and none if they do not end the
 }
 
 TEST_CASE("the page's JSON has all runs in columns", "[sweep][unit]") {
-  Merged merged{{study(), {}, {}, {}, 0, {}}, {"planner"}, {}, {}, {"a <note>"}};
+  Merged merged{{study(), {}, {}, {}, 0, {}, {}}, {"planner"}, {}, {}, {"a <note>"}};
   merged.groups = group(merged.sweeps.runs, merged.by);
   merged.sweeps.runs[2].run.gains = {{"k_p", 0.123456789}};
   merged.sweeps.runs[3].run.set = {"/planner/params/escape=it's"};
@@ -182,7 +209,7 @@ TEST_CASE("the page's JSON has all runs in columns", "[sweep][unit]") {
   merged.sweeps.runs[4].facts = {};
   PageExtras extras;
   extras.replays[1] = {"pages/x.html", 1.5};
-  extras.comparisons = comparisons_of_page(merged.sweeps.runs);
+  extras.comparisons = comparisons_of_page(merged.sweeps);
   const Json page = page_json(merged, extras);
   CHECK(page["format"] == "hamelin.sweep-page/2");
   CHECK(page["directories"] == Json{"d"});

@@ -264,7 +264,7 @@ TEST_CASE("a merge reports missing runs and records from several builds", "[swee
 }
 
 TEST_CASE("the summary's JSON has the values of the groups", "[sweep][unit]") {
-  Merged merged{{hand_made(), {}, {}, {}, 0, {}}, {"planner"}, {}, {}, {}};
+  Merged merged{{hand_made(), {}, {}, {}, 0, {}, {}}, {"planner"}, {}, {}, {}};
   merged.groups = group(merged.sweeps.runs, merged.by);
   const Json summary = to_json(merged);
   CHECK(summary["groups"][1]["labels"] == Json{{"planner", "hybrid"}});

@@ -81,6 +81,54 @@ TEST_CASE("planners run with the benchmark, and its results fit their schema", "
                                "| --- | --: | --: |\n| shelf | "));
 }
 
+TEST_CASE("planners are compared with themselves without a part", "[end_to_end]") {
+  Sandbox sandbox;
+  const Strings command{"bench",         "run",
+                        "--family",      "shelf,pillars",
+                        "--per-family",  "1",
+                        "--planner",     "hybrid",
+                        "--planner",     "hybrid:escape=memory",
+                        "--ablate",      "repulsion_speed_m_s",
+                        "--duration",    "3",
+                        "--expect-gain", "-o",
+                        "parts"};
+  const auto output = sandbox.run(command);
+  CAPTURE(output.err);
+  REQUIRE(output.exit_code == 0);
+  CHECK_THAT(line_of(output.out, "family"),
+             Catch::EndsWith("hybrid  hybrid:repulsion_speed_m_s=0  hybrid:escape=memory  "
+                             "hybrid:escape=memory,repulsion_speed_m_s=0"));
+  CHECK_THAT(line_of(output.out, "ablation"), Catch::Contains("only with  only without"));
+  CHECK_THAT(line_of(output.out, "hybrid:escape=memory,repulsion_speed_m_s=0"),
+             Catch::Contains("/2"));
+  const auto checked = sandbox.run({"validate", "parts/benchmark.json", "parts/plan.json"});
+  CAPTURE(checked.err);
+  CHECK(checked.exit_code == 0);
+  const Json results = sandbox.json("parts/benchmark.json");
+  CHECK(results["planners"].size() == 4);
+  REQUIRE(results["ablations"].size() == 2);
+  CHECK(results["ablations"][0]["planner"] == "hybrid");
+  CHECK(results["ablations"][1]["without"] == "hybrid:escape=memory,repulsion_speed_m_s=0");
+  for (const auto& ablation : results["ablations"]) {
+    CHECK(ablation["value"] == 0);
+    CHECK(ablation["pairs"] == 2);
+    CHECK(ablation["left_out"] == 0);
+  }
+  // the directory stores what was ablated, and only those runs have the part switched off
+  CHECK(sandbox.run({"bench", "table", "parts"}).out == output.out);
+  for (const auto& run : sandbox.json("parts/plan.json")["runs"]) {
+    const bool ablated = run["labels"]["planner"].get<std::string>().ends_with("=0");
+    const bool set =
+        run["set"].dump().find("/planner/params/repulsion_speed_m_s=0") != std::string::npos;
+    CHECK(set == ablated);
+  }
+  CHECK_THAT(sandbox.run({"sweep", "compare", "parts"}).out,
+             Catch::Contains("hybrid against hybrid:repulsion_speed_m_s=0: 2 pairs"));
+  test::require_pages();
+  CHECK(sandbox.run({"sweep", "merge", "parts", "--page", "page.html"}).exit_code == 0);
+  CHECK(sandbox.has("page.html"));
+}
+
 TEST_CASE("wrong command lines and changed sets of the benchmark end with one line",
           "[end_to_end]") {
   Sandbox sandbox;
@@ -111,6 +159,16 @@ TEST_CASE("wrong command lines and changed sets of the benchmark end with one li
         "shelf"},
        "absent"},
       {{"bench", "run", "-o", "out", "--goal", "jonit"}, "'joint'?"},
+      {{"bench", "run", "-o", "out", "--per-family", "1", "--family", "shelf", "--ablate",
+        "stering_gain"},
+       "--ablate stering_gain: planner 'hybrid' has no parameter 'stering_gain', expected one of "},
+      {{"bench", "run", "-o", "out", "--per-family", "1", "--family", "shelf", "--ablate",
+        "cruise_speed"},
+       "expected cruise_speed=VALUE or one of "},
+      {{"bench", "run", "-o", "out", "--per-family", "1", "--family", "shelf", "--planner",
+        "hybrid", "--planner", "template", "--ablate", "steering_gain"},
+       "planner 'template' has no parameter 'steering_gain'"},
+      {{"bench", "run", "-o", "out", "--expect-gain"}, "--expect-gain: has no effect"},
       {{"bench", "table", "data"}, "data/plan.json"},
       {{"bench", "draw", "-o", "set.json", "--name", "x", "--robot", "absent.urdf"},
        "absent.urdf"}};

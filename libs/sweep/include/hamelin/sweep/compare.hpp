@@ -15,9 +15,10 @@ struct Comparison {
   std::size_t pairs = 0;    ///< feasible runs that both sides have recorded
   std::size_t without = 0;  ///< recorded runs without a partner, and pairs that are not feasible
   std::size_t both = 0, only_a = 0, only_b = 0, neither = 0;  ///< of `pairs`: reached the goal
-  std::size_t other_scenes = 0;  ///< of `pairs`: whose scene files differ
-  Interval difference_interval;  ///< of (only_a − only_b) / pairs
-  double reached_p = 1.0;        ///< McNemar's exact test
+  std::size_t contacts_a = 0, contacts_b = 0;  ///< of `pairs`: runs in which the judge saw contact
+  std::size_t other_scenes = 0;                ///< of `pairs`: whose scene files differ
+  Interval difference_interval;                ///< of (only_a − only_b) / pairs
+  double reached_p = 1.0;                      ///< McNemar's exact test
   /// Arrival times of the pairs that both reach, a − b.
   SignedRank times;
   std::optional<MedianDifference> time_difference_s;
@@ -51,6 +52,11 @@ struct CompareOptions {
 [[nodiscard]] std::vector<Comparison> compare_values(const std::vector<MergedRun>& runs,
                                                      const CompareOptions& options = {},
                                                      std::size_t most = 8);
+
+/// Compares the runs of each planner with those without one of its parts: one entry per ablation,
+/// `a` with the part and `b` without it.
+/// @throws Error usage as compare_sweeps
+[[nodiscard]] std::vector<Comparison> compare_ablations(const Sweeps& sweeps);
 
 /// hamelin.comparison/1
 [[nodiscard]] Json to_json(const std::vector<Comparison>& comparisons);

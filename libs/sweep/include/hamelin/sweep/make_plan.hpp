@@ -56,6 +56,7 @@ struct PlanOptions {
   ClutterScenes clutter;
   GainScenes gains;
   std::vector<std::string> planners;  ///< "NAME" or "NAME:key=value,…"; empty: the scene's planner
+  std::vector<Ablation> ablations;    ///< of `planners`, see add_ablations()
   std::vector<std::string> set;       ///< "/json/pointer=VALUE" for all runs
   std::vector<std::string> vary;      ///< "/json/pointer=VALUE,VALUE,…", one run per combination
   std::vector<std::uint64_t> seeds{1};

@@ -49,6 +49,7 @@ struct Sweeps {
   Json machine;  ///< host, isa and build of the first record that names them; null if none does
   std::size_t repeated = 0;            ///< runs with equal records in several files
   std::vector<std::string> different;  ///< ids of runs whose records differ between files
+  std::vector<Ablation> ablations;     ///< of the plans, each once
 };
 
 /// Reads plans and records. Directories with the same plan are copies of one sweep: their records

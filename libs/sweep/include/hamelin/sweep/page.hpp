@@ -24,9 +24,10 @@ struct PageExtras {
   std::vector<std::pair<std::string, std::vector<Comparison>>> comparisons;
 };
 
-/// The comparisons that a page shows without being asked: each two planners, up to eight.
+/// The comparisons that a page shows without being asked: all ablations, and each two planners, up
+/// to eight.
 [[nodiscard]] std::vector<std::pair<std::string, std::vector<Comparison>>> comparisons_of_page(
-    const std::vector<MergedRun>& runs);
+    const Sweeps& sweeps);
 
 /// Data of the page of a sweep, hamelin.sweep-page/2: the summary and all runs in columns. The
 /// README describes the format.

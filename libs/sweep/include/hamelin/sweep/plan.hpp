@@ -51,11 +51,20 @@ struct PlannedRun {
   std::map<std::string, double> gains;        ///< of a gain set; otherwise empty
 };
 
+/// Two planners of a plan that differ in one part only: the runs show what the part contributes.
+struct Ablation {
+  std::string planner;    ///< the planner as given, which is the label of its runs
+  std::string without;    ///< the label of the runs without the part
+  std::string parameter;  ///< of the planner
+  Json value;             ///< of the parameter in the runs without the part
+};
+
 struct Plan {
   std::vector<PlannedScene> scenes;
   std::vector<PlannedInput> inputs;    ///< each once
   std::vector<PlannedPlugin> plugins;  ///< each once
   std::vector<PlannedRun> runs;
+  std::vector<Ablation> ablations;
   std::string sha256;  ///< of the plan's file; empty before it is written
 };
 
