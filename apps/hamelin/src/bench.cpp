@@ -264,7 +264,7 @@ void add_run_command(CLI::App& parent, int& exit_code) {
       "DIR/benchmark.json. Resumes where it stopped if it was interrupted",
       "hamelin bench run --planner hybrid --planner apf --per-family 1 -o quick\n"
       "hamelin bench run --planner hybrid+rrt-connect --planner python:mine.py:Mine -o full\n"
-      "hamelin bench run --ablate steering_gain --ablate escape=none --per-family 2 -o parts");
+      "hamelin bench run --ablate steering --ablate escape=none --per-family 2 -o parts");
   const auto options = std::make_shared<RunOptions>();
   command->add_option("-o,--output", options->output, "directory to write problems and records to")
       ->required()

@@ -21,17 +21,17 @@ Ablation made(const std::string& planner, const std::string& part) {
 }  // namespace
 
 TEST_CASE("a boolean is negated, a number becomes 0, and others get their value", "[sweep][unit]") {
-  const Ablation number = made("hybrid", "steering_gain");
+  const Ablation number = made("hybrid", "repulsion_speed_m_s");
   CHECK(number.planner == "hybrid");
-  CHECK(number.without == "hybrid:steering_gain=0");
+  CHECK(number.without == "hybrid:repulsion_speed_m_s=0");
   CHECK(number.value == 0);
-  CHECK(part_of(number) == "steering_gain=0");
+  CHECK(part_of(number) == "repulsion_speed_m_s=0");
   CHECK(made("apf", "gravity_compensation").without == "apf:gravity_compensation=false");
   // the value as given is negated, replaced, or kept beside the part
   CHECK(made("apf:gravity_compensation=false", "gravity_compensation").without ==
         "apf:gravity_compensation=true");
-  CHECK(made("hybrid+rrt-connect:steering_gain=3,escape=memory", "steering_gain").without ==
-        "hybrid+rrt-connect:escape=memory,steering_gain=0");
+  CHECK(made("hybrid+rrt-connect:repulsion_speed_m_s=3,escape=memory", "repulsion_speed_m_s")
+            .without == "hybrid+rrt-connect:escape=memory,repulsion_speed_m_s=0");
   const Ablation named = made("hybrid", "escape=none");
   CHECK(named.without == "hybrid:escape=none");
   CHECK(named.value == "none");

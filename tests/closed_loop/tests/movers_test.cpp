@@ -240,7 +240,8 @@ TEST_CASE("a tick does not allocate while the arm evades", "[simulation][allocat
   for (const auto& [name, obstacles] : all_movers()) {
     CAPTURE(name);
     Json document = scene_with(obstacles);
-    document["goals"][0]["speed_max"] = 1e-9;  // it stays there
+    document["goals"][0]["speed_max"] = 1e-9;              // it stays there
+    document["planner"]["params"] = {{"escape", "none"}};  // a search is announced
     document["duration_s"] = 5.0;
     const MoversRun logged = logged_run(document);
     REQUIRE(logged.evading_s.size() > 20);
