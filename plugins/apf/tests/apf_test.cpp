@@ -15,12 +15,12 @@ namespace {
 
 const std::string plugin_file = HAMELIN_TEST_PLUGIN_DIR "/apf.hamelin.so";
 
-test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
+test::PublishedLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
   return {plugin_file, std::move(params), robot, test::goal_52, test::ball_52};
 }
 
 /// A spatial arm of four joints among three balls, two of them near.
-test::ArmLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
+test::PublishedLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
   params["rho0_m"] = 5.0;
   return {plugin_file,      std::move(params), test::random_robot(11, 4),
           {0.3, 0.4, -0.2}, test::three_balls, gravity};
@@ -52,8 +52,8 @@ TEST_CASE(
 }
 
 TEST_CASE("apf reaches the goal of example 5.2 when the ball is out of the way", "[apf]") {
-  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
-                     {{{-3.0, -3.0, 0.0}, 0.25}});
+  test::PublishedLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                           {{{-3.0, -3.0, 0.0}, 0.25}});
   CHECK(loop.run(40.0).reached);
 }
 
@@ -62,7 +62,7 @@ TEST_CASE("the gradient of apf's potential is the difference quotient of its val
       {{"khatib", 2.0}, {"wang2018", 1.0}, {"wang2018", 2.0}, {"wang2018", 3.5}}));
   const bool joint_goal = GENERATE(false, true);
   INFO(law << " " << exponent << " " << joint_goal);
-  test::ArmLoop loop(
+  test::PublishedLoop loop(
       plugin_file,
       Json{{"mapping", "potential"},
            {"law", law},
@@ -136,7 +136,7 @@ TEST_CASE("both mappings of wang2018 apply Ge and Cui's forces, as forces or as 
 TEST_CASE("below distance_min_m the repulsion is constant", "[apf]") {
   // A ball beside the middle of the last link; k_p is zero, so only the repulsion acts.
   const auto at = [](double x) {
-    test::ArmLoop loop(
+    test::PublishedLoop loop(
         plugin_file,
         Json{{"mapping", "potential"}, {"k_p", 0}, {"rho0_m", 0.2}, {"distance_min_m", 0.05}},
         test::planar4(), test::goal_52, {{{3.5, x, 0.0}, 0.1}});
@@ -202,7 +202,7 @@ TEST_CASE("the operational mapping accelerates the tip by the attraction, up to 
 TEST_CASE("a joint goal attracts every joint with k_p times its error", "[apf]") {
   const Eigen::Vector4d to(0.5, -0.2, 0.1, 1.0), q(0.3, -0.5, 0.8, 0.4);
   const auto answer = [&](const char* mapping) {
-    auto loop = std::make_unique<test::ArmLoop>(
+    auto loop = std::make_unique<test::PublishedLoop>(
         plugin_file, Json{{"mapping", mapping}, {"k_p", 2}}, test::random_robot(11, 4),
         Eigen::Vector3d::Zero(), std::vector<test::Ball>{}, Eigen::Vector3d::Zero(), to);
     loop->q = q;
@@ -228,8 +228,8 @@ TEST_CASE("wang2018's repulsion vanishes at the goal, khatib's does not", "[apf]
   dynamics::forward_kinematics(model, ws, q);
   const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p();
   const auto torque = [&](const char* law, double exponent) {
-    test::ArmLoop loop(plugin_file, Json{{"law", law}, {"goal_exponent", exponent}}, robot, tip,
-                       {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
+    test::PublishedLoop loop(plugin_file, Json{{"law", law}, {"goal_exponent", exponent}}, robot,
+                             tip, {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
     loop.q = q;
     REQUIRE(loop.tick());
     REQUIRE(!loop.contacts().empty());
@@ -259,7 +259,7 @@ TEST_CASE("apf uses only the end of a path and the position of a pose, and ignor
           "[apf]") {
   const std::string mapping = GENERATE("operational", "potential"),
                     law = GENERATE("khatib", "wang2018");
-  const Json params{{"mapping", mapping}, {"law", law}};
+  const Json params{{"algorithm", "published"}, {"mapping", mapping}, {"law", law}};
   CAPTURE(params);
   test::check_ignores_path_and_self_contacts(plugin_file, params);
 }
