@@ -23,15 +23,16 @@ constexpr double fade_distance = 0.5;
 constexpr double least_mobility = 0.01;
 // Approaches are braked with this gain [1/s] to a speed from which this deceleration [m/s²] stops
 // the arm this far from the obstacle [m]; near it the speed is proportional to the distance [1/s].
-constexpr double brake_gain = 20.0, brake_deceleration = 3.0, brake_distance_m = 0.004,
+constexpr double brake_gain = 60.0, brake_deceleration = 3.0, brake_distance_m = 0.008,
                  brake_rate = 16.0;
 // The repulsion of joint limits: [rad³/s² or m³/s²] and [rad or m].
 constexpr Repulsion limit_repulsion{1e-3, 0.15, 0.03};
-// The speed towards a joint limit is one from which half of acceleration_max stops the joint at
-// this distance from it [rad or m]; near it the speed is proportional to the distance [1/s].
-constexpr double limit_distance = 0.005, limit_rate = 8.0;
-// Share of the velocity limits that is used, and of the torque limits.
-constexpr double speed_share = 0.9, torque_share = 0.98;
+// The speed towards a joint limit is one from which this deceleration [rad/s² or m/s²] stops the
+// joint at this distance from it [rad or m]; near it the speed is proportional to the distance
+// [1/s].
+constexpr double limit_deceleration = 7.5, limit_distance = 0.005, limit_rate = 8.0;
+// Share of the velocity limits that is used, of the torque limits, and of these for turning.
+constexpr double speed_share = 0.9, torque_share = 0.98, turning_share = 0.3;
 // Share of the torque limits that friction and wrong masses may explain.
 constexpr double disturbance_share = 0.3;
 // Motors that act late get the velocity bounds this much earlier, which also lowers the gain for
@@ -57,7 +58,7 @@ FieldDrive::FieldDrive(const planning::Setup& setup, const FieldDriveParams& par
       law_(setup, model_,
            {joint_gain, tip_gain, params.cruise_speed, tip_speed_m_s, tip_turn_rad_s, 0.0, 0.0, 0.0,
             0.0}),
-      obstacles_(setup, params.range_m) {
+      obstacles_(setup, contact_range_m(params.range_m)) {
   const int n = setup.dof();
   for (auto* x : {&q_, &v_, &a_, &row_, &Wa_, &turning_, &turned_, &torque_, &disturbance_})
     *x = Eigen::VectorXd::Zero(n);
@@ -155,7 +156,7 @@ void FieldDrive::repel_joint_limits() {
 /// the joint must leave the limit.
 double FieldDrive::joint_room(double offset) const {
   if (!std::isfinite(offset)) return infinity;
-  return reactive::approach_speed(offset - limit_distance, 0.5 * acceleration_max, limit_rate);
+  return reactive::approach_speed(offset - limit_distance, limit_deceleration, limit_rate);
 }
 
 // docs/theory.md (9.26), (9.27). The gyroscopic terms do no work, so that only the limits of the
@@ -175,7 +176,20 @@ void FieldDrive::bound_acceleration() {
   }
 }
 
+// Terms that are scaled by one factor still do no work. Their reserve of torque is what keeps the
+// joint limits.
+void FieldDrive::bound_turning(planning::Command& command) {
+  const auto effort = setup_.effort_max();
+  if (!effort) return;
+  const double excess = turning_.cwiseAbs().cwiseQuotient(turning_share * *effort).maxCoeff();
+  if (excess <= 1.0) return;
+  turning_ /= excess;
+  for (std::size_t i = 0; i < command.gyroscopic_count(); ++i)
+    planning::VectorMap(command.gyroscopic(i).w_world, 3) /= excess;
+}
+
 void FieldDrive::apply(planning::Command& command) {
+  bound_turning(command);
   repel_joint_limits();
   bound_acceleration();
   row_ = a_ + turned_ - disturbance_;

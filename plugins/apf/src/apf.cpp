@@ -17,14 +17,15 @@ Json completed(const Json& params) {
   return reactive::replace_nulls(
       params, is_published(params)
                   ? Json{{"eta", 13.0}, {"rho0_m", 0.5}, {"distance_min_m", 1e-3}}
-                  : Json{{"eta", 1e-6}, {"rho0_m", 0.025}, {"distance_min_m", 5e-3}});
+                  : Json{{"eta", 1e-6}, {"rho0_m", 0.025}, {"distance_min_m", 2e-3}});
 }
 
 /// The planner: one of its algorithms.
 class Apf final : public planning::Planner {
  public:
   static double influence_m(const Json& params) {
-    return completed(params).at("rho0_m").get<double>();
+    const auto range = completed(params).at("rho0_m").get<double>();
+    return is_published(params) ? range : reactive::FieldDrive::contact_range_m(range);
   }
 
   Apf(const planning::Host&, const planning::Setup& setup, const Json& given) {

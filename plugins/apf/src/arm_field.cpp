@@ -10,7 +10,8 @@ ArmField::ArmField(const planning::Setup& setup, const Json& params)
 void ArmField::tick(const planning::Tick& tick, planning::Command& command) {
   drive_.update(tick);
   for (const auto& point : drive_.points()) {
-    drive_.push(point, drive_.goal_factor() * repulsion_.force(point.distance));
+    if (point.distance < repulsion_.rho0)
+      drive_.push(point, drive_.goal_factor() * repulsion_.force(point.distance));
     drive_.brake(point);
   }
   drive_.apply(command);

@@ -10,9 +10,10 @@ using reactive::NearPoint;
 
 namespace {
 
-// Gain of the short repulsion [m^4/s^2], and the distance between parts of the arm below which it
-// acts [m]. They always lie near each other, so they are not turned.
-constexpr double eta = 1e-6, self_range_m = 0.03;
+// The short repulsion: its gain [m⁴/s²] and the distance below which it is constant [m], as planner
+// apf has them by default, and the distance between parts of the arm below which it acts [m]. These
+// always lie near each other, so they are not turned.
+constexpr double eta = 1e-6, least_m = 0.002, self_range_m = 0.03;
 // Below this speed [m/s] a point has no direction to turn.
 constexpr double least_speed = 1e-4;
 
@@ -22,9 +23,8 @@ ArmField::ArmField(const planning::Setup& setup, const Json& params)
     : drive_(setup, {params.at("cruise_speed"), params.at("rho0_m")}),
       rest_(setup),
       turning_(setup.model(), params),
-      hold_{eta, params.at("hold_m"),
-            std::min(turning_.least_m(), params.at("hold_m").get<double>())},
-      self_{eta, self_range_m, turning_.least_m()} {}
+      hold_{eta, params.at("hold_m"), std::min(least_m, params.at("hold_m").get<double>())},
+      self_{eta, self_range_m, least_m} {}
 
 void ArmField::tick(const planning::Tick& tick, planning::Command& command) {
   drive_.update(tick);
@@ -36,7 +36,9 @@ void ArmField::tick(const planning::Tick& tick, planning::Command& command) {
       drive_.push(point, drive_.goal_factor() * repulsion.force(point.distance));
     drive_.brake(point);
     // Of neighbouring points of one link only the nearest is turned.
-    if (!self && point.link != turned && turn(point, command)) turned = point.link;
+    if (!self && point.distance < turning_.range_m() && point.link != turned &&
+        turn(point, command))
+      turned = point.link;
   }
   drive_.apply(command);
   rest_.check(tick, drive_.at_goal(), command);

@@ -28,7 +28,8 @@ Json completed(const Json& params) {
 class Gyro final : public planning::Planner {
  public:
   static double influence_m(const Json& params) {
-    return completed(params).at("rho0_m").get<double>();
+    const auto range = completed(params).at("rho0_m").get<double>();
+    return is_arm(params) ? reactive::FieldDrive::contact_range_m(range) : range;
   }
 
   Gyro(const planning::Host&, const planning::Setup& setup, const Json& given) {

@@ -1,6 +1,6 @@
 #pragma once
 #include <Eigen/Cholesky>
-#include <optional>
+#include <algorithm>
 #include <span>
 
 #include "hamelin/dynamics/dynamics.hpp"
@@ -21,6 +21,13 @@ struct FieldDriveParams {
 /// the acceleration, then apply(). Only the constructor allocates.
 class FieldDrive {
  public:
+  /// Approaches are braked up to this distance [m].
+  static constexpr double brake_range_m = 0.1;
+  /// The distance up to which contacts are needed for a law that acts up to `range_m` [m].
+  [[nodiscard]] static double contact_range_m(double range_m) {
+    return std::max(brake_range_m, range_m);
+  }
+
   FieldDrive(const planning::Setup& setup, const FieldDriveParams& params);
 
   /// Takes the state and the near points of a tick. The acceleration becomes that of the
@@ -62,6 +69,7 @@ class FieldDrive {
  private:
   void attract(const planning::Tick& tick);
   void repel_joint_limits();
+  void bound_turning(planning::Command& command);
   void bound_acceleration();
   [[nodiscard]] double joint_room(double offset) const;
   void take_disturbance(const planning::Tick& tick);
