@@ -176,8 +176,7 @@ void FieldDrive::bound_acceleration() {
   }
 }
 
-// Terms that are scaled by one factor still do no work. Their reserve of torque is what keeps the
-// joint limits.
+// docs/theory.md (9.29). The other torque is the reserve that keeps the limits of the joints.
 void FieldDrive::bound_turning(planning::Command& command) {
   const auto effort = setup_.effort_max();
   if (!effort) return;
@@ -188,6 +187,7 @@ void FieldDrive::bound_turning(planning::Command& command) {
     planning::VectorMap(command.gyroscopic(i).w_world, 3) /= excess;
 }
 
+// docs/theory.md (9.28)
 void FieldDrive::apply(planning::Command& command) {
   bound_turning(command);
   repel_joint_limits();

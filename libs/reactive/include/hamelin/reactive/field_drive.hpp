@@ -17,7 +17,7 @@ struct FieldDriveParams {
 };
 
 /// Drives an arm by a field of joint accelerations within the limits of its joints, after Khatib
-/// (1986): docs/theory.md (9.19) to (9.28). A tick calls update(), then the functions that add to
+/// (1986): docs/theory.md (9.19)–(9.29). A tick calls update(), then the functions that add to
 /// the acceleration, then apply(). Only the constructor allocates.
 class FieldDrive {
  public:
@@ -31,7 +31,7 @@ class FieldDrive {
   FieldDrive(const planning::Setup& setup, const FieldDriveParams& params);
 
   /// Takes the state and the near points of a tick. The acceleration becomes that of the
-  /// attraction, docs/theory.md (9.20).
+  /// attraction, docs/theory.md (9.19), (9.20).
   void update(const planning::Tick& tick);
 
   [[nodiscard]] std::span<const NearPoint> points() noexcept { return obstacles_.points(); }
@@ -63,7 +63,7 @@ class FieldDrive {
   void pull(const NearPoint& point, const Eigen::Vector3d& force);
 
   /// Sets the held torque that gives the acceleration, bounded such that the arm keeps its limits:
-  /// docs/theory.md (9.24) to (9.28).
+  /// docs/theory.md (9.24)–(9.29).
   void apply(planning::Command& command);
 
  private:
