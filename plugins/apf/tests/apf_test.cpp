@@ -263,3 +263,47 @@ TEST_CASE("apf uses only the end of a path and the position of a pose, and ignor
   CAPTURE(params);
   test::check_ignores_path_and_self_contacts(plugin_file, params);
 }
+
+TEST_CASE("apf arrives among three balls, and rests before a ball that is in its way, by default",
+          "[apf]") {
+  // Both goals of the joints are free; the second one lies behind the ball.
+  const auto robot = test::planar4(25, 0.02);
+  const auto run = [&](const std::vector<test::Ball>& balls) {
+    test::ArmLoop loop(plugin_file, Json::object(), robot, {0.0, 4.0, 0.0}, balls,
+                       Eigen::Vector3d::Zero(), Eigen::Vector4d(1.5708, 0.0, 0.0, 0.0));
+    return loop.run(8.0);
+  };
+  const auto free = run({{{-1.0, 1.0, 0.0}, 0.2}, {{1.0, -1.0, 0.0}, 0.2}});
+  CAPTURE(free.distance_m, free.time_s);
+  CHECK(free.reached);
+  const auto held = run({{{2.0, 2.0, 0.0}, 0.2}});
+  CAPTURE(held.clearance_m, held.distance_m);
+  CHECK_FALSE(held.reached);
+  CHECK(held.clearance_m > 0.0);
+}
+
+TEST_CASE("algorithm arm of apf does not allocate in a tick and detects its stalls itself",
+          "[apf]") {
+  test::require_allocation_count();
+  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                     {{{3.5, 0.14, 0.0}, 0.1}});
+  loop.v << 0.5, 0.0, 0.0, 0.0;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.contacts().empty());
+  CHECK(loop.buffers.raw().state == HAMELIN_PLANNER_DETECTS_STALLS);
+  CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
+}
+
+TEST_CASE("apf repels within rho0_m by its parameters, null for those of the algorithm", "[apf]") {
+  const auto push = [](const Json& params, double gap) {
+    test::ArmLoop loop(plugin_file, params, test::planar4(), test::goal_52,
+                       {{{3.5, gap + 0.12, 0.0}, 0.1}}, Eigen::Vector3d::Zero(),
+                       Eigen::Vector4d(1.0, 0.0, 0.0, 0.0));
+    REQUIRE(loop.tick());
+    return Eigen::VectorXd(loop.buffers.held_torque());
+  };
+  const Eigen::VectorXd nothing = push(Json{{"eta", 0}}, 0.01);
+  CHECK((push(Json{{"eta", nullptr}}, 0.01) - push(Json{{"eta", 1e-6}}, 0.01)).norm() == 0.0);
+  CHECK((push(Json::object(), 0.01) - nothing).norm() > 1e-3);
+  CHECK((push(Json::object(), 0.026) - nothing).norm() < 1e-9);
+}

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
+#include <memory>
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
@@ -447,4 +448,60 @@ TEST_CASE("gyro uses only the end of a path and the position of a pose, and igno
   const Json params{{"variant", variant}, {"algorithm", "keep_attraction"}};
   CAPTURE(params);
   test::check_ignores_path_and_self_contacts(plugin_file, params);
+}
+
+TEST_CASE("algorithm arm of gyro turns approaching points without work and keeps the attraction",
+          "[gyro]") {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  test::ArmLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(), test::goal_52,
+                     {{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+  loop.v << 0.2, 0.0, 0.0, 0.1;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.buffers.gyroscopic().empty());
+  CHECK(loop.buffers.held_torque().norm() > 1e-3);
+  const Eigen::VectorXd torque = loop.gyroscopic_torque();
+  CHECK(torque.norm() > 1e-4);
+  CHECK(std::abs(torque.dot(loop.v)) < 1e-13 * torque.norm());
+  CHECK(loop.buffers.raw().state == HAMELIN_PLANNER_DETECTS_STALLS);
+  // Beyond rho0_m there is none, and none if the arm recedes.
+  test::ArmLoop far(plugin_file, Json{{"variant", variant}, {"rho0_m", 0.03}}, test::planar4(),
+                    test::goal_52, {{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+  far.v = loop.v;
+  REQUIRE(far.tick());
+  CHECK(far.buffers.gyroscopic().empty());
+  loop.v *= -1.0;
+  REQUIRE(loop.tick());
+  CHECK(loop.buffers.gyroscopic().empty());
+}
+
+TEST_CASE(
+    "the gyroscopic terms of algorithm arm are chosen by k_obs, and its published form works "
+    "through the held torque",
+    "[gyro]") {
+  const auto tick = [](Json params) {
+    auto loop = std::make_unique<test::ArmLoop>(
+        plugin_file, std::move(params), test::planar4(), test::goal_52,
+        std::vector<test::Ball>{{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+    loop->v << 0.2, 0.0, 0.0, 0.1;
+    REQUIRE(loop->tick());
+    return loop;
+  };
+  const auto one = tick({{"k_obs", 0.1}}), two = tick({{"k_obs", 0.2}}),
+             none = tick({{"k_obs", 0}}),
+             published = tick({{"k_obs", 0.1}, {"variant", "published"}});
+  CHECK((two->gyroscopic_torque() - 2.0 * one->gyroscopic_torque()).norm() < 1e-9);
+  CHECK(none->gyroscopic_torque().norm() == 0.0);
+  CHECK(published->buffers.gyroscopic().empty());
+  CHECK((published->buffers.held_torque() - none->buffers.held_torque()).norm() > 1e-4);
+}
+
+TEST_CASE("algorithm arm of gyro does not allocate in a tick", "[gyro]") {
+  test::require_allocation_count();
+  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                     {{{3.5, 0.14, 0.0}, 0.1}});
+  loop.v << 0.5, 0.0, 0.0, 0.0;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.buffers.gyroscopic().empty());
+  CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
 }

@@ -209,9 +209,12 @@ class ArmLoop : public planning::HostServices {
 /// A loop with planner apf or gyro and the published law, unless the parameters name another
 /// algorithm.
 struct PublishedLoop : ArmLoop {
-  template <class... Args>
-  PublishedLoop(const std::string& plugin_file, Json params, Args&&... args)
-      : ArmLoop(plugin_file, published(std::move(params)), std::forward<Args>(args)...) {}
+  PublishedLoop(const std::string& plugin_file, Json params, const model::Robot& robot,
+                const Eigen::Vector3d& goal, std::vector<Ball> balls,
+                const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero(),
+                const Eigen::VectorXd& q_goal = {})
+      : ArmLoop(plugin_file, published(std::move(params)), robot, goal, std::move(balls), gravity,
+                q_goal) {}
   static Json published(Json params) {
     if (!params.contains("algorithm")) params["algorithm"] = "published";
     return params;
