@@ -24,7 +24,7 @@ inline log::Result run_scene(const TemporaryFolder& folder, const Json& document
                          watch);
 }
 
-/// Example 5.2's arm and goal without gravity, limits and obstacles, with planner apf.
+/// Example 5.2's arm and goal without gravity, limits and obstacles, with planner apf as published.
 inline Json scene_52() {
   return {
       {"schema", "hamelin.scene/1"},
@@ -34,7 +34,9 @@ inline Json scene_52() {
       {"goals", {{{"type", "position"}, {"position_m", {2.0, 3.0, 0.0}}, {"speed_max", 0.05}}}},
       {"obstacles", Json::array()},
       {"planner",
-       {{"name", "apf"}, {"params", {{"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
+       {{"name", "apf"},
+        {"params",
+         {{"algorithm", "published"}, {"k_p", 29.5}, {"k_v", 19.9}, {"joint_damping", 2.07}}}}},
       {"step_s", 0.004},
       {"duration_s", 40.0}};
 }

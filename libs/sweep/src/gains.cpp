@@ -86,6 +86,9 @@ void set_gains(PlannedRun& run, const Gains& g) {
   // the host's stall rule is for planners without a rule of their own; hybrid does not move while
   // it searches
   if (run.planner == "hybrid") run.set.emplace_back("/stall=null");
+  // the gains are those of the law as published
+  if (run.planner == "apf" || run.planner == "gyro")
+    run.set.emplace_back("/planner/params/algorithm=published");
   set("k_p", g.k_p);
   set("k_v", g.k_v);
   set("joint_damping", g.joint_damping);

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -332,6 +333,9 @@ TEST_CASE(
     ++planners[run.labels.at("planner")];
     CHECK(run.gains.size() == 5);
     CHECK((run.set.front() == "/stall=null") == (run.planner == "hybrid"));
+    const auto published = std::count(run.set.begin(), run.set.end(),
+                                      std::string("/planner/params/algorithm=published"));
+    CHECK(published == (run.planner == "hybrid" ? 0 : 1));
     const std::string last = run.set.back();
     CHECK(last.starts_with(run.planner == "apf"    ? "/planner/params/eta="
                            : run.planner == "gyro" ? "/planner/params/k_obs="

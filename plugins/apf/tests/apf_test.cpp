@@ -15,12 +15,12 @@ namespace {
 
 const std::string plugin_file = HAMELIN_TEST_PLUGIN_DIR "/apf.hamelin.so";
 
-test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
+test::PublishedLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
   return {plugin_file, std::move(params), robot, test::goal_52, test::ball_52};
 }
 
 /// A spatial arm of four joints among three balls, two of them near.
-test::ArmLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
+test::PublishedLoop spatial(Json params, const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero()) {
   params["rho0_m"] = 5.0;
   return {plugin_file,      std::move(params), test::random_robot(11, 4),
           {0.3, 0.4, -0.2}, test::three_balls, gravity};
@@ -52,8 +52,8 @@ TEST_CASE(
 }
 
 TEST_CASE("apf reaches the goal of example 5.2 when the ball is out of the way", "[apf]") {
-  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
-                     {{{-3.0, -3.0, 0.0}, 0.25}});
+  test::PublishedLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                           {{{-3.0, -3.0, 0.0}, 0.25}});
   CHECK(loop.run(40.0).reached);
 }
 
@@ -62,7 +62,7 @@ TEST_CASE("the gradient of apf's potential is the difference quotient of its val
       {{"khatib", 2.0}, {"wang2018", 1.0}, {"wang2018", 2.0}, {"wang2018", 3.5}}));
   const bool joint_goal = GENERATE(false, true);
   INFO(law << " " << exponent << " " << joint_goal);
-  test::ArmLoop loop(
+  test::PublishedLoop loop(
       plugin_file,
       Json{{"mapping", "potential"},
            {"law", law},
@@ -136,7 +136,7 @@ TEST_CASE("both mappings of wang2018 apply Ge and Cui's forces, as forces or as 
 TEST_CASE("below distance_min_m the repulsion is constant", "[apf]") {
   // A ball beside the middle of the last link; k_p is zero, so only the repulsion acts.
   const auto at = [](double x) {
-    test::ArmLoop loop(
+    test::PublishedLoop loop(
         plugin_file,
         Json{{"mapping", "potential"}, {"k_p", 0}, {"rho0_m", 0.2}, {"distance_min_m", 0.05}},
         test::planar4(), test::goal_52, {{{3.5, x, 0.0}, 0.1}});
@@ -202,7 +202,7 @@ TEST_CASE("the operational mapping accelerates the tip by the attraction, up to 
 TEST_CASE("a joint goal attracts every joint with k_p times its error", "[apf]") {
   const Eigen::Vector4d to(0.5, -0.2, 0.1, 1.0), q(0.3, -0.5, 0.8, 0.4);
   const auto answer = [&](const char* mapping) {
-    auto loop = std::make_unique<test::ArmLoop>(
+    auto loop = std::make_unique<test::PublishedLoop>(
         plugin_file, Json{{"mapping", mapping}, {"k_p", 2}}, test::random_robot(11, 4),
         Eigen::Vector3d::Zero(), std::vector<test::Ball>{}, Eigen::Vector3d::Zero(), to);
     loop->q = q;
@@ -228,8 +228,8 @@ TEST_CASE("wang2018's repulsion vanishes at the goal, khatib's does not", "[apf]
   dynamics::forward_kinematics(model, ws, q);
   const Eigen::Vector3d tip = dynamics::tip_pose(model, ws).p();
   const auto torque = [&](const char* law, double exponent) {
-    test::ArmLoop loop(plugin_file, Json{{"law", law}, {"goal_exponent", exponent}}, robot, tip,
-                       {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
+    test::PublishedLoop loop(plugin_file, Json{{"law", law}, {"goal_exponent", exponent}}, robot,
+                             tip, {{tip + Eigen::Vector3d(0.3, 0.3, 0.0), 0.1}});
     loop.q = q;
     REQUIRE(loop.tick());
     REQUIRE(!loop.contacts().empty());
@@ -259,7 +259,52 @@ TEST_CASE("apf uses only the end of a path and the position of a pose, and ignor
           "[apf]") {
   const std::string mapping = GENERATE("operational", "potential"),
                     law = GENERATE("khatib", "wang2018");
-  const Json params{{"mapping", mapping}, {"law", law}};
+  const Json params{{"algorithm", "published"}, {"mapping", mapping}, {"law", law}};
   CAPTURE(params);
   test::check_ignores_path_and_self_contacts(plugin_file, params);
+}
+
+TEST_CASE("apf by default arrives beside two balls, and rests before one that is in its way",
+          "[apf]") {
+  const auto run = [](const std::vector<test::Ball>& balls) {
+    // At this speed the points of the arm, which is 4 m long, can be stopped within 0.1 m.
+    test::ArmLoop loop(plugin_file, Json{{"cruise_speed", 0.2}}, test::planar4(), {0.0, 4.0, 0.0},
+                       balls, Eigen::Vector3d::Zero(), Eigen::Vector4d(1.5708, 0.0, 0.0, 0.0));
+    return loop.run(20.0);
+  };
+  const auto free = run({{{-1.0, 1.0, 0.0}, 0.2}, {{1.0, -1.0, 0.0}, 0.2}});
+  CAPTURE(free.distance_m, free.time_s);
+  CHECK(free.reached);
+  CHECK(free.clearance_m > 0.0);
+  const auto held = run({{{2.0, 2.0, 0.0}, 0.2}});
+  CAPTURE(held.clearance_m, held.distance_m, held.speed_m_s);
+  CHECK_FALSE(held.reached);
+  CHECK(held.clearance_m > 0.0);
+  CHECK(held.speed_m_s < 0.01);
+}
+
+TEST_CASE("algorithm arm of apf does not allocate in a tick and detects its stalls itself",
+          "[apf]") {
+  test::require_allocation_count();
+  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                     {{{3.5, 0.14, 0.0}, 0.1}});
+  loop.v << 0.5, 0.0, 0.0, 0.0;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.contacts().empty());
+  CHECK(loop.buffers.raw().state == HAMELIN_PLANNER_DETECTS_STALLS);
+  CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
+}
+
+TEST_CASE("apf repels within rho0_m by its parameters, null for those of the algorithm", "[apf]") {
+  const auto push = [](const Json& params, double gap) {
+    test::ArmLoop loop(plugin_file, params, test::planar4(), test::goal_52,
+                       {{{3.5, gap + 0.12, 0.0}, 0.1}}, Eigen::Vector3d::Zero(),
+                       Eigen::Vector4d(1.0, 0.0, 0.0, 0.0));
+    REQUIRE(loop.tick());
+    return Eigen::VectorXd(loop.buffers.held_torque());
+  };
+  const Eigen::VectorXd nothing = push(Json{{"eta", 0}}, 0.01);
+  CHECK((push(Json{{"eta", nullptr}}, 0.01) - push(Json{{"eta", 1e-6}}, 0.01)).norm() == 0.0);
+  CHECK((push(Json::object(), 0.01) - nothing).norm() > 1e-3);
+  CHECK((push(Json::object(), 0.026) - nothing).norm() < 1e-9);
 }

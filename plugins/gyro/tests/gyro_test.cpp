@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
+#include <memory>
 #include <numbers>
 
 #include "hamelin/core/error.hpp"
@@ -15,11 +16,11 @@ namespace {
 
 const std::string plugin_file = HAMELIN_TEST_PLUGIN_DIR "/gyro.hamelin.so";
 
-test::ArmLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
+test::PublishedLoop example_52(Json params, const model::Robot& robot = test::planar4()) {
   return {plugin_file, std::move(params), robot, test::goal_52, test::ball_52};
 }
 
-test::ArmLoop spatial(Json params, const std::vector<test::Ball>& balls) {
+test::PublishedLoop spatial(Json params, const std::vector<test::Ball>& balls) {
   params["rho0_m"] = 5.0;
   params["gravity_compensation"] = false;
   return {plugin_file, std::move(params), test::random_robot(11, 4), {0.3, 0.4, -0.2}, balls};
@@ -37,7 +38,8 @@ struct ReferenceContact {
 };
 
 /// All contacts of an arm with one sphere per link, computed with separate kinematics.
-std::vector<ReferenceContact> reference_contacts(test::ArmLoop& loop, const model::Robot& robot) {
+std::vector<ReferenceContact> reference_contacts(test::PublishedLoop& loop,
+                                                 const model::Robot& robot) {
   const model::Model model(robot, geometry::SE3{}, Eigen::Vector3d::Zero());
   dynamics::Workspace ws(model);
   dynamics::forward_kinematics(model, ws, loop.q);
@@ -179,8 +181,8 @@ TEST_CASE("head-on, a planar arm is turned about the plane's normal", "[gyro]") 
   // would choose x.
   const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
   CAPTURE(variant);
-  test::ArmLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(25, 1e-10),
-                     test::goal_52, {{{2.5, 0.4, 0.0}, 0.1}});
+  test::PublishedLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(25, 1e-10),
+                           test::goal_52, {{{2.5, 0.4, 0.0}, 0.1}});
   loop.v << 1.0, 0.0, 0.0, 0.0;
   REQUIRE(loop.tick());
   REQUIRE(loop.buffers.gyroscopic().size() == 1);
@@ -251,8 +253,8 @@ TEST_CASE("Algorithm II switches the attraction off while steering, keep_attract
 
 TEST_CASE("a joint goal attracts every joint with k_p times its error", "[gyro]") {
   const Eigen::Vector4d to(0.5, -0.2, 0.1, 1.0), q(0.3, -0.5, 0.8, 0.4);
-  test::ArmLoop loop(plugin_file, Json{{"k_p", 2}}, test::random_robot(11, 4),
-                     Eigen::Vector3d::Zero(), {}, Eigen::Vector3d::Zero(), to);
+  test::PublishedLoop loop(plugin_file, Json{{"k_p", 2}}, test::random_robot(11, 4),
+                           Eigen::Vector3d::Zero(), {}, Eigen::Vector3d::Zero(), to);
   loop.q = q;
   REQUIRE(loop.tick());
   const model::Model model(test::random_robot(11, 4), geometry::SE3{}, Eigen::Vector3d::Zero());
@@ -341,8 +343,9 @@ TEST_CASE("outside rho0_m there is no steering, and the goal attracts", "[gyro]"
   CAPTURE(variant);
   // The ball is in the way of link 4's only sphere, with a distance of 0.4 m between them.
   const auto held = [&](double rho0, double k_p) {
-    test::ArmLoop loop(plugin_file, Json{{"variant", variant}, {"rho0_m", rho0}, {"k_p", k_p}},
-                       test::planar4(1), test::goal_52, {{{3.5, 0.4 + 0.02 + 0.1, 0.0}, 0.1}});
+    test::PublishedLoop loop(
+        plugin_file, Json{{"variant", variant}, {"rho0_m", rho0}, {"k_p", k_p}}, test::planar4(1),
+        test::goal_52, {{{3.5, 0.4 + 0.02 + 0.1, 0.0}, 0.1}});
     loop.v << 1.0, 0.0, 0.0, 0.0;
     REQUIRE(loop.tick());
     CHECK(loop.buffers.gyroscopic().size() == (rho0 > 0.4 && variant != "published" ? 1U : 0U));
@@ -357,7 +360,7 @@ TEST_CASE("garimella fades at rho0_m and towards tangential motion, chang-marsde
   // Link 4's only sphere moves at right angles to the link. |w| over the mass is the gain; the mass
   // is the same for both variants, so the ratio of |w| is the ratio of the gains.
   const auto turn = [](const char* variant, double gap, double bearing) {
-    test::ArmLoop loop(
+    test::PublishedLoop loop(
         plugin_file, Json{{"variant", variant}}, test::planar4(1), test::goal_52,
         {{{3.5 + (gap + 0.12) * std::sin(bearing), (gap + 0.12) * std::cos(bearing), 0.0}, 0.1}});
     loop.q << 0.0, 0.0, 0.0, 0.0;
@@ -390,14 +393,14 @@ TEST_CASE("a point mass passes the ball on any line, with the gain of Chang and 
   // at k_p = 1.
   const double offset = GENERATE(0.3, 0.1, 0.02, 1e-4, -0.1, -0.3);
   CAPTURE(offset);
-  test::ArmLoop loop(plugin_file,
-                     Json{{"variant", "chang-marsden"},
-                          {"algorithm", "keep_attraction"},
-                          {"k_p", 1},
-                          {"k_v", 1.5},
-                          {"joint_damping", 0},
-                          {"k_obs", 3.0 * std::numbers::pi}},
-                     point_mass(), {3.0, 0.0, 0.0}, {{{1.5, 0.0, 0.0}, 0.4}});
+  test::PublishedLoop loop(plugin_file,
+                           Json{{"variant", "chang-marsden"},
+                                {"algorithm", "keep_attraction"},
+                                {"k_p", 1},
+                                {"k_v", 1.5},
+                                {"joint_damping", 0},
+                                {"k_obs", 3.0 * std::numbers::pi}},
+                           point_mass(), {3.0, 0.0, 0.0}, {{{1.5, 0.0, 0.0}, 0.4}});
   loop.q << 0.0, offset;
   const auto result = loop.run(60.0);
   CAPTURE(result.time_s, result.distance_m, result.clearance_m);
@@ -445,4 +448,60 @@ TEST_CASE("gyro uses only the end of a path and the position of a pose, and igno
   const Json params{{"variant", variant}, {"algorithm", "keep_attraction"}};
   CAPTURE(params);
   test::check_ignores_path_and_self_contacts(plugin_file, params);
+}
+
+TEST_CASE("algorithm arm of gyro turns approaching points without work and keeps the attraction",
+          "[gyro]") {
+  const std::string variant = GENERATE("energy-neutral", "chang-marsden", "garimella");
+  CAPTURE(variant);
+  test::ArmLoop loop(plugin_file, Json{{"variant", variant}}, test::planar4(), test::goal_52,
+                     {{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+  loop.v << 0.2, 0.0, 0.0, 0.1;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.buffers.gyroscopic().empty());
+  CHECK(loop.buffers.held_torque().norm() > 1e-3);
+  const Eigen::VectorXd torque = loop.gyroscopic_torque();
+  CHECK(torque.norm() > 1e-4);
+  CHECK(std::abs(torque.dot(loop.v)) < 1e-13 * torque.norm());
+  CHECK(loop.buffers.raw().state == HAMELIN_PLANNER_DETECTS_STALLS);
+  // Beyond rho0_m there is none, and none if the arm recedes.
+  test::ArmLoop far(plugin_file, Json{{"variant", variant}, {"rho0_m", 0.03}}, test::planar4(),
+                    test::goal_52, {{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+  far.v = loop.v;
+  REQUIRE(far.tick());
+  CHECK(far.buffers.gyroscopic().empty());
+  loop.v *= -1.0;
+  REQUIRE(loop.tick());
+  CHECK(loop.buffers.gyroscopic().empty());
+}
+
+TEST_CASE(
+    "the gyroscopic terms of algorithm arm are chosen by k_obs, and its published form works "
+    "through the held torque",
+    "[gyro]") {
+  const auto tick = [](Json params) {
+    auto loop = std::make_unique<test::ArmLoop>(
+        plugin_file, std::move(params), test::planar4(), test::goal_52,
+        std::vector<test::Ball>{{{3.5, 0.04 + 0.12, 0.0}, 0.1}});
+    loop->v << 0.2, 0.0, 0.0, 0.1;
+    REQUIRE(loop->tick());
+    return loop;
+  };
+  const auto one = tick({{"k_obs", 0.1}}), two = tick({{"k_obs", 0.2}}),
+             none = tick({{"k_obs", 0}}),
+             published = tick({{"k_obs", 0.1}, {"variant", "published"}});
+  CHECK((two->gyroscopic_torque() - 2.0 * one->gyroscopic_torque()).norm() < 1e-9);
+  CHECK(none->gyroscopic_torque().norm() == 0.0);
+  CHECK(published->buffers.gyroscopic().empty());
+  CHECK((published->buffers.held_torque() - none->buffers.held_torque()).norm() > 1e-4);
+}
+
+TEST_CASE("algorithm arm of gyro does not allocate in a tick", "[gyro]") {
+  test::require_allocation_count();
+  test::ArmLoop loop(plugin_file, Json::object(), test::planar4(), test::goal_52,
+                     {{{3.5, 0.14, 0.0}, 0.1}});
+  loop.v << 0.5, 0.0, 0.0, 0.0;
+  REQUIRE(loop.tick());
+  REQUIRE(!loop.buffers.gyroscopic().empty());
+  CHECK(test::allocations_in([&] { (void)loop.tick(); }) == 0);
 }

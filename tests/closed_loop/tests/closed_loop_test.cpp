@@ -139,7 +139,7 @@ TEST_CASE("a timeout says if the shield holds the arm, and for what", "[simulati
   scene["start"] = {{"q", {0.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7}}};
   scene["goals"] = {{{"type", "joint"}, {"q", {1.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7}}}};
   scene["model"] = {{"joint_limits", true}, {"velocity_limits", true}, {"torque_limits", true}};
-  scene["planner"] = {{"name", "apf"}, {"params", {{"k_p", 1e6}}}};
+  scene["planner"] = {{"name", "apf"}, {"params", {{"algorithm", "published"}, {"k_p", 1e6}}}};
   scene["step_s"] = 0.004;
   scene["duration_s"] = 0.04;
   const auto result = run_scene(folder, scene);

@@ -39,6 +39,8 @@ std::vector<Json> ticks_of(const TemporaryFolder& folder, const Json& scene, lon
   return ticks;
 }
 
+const Json gyro_published{{"name", "gyro"}, {"params", {{"algorithm", "published"}}}};
+
 // The sum that stays constant, see docs/logs.md.
 double balance(const Json& tick) {
   const auto energy = [&](const char* key) { return tick["energy"][key].get<double>(); };
@@ -55,9 +57,14 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
   dynamics::Workspace ws(model);
   const std::vector<std::pair<Json, std::vector<std::string>>> planners = {
       {{{"name", "apf"},
-        {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}, {"joint_damping", 1.0}}}},
+        {"params",
+         {{"algorithm", "published"},
+          {"mapping", "potential"},
+          {"k_p", 5.0},
+          {"eta", 1.0},
+          {"joint_damping", 1.0}}}},
        {"potential", "damping"}},
-      {{{"name", "gyro"}}, {"held", "damping", "gyroscopic"}},
+      {gyro_published, {"held", "damping", "gyroscopic"}},
       {{{"name", "hybrid"}}, {"node"}}};
   for (const auto& [planner, channels] : planners) {
     CAPTURE(planner);
@@ -89,9 +96,11 @@ TEST_CASE("the logged torques are those that move the arm, in every channel", "[
 TEST_CASE("the energies in a log balance at every tick, including the last, in every channel",
           "[simulation][log]") {
   const TemporaryFolder folder;
-  Json potential = {{"name", "apf"},
-                    {"params", {{"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
-  for (const Json& planner : {potential, Json{{"name", "gyro"}}, Json{{"name", "hybrid"}}}) {
+  Json potential = {
+      {"name", "apf"},
+      {"params",
+       {{"algorithm", "published"}, {"mapping", "potential"}, {"k_p", 5.0}, {"eta", 1.0}}}};
+  for (const Json& planner : {potential, gyro_published, Json{{"name", "hybrid"}}}) {
     CAPTURE(planner);
     const auto ticks = ticks_of(folder, logged_scene(planner), 1);
     double error = 0.0, work = 0.0;
@@ -108,7 +117,7 @@ TEST_CASE("the energies in a log balance at every tick, including the last, in e
 TEST_CASE("the extrema in a log with fewer ticks are those of the ticks between",
           "[simulation][log]") {
   const TemporaryFolder folder;
-  const Json scene = logged_scene({{"name", "gyro"}});
+  const Json scene = logged_scene(gyro_published);
   Json result;
   const auto all = ticks_of(folder, scene, 1), few = ticks_of(folder, scene, 37, &result);
   REQUIRE(few.size() == (all.size() - 1 + 36) / 37 + 1);

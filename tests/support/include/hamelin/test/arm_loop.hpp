@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "hamelin/dynamics/dynamics.hpp"
@@ -203,6 +204,21 @@ class ArmLoop : public planning::HostServices {
   hamelin_goal target{};
   planning::CommandBuffers buffers;
   double clearance = 0.0;
+};
+
+/// A loop with planner apf or gyro and the published law, unless the parameters name another
+/// algorithm.
+struct PublishedLoop : ArmLoop {
+  PublishedLoop(const std::string& plugin_file, Json params, const model::Robot& robot,
+                const Eigen::Vector3d& goal, std::vector<Ball> balls,
+                const Eigen::Vector3d& gravity = Eigen::Vector3d::Zero(),
+                const Eigen::VectorXd& q_goal = {})
+      : ArmLoop(plugin_file, published(std::move(params)), robot, goal, std::move(balls), gravity,
+                q_goal) {}
+  static Json published(Json params) {
+    if (!params.contains("algorithm")) params["algorithm"] = "published";
+    return params;
+  }
 };
 
 /// The ball and the goal of example 5.2.
