@@ -56,8 +56,7 @@ FieldDrive::FieldDrive(const planning::Setup& setup, const FieldDriveParams& par
       horizon_s_(setup.sampled() ? std::max(sampled_horizon_s, setup.control_period_s())
                                  : setup.control_period_s()),
       law_(setup, model_,
-           {joint_gain, tip_gain, params.cruise_speed, tip_speed_m_s, tip_turn_rad_s, 0.0, 0.0, 0.0,
-            0.0}),
+           {joint_gain, tip_gain, params.cruise_speed, tip_speed_m_s, tip_turn_rad_s, 0.0, 0.0}),
       obstacles_(setup, contact_range_m(params.range_m)) {
   const int n = setup.dof();
   for (auto* x : {&q_, &v_, &a_, &row_, &Wa_, &turning_, &turned_, &torque_, &disturbance_})

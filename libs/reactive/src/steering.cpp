@@ -10,7 +10,7 @@ namespace hamelin::reactive {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double endless = std::numeric_limits<double>::infinity();
 constexpr double look_s = 0.05;                // between the beginnings of looks
 constexpr int watch_units = 1, try_units = 4;  // postures per tick, while the course is watched
                                                // and while candidates are tried
@@ -48,10 +48,10 @@ Steering::Steering(const planning::Host& host, const planning::Setup& setup,
 void Steering::restart() {
   phase_ = Phase::idle;
   turn_.left_s = 0.0;
-  begun_s_ = -infinity;
+  begun_s_ = -endless;
   sideways_count_ = index_ = rounds_ = 0;
   stall_count_ = 0;
-  best_distance_ = basin_best_ = least_distance_ = infinity;
+  best_distance_ = basin_best_ = least_distance_ = endless;
   arrives_ = false;
 }
 
@@ -113,7 +113,7 @@ void Steering::predict(const Turn& turn) {
 
 double Steering::cost() const {
   if (prediction_.arrives()) return arrival_per_s * prediction_.time_s() - arrival_bonus;
-  if (prediction_.is_lost()) return infinity;
+  if (prediction_.is_lost()) return endless;
   double out = prediction_.distance();
   for (std::size_t i = 0; i < std::min(stall_count_, stalls_max); ++i)
     out += std::exp(-(prediction_.end() - stalls_[i]).squaredNorm() / stall_width_squared);
