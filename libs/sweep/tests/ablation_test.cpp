@@ -41,7 +41,8 @@ TEST_CASE("a boolean is negated, a number becomes 0, and others get their value"
 TEST_CASE("parts that a planner does not have, or not as asked, are refused", "[sweep][unit]") {
   CHECK_THROWS_WITH(made("apf", "steering"),
                     "--ablate steering: planner 'apf' has no parameter 'steering', expected one of "
-                    "k_p, k_v, eta, joint_damping, mapping=VALUE, law=VALUE, gravity_compensation");
+                    "algorithm=VALUE, eta, k_p, k_v, joint_damping, mapping=VALUE, law=VALUE, "
+                    "gravity_compensation");
   CHECK_THROWS_WITH(
       made("hybrid", "cruise_speed"),
       Catch::StartsWith("--ablate cruise_speed: 'cruise_speed' of planner 'hybrid' can be "

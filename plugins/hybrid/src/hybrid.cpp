@@ -136,7 +136,6 @@ class Hybrid final : public planning::Planner {
     if (params["steering"].get<bool>()) {
       steering_ = std::make_unique<Steering>(host, setup_, model_, Tuning(setup, params).law,
                                              margins_, SteeringParams{turn_kinds(params)});
-      turn_series_ = host.declare_series("turn", "s");
     }
     const int n = setup.dof();
     for (auto* x : {
@@ -159,6 +158,7 @@ class Hybrid final : public planning::Planner {
       evasion_series_ = host.declare_series("evasion", "");
       clearance_series_ = host.declare_series("clearance_ahead", "m");
     }
+    if (steering_) turn_series_ = host.declare_series("turn", "s");
     M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
     llt_.compute(identity_);  // allocates its memory
     apply_params(Tuning(setup, params));

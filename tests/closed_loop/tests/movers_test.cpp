@@ -249,15 +249,15 @@ TEST_CASE("a tick does not allocate while the arm evades", "[simulation][allocat
     const double begin = logged.evading_s.front(), end = std::min(5.0, logged.first_event_s);
     REQUIRE(begin < logged.evading_s[20]);
     REQUIRE(logged.evading_s[20] < end);
-    const auto allocations = [&](double duration_s) {
-      document["duration_s"] = duration_s;
-      return test::allocations_in([&] {
-        const auto result = test::run_scene(folder, document);
-        CHECK(result.outcome == Outcome::timeout);
-      });
+    long before = -1, after = -1;
+    simulation::Watch watch;
+    watch.at_node = [&](double time_s, const auto&) {
+      if (before < 0 && time_s >= begin) before = allocation_count();
+      if (time_s < end) after = allocation_count();
     };
-    (void)allocations(0.2);  // allocations made once per process
-    CHECK(allocations(end) == allocations(begin));
+    CHECK(test::run_scene(folder, document, watch).outcome == Outcome::timeout);
+    CHECK(before > 0);
+    CHECK(after == before);
   }
 }
 
