@@ -345,7 +345,8 @@ TEST_CASE("a spatial arm under gravity reaches the same place with each scheme",
   scene["gravity_m_s2"] = {0.0, 0.0, -9.81};
   scene["start"] = {{"q", {0.3, -0.25, 0.4, -0.15, 0.5, -0.05, 0.6}}};
   scene["goals"] = {{{"type", "joint"}, {"q", {0.5, 0.1, 0.2, -0.3, 0.4, 0.1, 0.5}}}};
-  scene["planner"]["params"] = {{"k_p", 20.0}, {"k_v", 10.0}, {"joint_damping", 0.5}};
+  scene["planner"]["params"] = {
+      {"algorithm", "published"}, {"k_p", 20.0}, {"k_v", 10.0}, {"joint_damping", 0.5}};
   scene["step_s"] = 0.001;
   scene["duration_s"] = 20.0;
   std::optional<log::Result> first;
