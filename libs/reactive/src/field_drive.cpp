@@ -33,8 +33,6 @@ constexpr Repulsion limit_repulsion{1e-3, 0.15, 0.03};
 constexpr double limit_deceleration = 7.5, limit_distance = 0.005, limit_rate = 8.0;
 // Share of the velocity limits that is used, of the torque limits, and of these for turning.
 constexpr double speed_share = 0.9, torque_share = 0.98, turning_share = 0.3;
-// Share of the torque limits that friction and wrong masses may explain.
-constexpr double disturbance_share = 0.3;
 // Motors that act late get the velocity bounds this much earlier, which also lowers the gain for
 // noise [s].
 constexpr double sampled_horizon_s = 0.01;
@@ -57,9 +55,10 @@ FieldDrive::FieldDrive(const planning::Setup& setup, const FieldDriveParams& par
                                  : setup.control_period_s()),
       law_(setup, model_,
            {joint_gain, tip_gain, params.cruise_speed, tip_speed_m_s, tip_turn_rad_s, 0.0, 0.0}),
-      obstacles_(setup, contact_range_m(params.range_m)) {
+      obstacles_(setup, contact_range_m(params.range_m)),
+      disturbance_(setup.dof()) {
   const int n = setup.dof();
-  for (auto* x : {&q_, &v_, &a_, &row_, &Wa_, &turning_, &turned_, &torque_, &disturbance_})
+  for (auto* x : {&q_, &v_, &a_, &row_, &Wa_, &turning_, &turned_, &torque_})
     *x = Eigen::VectorXd::Zero(n);
   M_ = W_ = identity_ = Eigen::MatrixXd::Identity(n, n);
   llt_.compute(identity_);  // allocates its memory
@@ -76,7 +75,7 @@ void FieldDrive::update(const planning::Tick& tick) {
   dynamics::forward_kinematics(model_, ws_, q_);
   obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
   turning_.setZero();
-  take_disturbance(tick);
+  disturbance_.take(tick, setup_, M_);
   attract(tick);
 }
 
@@ -89,18 +88,6 @@ void FieldDrive::attract(const planning::Tick& tick) {
   law_.attract(model_, ws_, q_, target, a_);
   a_ = velocity_gain * (tick.speed_scale() * a_ - v_);
   scale_to(drive_acceleration, a_);
-}
-
-// A disturbance near the torque limits is no longer one that the torque can make up for.
-void FieldDrive::take_disturbance(const planning::Tick& tick) {
-  disturbance_.setZero();
-  if (!tick.disturbance()) return;
-  disturbance_ = *tick.disturbance();
-  const auto effort = setup_.effort_max();
-  if (!effort) return;
-  torque_.noalias() = M_ * disturbance_;
-  const double excess = torque_.cwiseAbs().cwiseQuotient(disturbance_share * *effort).maxCoeff();
-  if (excess > 1.0) disturbance_ /= excess;
 }
 
 Vector3d FieldDrive::velocity(const NearPoint& point) const {
@@ -191,7 +178,7 @@ void FieldDrive::apply(planning::Command& command) {
   bound_turning(command);
   repel_joint_limits();
   bound_acceleration();
-  row_ = a_ + turned_ - disturbance_;
+  row_ = a_ + turned_ - disturbance_.acceleration;
   dynamics::inverse_dynamics(model_, ws_, q_, v_, row_, torque_);
   if (const auto effort = setup_.effort_max())
     torque_ = torque_.cwiseMin(torque_share * *effort).cwiseMax(-torque_share * *effort);

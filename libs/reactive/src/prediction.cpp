@@ -57,8 +57,8 @@ void Prediction::begin(const Eigen::VectorXd& q, const hamelin_goal& goal, const
 
 bool Prediction::step() {
   const double ahead_s = moving_ && time_s() < foreseen_s ? time_s() : -1.0;
-  if (!glide_.place(q_, ahead_s, self_radius_m)) return end(false);
-  if (law_.within(model_, glide_.ws(), q_, *goal_, predicted_goal_share)) return end(true);
+  if (!glide_.place(q_, ahead_s, self_radius_m)) return finish(false);
+  if (law_.within(model_, glide_.ws(), q_, *goal_, predicted_goal_share)) return finish(true);
   const double distance = law_.distance(model_, glide_.ws(), q_, {goal_});
   if (!turn_.on()) note_distance(distance);
   dynamics::mass_matrix(model_, ws_, q_, M_);
@@ -68,7 +68,7 @@ bool Prediction::step() {
   set_velocity();
   law_.repel(glide_.points(), std::min(1.0, distance), u_);
   glide_.filter(law_.margin_weight(model_, glide_.ws(), q_, *goal_), M_, W_, u_);
-  if (idle_ > predicted_idle_steps || ++step_ == steps_max) return end(false);
+  if (idle_ > predicted_idle_steps || ++step_ == steps_max) return finish(false);
   q_ += Glide::step_s * u_;
   turn_.left_s -= Glide::step_s;
   return true;

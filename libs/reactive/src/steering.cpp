@@ -51,7 +51,7 @@ void Steering::restart() {
   begun_s_ = -endless;
   sideways_count_ = index_ = rounds_ = 0;
   stall_count_ = 0;
-  best_distance_ = basin_best_ = least_distance_ = endless;
+  overall_.distance = standing_.distance = predicted_.distance = endless;
   arrives_ = false;
 }
 
@@ -68,31 +68,29 @@ void Steering::advance(double time_s, const Eigen::VectorXd& q, double distance,
   }
 }
 
+bool Steering::Best::improves(double candidate, double time_s) {
+  if (!(candidate < distance - stall_progress)) return false;
+  distance = candidate;
+  since_s = time_s;
+  return true;
+}
+
 // Where the arm stands at a balance of attraction and what blocks it.
 void Steering::note_stall(double time_s, const Eigen::VectorXd& q, double distance) {
-  if (distance < least_distance_ - stall_progress) {
-    least_distance_ = distance;
-    least_since_s_ = time_s;
-    rounds_ = 0;
-  }
-  if (distance < best_distance_ - stall_progress || turn_.on()) {
-    best_distance_ = std::min(distance, best_distance_);
-    since_s_ = time_s;
-  } else if (time_s - since_s_ > stall_after_s) {
-    stalls_[stall_count_++ % stalls_max] = q;
-    since_s_ = time_s;
-    best_distance_ = distance;
+  if (overall_.improves(distance, time_s)) rounds_ = 0;
+  if (turn_.on()) {
+    standing_ = {std::min(distance, standing_.distance), time_s};
+  } else if (!standing_.improves(distance, time_s) && time_s - standing_.since_s > stall_after_s) {
+    remember(q);
+    standing_ = {distance, time_s};
   }
 }
 
+// Where the course without a turn ends again and again.
 void Steering::note_basin(const Eigen::VectorXd& end, double distance) {
-  if (distance < basin_best_ - stall_progress) {
-    basin_best_ = distance;
-    basin_since_s_ = begun_s_;
-  } else if (begun_s_ - basin_since_s_ > basin_s) {
-    stalls_[stall_count_++ % stalls_max] = end;
-    basin_since_s_ = begun_s_;
-  }
+  if (predicted_.improves(distance, begun_s_) || begun_s_ - predicted_.since_s <= basin_s) return;
+  remember(end);
+  predicted_.since_s = begun_s_;
 }
 
 void Steering::begin_look(double time_s, const Eigen::VectorXd& q, const hamelin_goal& goal,
@@ -113,9 +111,8 @@ void Steering::predict(const Turn& turn) {
 
 double Steering::cost() const {
   if (prediction_.arrives()) return arrival_per_s * prediction_.time_s() - arrival_bonus;
-  if (prediction_.is_lost()) return endless;
-  double out = prediction_.distance();
-  for (std::size_t i = 0; i < std::min(stall_count_, stalls_max); ++i)
+  double out = prediction_.distance();  // infinite if it is lost
+  for (std::size_t i = 0; i < std::min(stall_count_, stalls_.size()); ++i)
     out += std::exp(-(prediction_.end() - stalls_[i]).squaredNorm() / stall_width_squared);
   return out;
 }
@@ -159,8 +156,7 @@ void Steering::try_next() {
 
 void Steering::finish_look() {
   phase_ = Phase::idle;
-  if (!found_) return;
-  turn_ = best_turn_;
+  if (found_) turn_ = best_turn_;
 }
 
 // The next one of a cyclic list.

@@ -15,8 +15,6 @@ class Turning {
 
   [[nodiscard]] Variant variant() const noexcept { return variant_; }
   [[nodiscard]] double range_m() const noexcept { return rho0_; }
-  /// Below this distance the rate is constant [m].
-  [[nodiscard]] double least_m() const noexcept { return rho_min_; }
   /// The angular velocity e = γ u of the turning [rad/s], docs/theory.md (9.10).
   /// @param distance from the obstacle [m]
   /// @param to_obstacle, heading unit vectors to the obstacle and of the velocity, less than a

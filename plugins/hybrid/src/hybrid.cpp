@@ -34,9 +34,7 @@ using Eigen::VectorXd;
 constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint limit [1/s]
 constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
 constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
-// Share of the torque limits that friction and wrong masses may explain.
-constexpr double disturbance_share = 0.3;
-constexpr double torque_share = 0.98;  // share of the torque limits for the momentum box
+constexpr double torque_share = 0.98;     // share of the torque limits for the momentum box
 // Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
@@ -108,6 +106,7 @@ class Hybrid final : public planning::Planner {
         margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
         filter_(setup.dof(), 4 * Obstacles::max_points),
+        disturbance_(setup.dof()),
         evader_(host, setup_, model_, law_, margins_),
         follower_(setup, model_),
         stall_(params["stall_time_s"]),
@@ -152,7 +151,7 @@ class Hybrid final : public planning::Planner {
              &scratch_,
          })
       *x = VectorXd::Zero(n);
-    torque_ = disturbance_ = unexplained_ = last_torque_ = VectorXd::Zero(n);
+    torque_ = last_torque_ = VectorXd::Zero(n);
     // Scenes in which nothing moves need no series.
     if (host.obstacles_ahead(0.0, HAMELIN_MOVING, {}) > 0) {
       evasion_series_ = host.declare_series("evasion", "");
@@ -339,33 +338,17 @@ class Hybrid final : public planning::Planner {
     M_inv_ = identity_;
     llt_.solveInPlace(M_inv_);
     dynamics::bias_torque(model_, ws_, q_, v_, bias_);
-    take_disturbance(tick);
+    last_torque_ =
+        tick.torque() ? *tick.torque() : planning::ConstVectorMap(bias_.data(), q_.size());
+    disturbance_.take(tick, setup_, M_);
     w_ = v_;
     if (ramp_) {
-      scratch_ = bias_ - unexplained_;
+      scratch_ = bias_ - disturbance_.torque;
       ramp_->update(last_torque_, scratch_, M_inv_, v_);
       w_ = ramp_->coasting_velocity();
     }
     dynamics::forward_kinematics(model_, ws_, q_);
     obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
-  }
-
-  // Scaled down to what friction and wrong masses may explain: docs/theory.md (10.23).
-  void take_disturbance(const planning::Tick& tick) {
-    last_torque_ =
-        tick.torque() ? *tick.torque() : planning::ConstVectorMap(bias_.data(), q_.size());
-    disturbance_.setZero();
-    unexplained_.setZero();
-    if (!tick.disturbance()) return;
-    disturbance_ = *tick.disturbance();
-    unexplained_.noalias() = M_ * disturbance_;
-    const auto effort = setup_.effort_max();
-    if (!effort) return;
-    const double excess =
-        unexplained_.cwiseAbs().cwiseQuotient(disturbance_share * *effort).maxCoeff();
-    if (excess <= 1.0) return;
-    disturbance_ /= excess;
-    unexplained_ /= excess;
   }
 
   Target choose_target() {
@@ -419,7 +402,7 @@ class Hybrid final : public planning::Planner {
   // The torque that leads to x over the horizon, by the nominal model and what it does not explain:
   // docs/theory.md (10.22).
   void answer_by_torque(planning::Command& command) {
-    scratch_ = (x_ - w_) / horizon_s_ - disturbance_;
+    scratch_ = (x_ - w_) / horizon_s_ - disturbance_.acceleration;
     torque_.noalias() = M_ * scratch_;
     torque_ += bias_;
     if (const auto effort = setup_.effort_max())
@@ -483,7 +466,7 @@ class Hybrid final : public planning::Planner {
     const auto effort = setup_.effort_max();
     if (!effort) return;
     momentum_.noalias() = M_ * w_;
-    scratch_ = bias_ - unexplained_;
+    scratch_ = bias_ - disturbance_.torque;
     lower_ = momentum_ + horizon_s_ * (-torque_share * *effort - scratch_);
     upper_ = momentum_ + horizon_s_ * (torque_share * *effort - scratch_);
     filter_.set_momentum_box(lower_, upper_);
@@ -717,6 +700,7 @@ class Hybrid final : public planning::Planner {
   Margins margins_;
   JointBox box_;
   SafetyFilter filter_;
+  Disturbance disturbance_;
   Evader evader_;
   Follower follower_;
   TargetAnchor anchor_;           ///< the last place of the target to which a way was searched
@@ -740,10 +724,8 @@ class Hybrid final : public planning::Planner {
   std::optional<TorqueRamp> ramp_;  ///< only where the rate of the torque is limited
   bool uses_memory_ = false;
   JointPath path_;
-  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, torque_;
-  /// What the nominal model does not explain, as acceleration and as torque; both are zero under
-  /// ideal actuation.
-  VectorXd disturbance_, unexplained_, last_torque_;
+  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, torque_,
+      last_torque_;
   Eigen::MatrixXd M_, M_inv_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_

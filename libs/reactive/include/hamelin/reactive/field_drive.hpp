@@ -5,6 +5,7 @@
 
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
+#include "hamelin/reactive/disturbance.hpp"
 #include "hamelin/reactive/law.hpp"
 #include "hamelin/reactive/obstacles.hpp"
 #include "hamelin/reactive/repulsion.hpp"
@@ -72,7 +73,6 @@ class FieldDrive {
   void bound_turning(planning::Command& command);
   void bound_acceleration();
   [[nodiscard]] double joint_room(double offset) const;
-  void take_disturbance(const planning::Tick& tick);
 
   const planning::Setup setup_;
   model::Model model_;
@@ -80,7 +80,8 @@ class FieldDrive {
   double horizon_s_;  ///< within which the velocity bounds are reached
   Law law_;
   Obstacles obstacles_;
-  Eigen::VectorXd q_, v_, a_, row_, Wa_, turning_, turned_, torque_, disturbance_;
+  Disturbance disturbance_;
+  Eigen::VectorXd q_, v_, a_, row_, Wa_, turning_, turned_, torque_;
   Eigen::MatrixXd M_, W_, identity_;
   Eigen::LLT<Eigen::MatrixXd> llt_;
   dynamics::Matrix3Xd J_;

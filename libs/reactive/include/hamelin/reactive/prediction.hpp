@@ -37,7 +37,7 @@ class Prediction {
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
-  [[nodiscard]] bool end(bool arrives) {
+  [[nodiscard]] bool finish(bool arrives) {
     arrives_ = arrives;
     return false;
   }

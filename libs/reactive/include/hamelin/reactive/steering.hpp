@@ -40,15 +40,23 @@ class Steering {
   /// How often all candidates were tried in vain since the distance had its last new best.
   [[nodiscard]] int rounds_in_vain() const noexcept { return rounds_; }
   /// Since when the distance has had no new best [s].
-  [[nodiscard]] double in_vain_since_s() const noexcept { return least_since_s_; }
+  [[nodiscard]] double in_vain_since_s() const noexcept { return overall_.since_s; }
   /// Postures that were predicted.
   [[nodiscard]] long units() const noexcept { return units_; }
 
  private:
   enum class Phase { idle, straight, present, candidate };
 
+  /// The least distance so far, and since when.
+  struct Best {
+    double distance, since_s = 0.0;
+    /// @return whether this one is clearly less
+    bool improves(double candidate, double time_s);
+  };
+
   void note_stall(double time_s, const Eigen::VectorXd& q, double distance);
   void note_basin(const Eigen::VectorXd& end, double distance);
+  void remember(const Eigen::VectorXd& stall) { stalls_[stall_count_++ % stalls_.size()] = stall; }
   void begin_look(double time_s, const Eigen::VectorXd& q, const hamelin_goal& goal, bool moving);
   void predict(const Turn& turn);
   void finish_prediction();
@@ -82,8 +90,9 @@ class Steering {
   bool arrives_ = false;
   std::vector<Eigen::VectorXd> stalls_;
   std::size_t stall_count_ = 0;
-  double best_distance_ = 0.0, since_s_ = 0.0, basin_best_ = 0.0, basin_since_s_ = 0.0;
-  double least_distance_ = 0.0, least_since_s_ = 0.0;
+  Best overall_;    ///< of the arm's distance, since the start
+  Best standing_;   ///< of the arm's distance, since the last stall
+  Best predicted_;  ///< of where the course without a turn ends
   long units_ = 0;
 };
 
