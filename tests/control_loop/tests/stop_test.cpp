@@ -199,6 +199,28 @@ TEST_CASE("an arm whose measurements were lost goes on where it is measured then
   CHECK(std::isfinite(arrival(loop)));
 }
 
+TEST_CASE("a resumption waits for a measurement while few are lost, and a stop ends the wait",
+          "[control][stop]") {
+  control::Controller::Options options;
+  options.lost_measurements_max = 10;
+  Loop loop(sampled("clutter.json"), options);
+  control::Controller& controller = loop.controller;
+  const auto lose = [&] { loop.step(VectorXd(controller.tick_unseen().torque)); };
+  move_on(loop, 300);
+  controller.stop("a request");
+  move_on(loop, 400);
+  controller.resume();
+  lose();
+  CHECK(controller.answer().state == ControlState::stopping);
+  const bool stops = GENERATE(false, true);
+  if (stops) controller.stop("another request");
+  move_on(loop, 1);
+  CHECK((controller.answer().state == ControlState::stopping) == stops);
+  if (stops) controller.resume();
+  move_on(loop, 1);
+  CHECK(controller.answer().state == ControlState::running);
+}
+
 TEST_CASE("a clock that failed and is right again is no obstacle to going on", "[control][stop]") {
   Loop loop(sampled("clutter.json"));
   move_on(loop, 300);

@@ -200,6 +200,8 @@ void Controller::take_stop() {
   taken_stop_ = newest.number;
   if (answer_.state != ControlState::stopping)
     start_braking(StopReason::request, newest.cause.view());
+  else
+    withdrawn_serial_ = waiting_serial_;
 }
 
 void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
@@ -221,9 +223,14 @@ void Controller::describe_defect(LoadedArm& fresh, LineBuffer& line) {
 void Controller::take_load() {
   NewLoad& newest = mail_->load.take();
   if (newest.serial == taken_serial_.load()) return;
-  taken_serial_ = newest.serial;
-  const bool asked = newest.resumes > 0 && newest.resumes == stopped_.load(),
+  const bool asked = newest.resumes > 0 && newest.resumes == stopped_.load() &&
+                     newest.serial != withdrawn_serial_,
              resumes = asked && usable_;
+  if (asked && !usable_ && unusable_ <= options_.lost_measurements_max) {
+    waiting_serial_ = newest.serial;
+    return;
+  }
+  taken_serial_ = newest.serial;
   if (newest.number == answer_.load && !resumes) return;
   LoadedArm& fresh = *newest.arm;
   fresh.drive->continue_from(*arm_->drive);

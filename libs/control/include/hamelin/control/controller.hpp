@@ -189,10 +189,11 @@ class Controller {
   void stop(std::string_view cause);
   /// Goes on from where the arm is measured to be, from the next tick on, if the last answer has
   /// the state `stopping` and its cause is gone; servos that still move go on from their set point.
-  /// Planner, guide and shield are made again, goals go on where they were. The arm remains stopped
-  /// if the measurement of that tick cannot be used, or if there is no way to stop from where it
-  /// is; Answer::cause says so. A stop that no answer has shown yet remains. Any thread; this takes
-  /// milliseconds.
+  /// Planner, guide and shield are made again, goals go on where they were. If the measurement of
+  /// that tick cannot be used, the next one that can is waited for, unless more than
+  /// Options::lost_measurements_max are lost in a row. The arm remains stopped then, and if there is
+  /// no way to stop from where it is, which Answer::cause says. A stop that no answer has shown yet
+  /// remains. Any thread; this takes milliseconds.
   /// @throws Error plugin if the planner refuses to start; nothing changes then
   void resume();
 
@@ -324,6 +325,8 @@ class Controller {
   std::atomic<std::uint64_t> refused_load_{0}, used_load_{0};
   std::uint64_t serial_ = 0, resumes_ = 0;  ///< of the newest NewLoad
   std::atomic<std::uint64_t> taken_serial_{0};
+  /// Of a resumption that waits for a measurement, and of one that a stop has ended before it came.
+  std::uint64_t waiting_serial_ = 0, withdrawn_serial_ = 0;
   std::mutex stop_mutex_;
   std::uint64_t stop_number_ = 0, taken_stop_ = 0;
   /// How often the arm was stopped, and at which of the stops it stands still; 0: it does not.
