@@ -3,6 +3,7 @@
 #include "arm_field.hpp"
 #include "hamelin/reactive/replace_nulls.hpp"
 #include "params_schema.hpp"
+#include "predicted_turn.hpp"
 #include "published.hpp"
 
 namespace hamelin::gyro {
@@ -10,6 +11,10 @@ namespace {
 
 bool is_arm(const Json& params) {
   return params.at("algorithm") == "arm";
+}
+
+bool is_predicted(const Json& params) {
+  return params.at("variant") == "predicted";
 }
 
 /// The values of parameters that are null.
@@ -28,15 +33,21 @@ Json completed(const Json& params) {
 class Gyro final : public planning::Planner {
  public:
   static double influence_m(const Json& params) {
+    if (is_predicted(params)) return PredictedTurn::radius_m;
     const auto range = completed(params).at("rho0_m").get<double>();
     return is_arm(params) ? reactive::FieldDrive::contact_range_m(range) : range;
   }
 
-  Gyro(const planning::Host&, const planning::Setup& setup, const Json& given) {
+  Gyro(const planning::Host& host, const planning::Setup& setup, const Json& given) {
     const Json params = completed(given);
     if (params.at("distance_min_m") > params.at("rho0_m"))
       throw Error(ErrorCode::invalid, "/distance_min_m: above rho0_m, expected at most rho0_m");
-    if (is_arm(params))
+    if (is_predicted(params) && !is_arm(params))
+      throw Error(ErrorCode::invalid,
+                  "/variant: predicted needs algorithm arm, expected another variant");
+    if (is_predicted(params))
+      algorithm_ = std::make_unique<PredictedTurn>(host, setup, params);
+    else if (is_arm(params))
       algorithm_ = std::make_unique<ArmField>(setup, params);
     else
       algorithm_ = std::make_unique<Published>(setup, params);

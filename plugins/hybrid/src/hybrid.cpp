@@ -1,4 +1,4 @@
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,14 +14,12 @@
 #include "follower.hpp"
 #include "hamelin/dynamics/dynamics.hpp"
 #include "hamelin/planning/plugin.hpp"
-#include "hamelin/reactive/approach_speed.hpp"
 #include "joint_path.hpp"
 #include "memory.hpp"
 #include "params_schema.hpp"
 #include "parts.hpp"
 #include "roots.hpp"
 #include "stall.hpp"
-#include "torque_ramp.hpp"
 #include "tree.hpp"
 #include "tuning.hpp"
 #include "vias.hpp"
@@ -31,10 +29,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double joint_limit_rate = 8.0;  // speed per distance from a joint limit [1/s]
-constexpr double brake_share = 0.6;       // share of the braking room that one row counts on
-constexpr double least_brake = 0.3;       // braking that every row counts on [m/s²]
-constexpr double torque_share = 0.98;     // share of the torque limits for the momentum box
 // Distance of the carrot ahead of the arm on the goal's path and on an escape path [rad or m].
 constexpr double path_ahead = 0.25, escape_ahead = 0.15;
 // Stretch of a path ahead of a stall that is skipped, and searched afterwards [rad or m].
@@ -98,28 +92,20 @@ class Hybrid final : public planning::Planner {
       : host_(host),
         setup_(setup),
         model_(setup.model()),
-        ws_(model_),
         initial_params_(params),
         law_(setup, model_, Tuning(setup, params).law),
-        obstacles_(setup, params["contact_radius_m"]),
+        drive_(setup, model_, params["contact_radius_m"], params["horizon_s"]),
+        via_ws_(model_),
         surroundings_(host, setup, model_),
         margins_(setup, Tuning(setup, params).margins),
         box_(setup, lever_weights(model_)),
-        filter_(setup.dof(), 4 * Obstacles::max_points),
-        disturbance_(setup.dof()),
         evader_(host, setup_, model_, law_, margins_),
         follower_(setup, model_),
         stall_(params["stall_time_s"]),
         memory_(setup, box_, params["max_escapes"]),
         contact_radius_(params["contact_radius_m"]),
         max_escapes_(params["max_escapes"]),
-        horizon_s_(setup.control_period_s()),
         path_(setup.dof(), static_cast<Eigen::Index>(setup.path_points_max())) {
-    if (setup.sampled()) {
-      const double period = setup.control_period_s();
-      horizon_s_ = std::max(period, params["horizon_s"].get<double>());
-      if (const auto rate = setup.effort_rate_max()) ramp_.emplace(*rate, period, setup.delay_s());
-    }
     const std::string escape = params["escape"];
     uses_memory_ = escape == "memory";
     if (escape == "rollouts" || escape == "tree") {
@@ -136,30 +122,13 @@ class Hybrid final : public planning::Planner {
       steering_ = std::make_unique<Steering>(host, setup_, model_, Tuning(setup, params).law,
                                              margins_, SteeringParams{turn_kinds(params)});
     }
-    const int n = setup.dof();
-    for (auto* x : {
-             &q_,
-             &v_,
-             &w_,
-             &u_,
-             &x_,
-             &via_,
-             &bias_,
-             &momentum_,
-             &lower_,
-             &upper_,
-             &scratch_,
-         })
-      *x = VectorXd::Zero(n);
-    torque_ = last_torque_ = VectorXd::Zero(n);
+    u_ = via_ = lower_ = upper_ = scratch_ = VectorXd::Zero(setup.dof());
     // Scenes in which nothing moves need no series.
     if (host.obstacles_ahead(0.0, HAMELIN_MOVING, {}) > 0) {
       evasion_series_ = host.declare_series("evasion", "");
       clearance_series_ = host.declare_series("clearance_ahead", "m");
     }
     if (steering_) turn_series_ = host.declare_series("turn", "s");
-    M_ = M_inv_ = identity_ = Eigen::MatrixXd::Identity(n, n);
-    llt_.compute(identity_);  // allocates its memory
     apply_params(Tuning(setup, params));
   }
 
@@ -185,7 +154,7 @@ class Hybrid final : public planning::Planner {
     rate_ = tuning.approach_rate;
     joint_damping_ = tuning.joint_damping;
     stall_.set_stall_time(tuning.stall_time_s);
-    passes_ = tuning.filter_passes;
+    drive_.set_params({acceleration_max_, tuning.filter_passes});
     search_steps_ = tuning.search_steps;
     evader_.set_params(
         {velocity_gain_, follow_gain_, drive_acceleration_, acceleration_max_, rate_},
@@ -196,7 +165,6 @@ class Hybrid final : public planning::Planner {
   void reset(const planning::ConstVectorMap&, const planning::ConstVectorMap&) {
     memory_.reset();
     if (search_) search_->reset();
-    held_back_ = false;
     evader_.reset();
     evades_since_s_ = 0.0;
   }
@@ -204,23 +172,21 @@ class Hybrid final : public planning::Planner {
   static double influence_m(const Json& params) { return params["contact_radius_m"]; }
 
   void tick(const planning::Tick& tick, planning::Command& command) override {
-    q_ = tick.q();
-    v_ = tick.v();
     const auto& goal = tick.goal();
     if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
     if (measure_margins_) measure_margins();
-    prepare(tick);
+    drive_.update(tick);
 
     const Target target = choose_target();
     evader_.update(tick, arm(), course());
     tracks_ = tracks(tick);
     if (tracks_)
-      margins_.set_least(obstacles_.points());
+      margins_.set_least(drive_.points());
     else
-      margins_.set(obstacles_.points(), law_.margin_weight(model_, ws_, q_, goal));
+      margins_.set(drive_.points(), law_.margin_weight(model_, drive_.ws(), drive_.q(), goal));
     double closing_speed = 0.0;
     if (evader_.evades()) {
-      evader_.velocity(q_, u_);
+      evader_.velocity(drive_.q(), u_);
     } else if (mode_ == Mode::search) {
       u_.setZero();
     } else if (follows() && mode_ == Mode::goal) {
@@ -228,26 +194,22 @@ class Hybrid final : public planning::Planner {
     } else if (tracks_) {
       track(tick);
     } else {
-      closing_speed = law_.attract(model_, ws_, q_, target, u_);
+      closing_speed = law_.attract(model_, drive_.ws(), drive_.q(), target, u_);
       if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
-      const double distance = law_.distance(model_, ws_, q_, target);
+      const double distance = law_.distance(model_, drive_.ws(), drive_.q(), target);
       if (steering_ && mode_ == Mode::goal && path_.empty()) steer(tick, distance);
-      law_.repel(obstacles_.points(), std::min(1.0, distance), u_);
+      law_.repel(drive_.points(), std::min(1.0, distance), u_);
     }
 
     // The law's velocity after the horizon, with bounded acceleration: docs/theory.md (10.7).
     double gain = target.via != nullptr ? follow_gain_ : velocity_gain_,
-           drive = drive_acceleration_;
+           acceleration = drive_acceleration_;
     if ((follows() && mode_ == Mode::goal) || tracks_) gain = target_velocity_gain_;
-    if (tracks_) drive = acceleration_max_;
-    if (evader_.evades()) gain = evasion_gain, drive = evasion_acceleration;
+    if (tracks_) acceleration = acceleration_max_;
+    if (evader_.evades()) gain = evasion_gain, acceleration = evasion_acceleration;
     // A reference accelerates as the motors can, so the velocity that counts is the present one.
-    x_ = w_ + horizon_s_ * (gain * (u_ - (tracks_ ? v_ : w_))).cwiseMin(drive).cwiseMax(-drive);
-    project(command);
-    if (setup_.sampled())
-      answer_by_torque(command);
-    else
-      answer_by_velocity(command);
+    drive_.accelerate(u_, tracks_ ? drive_.v() : drive_.coasting_velocity(), gain, acceleration);
+    drive(command);
     if (joint_damping_ > 0.0) command.damping().setConstant(joint_damping_);
     if (follows())
       check_target(tick.time_s(), command);
@@ -289,42 +251,44 @@ class Hybrid final : public planning::Planner {
     enter(Mode::goal, tick.time_s());
     if (!follows()) return;
     anchor_.set(goal);
-    follower_.start(q_);
+    follower_.start(drive_.q());
     searches_target_ = false;
   }
 
   [[nodiscard]] bool follows() const { return goal_->type == HAMELIN_GOAL_FOLLOW; }
 
   void follow(const planning::Tick& tick) {
-    follower_.observe(ws_, v_, setup_.control_period_s());
-    for (int k = 0; k < setup_.dof(); ++k) std::tie(lower_[k], upper_[k]) = joint_bounds(k);
-    follower_.velocity(ws_, q_, *goal_, obstacles_.points(), 1.0 / target_velocity_gain_, lower_,
-                       upper_, u_);
+    follower_.observe(drive_.ws(), drive_.v(), setup_.control_period_s());
+    for (int k = 0; k < setup_.dof(); ++k)
+      std::tie(lower_[k], upper_[k]) = drive_.joint_bounds(k, pace());
+    follower_.velocity(drive_.ws(), drive_.q(), *goal_, drive_.points(),
+                       1.0 / target_velocity_gain_, lower_, upper_, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
-    follower_.keep_clear(obstacles_.points(), brake_, rate_, lower_, upper_, u_);
+    follower_.keep_clear(drive_.points(), brake_, rate_, lower_, upper_, u_);
   }
 
   // Whether the arm is near the reference of a trajectory; away from it, the trajectory is a path.
   [[nodiscard]] bool tracks(const planning::Tick& tick) const {
     const auto reference = tick.reference();
     return reference && reference->rate > track_rate_least && mode_ == Mode::goal &&
-           !evader_.evades() && (reference->q - q_).lpNorm<Eigen::Infinity>() < track_within;
+           !evader_.evades() &&
+           (reference->q - drive_.q()).lpNorm<Eigen::Infinity>() < track_within;
   }
 
   // docs/theory.md (18.17)
   void track(const planning::Tick& tick) {
     const auto reference = *tick.reference();
-    // Under ideal actuation v_ is that of the step before, on average half a period old.
+    // Under ideal actuation v is that of the step before, on average half a period old.
     const double lead =
         1.0 / target_velocity_gain_ - (setup_.sampled() ? 0.0 : 0.5 * setup_.control_period_s());
-    u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - q_);
+    u_ = reference.v + lead * reference.a + tracking_gain_ * (reference.q - drive_.q());
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
   }
 
   // docs/theory.md (10.40)
   void steer(const planning::Tick& tick, double distance) {
-    steering_->advance(tick.time_s(), q_, distance, *goal_, tick.moving_count() > 0);
-    steering_->apply(M_, u_);
+    steering_->advance(tick.time_s(), drive_.q(), distance, *goal_, tick.moving_count() > 0);
+    steering_->apply(drive_.M(), u_);
   }
 
   void measure_margins() {
@@ -332,33 +296,14 @@ class Hybrid final : public planning::Planner {
     measure_margins_ = false;
   }
 
-  void prepare(const planning::Tick& tick) {
-    dynamics::mass_matrix(model_, ws_, q_, M_);
-    llt_.compute(M_);
-    M_inv_ = identity_;
-    llt_.solveInPlace(M_inv_);
-    dynamics::bias_torque(model_, ws_, q_, v_, bias_);
-    last_torque_ =
-        tick.torque() ? *tick.torque() : planning::ConstVectorMap(bias_.data(), q_.size());
-    disturbance_.take(tick, setup_, M_);
-    w_ = v_;
-    if (ramp_) {
-      scratch_ = bias_ - disturbance_.torque;
-      ramp_->update(last_torque_, scratch_, M_inv_, v_);
-      w_ = ramp_->coasting_velocity();
-    }
-    dynamics::forward_kinematics(model_, ws_, q_);
-    obstacles_.update(model_, ws_, tick.contacts(), tick.self_contacts());
-  }
-
   Target choose_target() {
     if (mode_ == Mode::via) return {goal_, &memory_.via()};
     if (mode_ == Mode::escape_path) {
-      escape_position_ = search_->path().carrot(escape_position_, q_, escape_ahead, via_);
+      escape_position_ = search_->path().carrot(escape_position_, drive_.q(), escape_ahead, via_);
       return {goal_, &via_, escape_position_ < search_->path().length()};
     }
     if (path_.empty()) return {goal_};
-    path_position_ = path_.carrot(path_position_, q_, path_ahead, via_);
+    path_position_ = path_.carrot(path_position_, drive_.q(), path_ahead, via_);
     return {goal_, &via_, path_position_ < path_.length()};
   }
 
@@ -382,135 +327,34 @@ class Hybrid final : public planning::Planner {
     return course;
   }
 
-  [[nodiscard]] Evader::Arm arm() const { return {ws_, q_, v_, M_, M_inv_}; }
+  [[nodiscard]] Evader::Arm arm() const {
+    return {drive_.ws(), drive_.q(), drive_.v(), drive_.M(), drive_.M_inv()};
+  }
 
   // The length that remains: the distance from the target, and the path behind it.
   [[nodiscard]] double remaining(const Target& target) {
-    double length = law_.distance(model_, ws_, q_, target);
+    double length = law_.distance(model_, drive_.ws(), drive_.q(), target);
     if (mode_ == Mode::escape_path) length += search_->path().length() - escape_position_;
     if (mode_ == Mode::goal && !path_.empty()) length += path_.length() - path_position_;
     return length;
   }
 
-  // The node's velocity and the bias torque that keeps it through the step: docs/theory.md (10.21).
-  void answer_by_velocity(planning::Command& command) {
-    command.node_velocity() = x_;
-    dynamics::bias_torque(model_, ws_, q_, x_, bias_);
-    command.held_torque() = bias_;
+  // How fast limits are approached: a trajectory was planned to be clear.
+  [[nodiscard]] Pace pace() const {
+    if (!tracks_) return {brake_, rate_, 0.5 * acceleration_max_};
+    const double rate = track_rate_within(drive_.horizon_s());
+    return {track_brake, rate, acceleration_max_, rate};
   }
 
-  // The torque that leads to x over the horizon, by the nominal model and what it does not explain:
-  // docs/theory.md (10.22).
-  void answer_by_torque(planning::Command& command) {
-    scratch_ = (x_ - w_) / horizon_s_ - disturbance_.acceleration;
-    torque_.noalias() = M_ * scratch_;
-    torque_ += bias_;
-    if (const auto effort = setup_.effort_max())
-      torque_ = torque_.cwiseMin(*effort).cwiseMax(-*effort);
-    if (ramp_) ramp_->limit(torque_, last_torque_);
-    command.held_torque() = torque_;
-  }
-
-  void project(planning::Command& command) {
-    filter_.begin(M_, M_inv_);
-    set_joint_box();
-    set_momentum_box();
-    add_rows();
-    scratch_ = x_;
-    const auto report = filter_.project(x_, passes_);
-    held_back_ =
-        (x_ - scratch_).norm() > 1e-3 * horizon_s_ || obstacles_.clearance() < contact_radius_;
-    const double share = setup_.control_period_s() / horizon_s_;  // docs/theory.md (10.16), (10.17)
-    command.set_accounts(
-        share * (report.energy_after_J - report.energy_before_J - report.recovery_J),
-        share * report.recovery_J);
-  }
-
-  void set_joint_box() {
-    const double dt = horizon_s_;
-    const auto velocity_max = setup_.velocity_max();
-    if (velocity_max) {
-      double excess = 1.0;
-      for (int k = 0; k < setup_.dof(); ++k)
-        excess = std::max(excess, std::abs(x_[k]) / (*velocity_max)[k]);
-      x_ /= excess;
-    }
-    for (int k = 0; k < setup_.dof(); ++k) {
-      const auto [low, high] = joint_bounds(k);
-      // The acceleration bound goes last, docs/theory.md (10.12): a limit that cannot be kept is
-      // approached with the hardest braking.
-      const double slowest = w_[k] - dt * acceleration_max_,
-                   fastest = w_[k] + dt * acceleration_max_;
-      lower_[k] = std::clamp(low, slowest, fastest);
-      upper_[k] = std::clamp(high, slowest, fastest);
-      if (lower_[k] > upper_[k])
-        lower_[k] = upper_[k] = std::clamp(0.5 * (low + high), slowest, fastest);
-    }
-    filter_.set_box(lower_, upper_);
-  }
-
-  // The bounds of a joint's velocity by its limits, where these are modelled.
-  [[nodiscard]] std::pair<double, double> joint_bounds(int k) const {
-    const auto velocity_max = setup_.velocity_max(), q_lower = setup_.q_lower(),
-               q_upper = setup_.q_upper();
-    double low = -std::numeric_limits<double>::infinity(), high = -low;
-    if (velocity_max) low = -(*velocity_max)[k], high = (*velocity_max)[k];
-    if (q_lower) low = std::max(low, joint_approach(k, (*q_lower)[k] - q_[k], -1.0));
-    if (q_upper) high = std::min(high, joint_approach(k, (*q_upper)[k] - q_[k], 1.0));
-    return {low, high};
-  }
-
-  // Momenta within the torque limits, docs/theory.md (10.13). The bias torque is held at x, not at
-  // w; torque_share covers the difference.
-  void set_momentum_box() {
-    const auto effort = setup_.effort_max();
-    if (!effort) return;
-    momentum_.noalias() = M_ * w_;
-    scratch_ = bias_ - disturbance_.torque;
-    lower_ = momentum_ + horizon_s_ * (-torque_share * *effort - scratch_);
-    upper_ = momentum_ + horizon_s_ * (torque_share * *effort - scratch_);
-    filter_.set_momentum_box(lower_, upper_);
-  }
-
-  void add_rows() {
-    const double dt = horizon_s_;
-    const double brake_max = tracks_ ? track_brake : brake_,
-                 rate = tracks_ ? track_rate_within(dt) : rate_;
-    for (const auto& point : obstacles_.points()) {
-      const bool moves = evader_.moves(point.obstacle);
-      if (moves && !evader_.has_rows()) continue;
-      const double x = point.distance - point.margin;
-      // docs/theory.md (10.11)
-      double bound = point.obstacle_speed - approach_speed(x, brake_max, rate);
-      const double present = point.row.dot(w_);
-      // Near its limit a row demands no more braking than the boxes surely allow:
-      // docs/theory.md (10.20).
-      if (ramp_ || present - least_brake * dt <
-                       point.obstacle_speed - approach_speed(x, least_brake, rate)) {
-        const double room = filter_.braking_room(point.row, w_);
-        const double brake = std::clamp(brake_share * room / dt, least_brake, brake_max);
-        const double speed =
-            ramp_ ? approach_speed(x, brake, rate, ramp_->loss(point.row, M_inv_, brake))
-                  : approach_speed(x, brake, rate);
-        bound = std::min(point.obstacle_speed - speed, present + room);
-      }
-      const double floor =
-          point.obstacle_speed - rate * std::max(1e-9, point.distance - 0.5 * point.margin);
-      (void)filter_.add_row(point.row, bound, floor, moves ? MoverRows::softness : 0.0);
-    }
-    if (evader_.active() && evader_.has_rows()) evader_.add_rows(arm(), w_, filter_);
-  }
-
-  // The velocity bound at a joint limit at the signed distance `offset` in the direction `side`
-  // (±1), from which half of the allowed acceleration can brake: φ of docs/theory.md (10.10).
-  [[nodiscard]] double joint_approach(int k, double offset, double side) const {
-    const double x = side * offset;
-    if (!std::isfinite(x)) return side * std::numeric_limits<double>::infinity();
-    const double brake = (tracks_ ? 1.0 : 0.5) * acceleration_max_,
-                 rate = tracks_ ? track_rate_within(horizon_s_) : joint_limit_rate;
-    if (x <= 0.0) return side * joint_limit_rate * x;
-    if (!ramp_) return side * approach_speed(x, brake, rate);
-    return side * approach_speed(x, brake, rate, ramp_->loss_of_joint(k, side, M_inv_, brake));
+  void drive(planning::Command& command) {
+    drive_.begin_filter(pace());
+    drive_.add_points(pace(), [this](const NearPoint& point) {
+      if (!evader_.moves(point.obstacle)) return 0.0;
+      return evader_.has_rows() ? MoverRows::softness : -1.0;
+    });
+    if (evader_.active() && evader_.has_rows())
+      evader_.add_rows(arm(), drive_.coasting_velocity(), drive_.filter());
+    drive_.apply(command);
   }
 
   // An arm that is kept from its target searches a way around while it goes on following. A target
@@ -518,7 +362,7 @@ class Hybrid final : public planning::Planner {
   void check_target(double now, planning::Command& command) {
     command.disable_stall_rule();
     if (!search_) return;
-    const double distance = law_.distance(model_, ws_, q_, {goal_});
+    const double distance = law_.distance(model_, drive_.ws(), drive_.q(), {goal_});
     if (mode_ == Mode::escape_path) {
       if (distance < target_away || escape_has_ended(now)) resume_target(now);
       return;
@@ -538,9 +382,10 @@ class Hybrid final : public planning::Planner {
 
   // An escape towards a place of the target ends there, or where it is stuck.
   [[nodiscard]] bool escape_has_ended(double now) {
-    if (stall_.stalled(now, remaining({goal_, &via_}), v_.norm(), 1.0, held_back_)) return true;
+    if (stall_.stalled(now, remaining({goal_, &via_}), drive_.v().norm(), 1.0, drive_.held_back()))
+      return true;
     return escape_position_ >= search_->path().length() &&
-           (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < via_reached;
+           (search_->path().end() - drive_.q()).lpNorm<Eigen::Infinity>() < via_reached;
   }
 
   void resume_target(double now) {
@@ -560,7 +405,7 @@ class Hybrid final : public planning::Planner {
     }
     host_.info("searches a way to the target");
     surroundings_.count(nullptr);
-    search_->begin(anchor_.goal(), q_, nullptr, 0.0);
+    search_->begin(anchor_.goal(), drive_.q(), nullptr, 0.0);
     searches_target_ = true;
   }
 
@@ -573,20 +418,20 @@ class Hybrid final : public planning::Planner {
     } else if (now - evades_since_s_ < longest_wait_s && !makes_no_progress(now, target)) {
       return stall_.restart(now);
     }
-    const bool stalled =
-        stall_.stalled(now, remaining(target), v_.norm(), closing_speed, held_back_) ||
-        makes_no_progress(now, target);
+    const bool stalled = stall_.stalled(now, remaining(target), drive_.v().norm(), closing_speed,
+                                        drive_.held_back()) ||
+                         makes_no_progress(now, target);
     if (mode_ == Mode::via) {
-      const bool arrived = (memory_.via() - q_).lpNorm<Eigen::Infinity>() < via_reached;
+      const bool arrived = (memory_.via() - drive_.q()).lpNorm<Eigen::Infinity>() < via_reached;
       if (!arrived && !stalled && now < via_until_s_) return;
       // The via may lie beyond the blocked stretch.
       if (!path_.empty())
-        path_position_ = path_.nearest(path_position_, path_regained, q_, scratch_);
+        path_position_ = path_.nearest(path_position_, path_regained, drive_.q(), scratch_);
       return enter(Mode::goal, now);
     }
     if (mode_ == Mode::escape_path && escape_position_ >= search_->path().length()) {
       const bool arrived =
-          (search_->path().end() - q_).lpNorm<Eigen::Infinity>() < escape_end_reached;
+          (search_->path().end() - drive_.q()).lpNorm<Eigen::Infinity>() < escape_end_reached;
       // The escape path of a tip goal ends at a solution of the goal, so it is followed to its end.
       const bool stay = search_->arrives() && goal_->type != HAMELIN_GOAL_JOINT;
       if (arrived && (stalled || !stay)) {
@@ -632,19 +477,19 @@ class Hybrid final : public planning::Planner {
       // What moves may leave the way free, or come back to where it was: most searches assume the
       // one, each third the other.
       surroundings_.count(evader_.active() && escapes_ % 3 == 0 ? &evader_.sweep() : nullptr);
-      search_->begin(*goal_, q_, path_.empty() ? nullptr : &path_, path_position_);
+      search_->begin(*goal_, drive_.q(), path_.empty() ? nullptr : &path_, path_position_);
       return enter(Mode::search, now);
     }
     // On a path the distance from a point behind the blocked stretch counts.
     if (!path_.empty()) path_.at(path_position_ + path_beyond, via_);
     const auto distance = [&](const VectorXd& via) {
-      if (target.via == nullptr) dynamics::forward_kinematics(model_, ws_, via);
-      return law_.distance(model_, ws_, via, target);
+      if (target.via == nullptr) dynamics::forward_kinematics(model_, via_ws_, via);
+      return law_.distance(model_, via_ws_, via, target);
     };
     const auto clear = [&](const VectorXd& via) {
       return surroundings_.is_clear(via, margins_.params().full_m, margins_.params().self_m);
     };
-    memory_.next(q_, distance, clear);
+    memory_.next(drive_.q(), distance, clear);
     via_until_s_ = now + 1.2 + 0.05 * escapes_;
     enter(Mode::via, now);
   }
@@ -661,11 +506,12 @@ class Hybrid final : public planning::Planner {
   // The cause of a stall, from the multipliers of the filter.
   [[nodiscard]] std::string cause() {
     const auto& links = model_.robot().links;
-    const auto points = obstacles_.points();
+    const auto points = drive_.points();
     int worst = -1;
-    for (int i = 0; i < std::min<int>(filter_.row_count(), static_cast<int>(points.size())); ++i)
-      if (filter_.row_multiplier(i) > 0.0 &&
-          (worst < 0 || filter_.row_multiplier(i) > filter_.row_multiplier(worst)))
+    for (int i = 0; i < std::min<int>(drive_.filter().row_count(), static_cast<int>(points.size()));
+         ++i)
+      if (drive_.filter().row_multiplier(i) > 0.0 &&
+          (worst < 0 || drive_.filter().row_multiplier(i) > drive_.filter().row_multiplier(worst)))
         worst = i;
     if (worst >= 0) {
       const auto& point = points[static_cast<std::size_t>(worst)];
@@ -677,11 +523,11 @@ class Hybrid final : public planning::Planner {
              "' balances the attraction to the goal";
     }
     for (int k = 0; k < setup_.dof(); ++k) {
-      if (setup_.effort_max() && filter_.momentum_multiplier(k) > 0.0)
+      if (setup_.effort_max() && drive_.filter().momentum_multiplier(k) > 0.0)
         return "torque limit of joint '" + links[static_cast<std::size_t>(k)].joint.name + "'";
       const double at_limit = 0.02;
-      if ((setup_.q_lower() && q_[k] - (*setup_.q_lower())[k] < at_limit) ||
-          (setup_.q_upper() && (*setup_.q_upper())[k] - q_[k] < at_limit))
+      if ((setup_.q_lower() && drive_.q()[k] - (*setup_.q_lower())[k] < at_limit) ||
+          (setup_.q_upper() && (*setup_.q_upper())[k] - drive_.q()[k] < at_limit))
         return "joint limit: joint '" + links[static_cast<std::size_t>(k)].joint.name +
                "' is at its limit";
     }
@@ -692,15 +538,13 @@ class Hybrid final : public planning::Planner {
   planning::Host host_;
   planning::Setup setup_;
   model::Model model_;
-  dynamics::Workspace ws_;
   Json initial_params_;
   Law law_;
-  Obstacles obstacles_;
+  FilterDrive drive_;
+  dynamics::Workspace via_ws_;
   Surroundings surroundings_;
   Margins margins_;
   JointBox box_;
-  SafetyFilter filter_;
-  Disturbance disturbance_;
   Evader evader_;
   Follower follower_;
   TargetAnchor anchor_;           ///< the last place of the target to which a way was searched
@@ -719,20 +563,14 @@ class Hybrid final : public planning::Planner {
   double velocity_gain_ = 0.0, follow_gain_ = 0.0, target_velocity_gain_ = 1.0,
          tracking_gain_ = 0.0, drive_acceleration_ = 0.0, acceleration_max_ = 0.0, brake_ = 0.0,
          rate_ = 0.0, joint_damping_ = 0.0, contact_radius_;
-  int passes_ = 1, max_escapes_, search_steps_ = 1;
-  double horizon_s_;                ///< time after which the velocity is to be x
-  std::optional<TorqueRamp> ramp_;  ///< only where the rate of the torque is limited
+  int max_escapes_, search_steps_ = 1;
   bool uses_memory_ = false;
   JointPath path_;
-  VectorXd q_, v_, w_, u_, x_, via_, bias_, momentum_, lower_, upper_, scratch_, torque_,
-      last_torque_;
-  Eigen::MatrixXd M_, M_inv_, identity_;
-  Eigen::LLT<Eigen::MatrixXd> llt_;
+  VectorXd u_, via_, lower_, upper_, scratch_;
   const hamelin_goal* goal_ = nullptr;  ///< of goal_number_
   std::uint64_t goal_number_ = 0;
   Mode mode_ = Mode::goal;
   bool tracks_ = false;          ///< the reference of a trajectory
-  bool held_back_ = false;       ///< by the filter or a near obstacle
   bool measure_margins_ = true;  ///< whether goal or margins have changed
   int escapes_ = 0;
   double path_position_ = 0.0, escape_position_ = 0.0, via_until_s_ = 0.0;

@@ -1,5 +1,5 @@
 #pragma once
-#include "hamelin/reactive/disturbance.hpp"
+#include "hamelin/reactive/filter_drive.hpp"
 #include "hamelin/reactive/law.hpp"
 #include "hamelin/reactive/margins.hpp"
 #include "hamelin/reactive/movers.hpp"

@@ -5,7 +5,7 @@
 
 #include "hamelin/reactive/approach_speed.hpp"
 
-namespace hamelin::hybrid {
+namespace hamelin::reactive {
 
 /// Motors whose torque changes at a limited rate. An arm that accelerates keeps doing so until its
 /// torque has changed, so the planner decides on the velocity that it coasts to, and counts on the
@@ -69,4 +69,4 @@ class TorqueRamp {
   Eigen::VectorXd coasting_, mean_, impulse_;
 };
 
-}  // namespace hamelin::hybrid
+}  // namespace hamelin::reactive

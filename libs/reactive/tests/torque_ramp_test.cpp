@@ -1,15 +1,14 @@
-#include "../src/torque_ramp.hpp"
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "hamelin/reactive/torque_ramp.hpp"
 #include "hamelin/test/random_mass.hpp"
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using namespace hamelin::hybrid;
+using namespace hamelin::reactive;
 
 namespace {
 
