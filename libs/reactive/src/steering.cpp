@@ -135,13 +135,18 @@ void Steering::finish_prediction() {
     } else {
       turn_.left_s = 0.0;
     }
-  } else if (J < least_cost_ - switch_gain || (found_ && J < least_cost_)) {
+  } else if (may_turn() && (J < least_cost_ - switch_gain || (found_ && J < least_cost_))) {
     least_cost_ = J;
     best_turn_ = candidate_;
     found_ = true;
   }
   if (arrives_) return finish_look();
   try_next();
+}
+
+// An arm that follows a target leaves it only where it surely comes back to it.
+bool Steering::may_turn() const {
+  return prediction_.arrives() || goal_->type != HAMELIN_GOAL_FOLLOW;
 }
 
 void Steering::try_next() {

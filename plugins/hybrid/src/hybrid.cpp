@@ -191,6 +191,7 @@ class Hybrid final : public planning::Planner {
       u_.setZero();
     } else if (follows() && mode_ == Mode::goal) {
       follow(tick);
+      if (steers_to_target(tick.time_s())) turn_to_target(tick);
     } else if (tracks_) {
       track(tick);
     } else {
@@ -265,6 +266,24 @@ class Hybrid final : public planning::Planner {
                        1.0 / target_velocity_gain_, lower_, upper_, u_);
     if (tick.speed_scale() < 1.0) u_ *= tick.speed_scale();
     follower_.keep_clear(drive_.points(), brake_, rate_, lower_, upper_, u_);
+  }
+
+  // Without a search, an arm that is kept from its target turns where that leads to it.
+  [[nodiscard]] bool steers_to_target(double now) const {
+    return steering_ && !search_ && is_kept_from_target(now);
+  }
+  void turn_to_target(const planning::Tick& tick) {
+    steering_->advance(tick.time_s(), drive_.q(),
+                       law_.distance(model_, drive_.ws(), drive_.q(), {goal_}), *goal_,
+                       tick.moving_count() > 0);
+    if (!steering_->turn().on()) return;
+    law_.attract(model_, drive_.ws(), drive_.q(), {goal_}, u_);
+    u_ *= tick.speed_scale();
+    steering_->apply(drive_.M(), u_);
+    law_.repel(drive_.points(), 1.0, u_);
+  }
+  [[nodiscard]] bool is_kept_from_target(double now) const {
+    return now - blocked_since_s_ > target_blocked_s;
   }
 
   // Whether the arm is near the reference of a trajectory; away from it, the trajectory is a path.
@@ -361,8 +380,13 @@ class Hybrid final : public planning::Planner {
   // is never given up: it may come back.
   void check_target(double now, planning::Command& command) {
     command.disable_stall_rule();
-    if (!search_) return;
+    if (!search_ && !steering_) return;
     const double distance = law_.distance(model_, drive_.ws(), drive_.q(), {goal_});
+    if (!search_) {
+      if (steering_->turn().on() || is_held_from_target(distance)) return;
+      blocked_since_s_ = now;
+      return steering_->restart();
+    }
     if (mode_ == Mode::escape_path) {
       if (distance < target_away || escape_has_ended(now)) resume_target(now);
       return;
@@ -375,9 +399,12 @@ class Hybrid final : public planning::Planner {
       escape_position_ = 0.0;
       return enter(Mode::escape_path, now);
     }
-    if (follower_.progress() > target_blocked_share || distance < target_away)
-      blocked_since_s_ = now;
-    if (now - blocked_since_s_ > target_blocked_s) search_target(now);
+    if (!is_held_from_target(distance)) blocked_since_s_ = now;
+    if (is_kept_from_target(now)) search_target(now);
+  }
+
+  [[nodiscard]] bool is_held_from_target(double distance) const {
+    return follower_.progress() <= target_blocked_share && distance >= target_away;
   }
 
   // An escape towards a place of the target ends there, or where it is stuck.

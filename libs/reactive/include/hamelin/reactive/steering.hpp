@@ -60,6 +60,7 @@ class Steering {
   void begin_look(double time_s, const Eigen::VectorXd& q, const hamelin_goal& goal, bool moving);
   void predict(const Turn& turn);
   void finish_prediction();
+  [[nodiscard]] bool may_turn() const;
   void try_next();
   void finish_look();
   void draw_candidate();
