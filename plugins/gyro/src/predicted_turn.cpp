@@ -13,6 +13,8 @@ constexpr double joint_gain = 4.0, tip_gain = 3.0, tip_speed_m_s = 0.5, tip_turn
 // [rad/s² or m/s²]. The difference from acceleration_max is a reserve for obstacles.
 constexpr double velocity_gain = 10.0, drive_acceleration = 6.0, acceleration_max = 15.0;
 constexpr int filter_passes = 12;
+// So often all turns are tried in vain before the arm gives up.
+constexpr int rounds_max = 40;
 // What is kept of obstacles [m]: far from the goal, at a goal of the tip, and how much less than
 // the clearance there at a goal of the joints; between parts of the arm.
 constexpr double full_margin_m = 0.01, goal_margin_m = 0.003, self_margin_m = 0.005,
@@ -83,8 +85,16 @@ void PredictedTurn::tick(const planning::Tick& tick, planning::Command& command)
   drive_.begin_filter(pace);
   drive_.add_points(pace, [](const reactive::NearPoint&) { return 0.0; });
   drive_.apply(command);
-  const bool at_goal = law_.within(model_, drive_.ws(), drive_.q(), goal, 1.0);
-  rest_.check(tick, at_goal, command);
+  check_end(tick, command);
+}
+
+void PredictedTurn::check_end(const planning::Tick& tick, planning::Command& command) {
+  if (!steering_)
+    return rest_.check(tick, law_.within(model_, drive_.ws(), drive_.q(), tick.goal(), 1.0),
+                       command);
+  command.disable_stall_rule();
+  if (steering_->rounds_in_vain() >= rounds_max)
+    command.give_up("force balance: no turn that was predicted leads nearer to the goal");
 }
 
 }  // namespace hamelin::gyro

@@ -24,6 +24,7 @@ class PredictedTurn final : public planning::Planner {
 
  private:
   void start(const planning::Tick& tick);
+  void check_end(const planning::Tick& tick, planning::Command& command);
   void steer(const planning::Tick& tick, planning::Command& command);
 
   planning::Setup setup_;
@@ -33,7 +34,7 @@ class PredictedTurn final : public planning::Planner {
   reactive::Surroundings surroundings_;
   reactive::Margins margins_;
   std::optional<reactive::Steering> steering_;  ///< none with turns none
-  reactive::RestRule rest_;
+  reactive::RestRule rest_;                     ///< without steering
   Eigen::VectorXd u_;
   std::int32_t series_ = -1;
   std::uint64_t goal_number_ = 0;

@@ -440,6 +440,9 @@ TEST_CASE("gyro refuses parameters that contradict each other", "[gyro]") {
   CHECK_THROWS_WITH(example_52(Json{{"rho0_m", 0.01}, {"distance_min_m", 0.1}}),
                     Catch::EndsWith("/distance_min_m: above rho0_m, expected at most rho0_m"));
   CHECK_THROWS_WITH(example_52(Json{{"variant", "chang"}}), Catch::Contains("/variant"));
+  CHECK_THROWS_WITH(example_52(Json{{"variant", "predicted"}}),
+                    Catch::EndsWith("/variant: predicted needs algorithm arm, expected another "
+                                    "variant"));
 }
 
 TEST_CASE("gyro uses only the end of a path and the position of a pose, and ignores self contacts",

@@ -98,6 +98,28 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("a turn that is predicted leads past a ball, without work, where the same law rests",
+          "[simulation][energy]") {
+  const TemporaryFolder folder;
+  Json scene = scene_52();
+  scene["obstacles"] = Json::array({ball("in the way", 2.4, 2.2, 0.25)});
+  scene["goals"] = {{{"type", "joint"}, {"q", {1.6, 0.0, 0.0, 0.0}}}};
+  scene["actuation"]["type"] = GENERATE("ideal", "sampled");
+  scene["duration_s"] = 60.0;
+  CAPTURE(scene["actuation"]);
+  const auto run = [&](const std::string& turns) {
+    scene["planner"] = {{"name", "gyro"}, {"params", {{"variant", "predicted"}, {"turns", turns}}}};
+    const auto result = run_scene(folder, scene);
+    CHECK(result.gyroscopic_work_J == 0.0);
+    CHECK(*result.min_clearance_m > 0.0);
+    CHECK(result.energy_error_max_J < 1e-3);
+    return result.outcome;
+  };
+  CHECK(run("none") != Outcome::reached);
+  CHECK(run("tangents") == Outcome::reached);
+  CHECK(run("all") == Outcome::reached);
+}
+
 TEST_CASE("a start in contact is refused before the first step", "[simulation][outcome]") {
   const TemporaryFolder folder;
   Json scene = scene_52();
@@ -405,16 +427,18 @@ planning::Plugin keep_loaded(const std::string& planner) {
 TEST_CASE("a tick does not allocate", "[simulation][allocation]") {
   test::require_allocation_count();
   const TemporaryFolder folder;
-  const std::string planner = GENERATE(as<std::string>{}, "apf", "gyro", "hybrid");
-  CAPTURE(planner);
+  // The host allocates for messages, such as that of a search.
+  const auto [planner, params] =
+      GENERATE(std::pair("apf", Json::object()), std::pair("gyro", Json::object()),
+               std::pair("gyro", Json{{"variant", "predicted"}}),
+               std::pair("hybrid", Json{{"escape", "none"}}));
+  CAPTURE(planner, params);
   const auto loaded = keep_loaded(planner);
   Json scene = scene_52();
   scene["obstacles"] = {ball("obstacle", 2.4, 2.2, 0.25),
                         moving(ball("passer-by", 1.5, -0.4, 0.1), 0.5, 0.0)};
   scene["model"]["self_collision"] = true;
-  scene["planner"]["name"] = planner;
-  // The host allocates for messages, such as that of a search.
-  if (planner == "hybrid") scene["planner"]["params"] = {{"escape", "none"}};
+  scene["planner"] = {{"name", planner}, {"params", params}};
   // From node to node: what a result says at the end depends on the run.
   long before = -1, after = -1;
   simulation::Watch watch;

@@ -109,6 +109,29 @@ TEST_CASE("a target is dragged through the boards of a shelf without contact", "
   check_limits(result);
 }
 
+TEST_CASE("without a search an arm turns past a wall to a target that rests behind it", "[follow]") {
+  scene::Scene scene = shipped("data/scenes/follow.json");
+  scene.goals[0].motion = scene::SineMotion{};
+  scene.goals[0].pose = geometry::SE3{scene.goals[0].pose.R(), {0.4, 0.5, 0.3}};
+  scene::Obstacle wall;
+  wall.name = "wall";
+  wall.shape = scene::Shape::box;
+  wall.pose = geometry::SE3{Eigen::Matrix3d::Identity(), {0.5, 0.25, 0.4}};
+  wall.size_m = {0.6, 0.03, 0.8};
+  scene.obstacles.push_back(wall);
+  scene.duration_s = 8.0;
+  const auto error = [&](bool steering) {
+    scene.planner->params = {{"escape", "none"}, {"steering", steering}};
+    const log::Result result = simulation::run(scene, plugins, {});
+    CHECK(result.min_clearance_m > 0.0);
+    check_limits(result);
+    REQUIRE(result.goal);
+    return *result.goal->error_m;
+  };
+  CHECK(error(false) > 0.2);
+  CHECK(error(true) < 0.01);
+}
+
 TEST_CASE("singular postures are passed within all limits and without standstill", "[follow]") {
   const auto [file, share] =
       GENERATE(std::pair("wrist.json", 0.95), std::pair("stretched.json", 0.6));
