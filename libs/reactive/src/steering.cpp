@@ -21,8 +21,6 @@ constexpr double stall_after_s = 0.3, stall_progress = 0.01;
 constexpr double stall_width_squared = 0.25;  // [rad² or m²]
 constexpr std::size_t stalls_max = 64;
 constexpr double longest_turn_s = 1.6, shortest_random_share = 0.15;
-// After so many rounds in vain turns may go on for twice as long.
-constexpr int short_rounds = 2;
 constexpr std::array turn_shares{0.25, 0.5, 0.75, 1.0};
 constexpr std::array turn_angles{std::numbers::pi / 2, std::numbers::pi / 3,
                                  2.0 * std::numbers::pi / 3};
@@ -180,8 +178,7 @@ void Steering::draw_candidate() {
   const auto k = static_cast<std::size_t>(i);
   const double side = i % 2 == 0 ? 1.0 : -1.0;
   candidate_.angle = turn_angles[(r + k) % turn_angles.size()];
-  const double longest_s = longest_turn_s * (round < short_rounds ? 1.0 : 2.0);
-  candidate_.left_s = longest_s * turn_shares[(r + k / 2) % turn_shares.size()];
+  candidate_.left_s = longest_turn_s * turn_shares[(r + k / 2) % turn_shares.size()];
   if (i < tangents) {
     candidate_.direction = side * sideways_.col(i / 2);
   } else if (i < structured) {
@@ -189,7 +186,7 @@ void Steering::draw_candidate() {
     candidate_.direction[(i - tangents) / 2] = side;
   } else {
     for (auto& x : candidate_.direction) x = rng_.normal();
-    candidate_.left_s = longest_s * rng_.uniform(shortest_random_share, 1.0);
+    candidate_.left_s = longest_turn_s * rng_.uniform(shortest_random_share, 1.0);
   }
 }
 
