@@ -35,7 +35,8 @@ Steering::Steering(const planning::Host& host, const planning::Setup& setup,
       prediction_(setup, model, law, margins, surroundings_),
       turner_(setup.dof()),
       params_(params),
-      rng_(setup.seed()),
+      seed_(setup.seed()),
+      rng_(seed_),
       period_s_(setup.control_period_s()),
       cruise_speed_(law.cruise_speed),
       stalls_(stalls_max, Eigen::VectorXd::Zero(setup.dof())) {
@@ -46,6 +47,7 @@ Steering::Steering(const planning::Host& host, const planning::Setup& setup,
 }
 
 void Steering::restart() {
+  rng_ = Rng(seed_);
   phase_ = Phase::idle;
   turn_.left_s = 0.0;
   begun_s_ = -endless;

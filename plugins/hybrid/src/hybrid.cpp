@@ -172,10 +172,10 @@ class Hybrid final : public planning::Planner {
   static double influence_m(const Json& params) { return params["contact_radius_m"]; }
 
   void tick(const planning::Tick& tick, planning::Command& command) override {
+    drive_.update(tick);
     const auto& goal = tick.goal();
     if (goal_ == nullptr || goal_number_ != tick.goal_number()) set_goal(tick);
     if (measure_margins_) measure_margins();
-    drive_.update(tick);
 
     const Target target = choose_target();
     evader_.update(tick, arm(), course());

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "hamelin/core/rng.hpp"
@@ -71,6 +72,7 @@ class Steering {
   Prediction prediction_;
   Turner turner_;
   SteeringParams params_;
+  std::uint64_t seed_;
   Rng rng_;
   double period_s_, cruise_speed_;
 
